@@ -12,13 +12,12 @@ Read in this order:
 - `diff/`: the comparison of two reports;
 - `page/`: the page of a report;
 - `figures/`: figures and tables for papers, one module each;
+- `gallery/`: the pictures of README and documentation;
 - `report/`: measures what a report asks for and writes it;
 - `api/`: the functions of `import airlight` and their results;
 - `view/`: the live view in the browser;
 - `commands/`: the commands, one module each;
 - `docs/`: builds the documentation.
-
-`images/` holds pictures of the README.
 
 May import: `analytic`, `realtime`, `reference`, `validation`.
 """

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import listed
 import measured
+import shown
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 
@@ -29,6 +30,10 @@ PARTS = {
     "kernel-orders": measured.kernel_orders,
     "left-out": measured.left_out,
     "scenes": measured.scenes,
+    "strip": shown.strip,
+    "pictures": shown.pictures,
+    "gallery-scenes": shown.gallery_scenes,
+    "gallery-methods": shown.gallery_methods,
     "claims": measured.claims,
     "fastest": measured.fastest,
     "provenance": measured.provenance,

@@ -7,6 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from shown import scene_picture
+
 from reports.tables.checks import left_out_table
 from reports.tables.drawing import markdown
 from reports.tables.kernels import cost_table, order_table
@@ -51,7 +53,7 @@ def fastest() -> str:
 
 
 def method(name: str) -> str:
-    """Return a method's picture with its error, and its costs and errors in every scene."""
+    """Return a method's costs and errors in every scene."""
     rows, notes = [], []
     for scene in data()["scenes"]:
         for entry in scene["methods"]:
@@ -71,7 +73,7 @@ def method(name: str) -> str:
         *list(COLUMNS.values())[1:],
     )
     shown = Table("", columns, tuple(rows)).only("scene", "label", *_METHOD)
-    parts = [_pictures(name), markdown(shown), provenance()]
+    parts = [markdown(shown), provenance()]
     if notes:
         parts.append("What was refused or left out:\n\n" + "\n".join(notes))
     return "\n\n".join(part for part in parts if part)
@@ -80,20 +82,6 @@ def method(name: str) -> str:
 def _inside(label: str) -> str:
     """Return what stands in the brackets of a label: the kernel and the parameters."""
     return label.split(" (", 1)[1].rstrip(")") if " (" in label else "-"
-
-
-def _pictures(name: str) -> str:
-    shown = data()["pictures"].get(name)
-    if shown is None:
-        return ""
-    frame = f"The scene {shown['scene']} by {shown['label']}"
-    error = f"Its relative error, relative RMSE {number(shown['relative_rmse'], 2)}"
-    return (
-        f"```{{container}} pair\n![{frame}](data/method-{name}.png)\n![{error}](data/method-{name}-error.png)\n```\n\n"
-        f"*Left: `{shown['scene']}` by {shown['label']}. Right: its relative error, blue where it is too dark and red "
-        f"where it is too bright, white below 1e-4, full colour from 1 on; relative RMSE "
-        f"{number(shown['relative_rmse'], 2)}.*"
-    )
 
 
 def kernel_costs(phase: str) -> str:
@@ -138,9 +126,7 @@ def scenes() -> str:
 
 
 def _scene(record: Any, kept: dict[str, Any] | None) -> str:
-    words = [f"## `{record.name}`", ""]
-    if (DATA / f"scene-{record.name}.png").exists():
-        words += [f"![The scene {record.name}](data/scene-{record.name}.png)", ""]
+    words = [f"## `{record.name}`", "", scene_picture(record.name)]
     words += [record.purpose, "", f"- Published: {record.published}."]
     if kept:
         count = kept["counts"]

@@ -10,6 +10,7 @@ Read in this order:
 - `frame_view.py`: the view that a method is given.
 - `layers.py`: adaptive sampling around a method, passes over its image, and the composition.
 - `incremental.py`: the next frame of an animation, and the cache of what stood still.
+- `samples.py`: several rays of each pixel, for pictures.
 - `recorded.py`: functions that Dr.Jit records once and replays.
 
 May import: `realtime.area_lights`, `realtime.bounded_media`, `realtime.errors`, `realtime.kernels`,

@@ -17,7 +17,7 @@ error-free transformations of `realtime.numerics.error_free`. Only the *aim* nee
 scales nothing but rounding.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -58,6 +58,29 @@ def read_camera(camera: Camera) -> HostCamera:
     pairs = (camera.forward, camera.forward_low), (camera.left, camera.left_low), (camera.up, camera.up_low)
     vectors = (sum(np.array(part, dtype=np.float64).ravel() for part in pair) for pair in pairs)
     return HostCamera(camera.width, camera.height, np.array(camera.origin, dtype=np.float64).ravel(), *vectors)
+
+
+def shifted_camera(camera: Camera, right: float, down: float) -> Camera:
+    """Return a camera whose rays pass beside the centres of the pixels.
+
+    Only `forward` changes, by (W - 1)/2 - (i + right) and likewise for rows, so it is of unit length and upright on the
+    image to first order in the size of a pixel only: for pictures.
+
+    Parameters
+    ----------
+    camera
+        The camera.
+    right, down
+        How far beside [pixels].
+    """
+    host = read_camera(camera)
+    forward = host.forward - right * host.left - down * host.up
+    Vector = type(camera.forward)
+    real = np.float32 if dr.itemsize_v(camera.forward) == 4 else np.float64
+    high = forward.astype(real)
+    vectors = [Vector(*(float(c) for c in part)) for part in (high, forward - high)]
+    dr.make_opaque(*vectors)
+    return replace(camera, forward=vectors[0], forward_low=vectors[1])
 
 
 def tiled_pixels(width: int, height: int, tile: int = 4):

@@ -22,6 +22,7 @@ Read in this order:
 - `fidelity.py`: `airlight fidelity`
 - `figures.py`: `airlight figures`
 - `fit.py`: `airlight fit`
+- `gallery.py`: `airlight gallery`
 - `integrate.py`: `airlight integrate`
 - `lists.py`: `airlight list`
 - `maps.py`: `airlight maps`
@@ -38,9 +39,9 @@ Read in this order:
 
 May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.methods`,
 `realtime.methods.shadow_planes`, `realtime.parameters`, `realtime.scene`, `realtime.shadow_maps`,
-`reference.storage`, `reports.data`, `reports.diff`, `reports.docs`, `reports.figures`, `reports.interchange`,
-`reports.machine`, `reports.papers`, `reports.plotting`, `reports.report`, `reports.tables`, `reports.view`,
-`validation.certified`, `validation.comparison`, `validation.configurations`, `validation.diagnosis`,
+`reference.storage`, `reports.data`, `reports.diff`, `reports.docs`, `reports.figures`, `reports.gallery`,
+`reports.interchange`, `reports.machine`, `reports.papers`, `reports.plotting`, `reports.report`, `reports.tables`,
+`reports.view`, `validation.certified`, `validation.comparison`, `validation.configurations`, `validation.diagnosis`,
 `validation.estimates`, `validation.fidelity`, `validation.fit`, `validation.frames`, `validation.kernels`,
 `validation.metrics`, `validation.mutations`, `validation.papers`, `validation.scenes`, `validation.slab`.
 """

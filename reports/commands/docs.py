@@ -16,7 +16,7 @@ def docs(
         typer.Option(
             metavar="DIR",
             show_default=False,
-            help="First take the numbers and pictures from this report's folder; changes docs/data.",
+            help="First take the numbers from this report's folder; changes docs/data.",
         ),
     ] = None,
     kernels: Annotated[

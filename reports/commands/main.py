@@ -29,6 +29,7 @@ from reports.commands.doctor import doctor
 from reports.commands.fidelity import fidelity
 from reports.commands.figures import figures
 from reports.commands.fit import fit
+from reports.commands.gallery import gallery
 from reports.commands.help import HelpfulCommand, HelpfulGroup
 from reports.commands.integrate import integrate
 from reports.commands.lists import kernels, list_, methods, scenes
@@ -60,7 +61,7 @@ DONE, FAILED, WRONG_INPUT, MISSING, INTERRUPTED = 0, 1, 2, 3, 130
 _PANELS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start": (doctor, list_, render, view, cache),
     "Measure": (report, diff, bench, maps, stability),
-    "Images": (reference, compare, fit, merge, describe, integrate, slab),
+    "Images": (reference, compare, fit, merge, describe, integrate, slab, gallery),
     "Papers": (published, figures, fidelity),
     "Develop": (run_tests, docs, baselines, mutations, certify),
 }

@@ -46,8 +46,21 @@ def render(
         typer.Option("--output", "-o", metavar="FILE", help="Write the layers here, an .exr file.", show_default=False),
     ] = None,
     preview: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write a picture here, a .png file.", show_default=False)
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write a picture here, a .png file, through the tone curve x (1 + x/w^2) / (1 + x).",
+            show_default=False,
+        ),
     ] = None,
+    samples: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Camera rays a pixel, for pictures without stairs; a method's error is judged at pixel centres.",
+        ),
+    ] = 1,
     frames: Annotated[
         int | None,
         typer.Option(
@@ -90,6 +103,7 @@ def render(
     chosen = checked_configuration(name, single("--kernel", kernel), parse_settings(settings or []), limit=method_limit)
     outputs = {"exr": output, "png": preview}
     _check_outputs(outputs, frames, animate)
+    _check_samples(samples, outputs, frames)
     pixels = parse_size(size) if size else None
     changes = parse_changes(change or [])
     variant = activate()
@@ -97,9 +111,8 @@ def render(
     if plan:
         _print_plan(call(_plan, scene, pixels, changes, precision, chosen), json=json)
     elif frames is None:
-        _print_times(
-            call(_render, scene, pixels, changes, precision, chosen, outputs, force) | {"device": variant}, json=json
-        )
+        rendered = call(_render, scene, pixels, changes, precision, chosen, outputs, samples, force)
+        _print_times(rendered | {"device": variant}, json=json)
     else:
         rendered = call(_render_frames, scene, pixels, changes, precision, chosen, outputs, frames, animate, force)
         _print_frames(rendered | {"device": variant}, json=json)
@@ -126,6 +139,16 @@ def _check_outputs(outputs: dict[str, Path | None], frames: int | None, animate:
     for path in outputs.values():
         if path is not None:
             ensure_writable(path if frames is None else numbered(path, 1, frames))
+
+
+def _check_samples(samples: int, outputs: dict[str, Path | None], frames: int | None) -> None:
+    """Refuse several rays a pixel where nothing shows them."""
+    from analytic.errors import InputError
+
+    if samples > 1 and not any(outputs.values()):
+        raise InputError("--samples: got no place for the picture; add --preview NAME.png or --output NAME.exr")
+    if samples > 1 and frames is not None:
+        raise InputError("--samples: got --frames too, wanted one of them: animations have one ray a pixel")
 
 
 def _plan(name_or_path: str, pixels: tuple[int, int] | None, changes: dict, precision: str, chosen) -> dict[str, Any]:
@@ -203,22 +226,27 @@ def _render(
     precision: str,
     chosen,
     outputs: dict[str, Path | None],
+    samples: int,
     force: bool,
 ) -> dict[str, Any]:
     """Render a frame, write it and return what it costs."""
     import drjit as dr
 
-    from realtime.frame.renderer import render_frame
+    from realtime.frame.samples import render_samples
     from realtime.scene.read_scene import read_scene
     from reports.interchange.frames import write_frame
+    from reports.machine.progress import progress_bar
     from validation.configurations.timing import time_frame
+    from validation.frames.expected_work import TIMED
     from validation.scenes.loading import load_scene
 
     loaded = load_scene(name_or_path, pixels, changes)
     scene = read_scene(loaded.scene, precision)
-    _check_work(loaded.name, scene, chosen, force=force)
+    _check_work(loaded.name, scene, chosen, TIMED + samples if samples > 1 else None, force=force)
     renderer = _prepared(scene, chosen)
-    write_frame(loaded.name, chosen, render_frame(renderer), outputs=outputs)
+    with progress_bar(f"{loaded.name}: {samples} rays a pixel") as progress:
+        frame = render_samples(renderer, samples, lambda done: progress(done, "the picture"))
+    curve = write_frame(loaded.name, chosen, frame, outputs=outputs, samples=samples)
     times = time_frame(renderer)
     files = [str(path) for path in outputs.values() if path is not None]
     return {
@@ -236,6 +264,8 @@ def _render(
         "light_moved_camera_kept_ms": times.light_moved_camera_kept.median_ms,
         "colours_changed_ms": times.colours_changed.median_ms,
         "threads": dr.thread_count(),
+        "samples": samples,
+        "tone_curve": curve and curve.words,
         "files": files,
     }
 
@@ -290,6 +320,10 @@ def _print_times(times: dict[str, Any], *, json: bool) -> None:
     print(f"  camera rays kept: {times['light_moved_camera_kept_ms']:.3g} ms after the light moved,")
     print(f"    {times['colours_changed_ms']:.3g} ms after only medium or colours changed")
     print(f"  {times['device']}, {times['threads']} threads")
+    if times["tone_curve"]:
+        print(f"  picture: {times['tone_curve']}")
+    if times["samples"] > 1:
+        print(f"  {times['samples']} rays a pixel: for looking at; a method's error is judged at pixel centres")
     size = " x ".join(map(str, times["size"]))
     for path in times["files"]:
         what = "airlight, surface, their sum, depth" if path.lower().endswith(".exr") else "a picture"

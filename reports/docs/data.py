@@ -1,28 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the documentation takes from a report: its numbers without the long tables, and small pictures.
+"""What the documentation takes from a report: its numbers without the long tables.
 
-The documentation is built from `docs/data/report.json` and the PNG files beside it, schema "airlight-docs/1":
-`report` (when, by which command, on which machine), `claims`, `scenes` (each with `baseline`, `counts`, `truth`,
-`multiple` and `methods`), `pictures` (by method: whose frame it is), `kernels` (costs and errors of `airlight bench
---kernels`, or null).
+The documentation is built from `docs/data/report.json`, schema "airlight-docs/1": `report` (when, by which command, on
+which machine), `claims`, `scenes` (each with `baseline`, `counts`, `truth`, `multiple` and `methods`), `kernels` (costs
+and errors of `airlight bench --kernels`, or null). Pictures are those of `airlight gallery`.
 
 Stale numbers fail a test, which compares what a scene's numbers were measured with and what is measured now.
 """
 
-import io
 import json
 from pathlib import Path
 from typing import Any
 
 from analytic.errors import InputError
-from reference.storage.files import ensure_folder, write_bytes, write_text
+from reference.storage.files import ensure_folder, write_text
 from reports.data.json_files import read_json
 from reports.data.reader import read_report
 
 SCHEMA = "airlight-docs/1"
-#: The scene whose frames show a method: the first of these that the report holds, else its first scene.
-SHOWN = ("colonnade", "two-pens", "sphere-spot")
-WIDTH, LARGEST = 480, 60_000  # pixels, bytes: of a picture
 
 _ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative")
 _METHOD = ("label", "method", "kernel", "parameters", "knows_shadows", "refused", "note")
@@ -50,19 +45,14 @@ def refresh(data: Path, *, report: Path | None = None, kernels: Path | None = No
     kept: dict[str, Any] = {"schema": SCHEMA, "kernels": None}
     if path.exists():
         kept = _read_object(path, "the data of the documentation")
-    pictures: dict[str, bytes] = {}
     if report is not None:
-        content = read_report(report)
-        kept |= kept_of_report(content)
-        pictures = pictures_of(report, content, kept)
+        kept |= kept_of_report(read_report(report))
     if kernels is not None:
         costs = _read_object(kernels, "what `airlight bench --kernels --json` prints")
         kept["kernels"] = kept_of_kernels(costs, kernels)
     ensure_folder(data)
-    for name, content_of in pictures.items():
-        write_bytes(data / name, content_of)
     write_text(path, json.dumps(kept, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-    return [path, *(data / name for name in pictures)]
+    return [path]
 
 
 def _read_object(path: Path, what: str) -> dict[str, Any]:
@@ -136,52 +126,3 @@ def kept_of_kernels(costs: dict[str, Any], path: Path) -> dict[str, Any]:
         }
     except (KeyError, TypeError) as error:
         raise InputError(f"{path}: wanted what `airlight bench --kernels --json` prints, {error} is missing") from error
-
-
-def pictures_of(folder: Path, report: dict[str, Any], kept: dict[str, Any]) -> dict[str, bytes]:
-    """Return the pictures by file name, and put into `kept` which frame shows which method."""
-    scenes = {scene["name"]: scene for scene in report["scenes"] if scene["path"] is None}
-    pictures = {f"scene-{name}.png": small(folder / scene["files"]["picture"]) for name, scene in scenes.items()}
-    kept["pictures"] = {}
-    if not scenes:
-        return pictures
-    shown = next((scenes[name] for name in SHOWN if name in scenes), next(iter(scenes.values())))
-    for method in dict.fromkeys(entry["method"] for entry in shown["methods"]):
-        entry = _typical(
-            [entry for entry in shown["methods"] if entry["method"] == method and entry["files"] and entry["error"]]
-        )
-        if entry is None:
-            continue
-        error = entry["error"]["relative_rmse"]
-        kept["pictures"][method] = {"scene": shown["name"], "label": entry["label"], "relative_rmse": error}
-        for kind, suffix in (("picture", ""), ("error", "-error")):
-            pictures[f"method-{method}{suffix}.png"] = small(folder / entry["files"][kind])
-    return pictures
-
-
-def _typical(candidates: list[dict[str, Any]]) -> dict[str, Any] | None:
-    """Return the configuration that shows a method: few parameters set, little error."""
-    return min(
-        candidates, key=lambda entry: (len(entry["parameters"]), entry["error"]["relative_rmse"] or 0), default=None
-    )
-
-
-def small(path: Path) -> bytes:
-    """Return a picture as a PNG file of at most `LARGEST` bytes; raises InputError if it cannot be read."""
-    from PIL import Image, UnidentifiedImageError
-
-    try:
-        picture = Image.open(path).convert("RGB")
-    except (OSError, UnidentifiedImageError) as error:
-        raise InputError(f"{path}: no picture ({error}); wanted the folder of a whole report") from error
-    width = min(WIDTH, picture.width)
-    while True:
-        size = (width, max(1, round(picture.height * width / picture.width)))
-        scaled = picture if size == picture.size else picture.resize(size, Image.Resampling.LANCZOS)
-        buffer = io.BytesIO()
-        # No dithering: error maps are read by colour, and noise would not compress.
-        colours = scaled.quantize(128, dither=Image.Dither.NONE)
-        colours.save(buffer, format="PNG", optimize=True)
-        if buffer.tell() <= LARGEST or width < 80:
-            return buffer.getvalue()
-        width = round(0.85 * width)

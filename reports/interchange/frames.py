@@ -3,6 +3,7 @@
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -60,8 +61,6 @@ def write_frames(
     Interrupted
         At Ctrl-C, with the frames that are finished.
     """
-    from dataclasses import replace
-
     import numpy as np
 
     from realtime.frame.renderer import image_frame
@@ -71,7 +70,7 @@ def write_frames(
 
     cost: list[tuple[float, float]] = []
     kept = None
-    factor: float | None = None  # all frames share the exposure of the first, so that a lamp that fades looks it
+    curve = None  # all frames share that of the first, so that a lamp that fades looks it
     done = 0
     try:
         with hint_when_stopped(lambda: _kept(outputs, done, frames)):
@@ -82,7 +81,7 @@ def write_frames(
                 cost.append((moved, render_ms))
                 frame = image_frame(replace(renderer, scene=scene), stages)
                 numbers = {kind: path and numbered(path, number, frames) for kind, path in outputs.items()}
-                factor = write_frame(name, chosen, frame, outputs=numbers, factor=factor)
+                curve = write_frame(name, chosen, frame, outputs=numbers, curve=curve)
                 done = number
                 progress(number / frames, f"frame {number} of {frames}")
                 start = time.perf_counter()
@@ -101,10 +100,8 @@ def write_frames(
     }
 
 
-def write_frame(
-    name: str, chosen, frame, *, outputs: dict[str, Path | None], factor: float | None = None
-) -> float | None:
-    """Write a frame where it is wanted, as EXR and as PNG; return the exposure of the picture, if there is one.
+def write_frame(name: str, chosen, frame, *, outputs: dict[str, Path | None], curve=None, samples: int = 1):
+    """Write a frame where it is wanted, as EXR and as PNG; return the tone curve of the picture, if there is one.
 
     Parameters
     ----------
@@ -112,22 +109,28 @@ def write_frame(
         The name of the scene, the configuration, and the frame.
     outputs
         Paths or None, by 'exr' and 'png'.
-    factor
-        Exposure of the picture; by default one that suits it.
+    curve
+        Of the picture, a `reports.plotting.pictures.ToneCurve`; by default one that suits it.
+    samples
+        Rays of each pixel, which the header of the EXR file names where they are several.
     """
     if outputs["exr"] is not None:
         from reference.storage.exr import write_exr
         from reports.machine.environment import stamped
         from validation.estimates.images import layered_frame
 
-        write_exr(outputs["exr"], stamped(layered_frame(name, chosen, frame)))
+        image = layered_frame(name, chosen, frame)
+        if samples > 1:
+            made = {"airlight:pixel": "area", "airlight:samples": str(samples)}
+            image = replace(image, attributes=dict(image.attributes) | made)
+        write_exr(outputs["exr"], stamped(image))
     if outputs["png"] is not None:
-        from reports.plotting.pictures import exposure, tone_mapped, write_png
+        from reports.plotting.pictures import preview, tone_curve, write_png
 
         total = frame.airlight + frame.surface
-        factor = exposure(total) if factor is None else factor
-        write_png(outputs["png"], tone_mapped(total, factor))
-    return factor
+        curve = tone_curve(total) if curve is None else curve
+        write_png(outputs["png"], preview(total, curve))
+    return curve
 
 
 def _files(outputs: dict[str, Path | None], frames: int) -> Sequence[Path]:

@@ -14,6 +14,7 @@ KINDS = {
     "left-out": "Left out",
     "image": "Engine",
     "failed": "Failed",
+    "published": "Published peer",
     "refused": "Refused",
     "not-measured": "Not measured",
 }

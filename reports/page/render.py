@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from analytic.errors import InputError
-from reports.page.chart import speed_error_chart
+from reports.page.chart import scene_chart, speed_error_chart
 from reports.page.filters import FILTERS, KEYS, KINDS, MARKS, kept_words, precision_words, viewer_words
 from reports.page.image_cache import page_images
 from reports.page.image_index import SceneImages
-from reports.page.tables import TABLES
+from reports.page.tables import TABLES, trust_words
 from reports.plotting.colour_maps import signed_colours, unsigned_colours
 from reports.tables.methods import fastest_within
 
@@ -59,12 +59,19 @@ def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) 
     with_images = [scene for scene in data["scenes"] if any(entry["files"] for entry in scene["methods"])]
     images = page_images(with_images, Path(folder), limit - WORDS_LIMIT)
     number_of = {id(scene): number for number, scene in enumerate(with_images)}
+    lead = _lead(data["scenes"], [place for place, scene in enumerate(data["scenes"]) if id(scene) in number_of])
+    chart = "" if lead is None else Markup(scene_chart(data["scenes"], lead))
+    viewers = [
+        _viewer(scene, number_of[id(scene)], images[number_of[id(scene)]], chart if place == lead else "")
+        if id(scene) in number_of
+        else None
+        for place, scene in enumerate(data["scenes"])
+    ]
     page = environment.get_template("report.html.j2").render(
         report=data,
-        viewers=[
-            _viewer(scene, number_of[id(scene)], images[number_of[id(scene)]]) if id(scene) in number_of else None
-            for scene in data["scenes"]
-        ],
+        viewers=viewers,
+        lead=lead,
+        trust=trust_words(data["scenes"]),
         chart=Markup(speed_error_chart(data["scenes"])) if data["scenes"] else "",
         css=Markup((TEMPLATES / "report.css").read_text(encoding="utf-8")),
         scripts=[Markup((TEMPLATES / name).read_text(encoding="utf-8")) for name in SCRIPTS],
@@ -84,7 +91,7 @@ def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) 
     return page
 
 
-def _viewer(scene: Mapping[str, Any], number: int, images: SceneImages) -> dict[str, Any]:
+def _viewer(scene: Mapping[str, Any], number: int, images: SceneImages, chart: str) -> dict[str, Any]:
     shown = [entry for entry in scene["methods"] if entry["files"]]
     return {
         "number": number,
@@ -92,7 +99,16 @@ def _viewer(scene: Mapping[str, Any], number: int, images: SceneImages) -> dict[
         "first": _first_shown(shown),
         "size": images.index["size"],
         "words": viewer_words(images.index),
+        "chart": chart,
     }
+
+
+def _lead(scenes: Sequence[Mapping[str, Any]], shown: Sequence[int]) -> int | None:
+    """Return the place of the scene that opens the page: with the most edges between light and shadow; None for none.
+
+    Of equals the first; `shown` are the places of the scenes that have images.
+    """
+    return max(shown, key=lambda place: scenes[place]["truth"]["transitions"] or 0, default=None)
 
 
 def _first_shown(methods: Sequence[Mapping[str, Any]], target: float = 0.01) -> int:

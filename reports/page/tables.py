@@ -5,14 +5,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from reports.page.filters import words
+from reports.page.filters import MARKS, words
 from reports.papers.billeter import billeter_tables
 from reports.papers.biri import biri_notes, biri_tables
 from reports.papers.fidelity import fidelity_tables
-from reports.tables.agreement import agreement_table
+from reports.tables.agreement import agreement_table, trust_table, verdict
 from reports.tables.checks import left_out_table, mutation_table
 from reports.tables.drawing import html
 from reports.tables.methods import fastest_table, method_row, methods_table
+from reports.tables.peers import published_as
 from reports.tables.stability import summary_table
 from reports.tables.table import Column, Row, Table, table
 
@@ -31,12 +32,18 @@ _AGREEMENT = (
 def methods(scene: Data, timed: Sequence[int]) -> Table:
     """Return what the methods of a scene cost and how wrong they are."""
     shadows = scene["plan"]["shadows"].startswith("vis")
+
+    def row(entry: Data) -> Row:
+        made, peer = method_row(entry, shadows=shadows), published_as(entry)
+        return replace(made, remarks=(*made.remarks, f"published peer, {peer}")) if peer else made
+
     explanation = (
         f"Times at {words(timed)} pixels, medians, below those of a frame their quartiles; errors at "
         f"{words(scene['size'])} pixels, of the airlight against the truth, or of all light where an image has no "
-        "layers (total). A method that knows no shadows is marked; its error is then the light that shadows take away."
+        "layers (total). A method that knows no shadows is marked; its error is then the light that shadows take away. "
+        "Published peers, at the end, are papers as printed: their errors are theirs."
     )
-    rows = [method_row(entry, shadows=shadows) for entry in scene["methods"]]
+    rows = map(row, sorted(scene["methods"], key=lambda entry: bool(published_as(entry))))
     return methods_table(
         f"Times and errors of the methods in {scene['name']}", rows, *_METHODS, explanation=explanation
     )
@@ -46,9 +53,7 @@ def agreement(scene: Data) -> Table:
     """Return what estimators say of the truth of a scene."""
     explanation = (
         "Our own integrator, and Mitsuba's volpath against the same integral with the shadow ray shortened by the "
-        "measured epsilon. Agreement means that the 95 % interval of the relative bias lies inside the margin; "
-        "detectable is the least bias that is found in nine runs of ten, uncorrected the bias without the epsilon, "
-        "masked are pixels whose ray passes close to a light."
+        "measured epsilon."
     )
     title = f"Monte Carlo estimators against the quadrature in {scene['name']}"
     shown = agreement_table(title, scene["agreement"].items(), *_AGREEMENT, explanation=explanation)
@@ -78,6 +83,18 @@ def facts(title: str, entries: Data) -> Table:
     return table(title, columns, [(key.replace("_", " "), words(value)) for key, value in entries.items()])
 
 
+def trust_words(scenes: Sequence[Data]) -> dict[str, str]:
+    """Return in few words, after a mark, whether the truth is confirmed."""
+    verdicts = [verdict(entry) for scene in scenes for entry in scene["agreement"].values()]
+    if not verdicts:
+        return {"mark": MARKS[None][0], "words": "Truth not compared"}
+    against, agree = verdicts.count(False), verdicts.count(True)
+    if against:
+        return {"mark": MARKS[False][0], "words": f"Truth NOT confirmed in {against} of {len(verdicts)} comparisons"}
+    words = f"Truth confirmed in {agree} of {len(verdicts)} comparisons"
+    return {"mark": MARKS[True if agree == len(verdicts) else None][0], "words": words}
+
+
 def _drawn(function: Callable[..., Table | Iterable[Table]]) -> Callable[..., Any]:
     """Return a function that draws what another returns."""
 
@@ -95,6 +112,7 @@ TABLES: dict[str, Callable[..., Any]] = {
     "fastest_table": _drawn(fastest_table),
     "methods_table": _drawn(methods),
     "agreement_table": _drawn(agreement),
+    "trust_table": _drawn(trust_table),
     "stability_table": _drawn(summary_table),
     "left_out_table": _drawn(left_out_table),
     "mutation_table": _drawn(mutations),

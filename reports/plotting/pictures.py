@@ -1,7 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pictures of radiance and of errors, as 8-bit arrays and PNG files."""
+"""Pictures of radiance and of errors, as 8-bit arrays and PNG files.
+
+What is compared is linear up to white (`tone_mapped`): twice the radiance looks twice as bright, what is brighter than
+white is cut off. What is only looked at, previews and the gallery, goes through the curve of `preview`, which keeps the
+colours of lamps and shows the dark of a room.
+"""
 
 import io
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +40,38 @@ def tone_mapped(radiance: NDArray[np.float64], factor: float) -> Picture:
     picture = np.round(255 * np.clip(encoded, 0, 1)).astype(np.uint8)
     picture[~finite] = NOT_FINITE
     return picture
+
+
+@dataclass(frozen=True)
+class ToneCurve:
+    """x (1 + x/w^2) / (1 + x) of x, the radiance times an exposure, channel by channel: Reinhard et al. 2002, eq. 4."""
+
+    exposure: float  #: of the radiance
+    white: float  #: w, the x that becomes 1
+
+    @property
+    def words(self) -> str:
+        """The curve with its numbers."""
+        return (
+            f"tone curve x (1 + x/{self.white:.3g}^2) / (1 + x), x = {self.exposure:.3g} times the radiance, then sRGB"
+        )
+
+
+def tone_curve(radiance: NDArray[np.float64]) -> ToneCurve:
+    """Return the curve of previews that suits an image: its mean becomes 0.3, its 99.9th percentile white."""
+    finite = radiance[np.all(np.isfinite(radiance), axis=-1)]
+    mean = float(np.maximum(finite, 0).mean()) if finite.size else 0.0
+    if not mean > 0:
+        return ToneCurve(1.0, 1.0)
+    factor = 0.3 / mean
+    return ToneCurve(factor, max(1.0, factor * float(np.percentile(finite, 99.9))))
+
+
+def preview(radiance: NDArray[np.float64], curve: ToneCurve) -> Picture:
+    """Return linear RGB, (height, width, 3), through a tone curve, encoded in sRGB; what is not finite is magenta."""
+    with np.errstate(invalid="ignore"):
+        x = np.maximum(radiance * curve.exposure, 0)
+        return tone_mapped(x * (1 + x / curve.white**2) / (1 + x), 1.0)
 
 
 def error_map(reference: NDArray[np.float64], test: NDArray[np.float64]) -> Picture:

@@ -10,7 +10,8 @@ Read in this order:
 - `drawing.py`: the five ways to draw it
 - `terminal.py`: how commands print tables and JSON
 - `methods.py`: what methods cost and how wrong they are; the fastest within an error
-- `agreement.py`: the truth against Monte Carlo, and the verdict
+- `peers.py`: which configurations are a paper as published, errors included
+- `agreement.py`: the truth against Monte Carlo, the verdict, and the table of trust
 - `kernels.py`: costs, levels and orders of kernels
 - `stability.py`: where kernels and sums of shadow planes break
 - `decomposition.py`: errors by cause

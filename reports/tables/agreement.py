@@ -1,21 +1,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The truth against Monte Carlo: whether a comparison confirms it, and the table of all comparisons."""
+"""The truth against Monte Carlo: whether a comparison confirms it, all comparisons as a table, and how far to trust."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from reports.tables.table import Interval, Table, Verdict, numbers, table, words
+from reports.tables.table import Column, Interval, Row, Table, Value, Verdict, numbers, table, words
 
+_UNCORRECTED = "the bias without the shadow-ray epsilon"
+_DETECTABLE = "the least bias that is found in nine runs of ten"
 _PERCENT = {"percent": True, "sign": True, "places": 3}
 COLUMNS = (
     *words(name="the truth of", estimator="checked by"),
     *numbers("samples", how={"after": " M", "places": 0, "minor": True}),
-    *numbers(relative_bias="bias", interval="95 % interval", how=_PERCENT),
-    *numbers(uncorrected_bias="uncorrected", how={**_PERCENT, "minor": True}),
-    *numbers("margin", how={"percent": True}),
-    *numbers(detectable_bias="detectable", how={"percent": True, "digits": 2, "minor": True}),
-    *numbers("rejected", "masked", epsilon="shadow-ray epsilon", z_mean="z: mean", z_std="z: st. deviation"),
-    *numbers(expected_rejections="expected", how={"digits": 2}),
+    *numbers(relative_bias="bias", how={**_PERCENT, "meaning": "mean of the estimator less the truth, over the truth"}),
+    *numbers(interval="95 % interval", how={**_PERCENT, "meaning": "where 19 of 20 such runs find the bias"}),
+    *numbers(uncorrected_bias="uncorrected", how={**_PERCENT, "minor": True, "meaning": _UNCORRECTED}),
+    *numbers("margin", how={"percent": True, "meaning": "agreement: the whole interval lies inside it, either way"}),
+    *numbers(detectable_bias="detectable", how={"percent": True, "digits": 2, "minor": True, "meaning": _DETECTABLE}),
+    *numbers("rejected", how={"meaning": "pixels that differ by more than their noise explains"}),
+    *numbers("masked", how={"meaning": "pixels left out: their ray passes close to a light"}),
+    *numbers(epsilon="shadow-ray epsilon", how={"meaning": "by what share Mitsuba's shadow rays end before the light"}),
+    *numbers(z_mean="z: mean", how={"meaning": "errors of pixels in units of their noise: 0 if there is no bias"}),
+    *numbers(z_std="z: st. deviation", how={"meaning": "1 if the noise is as large as was estimated"}),
+    *numbers(expected_rejections="expected", how={"digits": 2, "meaning": "how many would be rejected by chance"}),
     *words("effort"),
     *numbers(agrees="agree"),
 )
@@ -39,6 +46,65 @@ def verdict(compared: Mapping[str, Any]) -> bool | None:
         return False
     low, high = interval
     return None if low <= statistics["margin"] and high >= -statistics["margin"] else False
+
+
+def worst_interval(compared: Iterable[Mapping[str, Any]]) -> tuple[Mapping[str, Any], float]:
+    """Return the comparison whose 95 % interval of the relative bias reaches the furthest from 0, and how far.
+
+    One whose interval is not known reaches furthest of all.
+    """
+
+    def reach(comparison: Mapping[str, Any]) -> float:
+        low, high = comparison["statistics"]["relative_bias_ci"] or (None, None)
+        return float("inf") if low is None or high is None else max(abs(low), abs(high))
+
+    worst = max(compared, key=reach)
+    return worst, reach(worst)
+
+
+def trust_table(scenes: Sequence[Mapping[str, Any]]) -> Table:
+    """Return how far the truth of each scene can be trusted: its own bound, its checks, the estimators' intervals.
+
+    Parameters
+    ----------
+    scenes
+        Of report.json. An estimator has the worst of its intervals over the layers of a scene.
+    """
+    estimators = list(dict.fromkeys(entry["estimator"] for scene in scenes for entry in scene["agreement"].values()))
+    columns = (
+        *words("scene"),
+        *numbers(bound="bound of its error", how={"share": True, "digits": 2}),
+        *numbers(left="shadow rays not settled", how={"alarm": True}),
+        *(Column(name, f"95 % interval by {name}", percent=True, sign=True, digits=2) for name in estimators),
+        *(Column(f"{name} agrees", "inside its margin") for name in estimators),
+    )
+    order = ["scene", "bound", "left", *(key for name in estimators for key in (name, f"{name} agrees"))]
+    return table(
+        "The truth of each scene",
+        columns,
+        (_trust(scene, estimators) for scene in scenes),
+        explanation=(
+            "The truth is a quadrature in double precision, with a bound of its own error as a share of the mean "
+            "airlight. Two Monte Carlo estimators, which share no derivation with it, check it: the 95 % interval of "
+            "their relative bias must lie inside a margin. Of several layers the worst interval is shown; each scene "
+            "below has them all."
+        ),
+    ).only(*order)
+
+
+def _trust(scene: Mapping[str, Any], estimators: Iterable[str]) -> Row:
+    values: dict[str, Value] = {"scene": scene["name"], "bound": scene["truth"]["relative_bound"]}
+    values["left"] = scene["truth"]["left"]
+    for name in estimators:
+        compared = [entry for entry in scene["agreement"].values() if entry["estimator"] == name]
+        if not compared:
+            continue
+        verdicts = [verdict(entry) for entry in compared]
+        good = False if False in verdicts else None if None in verdicts else True
+        worst = worst_interval(compared)[0]["statistics"]
+        values[name] = Interval.of(worst["relative_bias_ci"])
+        values[f"{name} agrees"] = Verdict(good, f"±{100 * worst['margin']:g} %")
+    return Row(values)
 
 
 def agreement_table(

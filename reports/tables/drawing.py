@@ -183,7 +183,16 @@ def html(table: Table) -> str:
         cells += [f'<td class="words" colspan="{left}">{_in_html(row.reason)}</td>'] if left else []
         marked = ' class="published"' if row.published else ""
         lines.append(f"<tr{marked}>{''.join(cells)}</tr>")
-    return "\n".join([*lines, "</tbody></table></div>"]) + "\n"
+    return "\n".join([*lines, "</tbody></table></div>", *_meanings(table.columns)]) + "\n"
+
+
+def _meanings(columns: Sequence[Column]) -> list[str]:
+    """Return what the columns mean, to be unfolded below a table."""
+    explained = [column for column in columns if column.meaning]
+    if not explained:
+        return []
+    terms = "".join(f"<dt>{_in_html(column.title)}</dt><dd>{_in_html(column.meaning)}</dd>" for column in explained)
+    return [f'<details class="terms"><summary>What the columns mean</summary><dl>{terms}</dl></details>']
 
 
 def latex(tables: Sequence[Table], *, comment: Sequence[str] = ()) -> str:

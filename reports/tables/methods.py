@@ -2,6 +2,7 @@
 """What methods cost and how wrong they are: the table of `airlight bench`, the page, the documentation and papers."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from reports.tables.table import (
@@ -25,9 +26,25 @@ Entry = Mapping[str, Any]  #: of a method in a scene, as in report.json
 TIMES = ("frame", "airlight", "surface", "light_moved", "objects_moved", "light_moved_camera_kept", "colours_changed")
 ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite")
 
+_RELATIVE = "{} of the pixels err by less: |error| over the truth, or over a thousandth of its mean where that is more"
+_MEANINGS = {
+    "frame": "a whole frame while nothing moves: median and quartiles",
+    "airlight": "the airlight alone, with the lists of tiles",
+    "surface": "camera rays and the lit surface",
+    "light_moved": "a frame after the light moved, with shadow maps or planes anew",
+    "objects_moved": "a frame after objects moved too",
+    "relative_rmse": "root of the mean squared error over the mean of the truth: errors of bright pixels weigh most",
+    "relative_bias": "mean error over the mean of the truth: below 0 the image as a whole is too dark",
+    "p50": _RELATIVE.format("half"),
+    "p99": _RELATIVE.format("99 of 100"),
+    "max": _RELATIVE.format("all"),
+    "flip": "the difference that an observer sees, over a range of exposures: 0 is none, 1 the largest",
+    "nonfinite": "pixels that are no number, which errors leave out",
+}
+
 _MS, _RATE, _SHARE, _MINOR = {"unit": "ms"}, {"whole": True}, {"digits": 2, "share": True}, {"minor": True}
 COLUMNS = {
-    column.key: column
+    column.key: replace(column, meaning=_MEANINGS.get(column.key, ""))
     for column in (
         *words(label="method"),
         *numbers("frame", how={**_MS, "spread": "quartiles"}),

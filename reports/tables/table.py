@@ -71,6 +71,7 @@ class Column:
     after: str = ""  #: behind every number, such as a multiplication sign
     spread: str = ""  #: heading of the quartiles of `Measured`, in a column of their own where cells have no room
     alarm: bool = False  #: anything but zero is bad
+    meaning: str = ""  #: what its values are, in words; HTML explains it below the table
     minor: bool = False  #: left out first where a terminal is narrow
 
     @property

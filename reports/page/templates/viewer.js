@@ -63,6 +63,10 @@ class Viewer {
       const button = target.closest("button");
       if (button) this.set({method: Number(button.dataset.method)});
     });
+    this.find(".speed")?.addEventListener("click", ({target}) => {
+      const point = target.closest("g[id^='point-']");
+      if (point) this.set({method: Number(point.id.slice("point-".length))});
+    });
     for (const canvas of Object.values(this.canvases)) {
       canvas.addEventListener("pointermove", (event) => this.state.pinned || this.probe(this.pixelAt(event), false));
       canvas.addEventListener("pointerdown", (event) => this.pin(this.pixelAt(event)));
@@ -185,12 +189,22 @@ class Viewer {
     const missing = this.mode === state.mode ? "" : " (no HDR-FLIP here)";
     this.find(".reference figcaption").textContent = `Reference (quadrature), ${layer}${holes(bad.reference)}`;
     this.find(".method figcaption").textContent = `${label}, ${layer}${other}${holes(bad.method)}`;
-    this.find(".error .what").textContent = `Error of ${label}: ${map}${missing}${holes(bad.error)}`;
+    const white = this.allWhite() ? `; all white: below ${percentWords(state.floor)} in every pixel` : "";
+    this.find(".error .what").textContent = `Error of ${label}: ${map}${missing}${white}${holes(bad.error)}`;
     const probe = "Arrow keys move the probe.";
     this.canvases.reference.setAttribute("aria-label", `${index.name}: reference, ${layer}. ${probe}`);
     this.canvases.method.setAttribute("aria-label", `${index.name}: ${label}, ${layer}. ${probe}`);
     this.canvases.error.setAttribute("aria-label", `${index.name}: error map of ${label}, ${map}. ${probe}`);
     this.showScale();
+  }
+
+  // Whether the map of signed errors shows none: an empty picture should say that it is meant.
+  allWhite() {
+    const {images, state, layer} = this;
+    if (this.mode !== "signed") return false;
+    for (let i = 0; i < images.width * images.height; i++)
+      if (!(Math.abs(images.worst(state.method, layer, i)) < state.floor)) return false;
+    return true;
   }
 
   showScale() {
@@ -240,6 +254,8 @@ class Viewer {
       this.find(`.${name}`).classList.toggle("shown", name === state.shown);
     for (const button of this.element.querySelectorAll(".strip button"))
       button.setAttribute("aria-pressed", String(Number(button.dataset.method) === state.method));
+    for (const point of this.element.querySelectorAll(".speed g[id^='point-']"))
+      point.classList.toggle("chosen", point.id === `point-${state.method}`);
   }
 
   // --- the probe ---

@@ -43,6 +43,19 @@ def test_first_frame_is_the_scene_as_it_stands(variant, tmp_path):
     np.testing.assert_array_equal(single["airlight"], first["airlight"])
 
 
+def test_several_rays_a_pixel_are_a_picture_and_the_output_says_so(variant, tmp_path, capfd):
+    exr, png = tmp_path / "a.exr", tmp_path / "a.png"
+    run("sphere-spot", *SMALL, "--method", "shadow-planes", "--samples", "4", "-o", str(exr), "--preview", str(png))
+    printed = capfd.readouterr().out
+    assert "4 rays a pixel: for looking at; a method's error is judged at pixel centres" in printed
+    assert "picture: tone curve x (1 + x/" in printed
+    made = read_exr(exr).attributes
+    assert (made["airlight:pixel"], made["airlight:samples"]) == ("area", "4")
+    run("sphere-spot", *SMALL, "--method", "shadow-planes", "-o", str(exr))
+    assert "airlight:samples" not in read_exr(exr).attributes
+    assert "rays a pixel" not in capfd.readouterr().out
+
+
 def test_ctrl_c_keeps_the_finished_frames_and_says_so(variant, tmp_path, capfd, monkeypatch):
     import reports.interchange.frames
 
@@ -64,6 +77,8 @@ def test_ctrl_c_keeps_the_finished_frames_and_says_so(variant, tmp_path, capfd, 
     ("arguments", "message"),
     [
         (["--frames", "3"], "--frames: got no place for the files"),
+        (["--samples", "3"], "--samples: got no place for the picture"),
+        (["--samples", "3", "--frames", "3", "-o", "x.exr"], "--samples: got --frames too"),
         (["--animate", "light"], "--animate: got no number of frames"),
         (
             ["--method", "unshadowed", "--method", "ray-march"],

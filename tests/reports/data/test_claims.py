@@ -51,7 +51,7 @@ def test_claims_on_a_truth_that_is_confirmed():
     assert [claim["kind"] for claim in claims(scenes())] == ["truth", "left-out"]
     assert "confirmed by Mitsuba's volpath in 3 of 3 comparisons" in trust
     assert "±0.5 %" in trust
-    assert "at worst 0.42 %" in trust
+    assert trust.endswith("the worst is +0..+0.1 %, in fog (airlight).")
     assert "NOT" not in trust
     assert left_out.endswith("The share of the airlight that this leaves out: fog 12 %; hall 12 %.")
 
@@ -115,7 +115,7 @@ def test_out_of_time_is_neither_confirmed_nor_against_the_truth():
     assert first["good"] is None
     assert "confirmed by Mitsuba's volpath in 2 of 3 comparisons" in first["text"]
     assert "not decided within the time in hall (airlight)" in first["text"]
-    assert "at worst 0.31 %" in first["text"]  # of those that were decided
+    assert "the worst is +0..+0.1 %, in fog (airlight)" in first["text"]  # of those that were decided
     # No other estimator says anything about the airlight of the hall.
     assert not confirmed(data)
     data[1]["agreement"]["single-scatter airlight"] = agreed(True, 1e-5, estimator="single-scatter")
@@ -147,6 +147,23 @@ def test_what_failed_is_named_with_its_pixels():
     assert failed[0]["text"] == "Images with values that are not finite: fast in fog (3 pixels)."
     assert failed[1]["text"] == "Images with negative values: fast in fog (2 pixels)."
     assert "hall (7)" in failed[2]["text"]
+
+
+def test_the_worst_interval_is_the_one_that_reaches_furthest():
+    data = scenes()
+    data[1]["agreement"]["surface"]["statistics"]["relative_bias_ci"] = [-0.0043, 0.0021]
+    assert "lies within ±0.5 %; the worst is -0.43..+0.21 %, in hall (surface)." in texts(data)[0]
+
+
+def test_what_is_wrong_as_published_is_no_failure():
+    data = scenes()
+    peer = method("shadow-planes (exact, order=none)", 0.1, 1.0) | {"parameters": {"order": "none"}}
+    peer["error"] |= {"negative": 5}
+    data[0]["methods"].append(peer)
+    assert [claim["good"] for claim in claims(data) if claim["kind"] == "published"] == [None]
+    assert "failed" not in [claim["kind"] for claim in claims(data)]
+    peer["parameters"] = {}
+    assert "failed" in [claim["kind"] for claim in claims(data)]
 
 
 def test_images_of_an_engine_are_judged():

@@ -189,6 +189,34 @@ def test_formulas_are_mathml_and_slips_are_named(extension):
             markup(slip, block=False)
 
 
+def test_no_page_sets_a_formula_in_typewriter_letters():
+    """Text that is set in by four outside a list is a literal block, which only formulas were."""
+    for path in sorted(DOCS.glob("*.md")):
+        text = re.sub(r"^( *)```.*?^\1```", "", path.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+        assert not re.findall(r"(?<=\n\n)    \S.*", text), path.name
+
+
+def test_every_scene_and_method_has_its_picture_and_command(extension):
+    from realtime.methods.registry import METHODS
+    from validation.scenes.registry import SCENES
+
+    fill = extension("generated").fill
+    scenes, methods = fill("<!-- generated: gallery-scenes -->"), fill("<!-- generated: gallery-methods -->")
+    for name in SCENES:
+        assert f"](gallery/scene-{name}.jpg)" in scenes, name
+        assert f"`airlight render {name} --method " in scenes, name
+        assert f"](gallery/scene-{name}.jpg)" in fill("<!-- generated: scenes -->"), name
+    for name in METHODS:
+        assert f"](gallery/method-{name}.jpg)" in methods, name
+        first = page(name).index(f"<!-- generated: pictures {name} -->")
+        assert first < page(name).index("\n## "), name
+        assert f"relative RMSE {extension('shown').number(_error(extension, name), 2)}" in fill(page(name)), name
+
+
+def _error(extension, name):
+    return extension("shown").kept()[f"method-{name}-error"]["relative_rmse"]
+
+
 def test_docstrings_are_shown_as_they_stand(extension):
     plain = extension("plain_docstrings")
     assert plain.escaped("|x| is a*b, see *Title* and x_n_") == r"\|x| is a\*b, see *Title* and x_n\_"

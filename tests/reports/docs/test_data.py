@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The documentation's numbers and pictures come from a report, whole or not at all."""
+"""The documentation's numbers come from a report, whole or not at all."""
 
-import io
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
-from PIL import Image
 
 from analytic.errors import InputError
-from reports.docs.data import LARGEST, WIDTH, refresh, small
+from reports.docs.data import refresh
 from tests.helpers.reports import checked, entry, refused, report_of, scene, timing
 from validation.configurations.methods import STANDARD
 from validation.frames import baseline_files
@@ -60,17 +57,10 @@ def report(**changes):
     return checked(report_of([fog, {**fog, "name": "own", "path": "own.xml"}], claims=claims)) | changes
 
 
-def noise(height, width):
-    """The hardest there is to compress."""
-    return np.random.default_rng(7).integers(0, 256, (height, width, 3), dtype=np.uint8)
-
-
 @pytest.fixture
 def folder(tmp_path):
     target = tmp_path / "results"
-    (target / "open-fog").mkdir(parents=True)
-    for name in ("a", "b"):
-        Image.fromarray(noise(6, 8)).save(target / f"open-fog/{name}.png")
+    target.mkdir()
     (target / "report.json").write_text(json.dumps(report()))
     return target
 
@@ -88,9 +78,6 @@ def test_a_report_is_kept_without_what_is_not_shown(variant, folder, tmp_path):
     assert scene["baseline"] == 7
     assert scene["methods"][2]["refused"] == "not in this fog"
     assert set(scene["methods"][0]["times"]) == {"frame", "airlight", "light_moved"}
-    assert kept["pictures"]["unshadowed"]["label"] == "unshadowed (exact)"  # the one that shows the method best
-    assert "min-max" not in kept["pictures"]
-    assert (data / "method-unshadowed-error.png").exists()
 
 
 def test_costs_of_kernels_come_and_stay(variant, folder, tmp_path):
@@ -133,13 +120,6 @@ def test_what_is_no_report_is_refused(content, words, folder, tmp_path):
     assert not (tmp_path / "data").exists()
 
 
-def test_nothing_is_written_where_a_picture_is_missing(variant, folder, tmp_path):
-    (folder / "open-fog/b.png").unlink()
-    with pytest.raises(InputError, match=r"b\.png: no picture"):
-        refresh(tmp_path / "data", report=folder)
-    assert not (tmp_path / "data").exists()
-
-
 @pytest.fixture(scope="module")
 def committed():
     return json.loads((ROOT / "docs/data/report.json").read_text(encoding="utf-8"))
@@ -174,13 +154,3 @@ def test_stale_numbers_are_told(monkeypatch):
     assert told(methods=methods[:1]) == [f"windows: {label} is not what it was"]
     assert told(methods=[*methods, {"label": "new", "refused": None}]) == ["windows: new is gone"]
     assert told(name="nowhere") == ["nowhere: there is no such scene any more"]
-
-
-def test_pictures_are_small(tmp_path):
-    large, little = tmp_path / "large.png", tmp_path / "little.png"
-    Image.fromarray(noise(300, 500)).save(large)
-    Image.fromarray(noise(6, 8)).save(little)
-    reduced = small(large)
-    assert len(reduced) <= LARGEST
-    assert Image.open(io.BytesIO(reduced)).width < WIDTH
-    assert Image.open(io.BytesIO(small(little))).size == (8, 6)

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import json
+import re
 
 import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from reports.page.chart import speed_error_chart
+from reports.page.chart import scene_chart, speed_error_chart
 from reports.page.filters import DASH, kept_words, number, percent, words
 from reports.page.render import SCRIPTS, render_page
 from reports.plotting.pictures import png_bytes
@@ -31,8 +32,9 @@ def data():
 
 @pytest.fixture(autouse=True)
 def _no_chart(monkeypatch):
-    """Draw the chart for the page of the module alone: it takes longer than everything else."""
+    """Draw the charts for the page of the module alone: they take longer than everything else."""
     monkeypatch.setattr("reports.page.render.speed_error_chart", lambda scenes: "<svg></svg>")
+    monkeypatch.setattr("reports.page.render.scene_chart", lambda scenes, place: "<svg></svg>")
 
 
 @pytest.fixture(scope="module")
@@ -94,8 +96,8 @@ def test_images_are_data_and_every_canvas_has_words(page):
 
 
 def test_tables_have_headers_and_captions(page):
-    # Probe, methods, agreement, multiple scattering, environment, times of parts, settings, keys.
-    assert len(page.tables) == 9
+    # Probe, trust, fastest, methods, agreement, multiple scattering, environment, times of parts, settings, keys.
+    assert len(page.tables) == 10
     for table in page.tables:
         assert any(tag == "caption" for tag, _ in table)
         headers = [attributes for tag, attributes in table if tag == "th"]
@@ -178,7 +180,7 @@ def test_missing_values_are_dashes(data, folder):
 def test_scene_without_agreement_and_published_figure(data, folder):
     data["scenes"][0] |= {"agreement": {}, "published": ""}
     page = render(data, folder)
-    assert len(page.tables) == 8
+    assert len(page.tables) == 9
     assert "Answers to" not in page.text
 
 
@@ -197,8 +199,10 @@ def test_failures_are_marked_and_not_by_colour_alone(data, folder):
     data["claims"] = [{"kind": "truth", "text": "The truth is NOT confirmed.", "good": False}]
     page = render(data, folder)
     marked = [tag for tag, attributes in page.tags if "bad" in (attributes.get("class") or "").split()]
-    assert sorted(marked) == ["li", "p", "td", "td"]  # claim, words for who has no scripts, agreement, not finite
+    # Claim, words for who has no scripts; trust, a shadow ray that is not settled, agreement, not finite.
+    assert sorted(marked) == ["li", "p", "td", "td", "td", "td"]
     assert "NO" in page.text
+    assert "Truth NOT confirmed in 1 of 2 comparisons" in page.text
     assert "does not hold: The truth is NOT confirmed." in page.text
 
 
@@ -236,6 +240,35 @@ def test_viewer_begins_with_the_fastest_within_one_per_cent(data, folder):
     assert first() == "0"
     good["error"]["relative_rmse"], flat["error"] = 0.5, flat["error"] | {"relative_rmse": 0.4, "nonfinite": 0}
     assert first() == "1"
+
+
+def test_the_scene_with_the_most_edges_of_shadow_leads(data, folder):
+    plain = report_data()["scenes"][0] | {"name": "plain"}
+    plain["truth"] = plain["truth"] | {"transitions": 3}
+    text = render(data | {"scenes": [plain, data["scenes"][0]]}, folder).text
+    assert "hall: the truth, a method and its error" in text
+    assert text.index("hall: the truth") < text.index("Can the truth be trusted?") < text.index("The fastest method")
+
+
+def test_charts_of_one_page_share_no_names(data):
+    lead, every = scene_chart(data["scenes"], 0), speed_error_chart(data["scenes"])
+    names = [re.findall(r'id="([^"]+)"', chart) for chart in (lead, every)]
+    assert len(set(names[0] + names[1])) == len(names[0]) + len(names[1])
+    assert {"point-0", "point-1"} <= set(names[0])
+    assert "<title>good (k): 3.21 ms, relative RMSE 0.012</title>" in lead
+
+
+def test_what_is_wrong_as_published_is_a_peer_and_stands_last(data, folder):
+    data["scenes"][0]["methods"].insert(0, method("shadow-planes (exact, order=none)", parameters={"order": "none"}))
+    page = render(data, folder)
+    rows = page.source[page.source.index("<caption>Times and errors") :]
+    assert rows.index('<th scope="row" style="text-align:left">flat') < rows.index("order=none")
+    assert "published peer, Biri 2006 without its stencil" in page.text
+
+
+def test_columns_are_explained_below_their_table(page):
+    assert page.text.count("What the columns mean") == 2  # methods, agreement
+    assert "root of the mean squared error over the mean of the truth" in page.text
 
 
 def test_entry_that_is_missing_is_an_error_rather_than_a_blank(data, folder):

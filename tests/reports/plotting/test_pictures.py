@@ -11,6 +11,8 @@ from reports.plotting.pictures import (
     error_scale,
     exposure,
     png_bytes,
+    preview,
+    tone_curve,
     tone_mapped,
     write_png,
 )
@@ -134,3 +136,27 @@ def test_png_brings_the_same_pixels_back(tmp_path):
         np.testing.assert_array_equal(np.asarray(image), picture)
     with Image.open(io.BytesIO(png_bytes(picture))) as image:
         np.testing.assert_array_equal(np.asarray(image), picture)
+
+
+@pytest.mark.claim("previews-tone-curve")
+def test_previews_follow_the_stated_curve():
+    """Reinhard et al. 2002, eq. 4, by hand for a grey pixel; the mean becomes 0.3, and nothing above white is cut."""
+    rng = np.random.default_rng(5)
+    radiance = rng.exponential(3.0, (40, 50, 1)) * np.ones(3)
+    curve = tone_curve(radiance)
+    assert curve.exposure * radiance.mean() == pytest.approx(0.3)
+    assert curve.white == pytest.approx(curve.exposure * np.percentile(radiance, 99.9))
+    x = curve.exposure * radiance[7, 9, 0]
+    linear = x * (1 + x / curve.white**2) / (1 + x)
+    encoded = 1.055 * linear ** (1 / 2.4) - 0.055
+    assert preview(radiance, curve)[7, 9, 0] == pytest.approx(255 * encoded, abs=0.6)
+    white = np.full((1, 1, 3), curve.white / curve.exposure)
+    assert preview(white, curve)[0, 0].tolist() == [255, 255, 255]
+    assert f"{curve.exposure:.3g} times the radiance" in curve.words
+
+
+def test_previews_of_nothing_and_of_what_is_not_finite():
+    black = np.zeros((2, 2, 3))
+    assert preview(black, tone_curve(black)).max() == 0
+    black[0, 1, 2] = np.nan
+    assert tuple(preview(black, tone_curve(black))[0, 1]) == MAGENTA

@@ -18,11 +18,18 @@ def test_pictures_are_those_of_the_files(page, folder):
 
 
 def test_the_page_opens_with_pictures(page):
-    """Truth, method, error and the strip of all errors lie in a window of 1300 x 1000."""
+    """Truth, method, error, the strip of all errors and the chart lie in a window of 1300 x 1000."""
     assert page.viewport_size == {"width": 1300, "height": 1000}
-    for shown in (".reference canvas", ".method canvas", ".error canvas", ".strip"):
+    for shown in (".reference canvas", ".method canvas", ".error canvas", ".strip", ".speed .chart"):
         box = viewer(page).locator(shown).first.bounding_box()
         assert box["y"] + box["height"] <= 1000, shown
+
+
+def test_a_point_of_the_chart_shows_its_image(page):
+    assert drawn(page) == "0 airlight signed 0"
+    page.locator("#point-1 use").first.click()
+    assert drawn(page) == "1 airlight signed 0"
+    assert page.locator("#point-1").get_attribute("class") == "chosen"
 
 
 def test_error_map_is_that_of_the_pictures(page, folder):
@@ -36,6 +43,17 @@ def test_error_map_is_that_of_the_pictures(page, folder):
     assert np.abs(got - wanted)[~hole].max() <= 6
     assert tuple(got[5, 7]) in {(255, 0, 255), (122, 0, 122)}
     assert "1 pixel not finite" in viewer(page).locator(".error .what").inner_text()
+
+
+def test_an_error_map_without_colour_says_that_it_is_meant(page):
+    """`good` is wrong by 3e-6: below 1e-4 everywhere, and not below 1e-6."""
+    words = viewer(page).locator(".error .what")
+    assert "all white: below 0.01 % in every pixel" in words.inner_text()
+    page.keyboard.press("r")
+    page.keyboard.press("r")
+    assert "all white" not in words.inner_text()
+    page.keyboard.press("2")
+    assert "all white" not in words.inner_text()
 
 
 def test_kinds_of_error_maps_follow_one_another(page, folder):

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Parts of pages that show pictures of the gallery, `docs/gallery/`, each with the command that makes it."""
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from reports.tables.table import number
+
+FOLDER = Path(__file__).resolve().parents[1] / "gallery"
+_METHODS = ("sketch", "method", "error")  # in the order of a page
+
+
+@cache
+def kept() -> dict[str, Any]:
+    """Return what is known of each picture, by name."""
+    return json.loads((FOLDER / "gallery.json").read_text(encoding="utf-8"))["pictures"]
+
+
+def strip() -> str:
+    """Return the four scenes at the top of the first page."""
+    return f"![Four scenes lit through fog: hall, clutter, three-media, windows](gallery/{kept()['strip']['file']})"
+
+
+def pictures(method: str) -> str:
+    """Return what a method renders, its error and how it works, side by side, with captions."""
+    shown = {kind: _of_method(method, kind) for kind in _METHODS}
+    present = {kind: entry for kind, entry in shown.items() if entry}
+    if not present:
+        return ""
+    words = {
+        "method": f"The scene {present['method']['scene']} by {method}",
+        "error": f"The relative error of {method}",
+        "sketch": f"How {method} works, seen from the side",
+    }
+    images = "\n".join(f"![{words[kind]}](gallery/{entry['file']})" for kind, entry in present.items())
+    return f"```{{container}} {'triple' if len(present) == 3 else 'pair'}\n{images}\n```\n\n*{_caption(present)}*"
+
+
+def _of_method(method: str, kind: str) -> dict[str, Any] | None:
+    name = f"method-{method}" if kind == "method" else f"method-{method}-{kind}"
+    return kept().get(name)
+
+
+def _caption(present: dict[str, dict[str, Any]]) -> str:
+    rendered, error = present["method"], present["error"]
+    text = (
+        f"what it renders, `{rendered['command']}`, and its error: blue where it is too dark, red where it is too "
+        f"bright, white below 1e-4 of the truth, full colour from 1 on; relative RMSE "
+        f"{number(error['relative_rmse'], 2)}."
+    )
+    if "sketch" not in present:
+        return text[0].upper() + text[1:]
+    how = "How it works, in `sphere-spot` seen from the side: some rays of the camera, what is lit in yellow."
+    return f"{how} Beside it {text}"
+
+
+def gallery_scenes() -> str:
+    """Return all scenes, each with its command."""
+    from validation.scenes.registry import SCENES
+
+    cards = []
+    for name, record in SCENES.items():
+        entry = kept().get(f"scene-{name}")
+        if entry:
+            link = f"[**{name}**](scenes.md#{name}): {record.purpose}"
+            cards.append(_card(entry, f"The scene {name}", link))
+    return "\n".join(cards)
+
+
+def gallery_methods() -> str:
+    """Return what each method renders, its error and how it works, each with its command."""
+    from realtime.methods.registry import METHODS
+
+    parts = []
+    for name, method in METHODS.items():
+        cards = [
+            _card(entry, f"{name}: {what}", what)
+            for kind, what in (("sketch", "how it works"), ("method", "what it renders"), ("error", "its error"))
+            if (entry := _of_method(name, kind))
+        ]
+        if cards:
+            parts += [f"### [{name}]({name}.md)", "", f"{method.summary[0].upper()}{method.summary[1:]}.", "", *cards]
+    return "\n".join(parts)
+
+
+def scene_picture(name: str) -> str:
+    """Return the picture of a scene with its command; nothing where it has none."""
+    entry = kept().get(f"scene-{name}")
+    return "" if entry is None else f"![The scene {name}](gallery/{entry['file']})\n\n```sh\n{entry['command']}\n```\n"
+
+
+def _card(entry: dict[str, Any], alt: str, words: str) -> str:
+    return f"```{{container}} card\n![{alt}](gallery/{entry['file']})\n\n{words}\n\n`{entry['command']}`\n```\n"

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Anti-aliased pictures: the mean of several frames whose camera rays pass through other points of the pixels.
+
+The n-th of N rays of a pixel passes through the point ((n + 1/2)/N, phi(n)) of Hammersley's set, phi the binary digits
+of n mirrored at the point (Hammersley 1960), moved so that the middle of all is the centre of the pixel. The set fills
+the pixel evenly, and the mean weighs it alike everywhere, a box filter. One sample is the centre itself. All pixels
+share the points, so that a frame costs what it always does.
+
+This is for pictures. The truth that methods are judged by is that of pixel centres.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from realtime.errors import InputError
+from realtime.frame.renderer import Frame, FrameRenderer, render_frame
+from realtime.scene.camera import shifted_camera
+
+
+def pixel_offsets(samples: int) -> Iterator[tuple[float, float]]:
+    """Yield where rays pass a pixel, to the right of and below its centre [pixels].
+
+    Both are between -1/2 and 1/2, and 0 in the mean.
+
+    Raises
+    ------
+    InputError
+        For no sample at all.
+    """
+    if samples < 1:
+        raise InputError(f"samples: got {samples}, wanted 1 or more")
+    down = [_radical_inverse(number) for number in range(samples)]
+    middle = sum(down) / samples
+    for number in range(samples):
+        yield (number + 0.5) / samples - 0.5, down[number] - middle
+
+
+def render_samples(renderer: FrameRenderer, samples: int, progress: Callable[[float], None] | None = None) -> Frame:
+    """Render the mean over some rays of each pixel.
+
+    Parameters
+    ----------
+    renderer
+        From `realtime.frame.renderer.frame_renderer`. What a method makes of the scene is made anew for each ray.
+    samples
+        Rays of each pixel; 1 is `render_frame`.
+    progress
+        Called with the share done.
+
+    Returns
+    -------
+    Frame
+        Mean radiances; the distance is that of the first ray.
+    """
+    camera, frame = renderer.scene.camera, None
+    for number, (right, down) in enumerate(pixel_offsets(samples), 1):
+        beside = shifted_camera(camera, right, down) if right or down else camera
+        last = render_frame(replace(renderer, scene=replace(renderer.scene, camera=beside)))
+        airlight, surface = (np.asarray(layer, dtype=np.float64) / samples for layer in (last.airlight, last.surface))
+        if samples == 1:
+            return last
+        frame = Frame(airlight, surface, last.distance) if frame is None else _sum(frame, airlight, surface)
+        if progress is not None:
+            progress(number / samples)
+    assert frame is not None
+    return frame
+
+
+def _sum(frame: Frame, airlight, surface) -> Frame:
+    return replace(frame, airlight=frame.airlight + airlight, surface=frame.surface + surface)
+
+
+def _radical_inverse(number: int) -> float:
+    """Return the binary digits of a number mirrored at the point."""
+    inverse, place = 0.0, 0.5
+    while number:
+        number, digit = divmod(number, 2)
+        inverse += digit * place
+        place /= 2
+    return inverse
