@@ -7,6 +7,7 @@ Read in this order:
 - `phase.py`: phase functions, which say their values, widths and series;
 - `medium.py`: homogeneous media, one without bounds or several with;
 - `lights.py`: point, spot and directional lights as homogeneous positions;
+- `closed_mesh.py`: closed meshes of any shape: their flaws by the name of an edge, and what lies inside;
 - `convex_bounds.py`: the convex bounds of media;
 - `directional_extent.py`: the smallest rectangle across a directional light through which all light of the media comes;
 - `triangle_table.py`: what shading needs of every triangle;

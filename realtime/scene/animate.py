@@ -112,7 +112,12 @@ def thicker_medium(medium: Medium, factor: float) -> Medium:
         replace(bounded_medium, medium=thicker_medium(bounded_medium.medium, factor))
         for bounded_medium in medium.bounded_media
     )
-    return replace(medium, sigma_t=sigma, bounded_media=bounded_media)
+    clouds = medium.clouds
+    if clouds is not None:
+        thicker = tuple(value * factor for value in clouds.sigma_t)
+        dr.make_opaque(thicker)
+        clouds = replace(clouds, sigma_t=thicker)
+    return replace(medium, sigma_t=sigma, bounded_media=bounded_media, clouds=clouds)
 
 
 @dataclass(frozen=True)

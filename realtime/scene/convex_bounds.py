@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog, nnls
 
 from realtime.errors import InputError
+from realtime.scene.closed_mesh import ClosedMesh, closed_mesh
 from realtime.scene.mesh_adjacency import mesh_triangles
 
 Array = NDArray[np.float64]
 
 _FLAT = 1e-5  # relative to the size of the body
+_SOME = 64  # triangles by which most shapes that are not convex are told at once
 _SAMPLES = 1 << 16  # pairs of points for the mean distance: its standard error is 0.2 %
 
 
@@ -39,7 +41,7 @@ class Bounds:
         return not len(self.offsets)
 
 
-def read_bounds(shape) -> Bounds:
+def read_bounds(shape) -> tuple[Bounds | None, ClosedMesh | None]:
     """Read the bounds of a medium from a shape.
 
     Parameters
@@ -47,18 +49,27 @@ def read_bounds(shape) -> Bounds:
     shape
         A Mitsuba shape.
 
+    Returns
+    -------
+    bounds
+        Its convex bounds; None where it is not convex.
+    mesh
+        Its triangles; None for a sphere.
+
     Raises
     ------
     InputError
-        For a shape that is neither a sphere nor a closed convex mesh with its normals outwards, with its name.
+        For a shape that is neither a sphere nor a closed mesh with its normals outwards, with its name.
     """
     name = shape.id()
     if shape.class_name() == "Sphere":
-        return _read_sphere(shape)
+        return _read_sphere(shape), None
     if not shape.is_mesh():
-        raise _refusal(name, f"is a {shape.class_name()}", "a sphere, a cube or a closed convex mesh")
+        raise _refusal(name, f"is a {shape.class_name()}", "a sphere, a cube or a closed mesh")
     vertices, faces = mesh_triangles(shape)
-    return mesh_bounds(name, vertices, faces[:, ::-1] if shape.has_flipped_normals() else faces)
+    faces = faces[:, ::-1] if shape.has_flipped_normals() else faces
+    mesh = closed_mesh(name, vertices, faces)
+    return mesh_bounds(name, vertices, faces, mesh), mesh
 
 
 def _read_sphere(shape) -> Bounds:
@@ -74,8 +85,8 @@ def _read_sphere(shape) -> Bounds:
     )
 
 
-def mesh_bounds(name: str, vertices: Array, faces: NDArray[Any]) -> Bounds:
-    """Return the bounds that the mesh `name` describes.
+def mesh_bounds(name: str, vertices: Array, faces: NDArray[Any], mesh: ClosedMesh | None = None) -> Bounds | None:
+    """Return the bounds that the mesh `name` describes, None where it is not convex.
 
     Parameters
     ----------
@@ -85,43 +96,38 @@ def mesh_bounds(name: str, vertices: Array, faces: NDArray[Any]) -> Bounds:
         Positions [m], (vertices, 3).
     faces
         Vertex numbers, counter-clockwise seen from outside, (faces, 3).
+    mesh
+        The same as `closed_mesh` returns it, if it is known.
 
     Raises
     ------
     InputError
-        For a mesh that is not closed, not convex, inside out or flat.
+        For a mesh that is not closed, inside out or flat.
     """
+    mesh = mesh or closed_mesh(name, vertices, faces)
     corners = vertices[faces]
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    _check_closed(name, corners)
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     twice = np.linalg.norm(area, axis=1)
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     volume = np.sum((corners[:, 0] - vertices.mean(axis=0)) * area) / 6
     if not abs(volume) > _FLAT * size**3 * 1e-3:
-        raise _refusal(name, "has no volume", "a closed convex mesh")
+        raise _refusal(name, "has no volume", "a closed mesh around a body")
     if volume < 0:
-        raise _refusal(name, "is inside out", "faces that run counter-clockwise seen from outside")
+        flaw = f"is inside out, at {mesh.edge_words(*mesh.faces[0, :2])}"
+        raise _refusal(name, flaw, "faces that run counter-clockwise seen from outside")
     sound = twice > _FLAT * size * longest
     normals = area[sound] / twice[sound, None]
     offsets = np.mean(np.sum(corners[sound] * normals[:, None], axis=2), axis=1)
+    some = slice(None, None, max(1, len(normals) // _SOME))
+    if np.any(vertices @ normals[some].T > offsets[some] + 2 * _FLAT * size):
+        return None
     normals, offsets = _merged(normals, offsets, size)
     if np.any(vertices @ normals.T > offsets + 2 * _FLAT * size):
-        raise _refusal(name, "is not convex", "convex bounds: cut the shape into convex parts")
+        return None
     centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     radius = float(np.linalg.norm(vertices - centre, axis=1).max())
     return Bounds(name, normals, offsets, corners, centre, radius)
-
-
-def _check_closed(name: str, corners: Array) -> None:
-    """Refuse a surface in which not every edge is met once each way; doubled vertices are one."""
-    _, number = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    face = number.reshape(-1, 3)
-    tail, head = face.ravel(), np.roll(face, -1, axis=1).ravel()
-    count = face.max() + 1
-    forward, backward = np.sort(tail * count + head), np.sort(head * count + tail)
-    if np.any(tail == head) or np.any(forward[1:] == forward[:-1]) or not np.array_equal(forward, backward):
-        raise _refusal(name, "is not a closed surface", "a closed convex mesh without doubled or degenerate faces")
 
 
 def _merged(normals: Array, offsets: Array, size: float) -> tuple[Array, Array]:

@@ -4,18 +4,22 @@
 Light enters there before all shapes, and leaves through the same rectangle behind the media. Heights above that end are
 small numbers where depths may be large ones, so its middle stands for the place of the light.
 
-The media lie in the hull of some spheres: the corners of media of few planes, which are spheres of radius 0, and the
-spheres about the others. Seen along the light their rectangle is wanted at the angle at which it has the least area.
+The media lie in the hull of some spheres: the corners of media of few planes and of meshes that are not convex, which
+are spheres of radius 0, and the spheres about the others. Seen along the light their rectangle is wanted at the angle
+at which it has the least area.
 """
 
+from collections.abc import Sequence
 from itertools import combinations
 from typing import Any
 
 import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
 from realtime.numerics.array_types import ArrayTypes
+from realtime.scene.closed_mesh import ClosedMesh
 from realtime.scene.lights import DirectionalExtent, with_low
 from realtime.scene.medium import BoundedMedium
 
@@ -33,7 +37,17 @@ def media_spheres(bounded_media: tuple[BoundedMedium, ...]) -> Array:
     Numbers are rounded, and the spheres grown by as much: what the precision of the media puts in their last digits
     must not move the rays of a map.
     """
-    spheres = np.concatenate([_spheres(bounded_medium) for bounded_medium in bounded_media])
+    return _rounded(np.concatenate([_spheres(bounded_medium) for bounded_medium in bounded_media]))
+
+
+def mesh_spheres(meshes: Sequence[ClosedMesh]) -> Array:
+    """Return spheres whose hull holds meshes, as `media_spheres` does: the corners of their convex hull."""
+    vertices = np.concatenate([mesh.vertices for mesh in meshes])
+    corners = vertices[ConvexHull(vertices).vertices]
+    return _rounded(np.column_stack([corners, np.zeros(len(corners))]))
+
+
+def _rounded(spheres: Array) -> Array:
     grain = 2.0 ** np.ceil(np.log2(np.ptp(spheres[:, :3], axis=0).max() + spheres[:, 3].max()) - _BITS)
     return grain * (np.round(spheres / grain) + np.array([0, 0, 0, 2]))
 

@@ -21,6 +21,8 @@ class SceneFeatures:
     directional_lights: int = 0
     area_lights: tuple[str, ...] = ()  #: the shapes of lights with extent: 'rectangle', 'disk' or 'sphere'
     clear: bool = False  #: bounded: nothing fills the space between the media
+    concave: tuple[str, ...] = ()  #: shapes that bound media and are not all convex: clouds
+    sky: str = ""  #: the axis from which a uniform sky shines, '' where there is none; it is seen behind the scene
     notes: tuple[str, ...] = ()  #: what the user should know of this scene
 
 
@@ -39,6 +41,7 @@ def describe(features: SceneFeatures) -> dict[str, str]:
     )
     lights = [f"{count} {kind}" for kind, count in counts if count]
     lights += [f"{count} {shape} with extent" for shape, count in Counter(features.area_lights).items()]
+    lights += [f"a sky, as a beam from {features.sky}"] if features.sky else []
     words = {
         "surfaces": "lit surfaces" if features.surfaces else "none: no ray is cast for the camera",
         "shadows": "visibility tests" if features.shadows else "none: nothing casts a shadow",
@@ -48,7 +51,9 @@ def describe(features: SceneFeatures) -> dict[str, str]:
         "phase function": "isotropic: left out of the integrand"
         if features.isotropic
         else "anisotropic: split at the foot point",
-        "medium": f"bounded, in {'clear air' if features.clear else 'another medium'}: rays clipped, no kernel"
+        "medium": f"{len(features.concave)} clouds in clear air, bounded by meshes: rays cast at them"
+        if features.concave
+        else f"bounded, in {'clear air' if features.clear else 'another medium'}: rays clipped, no kernel"
         if features.bounded
         else "unbounded: every ray lies in it whole",
         "lights": " and ".join(lights),

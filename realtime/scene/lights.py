@@ -77,6 +77,7 @@ class Light:
     extent: Any = None  #: directional: the `DirectionalExtent` through which all light of the media comes
     facing: Facing | None = None  #: light point: how its shape faces
     source: int | None = None  #: light point: the number of its light in `Scene.area_lights`
+    sky: Any = None  #: the radiance of a uniform sky, for which this light stands as a beam from above [W/(m^2 sr)]
 
     @property
     def w(self) -> int:

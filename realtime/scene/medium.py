@@ -19,6 +19,7 @@ class Medium:
     phase: Phase
     bounded_media: tuple["BoundedMedium", ...] = ()  #: convex, disjoint, with as many extinctions
     clear: bool = False  #: around the bounded media nothing scatters or absorbs
+    clouds: "Clouds | None" = None  #: in clear air: all bounded media, of any shape, for methods that render clouds
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,16 @@ class BoundedMedium:
     mean_distance: Any  #: R, see `realtime.scene.convex_bounds.mean_distance` [m]
     neighbours: Any = None  #: `sides` numbers a half space: planes that share an edge with it, or itself; None: sphere
     sides: int = 0
+
+
+@dataclass(frozen=True)
+class Clouds:
+    """Homogeneous media within closed bounds of any shape, disjoint, in clear air: tables with an entry for each."""
+
+    sigma_t: tuple[Any, ...]  #: extinction [1/m], by channel
+    albedo: Any  #: single-scattering albedos, RGB [1]
+    phases: tuple[Phase, ...]  #: those that differ
+    phase: Any  #: the number of each cloud's phase function
 
 
 def per_extinction(medium: Medium, function: Callable[[Any], Any]):

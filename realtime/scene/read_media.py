@@ -3,9 +3,12 @@
 
 A shape with the material `null` and an interior medium is the boundary of a medium: light passes, nothing is seen of
 it. All of them lie in one medium, the camera's own or, for a camera inside one of them, its exterior; none is a vacuum.
+In clear air a boundary may be any closed mesh: a cloud.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -13,8 +16,9 @@ import numpy as np
 
 from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes
+from realtime.scene.closed_mesh import ClosedMesh, check_bodies, encloses
 from realtime.scene.convex_bounds import Bounds, holds, mean_distance, overlap, plane_neighbours, read_bounds
-from realtime.scene.medium import BoundedMedium, Medium
+from realtime.scene.medium import BoundedMedium, Clouds, Medium
 from realtime.scene.phase import HenyeyGreenstein, Isotropic, Phase, named_phase, tabulated
 
 _PHASES = {
@@ -51,7 +55,7 @@ def sort_shapes(scene):
         elif shape.interior_medium() is not None:
             boundaries.append(shape)
         elif bounds:
-            raise InputError(f"shape '{name}' is a hole in a medium; wanted media inside of convex bounds")
+            raise InputError(f"shape '{name}' is a hole in a medium; wanted media inside of closed bounds")
         else:
             raise InputError(f"shape '{name}' is transparent and bounds no medium; wanted opaque surfaces: remove it")
     return opaque, boundaries
@@ -67,7 +71,7 @@ def opaque_scene(scene, opaque):
     return mi.load_dict({"type": "scene"} | dict(zip(names, opaque, strict=True)))
 
 
-def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
+def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[ClosedMesh, ...]]:
     """Return the medium of a scene with the bounded media in it.
 
     Parameters
@@ -78,6 +82,13 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
         The shapes that bound media.
     types
         Array types to compute with.
+
+    Returns
+    -------
+    medium
+        In clear air with `clouds`, whatever the bounds; with `bounded_media` only where all bounds are convex.
+    meshes
+        The bounds where not all of them are convex; then all are meshes.
 
     Raises
     ------
@@ -90,26 +101,78 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
                 "the camera references no medium: it would be in a vacuum; declare the medium with an id and put "
                 '<ref name="medium" id="..."/> inside the sensor'
             )
-        return _homogeneous(sensor.get_medium(), types)
-    bounds = [read_bounds(shape) for shape in boundaries]
-    _check_disjoint(bounds)
-    around = _surrounding(sensor, boundaries, bounds)
+        return _homogeneous(sensor.get_medium(), types), ()
+    shapes = [read_bounds(shape) for shape in boundaries]
+    bounds = [convex for convex, _ in shapes if convex is not None]
+    all_convex = len(bounds) == len(boundaries)
+    meshes = () if all_convex else _closed_meshes(shapes)
+    if all_convex:
+        _check_disjoint(bounds)
+    else:
+        check_bodies(meshes, boundaries)
+    around = _surrounding(sensor, boundaries, meshes or bounds)
+    if around is not None and not all_convex:
+        raise InputError(
+            f"shape '{_first_concave(shapes)}' bounds a medium within another one and is not convex; wanted convex "
+            "bounds there, or clear air around it: remove the exterior medium, and the camera's"
+        )
     media = [_homogeneous(shape.interior_medium(), types) for shape in boundaries]
     ambient = _clear(types) if around is None else _homogeneous(around, types)
     channels = max(len(medium.sigma_t) for medium in [ambient, *media])
-    bounded_media = tuple(
-        make_bounded_medium(_in_channels(medium, channels), own_bounds, types)
-        for medium, own_bounds in zip(media, bounds)
+    media = [_in_channels(medium, channels) for medium in media]
+    bounded_media = (
+        tuple(make_bounded_medium(medium, own_bounds, types) for medium, own_bounds in zip(media, bounds))
+        if all_convex
+        else ()
     )
-    return replace(_in_channels(ambient, channels), bounded_media=bounded_media)
+    clouds = _clouds(media, boundaries, types) if around is None else None
+    return replace(_in_channels(ambient, channels), bounded_media=bounded_media, clouds=clouds), meshes
 
 
-def _surrounding(sensor, boundaries, bounds: list[Bounds]):
+def _closed_meshes(shapes: Sequence[tuple[Bounds | None, ClosedMesh | None]]) -> tuple[ClosedMesh, ...]:
+    """Return the meshes of shapes of which one at least is not convex."""
+    for bounds, mesh in shapes:
+        if mesh is None and bounds is not None:
+            raise InputError(
+                f"shape '{bounds.name}' is a sphere, and shape '{_first_concave(shapes)}' is not convex; wanted meshes "
+                "for all of them: replace the sphere by a mesh"
+            )
+    return tuple(mesh for _, mesh in shapes if mesh is not None)
+
+
+def _first_concave(shapes: Sequence[tuple[Bounds | None, ClosedMesh | None]]) -> str:
+    return next(mesh.name for bounds, mesh in shapes if bounds is None and mesh is not None)
+
+
+def _clouds(media: list[Medium], boundaries, types: ArrayTypes) -> Clouds:
+    """Return bounded media as tables with an entry for each; equal phase functions are one."""
+    keys = [_phase_key(shape.interior_medium().phase_function()) for shape in boundaries]
+    distinct = list(dict.fromkeys(keys))
+    sigma_t = tuple(
+        types.scalar([float(medium.sigma_t[channel][0]) for medium in media])
+        for channel in range(len(media[0].sigma_t))
+    )
+    albedos = np.stack([np.array(medium.albedo, dtype=np.float64).ravel() for medium in media], axis=1)
+    albedo = types.color(*(types.scalar(column) for column in albedos))
+    number = mi.UInt32([distinct.index(key) for key in keys])
+    dr.make_opaque(sigma_t, albedo, number)
+    return Clouds(sigma_t, albedo, tuple(media[keys.index(key)].phase for key in distinct), number)
+
+
+def _phase_key(phase) -> tuple[Any, ...]:
+    """Return what two phase functions have in common if they are equal."""
+    parameters = mi.traverse(phase)
+    names = sorted(parameters.keys())
+    return phase.class_name(), *(np.array(parameters[name], dtype=np.float64).tobytes() for name in names)
+
+
+def _surrounding(sensor, boundaries, bounds: Sequence[Bounds | ClosedMesh]):
     """Return the Mitsuba medium around the bounded ones, or None; refuse a camera or boundary that says otherwise."""
     camera = np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)[:3, 3]
     around = sensor.get_medium()
     for shape, own_bounds in zip(boundaries, bounds):
-        if holds(own_bounds, camera):
+        inside = encloses(own_bounds, camera) if isinstance(own_bounds, ClosedMesh) else holds(own_bounds, camera)
+        if inside:
             if sensor.get_medium() != shape.interior_medium():
                 raise InputError(
                     f"the camera is inside of shape '{own_bounds.name}', but references another medium or none; "

@@ -12,18 +12,22 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 from realtime.area_lights.read import is_area_light, read_area_light
 from realtime.area_lights.shape import AreaLight
 from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes, array_types, is_single, types_of
 from realtime.scene.camera import Camera
-from realtime.scene.directional_extent import directional_fields, distance_before, media_spheres
+from realtime.scene.closed_mesh import ClosedMesh
+from realtime.scene.directional_extent import directional_fields, distance_before, media_spheres, mesh_spheres
 from realtime.scene.features import SceneFeatures, camera_notes
 from realtime.scene.lights import Light, spot_fields
 from realtime.scene.medium import Medium
 from realtime.scene.read_media import opaque_scene, read_medium, sort_shapes
 from realtime.scene.triangle_table import Facets, read_facets
+
+_UPRIGHT = 1e-3  # cosine between a camera's left, or its up, and an axis that counts as upright in the image
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,7 @@ class Scene:
     facets: Facets | None = None  #: the triangles, where a table says all that shading needs
     positions: Mapping[str, Any] = field(default_factory=dict)  #: vertices of the shapes that moved, by name [m]
     area_lights: tuple[AreaLight, ...] = ()  #: those with extent, of which methods render points
+    boundaries: tuple[Any, ...] = ()  #: Mitsuba's shapes around bounded media, in the order of `Medium.clouds`
 
 
 def read_scene(scene, precision: str = "single") -> Scene:
@@ -84,23 +89,46 @@ def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
     """Return the fields of a `Scene` but for its shapes, and the opaque shapes."""
     camera, sensor = _read_camera(scene, types)
     opaque, boundaries = sort_shapes(scene)
-    medium = read_medium(sensor, boundaries, types)
+    medium, meshes = read_medium(sensor, boundaries, types)
     if not scene.emitters():
         raise InputError(
             "the scene has no light; wanted at least one emitter of type 'point', 'spot', 'directional' or 'area'"
         )
+    bodies = _Bodies(medium, meshes, opaque)
     lights = tuple(
-        _read_directional(emitter, medium, opaque, types)
+        _read_directional(emitter, bodies, types)
         if emitter.class_name() == "DirectionalEmitter"
+        else _read_sky(emitter, bodies, _upwards(scene, camera), types)
+        if emitter.class_name() == "ConstantBackgroundEmitter" and medium.clouds is not None
         else _read_light(emitter, types)
         for emitter in scene.emitters()
         if not is_area_light(emitter)
     )
     here = np.array(camera.origin, dtype=np.float64).ravel()
     area_lights = tuple(read_area_light(shape, here) for shape in scene.shapes() if shape.is_emitter())
-    features = _scene_features(scene, opaque, medium, lights, area_lights)
-    parts = {"camera": camera, "medium": medium, "lights": lights, "features": features, "area_lights": area_lights}
+    parts = {
+        "camera": camera,
+        "medium": medium,
+        "lights": lights,
+        "features": _scene_features(scene, bodies, lights, area_lights),
+        "area_lights": area_lights,
+        "boundaries": tuple(boundaries),
+    }
     return parts, opaque
+
+
+@dataclass(frozen=True)
+class _Bodies:
+    """What of a scene light meets."""
+
+    medium: Medium
+    meshes: tuple[ClosedMesh, ...]  #: bounds of media that are not all convex
+    opaque: list[Any]  #: Mitsuba's shapes
+
+    def beam(self, axis, types: ArrayTypes) -> dict[str, Any]:
+        """Return the fields of a `Light` from infinity, which travels along a unit vector."""
+        spheres = mesh_spheres(self.meshes) if self.meshes else media_spheres(self.medium.bounded_media)
+        return directional_fields(axis, spheres, distance_before(spheres, self.opaque), types)
 
 
 def _read_camera(scene, types: ArrayTypes):
@@ -151,8 +179,9 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
     return Light(**arrays)
 
 
-def _read_directional(emitter, medium: Medium, opaque, types: ArrayTypes) -> Light:
-    if not (medium.bounded_media and medium.clear):
+def _read_directional(emitter, bodies: _Bodies, types: ArrayTypes) -> Light:
+    medium = bodies.medium
+    if not (medium.clear and medium.clouds):
         raise InputError(
             "the scene has a directional light and a medium without bounds, which lets nothing of it through from "
             "infinity: wanted media with bounds in clear air; give the medium bounds, or use a 'point' or 'spot' light"
@@ -164,10 +193,46 @@ def _read_directional(emitter, medium: Medium, opaque, types: ArrayTypes) -> Lig
     matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
     axis = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
     arrays: dict[str, Any] = {"intensity": types.color(*(float(c) for c in irradiance))}
-    spheres = media_spheres(medium.bounded_media)
-    arrays |= directional_fields(axis, spheres, distance_before(spheres, opaque), types)
+    arrays |= bodies.beam(axis, types)
     dr.make_opaque(*arrays.values())
     return Light(**arrays)
+
+
+def _read_sky(emitter, bodies: _Bodies, up: NDArray[np.float64], types: ArrayTypes) -> Light:
+    """Return the beam that stands for a uniform sky of radiance L: from above, of the irradiance pi L.
+
+    That is what the upper half of the sky sends through a horizontal plane.
+    """
+    parameters = mi.traverse(emitter)
+    if "radiance.value" not in parameters:
+        raise InputError("the constant emitter has a textured or spectral radiance; wanted a constant 'rgb' one")
+    radiance = _read_colour(parameters["radiance.value"], "the constant emitter's radiance", "W/(m^2 sr)")
+    arrays: dict[str, Any] = {
+        "intensity": types.color(*(math.pi * float(c) for c in radiance)),
+        "sky": types.color(*(float(c) for c in radiance)),
+    }
+    arrays |= bodies.beam(-up, types)
+    dr.make_opaque(*arrays.values())
+    return Light(**arrays)
+
+
+def _upwards(scene, camera: Camera) -> NDArray[np.float64]:
+    """Return the axis of coordinates that is upright in the image, a unit vector (3,).
+
+    A camera that is not rolled has it across its left; of several such axes it is the one from which the suns shine
+    most, and without suns the nearest to the camera's up.
+    """
+    left, up = (np.array(vector, dtype=np.float64).ravel() for vector in (camera.left, camera.up))
+    left, up = left / np.linalg.norm(left), up / np.linalg.norm(up)
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    upright = axes[(np.abs(axes @ left) < _UPRIGHT) & (axes @ up > _UPRIGHT)]
+    falling = np.zeros(3)
+    for emitter in scene.emitters():
+        if emitter.class_name() == "DirectionalEmitter":
+            falling += np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)[:3, 2]
+    if not len(upright):
+        return axes[np.argmax(axes @ up)]
+    return upright[np.argmax(upright @ (-falling if falling.any() else up))]
 
 
 def _read_colour(value, name: str, unit: str):
@@ -191,8 +256,9 @@ def _read_angles(parameters) -> tuple[float, float]:
 
 
 def _scene_features(
-    scene, opaque, medium: Medium, lights: tuple[Light, ...], area_lights: tuple[AreaLight, ...]
+    scene, bodies: _Bodies, lights: tuple[Light, ...], area_lights: tuple[AreaLight, ...]
 ) -> SceneFeatures:
+    medium, opaque = bodies.medium, bodies.opaque
     notes = camera_notes(scene)
     for shape in opaque:
         flags = shape.bsdf().flags()
@@ -200,20 +266,30 @@ def _scene_features(
             notes.append(
                 f"shape '{shape.id()}' is not purely diffuse: shaded by its diffuse reflectance, airlight unaffected"
             )
-    media = [bounded_medium.medium for bounded_medium in medium.bounded_media] + [medium] * (not medium.clear)
+    phases = [bounded_medium.medium.phase for bounded_medium in medium.bounded_media]
+    phases += list(medium.clouds.phases) if medium.clouds else [medium.phase] * (not medium.clear)
     return SceneFeatures(
         # A light never shadows itself.
         shadows=len(opaque) > (1 if len(area_lights) == 1 and area_lights[0].opaque and not lights else 0),
         surfaces=bool(opaque),
         extinctions=len(medium.sigma_t),
-        isotropic=all(filling.phase.constant for filling in media),
+        isotropic=all(phase.constant for phase in phases),
         bounded=bool(medium.bounded_media),
         clear=medium.clear,
         vacuum=any(float(sigma_t[0]) == 0 for sigma_t in medium.sigma_t),
         point_lights=sum(light.kind == "point" for light in lights),
         spot_lights=sum(light.kind == "spot" for light in lights),
-        directional_lights=sum(light.kind == "directional" for light in lights),
+        directional_lights=sum(light.kind == "directional" and light.sky is None for light in lights),
         soft_spots=any(light.beam is not None for light in lights),
         area_lights=tuple(light.kind for light in area_lights),
+        concave=tuple(mesh.name for mesh in bodies.meshes),
+        sky=next((_axis_name(light) for light in lights if light.sky is not None), ""),
         notes=tuple(dict.fromkeys(notes)),
     )
+
+
+def _axis_name(light: Light) -> str:
+    """Return the axis of coordinates from which a beam comes: 'x', '-x', 'y', '-y', 'z' or '-z'."""
+    from_there = -np.array(light.axis, dtype=np.float64).ravel()
+    number = int(np.argmax(np.abs(from_there)))
+    return ("-" if from_there[number] < 0 else "") + "xyz"[number]

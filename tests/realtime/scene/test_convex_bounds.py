@@ -47,15 +47,18 @@ def test_many_facets_stay_many_planes():
 @pytest.mark.parametrize(
     ("mesh", "message"),
     [
-        (lambda: prism(star(0.3, 0.9, 5), 0.4), "'solid' bounds a medium and is not convex"),
-        (lambda: (box((1.0, 1.1, 1.2))[0], box((1.0, 1.1, 1.2))[1][:, ::-1]), "inside out"),
-        (lambda: (box((1.0, 1.1, 1.2))[0], box((1.0, 1.1, 1.2))[1][1:]), "not a closed surface"),
+        (lambda: (box((1.0, 1.1, 1.2))[0], box((1.0, 1.1, 1.2))[1][:, ::-1]), "inside out, at edge"),
+        (lambda: (box((1.0, 1.1, 1.2))[0], box((1.0, 1.1, 1.2))[1][1:]), "not a closed surface: edge"),
         (lambda: (box((1.0, 1.1, 1.2))[0] * (1, 1, 0), box((1.0, 1.1, 1.2))[1]), "has no volume|not a closed"),
     ],
 )
 def test_refusals_name_the_shape_and_the_flaw(mesh, message):
     with pytest.raises(InputError, match=message):
         bounds(mesh())
+
+
+def test_a_mesh_that_is_not_convex_has_no_convex_bounds():
+    assert bounds(prism(star(0.3, 0.9, 5), 0.4)) is None
 
 
 @pytest.mark.parametrize("gap", [-0.01, 0.01])

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The boundaries of all clouds of a scene: a Mitsuba scene to cast rays at, and a table of normals."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from realtime.numerics.array_types import four_numbers
+from realtime.scene.closed_mesh import boundary_scene, shape_number
+from realtime.scene.mesh_adjacency import mesh_triangles
+from realtime.scene.read_scene import Scene
+
+
+@dataclass(frozen=True)
+class CloudSurfaces:
+    """The boundaries of clouds; part of the state of a method, so that recorded functions take it as it is."""
+
+    geometry: Any  #: an `mi.Scene` of the boundaries alone
+    first: Any  #: by number of the shape in Mitsuba's registry, its first row of `facets`
+    cloud: Any  #: by that number, the number of the cloud in `Medium.clouds`
+    facets: Any  #: four numbers each: the outward unit normal of a triangle and 0, or the centre of a sphere [m] and 1
+
+
+def cloud_surfaces(scene: Scene) -> CloudSurfaces:
+    """Return the boundaries of the clouds of a scene; it must have `Medium.clouds`."""
+    shapes = scene.boundaries
+    rows = [_rows(shape) for shape in shapes]
+    numbers = [shape_number(shape) for shape in shapes]
+    first, cloud = np.zeros(max(numbers) + 1, dtype=np.uint32), np.zeros(max(numbers) + 1, dtype=np.uint32)
+    first[numbers] = np.cumsum([0] + [len(own) for own in rows[:-1]])
+    cloud[numbers] = np.arange(len(shapes))
+    facets = mi.Float(np.concatenate(rows).ravel())
+    surfaces = CloudSurfaces(boundary_scene(shapes), mi.UInt32(first), mi.UInt32(cloud), facets)
+    dr.make_opaque(surfaces.first, surfaces.cloud, surfaces.facets)
+    return surfaces
+
+
+def outward_normal(surfaces: CloudSurfaces, hit, point, active):
+    """Return the outward unit normals where `hit`, a preliminary intersection, meets a boundary at a `point` [m]."""
+    shape = dr.reinterpret_array(mi.UInt32, hit.shape)
+    row = dr.gather(mi.UInt32, surfaces.first, shape, active)
+    ball = dr.gather(four_numbers(mi.Float), surfaces.facets, row, active).w > 0
+    x, y, z, _ = dr.gather(four_numbers(mi.Float), surfaces.facets, row + dr.select(ball, 0, hit.prim_index), active)
+    normal = mi.Vector3f(x, y, z)
+    return dr.select(ball, dr.normalize(point - normal), normal)
+
+
+def _rows(shape):
+    """Return the rows of a shape, (rows, 4)."""
+    if not shape.is_mesh():  # a sphere
+        box = shape.bbox()
+        centre = 0.5 * (np.array(box.min, dtype=np.float64).ravel() + np.array(box.max, dtype=np.float64).ravel())
+        return np.array([[*centre, 1.0]])
+    vertices, faces = mesh_triangles(shape)
+    corners = vertices[faces]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area *= -1.0 if shape.has_flipped_normals() else 1.0
+    length = np.linalg.norm(area, axis=1, keepdims=True)
+    normals = np.divide(area, length, out=np.zeros_like(area), where=length > 0)
+    return np.column_stack([normals, np.zeros(len(normals))])

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Crossings of rays with clouds against all triangles in float64."""
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from realtime.clouds.bounds.crossings import next_crossing, optical_depths
+from realtime.clouds.bounds.surfaces import cloud_surfaces
+from realtime.scene.read_scene import read_scene
+from tests.helpers.clouds import SUN, cloud, length_inside, loaded, ring
+from validation.scenes.parts import placed
+from validation.scenes.solids import box
+
+pytestmark = pytest.mark.usefixtures("variant")
+
+SIGMA = 0.0363
+
+
+def random_rays(count, seed=3, spread=200.0):
+    random = np.random.default_rng(seed)
+    direction = random.normal(size=(count, 3))
+    return random.uniform(-spread, spread, (count, 3)), direction / np.linalg.norm(direction, axis=1, keepdims=True)
+
+
+def depths_of(scene, origin, direction, end, precision="single"):
+    read = read_scene(scene, precision)
+    Float = type(read.camera.origin.x)
+    Vector = type(read.camera.origin)
+    arrays = (Vector(*(Float(column) for column in values.T)) for values in (origin, direction))
+    depths = optical_depths(cloud_surfaces(read), read.medium.clouds, *arrays, Float(end))
+    return [np.array(depth, dtype=np.float64) for depth in depths]
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+@pytest.mark.parametrize("end", [np.inf, 170.0])
+def test_depths_in_a_ring_are_those_of_all_its_triangles(precision, end):
+    """Rays start inside and outside and cross the ring up to four times; float32 rounds 400 m to 2e-5 m."""
+    origin, direction = random_rays(400)
+    (depth,) = depths_of(loaded(), origin, direction, end, precision)
+    expected = [SIGMA * length_inside(ring(), *ray, end) for ray in zip(origin, direction)]
+    assert np.count_nonzero(expected) > 50
+    assert depth == pytest.approx(np.array(expected), abs=SIGMA * 5e-4)
+
+
+def test_clouds_of_two_extinctions_add_up():
+    coloured = {"type": "homogeneous", "sigma_t": {"type": "rgb", "value": [0.01, 0.02, 0.04]}}
+    slab = placed(box((220.3, 190.7, 31.1)), (3.1, 1.7, -190.9))
+    scene = loaded(sun=SUN, ring=cloud("ring", ring()), slab=cloud("slab", slab, coloured))
+    origin, direction = random_rays(300, seed=5, spread=250.0)
+    depths = depths_of(scene, origin, direction, np.inf)
+    for depth, sigma in zip(depths, (0.01, 0.02, 0.04), strict=True):
+        expected = [
+            SIGMA * length_inside(ring(), *ray) + sigma * length_inside(slab, *ray) for ray in zip(origin, direction)
+        ]
+        assert depth == pytest.approx(np.array(expected), abs=1e-4)
+
+
+def test_a_sphere_is_a_cloud_too():
+    ball = {"type": "sphere", "center": [1.3, -2.7, 3.1], "radius": 71.3, "bsdf": {"type": "null"}}
+    fog = {"type": "homogeneous", "sigma_t": SIGMA, "albedo": 1.0}
+    origin, direction = random_rays(300, seed=7, spread=90.0)
+    (depth,) = depths_of(loaded(sun=SUN, ball=ball | {"interior": fog}), origin, direction, np.inf)
+    toward = np.array([1.3, -2.7, 3.1]) - origin
+    middle = np.sum(toward * direction, axis=1)
+    half = 71.3**2 - np.sum(toward**2, axis=1) + middle**2
+    chord = np.sqrt(np.maximum(half, 0))
+    inside = np.maximum(middle + chord, 0) - np.maximum(middle - chord, 0)
+    assert depth == pytest.approx(SIGMA * inside, abs=2e-4)
+
+
+def test_points_on_the_boundary_are_neither_lost_nor_counted_twice():
+    """Legs start where camera rays enter and leave: towards the inside the whole chord counts, away from it nothing."""
+    read = read_scene(loaded())
+    surfaces = cloud_surfaces(read)
+    origin, direction = random_rays(2000, seed=11)
+    o, d = (mi.Vector3f(*(mi.Float(column) for column in values.T)) for values in (origin, direction))
+    first = next_crossing(surfaces, o, d, mi.Float(0))
+    met = np.array(dr.isfinite(first.distance) & ~first.leaves)
+    place = o + d * first.distance
+    inwards = mi.Vector3f(-first.normal)
+    for way, sign in ((inwards, 1), (-inwards, 0)):
+        (depth,) = optical_depths(surfaces, read.medium.clouds, place, way, mi.Float(60.0), mi.Bool(met))
+        points, ways = (np.array(array, dtype=np.float64).T[met][:200] for array in (place, way))
+        # A little further on there is no doubt about the start.
+        expected = [
+            SIGMA * (length_inside(ring(), point + 0.01 * unit, unit, 59.99) + 0.01 * sign)
+            for point, unit in zip(points, ways)
+        ]
+        assert np.array(depth)[met][:200] == pytest.approx(np.array(expected), abs=SIGMA * 2e-3)

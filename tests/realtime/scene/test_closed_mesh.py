@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Meshes around clouds: what is refused, with the name of an edge, and what is taken."""
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from realtime.errors import InputError
+from realtime.scene.closed_mesh import closed_mesh, encloses
+from realtime.scene.read_scene import read_scene
+from tests.helpers.clouds import DROPLETS, SUN, TURN, cloud, cloud_of, cloud_scene, length_inside, loaded, ring
+from validation.scenes.parts import joined, placed
+from validation.scenes.solids import box, torus
+
+pytestmark = pytest.mark.usefixtures("variant")
+
+
+def flipped(mesh):
+    return mesh[0], mesh[1][:, ::-1]
+
+
+def turned_part(mesh, faces):
+    """Return a mesh of which some faces run the other way round."""
+    turned = mesh[1].copy()
+    turned[faces] = turned[faces][:, ::-1]
+    return mesh[0], turned
+
+
+def pulled(mesh, vertex, to):
+    vertices = mesh[0].copy()
+    vertices[vertex] = to
+    return vertices, mesh[1]
+
+
+FAR = (400.3, 20.1, -30.7)
+WITHIN = np.array([3.71, -0.13, 2.03]) + 101.37 * TURN[:, 0]  # in the middle of the tube of the ring
+
+
+@pytest.mark.claim("cloud-meshes-refused")
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        ([(ring()[0], ring()[1][1:])], r"'0' .* not a closed surface: edge \d+-\d+ at \(.*\), one triangle meets it"),
+        ([turned_part(ring(), [7])], r"not a closed surface: edge \d+-\d+ at \(.*the same way"),
+        ([joined([ring(), placed(flipped(torus(31.0, 9.0, (17, 9))), FAR)])], r"is inside out, at edge \d+-\d+ at"),
+        ([flipped(ring())], r"is inside out, at edge \d+-\d+ at \("),
+        ([pulled(ring(), 0, (-180.0, 10.0, 5.0))], r"crosses itself: edge \d+-\d+ at \(.*passes through triangle \d+"),
+        ([ring(), ring((90.3, 20.1, 4.7))], r"'0' and '1' overlap: edge \d+-\d+ at"),
+        ([ring(), placed(box((7.0, 6.0, 5.0)), WITHIN)], r"'1' lies within that of shape '0', at edge \d+-\d+"),
+        ([joined([ring(), placed(box((7.0, 6.0, 5.0)), WITHIN)])], r"has a part within another, at edge \d+-\d+"),
+    ],
+    ids=["open", "turned", "part-inside-out", "inside-out", "self-crossing", "overlap", "nested", "nested-part"],
+)
+def test_meshes_that_bound_no_body_are_refused_with_an_edge(parts, message):
+    named = {str(number): cloud(str(number), mesh) for number, mesh in enumerate(parts)}
+    with pytest.raises(InputError, match=message):
+        read_scene(loaded(sun=SUN, **named))
+
+
+def test_a_hollow_cloud_and_a_cloud_in_its_hollow_are_taken():
+    shell = joined(
+        [placed(torus(101.0, 41.0, (23, 17)), (0, 0, 0)), placed(flipped(torus(101.0, 17.0, (23, 17))), (0, 0, 0))]
+    )
+    core = placed(torus(101.0, 5.0, (23, 17)), (0, 0, 0))
+    read = read_scene(loaded(sun=SUN, shell=cloud("shell", shell), core=cloud("core", core)))
+    assert read.features.concave == ("shell", "core")
+    mesh = closed_mesh("shell", *shell)
+    assert [encloses(mesh, np.array([x, 0.3, 0.1])) for x in (101.0, 125.0, 150.0, 0.0)] == [False, True, False, False]
+
+
+def test_a_point_lies_within_as_its_ray_says():
+    mesh = closed_mesh("ring", *ring())
+    points = np.random.default_rng(2).uniform(-130, 130, (200, 3))
+    up = np.array([0.0, 0.0, 1.0])
+    expected = [length_inside(ring(), point, up, 1e-6) > 0 for point in points]
+    assert [encloses(mesh, point) for point in points] == expected
+    assert 0 < sum(expected) < 200
+
+
+def test_equal_phase_functions_are_one_and_others_are_not():
+    other = DROPLETS | {"phase": {"type": "isotropic"}}
+    clouds = {
+        name: cloud(name, placed(ring(), (0, 0, height)), medium)
+        for name, height, medium in (("low", -300.0, DROPLETS), ("middle", 0.0, other), ("high", 300.0, DROPLETS))
+    }
+    medium = read_scene(loaded(sun=SUN, **clouds)).medium
+    assert medium.bounded_media == ()
+    assert [phase.name for phase in medium.clouds.phases] == ["hg", "isotropic"]
+    assert np.array(medium.clouds.phase).tolist() == [0, 1, 0]
+
+
+def test_convex_media_beside_a_concave_one_are_clouds_all():
+    read = read_scene(loaded(sun=SUN, ring=cloud("ring", ring()), box=cloud("box", placed(box((9.0, 8.0, 7.0)), FAR))))
+    assert read.features.concave == ("ring", "box")
+    assert len(np.array(read.medium.clouds.phase)) == 2
+
+
+def test_a_camera_in_a_cloud_references_it():
+    with pytest.raises(InputError, match="the camera is inside of shape 'ring'"):
+        read_scene(mi.load_dict(cloud_scene(origin=tuple(WITHIN))))
+    medium = mi.load_dict(DROPLETS)
+    scene = cloud_scene(origin=tuple(WITHIN), sun=SUN, ring=cloud_of("ring", ring(), medium))
+    scene["sensor"]["medium"] = medium
+    assert read_scene(mi.load_dict(scene)).features.concave == ("ring",)
+
+
+def test_a_sphere_beside_a_concave_cloud_is_refused():
+    ball = {"type": "sphere", "radius": 2.0, "center": list(FAR), "bsdf": {"type": "null"}, "interior": DROPLETS}
+    with pytest.raises(InputError, match="'ball' is a sphere, and shape 'ring' is not convex"):
+        read_scene(loaded(sun=SUN, ring=cloud("ring", ring()), ball=ball))
