@@ -46,6 +46,7 @@ class FrameCache:
     lists: Any  #: camera, geometry and lights
     history: History | None = None  #: the last frame, for passes over the image
     carried: Any = None  #: what the method handed on from the last frame
+    extra: Any = None  #: further layers of the last frame by their names; no frame needs them
 
 
 def next_frame(
@@ -90,7 +91,7 @@ def next_frame(
         return _next_of_groups(renderer, made, cast_again=cast_again)
     state, lists, cast, by_light = _before_method(renderer, made, None, cast_again=cast_again)
     *layers, history, carried = run_method(renderer, state, cast, by_light, lists, *_last(cache))
-    return evaluated(cast, by_light, layers), FrameCache(cast, state, lists, history, carried)
+    return evaluated(cast, by_light, layers), FrameCache(cast, state, lists, history, carried, layers[2])
 
 
 def _last(cache: FrameCache | None) -> tuple[Any, Any]:

@@ -34,13 +34,15 @@ def adaptive_layers(render: Callable[[View], Layers], view: View, corners: Corne
         See `realtime.tiles.adaptive_sampling.between_corners`.
     """
     part = view.part()
+    known = {"carried": view.carried, "extra_layers": view.extra_layers}
     given: list[Layers] = []  # by the last call of `render`, for what is a mask in its layers and what is missing
 
     def sample(pixel, distance, tile, layout):
-        layers = render(part(pixel, distance, tile, layout))
+        layers = render(replace(part(pixel, distance, tile, layout), **known))
         given.append(layers)
         shares = layers.visibility or ()
-        more = (layers.transmittance, layers.background, *(share for share in shares if not _is_mask(share)))
+        extra = (layers.extra or {}).values()
+        more = (layers.transmittance, layers.background, *extra, *(share for share in shares if not _is_mask(share)))
         numbers = (layers.in_scattered, *(value for value in more if value is not None))
         return numbers, tuple(share for share in shares if _is_mask(share))
 
@@ -48,13 +50,15 @@ def adaptive_layers(render: Callable[[View], Layers], view: View, corners: Corne
         corners, view.pixel, view.distance, sample, width=view.camera.width, tolerance=tolerance
     )
     layers, number, mask = given[-1], iter(numbers), iter(masks)
+    carried = given[0].carried  # What a branch computes cannot be handed on: the corners are.
     in_scattered = next(number)
     transmittance = None if layers.transmittance is None else next(number)
     background = None if layers.background is None else next(number)
+    extra = None if layers.extra is None else {name: next(number) for name in layers.extra}
     if layers.visibility is None:
-        return Layers(in_scattered, None, transmittance, background)
+        return Layers(in_scattered, None, transmittance, background, extra, carried)
     shares = tuple(next(mask) if _is_mask(share) else next(number) for share in layers.visibility)
-    return Layers(in_scattered, shares, transmittance, background)
+    return Layers(in_scattered, shares, transmittance, background, extra, carried)
 
 
 def composed(layers: Layers, by_light: tuple[PerRay, ...]) -> tuple[PerRay, PerRay | None]:

@@ -11,8 +11,8 @@ each light point by itself. The stages for light points are recorded once and re
 added up. What the stages of a single group take and return is a tuple by group then: states, surfaces and lists.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, is_dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, is_dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -70,6 +70,7 @@ class FrameRenderer:
     shade_casts_rays: bool  #: whether shading asks Mitsuba for shapes or shadows
     casts_rays: bool  #: whether the method casts rays of its own
     carries: bool  #: whether the method hands arrays on to the next frame
+    extra_layers: bool  #: whether `render` returns `Layers.extra` too
     groups: LightGroups | None = None  #: where the scene has lights with extent
 
     # A frozen function reads all shapes of a scene that it is given anew at every call.
@@ -98,9 +99,12 @@ class Frame:
     airlight: Any  #: in-scattered radiance [W/(m^2 sr)]
     surface: Any  #: radiance of the lit surface through the medium [W/(m^2 sr)]
     distance: Any  #: to the visible surface, infinite where there is none [m]
+    extra: Mapping[str, Any] = field(default_factory=dict)  #: further layers by their names, colours
 
 
-def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -> FrameRenderer:
+def frame_renderer(
+    scene: Scene, method: Method, *, kernel=None, extra_layers: bool = False, **parameters
+) -> FrameRenderer:
     """Prepare the stages of a frame.
 
     Parameters
@@ -111,6 +115,8 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         A real-time method.
     kernel
         An airlight kernel function; needed where `method.uses_kernel` says so.
+    extra_layers
+        Whether frames have the further layers that the method names; in a scene with lights with extent they have not.
     parameters
         Values of the method's parameters, and of `realtime.area_lights.points.LightPoints`; the others have their
         defaults.
@@ -124,8 +130,9 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     chosen, light_points = method_parameters(method, parameters)
     if method.uses_kernel(chosen) and kernel is None:
         raise InputError(f"method {method.name}: got no kernel, wanted one of realtime.kernels.registry.KERNELS")
+    _check_clouds(scene, method)
     if not scene.area_lights:
-        return _stages(scene, method, kernel, chosen)
+        return _stages(scene, method, kernel, chosen, extra_layers=extra_layers)
     lit = with_light_points(scene, light_points.points, light_points.pattern)
     if _has_passes(method, chosen) or method.lights_at_once(chosen) or method.carries(chosen):
         groups = LightGroups(light_points, _stages(lit, method, kernel, chosen), None)
@@ -138,7 +145,38 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     return replace(known, scene=scene, prepare=GroupPreparation(groups), groups=groups)
 
 
-def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: bool = False) -> FrameRenderer:
+def _check_clouds(scene: Scene, method: Method) -> None:
+    """Refuse clouds and skies where a method does not know them, and where it does what clouds cannot have."""
+    features, name = scene.features, method.name
+    if not method.renders_clouds:
+        if features.concave:
+            raise InputError(
+                f"method {name}: the bounds of the media are not all convex, and these rays cross convex bounds only "
+                f"(shapes {', '.join(map(repr, features.concave[:3]))}); use cloud-collectors or cloud-octaves, or cut "
+                "the shapes into convex parts"
+            )
+        if features.sky:
+            raise InputError(
+                f"method {name}: the scene has a sky, an emitter of type 'constant', which this method does not know; "
+                "use cloud-collectors or cloud-octaves, or remove it"
+            )
+        return
+    if scene.medium.clouds is None:
+        raise InputError(
+            f"method {name}: the scene has no clouds; wanted media with closed bounds in clear air: give the medium "
+            "bounds, or use another method"
+        )
+    kinds = [light.kind for light in scene.lights if light.w] + [f"area ({light.kind})" for light in scene.area_lights]
+    if kinds:
+        raise InputError(
+            f"method {name}: the scene has a light of kind {kinds[0]}, and clouds are lit from infinity; wanted "
+            "emitters of type 'directional', and at most one 'constant': replace it or remove it"
+        )
+
+
+def _stages(
+    scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: bool = False, extra_layers: bool = False
+) -> FrameRenderer:
     """Return the stages for the lights of a scene; with `adds_up`, what they render is added to what was before."""
     by_rays = method.by_rays is not None and method.by_rays(chosen)
     tolerance = chosen.tolerance if method.by_rays else 0.0
@@ -146,7 +184,12 @@ def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: 
     provides_visibility = method.provides_visibility(chosen)
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
     corners = tile_corners(pixel, camera, tolerance, by_rays=by_rays, lights=len(scene.lights))
-    stages = surface_stages(scene, provides_visibility=provides_visibility, by_source=method.by_source(chosen))
+    stages = surface_stages(
+        scene,
+        provides_visibility=provides_visibility,
+        by_source=method.by_source(chosen),
+        through_media=not method.renders_clouds,
+    )
     surface, shade, shade_casts_rays = stages
     has_passes = _has_passes(method, chosen)
     tables = prepare_kernel(kernel, type(camera.origin.x)) if method.uses_kernel(chosen) else None
@@ -180,20 +223,27 @@ def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: 
         if provides_visibility:
             view = replace(view, surfaces=by_light)
 
+        if extra_layers:
+            view = replace(view, extra_layers=True)
+
         def layers_of(view):
-            return method.render(view, state, lists, kernel=with_tables(kernel, tables), parameters=chosen)
+            layers = method.render(view, state, lists, kernel=with_tables(kernel, tables), parameters=chosen)
+            return layers if extra_layers else replace(layers, extra=None)
 
         layers = layers_of(view) if corners is None else adaptive_layers(layers_of, view, corners, tolerance)
+        extra, layers = layers.extra, replace(layers, extra=None)
         if carries:
             carried, layers = layers.carried, replace(layers, carried=None)
-            return (layers if has_passes else composed(layers, by_light)), carried
-        if has_passes:
-            return layers
-        return composed(layers, by_light) if sums is None else added(sums, layers, by_light)
+            returned: Any = ((layers if has_passes else composed(layers, by_light)), carried)
+        elif has_passes:
+            returned = layers
+        else:
+            returned = composed(layers, by_light) if sums is None else added(sums, layers, by_light)
+        return (returned, extra) if extra_layers else returned
 
     # Every scene runs it: it checks the parameters also where nothing casts a shadow.
     prepare = method.prepare(scene, chosen) if method.prepare else _no_state
-    if not features.shadows:
+    if not (features.shadows or method.renders_clouds):
         prepare = _no_state
     cull = sort if method.cull and features.shadows else _no_lists
     casts_rays = method.casts_rays(chosen)
@@ -235,6 +285,7 @@ def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: 
         shade_casts_rays=shade_casts_rays,
         casts_rays=casts_rays,
         carries=carries,
+        extra_layers=extra_layers,
     )
 
 
@@ -244,17 +295,21 @@ def _has_passes(method: Method, parameters: Any) -> bool:
 
 def render_frame(renderer: FrameRenderer) -> Frame:
     """Render one frame and bring it to the host in the order of the image."""
-    return image_frame(renderer, run_stages(renderer, renderer.prepare(renderer.scene)))
+    cast, by_light = run_cast_and_shade(renderer)
+    layers = run_method(renderer, renderer.prepare(renderer.scene), cast, by_light)
+    return image_frame(renderer, evaluated(cast, by_light, layers), layers[2])
 
 
-def image_frame(renderer: FrameRenderer, stages) -> Frame:
-    """Bring `stages`, what `run_stages` returned, to the host in the order of the image."""
+def image_frame(renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None = None) -> Frame:
+    """Bring `stages`, what `run_stages` returned, to the host in the order of the image, and `extra` layers."""
     distance, surface, airlight = stages
     height, width = renderer.scene.camera.height, renderer.scene.camera.width
+    shown = {name: _colour(renderer, values) for name, values in (extra or {}).items()}
     frame = Frame(
         _image(renderer, airlight, (height, width, 3)),
         _image(renderer, surface, (height, width, 3)),
         _image(renderer, distance, (height, width)),
+        {name: _image(renderer, values, (height, width, 3)) for name, values in shown.items()},
     )
     check_radiance(renderer.scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
     return frame
@@ -271,9 +326,9 @@ def evaluated(cast: Cast, by_light, layers):
 
     These are what the stages returned; a colour by light is the surface where the layers have none of their own.
     """
-    airlight, behind = layers[:2]
+    airlight, behind, *more = layers[:3]
     surface = by_light[0] if behind is None else behind
-    dr.eval(cast.distance, surface, airlight)
+    dr.eval(cast.distance, surface, airlight, more)
     return cast.distance, surface, airlight
 
 
@@ -368,7 +423,7 @@ def run_method(
     lists=None,
     history: History | None = None,
     carried: Any = None,
-) -> tuple[PerRay, PerRay | None, History | None, Any]:
+) -> tuple[PerRay, PerRay | None, Mapping[str, PerRay] | None, History | None, Any]:
     """Run the stages of the method, and return what they do, not evaluated.
 
     Parameters
@@ -390,6 +445,8 @@ def run_method(
         In-scattered radiance [W/(m^2 sr)].
     surface
         What is seen through it [W/(m^2 sr)]; None where that is the shaded surface as it is.
+    extra
+        Further layers by their names; None where nobody asks for them.
     history
         For the next frame; None where the method has no passes.
     carried
@@ -402,22 +459,24 @@ def run_method(
             own = state[0] if state else groups[0].prepare(groups[0].scene)
             airlight, surface, *left = run_method(groups[0], own, cast, by_light[0], only, history, carried)
             return airlight, by_light[0][0] if surface is None else surface, *left
-        return *_summed(groups, state, cast, by_light, lists), None, None
+        return *_summed(groups, state, cast, by_light, lists), None, None, None
     scene, pixel = renderer.scene, renderer.pixel
     if lists is None:
         lists = run_cull(renderer, state, cast.distance)
     shown = pixel, scene.camera, scene.medium, renderer.lights
     inputs = state, lists, cast.distance, by_light, renderer.tables, renderer.corners
+    last = (None, carried) if renderer.carries else ()
+    layers, extra = renderer.render(renderer.geometry, *shown, *inputs, *last), None
+    if renderer.extra_layers:
+        layers, extra = layers
     if renderer.carries:
-        layers, carried = renderer.render(renderer.geometry, *shown, *inputs, None, carried)
-    else:
-        layers = renderer.render(renderer.geometry, *shown, *inputs)
+        layers, carried = layers
     if renderer.passes is None:
-        return *layers, None, carried
+        return *layers, extra, None, carried
     geometry = scene.geometry if scene.facets is None else None
     place = geometry, scene.facets, pixel, renderer.lane, scene.camera, scene.medium
     airlight, surface, layers, g_buffer = renderer.passes(*place, cast, by_light, layers, history)
-    return airlight, surface, History(layers, g_buffer, scene.camera), carried
+    return airlight, surface, extra, History(layers, g_buffer, scene.camera), carried
 
 
 def _summed(groups: Sequence[FrameRenderer], states, cast: Cast, by_light, lists) -> tuple[PerRay, PerRay]:
@@ -478,6 +537,12 @@ def _no_state(scene: Scene) -> tuple[()]:
 
 def _no_lists(*place) -> tuple[()]:
     return ()
+
+
+def _colour(renderer: FrameRenderer, values):
+    """Return a layer as a colour: a number is grey."""
+    Color = type(renderer.scene.medium.albedo)
+    return values if isinstance(values, Color) else Color(values)
 
 
 def _image(renderer: FrameRenderer, values, shape):

@@ -148,6 +148,8 @@ def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light,
     reflected = surface.albedo * arriving * (dr.inv_pi * cosine / dr.square(r) if light.w else dr.inv_pi * cosine)
     if medium.bounded_media:
         kept = path_transmittance(medium, light, depths=depths, point=surface.point, active=lit)
+    elif medium.clear:
+        kept = 1
     else:
         kept = transmittance(medium, dr.select(lit, surface.distance + r, 0))
     return dr.select(lit, reflected * kept, type(medium.albedo)(0))

@@ -21,7 +21,7 @@ from realtime.scene.read_scene import Scene
 
 
 def surface_stages(
-    scene: Scene, *, provides_visibility: bool, by_source: bool = False
+    scene: Scene, *, provides_visibility: bool, by_source: bool = False, through_media: bool = True
 ) -> tuple[Callable[..., Any], Callable[..., Any], bool]:
     """Return the stages for a scene.
 
@@ -33,6 +33,8 @@ def surface_stages(
         Whether the method finds out which surfaces are lit.
     by_source
         Whether it does so for all points of a light with extent together.
+    through_media
+        Whether the bounded media dim the surfaces; if not, the method says how much they do.
 
     Returns
     -------
@@ -52,7 +54,7 @@ def surface_stages(
     def cast_all(geometry, facets, pixel, camera, medium) -> Cast:
         direction, _ = ray_directions(camera, pixel)
         cast = cast_rays(geometry, facets, camera.origin, direction)
-        if not medium.bounded_media:
+        if not (medium.bounded_media and through_media):
             return cast
         insides = camera_insides(medium, camera.origin, direction, cast.distance)
         return replace(cast, insides=insides)
@@ -60,6 +62,7 @@ def surface_stages(
     def shade_all(geometry, facets, pixel, camera, medium, lights, cast):
         direction, _ = ray_directions(camera, pixel)
         seen = visible_surface(cast, facets, camera.origin, direction, color=type(medium.albedo))
+        medium = medium if through_media else replace(medium, bounded_media=())
         depths = optical_depths(medium, cast.distance, cast.insides) if medium.bounded_media else None
         shown = {"medium": medium, "depths": depths}
 

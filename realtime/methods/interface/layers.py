@@ -9,6 +9,7 @@ in which `surface` is the light of a lamp that the visible surface reflects to t
 scene and without shadows, summed over the lamps.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,6 +29,8 @@ class Layers:
         None  #: share of what comes from behind that passes what the method adds to the scene's media; None: all
     )
     background: PerRay | None = None  #: radiance from behind all media, 0 where a surface hides it [W/(m^2 sr)]
+    #: Further layers of the image by their names, radiance [W/(m^2 sr)] or shares, only where the view asks for them
+    extra: Mapping[str, PerRay] | None = None
     carried: Any = None  #: arrays that the next frame finds in its view, whatever their sizes; see `Method.carries`
 
 

@@ -67,6 +67,10 @@ class Method:
     uses_kernel: Callable[[Any], bool] = always  #: parameters -> whether `render` calls an airlight kernel
     shadows: bool = True  #: whether it knows shadows; one that does not is wrong where there are occluders
     provides_visibility: Callable[[Any], bool] = never  #: parameters -> whether its layers have a visibility
+    #: Whether it knows clouds of any shape and a sky. Then it says itself how the media dim the surfaces, and `prepare`
+    #: runs where nothing casts a shadow too.
+    renders_clouds: bool = False
+    layers: tuple[str, ...] = ()  #: the names that `Layers.extra` may have, where a frame asks for further layers
     casts_rays: Callable[[Any], bool] = never  #: parameters -> whether it casts rays
     frozen: Callable[[Any], bool] = always  #: parameters -> whether Dr.Jit can record it once and replay it
     #: Parameters -> whether it computes each ray by itself, on any layout: then a frame may interpolate. It has the

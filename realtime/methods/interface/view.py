@@ -48,6 +48,7 @@ class View:
         None  #: by light, what the visible surface sends back unshadowed, for a method that provides visibility
     )
     prepared: Any = ()  #: for a user's plain function: what its `prepare` made
+    extra_layers: bool = False  #: whether the image is to have `Layers.extra`
     carried: Any = None  #: the `Layers.carried` of the last frame; None in the first
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from realtime.errors import InputError
 from realtime.kernels.exact import exact
-from realtime.methods.registry import METHODS
+from realtime.methods.registry import FOG_METHODS, METHODS
 from tests.helpers.scenes import spot, tiny_scene
 
 
@@ -27,7 +27,7 @@ def render(method, *, position, size=(9, 9), **changes):
 
 
 @pytest.mark.claim("light-on-a-ray-refused")
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", FOG_METHODS)
 @pytest.mark.parametrize("position", [[0.0, -5.0, 1.0], [0.0, 0.0, 1.0], [1e-8, 0.0, 1.0]])
 def test_a_light_at_the_camera_or_on_a_ray_is_refused_by_its_distance(variant, method, position):
     with pytest.raises(InputError, match=r"light 1 is [\d.e-]+ m from the (camera|ray .* column 4 of row 4)"):

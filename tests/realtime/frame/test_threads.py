@@ -19,8 +19,9 @@ from validation.configurations.methods import configuration, prepared
 from validation.scenes.loading import load_scene
 
 # As many pixels as several blocks of work have, so that each of the threads gets some.
-scene = read_scene(load_scene("sphere-spot", (128, 96)).scene)
+fog, clouds = (read_scene(load_scene(name, (128, 96)).scene) for name in ("sphere-spot", "cumulus"))
 for method in METHODS.values():
+    scene = clouds if method.renders_clouds else fog
     chosen = configuration(method.name, None, {"map": 128} if "map" in method.defaults else {})
     frames = []
     for threads in (2, 1):

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Single scattering in clouds, by steps on which the legs of the light are linear.
+
+Light of the irradiance E that comes from a direction reaches the point at x after the depth l(x), and the eye after
+tau(x) more; of phase function P/4 pi and albedo w,
+
+    L = w E P/(4 pi) int kappa exp(-tau(x) - l(x)) dx.
+
+On a step u = tau + l is linear between two nodes, du = kappa dx + dl, so that with e = exp(-u)
+
+    int kappa exp(-u) dx = kappa dx/(kappa dx + dl) (e_i - e_{i+1}),
+
+and kappa dx e where dl = -kappa dx. Printed (Bouthors 2008, eq. 1) are the other sign and no factor: e_{i+1} - e_i.
+In a polyhedron l is linear between kinks and jumps, where rays and legs cross edges, so the error is that of the steps
+with one of these in them.
+
+Octaves of a light (`realtime.methods.cloud_octaves`) have the leg a l with a factor a each, and a phase function each:
+the same sum with u = tau + a l.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from realtime.clouds.bounds.crossings import next_crossing, optical_depths
+from realtime.clouds.bounds.surfaces import CloudSurfaces
+from realtime.clouds.single_scattering.spacing import node_depth
+from realtime.scene.lights import Light
+from realtime.scene.medium import Clouds
+
+_SERIES = 0.02  # below it (1 - exp(-d))/d is summed up: d^4/120 is left, 1e-9
+
+
+@dataclass(frozen=True)
+class CloudRays:
+    """Rays through clouds."""
+
+    surfaces: CloudSurfaces
+    clouds: Clouds
+    origin: Any  #: [m]
+    direction: Any  #: unit directions
+    end: Any  #: distance to the visible surface, infinite where there is none [m]
+    depths: tuple[Any, ...]  #: optical depth up to there, by channel [1]
+
+
+@dataclass(frozen=True)
+class Beam:
+    """A light from infinity as points in clouds see it."""
+
+    irradiance: Any  #: across the beam, RGB [W/m^2]
+    scales: tuple[Any, ...]  #: by octave, of the depths of its legs [1]
+    phases: tuple[tuple[Any, ...], ...]  #: by octave and by phase function of the clouds, its value on the rays, mean 1
+    #: (point [m], active) -> the depth of the leg to a point, by channel [1]
+    leg: Callable[[Any, Any], tuple[Any, ...]]
+    #: (point [m], active) -> whether no surface is in the way; None where nothing casts a shadow
+    lit: Callable[[Any, Any], Any] | None
+
+
+def cloud_rays(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end) -> CloudRays:
+    """Return rays with their depths; arguments as of `realtime.clouds.bounds.crossings.optical_depths`.
+
+    `surfaces` and `clouds` are the boundaries and what fills them, `origin` [m] and unit `direction` the rays, `end`
+    may be infinite [m].
+    """
+    depths = optical_depths(surfaces, clouds, origin, direction, end)
+    return CloudRays(surfaces, clouds, origin, direction, end, depths)
+
+
+def exact_leg(surfaces: CloudSurfaces, clouds: Clouds, light: Light) -> Callable[[Any, Any], tuple[Any, ...]]:
+    """Return the function from points [m] and active lanes to the depths of the legs from a light, by cast rays."""
+    return lambda point, active: optical_depths(surfaces, clouds, point, -light.axis, type(point.x)(dr.inf), active)
+
+
+def scattered(
+    rays: CloudRays, beams: Sequence[Beam], *, steps: int, printed: bool = False
+) -> tuple[tuple[Any, ...], ...]:
+    """Return the radiance that clouds scatter once into rays, by beam and octave, RGB [W/(m^2 sr)].
+
+    Parameters
+    ----------
+    rays
+        Rays through clouds.
+    beams
+        The lights.
+    steps
+        N of `realtime.clouds.single_scattering.spacing`, in a ray; a stretch in a cloud has one more.
+    printed
+        Whether to sum what the paper prints.
+
+    Notes
+    -----
+    Valid for any extinction and thickness; `steps` is at least 1.
+
+    References
+    ----------
+    Bouthors, Neyret, Max, Bruneton, Crassin 2008, section 6.2.
+    """
+    clouds, Float, Color = rays.clouds, type(rays.direction.x), type(rays.clouds.albedo)
+    channels, lanes = len(clouds.sigma_t), dr.width(rays.direction)
+    mean_depth = sum(rays.depths) / channels
+    several = len(clouds.phases) > 1
+
+    def legs_at(point, active):
+        legs = tuple(beam.leg(point, active) for beam in beams)
+        shares = tuple(
+            Float(1) if beam.lit is None else dr.select(beam.lit(point, active), Float(1), 0) for beam in beams
+        )
+        return legs, shares
+
+    def body(x, edge, number, cloud, depths, legs, shares, sums, going):
+        # Where no stretch is open, look for the next crossing: its far end if the ray is in a cloud, else its start.
+        looks = going & (x >= edge)
+        crossing = next_crossing(rays.surfaces, rays.origin, rays.direction, x, looks)
+        opens = looks & crossing.leaves
+        jumps = looks & ~crossing.leaves
+        edge = dr.select(opens, dr.minimum(crossing.distance, rays.end), edge)
+        cloud = dr.select(opens, crossing.cloud, cloud)
+        steps_on = going & ~looks
+        sigma_t = tuple(dr.gather(Float, own, cloud, opens | steps_on) for own in clouds.sigma_t)
+        mean_sigma, mean_before = sum(sigma_t) / channels, sum(depths) / channels
+        ahead = (node_depth(number, steps, mean_depth) - mean_before) / mean_sigma
+        reach = dr.select(mean_sigma > 0, dr.maximum(ahead, 0), dr.inf)
+        to_edge = x + reach >= edge
+        target = dr.select(to_edge, edge, x + reach)
+        length = dr.select(steps_on, target - x, 0)
+        x = dr.select(jumps, crossing.distance, dr.select(steps_on, target, x))
+        point = rays.origin + rays.direction * dr.select(dr.isfinite(x), x, 0)
+        after = tuple(dr.fma(sigma, length, depth) for sigma, depth in zip(sigma_t, depths))
+        asks = opens | steps_on
+        new_legs, new_shares = legs_at(point, asks)
+        albedo = dr.gather(Color, clouds.albedo, cloud, steps_on)
+        phase = dr.gather(mi.UInt32, clouds.phase, cloud, steps_on) if several else None
+        sums = tuple(
+            tuple(
+                total + dr.select(steps_on, term * factor, 0)
+                for total, term, factor in zip(
+                    own,
+                    _terms(beam, sigma_t, length, (depths, after), (was, now), printed=printed),
+                    [albedo * share * (_chosen(values, phase) if several else 1) for values in beam.phases],
+                    strict=True,
+                )
+            )
+            for beam, own, was, now, share in zip(
+                beams, sums, legs, new_legs, [0.5 * (old + new) for old, new in zip(shares, new_shares)], strict=True
+            )
+        )
+        legs = tuple(
+            tuple(dr.select(asks, new, old) for new, old in zip(*pair)) for pair in zip(new_legs, legs, strict=True)
+        )
+        shares = tuple(dr.select(asks, new, old) for new, old in zip(new_shares, shares, strict=True))
+        number = dr.select(steps_on & ~to_edge, number + 1, number)
+        going &= x < rays.end
+        return x, edge, number, cloud, after, legs, shares, sums, going
+
+    def zeros(count: int):
+        return tuple(dr.zeros(Float, lanes) for _ in range(count))
+
+    zero = dr.zeros(Float, lanes)
+    sums = tuple(tuple(dr.zeros(Color, lanes) for _ in beam.scales) for beam in beams)
+    state = (
+        +zero,
+        +zero,
+        dr.full(mi.UInt32, 1, lanes),
+        dr.zeros(mi.UInt32, lanes),
+        zeros(channels),
+        tuple(zeros(channels) for _ in beams),
+        tuple(dr.full(Float, 1, lanes) for _ in beams),
+        sums,
+        (mean_depth > 0) & (zero < rays.end),
+    )
+    *_, sums, _ = dr.while_loop(state=state, cond=lambda *state: state[-1], body=body)
+    return tuple(
+        tuple(
+            total * beam.irradiance * (0.25 * dr.inv_pi * (1 if several else values[0]))
+            for total, values in zip(own, beam.phases, strict=True)
+        )
+        for own, beam in zip(sums, beams, strict=True)
+    )
+
+
+def _terms(beam: Beam, sigma_t, length, depths, legs, *, printed: bool) -> list[Any]:
+    """Return the integrals over a step by octave, colours; `depths` to the eye and `legs` are those at its two ends."""
+    Color = type(beam.irradiance)
+    return [
+        Color(
+            *(
+                _step(sigma * length, (before, then), (scale * leg, scale * next_leg), printed=printed)
+                for sigma, before, then, leg, next_leg in zip(sigma_t, *depths, *legs, strict=True)
+            )
+        )
+        for scale in beam.scales
+    ]
+
+
+def _step(depth, eye, leg, *, printed: bool):
+    """Return the integral over a step of its own `depth`, from the depths to the `eye` and of the `leg` at its ends."""
+    first, last = eye[0] + leg[0], eye[1] + leg[1]
+    if printed:
+        return dr.exp(-last) - dr.exp(-first)
+    change = dr.abs(depth + (leg[1] - leg[0]))
+    series = dr.fma(change, dr.fma(change, dr.fma(change, -1 / 24, 1 / 6), -0.5), 1)
+    share = dr.select(change < _SERIES, series, (1 - dr.exp(-change)) / dr.maximum(change, _SERIES))
+    return depth * dr.exp(-dr.minimum(first, last)) * share
+
+
+def _chosen(values: tuple[Any, ...], number):
+    """Return the value of a number."""
+    chosen = values[0]
+    for place, value in enumerate(values[1:], 1):
+        chosen = dr.select(number == place, value, chosen)
+    return chosen

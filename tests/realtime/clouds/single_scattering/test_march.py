@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: order 1 and opacity of homogeneous clouds of any shape are those of a sum over small steps in float64."""
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from realtime.clouds.bounds.surfaces import cloud_surfaces
+from realtime.clouds.single_scattering.march import Beam, _step, cloud_rays, exact_leg, scattered
+from realtime.clouds.single_scattering.opacity import opacity, opacity_of, printed_opacity
+from realtime.clouds.single_scattering.spacing import node_depth
+from realtime.scene.read_scene import read_scene
+from tests.helpers.clouds import SUN, cloud, crossings, length_inside, loaded, ring
+from validation.scenes.parts import placed
+from validation.scenes.solids import box
+
+pytestmark = pytest.mark.usefixtures("variant")
+
+COLOURED = {
+    "type": "homogeneous",
+    "sigma_t": {"type": "rgb", "value": [0.0163, 0.0271, 0.0414]},
+    "albedo": {"type": "rgb", "value": [0.97, 0.93, 0.89]},
+    "phase": {"type": "hg", "g": 0.71},
+}
+SIGMA, ALBEDO, G = np.array([0.0163, 0.0271, 0.0414]), np.array([0.97, 0.93, 0.89]), 0.71
+TRAVELS = np.array([0.737, -0.271, -0.619]) / np.linalg.norm([0.737, -0.271, -0.619])
+
+
+def rays(count=60):
+    """Return rays that look at the ring from outside, and some that start in it."""
+    random = np.random.default_rng(4)
+    origin = np.array([30.83, -400.91, 57.03]) + random.uniform(-40, 40, (count, 3))
+    direction = random.uniform(-110, 110, (count, 3)) - origin
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    origin[::4] += 380 * direction[::4]
+    return origin, direction
+
+
+def legs(points):
+    """Return lengths in the ring from points towards the sun [m]: where it leaves less where it enters."""
+    vertices, faces = ring()
+    a, b, c = np.moveaxis(vertices.astype(np.float32).astype(np.float64)[faces], 1, 0)
+    first, second = b - a, c - a
+    across = np.cross(-TRAVELS, second)
+    inverse = 1 / np.einsum("ij,ij->i", first, across)
+    offset = points[:, None] - a
+    u = np.einsum("pij,ij->pi", offset, across) * inverse
+    turned = np.cross(offset, first)
+    v = turned @ -TRAVELS * inverse
+    distance = np.einsum("pij,ij->pi", turned, second) * inverse
+    met = (u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 0)
+    return np.sum(np.where(met, distance * np.sign(np.cross(first, second) @ -TRAVELS), 0), axis=1)
+
+
+def summed_up(origin, direction, scale=1.0, steps=600):
+    """Return radiance by the midpoint rule, for unit irradiance and P = 1, by channel."""
+    total, before = np.zeros(3), 0.0
+    distance, leaves = crossings(ring(), origin, direction)
+    for begin, end in zip(np.append(0.0, distance)[:-1][leaves], distance[leaves]):
+        width = (end - begin) / steps
+        middle = begin + (np.arange(steps) + 0.5) * width
+        leg = legs(origin + middle[:, None] * direction)
+        path = before + middle - begin
+        depth = SIGMA * (path + scale * leg)[:, None]
+        total += (ALBEDO * SIGMA * np.exp(-depth)).sum(axis=0) * width
+        before += end - begin
+    return total / (4 * np.pi)
+
+
+def device(array):
+    return mi.Vector3f(*(mi.Float(column) for column in np.asarray(array).T))
+
+
+def marched(scene, origin, direction, *, steps, scales=(1.0,), printed=False):
+    read = read_scene(scene)
+    surfaces, clouds = cloud_surfaces(read), read.medium.clouds
+    path = cloud_rays(surfaces, clouds, device(origin), device(direction), mi.Float(dr.inf))
+    leg = exact_leg(surfaces, clouds, read.lights[0])
+    ones = tuple((mi.Float(1),) for _ in scales)
+    beam = Beam(mi.Color3f(1), tuple(mi.Float(scale) for scale in scales), ones, leg, None)
+    (octaves,) = scattered(path, [beam], steps=steps, printed=printed)
+    return [np.array(octave, dtype=np.float64).T for octave in octaves]
+
+
+@pytest.fixture(scope="module")
+def few():
+    origin, direction = rays()
+    expected = np.array([summed_up(*ray) for ray in zip(origin, direction)])
+    assert np.count_nonzero(expected[:, 0]) > 30
+    return origin, direction, expected
+
+
+@pytest.mark.claim("cloud-single-scattering", tolerance="0.5 % relative RMSE")
+def test_order_one_with_64_steps(few):
+    """From outside and inside, through two lobes one behind the other; the sum over 600 steps errs by less."""
+    origin, direction, expected = few
+    (radiance,) = marched(loaded(sun=SUN, ring=cloud("ring", ring(), COLOURED)), origin, direction, steps=64)
+    assert np.sqrt(np.mean((radiance - expected) ** 2)) < 0.005 * expected.mean()
+
+
+def test_octaves_have_their_own_legs(few):
+    origin, direction, expected = few
+    scene = loaded(sun=SUN, ring=cloud("ring", ring(), COLOURED))
+    first, second = marched(scene, origin[:20], direction[:20], steps=64, scales=(1.0, 0.3))
+    assert np.sqrt(np.mean((first - expected[:20]) ** 2)) < 0.005 * expected[:20].mean()
+    weaker = np.array([summed_up(*ray, scale=0.3) for ray in zip(origin[:20], direction[:20])])
+    assert np.sqrt(np.mean((second - weaker) ** 2)) < 0.005 * weaker.mean()
+
+
+def test_a_slab_seen_from_above_is_exact_with_one_step():
+    """Legs are linear in a slab, so steps leave no error: mu0/(mu0 + mu) (1 - exp(-tau (1/mu + 1/mu0)))."""
+    slab = cloud("slab", placed(box((4000.0, 4000.0, 37.0)), (0, 0, -18.5)), COLOURED)
+    direction = np.array([[0.3, 0.2, -0.8], [-0.1, 0.5, -0.3], [0.0, 0.0, -1.0]])
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    origin = -60 * direction
+    (radiance,) = marched(loaded(sun=SUN, slab=slab), origin, direction, steps=1)
+    mu, mu0 = -direction[:, 2:], -TRAVELS[2]
+    expected = ALBEDO / (4 * np.pi) * mu0 / (mu0 + mu) * (1 - np.exp(-SIGMA * 37 * (1 / mu + 1 / mu0)))
+    assert radiance == pytest.approx(expected, rel=2e-5)
+
+
+@pytest.mark.claim("cloud-opacity", tolerance="0.1 %")
+def test_opacity_is_one_less_the_transmittance():
+    origin, direction = rays(300)
+    read = read_scene(loaded(sun=SUN, ring=cloud("ring", ring(), COLOURED)))
+    surfaces = cloud_surfaces(read)
+    found = opacity(surfaces, read.medium.clouds, device(origin), device(direction), mi.Float(470.0))
+    length = np.array([length_inside(ring(), *ray, 470.0) for ray in zip(origin, direction)])
+    share = np.array(found).T
+    assert share == pytest.approx(1 - np.exp(-SIGMA * length[:, None]), rel=1e-3, abs=1e-5)
+
+
+def test_opacity_of_next_to_nothing_keeps_its_digits():
+    (shallow, *_) = opacity_of((mi.Float([1e-7, 3e-5, 0.05, 3.0]),) * 3, mi.Color3f)
+    assert np.array(shallow) == pytest.approx(-np.expm1(-np.array([1e-7, 3e-5, 0.05, 3.0])), rel=1e-6)
+
+
+@pytest.mark.claim("cloud-printed-equations")
+def test_equations_as_printed_have_the_wrong_sign(few):
+    """On the slab of one step both differ from what is right by the factor -(1 + dl/dx), and by -1/kappa."""
+    origin, direction, _ = few
+    scene = loaded(sun=SUN, ring=cloud("ring", ring(), COLOURED))
+    (printed,) = marched(scene, origin, direction, steps=16, printed=True)
+    (right,) = marched(scene, origin, direction, steps=16)
+    assert right.min() >= 0 > printed.min()
+    read = read_scene(scene)
+    path = device(origin), device(direction), mi.Float(dr.inf)
+    surfaces = cloud_surfaces(read)
+    length = np.array(printed_opacity(surfaces, read.medium.clouds, *path)).T
+    one_stretch = [len(crossings(ring(), *ray)[0]) <= 2 for ray in zip(origin, direction)]
+    share = np.array(opacity(surfaces, read.medium.clouds, *path)).T
+    assert length[one_stretch] == pytest.approx(-share[one_stretch] / SIGMA, rel=1e-4, abs=1e-4)
+
+
+def test_steps_against_the_integral_for_all_signs_of_the_leg():
+    """Also where the leg falls as fast as the eye's depth grows, dl = -kappa dx: kappa dx e."""
+    depth = np.array([1e-6, 0.3, 0.3, 0.3, 2.0, 7.0])
+    change = np.array([0.0, -0.3, 0.4, -0.2999, -9.0, 30.0])
+    first = np.full(6, 10.0)
+    eye = mi.Float(np.zeros(6)), mi.Float(depth)
+    leg = mi.Float(first), mi.Float(first + change)
+    u = depth + change
+    share = np.where(np.abs(u) > 1e-12, -np.expm1(-u) / np.where(u == 0, 1, u), 1.0)
+    assert np.array(_step(mi.Float(depth), eye, leg, printed=False)) == pytest.approx(
+        depth * np.exp(-first) * share, rel=3e-4
+    )
+
+
+def test_nodes_end_where_the_ray_does():
+    total = mi.Float([1e-3, 1.0, 50.0])
+    nodes = np.array([np.array(node_depth(mi.UInt32(number), 8, total)) for number in range(1, 9)])
+    assert np.all(np.diff(nodes[:-1], axis=0) > 0)
+    assert np.all(nodes[:-1] < np.array(total))
+    assert np.all(np.isinf(nodes[-1]))
