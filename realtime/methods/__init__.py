@@ -8,13 +8,15 @@ Read in this order:
 
 - `unshadowed.py`: one integral a ray and light, the shortest method there is.
 - `ray_march.py`: the baseline, steps with a visibility test each.
+- `cloud_octaves.py`: clouds as engines render them.
+- `cloud_collectors.py`: light of many orders in clouds, from where it enters them.
 - `registry.py`: the records by name, and how a name becomes a record.
 - `user_method.py`: a user's plain function or record, made a method with its errors named.
 - `user_result.py`: what that returned, checked.
 
-May import: `realtime.area_lights`, `realtime.bounded_media`, `realtime.errors`, `realtime.intervals`,
-`realtime.kernels`, `realtime.memory`, `realtime.methods.epipolar`, `realtime.methods.froxel_fog`,
-`realtime.methods.interface`, `realtime.methods.light_volumes`, `realtime.methods.shadow_planes`,
-`realtime.methods.soft_shafts`, `realtime.parameters`, `realtime.rays`, `realtime.scene`, `realtime.shadow_maps`,
-`realtime.tiles`.
+May import: `realtime.area_lights`, `realtime.bounded_media`, `realtime.clouds`, `realtime.errors`,
+`realtime.intervals`, `realtime.kernels`, `realtime.memory`, `realtime.methods.epipolar`,
+`realtime.methods.froxel_fog`, `realtime.methods.interface`, `realtime.methods.light_volumes`,
+`realtime.methods.shadow_planes`, `realtime.methods.soft_shafts`, `realtime.numerics`, `realtime.parameters`,
+`realtime.rays`, `realtime.scene`, `realtime.shadow_maps`, `realtime.tiles`.
 """

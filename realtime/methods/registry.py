@@ -6,7 +6,16 @@ every command and report knows it. `find_method` also finds a user's own, which 
 """
 
 from realtime.area_lights.points import LightPoints
+from realtime.clouds.order_layers import OPACITY, ORDER_LAYERS
 from realtime.errors import InputError
+from realtime.methods.cloud_collectors import (
+    CollectorParameters,
+    carries,
+    cloud_collectors,
+    collector_errors,
+    prepare_collectors,
+)
+from realtime.methods.cloud_octaves import CloudOctavesParameters, cloud_octaves, prepare_cloud_octaves
 from realtime.methods.epipolar.method import MinMaxParameters, min_max, prepare_min_max
 from realtime.methods.froxel_fog.method import (
     FroxelFogParameters,
@@ -135,7 +144,42 @@ METHODS: dict[str, Method] = {
         parameters=SoftShaftsParameters,
         error_causes=soft_shaft_errors,
     ),
+    "cloud-octaves": Method(
+        "cloud-octaves",
+        cloud_octaves,
+        "clouds: single scattering that is extinguished less with every octave, what engines do",
+        "Wrenninge 2013; Hillaire 2016",
+        prepare=prepare_cloud_octaves,
+        prepared_from=frozenset({"geometry"}),
+        uses_kernel=never,
+        casts_rays=always,
+        provides_visibility=always,
+        renders_clouds=True,
+        layers=(*ORDER_LAYERS, OPACITY),
+        parameters=CloudOctavesParameters,
+    ),
+    "cloud-collectors": Method(
+        "cloud-collectors",
+        cloud_collectors,
+        "clouds: light of all orders from where it enters them, found by light maps and the transport of a slab",
+        "Bouthors, Neyret, Max, Bruneton, Crassin 2008",
+        prepare=prepare_collectors,
+        prepared_from=frozenset({"geometry", "light"}),
+        uses_kernel=never,
+        renders_clouds=True,
+        provides_visibility=always,
+        casts_rays=always,
+        by_rays=always,
+        carries=carries,
+        layers=(*ORDER_LAYERS, OPACITY),
+        parameters=CollectorParameters,
+        error_causes=collector_errors,
+    ),
 }
+
+
+#: Those of light that is scattered once, in any scene; the others are for clouds.
+FOG_METHODS: dict[str, Method] = {name: method for name, method in METHODS.items() if not method.renders_clouds}
 
 
 def find_method(name: str) -> Method:

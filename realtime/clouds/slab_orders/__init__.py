@@ -16,5 +16,5 @@ Read in this order:
 - `radiance.py`: the radiance of all orders in any direction;
 - `slab.py`: what leaves a slab and what is inside, with the error of every number.
 
-May import: `realtime.droplets`.
+May import: `realtime.droplets`, `realtime.scene`.
 """

@@ -53,7 +53,9 @@ class DepthPanels:
         return self.nodes.reshape(-1)
 
 
-def depth_panels(tau: float, narrowest: float, *, depths: Sequence[float] = (), count: int = 8) -> DepthPanels:
+def depth_panels(
+    tau: float, narrowest: float, *, depths: Sequence[float] = (), count: int = 8, widest: float = _WIDEST
+) -> DepthPanels:
     """Return panels for a slab.
 
     Parameters
@@ -66,11 +68,13 @@ def depth_panels(tau: float, narrowest: float, *, depths: Sequence[float] = (), 
         Depths in [0, tau] that become edges, so that results are known there.
     count
         Nodes of each panel.
+    widest
+        Width of a panel at most, where the distance from the boundaries is not over 50 [mean free paths].
     """
     half = [0.0]
     while half[-1] < tau / 2:
-        widest = max(_WIDEST, _DEEP_GROWTH * (half[-1] - _DEEP))
-        half.append(half[-1] + min(max(narrowest, _GROWTH * half[-1]), widest))
+        limit = max(widest, _DEEP_GROWTH * (half[-1] - _DEEP))
+        half.append(half[-1] + min(max(narrowest, _GROWTH * half[-1]), limit))
     upper = np.array(half) * (tau / 2 / half[-1])
     edges = np.unique(np.concatenate([upper, tau - upper, np.asarray(depths, dtype=np.float64), [0.0, tau]]))
     # An edge that rounding put beside another, not a depth that was asked for, is left out.
@@ -105,7 +109,7 @@ class Transport:
         self._down = np.flatnonzero(mu < 0)
         widths = np.diff(panels.edges)
         self._weights = {
-            sign: _panel_weights(widths[::-sign], np.abs(mu[which]), panels.nodes.shape[1])
+            sign: panel_weights(widths[::-sign], np.abs(mu[which]), panels.nodes.shape[1])
             for sign, which in self._sides()
         }
 
@@ -147,7 +151,7 @@ class Transport:
         return at_nodes.reshape(fields, panels * count, streams), at_edges
 
 
-def _panel_weights(all_widths: Array, mu: Array, count: int) -> tuple[Array, Array]:
+def panel_weights(all_widths: Array, mu: Array, count: int) -> tuple[Array, Array]:
     """Return (P, K + 1, K, J) weights of the source, and (P, K + 1, J) exponentials, at the nodes and the far edge."""
     widths, index = np.unique(all_widths, return_inverse=True)
     reference, _ = leggauss(count)

@@ -1,0 +1,333 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The 22 functions of Bouthors 2008, section 5.2, fitted to the tables, in optical lengths.
+
+With theta the scattering angle, phi_L = acos(mu_L) and the paper's functions in capitals,
+
+    T     = P(theta) A X mu_L log(d + D)/log(B + D) exp(-(d - B)^2/(2 C^2)),     B = B1(t, mu) - B2(t, mu_L),
+    c_y   = F sin phi sin(G phi_L) log(1 + E d) + H sin phi sin phi_L,
+    c_x   = (I + J (cos phi sin(K phi_L) + L phi_L)) log(1 + E d) + M + N cos phi,
+    sigma = O + Q t log(1 + R d) + S log(1 + T t),
+
+A, C, D of (t, mu), X of (t, mu_L), E to M of mu, N of (mu, mu_L), O to T numbers. The paper's c_x is c_y here and its
+c_z is c_x. It prints no fitted value, so all are fitted here, one set at a time, by least squares as the paper says.
+
+As printed, the logarithms depend on the unit of length, change sign at d + D = 1, and the quotient is singular at
+B + D = 1: D is kept above 1.01 and B + D above 1.05, in mean free paths.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from realtime.clouds.canonical import coordinates
+from realtime.clouds.canonical.look_up import LookUp, direction_share
+from realtime.clouds.canonical.sets import SETS
+from realtime.numerics.array_types import ArrayTypes
+
+Array = NDArray[Any]
+Progress = Callable[[float, str], None]
+
+_THICKNESSES, _DEPTHS, _SUNS, _DIRECTIONS, _AZIMUTHS = 10, 10, 5, 13, 3
+_ANGLES = 61  #: of P
+_LEAST_D, _LEAST_SUM = 1.01, 1.05
+_FLOOR = 0.02  #: of the brightest of a thickness, below which errors count less
+_ROUNDS = 1  #: of P, fitted to what is left of T
+_DIM = 1e-3  #: of all sets' light, below which a collector does not count
+
+
+@dataclass(frozen=True)
+class FittedSet:
+    """The functions of one set.
+
+    Parameters
+    ----------
+    p
+        (angles,), at even scattering angles.
+    of_directions
+        (thicknesses, directions, 4): log A, B1, C, D.
+    of_suns
+        (thicknesses, suns, 2): log X, B2.
+    collector
+        (directions, 9): E to M.
+    n
+        (directions, suns): N.
+    spread
+        (5,): O, Q, R, S, T.
+    """
+
+    p: Array
+    of_directions: Array
+    of_suns: Array
+    collector: Array
+    n: Array
+    spread: Array
+
+
+@dataclass(frozen=True)
+class _Samples:
+    """Points (thicknesses, depths, suns, directions, azimuths), and what the tables say there."""
+
+    t: Array
+    d: Array
+    mu_l: Array
+    mu: Array
+    phi: Array
+    T: Array
+    c_x: Array
+    c_y: Array
+    sigma: Array
+    share: Array  #: of the light of all sets
+
+
+def fit_tables(look_up: LookUp, types: ArrayTypes, *, progress: Progress | None = None) -> tuple[FittedSet, ...]:
+    """Fit the functions to tables.
+
+    Parameters
+    ----------
+    look_up
+        Of the tables, `realtime.clouds.canonical.look_up.on_device`.
+    types
+        Of its numbers.
+    progress
+        Called with (share done, what).
+    """
+    tell = progress or (lambda share, what: None)
+    samples = _samples(look_up, types)
+    fitted = []
+    for number, of_set in enumerate(samples):
+        tell(number / len(SETS), f"set {number + 1} of {len(SETS)}")
+        of_directions, of_suns, p = _fit_transport(of_set, constant=number == len(SETS) - 1)
+        collector, n = _fit_collector(of_set)
+        fitted.append(FittedSet(p, of_directions, of_suns, collector, n, _fit_spread(of_set)))
+    return tuple(fitted)
+
+
+def _axes() -> tuple[Array, Array, Array]:
+    return coordinates.thicknesses(_THICKNESSES), coordinates.suns(_SUNS), coordinates.directions(_DIRECTIONS)
+
+
+def _samples(look_up: LookUp, types: ArrayTypes) -> list[_Samples]:
+    thicknesses, suns, directions = _axes()
+    azimuths = (np.arange(_AZIMUTHS) + 0.5) * np.pi / _AZIMUTHS
+    depths = np.stack([coordinates.depths(_DEPTHS, t) for t in thicknesses])
+    shape = (_THICKNESSES, _DEPTHS, _SUNS, _DIRECTIONS, _AZIMUTHS)
+    t, mu_l, mu, phi = (
+        np.broadcast_to(values.reshape([-1 if axis == place else 1 for axis in range(5)]), shape)
+        for values, place in ((thicknesses, 0), (suns, 2), (directions, 3), (azimuths, 4))
+    )
+    d = np.broadcast_to(depths[:, :, None, None, None], shape)
+    given = [types.scalar(values.ravel()) for values in (t, d, mu, np.cos(phi), np.sin(phi), mu_l)]
+    values: list[Any] = []
+    for number in range(len(SETS)):
+        results = look_up(number, *given)
+        dr.eval(results)
+        values.append([np.array(each, dtype=np.float64).reshape(shape) for each in results])
+    light = np.maximum(np.sum([each[0] for each in values], axis=0), 1e-300)
+    values = [(*each, each[0] / light) for each in values]
+    return [_Samples(t, d, mu_l, mu, phi, *each) for each in values]
+
+
+def _angles(samples: _Samples) -> Array:
+    sines = np.sqrt((1 - samples.mu**2) * (1 - samples.mu_l**2))
+    return np.arccos(np.clip(sines * np.cos(samples.phi) - samples.mu * samples.mu_l, -1, 1))
+
+
+def _fit_transport(samples: _Samples, *, constant: bool) -> tuple[Array, Array, Array]:
+    """Return log A, B1, C, D; log X, B2; and P."""
+    at = np.linspace(0, np.pi, _ANGLES)
+    angles = _angles(samples)
+    p = np.ones(_ANGLES)
+    of_directions = np.zeros((_THICKNESSES, _DIRECTIONS, 4))
+    of_suns = np.zeros((_THICKNESSES, _SUNS, 2))
+    for turn in range(_ROUNDS + (not constant)):
+        values = np.interp(angles, at, p)
+        model = np.empty_like(samples.T)
+        for number in range(_THICKNESSES):
+            start = (of_directions[number], of_suns[number]) if turn else None
+            of_directions[number], of_suns[number], model[number] = _fit_thickness(samples, number, values, start)
+        if constant:
+            break
+        # P takes what is left at each angle, weighted as T is fitted.
+        weight = 1 / (samples.T + _floor(samples)) ** 2
+        bins = np.rint(angles / np.pi * (_ANGLES - 1)).astype(np.int64).ravel()
+        above = np.bincount(bins, (weight * samples.T * model).ravel(), _ANGLES)
+        below = np.bincount(bins, (weight * model**2).ravel(), _ANGLES)
+        seen = below > 0
+        p *= np.interp(at, at[seen], np.maximum(above[seen] / below[seen], 1e-3))
+    return of_directions, of_suns, p
+
+
+def _floor(samples: _Samples) -> Array:
+    return _FLOOR * samples.T.max(axis=(1, 2, 3, 4), keepdims=True) + 1e-30
+
+
+def _fit_thickness(
+    samples: _Samples, number: int, p: Array, start: tuple[Array, Array] | None
+) -> tuple[Array, Array, Array]:
+    """Fit one thickness, all directions and suns together; return the functions and the modelled T."""
+    t, T = float(samples.t[number].flat[0]), samples.T[number]
+    d, mu_l = samples.d[number, :, 0, 0, 0], samples.mu_l[number, 0, :, 0, 0]
+    scale = T + _floor(samples)[number]
+    first = _DIRECTIONS * 4
+    if start is None:
+        typical = max(float(np.median(T[T > 0])) if (T > 0).any() else 1e-30, 1e-30)
+        begin = np.tile([np.log(typical), t / 3, max(t / 2, 0.1), 0.5], (_DIRECTIONS, 1))
+        start = begin, np.zeros((_SUNS, 2))
+    else:
+        directions, suns = start
+        # C and D are kept positive by their logarithms.
+        directions = directions.copy()
+        directions[:, 3] = np.log(np.maximum(directions[:, 3] - _LEAST_D, 1e-6))
+        start = directions, suns
+
+    def model(x: Array) -> Array:
+        of_mu, of_sun = x[:first].reshape(-1, 4), x[first:].reshape(-1, 2)
+        log_a, b1, c, log_d = of_mu.T
+        log_x, b2 = of_sun.T
+        shift = _LEAST_D + np.exp(np.clip(log_d, -14, 14))
+        b = b1 - b2[:, None]
+        ratio = np.log(d[:, None, None] + shift) / np.log(np.maximum(b + shift, _LEAST_SUM))
+        width = np.maximum(np.abs(c), 1e-3 * t)
+        bell = np.exp(np.clip(log_a + log_x[:, None], -200, 50) - (d[:, None, None] - b) ** 2 / (2 * width**2))
+        return (bell * ratio * mu_l[:, None])[..., None] * p[number]
+
+    # Least squares with a Jacobian by differences: the functions of one direction touch no other direction.
+    fitted = least_squares(
+        lambda x: ((model(x) - T) / scale).ravel(),
+        np.concatenate([each.ravel() for each in start]),
+        method="trf",
+        max_nfev=12,
+        x_scale="jac",
+    )
+    of_mu, of_sun = fitted.x[:first].reshape(-1, 4).copy(), fitted.x[first:].reshape(-1, 2)
+    of_mu[:, 2] = np.maximum(np.abs(of_mu[:, 2]), 1e-3 * t)
+    of_mu[:, 3] = _LEAST_D + np.exp(np.clip(of_mu[:, 3], -14, 14))
+    return of_mu, of_sun, model(fitted.x)
+
+
+def _fit_collector(samples: _Samples) -> tuple[Array, Array]:
+    """Return E to M by direction, and N by direction and sun."""
+    collector, n = np.zeros((_DIRECTIONS, 9)), np.zeros((_DIRECTIONS, _SUNS))
+    for number in range(_DIRECTIONS):
+        part = (slice(None), slice(None), slice(None), number)
+        seen = samples.share[part] > _DIM
+        if seen.sum() < 40:
+            seen = samples.T[part] > 0
+        d, mu_l, phi, sigma = (each[part][seen] for each in (samples.d, samples.mu_l, samples.phi, samples.sigma))
+        sun = np.broadcast_to(np.arange(_SUNS)[:, None], samples.d[part].shape)[seen]
+        c_x, c_y = samples.c_x[part][seen], samples.c_y[part][seen]
+        phi_l = np.arccos(mu_l)
+
+        def errors(x: Array) -> Array:
+            along, across = _collector(x[:9], x[9 + sun], d, phi, phi_l)  # noqa: B023
+            return np.concatenate([(along - c_x) / sigma, (across - c_y) / sigma])  # noqa: B023
+
+        start = np.concatenate([[1.0, -0.5, 1.0, -0.2, -0.1, -0.5, 1.0, 0.5, 0.0], np.zeros(_SUNS)])
+        fitted = least_squares(errors, start, method="trf", max_nfev=60, loss="soft_l1")
+        collector[number], n[number] = fitted.x[:9], fitted.x[9:]
+    return collector, n
+
+
+def _collector(x: Array, n: Array, d: Array, phi: Array, phi_l: Array) -> tuple[Array, Array]:
+    """Return c_x and c_y of the form."""
+    e, f, g, h, i, j, k, ell, m = x
+    depth = np.log1p(np.abs(e) * d)
+    along = (i + j * (np.cos(phi) * np.sin(k * phi_l) + ell * phi_l)) * depth + m + n * np.cos(phi)
+    across = f * np.sin(phi) * np.sin(g * phi_l) * depth + h * np.sin(phi) * np.sin(phi_l)
+    return along, across
+
+
+def _fit_spread(samples: _Samples) -> Array:
+    """Return O, Q, R, S, T."""
+    seen = samples.share > _DIM
+    t, d, sigma = (each[seen][::3] for each in (samples.t, samples.d, samples.sigma))
+
+    def model(x: Array) -> Array:
+        o, q, r, s, big_t = x
+        return o + q * t * np.log1p(np.abs(r) * d) + s * np.log1p(np.abs(big_t) * t)
+
+    fitted = least_squares(lambda x: model(x) / sigma - 1, [0.1, 0.01, 1.0, 0.5, 1.0], max_nfev=200, loss="soft_l1")
+    x = fitted.x
+    return np.array([x[0], x[1], abs(x[2]), x[3], abs(x[4])])
+
+
+def fit_on_device(fitted: tuple[FittedSet, ...], types: ArrayTypes) -> "DeviceFit":
+    """Return the look-up of fitted functions, with the arguments and results of that of tables.
+
+    Depths are kept within the slab, thicknesses and suns within those that were fitted; sigma is kept positive.
+    """
+    Float = types.scalar
+
+    def arrays(number: int) -> dict[str, Any]:
+        each = fitted[number]
+        by_name = {"p": each.p, "of_directions": each.of_directions, "of_suns": each.of_suns}
+        by_name |= {"collector": each.collector, "n": each.n}
+        return {name: Float(np.ascontiguousarray(values).ravel()) for name, values in by_name.items()}
+
+    made = DeviceFit(
+        tuple(arrays(number) for number in range(len(fitted))),
+        tuple(tuple(float(value) for value in each.spread) for each in fitted),
+    )
+    dr.make_opaque(made)
+    return made
+
+
+@dataclass(frozen=True)
+class DeviceFit:
+    """Fitted functions as a `LookUp`; their arrays are fields, so that recorded functions take them as inputs."""
+
+    tables: tuple[dict[str, Any], ...]
+    spreads: tuple[tuple[float, ...], ...]
+
+    def __call__(self, set_number: int, t, d, mu, cos_phi, sin_phi, mu_l):
+        """Return T [1/sr], c_x, c_y, sigma [mean free paths]."""
+        Float, table = type(t), self.tables[set_number]
+        low, high = np.log(np.array([coordinates.THINNEST, coordinates.THICKEST]) + coordinates.THICKNESS_SHIFT)
+        low_sun = coordinates.lowest_sun_coordinate()
+        t = dr.clip(t, coordinates.THINNEST, coordinates.THICKEST)
+        d = dr.clip(d, 0, t)
+        sun = dr.clip(mu_l, coordinates.LOWEST_SUN, 1)
+        phi_l = dr.acos(sun)
+        at_t = (dr.log(t + coordinates.THICKNESS_SHIFT) - low) / (high - low)
+        at_sun = (dr.sqrt(dr.asin(sun) * (2 / np.pi)) - low_sun) / (1 - low_sun)
+        at_mu = direction_share(dr.clip(mu, -1, 1))
+        cosine = dr.fma(dr.safe_sqrt((1 - mu * mu) * (1 - sun * sun)), cos_phi, -mu * sun)
+        (p,) = _along(Float, table["p"], [(dr.safe_acos(cosine) / np.pi, _ANGLES)], 1)
+        direction, height = (at_mu, _DIRECTIONS), (at_sun, _SUNS)
+        log_a, b1, c, shift = _along(Float, table["of_directions"], [(at_t, _THICKNESSES), direction], 4)
+        log_x, b2 = _along(Float, table["of_suns"], [(at_t, _THICKNESSES), height], 2)
+        e, f, g, h, i, j, k, ell, m = _along(Float, table["collector"], [direction], 9)
+        (n,) = _along(Float, table["n"], [direction, height], 1)
+        b = b1 - b2
+        ratio = dr.log(d + shift) / dr.log(dr.maximum(b + shift, _LEAST_SUM))
+        T = p * mu_l * ratio * dr.exp(log_a + log_x - 0.5 * dr.square((d - b) / c))
+        depth = dr.log(1 + dr.abs(e) * d)
+        c_x = (i + j * (cos_phi * dr.sin(k * phi_l) + ell * phi_l)) * depth + m + n * cos_phi
+        c_y = sin_phi * (f * dr.sin(g * phi_l) * depth + h * dr.sin(phi_l))
+        o, q, r, s, big_t = self.spreads[set_number]
+        sigma = o + q * t * dr.log(1 + r * d) + s * dr.log(1 + big_t * t)
+        return dr.select(mu_l > 0, T, 0), c_x, c_y, dr.maximum(sigma, 1e-3)
+
+
+def _along(Float, table, places: list[tuple[Any, int]], width: int) -> list[Any]:
+    """Return the numbers of a table, linear between entries along one or two coordinates from 0 to 1."""
+    corners = [(mi.UInt32(0), Float(1))]
+    for share, count in places:
+        position = dr.clip(share, 0, 1) * (count - 1)
+        cell = dr.minimum(mi.UInt32(position), count - 2)
+        weight = position - Float(cell)
+        corners = [
+            (index * count + cell + step, part * (weight if step else 1 - weight))
+            for index, part in corners
+            for step in (0, 1)
+        ]
+    return [
+        sum(part * dr.gather(Float, table, index * width + number) for index, part in corners)
+        for number in range(width)
+    ]

@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The collector search of Bouthors 2008: where the light of a set of orders enters a cloud, and how much of it comes.
+
+Read in this order:
+
+- `tangent_slab.py`: the slab that touches the filtered surface, and a point and a view in it;
+- `search.py`: the fixed point of the collector, and the light that comes from there;
+- `orders.py`: one search for each set of orders;
+- `transport_grid.py`: the canonical transport on a grid that frames read fast.
+
+May import: `realtime.clouds.canonical`, `realtime.clouds.light_maps`, `realtime.numerics`.
+"""

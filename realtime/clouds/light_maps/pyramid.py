@@ -1,0 +1,263 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""The lit surface of a cloud filtered to any width: premultiplied MIP levels, read between texels and levels.
+
+With A = 1 where a ray of the light meets the cloud and 0 elsewhere, each level holds the means over squares of 2^l
+texels of
+
+    A,   A front,   A back,   A (u, v),   A n,
+
+so that what is read of them over what is read of A is the mean over the cloud alone, and what lies beside it counts
+for nothing (Bouthors 2008, section 7; Dachsbacher and Stamminger 2003). The mean of (u, v) is no part of the paper: it
+says *where* the mean of the heights is. Over the middle of a cloud it is the place that was asked for; at a silhouette
+it lies on the side of the cloud, and a tangent plane through the mean height must go through it there.
+
+*Width*. A mean over a square of width w has the variance w^2/12 along each axis, and what is linear between such means
+adds the w^2/6 of a tent: w^2/4 together. So the level of a filter of standard deviation sigma is
+
+    w = 2 sigma,   l = log2(2 sigma / texel),
+
+and what lies between two levels is linear in l.
+
+*Holes*. Where all texels that are read have A = 0 there is no mean. So a texel without cloud takes what its parent
+holds, with the weight `HOLE`: a look-up beside the cloud finds what is nearest to it, from the finest level that holds
+anything of the cloud, and a look-up at the cloud is changed by a share of `HOLE` at most. Holes are filled when all
+levels are there, from the coarsest down, so that no mean counts them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from realtime.clouds.light_maps.surfaces import LitSurfaces, cast_surfaces
+from realtime.numerics.array_types import Metres, PerRay, bytes_of, four_numbers
+from realtime.scene.lights import Light
+from realtime.shadow_maps.projection import Projection, light_projection
+
+HOLE = 1e-6  #: weight of a texel without cloud
+
+
+@dataclass(frozen=True)
+class LightMap:
+    """The levels of the maps of all clouds, cloud after cloud, the finest level first, row by row."""
+
+    size: int  #: texels on a side of the finest level
+    heights: Any  #: by texel A, A front [m], A back [m], A u
+    normals: Any  #: by texel A n, A v
+    texel: Any  #: width of a texel of the finest level [m]
+    position: Any  #: middle of the rectangle where heights are 0 [m]
+    projection: Projection
+    before: Any = 0  #: texels before those of the cloud that is asked for, one for all lanes or by lane
+
+    def of_cloud(self, number: PerRay) -> "LightMap":
+        """Return the map in which lanes look at a cloud of their own."""
+        return replace(self, before=number * _texels_before(self.size, self.levels))
+
+    @property
+    def levels(self) -> int:
+        """How many levels there are."""
+        return self.size.bit_length()
+
+    @property
+    def axis(self) -> Any:
+        """The direction in which the light travels."""
+        return self.projection.parallel_axis
+
+
+@dataclass(frozen=True)
+class _Level:
+    """One level, row by row."""
+
+    heights: Any  #: A, A front, A back, A u
+    normals: Any  #: A n, A v
+
+
+@dataclass(frozen=True)
+class FilteredSurface:
+    """The lit surface near some points, filtered."""
+
+    cover: Any  #: share of the filter's width in which there is cloud; about `HOLE` or less where there is none
+    middle: Any  #: the middle of that part of the surface [m]
+    thickness: Any  #: from the first to the last surface, along the light [m]
+    normal: Any  #: of unit length, towards the light
+
+
+def light_map(clouds: Sequence[Any], light: Light, size: int) -> LightMap:
+    """Return the map of clouds under one directional light.
+
+    Parameters
+    ----------
+    clouds
+        By cloud a Mitsuba scene of its boundary alone.
+    light, size
+        See `cast_surfaces`, which says what is refused, too.
+    """
+    return filtered_map([cast_surfaces(cloud, light, size) for cloud in clouds], light)
+
+
+def filtered_map(surfaces: Sequence[LitSurfaces], light: Light) -> LightMap:
+    """Return all levels of a map from the finest of each cloud."""
+    Float = type(light.position.x)
+    size, projection = surfaces[0].size, light_projection(light)
+    texels = _texels_before(size, size.bit_length())
+    heights, normals = (dr.empty(Float, 4 * texels * len(surfaces)) for _ in range(2))
+    for number, cloud in enumerate(surfaces):
+        for finer, level in enumerate(_filled_levels(cloud, projection.parallel_axis)):
+            place = dr.arange(mi.UInt32, (size >> finer) ** 2) + (_texels_before(size, finer) + number * texels)
+            dr.scatter(heights, level.heights, place)
+            dr.scatter(normals, level.normals, place)
+    assert projection.basis is not None
+    across, up, _ = projection.basis
+    texel = (2.0 / size) * dr.sqrt(dr.norm(across) * dr.norm(up))
+    dr.eval(heights, normals, texel)
+    return LightMap(size, heights, normals, texel, light.position, projection)
+
+
+def _filled_levels(surfaces: LitSurfaces, axis: Any) -> list[_Level]:
+    """Return the levels of one cloud, without holes."""
+    Float = type(surfaces.front)
+    Four, size = four_numbers(Float), surfaces.size
+    texels = dr.arange(mi.UInt32, size * size)
+    row = texels // size
+    u, v = (dr.fma(Float(texel), 2.0 / size, 1.0 / size - 1) for texel in (texels - row * size, row))
+    cover = dr.select(surfaces.there, Float(1), 0)
+    levels = [
+        _Level(
+            Four(cover, surfaces.front, surfaces.back, cover * u),
+            Four(surfaces.normal.x, surfaces.normal.y, surfaces.normal.z, cover * v),
+        )
+    ]
+    while len(levels) < size.bit_length():
+        dr.eval(levels[-1])
+        side = size >> len(levels)
+        levels.append(_Level(*(_means(part, side) for part in (levels[-1].heights, levels[-1].normals))))
+    dark = _Level(Four(1, 0, 0, 0), Four(-axis.x, -axis.y, -axis.z, 0))
+    filled = [_filled(levels[-1], dark)]
+    for number in range(len(levels) - 2, -1, -1):
+        dr.eval(filled[0])
+        parent = _parents(size >> number)
+        coarser = _Level(*(dr.gather(Four, part, parent) for part in (filled[0].heights, filled[0].normals)))
+        filled.insert(0, _filled(levels[number], coarser))
+    return filled
+
+
+def maps_memory(Float: Any, size: int) -> int:
+    """Return how much the map of a cloud and a sun takes, in numbers of a type [bytes]."""
+    return 8 * bytes_of(Float) * _texels_before(size, size.bit_length())
+
+
+def map_place(light_map: LightMap, point) -> tuple[Any, Any]:
+    """Return (u, v) of points [m] on a map; beyond -1 or 1 they lie beside it."""
+    u, v, _, _ = light_map.projection.homogeneous(mi.UInt32(0), point - light_map.position, 1)
+    return u, v
+
+
+def filtered_surface(light_map: LightMap, point, width: Metres) -> FilteredSurface:
+    """Return the lit surface that points lie under, or over, along the light.
+
+    Parameters
+    ----------
+    light_map
+        Of a cloud and a light.
+    point
+        Points [m].
+    width
+        Standard deviation of the filter [m].
+
+    Notes
+    -----
+    Valid for any point and any width of 0 or more; what lies beside the map has the values of its edge.
+    """
+    Float = type(width)
+    level = dr.clip(dr.log2(dr.maximum(2 * width / light_map.texel, 1)), 0, light_map.levels - 1)
+    fine = dr.minimum(mi.UInt32(level), light_map.levels - 1)
+    coarse = dr.minimum(fine + 1, light_map.levels - 1)
+    share = level - Float(fine)
+    place = map_place(light_map, point)
+    sums = [_at_level(light_map, place, number) for number in (fine, coarse)]
+    cover, front, back, u = dr.lerp(sums[0][0], sums[1][0], share)
+    *normal, v = dr.lerp(sums[0][1], sums[1][1], share)
+    inverse = dr.rcp(cover)
+    assert light_map.projection.basis is not None
+    across, up, axis = light_map.projection.basis
+    middle = light_map.position + across * (u * inverse) + up * (v * inverse) - axis * (front * inverse)
+    return FilteredSurface(cover, middle, (front - back) * inverse, dr.normalize(type(point)(*normal)))
+
+
+def length_along_light(light_map: LightMap, point, active: Any = True) -> Metres:
+    """Return how much of the way of the light to points lies in a cloud [m].
+
+    From its first surface to the point, or to its last: what lies between both is cloud, also clear air between two
+    lobes (Bouthors 2008, section 7). Parameters are those of `filtered_surface`; here the surface is that of the finest
+    level.
+    """
+    u, v, height, _ = light_map.projection.homogeneous(mi.UInt32(0), point - light_map.position, 1)
+    cover, front, back, _ = _between_texels(light_map, light_map.heights, (u, v), mi.UInt32(0), active)
+    length = dr.maximum(dr.minimum(front - height * cover, front - back), 0) / cover
+    return dr.select(cover > 0.5, length, 0)
+
+
+def _at_level(light_map: LightMap, place: tuple[PerRay, PerRay], level: PerRay) -> tuple[Any, Any]:
+    """Return both quadruples between the texels of a level."""
+    return tuple(_between_texels(light_map, table, place, level) for table in (light_map.heights, light_map.normals))
+
+
+def _between_texels(light_map: LightMap, table: Any, place: Any, level: PerRay, active: Any = True) -> Any:
+    """Return the four numbers of a table between the texels of a level."""
+    Float = type(table)
+    Four = four_numbers(Float)
+    side = mi.UInt32(light_map.size) >> level
+    before = light_map.before + _texels_before(light_map.size, level)
+    columns, rows = (_neighbours(w, side, Float) for w in place)
+    total = Four(0)
+    for row, down in rows:
+        for column, along in columns:
+            texel = dr.gather(Four, table, before + row * side + column, active)
+            total = dr.fma(texel, down * along, total)
+    return total
+
+
+def _neighbours(place: PerRay, side: PerRay, Float: Any) -> tuple[tuple[PerRay, PerRay], tuple[PerRay, PerRay]]:
+    """Return the numbers of the texels on both sides of u or v, and their weights."""
+    position = dr.clip(dr.fma(0.5 * Float(side), place + 1, -0.5), 0, Float(side) - 1)
+    lower = dr.minimum(mi.UInt32(position), side - 1)
+    share = position - Float(lower)
+    return (lower, 1 - share), (dr.minimum(lower + 1, side - 1), share)
+
+
+def _texels_before(size: int, level: Any) -> Any:
+    """Return how many texels the levels before one have: size^2 (1 + 1/4 + ..)."""
+    if isinstance(level, int):
+        return sum((size >> finer) ** 2 for finer in range(level))
+    side = mi.UInt32(size) >> level
+    return (size * size - side * side) // 3 * 4
+
+
+def _means(part: Any, side: int) -> Any:
+    """Return the means over squares of 2 x 2, (side, side)."""
+    texel = dr.arange(mi.UInt32, side * side)
+    row = texel // side
+    first = 4 * row * side + 2 * (texel - row * side)
+    total = type(part)(0)
+    for place in (first, first + 1, first + 2 * side, first + 2 * side + 1):
+        total += dr.gather(type(part), part, place)
+    return 0.25 * total
+
+
+def _parents(side: int) -> PerRay:
+    """Return the number of the coarser texel that holds each texel of a level."""
+    texel = dr.arange(mi.UInt32, side * side)
+    row = texel // side
+    return (row // 2) * (side // 2) + (texel - row * side) // 2
+
+
+def _filled(level: _Level, coarser: _Level) -> _Level:
+    """Return a level whose texels without cloud hold what the coarser one has there."""
+    hole = level.heights.x == 0
+    weight = HOLE / coarser.heights.x
+    return _Level(
+        dr.select(hole, coarser.heights * weight, level.heights),
+        dr.select(hole, coarser.normals * weight, level.normals),
+    )

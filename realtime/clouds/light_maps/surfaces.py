@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The first and the last surface of a cloud along parallel light, and the normal of the first, in plain arrays.
+
+The rectangle of a directional light is cut into size^2 texels, and a ray goes through the middle of each: from before
+the rectangle's shapes to the first surface, and from behind back to the last. Heights are those of
+`realtime.shadow_maps.projection`: above the rectangle where the media end, so that the lit side is the higher one and
+height falls along the light.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from realtime.scene.lights import Light
+from realtime.shadow_maps.projection import map_ray
+from realtime.shadow_maps.shadow_map import check_size, tiled_corners
+
+
+@dataclass(frozen=True)
+class LitSurfaces:
+    """What rays along the light meet of a cloud, row by row."""
+
+    size: int  #: texels on a side
+    there: Any  #: whether the ray meets the cloud
+    front: Any  #: height of the first surface, 0 where there is none [m]
+    back: Any  #: height of the last surface, 0 where there is none [m]
+    normal: Any  #: outward unit normal of the first surface, towards the light; 0 where there is none
+
+
+def cast_surfaces(cloud, light: Light, size: int) -> LitSurfaces:
+    """Cast both rays of every texel.
+
+    Parameters
+    ----------
+    cloud
+        A Mitsuba scene of the cloud's boundary alone.
+    light
+        A directional light, with an extent that holds the cloud.
+    size
+        Texels on a side, a power of two.
+
+    Raises
+    ------
+    InputError
+        If `size` is not a power of two from 4 to 8192.
+    """
+    check_size(size)
+    Float, Vector = type(light.position.x), type(light.position)
+    _, row, column = tiled_corners(1, size)
+    u, v = (dr.fma(mi.Float64(texel), 2.0 / size, 1.0 / size - 1) for texel in (column, row))
+    start, axis = map_ray(light, mi.UInt32(0), u, v)
+    depth = mi.Float64(light.extent.depth)
+    first = mi.Ray3f(mi.Point3f(start), mi.Vector3f(axis))
+    last = mi.Ray3f(mi.Point3f(start + axis * depth), mi.Vector3f(-axis))
+    hit = cloud.ray_intersect(first, mi.RayFlags.Minimal, True)
+    behind = cloud.ray_intersect_preliminary(last, coherent=True)
+    # At a silhouette one of both rays may slip past: there is no cloud of any thickness.
+    there = hit.is_valid() & behind.is_valid()
+    front, back = dr.select(there, Float(depth) - Float(hit.t), 0), dr.select(there, Float(behind.t), 0)
+    along = dr.dot(hit.n, mi.Vector3f(axis))
+    normal = Vector(dr.select(there, dr.select(along > 0, -hit.n, hit.n), 0))
+    surfaces = LitSurfaces(size, *(dr.empty(type(value), size * size) for value in (there, front, back, normal)))
+    place = row * size + column
+    for array, value in ((surfaces.there, there), (surfaces.front, front), (surfaces.back, back)):
+        dr.scatter(array, value, place)
+    dr.scatter(surfaces.normal, normal, place)
+    dr.eval(surfaces)
+    return surfaces

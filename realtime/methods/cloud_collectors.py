@@ -1,0 +1,322 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Clouds by collectors: light scattered many times, without a walk through the volume (Bouthors 2008).
+
+Where a camera ray meets a cloud, or at the camera if that is within one, light leaves towards the eye. Single
+scattering is integrated along the ray. The light of each set of orders from 2 on is the canonical transport from the
+collector that `realtime.clouds.collectors` finds for it. Each sun has its own maps and searches; a uniform sky is one
+more sun, which shines from above (`Light.sky`). What is behind is seen through the transmittance of the ray.
+
+The peak of a phase function below five degrees is cut from the orders from 2 on, as light in the peak hardly leaves its
+way: with f the share of the peak and a the albedo, the density is (1 - a f) sigma_t and the albedo a (1 - f)/(1 - a f);
+single scattering has P/(1 - a f) with that density (TMS), so that nothing is counted twice. `peak=matched` takes the f
+of the phase function, `half` the printed 0.5, `full` cuts nothing: only then the sets hold the orders of the medium as
+it is.
+
+Of each cloud a ray shows what leaves at the first entry; where it leaves a cloud and enters it again, the slab of the
+first entry stands for both.
+
+References
+----------
+Bouthors, Neyret, Max, Bruneton, Crassin 2008, *Interactive multiple anisotropic scattering in clouds*. Nakajima, Tanaka
+1988, *Algorithms for radiative intensity calculations in moderately thick atmospheres using a truncation approximation*
+(TMS).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from realtime.clouds.bounds.crossings import next_crossing, optical_depths
+from realtime.clouds.bounds.surfaces import CloudSurfaces, cloud_surfaces
+from realtime.clouds.canonical.fit import fit_on_device, fit_tables
+from realtime.clouds.canonical.look_up import on_device
+from realtime.clouds.canonical.scene_phase import share_of_peak, slab_phase
+from realtime.clouds.canonical.sets import SETS
+from realtime.clouds.canonical.tables import canonical_tables
+from realtime.clouds.collectors.orders import light_of_orders
+from realtime.clouds.collectors.search import Search
+from realtime.clouds.collectors.transport_grid import transport_grid
+from realtime.clouds.light_maps.pyramid import LightMap, length_along_light, light_map, maps_memory
+from realtime.clouds.order_layers import OPACITY, order_layer
+from realtime.clouds.single_scattering.behind import light_on_surfaces, sky_behind
+from realtime.clouds.single_scattering.march import Beam, CloudRays, exact_leg, scattered
+from realtime.clouds.single_scattering.opacity import opacity_of, printed_opacity
+from realtime.memory import check_memory
+from realtime.methods.interface.layers import Layers
+from realtime.methods.interface.method import ErrorCause
+from realtime.methods.interface.view import View
+from realtime.numerics.array_types import types_of
+from realtime.parameters import Parameters, parameter
+from realtime.scene.closed_mesh import boundary_scene
+from realtime.scene.medium import Clouds
+from realtime.scene.read_scene import Scene
+from realtime.shadow_maps.shadow_map import map_size
+from realtime.tiles.adaptive_sampling import tolerance
+from realtime.tiles.layout import Layout
+
+_HALF = 0.5  #: of the density, as printed
+#: N0 pi r_e^2 over the extinction by Mie's theory, for the droplets of the paper.
+_PRINTED_EXTINCTION = 0.0452 / 0.0363
+
+
+@dataclass(frozen=True)
+class CollectorParameters(Parameters):
+    """The parameters of the collector method."""
+
+    iterations: int = parameter(10, "steps of a search at most", least=1, most=1000)
+    start: str = parameter(
+        "cold",
+        "a search starts at the point itself, or with the collector of the last frame",
+        choices=("cold", "previous"),
+    )
+    settled: float = parameter(
+        0.0, "step with which a search ends early, as a share of sigma; 0: all steps are taken", least=0, below=1
+    )
+    transport: str = parameter(
+        "grid",
+        "the canonical transport by a grid for frames, by its tables, or by the paper's functions",
+        choices=("grid", "table", "fit"),
+    )
+    thickness: str = parameter(
+        "slab", "slabs as thick as they are across, or along the light, as printed", choices=("slab", "light")
+    )
+    kappa: str = parameter(
+        "mie",
+        "the extinction of the scene, or 24.5 % more, which is what eq. 4 has for droplets",
+        choices=("mie", "printed"),
+    )
+    peak: str = parameter(
+        "matched",
+        "the density loses what the phase function loses below 5 degrees, or half, as printed, or both lose nothing",
+        choices=("matched", "half", "full"),
+    )
+    single: str = parameter(
+        "corrected", "single scattering as derived, or by eq. 1 as printed", choices=("corrected", "printed")
+    )
+    opacity: str = parameter(
+        "corrected", "opacity as derived, or by eq. 2 as printed", choices=("corrected", "printed")
+    )
+    legs: str = parameter(
+        "map", "the way of the sun's light to a point by the light map, or by cast rays", choices=("map", "exact")
+    )
+    steps: int = parameter(16, "steps of single scattering along a ray", least=1, most=4096)
+    map: int = map_size(512, "texels on a side of the maps of a sun")
+    tolerance: float = tolerance()
+
+
+@dataclass(frozen=True)
+class Filling:
+    """A phase function and an albedo that occur in clouds, and the canonical transport of both."""
+
+    transport: Any
+    clouds: tuple[Any, ...]  #: by channel, 1 for each cloud that is filled with it, otherwise 0
+
+
+@dataclass(frozen=True)
+class CloudState:
+    """What frames need of clouds and suns."""
+
+    surfaces: CloudSurfaces
+    maps: tuple[LightMap, ...]  #: by sun
+    fillings: tuple[Filling, ...]
+    left: tuple[Any, ...]  #: by channel, what is left of the extinction of each cloud without the peak [1]
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """Where camera rays meet a cloud."""
+
+    point: Any  #: on its boundary, or the camera within it [m]
+    cloud: Any  #: its number
+    there: Any  #: whether there is one before the visible surface
+
+
+def carries(parameters: CollectorParameters) -> bool:
+    """Return whether frames hand their collectors on."""
+    return parameters.start == "previous"
+
+
+def prepare_collectors(scene: Scene, parameters: CollectorParameters) -> Callable[[Scene], CloudState]:
+    """Return the function that makes the light maps of a frame; tables and boundaries are made here, once.
+
+    Raises
+    ------
+    InputError
+        If the maps need more memory than the machine has.
+    """
+    suns, clouds = len(scene.lights), len(scene.boundaries)
+    needed = suns * clouds * maps_memory(type(scene.camera.origin.x), parameters.map)
+    check_memory(f"map: {parameters.map} texels for {suns} sun(s) and {clouds} cloud(s)", needed, "use a smaller map")
+    fillings, left = _fillings(scene, parameters)
+    surfaces = cloud_surfaces(scene)
+    bodies = [boundary_scene((shape,)) for shape in scene.boundaries]
+
+    def cast(scene: Scene) -> CloudState:
+        maps = tuple(light_map(bodies, light, parameters.map) for light in scene.lights)
+        return CloudState(surfaces, maps, fillings, left)
+
+    return cast
+
+
+def _fillings(scene: Scene, parameters: CollectorParameters) -> tuple[tuple[Filling, ...], tuple[Any, ...]]:
+    """Return what clouds are filled with, each phase function and albedo once, and `CloudState.left`."""
+    clouds = scene.medium.clouds
+    assert clouds is not None
+    types = types_of(type(scene.camera.origin.x))
+    phases = np.array(clouds.phase)
+    albedos = np.array(clouds.albedo, dtype=np.float64).reshape(3, -1)
+    grey = len(clouds.sigma_t) == 1 and np.all(albedos == albedos[0])
+    albedos = albedos[:1] if grey else albedos
+    fillings, left = [], np.ones_like(albedos)
+    for phase, albedo in sorted({(int(phase), float(value)) for row in albedos for phase, value in zip(phases, row)}):
+        known = clouds.phases[phase]
+        share = {"matched": share_of_peak(known, types), "half": _HALF, "full": 0.0}[parameters.peak]
+        filled = (phases == phase) & (albedos == albedo)
+        left[filled] = 1 - albedo * share
+        tables = canonical_tables(
+            slab_phase(known, types, modified=parameters.peak != "full"), albedo * (1 - share) / (1 - albedo * share)
+        )
+        transport: Any = on_device(tables, types)
+        if parameters.transport == "grid":
+            transport = transport_grid(transport, tables.angular, len(SETS))
+        elif parameters.transport == "fit":
+            transport = fit_on_device(fit_tables(transport, types), types)
+        fillings.append(Filling(transport, tuple(mi.UInt32(row.astype(np.uint32)) for row in filled)))
+    by_channel = tuple(types.scalar(row) for row in left)
+    dr.make_opaque([filling.clouds for filling in fillings], by_channel)
+    return tuple(fillings), by_channel
+
+
+def collector_errors(parameters: CollectorParameters, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
+    """Return the causes of its errors, as `realtime.methods.interface.method.Method.error_causes` has them."""
+    return ("resolution", {"tolerance": 0.0}), ("map", {"map": 2048}), ("search", {"iterations": 40}), ("slab", None)
+
+
+def cloud_collectors(view: View, state: CloudState, lists, *, kernel, parameters: CollectorParameters) -> Layers:
+    """Return the light of clouds along every ray [W/(m^2 sr)].
+
+    Parameters
+    ----------
+    view
+        The frame.
+    state
+        From `prepare_collectors`.
+    lists, kernel
+        Not used.
+    parameters
+        Values of the parameters.
+    """
+    assert view.medium.clouds is not None
+    Float, Color = type(view.distance), type(view.medium.albedo)
+    clouds = _as_dense(view.medium.clouds, parameters)
+    thin = _without_peak(clouds, state)
+    both = replace(clouds, sigma_t=(*clouds.sigma_t, *thin.sigma_t))
+    depths = optical_depths(state.surfaces, both, view.origin, view.direction, view.distance)
+    channels = len(clouds.sigma_t)
+    rays = CloudRays(state.surfaces, clouds, view.origin, view.direction, view.distance, depths[:channels])
+    thin_rays = replace(rays, clouds=thin, depths=depths[channels:])
+    beams = [_beam(view, state, thin, number, parameters) for number in range(len(view.lights))]
+    once = scattered(thin_rays, beams, steps=parameters.steps, printed=parameters.single == "printed")
+    first = next_crossing(state.surfaces, view.origin, view.direction, dr.zeros(Float, dr.width(view.direction)))
+    begin = dr.select(first.leaves, 0, first.distance)
+    there = dr.isfinite(begin) & (begin < view.distance)
+    entry = _Entry(view.origin + view.direction * dr.select(there, begin, 0), first.cloud, there)
+    by_set, kept = [sum(radiance for (radiance,) in once), *(Color(0) for _ in SETS)], []
+    for number, (light, sun) in enumerate(zip(view.lights, state.maps)):
+        last = view.carried[number] if view.carried is not None else None
+        shown = sun.of_cloud(first.cloud)
+        parts, collectors = _many_times(view, state, thin, entry, shown, last=last, parameters=parameters)
+        by_set[1:] = [sum_ + light.intensity * part for sum_, part in zip(by_set[1:], parts)]
+        kept.append(collectors)
+    if parameters.opacity == "printed":
+        opacity = printed_opacity(state.surfaces, clouds, view.origin, view.direction, view.distance)
+    else:
+        opacity = opacity_of(rays.depths, Color)
+    names = (order_layer(first) for first in (1, *(int(first) for first, _ in SETS)))
+    extra = dict(zip(names, by_set)) | {OPACITY: opacity} if view.extra_layers else None
+    return Layers(
+        sum(by_set),
+        tuple(light_on_surfaces(rays, exact_leg(state.surfaces, clouds, light)) for light in view.lights),
+        1 - opacity,
+        sky_behind(view.lights, view.distance, Color),
+        extra,
+        tuple(kept) if carries(parameters) else None,
+    )
+
+
+def _as_dense(clouds: Clouds, parameters: CollectorParameters) -> Clouds:
+    """Return clouds as dense as they are, or as eq. 4 makes them."""
+    if parameters.kappa == "mie":
+        return clouds
+    return replace(clouds, sigma_t=tuple(sigma_t * _PRINTED_EXTINCTION for sigma_t in clouds.sigma_t))
+
+
+def _without_peak(clouds: Clouds, state: CloudState) -> Clouds:
+    """Return clouds without the peak of their phase functions, which scatter once as much as those with it (TMS)."""
+    channels = range(len(state.left))
+    sigma_t = tuple(clouds.sigma_t[min(c, len(clouds.sigma_t) - 1)] * state.left[c] for c in channels)
+    albedo = [value / state.left[min(c, channels[-1])] for c, value in enumerate(clouds.albedo)]
+    return replace(clouds, sigma_t=sigma_t, albedo=type(clouds.albedo)(*albedo))
+
+
+def _beam(view: View, state: CloudState, clouds: Clouds, number: int, parameters: CollectorParameters) -> Beam:
+    """Return a sun as points in clouds see it that scatter once."""
+    light, sun = view.lights[number], state.maps[number]
+    Float = type(view.distance)
+
+    def by_map(point, active):
+        depths = [Float(0) for _ in clouds.sigma_t]
+        for cloud in range(dr.width(clouds.phase)):
+            length = length_along_light(sun.of_cloud(mi.UInt32(cloud)), point, active)
+            kappas = (dr.gather(Float, sigma_t, mi.UInt32(cloud)) for sigma_t in clouds.sigma_t)
+            depths = [dr.fma(kappa, length, depth) for kappa, depth in zip(kappas, depths)]
+        return tuple(depths)
+
+    leg = by_map if parameters.legs == "map" else exact_leg(state.surfaces, clouds, light)
+    lit = (lambda point, active: view.visible(point, light)) if view.features.shadows else None
+    cosine = -dr.dot(view.direction, light.axis)
+    return Beam(light.intensity, (Float(1),), (tuple(phase.evaluate(cosine) for phase in clouds.phases),), leg, lit)
+
+
+def _many_times(
+    view: View, state: CloudState, clouds: Clouds, entry: _Entry, sun: LightMap, *, last: Any, parameters: Any
+):
+    """Return the light of a sun that was scattered twice and more, for unit irradiance across the beam [1/sr].
+
+    Returns
+    -------
+    by_set
+        A colour for each set of orders.
+    kept
+        What the next frame takes as `last`: collectors by channel and filling. Of an interpolated frame, those of the
+        corners of tiles go on for all their pixels.
+    """
+    Float, Color = type(view.distance), type(view.medium.albedo)
+    search = Search(parameters.iterations, parameters.settled, parameters.thickness == "light")
+    sums, kept = [], []
+    for channel, own in enumerate(clouds.sigma_t):
+        sigma_t = dr.gather(Float, own, entry.cloud, entry.there)
+        of_fillings, of_channel = [], []
+        for number, filling in enumerate(state.fillings):
+            filled = entry.there & (dr.gather(mi.UInt32, filling.clouds[channel], entry.cloud, entry.there) != 0)
+            light = light_of_orders(
+                sun,
+                filling.transport,
+                sets=len(SETS),
+                point=entry.point,
+                toward=-view.direction,
+                extinction=dr.select(filled, sigma_t, 1),
+                search=search,
+                last=None if last is None else last[channel][number],
+                place=view.tile if view.layout is Layout.SOME else None,
+                active=filled,
+            )
+            of_fillings.append(light.by_set)
+            of_channel.append(light.collectors)
+        kept.append(tuple(of_channel))
+        sums.append([sum(parts) for parts in zip(*of_fillings)])
+    return tuple(Color(*parts) for parts in zip(*(sums * (3 // len(sums))))), tuple(kept)

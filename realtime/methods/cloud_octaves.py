@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Octaves: many orders of scattering as single scattering that is extinguished less and less, what engines do.
+
+Light that was scattered more often comes in with less extinction and from more directions. So octave n is light of one
+scattering, the depth of its leg times a^n, its amount times b^n, the mean cosine of its phase function times c^n:
+
+    L = sum_{n < N} b^n w E/(4 pi) int kappa P_n(cos) exp(-tau(x) - a^n l(x)) dx.
+
+Wrenninge 2013 halves all three with every octave; Hillaire 2016 leaves a, b and c to the artist and asks for b <= a, so
+that no octave makes light. Octave 0 is single scattering, with the phase function of the scene; the others have that of
+Henyey and Greenstein with c^n times its mean cosine. Their light belongs to no order: for errors by order, octave n
+counts as the order n + 1, which it stands for.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from realtime.clouds.bounds.crossings import sum_over_stretches
+from realtime.clouds.bounds.surfaces import CloudSurfaces, cloud_surfaces
+from realtime.clouds.order_layers import OPACITY, order_layer
+from realtime.clouds.single_scattering.behind import light_on_surfaces, sky_behind
+from realtime.clouds.single_scattering.march import Beam, cloud_rays, exact_leg, scattered
+from realtime.clouds.single_scattering.opacity import opacity_of, printed_opacity
+from realtime.errors import InputError
+from realtime.methods.interface.layers import Layers
+from realtime.methods.interface.view import View
+from realtime.parameters import Parameters, parameter
+from realtime.scene.lights import Light
+from realtime.scene.medium import Clouds
+from realtime.scene.phase import HenyeyGreenstein, Phase, named_phase
+from realtime.scene.read_scene import Scene
+
+_ANGLES = 20_000  # of a mean cosine, by the midpoint rule in the root of the angle
+
+
+def _check_phase(words: Any) -> None:
+    name, *cells = str(words).split(":")
+    numbers = {"scene": 0, "isotropic": 0, "hg": 1, "hg-draine": 1}
+    try:
+        values = [float(cell) for cell in cells]
+    except ValueError:
+        values = [math.nan]
+    if len(values) > numbers.get(name, -1) or (name == "hg" and not values) or not all(map(math.isfinite, values)):
+        raise InputError(f"phase: got {words!r}, wanted scene, isotropic, hg:G or hg-draine:DIAMETER [um]")
+    if name == "hg" and not -1 < values[0] < 1:
+        raise InputError(f"phase: got {words!r}, wanted a mean cosine between -1 and 1, such as hg:0.85")
+
+
+@dataclass(frozen=True)
+class CloudOctavesParameters(Parameters):
+    """The parameters of octaves."""
+
+    octaves: int = parameter(8, "how many", least=1, most=31)
+    extinction: float = parameter(0.5, "a: times the depth of the leg, with every octave", above=0, most=1)
+    contribution: float = parameter(0.5, "b: times the amount, with every octave", above=0, most=1)
+    anisotropy: float = parameter(0.5, "c: times the mean cosine, with every octave", least=0, most=1)
+    phase: str = parameter(
+        "scene",
+        "scene: each cloud's own; isotropic, hg:G or hg-draine:DIAMETER for all",
+        check=_check_phase,
+        wanted="scene, isotropic, hg:G or hg-draine:DIAMETER",
+    )
+    steps: int = parameter(32, "steps of every ray", least=1)
+    light_steps: int = parameter(0, "samples of the density on a leg, as engines take; 0: its exact depth", least=0)
+    light_reach: float = parameter(0.0, "how far these samples go; 0: through all clouds", least=0, unit="m")
+    single: str = parameter("corrected", "equation 1 of Bouthors 2008", choices=("corrected", "printed"))
+    opacity: str = parameter("corrected", "equation 2 of Bouthors 2008", choices=("corrected", "printed"))
+
+
+@dataclass(frozen=True)
+class OctaveState:
+    """What a frame needs beside the scene; constants are arrays, so that others need no new recording."""
+
+    surfaces: CloudSurfaces
+    extinction: Any
+    contribution: Any
+    anisotropy: Any
+    means: Any  #: by phase function of the clouds, its mean cosine [1]
+    reach: Any  #: how far samples on a leg go [m]
+
+
+def prepare_cloud_octaves(scene: Scene, parameters: CloudOctavesParameters) -> Callable[[Scene], OctaveState]:
+    """Return the function that makes the state of a frame."""
+    clouds = scene.medium.clouds
+    assert clouds is not None  # `realtime.frame.renderer` refuses the others
+    Float = type(scene.camera.origin.x)
+    means = [mean_cosine(phase, Float) for phase in _phases(clouds, parameters, Float)]
+    box = mi.ScalarBoundingBox3f()
+    for shape in scene.boundaries:
+        box.expand(shape.bbox())
+    size = float(np.linalg.norm(np.array(box.max) - np.array(box.min)))
+    state = OctaveState(
+        cloud_surfaces(scene),
+        extinction=dr.opaque(Float, parameters.extinction),
+        contribution=dr.opaque(Float, parameters.contribution),
+        anisotropy=dr.opaque(Float, parameters.anisotropy),
+        means=Float(means),
+        reach=dr.opaque(Float, parameters.light_reach or size),
+    )
+    dr.make_opaque(state.means)
+    return lambda now: state
+
+
+def cloud_octaves(view: View, state: OctaveState, lists, *, kernel, parameters: CloudOctavesParameters) -> Layers:
+    """Return the light of clouds by octaves, their opacity, and how much they dim the light on surfaces.
+
+    Parameters
+    ----------
+    view
+        The frame.
+    state
+        From `prepare_cloud_octaves`.
+    lists, kernel
+        Not used.
+    parameters
+        Values of the parameters.
+
+    References
+    ----------
+    Wrenninge, Kulla, Lundqvist 2013, *Oz: the great and volumetric*, SIGGRAPH talks. Hillaire 2016, *Physically based
+    sky, atmosphere and cloud rendering in Frostbite*, SIGGRAPH course, section 5.6.
+    """
+    clouds, surfaces = view.medium.clouds, state.surfaces
+    assert clouds is not None
+    Color = type(clouds.albedo)
+    rays = cloud_rays(surfaces, clouds, view.origin, view.direction, view.distance)
+    beams = [_beam(view, state, light, parameters) for light in view.lights]
+    by_light = scattered(rays, beams, steps=parameters.steps, printed=parameters.single == "printed")
+    by_octave = [sum(own) for own in zip(*by_light)]
+    amount, amounts = type(view.distance)(1), []
+    for radiance in by_octave:
+        amounts.append(amount * radiance)
+        amount = amount * state.contribution
+    if parameters.opacity == "printed":
+        opacity = printed_opacity(surfaces, clouds, view.origin, view.direction, view.distance)
+    else:
+        opacity = opacity_of(rays.depths, Color)
+    extra: dict[str, Any] = {}
+    if view.extra_layers:
+        for octave, radiance in enumerate(amounts):
+            name = order_layer(octave + 1)
+            extra[name] = extra[name] + radiance if name in extra else radiance
+        extra[OPACITY] = opacity
+    return Layers(
+        sum(amounts),
+        tuple(light_on_surfaces(rays, exact_leg(surfaces, clouds, light)) for light in view.lights),
+        1 - opacity,
+        sky_behind(view.lights, view.distance, Color),
+        extra,
+    )
+
+
+def mean_cosine(phase: Phase, Float: Any) -> float:
+    """Return the mean cosine of a phase function [1]; `Float` is the type of its arrays."""
+    root = (np.arange(_ANGLES) + 0.5) / _ANGLES
+    angle = np.pi * root**2
+    share = np.sin(angle) * np.array(phase.evaluate(Float(np.cos(angle))), dtype=np.float64) * root
+    return float(share @ np.cos(angle) / share.sum())
+
+
+def _phases(clouds: Clouds, parameters: CloudOctavesParameters, Float: Any) -> tuple[Phase, ...]:
+    """Return the phase functions of octave 0."""
+    if parameters.phase == "scene":
+        return clouds.phases
+    return (named_phase(parameters.phase, Float=Float),) * len(clouds.phases)
+
+
+def _beam(view: View, state: OctaveState, light: Light, parameters: CloudOctavesParameters) -> Beam:
+    """Return a light with the depths of its legs and its phase functions by octave."""
+    clouds, surfaces = view.medium.clouds, state.surfaces
+    assert clouds is not None
+    Float = type(view.distance)
+    cosine = -dr.dot(view.direction, light.axis)  # forward where the eye looks into the sun
+    scale, sharp = Float(1), state.anisotropy
+    scales, phases = [], []
+    for octave in range(parameters.octaves):
+        scales.append(scale)
+        scale = scale * state.extinction
+        if octave == 0:
+            own = _phases(clouds, parameters, Float)
+        else:
+            means = (dr.gather(Float, state.means, number) for number in range(len(clouds.phases)))
+            own = tuple(HenyeyGreenstein(sharp * mean) for mean in means)
+            sharp = sharp * state.anisotropy
+        phases.append(tuple(phase.evaluate(cosine) for phase in own))
+    leg = exact_leg(surfaces, clouds, light)
+    if parameters.light_steps:
+        leg = _sampled_leg(state, clouds, light, parameters.light_steps)
+    lit = (lambda point, active: view.visible(point, light)) if view.features.shadows else None
+    return Beam(light.intensity, tuple(scales), tuple(phases), leg, lit)
+
+
+def _sampled_leg(state: OctaveState, clouds: Clouds, light: Light, steps: int):
+    """Return legs by samples of the density in the middles of equal steps, as a march through a grid takes them."""
+
+    def leg(point, active):
+        Float = type(point.x)
+        step = state.reach / steps
+
+        def samples_before(x):
+            return dr.minimum(dr.ceil(x / step - 0.5), steps)
+
+        def add(depths, begin, end, cloud, inside):
+            length = dr.select(inside, step * (samples_before(end) - samples_before(begin)), 0)
+            kappas = (dr.gather(Float, sigma_t, cloud, inside) for sigma_t in clouds.sigma_t)
+            return tuple(dr.fma(kappa, length, depth) for kappa, depth in zip(kappas, depths))
+
+        nothing = tuple(dr.zeros(Float, dr.width(point)) for _ in clouds.sigma_t)
+        return sum_over_stretches(state.surfaces, point, -light.axis, Float(dr.inf), nothing, add, active)
+
+    return leg

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: radiance by sets of orders, with centre and spread of its entries, is that of photons and sums to DISORT's."""
+
+import math
+import warnings
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from PythonicDISORT.pydisort import pydisort
+
+from realtime.clouds.canonical.directional_moments import DirectionalMoments
+from realtime.clouds.canonical.sets import SETS
+from realtime.clouds.slab_orders.moments import SlabOrders, order_sets
+from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
+from realtime.clouds.slab_orders.streams import double_gauss
+from reference.monte_carlo.slab_walk.directions import direction_estimate
+from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein
+from reference.monte_carlo.slab_walk.walk import Slab
+
+HG = HenyeyGreensteinPhase(0.75)
+
+
+def at_azimuths(modes, phi):
+    """Return the four moments (sets, suns, depths, directions, azimuths): 1, x, y, x^2 + y^2."""
+    m = np.arange(modes.shape[1])
+    cosines, sines = np.cos(m[:, None] * phi), np.sin(m[:, None] * phi)
+    twice, once = np.where(m > 0, 2.0, 1.0)[:, None], np.where(m > 0, 1.0, 0.5)[:, None]
+    fields = (
+        (modes[:, :, 0], cosines * twice),
+        (modes[:, :, 1] + modes[:, :, 2], cosines * once),
+        (modes[:, :, 1] - modes[:, :, 2], sines),
+        (modes[:, :, 3], cosines * twice),
+    )
+    return [np.einsum("smlzk,mp->slzkp", each, wave) for each, wave in fields]
+
+
+@pytest.mark.claim("clouds-moments-are-fluxes", tolerance="1e-5 relative: 32 streams against 64")
+def test_integrals_over_directions_are_fluence_and_flux_with_their_moments():
+    tau, mu0, depth = 3.0, 0.5, 1.3
+    rule = double_gauss(16)
+    modes = DirectionalMoments(HG, 0.97, rule.mu, modes=2, single=False)(tau, [mu0], [0.0, depth])[:, :, :, 0]
+    slab = SlabOrders(tau, mu0, HG, 0.97, depths=[depth])
+    expected, _ = order_sets(slab, SETS)
+    place = int(np.argmin(np.abs(slab.panels.edges - depth)))
+    weights = 2 * np.pi * rule.weights
+    for number, edges in enumerate(expected):
+        inside, top = modes[number, 0, :, 1], modes[number, 0, :, 0]
+        found = [(inside[field] * weights).sum() for field in (0, 1, 3)]
+        assert found == pytest.approx(list(edges.fluence[:, place]), rel=1e-6)
+        upward = weights * np.maximum(rule.mu, 0)
+        assert [(top[field] * upward).sum() for field in (0, 1, 3)] == pytest.approx(list(edges.up[:, 0]), rel=1e-5)
+
+
+@pytest.mark.claim("clouds-radiance-is-disort", tolerance="1e-4 relative: single precision and 25 modes")
+def test_sums_of_sets_and_order_one_are_disort():
+    tau, mu0, albedo, streams = 2.0, 0.4, 0.9, 32
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        mu, *_, radiance = pydisort(tau, albedo, 2 * streams, 0.75 ** np.arange(2 * streams), mu0, np.pi, 0.0)
+    chosen = np.array([3, 20, streams + 10, streams - 1])
+    depths, azimuths = [0.0, 0.7, tau], np.array([0.3, 2.0])
+    modes = DirectionalMoments(HG, albedo, mu[chosen], modes=40)(tau, [mu0], depths)
+    total = at_azimuths(modes, azimuths)[0].sum(0)[0]
+    theirs = np.array([[[radiance(z, p)[place] for p in azimuths] for place in chosen] for z in depths]) / np.pi
+    z, cosine = np.array(depths)[:, None, None], mu[chosen][:, None]
+    order_one = first_order(tau, mu0, albedo, z, cosine, azimuths)
+    seen = theirs > 1e-9
+    np.testing.assert_allclose((total + order_one)[seen], theirs[seen], rtol=1e-4)
+
+
+def first_order(tau, mu0, albedo, z, mu, phi):
+    """Return single scattering in closed form."""
+    angle = -mu * mu0 + np.sqrt((1 - mu**2) * (1 - mu0**2)) * np.cos(phi)
+    source = albedo / (4 * np.pi) * HG.values(angle)
+    rate = 1 / mu0 + 1 / mu
+    up = (np.exp(-z / mu0) - np.exp(-tau / mu0 - (tau - z) / mu)) / (mu * rate)
+    gap = np.where(np.abs(rate) < 1e-9, 1e-9, rate)
+    down = (np.exp(-z / mu0) - np.exp(z / np.minimum(mu, -1e-9))) / (mu * gap)
+    return source * np.where(mu > 0, up, down)
+
+
+@pytest.mark.statistical
+@pytest.mark.claim("clouds-directions-are-photons", tolerance="4.5 standard errors: 1 false alarm in 1000 runs of 144")
+def test_bins_of_directions_are_those_of_photons():
+    tau, mu0, albedo, depth = 4.0, 0.7, 0.98, 1.5
+    mu_edges, phi_edges = np.array([-1.0, -0.8, -0.5, -0.2, 0.2, 0.5, 0.8, 1.0]), np.array([0.0, 0.6, 2.0, np.pi])
+    sets = [SETS[0], SETS[2], SETS[4], SETS[7]]
+    slab = Slab(tau, mu0, albedo, HenyeyGreenstein(0.75), [depth])
+    walked = direction_estimate(slab, sets, mu_edges=mu_edges, phi_edges=phi_edges, photons=200_000, seed=3)
+    nodes, weights = np.polynomial.legendre.leggauss(6)
+    bins = [place for place in range(7) if place != 3]  # grazing photons have no finite variance
+    mu = np.concatenate([(a + b) / 2 + (b - a) / 2 * nodes for a, b in pairwise(mu_edges)])
+    phi = np.concatenate([(a + b) / 2 + (b - a) / 2 * nodes for a, b in pairwise(phi_edges)])
+    moments = at_azimuths(DirectionalMoments(HG, albedo, mu)(tau, [mu0], [depth]), phi)
+    m0, x, y, square = (
+        np.einsum("smapb,a,b->smp", each[:, 0, 0].reshape(8, 7, 6, 3, 6), weights / 2, weights / 2)[[0, 2, 4, 7]]
+        for each in moments
+    )
+    for found, error, expected in (
+        (walked.radiance, walked.radiance_error, m0),
+        (walked.x, walked.x_error, x / m0),
+        (walked.y, walked.y_error, y / m0),
+        (walked.square, walked.square_error, square / m0),
+    ):
+        off = ((found[:, 0] - expected) / np.maximum(error[:, 0], 1e-300))[:, bins]
+        assert np.abs(off).max() < 4.5
+        assert math.sqrt(np.mean(off**2)) < 1.35
+
+
+def test_suns_shine_alone_and_directions_keep_their_order():
+    slabs = DirectionalMoments(HG, 1.0, [0.5, -0.3, 0.1])
+    both, one = slabs(1.0, [0.9, 0.3], [0.4]), slabs(1.0, [0.3], [0.4])
+    np.testing.assert_allclose(both[:, :, :, 1], one[:, :, :, 0], rtol=1e-3, atol=1e-9)
+    other = DirectionalMoments(HG, 1.0, [-0.3, 0.1, 0.5])(1.0, [0.3], [0.4])
+    np.testing.assert_allclose(one[..., [1, 2, 0]], other, rtol=1e-4, atol=1e-9)

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The collector search on shapes and with transports whose fixed points are known."""
+
+import numpy as np
+import pytest
+
+from tests.helpers.sunlit import clear_scene, cube, read, sun, unit
+from validation.scenes.parts import medium_boundary, rotation
+from validation.scenes.solids import box
+
+SLAB_TURN = np.asarray(rotation((0.2, 1.0, 0.4), 21.0))
+SLAB = np.array([9.0, 9.0, 0.8])
+MIDDLE = np.array([0.3, 9.4, 1.2])
+EXTINCTION = 2.3
+
+
+def _map(direction, *, sides=SLAB, turn=SLAB_TURN, size=256):
+    import mitsuba as mi
+
+    from realtime.clouds.light_maps.pyramid import light_map
+
+    entry = cube(centre=tuple(MIDDLE), sides=sides, turn=turn)
+    scene = read(clear_scene(lamp=sun(direction), cube=entry), "single")
+    return light_map([mi.load_dict({"type": "scene", "cloud": entry})], scene.lights[0], size)
+
+
+def _vectors(points):
+    import mitsuba as mi
+
+    return mi.Vector3f(np.asarray(points, dtype=np.float32).reshape(-1, 3).T)
+
+
+def _search(light_map, transport, points, towards, **options):
+    import mitsuba as mi
+
+    from realtime.clouds.collectors.search import Search, cold_start, collector_light
+
+    point, toward = _vectors(points), _vectors(towards)
+    return collector_light(
+        light_map,
+        transport,
+        0,
+        point=point,
+        toward=toward,
+        extinction=mi.Float(EXTINCTION),
+        start=cold_start(light_map, point),
+        search=Search(**options),
+    )
+
+
+def _recording(slabs):
+    """Return a transport whose collector stands at (0.7, -0.2) from the foot, and which notes what it is asked."""
+    import mitsuba as mi
+
+    def transport(number, t, d, mu, cos_phi, sin_phi, mu_l):
+        slabs.append([t, d, mu, cos_phi, sin_phi, mu_l])
+        return d + 2 * t + 3 * mu + 5 * cos_phi * (1 - mu * mu) + 7 * sin_phi * (1 - mu * mu) + 11 * mu_l, *map(
+            mi.Float, (0.7, -0.2, 0.9)
+        )
+
+    return transport
+
+
+@pytest.mark.parametrize("lit_from_below", [False, True])
+def test_a_slab_is_found_as_it_is(variant, lit_from_below):
+    """Thickness, depth, both angles and the collector, in the frame of a slab that lies askew in the world."""
+    normal = SLAB_TURN[:, 2] * (-1 if lit_from_below else 1)
+    horizontal = unit(SLAB_TURN @ (0.6, 0.8, 0.0))
+    cosine = 0.61
+    axis = horizontal * np.sqrt(1 - cosine**2) - normal * cosine
+    light_map = _map(axis)
+    rng = np.random.default_rng(11)
+    depths = rng.uniform(0, SLAB[2], 300)
+    plane = rng.uniform(-1.5, 1.5, (300, 2)) @ SLAB_TURN[:, :2].T
+    points = MIDDLE + plane + np.outer(0.5 * SLAB[2] - depths, normal)
+    towards = rng.normal(size=(300, 3))
+    towards /= np.linalg.norm(towards, axis=1)[:, None]
+    beside = np.cross(normal, horizontal)
+    light = _search(light_map, _recording([]), points, towards, iterations=12)
+    mu, x, y = towards @ normal, towards @ horizontal, towards @ beside
+    sine = np.sqrt(1 - mu**2)
+    expected = EXTINCTION * (depths + 2 * SLAB[2]) + 3 * mu + (5 * x + 7 * y) * sine + 11 * cosine
+    np.testing.assert_allclose(np.array(light.radiance), expected, rtol=2e-3, atol=5e-3)
+    centre = points + np.outer(depths, normal) + (0.7 * horizontal - 0.2 * beside) / EXTINCTION
+    np.testing.assert_allclose(np.array(light.collector.centre).T, centre, atol=2e-3)
+    np.testing.assert_allclose(np.array(light.collector.width), 0.9 / EXTINCTION, rtol=1e-6)
+    assert np.array(light.missed).max() < 2e-2
+
+
+def test_as_printed_lengths_are_those_along_the_light(variant):
+    normal = SLAB_TURN[:, 2]
+    horizontal = SLAB_TURN[:, 0]
+    cosine = np.cos(np.deg2rad(75.0))
+    light_map = _map(horizontal * np.sin(np.deg2rad(75.0)) - normal * cosine)
+    transport = lambda number, t, d, *angles: (t + 10 * d, 0 * t, 0 * t, 0 * t + 0.5)  # noqa: E731
+    point = MIDDLE + 0.1 * normal
+    printed, corrected = (
+        float(_search(light_map, transport, point, normal, along_light=choice).radiance[0]) for choice in (True, False)
+    )
+    np.testing.assert_allclose(corrected, EXTINCTION * (SLAB[2] + 10 * (0.5 * SLAB[2] - 0.1)), rtol=2e-3)
+    np.testing.assert_allclose(printed / corrected, 3.8637, rtol=2e-3)
+
+
+WEDGE_HEIGHT, WEDGE_SLOPE = 0.7, 0.05
+
+
+def _wedge(axis):
+    """Return the map of a cloud with a level face at z = 0 and a floor at -0.7 - 0.05 x: its thickness tells x."""
+    import mitsuba as mi
+
+    from realtime.clouds.light_maps.pyramid import light_map
+
+    vertices, faces = box((12.0, 9.0, 1.0))
+    vertices = np.array(vertices, dtype=float)
+    below = vertices[:, 2] < 0
+    vertices[:, 2] = np.where(below, -WEDGE_HEIGHT - WEDGE_SLOPE * vertices[:, 0], 0.0)
+    entry = medium_boundary("wedge", (vertices + np.array([0.0, 9.4, 0.0]), faces), {"type": "homogeneous"})
+    scene = read(clear_scene(lamp=sun(axis), cube=entry), "single")
+    return light_map([mi.load_dict({"type": "scene", "cloud": entry})], scene.lights[0], 256)
+
+
+@pytest.mark.claim("collector-search", tolerance="a tenth of sigma")
+@pytest.mark.parametrize(("slope", "iterations"), [(0.6, 25), (0.0, 8), (-0.7, 12), (-1.0, 12), (-2.5, 15), (-6.0, 25)])
+def test_the_search_ends_at_the_fixed_point_whatever_the_slope_of_the_map(variant, slope, iterations):
+    """A map whose slope is -1 goes to and fro between two places for ever, one of -2.5 runs away: half steps end it."""
+    sine, fixed = 0.3, 0.9
+    axis = np.array([sine, 0.0, -np.sqrt(1 - sine**2)])
+    light_map = _wedge(axis)
+    point = np.array([-0.6, 9.2, -0.2])
+
+    def transport(number, t, d, mu, cos_phi, sin_phi, mu_l):
+        length = t / (EXTINCTION * mu_l)
+        x = (length * (mu_l - WEDGE_SLOPE * sine) - WEDGE_HEIGHT) / WEDGE_SLOPE
+        wanted = fixed + slope * (x - fixed)
+        return t, (wanted - float(point[0])) * EXTINCTION, 0 * t, 0 * t + 0.3 * EXTINCTION
+
+    light = _search(light_map, transport, point, [0.0, 0.0, 1.0], iterations=iterations)
+    np.testing.assert_allclose(np.array(light.collector.centre).ravel(), [fixed, 9.2, 0.0], atol=0.03)
+    assert float(light.missed[0]) < 0.15
+    settled = _search(light_map, transport, point, [0.0, 0.0, 1.0], iterations=99, settled=0.05)
+    assert float(settled.missed[0]) <= 0.05
+    assert int(settled.steps[0]) < 99
+
+
+def test_no_step_is_longer_than_sigma(variant):
+    import mitsuba as mi
+
+    normal = SLAB_TURN[:, 2]
+    light_map = _map(-normal)
+    transport = lambda number, t, d, *angles: (t, 0 * t + 30.0, 0 * t, 0 * t + 0.25)  # noqa: E731
+    point = MIDDLE + 0.4 * normal
+    ends = [
+        np.array(_search(light_map, transport, point, normal, iterations=n).collector.centre).ravel() for n in (1, 2, 3)
+    ]
+    for number, end in enumerate(ends, 1):
+        np.testing.assert_allclose(np.linalg.norm(end - point), number * 0.25 / EXTINCTION, rtol=5e-3)
+    assert isinstance(light_map.texel, mi.Float)

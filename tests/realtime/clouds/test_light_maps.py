@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Light maps of clouds: heights and normals of the lit side, means over the cloud alone, and nothing that is not finite
+beside it."""
+
+import numpy as np
+import pytest
+
+from tests.helpers.sunlit import ALONG, SIDES, TURN, clear_scene, cube, read, sun, unit
+from tests.helpers.sunlit import CUBE_AT as MIDDLE
+
+SIZE = 64
+
+
+def _cube_map(precision="single", *, size=SIZE, direction=ALONG):
+    import mitsuba as mi
+
+    from realtime.clouds.light_maps.pyramid import filtered_map
+    from realtime.clouds.light_maps.surfaces import cast_surfaces
+
+    scene = read(clear_scene(lamp=sun(direction), cube=cube()), precision)
+    cloud = mi.load_dict({"type": "scene", "cloud": cube()})
+    surfaces = cast_surfaces(cloud, scene.lights[0], size)
+    return surfaces, filtered_map([surfaces], scene.lights[0])
+
+
+def _vectors(points):
+    import mitsuba as mi
+
+    return mi.Vector3f(np.asarray(points, dtype=np.float32).T)
+
+
+def test_the_finest_level_holds_the_faces_of_a_box(variant):
+    import mitsuba as mi
+
+    from realtime.clouds.light_maps.pyramid import filtered_surface
+
+    _, light_map = _cube_map(size=256)
+    along, turned = unit(ALONG), np.asarray(TURN)
+    inside = np.asarray(MIDDLE) + np.random.default_rng(3).uniform(-0.3, 0.3, (200, 3)) @ (turned * SIDES).T
+    surface = filtered_surface(light_map, _vectors(inside), mi.Float(0))
+    # Where the line through the point along the light enters and leaves the box.
+    local, way = (inside - MIDDLE) @ turned, along @ turned
+    ends = np.stack([(-0.5 * SIDES - local) / way, (0.5 * SIDES - local) / way])
+    enter, leave = ends.min(axis=0), ends.max(axis=0)
+    entries = inside + along * enter.max(axis=1)[:, None]
+    faces = turned[:, enter.argmax(axis=1)].T * -np.sign(way)[enter.argmax(axis=1)][:, None]
+    texel = float(light_map.texel[0])
+    np.testing.assert_allclose(np.array(surface.cover), 1.0, rtol=1e-6)
+    close = np.abs(np.array(surface.normal).T - faces).max(axis=1) < 1e-3
+    assert close.mean() > 0.9  # the others are within a texel of an edge
+    off = np.array(surface.middle).T - entries
+    assert np.abs(np.einsum("ij,ij->i", off, faces))[close].max() < 1e-4
+    assert np.linalg.norm(off - np.outer(off @ along, along), axis=1).max() < 1e-3
+    thickness = leave.min(axis=1) - enter.max(axis=1)
+    assert np.quantile(np.abs(np.array(surface.thickness) - thickness), 0.9) < 2 * texel
+
+
+def test_levels_are_means_over_the_cloud_alone(variant):
+    """A premultiplied mean leaves out what lies beside the cloud, and knows where the rest is."""
+    import mitsuba as mi
+
+    from realtime.clouds.light_maps.pyramid import filtered_surface
+
+    surfaces, light_map = _cube_map()
+    there = np.array(surfaces.there).reshape(SIZE, SIZE)
+    front, back = (np.array(value).reshape(SIZE, SIZE) for value in (surfaces.front, surfaces.back))
+    normal = np.array(surfaces.normal).T.reshape(SIZE, SIZE, 3)
+    level, checked = 3, 0
+    side = 2**level
+    basis = [np.array(vector, dtype=float).ravel() for vector in light_map.projection.basis]
+    position = np.array(light_map.position, dtype=float).ravel()
+    for row, column in np.ndindex(SIZE // side, SIZE // side):
+        square = (slice(row * side, (row + 1) * side), slice(column * side, (column + 1) * side))
+        if not there[square].any():
+            continue
+        u, v = (2 * side / SIZE * (place + 0.5) - 1 for place in (column, row))
+        asked = position + u * basis[0] + v * basis[1]
+        width = mi.Float(0.5 * side) * light_map.texel
+        surface = filtered_surface(light_map, _vectors([asked]), width)
+        np.testing.assert_allclose(surface.cover[0], there[square].mean(), rtol=1e-4)
+        mean = normal[square][there[square]].mean(axis=0)
+        np.testing.assert_allclose(np.array(surface.normal).ravel(), unit(mean), atol=1e-4)
+        np.testing.assert_allclose(surface.thickness[0], (front - back)[square][there[square]].mean(), rtol=1e-3)
+        rows, columns = np.nonzero(there[square])
+        place = np.stack([columns + column * side, rows + row * side], axis=1).mean(axis=0)
+        expected = (2 * place + 1) / SIZE - 1
+        where = position + basis[0] * expected[0] + basis[1] * expected[1]
+        where = where - basis[2] * front[square][there[square]].mean()
+        np.testing.assert_allclose(np.array(surface.middle).ravel(), where, atol=2e-4)
+        checked += there[square].mean() < 1
+    assert checked > 4  # squares that the silhouette cuts
+
+
+@pytest.mark.claim("collector-silhouettes", tolerance="within half the diagonal of the body")
+@pytest.mark.parametrize("width", [0.0, 0.03, 0.4, 50.0])
+def test_beside_the_cloud_is_what_is_nearest_of_it(variant, width):
+    """Past the silhouette A = 0: there is no mean, and yet a surface."""
+    import mitsuba as mi
+
+    from realtime.clouds.light_maps.pyramid import filtered_surface
+
+    _, light_map = _cube_map()
+    rng = np.random.default_rng(7)
+    points = np.asarray(MIDDLE) + rng.uniform(-3, 3, (500, 3))
+    surface = filtered_surface(light_map, _vectors(points), mi.Float(width))
+    for value in (surface.cover, surface.middle, surface.thickness, surface.normal):
+        assert np.isfinite(np.array(value)).all()
+    assert (np.linalg.norm(np.array(surface.middle).T - MIDDLE, axis=1) < 0.51 * np.linalg.norm(SIDES)).all()
+    assert (np.array(surface.normal).T @ unit(ALONG) < 0).all()
+    assert (np.array(surface.thickness) > 0).all()
+
+
+def test_a_light_that_sees_no_cloud_finds_a_surface_of_no_thickness(variant):
+    import mitsuba as mi
+
+    from realtime.clouds.light_maps.pyramid import filtered_map, filtered_surface
+    from realtime.clouds.light_maps.surfaces import cast_surfaces
+
+    scene = read(clear_scene(lamp=sun(), cube=cube()), "single")
+    elsewhere = mi.load_dict({"type": "scene", "cloud": cube(centre=(40.0, 0.0, 0.0))})
+    light_map = filtered_map([cast_surfaces(elsewhere, scene.lights[0], SIZE)], scene.lights[0])
+    surface = filtered_surface(light_map, _vectors([MIDDLE]), mi.Float(0.2))
+    assert float(surface.thickness[0]) == 0
+    assert np.isfinite(np.array(surface.middle)).all()
+    np.testing.assert_allclose(np.array(surface.normal).ravel(), -unit(ALONG), atol=1e-6)
+
+
+def test_both_precisions_hold_the_same_surfaces(variant):
+    single, double = _cube_map("single")[1], _cube_map("double")[1]
+    for one, other in ((single.heights, double.heights), (single.normals, double.normals)):
+        np.testing.assert_allclose(np.array(one), np.array(other), atol=2e-6)
+
+
+def test_lanes_look_at_clouds_of_their_own(variant):
+    """Of two clouds over one another each has its own surfaces, whatever lies before it."""
+    import mitsuba as mi
+
+    from realtime.clouds.light_maps.pyramid import filtered_surface, light_map
+
+    thin = np.array([1.1, 0.9, 0.3])
+    entries = [cube(sides=SIDES), cube(sides=thin)]
+    clouds = [mi.load_dict({"type": "scene", "cloud": entry}) for entry in entries]
+    light = read(clear_scene(lamp=sun(), cube=entries[0]), "single").lights[0]
+    both, *single = light_map(clouds, light, SIZE), *(light_map([cloud], light, SIZE) for cloud in clouds)
+    points, width = _vectors([MIDDLE] * 2), mi.Float(0.05)
+    surface = filtered_surface(both.of_cloud(mi.UInt32([0, 1])), points, width)
+    alone = [filtered_surface(own, _vectors([MIDDLE]), width) for own in single]
+    np.testing.assert_array_equal(np.array(surface.thickness), [float(own.thickness[0]) for own in alone])
+    assert surface.thickness[0] > 1.2 * surface.thickness[1]

@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Clouds by collectors as a method: what a frame makes of a transport that is a formula here."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.helpers.clouds import DROPLETS, cloud, cloud_scene, ring
+from validation.scenes.parts import camera, placed, rotation
+from validation.scenes.solids import box
+
+THICKNESS, EXTINCTION = 143.7, 0.0363
+TURN = rotation((0.3, 1.0, -0.2), 11.0)
+MIDDLE = np.array([3.1, 0.2, -60.0])
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A canonical transport whose light tells all that it was asked."""
+
+    weights: Any  #: by set
+
+    def __call__(self, number, t, d, mu, cos_phi, sin_phi, mu_l):
+        import drjit as dr
+
+        weight = dr.gather(type(self.weights), self.weights, dr.uint32_array_t(type(self.weights))(number))
+        sine = dr.safe_sqrt(1 - mu * mu)
+        radiance = (
+            weight * (3 + mu + 0.7 * sine * cos_phi + 0.4 * sine * sin_phi) * mu_l * t / (1 + t) * dr.exp(-0.1 * d)
+        )
+        return radiance, -0.2 * sine * cos_phi, -0.2 * sine * sin_phi, 0.5 + 0 * t
+
+    @staticmethod
+    def radiance(t, d, mu, x, y, mu_l):
+        return (3 + mu + 0.7 * x + 0.4 * y) * mu_l * t / (1 + t) * np.exp(-0.1 * d)
+
+
+WEIGHTS = [0.02, 0.04, 0.03, 0.01, 0.05, 0.03, 0.02, 0.06]
+
+
+@pytest.fixture(autouse=True)
+def formula(monkeypatch):
+    import drjit as dr
+
+    import realtime.methods.cloud_collectors as method
+
+    def on_device(tables, types):
+        weights = types.scalar(WEIGHTS)
+        dr.make_opaque(weights)
+        return Formula(weights)
+
+    monkeypatch.setattr(method, "canonical_tables", lambda phase, albedo: SimpleNamespace(angular=None))
+    monkeypatch.setattr(method, "on_device", on_device)
+    monkeypatch.setattr(method, "transport_grid", lambda look_up, angular, sets: look_up)
+
+
+def _sun(direction, irradiance=(3.1, 2.9, 2.3)) -> dict[str, Any]:
+    return {
+        "type": "directional",
+        "direction": list(direction),
+        "irradiance": {"type": "rgb", "value": list(irradiance)},
+    }
+
+
+def _slab(scale=1.0, *, width=2500.0, medium=None):
+    medium = medium or (DROPLETS | {"sigma_t": EXTINCTION / scale})
+    return cloud(
+        "slab", placed(box((width * scale, width * scale, THICKNESS * scale)), tuple(MIDDLE * scale), TURN), medium
+    )
+
+
+ALONG = np.asarray(TURN) @ (0.48, 0.36, -0.8)
+
+
+def _scene(scale=1.0, *, size=(16, 12), **parts):
+    parts = parts or {"sun": _sun(ALONG), "slab": _slab(scale)}
+    origin, target = np.array([(30.83, -400.91, 257.03), (3.17, 0.29, 1.49)]) * scale
+    return {"type": "scene", "sensor": camera(origin, target, fov=47.9, size=size, in_fog=False)} | parts
+
+
+def _renderer(scene, precision="single", **parameters):
+    import mitsuba as mi
+
+    from realtime.frame.renderer import frame_renderer
+    from realtime.methods.registry import METHODS
+    from realtime.scene.read_scene import read_scene
+
+    return frame_renderer(read_scene(mi.load_dict(scene), precision), METHODS["cloud-collectors"], **parameters)
+
+
+def _frame(scene, precision="single", **parameters):
+    from realtime.frame.renderer import render_frame
+
+    return render_frame(_renderer(scene, precision, **parameters))
+
+
+def _airlight(scene, precision="single", **parameters):
+    """Return the light of orders 2 and above."""
+    frame = _frame(scene, precision, extra_layers=True, **({"peak": "full"} | parameters))
+    return np.array(frame.airlight) - np.array(frame.extra["airlight_1"])
+
+
+def _rays(scene, precision="single"):
+    import mitsuba as mi
+
+    from realtime.scene.camera import ray_directions
+    from realtime.scene.read_scene import read_scene
+
+    camera = read_scene(mi.load_dict(scene), precision).camera
+    pixels = mi.UInt32(np.arange(camera.width * camera.height))
+    directions = np.array(ray_directions(camera, pixels)[0]).T
+    return np.array(camera.origin, dtype=float).ravel(), directions.reshape(camera.height, camera.width, 3)
+
+
+def test_a_slab_sends_back_what_the_transport_says(variant):
+    """All angles, lengths and sums over sets, colours and irradiance of the sun."""
+    scene = _scene()
+    image = _airlight(scene, settled=0.02, iterations=30)
+    _, directions = _rays(scene)
+    normal, horizontal = np.asarray(TURN)[:, 2], np.asarray(TURN) @ (0.8, 0.6, 0.0)
+    beside = np.cross(normal, horizontal)
+    expected = sum(WEIGHTS) * Formula.radiance(
+        EXTINCTION * THICKNESS, 0, -directions @ normal, -directions @ horizontal, -directions @ beside, 0.8
+    )
+    shown = directions @ normal < -0.3  # rays that come down on the slab, far from its sides
+    assert shown.mean() > 0.3
+    for channel, irradiance in enumerate((3.1, 2.9, 2.3)):
+        np.testing.assert_allclose(image[shown][:, channel], irradiance * expected[shown], rtol=4e-3)
+
+
+def test_the_layers_of_all_sets_add_up(variant):
+    frame = _frame(_scene(), peak="full", extra_layers=True)
+    by_set = {name: np.array(layer) for name, layer in frame.extra.items()}
+    names = ["2", "3_4", "5_6", "7_8", "9_12", "13_18", "19_30", "31_inf"]
+    assert list(by_set) == ["airlight_1", *(f"airlight_{name}" for name in names), "opacity"]
+    total = sum(layer for name, layer in by_set.items() if name != "opacity")
+    np.testing.assert_allclose(total, np.array(frame.airlight), rtol=1e-5)
+    shares = [by_set[f"airlight_{name}"].mean() for name in names]
+    np.testing.assert_allclose(np.array(shares) / shares[0], np.array(WEIGHTS) / WEIGHTS[0], rtol=1e-3)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_optical_lengths_alone_matter(variant, scale):
+    """Metres against kilometres."""
+    one = _airlight(_scene(sun=_sun(ALONG), cloud=cloud("ring", ring())))
+    mesh = (ring()[0] * scale, ring()[1])
+    other = cloud("ring", mesh, DROPLETS | {"sigma_t": EXTINCTION / scale})
+    scaled = _airlight(_scene(scale, sun=_sun(ALONG), cloud=other))
+    np.testing.assert_allclose(np.mean(np.abs(scaled - one)) / np.mean(one), 0, atol=3e-3)
+
+
+def test_both_precisions_agree(variant):
+    single, double = (_airlight(_scene(), precision) for precision in ("single", "double"))
+    np.testing.assert_allclose(single, double, rtol=2e-3, atol=1e-4)
+
+
+def test_suns_add_up_and_so_does_a_sky(variant):
+    other = _sun((-0.6, 0.3, -0.7), (0.7, 0.9, 1.9))
+    sky = {"type": "constant", "radiance": {"type": "rgb", "value": [0.11, 0.17, 0.31]}}
+    above = _sun((0.0, 0.0, -1.0), np.pi * np.array([0.11, 0.17, 0.31]))
+    parts = {"sun": _sun(ALONG), "other": other, "sky": sky}
+    both = _airlight(_scene(slab=_slab(), **parts))
+    alone = sum(_airlight(_scene(slab=_slab(), lamp=lamp)) for lamp in (parts["sun"], other, above))
+    np.testing.assert_allclose(both, alone, rtol=2e-3)
+
+
+def test_coloured_clouds_are_three_grey_ones(variant):
+    sigma = (0.05, 0.03, 0.02)
+    spectral = {"sigma_t": {"type": "rgb", "value": list(sigma)}, "has_spectral_extinction": True}
+    coloured = _airlight(_scene(sun=_sun(ALONG), slab=_slab(medium=DROPLETS | spectral)))
+    for channel, value in enumerate(sigma):
+        grey = _airlight(_scene(sun=_sun(ALONG), slab=_slab(medium=DROPLETS | {"sigma_t": value})))
+        np.testing.assert_allclose(coloured[..., channel], grey[..., channel], rtol=1e-4, atol=1e-7)
+
+
+def test_the_peak_lowers_the_density(variant):
+    """The share of the peak is what the slab loses in thickness; the printed half is more."""
+    import mitsuba as mi
+
+    from realtime.clouds.canonical.scene_phase import share_of_peak
+    from realtime.numerics.array_types import array_types
+    from realtime.scene.phase import HenyeyGreenstein
+
+    share = share_of_peak(HenyeyGreenstein(mi.Float(0.85)), array_types("single"))
+    thin = _slab(medium=DROPLETS | {"sigma_t": (1 - share) * EXTINCTION})
+    matched = _airlight(_scene(), peak="matched")
+    np.testing.assert_allclose(matched, _airlight(_scene(sun=_sun(ALONG), slab=thin)), rtol=1e-3, atol=1e-6)
+    assert _airlight(_scene(), peak="half").mean() < 0.95 * matched.mean()
+    assert _airlight(_scene(), kappa="printed").mean() > 1.02 * _airlight(_scene()).mean()
+    assert _airlight(_scene(), thickness="light").mean() > 1.02 * _airlight(_scene()).mean()
+
+
+def test_a_camera_in_the_cloud_is_its_point(variant):
+    """The transport is asked for the depth of the camera below the lit face, in all directions."""
+    depth = 51.3
+    normal = np.asarray(TURN)[:, 2]
+    inside = MIDDLE + (0.5 * THICKNESS - depth) * normal
+    medium = {"type": "homogeneous", "id": "fog", **{k: v for k, v in DROPLETS.items() if k != "type"}}
+    import mitsuba as mi
+
+    held = mi.load_dict(medium)
+    from tests.helpers.clouds import cloud_of
+
+    slab = cloud_of("slab", placed(box((2500.0, 2500.0, THICKNESS)), tuple(MIDDLE), TURN), held)
+    scene = cloud_scene((16, 12), origin=tuple(inside), sun=_sun(ALONG), slab=slab)
+    scene["sensor"]["medium"] = held
+    image = _airlight(scene, settled=0.02, iterations=40)
+    _, directions = _rays(scene)
+    horizontal = np.asarray(TURN) @ (0.8, 0.6, 0.0)
+    beside = np.cross(normal, horizontal)
+    expected = sum(WEIGHTS) * Formula.radiance(
+        EXTINCTION * THICKNESS,
+        EXTINCTION * depth,
+        -directions @ normal,
+        -directions @ horizontal,
+        -directions @ beside,
+        0.8,
+    )
+    np.testing.assert_allclose(image[..., 0], 3.1 * expected, rtol=4e-3)
+
+
+@pytest.mark.claim("collector-frames", tolerance="2e-3 of the mean; interpolated 2 %, as tiles are coarse here")
+@pytest.mark.parametrize(("tolerance", "bound"), [(0.0, 2e-3), (0.01, 0.02)])
+def test_the_last_frame_s_collectors_go_on(variant, tolerance, bound):
+    """Three steps a frame end where forty end; in interpolated frames the corners of tiles go on for their pixels."""
+    from realtime.frame.incremental import next_frame
+
+    scene = cloud_scene((64, 48), origin=(30.83, -400.91, 57.03), sun=_sun(ALONG), ring=cloud("ring", ring()))
+    whole = _airlight(scene, iterations=40, tolerance=tolerance)
+    options = {"peak": "full", "tolerance": tolerance, "extra_layers": True}
+    renderer = _renderer(scene, start="previous", iterations=3, **options)
+    still = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
+    from realtime.frame.renderer import image_frame
+
+    cache, errors = None, []
+    for _ in range(30):
+        stages, cache = next_frame(renderer, renderer.scene, cache, **still)
+        frame = image_frame(renderer, stages, cache.extra)
+        airlight = frame.airlight - frame.extra["airlight_1"]
+        errors.append(np.abs(airlight - whole).mean() / whole.mean())
+    assert errors[0] > 0.02
+    assert errors[-1] < bound
+    assert renderer.render.n_recordings <= 3
+
+
+def test_another_cloud_in_the_light_changes_no_thickness(variant):
+    """Each cloud has its own maps: clear air between two is no matter."""
+    far = cloud("far", placed(box((300.0, 300.0, 20.0)), tuple(MIDDLE - 900.0 * ALONG), TURN))
+    alone = _airlight(_scene(sun=_sun(ALONG), slab=_slab()), map=1024)
+    both = _airlight(_scene(sun=_sun(ALONG), slab=_slab(), far=far), map=1024)
+    np.testing.assert_allclose(both, alone, rtol=1e-2)
+
+
+def test_wrong_values_are_refused(variant):
+    from realtime.errors import InputError
+
+    for name, value in (("iterations", 0), ("start", "warm"), ("peak", "none"), ("map", 500), ("settled", 1.0)):
+        with pytest.raises(InputError, match=name):
+            _renderer(_scene(), **{name: value})

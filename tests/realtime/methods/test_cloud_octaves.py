@@ -1,0 +1,297 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: octaves are what their formula says; clouds dim what lies behind and below them; others refuse clouds."""
+
+from dataclasses import replace
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from realtime.clouds.order_layers import FIRST_ORDERS, OPACITY, ORDER_LAYERS, order_layer
+from realtime.errors import InputError
+from realtime.frame.incremental import next_frame
+from realtime.frame.renderer import frame_renderer, image_frame, render_frame
+from realtime.kernels.exact import exact
+from realtime.methods.cloud_octaves import mean_cosine
+from realtime.methods.interface.layers import Layers
+from realtime.methods.interface.method import Method, never
+from realtime.methods.registry import FOG_METHODS, METHODS
+from realtime.scene.animate import thicker_medium
+from realtime.scene.camera import ray_directions
+from realtime.scene.phase import named_phase
+from realtime.scene.read_scene import read_scene
+from tests.helpers.clouds import DROPLETS, SUN, cloud, cloud_of, cloud_scene, loaded, ring
+from validation.scenes.parts import grid, mitsuba_mesh, placed
+from validation.scenes.solids import box
+
+pytestmark = pytest.mark.usefixtures("variant")
+
+OCTAVES = METHODS["cloud-octaves"]
+SKY = {"type": "constant", "radiance": {"type": "rgb", "value": [0.13, 0.22, 0.41]}}
+SIGMA = 0.0363
+
+
+def rendered(scene, *, precision="single", extra_layers=False, **parameters):
+    read = read_scene(scene, precision)
+    return render_frame(frame_renderer(read, OCTAVES, extra_layers=extra_layers, **parameters))
+
+
+def directions(scene):
+    """Return the unit directions of the rays of a Mitsuba scene of 16 x 12 pixels, (12, 16, 3)."""
+    pixel = mi.UInt32(np.arange(16 * 12, dtype=np.uint32))
+    return np.array(ray_directions(read_scene(scene, "double").camera, pixel)[0]).T.reshape(12, 16, 3)
+
+
+def slab(thickness=31.7, size=9000.0, middle=0.0):
+    return placed(box((size, size, thickness)), (11.3, -7.9, middle))
+
+
+def test_layers_of_orders():
+    assert [order_layer(first) for first in FIRST_ORDERS] == list(ORDER_LAYERS)
+    assert [order_layer(order) for order in (4, 8, 12, 18, 30, 99)] == [
+        "airlight_3_4", "airlight_7_8", "airlight_9_12", "airlight_13_18", "airlight_19_30", "airlight_31_inf",
+    ]  # fmt: skip
+
+
+@pytest.mark.claim("octaves", tolerance="5e-4 relative: 48 steps in float32")
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_octaves_in_a_slab_are_their_integrals(precision):
+    """Seen from above, octave n is b^n P_n mu0/(mu0 + a^n mu) (1 - exp(-tau (1/mu + a^n/mu0)))/(4 pi)."""
+    scene = mi.load_dict(cloud_scene(origin=(30.0, -400.0, 700.0), sun=SUN, slab=cloud("slab", slab())))
+    numbers = {"octaves": 3, "extinction": 0.4, "contribution": 0.3, "anisotropy": 0.6, "steps": 48}
+    frame = rendered(scene, precision=precision, extra_layers=True, **numbers)
+    direction = directions(scene)
+    travels = np.array(SUN["direction"]) / np.linalg.norm(SUN["direction"])
+    mu, mu0, cosine = -direction[..., 2:], -travels[2], -(direction @ travels)[..., None]
+    tau, expected = SIGMA * 31.7, []
+    for octave in range(3):
+        a, b, g = 0.4**octave, 0.3**octave, 0.85 * 0.6**octave
+        phase = (1 - g * g) / (1 + g * g - 2 * g * cosine) ** 1.5
+        share = mu0 / (mu0 + a * mu) * (1 - np.exp(-tau * (1 / mu + a / mu0)))
+        expected.append(np.array([3.1, 2.9, 2.3]) * b * phase / (4 * np.pi) * share)
+    assert frame.airlight == pytest.approx(sum(expected), rel=5e-4)
+    assert list(frame.extra) == ["airlight_1", "airlight_2", "airlight_3_4", OPACITY]
+    for name, octave in zip(frame.extra, expected):
+        assert frame.extra[name] == pytest.approx(octave, rel=5e-4)
+    assert frame.extra[OPACITY] == pytest.approx(np.broadcast_to(1 - np.exp(-tau / mu), (12, 16, 3)), rel=1e-4)
+
+
+@pytest.mark.claim("cloud-layers")
+def test_layers_cost_nothing_and_change_nothing_where_nobody_asks():
+    scene = loaded()
+    asked, plain = (rendered(scene, extra_layers=asked, octaves=12) for asked in (True, False))
+    assert plain.extra == {}
+    np.testing.assert_array_equal(asked.airlight, plain.airlight)
+    orders = [values for name, values in asked.extra.items() if name != OPACITY]
+    assert len(orders) == 6
+    assert sum(orders) == pytest.approx(asked.airlight, rel=1e-5)
+
+
+def test_the_sky_is_seen_through_clouds_and_lights_them_from_above():
+    """A sky alone: behind it shines L, and the slab gets pi L from above."""
+    parts = {"origin": (30.0, -40.0, 700.0), "sky": SKY, "slab": cloud("slab", slab())}
+    frame = rendered(mi.load_dict(cloud_scene(**parts)), octaves=1, extra_layers=True)
+    sky = np.array(SKY["radiance"]["value"])
+    assert frame.surface == pytest.approx((1 - frame.extra[OPACITY]) * sky, rel=1e-5)
+    down = SUN | {"direction": [0, 0, -1.0], "irradiance": {"type": "rgb", "value": list(np.pi * sky)}}
+    lit = rendered(mi.load_dict(cloud_scene(**(parts | {"sky": down}))), octaves=1)
+    assert frame.airlight == pytest.approx(lit.airlight, rel=1e-5)
+    assert lit.surface.max() == 0
+
+
+def test_light_that_came_through_a_cloud_falls_on_the_ground():
+    """Under a slab the ground has rho E mu0/pi exp(-tau/mu0); a part beyond its edge has all of it."""
+    ground = mitsuba_mesh("ground", grid((-4000, -4000, -200), (8000, 0, 0), (0, 8000, 0), (1, 1)), (0.4, 0.3, 0.2))
+    origin = (30.0, -300.0, 350.0)
+    scene = mi.load_dict(cloud_scene(origin=origin, sun=SUN, slab=cloud("slab", slab()), ground=ground))
+    frame = rendered(scene)
+    mu0 = 0.619 / np.linalg.norm(SUN["direction"])
+    full = np.array([0.4, 0.3, 0.2]) * np.array([3.1, 2.9, 2.3]) * mu0 / np.pi
+    through = np.exp(-SIGMA * 31.7 * (1 / mu0 + 1 / -directions(scene)[..., 2:]))
+    assert frame.surface == pytest.approx(full * through, rel=3e-4)
+    away = cloud_scene(origin=origin, sun=SUN, ring=cloud("ring", ring((3000.0, 0.0, 900.0))), ground=ground)
+    assert rendered(mi.load_dict(away)).surface[-1] == pytest.approx(np.tile(full, (16, 1)), rel=1e-5)
+
+
+def test_surfaces_shadow_clouds():
+    """A roof over the slab takes all light of the sun."""
+    roof = mitsuba_mesh("roof", grid((-4e4, -4e4, 900), (8e4, 0, 0), (0, 8e4, 0), (1, 1)), (0.4, 0.3, 0.2))
+    scene = cloud_scene(origin=(30.0, -40.0, 700.0), sun=SUN, slab=cloud("slab", slab()), roof=roof)
+    assert rendered(mi.load_dict(scene)).airlight.max() == 0
+
+
+def test_an_eye_in_a_cloud():
+    medium = mi.load_dict(DROPLETS)
+    scene = cloud_scene(origin=(30.0, -400.0, 1.7), sun=SUN, ring=cloud_of("ring", slab(), medium))
+    scene["sensor"]["medium"] = medium
+    frame = rendered(mi.load_dict(scene), extra_layers=True)
+    assert np.isfinite(frame.airlight).all()
+    assert frame.airlight.min() > 0
+    assert frame.extra[OPACITY].min() > 0.3
+
+
+@pytest.mark.parametrize(
+    ("origin", "sun", "axis"),
+    [
+        ((30.0, -400.0, 57.0), True, "z"),  # level
+        ((30.0, -40.0, 700.0), True, "z"),  # steeply down
+        ((3.17, -300.0, 300.0), True, "z"),  # down along an axis, where the sun decides
+        ((3.17, -100.0, 300.0), False, "y"),  # and without a sun the image
+    ],
+)
+def test_up_is_what_is_upright_in_the_image(origin, sun, axis):
+    parts = ({"sun": SUN} if sun else {}) | {"sky": SKY, "ring": cloud("ring", ring())}
+    assert read_scene(mi.load_dict(cloud_scene(origin=origin, **parts))).features.sky == axis
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_metres_or_kilometres_make_no_difference(scale):
+    """Optical depth alone matters."""
+    medium = DROPLETS | {"sigma_t": SIGMA / scale}
+    vertices, faces = ring()
+    view = tuple(scale * np.array([30.83, -400.91, 57.03]))
+    scene = cloud_scene(origin=view, sun=SUN, ring=cloud("ring", (scale * vertices, faces), medium))
+    scene["sensor"]["to_world"] = mi.ScalarTransform4f().look_at(
+        view, [3.17 * scale, 0.29 * scale, 1.49 * scale], [0, 0, 1]
+    )
+    expected = rendered(loaded()).airlight
+    assert np.sqrt(np.mean((rendered(mi.load_dict(scene)).airlight - expected) ** 2)) < 1e-3 * expected.mean()
+
+
+@pytest.mark.parametrize("sigma_t", [0.0, 1e-6, 30.0])
+def test_next_to_nothing_and_next_to_a_wall(sigma_t):
+    """Thin clouds have the light of their thickness, thick ones what their surface scatters; a vacuum has none."""
+    frame = rendered(loaded(sun=SUN, ring=cloud("ring", ring(), DROPLETS | {"sigma_t": sigma_t})), octaves=1)
+    assert np.isfinite(frame.airlight).all()
+    assert frame.airlight.min() >= 0
+    assert (frame.airlight.max() > 0) == (sigma_t > 0)
+
+
+@pytest.mark.parametrize("phase", ["hg:0.95", "hg-draine:12", "isotropic"])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_sun_in_the_axis_of_the_view(sign, phase):
+    """Scattering angles of 0 and 180 degrees exactly: the eye looks into the sun, or has it behind."""
+    scene = loaded()
+    middle = directions(scene)[6, 8]
+    sun = SUN | {"direction": (-sign * middle).tolist()}
+    frame = rendered(loaded(sun=sun, ring=cloud("ring", ring())), phase=phase)
+    assert np.isfinite(frame.airlight).all()
+    assert frame.airlight.min() >= 0
+    if phase == "hg:0.95":
+        assert (frame.airlight.max() > 1) == (sign == 1)
+
+
+def test_sampled_legs_converge_to_exact_ones():
+    exact_legs = rendered(loaded(), steps=64).airlight
+    errors = [
+        np.abs(rendered(loaded(), steps=64, light_steps=count, light_reach=300.0).airlight - exact_legs).mean()
+        for count in (8, 32, 128)
+    ]
+    assert errors[2] < 0.3 * errors[1] < 0.3 * errors[0]
+    assert errors[2] < 0.01 * exact_legs.mean()
+
+
+def test_printed_equations_run_and_differ():
+    frame, single, opaque = (
+        rendered(loaded(sun=SUN, sky=SKY, ring=cloud("ring", ring())), **switch)
+        for switch in ({}, {"single": "printed"}, {"opacity": "printed"})
+    )
+    assert single.airlight.min() < 0
+    np.testing.assert_array_equal(opaque.airlight, frame.airlight)
+    assert opaque.surface.max() > frame.surface.max()
+
+
+@pytest.mark.parametrize(("words", "expected"), [("isotropic", 0.0), ("hg:0.85", 0.85), ("hg-draine:12", None)])
+def test_mean_cosines(words, expected):
+    from analytic.phase import hg_draine_moments
+
+    expected = hg_draine_moments(12.0, 2)[1] if expected is None else expected
+    assert mean_cosine(named_phase(words, Float=mi.Float64), mi.Float64) == pytest.approx(expected, abs=1e-6)
+
+
+def test_another_phase_function_for_all_clouds():
+    same, other = (rendered(loaded(), phase=words).airlight for words in ("hg:0.85", "hg-draine:12"))
+    np.testing.assert_allclose(same, rendered(loaded()).airlight, rtol=1e-5)
+    assert np.abs(other / np.maximum(same, 1e-9) - 1).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"phase": "mie"}, "phase: got 'mie', wanted scene"),
+        ({"phase": "hg"}, "phase: got 'hg'"),
+        ({"phase": "hg:1.2"}, "between -1 and 1"),
+        ({"phase": "hg-draine:3"}, "diameter of 'hg-draine'"),
+        ({"octaves": 0}, "octaves: got 0"),
+        ({"extinction": 0.0}, "extinction: got 0.0"),
+        ({"anisotropy": 1.5}, "anisotropy: got 1.5"),
+    ],
+)
+def test_parameters_out_of_range_are_refused(parameters, message):
+    with pytest.raises(InputError, match=message):
+        rendered(loaded(), **parameters)
+
+
+LAMP = {"type": "point", "position": [0.0, 0.0, 300.0], "intensity": {"type": "rgb", "value": 9.0}}
+
+
+@pytest.mark.claim("clouds-refused")
+def test_what_is_not_lit_from_infinity_is_refused():
+    with pytest.raises(InputError, match="cloud-octaves: the scene has a light of kind point, and clouds are lit from"):
+        rendered(loaded(sun=SUN, lamp=LAMP, ring=cloud("ring", ring())))
+    panel = {"type": "rectangle", "emitter": {"type": "area", "radiance": {"type": "rgb", "value": 3.0}}}
+    with pytest.raises(InputError, match=r"a light of kind area \(rectangle\)"):
+        rendered(loaded(sun=SUN, panel=panel, ring=cloud("ring", ring())))
+
+
+@pytest.mark.claim("clouds-refused", "media-refused")
+@pytest.mark.parametrize("name", FOG_METHODS)
+def test_methods_for_fog_refuse_clouds_and_skies_and_name_who_takes_them(name):
+    method = METHODS[name]
+    kernel = {"kernel": exact} if method.uses_kernel(method.parameters()) else {}
+    wanted = rf"method {name}: .*use cloud-collectors or cloud-octaves"
+    with pytest.raises(InputError, match=wanted):
+        frame_renderer(read_scene(loaded()), method, **kernel)
+    with pytest.raises(InputError, match=wanted):
+        frame_renderer(read_scene(loaded(sun=SUN, sky=SKY, slab=cloud("slab", slab()))), method, **kernel)
+
+
+def test_clouds_are_wanted():
+    from tests.helpers.scenes import tiny_scene
+
+    with pytest.raises(InputError, match="cloud-octaves: the scene has no clouds"):
+        rendered(mi.load_dict(tiny_scene()))
+
+
+def test_frames_after_the_sun_moved_and_the_cloud_thickened():
+    """What was recorded once serves for all, with its layers."""
+    read = read_scene(loaded(sun=SUN, sky=SKY, ring=cloud("ring", ring())))
+    renderer = frame_renderer(read, OCTAVES, extra_layers=True)
+    still = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
+    stages, cache = next_frame(renderer, read, None, **still)
+    first = image_frame(renderer, stages, cache.extra)
+    np.testing.assert_array_equal(first.airlight, render_frame(renderer).airlight)
+    thick = replace(read, medium=thicker_medium(read.medium, 2.0))
+    stages, cache = next_frame(renderer, thick, cache, **still)
+    now = image_frame(renderer, stages, cache.extra)
+    new = rendered(loaded(sun=SUN, sky=SKY, ring=cloud("ring", ring(), DROPLETS | {"sigma_t": 2 * SIGMA})))
+    assert now.airlight == pytest.approx(new.airlight, rel=1e-4, abs=1e-7)
+    assert now.extra[OPACITY].mean() > first.extra[OPACITY].mean()
+
+
+def test_extra_layers_of_a_method_that_carries_and_one_with_passes():
+    """Every form of a method may name layers."""
+
+    def render(view, state, lists, *, kernel, parameters):
+        glow = type(view.medium.albedo)(0.25)
+        return Layers(
+            glow, None, None, None, {"half": 0.5 * glow} if view.extra_layers else None, carried=view.distance
+        )
+
+    plain = Method("glow", render, "a glow", "tests", uses_kernel=never, renders_clouds=True)
+    carrying = replace(plain, carries=lambda parameters: True)
+    passing = replace(plain, passes=(lambda layers, g_buffer, history, **place: layers,))
+    for method in (plain, carrying, passing):
+        frame = render_frame(frame_renderer(read_scene(loaded()), method, extra_layers=True))
+        assert frame.extra["half"] == pytest.approx(np.full((12, 16, 3), 0.125))
+        assert frame.airlight == pytest.approx(np.full((12, 16, 3), 0.25))
