@@ -7,7 +7,8 @@ Read in this order:
 - `allocation.py`: where the samples of a path tracer go;
 - `single_scatter`: an integrator of our own for Mitsuba;
 - `volpath`: Mitsuba's volumetric path tracer;
-- `slab_walk`: photons in a slab, counted by order of scattering.
+- `slab_walk`: photons in a slab, counted by order of scattering;
+- `cloud_paths`: paths through clouds of any shape, by order of scattering.
 
 May import: `analytic.errors`.
 """

@@ -29,6 +29,7 @@ class Batches:
     mean: Array  #: mean of the batch means, (layers, pixels, 3)
     squares: Array  #: sum of squared deviations from the mean, (layers, pixels, 3)
     totals: Array  #: image means of every batch, (batches, layers, 3)
+    layers: tuple[str, ...] = LAYERS  #: what they hold; more may follow the usual two
 
     @property
     def standard_error(self) -> Array:
@@ -49,7 +50,7 @@ def check_samples(samples: int) -> None:
         raise ValueError(f"samples: got {samples}, wanted 1 to {LARGEST_BATCH}")
 
 
-def single_batch(seed: int, samples: int, mean: Array) -> Batches:
+def single_batch(seed: int, samples: int, mean: Array, *, layers: tuple[str, ...] = LAYERS) -> Batches:
     """Return one batch, given its radiance of every pixel, (layers, pixels, 3).
 
     Parameters
@@ -60,6 +61,8 @@ def single_batch(seed: int, samples: int, mean: Array) -> Batches:
         Samples a pixel in it.
     mean
         Its radiance of every pixel, (layers, pixels, 3) [W/(m^2 sr)].
+    layers
+        Their names.
 
     Raises
     ------
@@ -73,7 +76,7 @@ def single_batch(seed: int, samples: int, mean: Array) -> Batches:
             f"{int(np.argmax(wrong))}, row by row; a light may lie on its ray, or a number of the scene be too large "
             "for float32: move the light, or use other units"
         )
-    return Batches((seed,), samples, mean, np.zeros_like(mean), mean.mean(axis=1)[None])
+    return Batches((seed,), samples, mean, np.zeros_like(mean), mean.mean(axis=1)[None], layers)
 
 
 def merged(first: Batches, second: Batches) -> Batches:
@@ -90,7 +93,12 @@ def merged(first: Batches, second: Batches) -> Batches:
         (len(first.seeds), first.mean, first.squares), (len(second.seeds), second.mean, second.squares)
     )
     return Batches(
-        first.seeds + second.seeds, first.samples, mean, squares, np.concatenate([first.totals, second.totals])
+        first.seeds + second.seeds,
+        first.samples,
+        mean,
+        squares,
+        np.concatenate([first.totals, second.totals]),
+        first.layers,
     )
 
 

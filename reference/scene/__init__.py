@@ -10,6 +10,8 @@ Read in this order:
 - `directional_light.py`: directional lights: direction and irradiance;
 - `area_light.py`: lights with extent, read and checked;
 - `read.py`: the whole scene: lights, media, camera rays;
+- `closed_mesh.py`: whether meshes bound bodies apart from one another;
+- `clouds.py`: scenes of clouds: media of any shape, suns and a sky;
 - `shapes.py`: opaque shapes as triangles and spheres;
 - `shadow_epsilon.py`: how far short of the light Mitsuba's shadow rays end.
 

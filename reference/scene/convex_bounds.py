@@ -99,7 +99,11 @@ def _read_polyhedron(shape: Any, vertices: Array, faces: Index) -> Polyhedron:
         block = slice(first, first + 256)
         outside = np.max(vertices @ normal[block].T, axis=0) - offset[block]
         if np.any(sound[block] & (outside > allowed[block])):
-            raise _refusal(shape, "is not convex", "convex bounds: cut the body into convex parts")
+            raise _refusal(
+                shape,
+                "is not convex",
+                "convex bounds: cut the body into convex parts, or for a cloud take the estimator cloud-paths",
+            )
     if not np.any(sound):
         raise _refusal(shape, "has no volume", "a closed convex mesh")
     bends = np.linalg.norm(normal[sides[:, 0]] - normal[sides[:, 1]], axis=1) > 10 * _FLAT

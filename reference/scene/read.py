@@ -51,6 +51,9 @@ class TruthMedium:
     plugin: Any  #: Mitsuba's medium, None for a vacuum
 
 
+CLEAR_AIR = TruthMedium(np.zeros(3), np.zeros(3), PhaseFunction("isotropic"), None)
+
+
 @dataclass(frozen=True)
 class BoundedMedium(TruthMedium):
     """A homogeneous medium within convex bounds."""
@@ -98,7 +101,7 @@ def read_truth(scene) -> TruthScene:
     lights = tuple(_read_light(emitter) for emitter in near)
     origin = camera_matrix(sensor)[:3, 3]
     area = tuple(read_area_light(emitter, origin) for emitter in wide)
-    opaque, boundaries = _sorted_shapes(scene)
+    opaque, boundaries = sorted_shapes(scene)
     media = tuple(_read_bounded(shape) for shape in boundaries)
     _check_disjoint(media)
     medium = _read_ambient(sensor, origin, media, boundaries)
@@ -119,7 +122,7 @@ def read_truth(scene) -> TruthScene:
     )
 
 
-def _sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
+def sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
     """Return the opaque shapes and those that bound a medium; what is neither takes no part."""
     opaque, boundaries = [], []
     for shape in scene.shapes():
@@ -143,8 +146,11 @@ def _sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
 
 def scene_of(shapes: list[Any], whole):
     """Return a scene of some of the shapes of `whole`, or `whole` itself if they are all of its shapes."""
-    if len(shapes) == len(whole.shapes()):
-        return whole
+    return whole if len(shapes) == len(whole.shapes()) else scene_from(shapes)
+
+
+def scene_from(shapes: list[Any]):
+    """Return a scene of some shapes, which keep their names."""
     # The keys become the names of the shapes, in the whole scene too: they keep those they have, if these are keys.
     names = {shape.id() for shape in shapes}
     sound = len(names) == len(shapes) and not any("." in name or not name for name in names)
@@ -182,20 +188,21 @@ def _read_ambient(sensor, origin: Array, media: tuple[BoundedMedium, ...], bound
                 "the medium that the camera references as exterior of all shapes, or none at all"
             )
     if ambient is not None:
-        return _read_medium(ambient, "the medium")
+        return read_medium(ambient, "the medium")
     if not media:
         raise InputError("the camera references no medium: it would be in a vacuum; reference the medium in the sensor")
-    return TruthMedium(np.zeros(3), np.zeros(3), PhaseFunction("isotropic"), None)
+    return CLEAR_AIR
 
 
 def _read_bounded(shape) -> BoundedMedium:
-    inside = _read_medium(shape.interior_medium(), f"the medium of shape '{shape.id()}'")
+    inside = read_medium(shape.interior_medium(), f"the medium of shape '{shape.id()}'")
     return BoundedMedium(
         inside.sigma_t, inside.albedo, inside.phase, inside.plugin, bounds=read_bounds(shape), name=shape.id()
     )
 
 
-def _read_medium(medium, name: str) -> TruthMedium:
+def read_medium(medium, name: str) -> TruthMedium:
+    """Read a homogeneous medium; messages call it by `name`."""
     if not medium.is_homogeneous():
         raise InputError(f"{name} is a {medium.class_name()}; wanted a medium of type 'homogeneous'")
     parameters = mi.traverse(medium)
@@ -222,7 +229,7 @@ def _read_light(emitter) -> TruthLight:
     if name not in ("PointLight", "SpotLight"):
         raise InputError(
             f"the scene has an emitter of class {name}; wanted emitters of type 'point', 'spot', 'directional' or "
-            "'area' only"
+            "'area' only; for clouds before a constant sky take the estimator cloud-paths"
         )
     parameters = mi.traverse(emitter)
     matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)

@@ -3,7 +3,8 @@
 
 Read in this order:
 
-- `integrator.py`: runs it in batches, airlight and surface apart.
+- `integrator.py`: runs it in batches, airlight and surface apart;
+- `orders.py`: clouds by order of scattering.
 
 May import: `reference.monte_carlo`, `reference.scene`.
 """

@@ -79,19 +79,19 @@ def volpath_batch(
     in_air, on_surface = np.full((2, truth.width * truth.height), samples) if counts is None else counts
     hidden = {"hide_emitters": True} if truth.area else {}
     integrator = mi.load_dict({"type": "volpath", "max_depth": max_depth, "rr_depth": 1000} | hidden)
-    with _black_surfaces(truth.occluders):
-        airlight = _trace(truth, integrator, 2 * seed, in_air)
+    with black_surfaces(truth.occluders):
+        airlight = trace(truth, integrator, 2 * seed, in_air)
     surface = np.zeros_like(airlight)
     if truth.occluders.shapes() and max_depth == 2:
-        surface = _trace(truth, integrator, 2 * seed + 1, on_surface, scattering=False)
+        surface = trace(truth, integrator, 2 * seed + 1, on_surface, scattering=False)
     elif truth.occluders.shapes():
         # The same paths once more, now with light from surfaces; the difference is what these add.
-        surface = _trace(truth, integrator, 2 * seed, in_air) - airlight
+        surface = trace(truth, integrator, 2 * seed, in_air) - airlight
     return single_batch(seed, samples, np.stack([airlight, surface]))
 
 
 @contextmanager
-def _black_surfaces(scene) -> Iterator[None]:
+def black_surfaces(scene) -> Iterator[None]:
     """Make every surface black for a while."""
     black = mi.load_dict({"type": "diffuse", "reflectance": 0.0})
     own = [(shape, shape.bsdf()) for shape in scene.shapes()]
@@ -104,8 +104,22 @@ def _black_surfaces(scene) -> Iterator[None]:
             shape.set_bsdf(bsdf)
 
 
-def _trace(truth: TruthScene, integrator, seed: int, counts: Counts, *, scattering: bool = True) -> Array:
-    """Return the mean radiance of every pixel, (pixels, 3), over so many paths each."""
+def trace(truth: TruthScene, integrator, seed: int, counts: Counts, *, scattering: bool = True) -> Array:
+    """Return the mean radiance of every pixel, (pixels, 3) [W/(m^2 sr)].
+
+    Parameters
+    ----------
+    truth
+        The scene.
+    integrator
+        Of Mitsuba.
+    seed
+        Of the whole image.
+    counts
+        Paths of each pixel, (pixels,).
+    scattering
+        Whether media scatter.
+    """
     image = np.zeros((len(counts), 3))
     parts = _parts(counts)
     extinctions = np.stack([medium.sigma_t for medium in (truth.medium, *truth.media)], axis=1)

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How much clouds let through along the pixel-centre rays, up to the visible surface or to infinity, without samples.
+
+Mitsuba's ray casts find the triangles that a ray crosses; where it crosses their planes is computed in float64. A
+stretch lies in a cloud if it ends at a face of it seen from inside, as in the walk.
+"""
+
+from dataclasses import dataclass
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.scene.clouds import CloudScene
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SeenClouds:
+    """What the pixel-centre rays meet."""
+
+    transmittance: Array  #: of all clouds up to the visible surface, or to infinity, (pixels, 3)
+    distance: Array  #: to the visible surface, infinite where there is none, (pixels,) [m]
+    meets: NDArray[np.bool_]  #: whether there is a cloud or a surface, (pixels,)
+
+
+def seen_clouds(clouds: CloudScene) -> SeenClouds:
+    """Follow the pixel-centre rays of a scene."""
+    count = len(clouds.direction)
+    depth, distance = np.zeros((count, 3)), np.full(count, np.inf)
+    passed, cast, meets = np.zeros(count), np.zeros(count), np.zeros(count, dtype=bool)
+    inside = np.full(count, clouds.camera_cloud)
+    left = np.arange(count)
+    extinction = np.stack([cloud.sigma_t for cloud in clouds.clouds])
+    corners = [_corners(cloud.shape) for cloud in clouds.clouds]
+    reach = float(np.abs(np.array([clouds.scene.bbox().min, clouds.scene.bbox().max])).max())
+    step = 4e-7 * max(reach, float(np.abs(clouds.origin).max()))
+    while left.size:
+        way = clouds.direction[left]
+        start = cast[left]
+        ray = mi.Ray3f(mi.Point3f((clouds.origin + start[:, None] * way).T), mi.Vector3f(way.T))
+        si = clouds.scene.ray_intersect(ray)
+        hit = np.array(si.is_valid(), dtype=bool)
+        left, way, start = left[hit], way[hit], start[hit]
+        meets[left] = True
+        length = start + np.array(si.t, dtype=np.float64)[hit]
+        cast[left] = length + step
+        face = np.array(si.prim_index, dtype=np.int64)[hit]
+        leaves = (np.array(si.n, dtype=np.float64).T[hit] * way).sum(axis=1) > 0
+        opaque = np.ones(len(left), dtype=bool)
+        within = inside[left]
+        for number, cloud in enumerate(clouds.clouds):
+            on = np.array(si.shape == mi.ShapePtr(cloud.shape), dtype=bool)[hit]
+            opaque &= ~on
+            triangles = corners[number]
+            if triangles is not None:
+                length[on] = _crossing(triangles[face[on]], clouds.origin, way[on], length[on])
+            within = np.where(on, np.where(leaves, number, -1), within)
+            inside[left[on]] = np.where(leaves[on], -1, number)
+        stretch = np.maximum(length - passed[left], 0.0)
+        depth[left] += np.where(within[:, None] >= 0, extinction[within] * stretch[:, None], 0.0)
+        passed[left] = np.maximum(length, passed[left])
+        distance[left[opaque]] = length[opaque]
+        left = left[~opaque]
+    return SeenClouds(np.exp(-depth), distance, meets)
+
+
+def _corners(shape) -> Array | None:
+    if not shape.is_mesh():
+        return None
+    parameters = mi.traverse(shape)
+    vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
+    return np.asarray(vertices[np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)])
+
+
+def _crossing(corners: Array, origin: Array, way: Array, near: Array) -> Array:
+    """Return where rays cross the planes of triangles, in float64; where they graze them, what the cast said."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    normal = np.cross(b - a, c - a)
+    slope = (normal * way).sum(axis=1)
+    steep = np.abs(slope) > 1e-4 * np.linalg.norm(normal, axis=1)
+    exact = ((a - origin) * normal).sum(axis=1) / np.where(steep, slope, 1.0)
+    return np.where(steep, exact, near)

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Phase functions of the walk, in Dr.Jit: values by half the angle, and scattering angles at random.
+
+Both work with down = sin^2(angle/2), which two unit vectors give without cancellation, |a - b|^2/4. Values have the
+mean 1 over the sphere, so down is distributed with the density p on [0, 1].
+"""
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from analytic.phase import PhaseFunction
+
+Array = NDArray[np.float64]
+
+
+class WalkPhase:
+    """A phase function."""
+
+    def value(self, down, up):
+        """Return p at sin^2 and cos^2 of half the scattering angle."""
+        raise NotImplementedError
+
+    def down(self, sampler, active):
+        """Return sin^2 of half a random scattering angle."""
+        raise NotImplementedError
+
+
+class HenyeyGreenstein(WalkPhase):
+    """Henyey and Greenstein's function, isotropic for g = 0.
+
+    The distribution's inverse is down = (1 - g) (1 - u) (r + 1 - g) / (2 (1 - g + 2 g u)), r = (1 - g^2)/(1 - g + 2 g
+    u): the usual formula of the cosine without its cancellations.
+    """
+
+    def __init__(self, g: float):
+        self._g = g
+
+    def value(self, down, up):
+        """Return p."""
+        g = self._g
+        base = (1 - g) ** 2 + 4 * g * down if g >= 0 else (1 + g) ** 2 - 4 * g * up
+        return (1 - g * g) * dr.rsqrt(base) / base
+
+    def down(self, sampler, active):
+        """Return sin^2 of half a random scattering angle."""
+        g, u = self._g, sampler.next_1d(active)
+        below = dr.rcp(1 - g + 2 * g * u)
+        return dr.clip(0.5 * (1 - g) * (1 - u) * below * ((1 - g * g) * below + 1 - g), 0.0, 1.0)
+
+
+class Rayleigh(WalkPhase):
+    """Rayleigh's function; its cosines by Cardano's formula."""
+
+    def value(self, down, up):
+        """Return p."""
+        return 0.75 + 0.75 * dr.square(up - down)
+
+    def down(self, sampler, active):
+        """Return sin^2 of half a random scattering angle."""
+        z = 4 * sampler.next_1d(active) - 2
+        root = dr.cbrt(dr.abs(z) + dr.sqrt(dr.fma(z, z, 1.0)))
+        return dr.clip(0.5 - 0.5 * dr.copysign(root - dr.rcp(root), z), 0.0, 1.0)
+
+
+class Tabulated(WalkPhase):
+    """Values at regularly spaced cosines, linear between them.
+
+    A cell is drawn by the alias method (Walker 1977; Vose 1991), a place in it by the inverse of the linear density.
+
+    Parameters
+    ----------
+    values
+        (A,), from backward to forward, of mean 1.
+    """
+
+    def __init__(self, values: Array):
+        self._last = len(values) - 1
+        self._values = mi.Float(values)
+        share, other = _aliases(0.5 * (values[1:] + values[:-1]))
+        self._share, self._other = mi.Float(share), mi.UInt32(other)
+
+    def value(self, down, up):
+        """Return p."""
+        place = up * self._last
+        cell = dr.clip(mi.Int32(place), 0, self._last - 1)
+        low, high = dr.gather(mi.Float, self._values, cell), dr.gather(mi.Float, self._values, cell + 1)
+        return dr.lerp(low, high, place - cell)
+
+    def down(self, sampler, active):
+        """Return sin^2 of half a random scattering angle."""
+        number = dr.minimum(mi.UInt32(sampler.next_1d(active) * self._last), self._last - 1)
+        own = sampler.next_1d(active) < dr.gather(mi.Float, self._share, number, active)
+        cell = dr.select(own, number, dr.gather(mi.UInt32, self._other, number, active))
+        low = dr.gather(mi.Float, self._values, cell, active)
+        high = dr.gather(mi.Float, self._values, cell + 1, active)
+        u = sampler.next_1d(active)
+        root = dr.sqrt(dr.lerp(dr.square(low), dr.square(high), u))
+        share = u * (low + high) / dr.maximum(low + root, dr.smallest(mi.Float))
+        return dr.clip((self._last - cell - share) / self._last, 0.0, 1.0)
+
+
+def _aliases(weights: Array) -> tuple[Array, NDArray[np.uint32]]:
+    """Return for each cell the share of its draws that stay with it, and the cell that gets the others."""
+    count = len(weights)
+    share = weights * (count / weights.sum())
+    other = np.arange(count, dtype=np.uint32)
+    small, large = list(np.flatnonzero(share < 1)), list(np.flatnonzero(share >= 1))
+    while small and large:
+        low, high = small.pop(), large[-1]
+        other[low] = high
+        share[high] -= 1 - share[low]
+        if share[high] < 1:
+            small.append(large.pop())
+    share[small + large] = 1.0
+    return share, other
+
+
+def walk_phase(phase: PhaseFunction) -> WalkPhase:
+    """Return a phase function of the scene for the walk.
+
+    Raises
+    ------
+    InputError
+        For one that no scene has.
+    """
+    if phase.name in ("isotropic", "hg"):
+        return HenyeyGreenstein(phase.g)
+    if phase.name == "rayleigh":
+        return Rayleigh()
+    if phase.name == "tabulated":
+        values = np.asarray(phase.table)
+        return Tabulated(values / (0.5 * (values[1:] + values[:-1])).mean())
+    raise InputError(f"the walk has no phase function '{phase.name}'; wanted isotropic, hg, rayleigh or tabulated")

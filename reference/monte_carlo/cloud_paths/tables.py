@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A scene of clouds as arrays that the walk gathers from: media by number, suns, phase functions.
+
+Medium 0 is clear air, and as the kind of a shape it means an opaque one; the clouds count from 1.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from reference.monte_carlo.cloud_paths.phases import WalkPhase, walk_phase
+from reference.scene.clouds import CloudScene
+
+_FOUR_PI = 4 * np.pi
+#: How far past a crossing the next ray starts, relative to the largest coordinate: what float32 can tell apart.
+_BEYOND = 4e-7
+
+
+@dataclass(frozen=True)
+class WalkScene:
+    """What the walk reads, for one extinction of each medium."""
+
+    scene: Any  #: the `mi.Scene`
+    camera_medium: int  #: number of the medium that it is in
+    kinds: Any  #: number of the medium within a shape, by Mitsuba's number of the shape
+    sigma_t: Any  #: by medium [1/m]
+    albedo: Any  #: by medium, as colours
+    phases: tuple[WalkPhase, ...]  #: each once
+    phase_of: Any  #: which of `phases`, by medium
+    sky: tuple[float, float, float]  #: radiance [W/(m^2 sr)]
+    suns: tuple[tuple[Any, Any, float], ...]  #: direction to each, irradiance over 4 pi and probability, probability
+    has_surfaces: bool
+    beyond: float  #: how far past a crossing the next ray starts [m]
+
+    @property
+    def has_suns(self) -> bool:
+        """Whether there are suns."""
+        return bool(self.suns)
+
+    @property
+    def has_sky(self) -> bool:
+        """Whether the sky shines."""
+        return any(value > 0 for value in self.sky)
+
+    def random_sun(self, sampler, active):
+        """Return the number of a sun, drawn by irradiance."""
+        if len(self.suns) < 2:
+            return mi.UInt32(0)
+        u, number, below = sampler.next_1d(active), mi.UInt32(0), 0.0
+        for _, _, probability in self.suns[:-1]:
+            below += probability
+            number += dr.select(u >= below, mi.UInt32(1), mi.UInt32(0))
+        return number
+
+    def to_sun(self, number):
+        """Return the direction to a sun."""
+        return self._by_sun(number, 0, mi.Vector3f)
+
+    def irradiance(self, number):
+        """Return the irradiance of a sun over its probability [W/m^2]."""
+        return self._by_sun(number, 1, mi.Color3f)
+
+    def _by_sun(self, number, field: int, kind):
+        result = kind(0)
+        for place, sun in enumerate(self.suns):
+            result = kind(sun[field]) if place == 0 else dr.select(number == place, kind(sun[field]), result)
+        return result
+
+    def phase_value(self, medium, first, second, active):
+        """Return the phase function of a medium between two directions [1/sr]."""
+        down, up = 0.25 * dr.squared_norm(first - second), 0.25 * dr.squared_norm(first + second)
+        value = self.phases[0].value(down, up)
+        if len(self.phases) > 1:
+            number = dr.gather(mi.UInt32, self.phase_of, medium, active)
+            for place, phase in enumerate(self.phases[1:], 1):
+                value = dr.select(number == place, phase.value(down, up), value)
+        return value / _FOUR_PI
+
+    def phase_about_suns(self, medium, direction, active):
+        """Return the density of directions drawn about suns [1/sr]."""
+        density = mi.Float(0)
+        for towards, _, probability in self.suns:
+            density += probability * self.phase_value(medium, mi.Vector3f(towards), direction, active)
+        return density
+
+    def scattered(self, medium, about, sampler, active):
+        """Return a random direction by the phase function of a medium about a direction."""
+        down = self.phases[0].down(sampler, active)
+        if len(self.phases) > 1:
+            number = dr.gather(mi.UInt32, self.phase_of, medium, active)
+            for place, phase in enumerate(self.phases[1:], 1):
+                down = dr.select(number == place, phase.down(sampler, active), down)
+        sine, azimuth = 2 * dr.sqrt(down * (1 - down)), 2 * dr.pi * sampler.next_1d(active)
+        across, along = dr.sincos(azimuth)
+        s, t = mi.coordinate_system(about)
+        return dr.normalize(dr.fma(s, sine * along, dr.fma(t, sine * across, about * (1 - 2 * down))))
+
+
+def _numbers(values) -> tuple[float, float, float]:
+    first, second, third = (float(value) for value in values)
+    return first, second, third
+
+
+def walk_scene(clouds: CloudScene, channel: int) -> WalkScene:
+    """Return what the walk reads, with the extinctions of one channel."""
+    numbers = {
+        int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(each.shape))[0]): n for n, each in enumerate(clouds.clouds, 1)
+    }
+    every = [int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0]) for shape in clouds.scene.shapes()]
+    kinds = np.zeros(max(every) + 1, dtype=np.uint32)
+    kinds[list(numbers)] = list(numbers.values())
+    functions = list(dict.fromkeys(each.phase for each in clouds.clouds))
+    power = np.array([sun.irradiance.sum() for sun in clouds.suns])
+    suns = []
+    for sun, share in zip(clouds.suns, power / power.sum() if len(power) else [], strict=True):
+        if share > 0:
+            suns.append((_numbers(-sun.direction), _numbers(sun.irradiance / share), float(share)))
+    reach = max(np.abs(np.array(clouds.scene.bbox().min)).max(), np.abs(np.array(clouds.scene.bbox().max)).max())
+    return WalkScene(
+        scene=clouds.scene,
+        camera_medium=clouds.camera_cloud + 1,
+        kinds=mi.UInt32(kinds),
+        sigma_t=mi.Float([0.0, *(float(each.sigma_t[channel]) for each in clouds.clouds)]),
+        albedo=mi.Float(np.concatenate([np.ones(3), *(each.albedo for each in clouds.clouds)])),
+        phases=tuple(walk_phase(function) for function in functions),
+        phase_of=mi.UInt32([0, *(functions.index(each.phase) for each in clouds.clouds)]),
+        sky=_numbers(clouds.sky),
+        suns=tuple(suns),
+        has_surfaces=bool(clouds.occluders.shapes()),
+        beyond=_BEYOND * max(float(reach), float(np.abs(clouds.origin).max())),
+    )

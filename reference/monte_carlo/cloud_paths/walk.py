@@ -1,0 +1,276 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Light paths from the eye through clouds, in one loop that casts one ray a turn.
+
+A path flies an exponentially distributed optical length through clouds, air costs nothing, is scattered by the phase
+function, and so on until it leaves; what it meets then is the sky. At every place of scattering a shadow ray to a sun
+adds the sun's light: one of the suns at random, by its irradiance.
+
+With a directional sun that term holds the phase function p_s of the angle between the path and the sun, whose forward
+peak is rarely met and then great. So directions are sampled a second time, about the sun (multiple importance sampling,
+Veach and Guibas 1995): from each place x a *side flight* leaves in a direction drawn from p_s, has its own free flight,
+and adds the sun's light where that ends. With p_a the phase function about the path, the sun's light at the end of both
+flights counts
+
+    p_a/(p_a + p_s)                  times what it is after the path's own flight,
+
+which is at most 1 times p_s, so that their product stays below p_a: no peak is left. A place before which the path was
+not scattered (the first, and the one after a surface) has no side flight before it, and its light counts whole.
+
+Paths are never cut short in clouds: absorption is a weight. Where a weight falls below 0.05, by absorption or by dark
+surfaces, the path goes on with a probability in proportion (Russian roulette, unbiased). A shadow ray that leaves a
+cloud with less than 1/8 of its light likewise goes on with 8 times that share as its probability.
+
+In which medium a stretch lies follows from its end: before a face of a cloud seen from inside, the cloud; before one
+seen from outside, or nothing, clear air; before an opaque surface, where the path was last. So a crossing that rounding
+doubles or hides mends itself at the next face. After a crossing a ray starts a little further on, which is added to the
+length of its next stretch.
+
+A lane of the loop follows the samples of one pixel one after another, so that lanes end at nearly the same time.
+"""
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from reference.monte_carlo.cloud_paths.tables import WalkScene
+
+MAIN, SIDE, SHADOW, SIDE_SHADOW, SURFACE_SHADOW = range(5)  #: what the ray of a lane is
+_LEAST_WEIGHT = 0.05
+_SHADOW_SHARE = 8.0
+
+
+@dataclass(frozen=True)
+class Targets:
+    """Where light goes: its layer by order of scattering, and two of surfaces.
+
+    Light that met no surface goes to one of `orders` layers, or to the layer `orders` if it is of no order wanted.
+    Two layers follow: light that met surfaces, and of that what came from the lights to the visible surface and from
+    there to the eye straight, which the first of the two lacks.
+    """
+
+    by_order: Any  #: layer of each order from 0 on, UInt32; the last number is that of all further orders
+    orders: int  #: how many layers of orders there are
+
+    @property
+    def count(self) -> int:
+        """How many layers there are."""
+        return self.orders + 3
+
+    def layer(self, order, met, straight):
+        """Return the layer of light of an order, that `met` a surface or not, and came straight from there."""
+        of_order = dr.gather(mi.UInt32, self.by_order, dr.minimum(order, dr.width(self.by_order) - 1))
+        of_surface = dr.select(straight, mi.UInt32(self.orders + 2), mi.UInt32(self.orders + 1))
+        return dr.select(met, of_surface, of_order)
+
+
+@dataclass
+class Paths:
+    """What a lane knows of its path."""
+
+    mode: Any  #: what its ray is
+    o: Any  #: where the ray starts [m]
+    d: Any  #: its direction
+    gap: Any  #: how far past the last crossing it starts [m]
+    depth: Any  #: optical length that is left of a flight, or that a shadow ray has passed
+    medium: Any  #: where the ray starts, for stretches that end at an opaque surface
+    x: Any  #: the last place of scattering or reflection [m]
+    w: Any  #: direction in which the path came there, or leaves a surface
+    cloud: Any  #: medium of that place
+    weight: Any  #: of the path, a colour
+    order: Any  #: how many times it was scattered
+    bounces: Any  #: how many surfaces it met
+    share: Any  #: of the sun's light at the end of this flight that counts
+    value: Any  #: light at the start of a shadow ray
+    target: Any  #: its layer
+    left: Any  #: paths to follow, this one among them
+    casts: Any  #: rays cast
+
+
+def walk(scene: WalkScene, targets: Targets, sampler, rays, *, samples: int, side: float):
+    """Return the sums over samples, (layers x lanes) for each channel, and how many rays each lane cast.
+
+    Parameters
+    ----------
+    scene
+        What the walk reads.
+    targets
+        Where light goes.
+    sampler
+        Seeded, as wide as there are lanes.
+    rays
+        Where paths start from the eye's side and their unit directions, one a lane, as Mitsuba's rays.
+    samples
+        How many paths each lane follows.
+    side
+        Probability of a side flight, 0 to 1.
+    """
+    lanes = dr.width(rays.d)
+    sums = [dr.zeros(mi.Float, targets.count * lanes) for _ in range(3)]
+    paths = Paths(
+        mode=mi.UInt32(MAIN),
+        o=mi.Point3f(rays.o),
+        d=mi.Vector3f(rays.d),
+        gap=mi.Float(0),
+        depth=-dr.log(1 - sampler.next_1d()),
+        medium=mi.UInt32(scene.camera_medium),
+        x=mi.Point3f(0),
+        w=mi.Vector3f(0, 0, 1),
+        cloud=mi.UInt32(0),
+        weight=mi.Color3f(1),
+        order=mi.UInt32(0),
+        bounces=mi.UInt32(0),
+        share=mi.Float(1),
+        value=mi.Color3f(0),
+        target=mi.UInt32(0),
+        left=mi.UInt32(samples),
+        casts=mi.UInt32(0),
+    )
+    turn = partial(_turn, scene=scene, targets=targets, sums=sums, rays=rays, side=side)
+    paths, _ = dr.while_loop(
+        state=(paths, sampler), cond=lambda paths, _: paths.left > 0, body=turn, label="paths through clouds"
+    )
+    return sums, paths.casts
+
+
+def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, rays, side: float):
+    """Cast the ray of every lane, and return what follows."""
+    active = paths.left > 0
+    lanes = dr.width(rays.d)
+    lane = dr.arange(mi.UInt32, lanes)
+    flags = int(mi.RayFlags.All) if scene.has_surfaces else int(mi.RayFlags.Minimal)
+    mode, o, d, gap, depth, medium = paths.mode, paths.o, paths.d, paths.gap, paths.depth, paths.medium
+    x, w, cloud, weight, order = paths.x, paths.w, paths.cloud, paths.weight, paths.order
+    bounces, share, value, target = paths.bounces, paths.share, paths.value, paths.target
+    si = scene.scene.ray_intersect(mi.Ray3f(o, d), flags, False, active)
+    hit = active & si.is_valid()
+    kind = dr.gather(mi.UInt32, scene.kinds, dr.reinterpret_array(mi.UInt32, si.shape), hit)
+    opaque, boundary = hit & (kind == 0), hit & (kind > 0)
+    leaves = boundary & (dr.dot(si.n, d) > 0)
+    within = dr.select(leaves, kind, dr.select(opaque, medium, 0))
+    sigma_t = dr.gather(mi.Float, scene.sigma_t, within, active)
+    optical = dr.select(within > 0, sigma_t * (si.t + gap), 0.0)
+    flies, is_main = active & (mode <= SIDE), active & (mode == MAIN)
+    scatters = flies & (within > 0) & (optical > depth)
+    crosses, meets = boundary & ~scatters, opaque & ~scatters
+    escapes = active & ~hit
+    begins = scatters & is_main
+    scattered_at = o + d * (depth / dr.maximum(sigma_t, dr.smallest(mi.Float)) - gap)
+    shadow = active & ~flies
+    depth = dr.select(shadow, depth + optical, depth - optical)
+
+    # Shadow rays add their light, or end in the dark, or by roulette where they leave a cloud.
+    lit = dr.exp(-dr.select(shadow, depth, 0.0))
+    arrives, dims = shadow & escapes, shadow & leaves
+    arriving = value * lit
+    place = target * lanes + lane
+    for number in range(3):
+        dr.scatter_add(sums[number], arriving[number], place, arrives, mode=dr.ReduceMode.NoConflicts)
+    chance = dr.minimum(_SHADOW_SHARE * lit, 1.0)
+    fades = dims & (sampler.next_1d(active) >= chance)
+    value = dr.select(dims, arriving / dr.maximum(chance, dr.smallest(mi.Float)), value)
+    depth = dr.select(dims, 0.0, depth)
+    dark = arrives | fades | (shadow & meets)
+    crosses &= ~fades
+
+    # The path is scattered, or reflected by a surface, or has left.
+    albedo = dr.gather(mi.Color3f, scene.albedo, within, active)
+    order = dr.select(begins, order + 1, order)
+    weight = dr.select(begins, weight * albedo, weight)
+    x, w, cloud = dr.select(begins, scattered_at, x), dr.select(begins, d, w), dr.select(begins, within, cloud)
+    over = escapes & is_main
+    if scene.has_sky:
+        of_sky = over & ((order > 0) | (bounces > 0))
+        place = targets.layer(order, bounces > 0, (order == 0) & (bounces == 1)) * lanes + lane
+        from_sky = weight * mi.Color3f(*scene.sky)
+        for number in range(3):
+            dr.scatter_add(sums[number], from_sky[number], place, of_sky, mode=dr.ReduceMode.NoConflicts)
+    sun = scene.random_sun(sampler, active)
+    to_sun, irradiance = scene.to_sun(sun), scene.irradiance(sun)
+    weighed = dr.select(begins, weight, weight * albedo) * share
+    scattered = weighed * scene.phase_value(within, d, to_sun, scatters) * irradiance
+    value = dr.select(scatters, scattered, value)
+    of_order = dr.select(begins, order, order + 1)
+    target = dr.select(scatters, targets.layer(of_order, bounces > 0, mi.Bool(False)), target)
+    shadow_from, reflects = mi.Point3f(scattered_at), mi.Bool(False)
+    if scene.has_surfaces:
+        reflects = meets & is_main
+        bounces = dr.select(reflects, bounces + 1, bounces)
+        bsdf, context = si.bsdf(mi.RayDifferential3f(mi.Ray3f(o, d))), mi.BSDFContext()
+        seen_sun = bsdf.eval(context, si, si.to_local(to_sun), reflects) * irradiance
+        value = dr.select(reflects, weight * seen_sun, value)
+        target = dr.select(reflects, targets.layer(order, mi.Bool(True), (order == 0) & (bounces == 1)), target)
+        first, second = sampler.next_1d(active), mi.Point2f(sampler.next_1d(active), sampler.next_1d(active))
+        drawn, passed = bsdf.sample(context, si, first, second, reflects)
+        onwards = si.to_world(drawn.wo)
+        weight = dr.select(reflects, weight * passed, weight)
+        w, x = dr.select(reflects, onwards, w), dr.select(reflects, si.spawn_ray(onwards).o, x)
+        cloud = dr.select(reflects, medium, cloud)
+        shadow_from = dr.select(reflects, si.spawn_ray(to_sun).o, shadow_from)
+
+    # What follows: a shadow ray, a side flight, the path itself, or the next path.
+    begins_shadow = (scatters | reflects) & scene.has_suns
+    reflected = (dark & (mode == SURFACE_SHADOW)) if scene.has_suns else reflects
+    main_done = (dark & (mode == SHADOW)) if scene.has_suns else begins
+    turns_aside = main_done & (sampler.next_1d(active) < side)
+    side_done = ((mode == SIDE) & active & (escapes | meets)) | (dark & (mode == SIDE_SHADOW))
+    resumes = side_done | (main_done & ~turns_aside)
+    about = dr.select(turns_aside, scene.to_sun(scene.random_sun(sampler, active)), w)
+    new = scene.scattered(cloud, about, sampler, resumes | turns_aside)
+    of_path = scene.phase_value(cloud, w, new, resumes | turns_aside)
+    of_suns = scene.phase_about_suns(cloud, new, resumes | turns_aside)
+    share = dr.select(resumes | turns_aside, of_path / (of_path + side * of_suns), share)
+    share = dr.select(reflected, 1.0, share)
+
+    # Light paths' weights fall by absorption and at surfaces alone.
+    survival = dr.minimum(dr.max(weight) / _LEAST_WEIGHT, 1.0)
+    resumes_any = resumes | reflected
+    lost = resumes_any & (sampler.next_1d(active) >= survival)
+    weight = dr.select(resumes_any, weight / dr.maximum(survival, dr.smallest(mi.Float)), weight)
+    over |= lost
+
+    flown = resumes_any | turns_aside | over
+    free = -dr.log(1 - sampler.next_1d(active))
+    depth = dr.select(flown, free, dr.select(begins_shadow, 0.0, depth))
+    forward = scene.beyond
+    next_o = dr.select(crosses, o + d * (si.t + forward), o)
+    next_o = dr.select(begins_shadow, shadow_from, next_o)
+    next_o = dr.select(resumes_any | turns_aside, x, next_o)
+    o = dr.select(over, rays.o, next_o)
+    next_d = dr.select(begins_shadow, to_sun, d)
+    next_d = dr.select(resumes | turns_aside, new, next_d)
+    next_d = dr.select(reflected, w, next_d)
+    d = dr.select(over, rays.d, next_d)
+    gap = dr.select(crosses, forward, dr.select(flown | begins_shadow, 0.0, gap))
+    next_medium = dr.select(crosses, dr.select(leaves, 0, kind), medium)
+    next_medium = dr.select(scatters, within, next_medium)
+    next_medium = dr.select(resumes_any | turns_aside, cloud, next_medium)
+    medium = dr.select(over, scene.camera_medium, next_medium)
+    next_mode = dr.select(begins_shadow, dr.select(reflects, SURFACE_SHADOW, mode + 2), mode)
+    next_mode = dr.select(turns_aside, SIDE, next_mode)
+    mode = dr.select(resumes_any | over, MAIN, next_mode)
+    weight = dr.select(over, 1.0, weight)
+    order, bounces = dr.select(over, 0, order), dr.select(over, 0, bounces)
+    share = dr.select(over, 1.0, share)
+    following = Paths(
+        mode,
+        o,
+        d,
+        gap,
+        depth,
+        medium,
+        x,
+        w,
+        cloud,
+        weight,
+        order,
+        bounces,
+        share,
+        value,
+        target,
+        left=dr.select(over, paths.left - 1, paths.left),
+        casts=paths.casts + dr.select(active, mi.UInt32(1), mi.UInt32(0)),
+    )
+    return following, sampler

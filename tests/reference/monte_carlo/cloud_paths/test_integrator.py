@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: paths through clouds give the light of each order: DISORT's in a slab, Mitsuba's `volpath` elsewhere."""
+
+import math
+from dataclasses import replace
+from functools import reduce
+
+import numpy as np
+import pytest
+from scipy.stats import chi2, norm
+
+SETS = [("1", (1, 1)), ("2", (2, 2)), ("3-4", (3, 4)), ("5-inf", (5, math.inf))]
+
+
+def paths(clouds, count, samples, sets=SETS, first=0):
+    from reference.monte_carlo.batches import merged
+    from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch
+    from reference.monte_carlo.cloud_paths.opacity import seen_clouds
+
+    seen = seen_clouds(clouds).meets
+    return reduce(
+        merged, (cloud_paths_batch(clouds, seed, samples, sets=sets, seen=seen) for seed in range(first, first + count))
+    )
+
+
+def ball(sigma_t, albedo, phase, centre=(0.0, 0.0, 0.0), radius=1.3):
+    return {
+        "type": "sphere",
+        "center": list(centre),
+        "radius": radius,
+        "bsdf": {"type": "null"},
+        "interior": {
+            "type": "homogeneous",
+            "sigma_t": {"type": "rgb", "value": [value / max(sigma_t) for value in sigma_t]},
+            "scale": max(sigma_t),
+            "albedo": {"type": "rgb", "value": list(albedo)},
+            "phase": phase,
+            "has_spectral_extinction": len(set(sigma_t)) > 1,
+        },
+    }
+
+
+def scene(**parts):
+    import mitsuba as mi
+
+    from validation.scenes.cloud_parts import sun
+    from validation.scenes.parts import camera
+
+    usual = {
+        "type": "scene",
+        "sensor": camera((0.3, -6.1, 0.7), (0.1, 0.0, 0.1), fov=43.0, size=(8, 6), in_fog=False),
+        "sun": sun((0.3, 0.5, -0.8), (3.1, 2.7, 2.3)),
+    }
+    return mi.load_dict({name: part for name, part in (usual | parts).items() if part is not None})
+
+
+def scenes():
+    from validation.scenes.cloud_parts import sky, sun
+    from validation.scenes.parts import grid, mitsuba_mesh
+
+    hg = {"type": "hg", "g": 0.6}
+    ground = mitsuba_mesh("ground", grid((-9, -9, -1.7), (18, 0, 0), (0, 18, 0), (1, 1)), (0.7, 0.5, 0.3))
+    block = mitsuba_mesh("block", grid((0.0, -0.6, -0.6), (1.1, 0.2, 0), (0.1, 0.0, 1.1), (1, 1)), (0.6, 0.6, 0.2))
+    table = {"type": "tabphase", "values": "1.0, 0.2, 0.3, 0.9, 5.0"}
+    return {
+        "sky alone, coloured and absorbing": {
+            "ball": ball((0.9, 1.3, 1.9), (0.9, 0.8, 0.6), hg),
+            "sky": sky((0.7, 0.9, 1.1)),
+            "sun": None,
+        },
+        "two clouds, a ground and a block inside": {
+            "low": ball((2.1,) * 3, (1.0,) * 3, {"type": "rayleigh"}, (0.9, 0.3, -0.4), 0.8),
+            "high": ball((1.1,) * 3, (0.97, 0.9, 0.8), table, (-0.6, 0.2, 0.7), 1.1),
+            "ground": ground,
+            "sky": sky((0.2, 0.3, 0.4)),
+        },
+        "a surface within, two suns": {
+            "ball": ball((1.3,) * 3, (0.95,) * 3, hg),
+            "block": block,
+            "other": sun((-0.7, 0.1, -0.4), (0.3, 0.9, 1.7)),
+        },
+    }
+
+
+def z_of(first, second, layer):
+    """Return by how many standard errors the image means of a layer differ, in each channel."""
+    (a, va), (b, vb) = (
+        (
+            each.totals[:, each.layers.index(layer)].mean(0),
+            each.totals[:, each.layers.index(layer)].var(0, ddof=1) / len(each.seeds),
+        )
+        for each in (first, second)
+    )
+    return np.where(va + vb > 0, (a - b) / np.sqrt(np.maximum(va + vb, 1e-300)), 0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.statistical
+@pytest.mark.claim(
+    "cloud-paths-are-volpath", tolerance="4 standard errors of the image mean, one comparison in 16 000 by chance"
+)
+@pytest.mark.parametrize(
+    "name",
+    ["sky alone, coloured and absorbing", "two clouds, a ground and a block inside", "a surface within, two suns"],
+)
+def test_every_order_is_that_of_volpath(variant, name):
+    """Sky, several suns and clouds, phase functions, colours, and surfaces below and within clouds."""
+    from reference.monte_carlo.batches import merged
+    from reference.monte_carlo.volpath.orders import volpath_orders_batch
+    from reference.scene.clouds import read_clouds
+
+    clouds = read_clouds(scene(**scenes()[name]))
+    sets, batches = [("1", (1, 1)), ("2-inf", (2, math.inf))], 32  # few sets: each compiles a kernel of Mitsuba
+    ours = paths(clouds, batches, 256, sets)
+    theirs = reduce(merged, (volpath_orders_batch(clouds, seed, 256, sets=sets) for seed in range(batches)))
+    for layer in theirs.layers:
+        assert np.abs(z_of(ours, theirs, layer)).max() < 4, layer
+        if ours.mean[ours.layers.index(layer)].any():
+            spread = ours.totals[:, ours.layers.index(layer)]
+            assert np.all(spread.std(0, ddof=1) / math.sqrt(batches) < 0.04 * spread.mean(0)), (
+                "too few paths to say anything"
+            )
+
+
+def slab_rays():
+    """Return directions out of the slab, as mu and phi [degrees] of the light that leaves."""
+    return [(mu, phi) for mu in (0.15, 0.4, 0.7, 0.95) for phi in (0.0, 65.0, 180.0)]
+
+
+def slab_clouds():
+    """Return the built-in slab, seen along `slab_rays`."""
+    from reference.scene.clouds import read_clouds
+    from validation.scenes.loading import load_scene
+
+    clouds = read_clouds(load_scene("cloud-slab", (4, 3)).scene)
+    travels = clouds.suns[0].direction
+    forward = travels[:2] / np.linalg.norm(travels[:2])
+    aside = np.array([-forward[1], forward[0]])
+    ways = []
+    for mu, phi in slab_rays():
+        angle, sine = math.radians(phi), math.sqrt(1 - mu * mu)
+        ways.append(-np.array([*(sine * (math.cos(angle) * forward + math.sin(angle) * aside)), mu]))
+    return replace(clouds, direction=np.array(ways), origin=np.array([0.0, 0.0, 311.0]))
+
+
+def slab_truth(clouds):
+    """Return the radiance of the slab along `slab_rays`; another test holds `slab_radiance` against DISORT."""
+    from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
+    from realtime.clouds.slab_orders.radiance import slab_radiance
+
+    cloud, sun = clouds.clouds[0], clouds.suns[0]
+    tau, g = float(cloud.sigma_t[1]) * 291.7, cloud.phase.g
+    directions = [(mu, math.radians(phi)) for mu, phi in slab_rays()]
+    radiance = slab_radiance(
+        tau, -sun.direction[2], HenyeyGreensteinPhase(g), float(cloud.albedo[1]), depths=[0.0], directions=directions
+    )[0]
+    return radiance[:, None] * sun.irradiance
+
+
+@pytest.mark.statistical
+@pytest.mark.claim(
+    "cloud-paths-are-disort", tolerance="chi-squared of 12 directions, level 1e-4; bias 4 standard errors"
+)
+def test_the_slab_is_that_of_disort(variant):
+    clouds = slab_clouds()
+    truth = slab_truth(clouds)
+    batches = paths(clouds, 32, 256)
+    z = ((batches.mean[0] - truth) / batches.standard_error[0])[:, 1]
+    assert np.all(batches.standard_error[0] < 0.06 * truth)
+    # A z of 32 batches has the variance 31/29.
+    assert chi2.sf((z**2).sum() * 29 / 31, len(z)) > 1e-4
+    assert abs(z.sum()) / math.sqrt(len(z)) < 4
+
+
+@pytest.mark.slow
+@pytest.mark.statistical
+@pytest.mark.claim(
+    "cloud-paths-standard-errors", tolerance="95 % intervals of 32 batches hold DISORT's radiance: 91 to 98 %"
+)
+def test_standard_errors_cover_the_truth_as_often_as_they_say(variant):
+    """24 runs of 12 directions: 288 intervals, of which 88.7 % to 98 % hold by chance at a level of 1e-4 or so."""
+    from scipy.stats import t
+
+    clouds = slab_clouds()
+    truth = slab_truth(clouds)[:, 1]
+    held = []
+    for run in range(24):
+        batches = paths(clouds, 32, 64, first=1000 + 32 * run)
+        z = (batches.mean[0][:, 1] - truth) / batches.standard_error[0][:, 1]
+        held.append(np.abs(z) < t.ppf(0.975, 31))
+    share = np.mean(held)
+    spread = math.sqrt(0.95 * 0.05 / np.size(held))
+    assert abs(share - 0.95) < norm.ppf(1 - 5e-5) * spread + 0.005  # batches of 64 paths are skewed
+
+
+def test_order_one_is_its_integral(variant):
+    """P/(4 pi) mu0/(mu + mu0) (1 - exp(-tau (1/mu + 1/mu0))), seen from above."""
+    clouds = slab_clouds()
+    mu0, g = -clouds.suns[0].direction[2], clouds.clouds[0].phase.g
+    tau = float(clouds.clouds[0].sigma_t[1]) * 291.7
+    batches = paths(clouds, 8, 256)
+    for (mu, phi), mean, error in zip(slab_rays(), batches.mean[2][:, 1], batches.standard_error[2][:, 1], strict=True):
+        cosine = -mu * mu0 + math.sqrt((1 - mu * mu) * (1 - mu0 * mu0)) * math.cos(math.radians(phi))
+        p = (1 - g * g) / (1 + g * g - 2 * g * cosine) ** 1.5
+        light = p / (4 * math.pi) * mu0 / (mu + mu0) * -math.expm1(-tau * (1 / mu + 1 / mu0))
+        assert mean == pytest.approx(light * clouds.suns[0].irradiance[1], abs=6 * error)
+        assert error < 0.04 * mean
+
+
+def test_layers_add_up_and_seeds_give_the_same_numbers(variant):
+    from reference.scene.clouds import read_clouds
+
+    loaded = scene(cloud=ball((1.1,) * 3, (1.0,) * 3, {"type": "isotropic"}))
+    clouds = read_clouds(loaded)
+    one, two = paths(clouds, 2, 16), paths(clouds, 2, 16)
+    np.testing.assert_array_equal(one.mean, two.mean)
+    assert one.layers == (
+        "airlight",
+        "surface",
+        "airlight_1",
+        "airlight_2",
+        "airlight_3_4",
+        "airlight_5_inf",
+        "surface_straight",
+    )
+    np.testing.assert_allclose(one.mean[2:6].sum(0), one.mean[0], rtol=1e-6, atol=1e-12)
+    assert not one.mean[1].any()
+    few = paths(clouds, 2, 16, sets=SETS[1:2])
+    np.testing.assert_array_equal(few.mean[2], one.mean[3])
+    np.testing.assert_allclose(few.mean[0], one.mean[0], rtol=1e-6, atol=1e-12)

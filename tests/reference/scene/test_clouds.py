@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: clouds are read from closed meshes alone; what has no place among them is refused by name."""
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from validation.scenes.parts import joined, placed, scaled
+from validation.scenes.solids import box, icosphere, torus
+
+
+def cloud(mesh, name="puff"):
+    from validation.scenes.parts import fog, medium_boundary
+
+    return medium_boundary(name, mesh, fog(0.7, (0.9, 0.9, 0.9)))
+
+
+def read(**parts):
+    import mitsuba as mi
+
+    from reference.scene.clouds import read_clouds
+    from validation.scenes.cloud_parts import sun
+    from validation.scenes.parts import camera
+
+    usual = {
+        "sensor": camera((0.3, -7.1, 0.7), (0, 0, 0), fov=41.0, size=(4, 3), in_fog=False),
+        "sun": sun((0.1, 0.2, -0.9), (1.3, 1.1, 0.9)),
+    }
+    return read_clouds(mi.load_dict({"type": "scene"} | {k: v for k, v in (usual | parts).items() if v is not None}))
+
+
+def test_non_convex_and_several_clouds_are_read(variant):
+    clouds = read(a=cloud(torus(0.9, 0.3, (17, 9)), "a"), b=cloud(placed(icosphere(1), (2.9, 0, 0)), "b"))
+    assert [each.name for each in clouds.clouds] == ["a", "b"]
+    assert clouds.camera_cloud == -1
+    inside = read(puff=cloud(torus(0.9, 0.3, (17, 9))), b=None)
+    assert len(inside.suns) == 1
+
+
+@pytest.mark.claim("clouds-are-closed", tolerance="none")
+def test_open_and_inside_out_meshes_are_refused(variant):
+    vertices, faces = box((1.0, 1.1, 1.3))
+    with pytest.raises(InputError, match=r"shape 'puff' bounds a cloud and is not a closed surface: edge \(.*\) - \("):
+        read(puff=cloud((vertices, faces[1:])))
+    with pytest.raises(InputError, match="'puff' bounds a cloud and is inside out"):
+        read(puff=cloud((vertices, faces[:, ::-1])))
+    turned = faces.copy()
+    turned[0] = turned[0, ::-1]
+    with pytest.raises(InputError, match="has not one face on each side"):
+        read(puff=cloud((vertices, turned)))
+
+
+@pytest.mark.claim("clouds-are-closed", tolerance="none")
+def test_crossing_and_nested_clouds_are_refused(variant):
+    ball = icosphere(2)
+    with pytest.raises(InputError, match=r"'puff' bounds a cloud and crosses itself: edge \(.*goes through a face"):
+        read(puff=cloud(joined([ball, placed(ball, (0.7, 0.1, 0.2))])))
+    with pytest.raises(InputError, match="'a' bounds a cloud and crosses cloud 'b'"):
+        read(a=cloud(ball, "a"), b=cloud(placed(ball, (0.7, 0.1, 0.2)), "b"))
+    with pytest.raises(InputError, match="cloud 'b' lies within cloud 'a'"):
+        read(a=cloud(ball, "a"), b=cloud(scaled(ball, 0.4), "b"))
+
+
+def test_vertices_that_a_file_doubles_count_as_one(variant):
+    vertices, faces = icosphere(1)
+    doubled = vertices[faces.reshape(-1)], np.arange(faces.size).reshape(-1, 3)
+    assert len(read(puff=cloud(doubled)).clouds) == 1
+
+
+def test_other_lights_and_scenes_without_clouds_are_refused(variant):
+    from validation.scenes.cloud_parts import sky
+    from validation.scenes.parts import mitsuba_mesh, point_light
+
+    ball = icosphere(1)
+    with pytest.raises(InputError, match="light 'lamp' is a PointLight; clouds are lit by"):
+        read(puff=cloud(ball), lamp=point_light((0, 0, 4), (1.0, 1.1, 1.2)))
+    with pytest.raises(InputError, match="the scene has no cloud"):
+        read(a=mitsuba_mesh("solid", ball, (0.3, 0.4, 0.5)))
+    with pytest.raises(InputError, match="no light; wanted"):
+        read(puff=cloud(ball), sun=None)
+    np.testing.assert_allclose(read(puff=cloud(ball), sky=sky((0.1, 0.2, 0.3))).sky, (0.1, 0.2, 0.3), rtol=1e-6)
+
+
+def test_a_camera_in_a_cloud_must_say_so(variant):
+    with pytest.raises(InputError, match="the camera is inside of shape 'puff', but references another medium"):
+        read(puff=cloud(scaled(icosphere(2), 9.0)))
+
+
+def test_opacity_is_that_of_the_lengths(variant):
+    """Beside a ball of radius 1 along its middle ray: exp(-2 sigma_t); two clouds behind one another multiply."""
+    from reference.monte_carlo.cloud_paths.opacity import seen_clouds
+
+    cube = box((1.7, 1.9, 1.3))
+    clouds = read(a=cloud(cube, "a"), b=cloud(placed(cube, (0.0, 2.9, 0.0)), "b"))
+    from dataclasses import replace
+
+    ways = np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
+    seen = seen_clouds(replace(clouds, direction=ways, origin=np.array([0.2, -7.1, 0.1])))
+    sigma_t = clouds.clouds[0].sigma_t
+    # float32 holds the corners to 6e-8.
+    np.testing.assert_allclose(seen.transmittance[0], np.exp(-2 * 1.9 * sigma_t), rtol=1e-6)
+    np.testing.assert_array_equal(seen.transmittance[1], 1.0)
+    assert list(seen.meets) == [True, False]
