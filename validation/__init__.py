@@ -17,6 +17,7 @@ Read in this order:
 - `papers/`: the results of papers measured again;
 - `fidelity/`: a verdict for every claim of these papers;
 - `slab/`: a slab by order of scattering, on both sides;
+- `canonical/`: tables of light scattered in a slab, as frames look them up, against their computation;
 - `comparison/`: images from files and engines against the truth.
 
 `baselines/` holds the known errors of every configuration as JSON files.

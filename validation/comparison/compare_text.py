@@ -4,6 +4,7 @@
 import math
 
 from validation.metrics.colour import ColourDifference
+from validation.metrics.errors import Metrics
 from validation.metrics.flip import Flip
 from validation.metrics.other_tools import PublishedErrors
 from validation.statistics.comparison import Statistics
@@ -34,6 +35,15 @@ def statistics_lines(s: Statistics) -> list[str]:
         f"exceeding        {s.exceeding} values, {s.expected_exceeding:.0f} expected (level {s.plain_level:g}), "
         f"p = {shown(s.exceeding_p, 3)}; p-values uniform: p = {shown(s.uniformity_p, 3)}",
     ]
+
+
+def order_line(layer: str, m: Metrics, s: Statistics | None) -> str:
+    """Return the comparison of light of some orders of scattering as a line of text."""
+    interval = ""
+    if s is not None:
+        low, high = s.relative_bias_ci_batches or s.relative_bias_ci
+        interval = f" (95 % interval {percent(low)} to {percent(high)})"
+    return f"{layer:<17}relative bias {percent(m.relative_bias)}{interval}, relative rmse {percent(m.relative_rmse)}"
 
 
 def errors_lines(e: PublishedErrors) -> list[str]:

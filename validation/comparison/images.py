@@ -3,7 +3,8 @@
 
 import math
 import os
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 from analytic.errors import InputError
 from reference.storage.exr import TOTAL, Image, read_exr
 from reference.storage.exr import layer as image_layer
-from validation.comparison.compare_text import colour_lines, errors_lines, flip_line, percent, shown, statistics_lines
+from validation.comparison.compare_text import (
+    colour_lines,
+    errors_lines,
+    flip_line,
+    order_line,
+    percent,
+    shown,
+    statistics_lines,
+)
 from validation.metrics.colour import ColourDifference, colour_difference
 from validation.metrics.errors import Metrics, error_metrics
 from validation.metrics.flip import Flip, flip_hdr
@@ -20,6 +29,7 @@ from validation.metrics.other_tools import PublishedErrors, published_errors
 from validation.statistics.comparison import Estimate, Statistics, compare_statistics
 
 STOPS = 200.0  #: the largest exposure, more than float32 images can need
+_ORDER = re.compile(r"airlight_\d+(_(\d+|inf))?")
 BATCHES = "airlight:batches"  #: header attribute: how many batch means gave the standard errors
 
 
@@ -35,6 +45,7 @@ class Comparison:
     errors_normalised: PublishedErrors | None = None  #: the same with the mean of the reference as the unit
     colour: ColourDifference | None = None  #: None if it was not asked for
     flip: Flip | None = None  #: None if it was not asked for
+    orders: tuple["Comparison", ...] = ()  #: of the layers by order of scattering that both images have, if asked for
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -46,6 +57,7 @@ class Comparison:
             reasons.append(f"{self.metrics.negative} pixels of the test image are negative")
         if self.statistics is not None and self.statistics.equivalent is False:
             reasons.append(f"the relative bias is not shown to be within +-{self.statistics.margin:.3g}")
+        reasons += [f"{each.layer}: {reason}" for each in self.orders for reason in each.failures]
         return tuple(reasons)
 
     def to_json(self) -> dict[str, Any]:
@@ -61,7 +73,8 @@ class Comparison:
             if getattr(self, name) is not None
         }
         flat = {"layer": self.layer, **statistics, **self.metrics.to_json(), "masked": self.masked}
-        return {**flat, **extras, "failures": list(self.failures)}
+        by_order = {"orders": [each.to_json() for each in self.orders]} if self.orders else {}
+        return {**flat, **extras, **by_order, "failures": list(self.failures)}
 
     def summary(self) -> str:
         """Return the numbers as text, a line for each group."""
@@ -81,6 +94,7 @@ class Comparison:
             lines += [] if errors is None else errors_lines(errors)
         lines += [] if self.colour is None else colour_lines(self.colour)
         lines += [] if self.flip is None else [flip_line(self.flip)]
+        lines += [order_line(each.layer, each.metrics, each.statistics) for each in self.orders]
         return "\n".join(lines + [f"failed           {reason}" for reason in self.failures])
 
 
@@ -138,6 +152,7 @@ def compare_files(
     all_metrics: bool = False,
     flip: bool = False,
     exposure: float | None = None,
+    by_order: bool = False,
 ) -> Comparison:
     """Compare a layer of two EXR files (see `compare_images`); messages name the file.
 
@@ -151,16 +166,35 @@ def compare_files(
         An EXR file; pixels whose R, G and B (or Y) are all zero there are left out.
     margin, all_metrics, flip, exposure
         See `compare_images`.
+    by_order
+        Compare as well the layers by order of scattering that both files have, such as `airlight_3_4`.
 
     Raises
     ------
     InputError
-        Also if a file is missing, broken or of a kind that is not read.
+        Also if a file is missing, broken or of a kind that is not read, or has no layer by order.
     """
     reference_image, test_image = read_exr(reference), read_exr(test)
     chosen = None if mask is None else read_mask(mask)
     names = (str(reference), reference_image), (str(test), test_image)
-    return _compare(*names, name=layer, mask=chosen, margin=margin, extras=_Extras(all_metrics, flip, exposure))
+    whole = _compare(*names, name=layer, mask=chosen, margin=margin, extras=_Extras(all_metrics, flip, exposure))
+    if not by_order:
+        return whole
+    plain = _Extras(all_metrics=False, flip=False, exposure=None)
+    orders = tuple(
+        _compare(*names, name=name, mask=chosen, margin=margin, extras=plain) for name in _layers_by_order(*names)
+    )
+    return replace(whole, orders=orders)
+
+
+def _layers_by_order(reference: tuple[str, Image], test: tuple[str, Image]) -> list[str]:
+    """Return the layers by order that both images have, by their first order."""
+    of_both = [name for name in reference[1].layers if _ORDER.fullmatch(name) and name in test[1].layers]
+    if not of_both:
+        have = {path: [name for name in image.layers if _ORDER.fullmatch(name)] for path, image in (reference, test)}
+        told = "; ".join(f"{path} has {', '.join(names) or 'none'}" for path, names in have.items())
+        raise InputError(f"--by-order: the files share no layer by order of scattering, such as airlight_3_4: {told}")
+    return sorted(of_both, key=lambda name: int(name.split("_")[1]))
 
 
 @dataclass(frozen=True)

@@ -172,8 +172,8 @@ def parse_settings(settings: Sequence[str]) -> dict[str, str]:
     return pairs
 
 
-def prepared(scene: Scene, chosen: Configuration) -> FrameRenderer:
-    """Return the frame renderer of a configuration for a scene.
+def prepared(scene: Scene, chosen: Configuration, *, extra_layers: bool = False) -> FrameRenderer:
+    """Return the frame renderer of a configuration for a scene; `extra_layers` as of `frame_renderer`.
 
     Raises
     ------
@@ -181,7 +181,8 @@ def prepared(scene: Scene, chosen: Configuration) -> FrameRenderer:
         If the method refuses the scene or a parameter.
     """
     kernel = find_kernel(chosen.kernel) if chosen.kernel else None
-    return frame_renderer(scene, find_method(chosen.method), kernel=kernel, **dict(chosen.parameters))
+    parameters: dict[str, Any] = dict(chosen.parameters)
+    return frame_renderer(scene, find_method(chosen.method), kernel=kernel, extra_layers=extra_layers, **parameters)
 
 
 def rendered_lights(scene: Scene, chosen: Configuration) -> int:

@@ -15,5 +15,6 @@ Read in this order:
 - `expected_airlight.py`: the airlight that an estimator with a shadow-ray epsilon converges to.
 
 May import: `analytic`, `realtime.frame`, `reference.monte_carlo`, `reference.quadrature`, `reference.scene`,
-`reference.storage`, `validation.configurations`, `validation.scenes`, `validation.statistics`.
+`reference.storage`, `validation.configurations`, `validation.scenes`, `validation.slab`,
+`validation.statistics`.
 """

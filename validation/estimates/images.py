@@ -5,15 +5,19 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.errors import InputError
 from realtime.frame.renderer import Frame
-from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, seed_ranges
+from reference.monte_carlo.batches import LARGEST_SEED, Batches, seed_ranges
+from reference.monte_carlo.cloud_paths.opacity import seen_clouds
 from reference.quadrature.light_points import REPLICATES
 from reference.quadrature.ray_values import TruthImage
 from reference.quadrature.surface import surface_hits
+from reference.scene.clouds import read_clouds
 from reference.scene.read import read_truth
 from reference.storage.exr import Image
 from reference.storage.scene_digest import scene_digest
@@ -22,6 +26,7 @@ from validation.estimates.budget import LEAST_BATCHES, Budget, RelativeErrors, b
 from validation.estimates.monte_carlo import monte_carlo_batches
 from validation.estimates.quadrature import truth_image
 from validation.scenes.loading import LoadedScene
+from validation.slab.request import order_range, parse_orders
 
 Progress = Callable[[float, str], None]
 
@@ -69,7 +74,7 @@ def layered_frame(name: str, chosen: Configuration, frame: Frame) -> Image:
     attributes = {"airlight:scene": name, "airlight:method": chosen.method}
     attributes |= {"airlight:kernel": chosen.kernel} if chosen.kernel else {}
     attributes |= {f"airlight:{key}": str(value) for key, value in chosen.parameters}
-    return Image({"airlight": frame.airlight, "surface": frame.surface}, frame.distance, attributes)
+    return Image({"airlight": frame.airlight, "surface": frame.surface, **frame.extra}, frame.distance, attributes)
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,13 @@ class MonteCarloReference:
 
 
 def monte_carlo_reference(
-    loaded: LoadedScene, estimator: str, *, budget: Budget, seed: int = 0, progress: Progress | None = None
+    loaded: LoadedScene,
+    estimator: str,
+    *,
+    budget: Budget,
+    seed: int = 0,
+    orders: tuple[str, ...] | None = None,
+    progress: Progress | None = None,
 ) -> MonteCarloReference:
     """Return the mean of an estimator's batches with its standard errors.
 
@@ -96,17 +107,27 @@ def monte_carlo_reference(
     loaded
         The scene.
     estimator
-        'single-scatter' or 'volpath'.
+        'single-scatter', 'volpath' or 'cloud-paths'.
     budget
-        When to stop.
+        When to stop; an error is that of the layers `airlight` and `surface`.
     seed
         Seed of the first batch; the others count up.
+    orders
+        Of a scene of clouds: the sets of orders with a layer of their own, see `cloud_orders`.
     progress
         Called with (share done, what) after every batch.
     """
-    truth = read_truth(loaded.scene)
-    distance = surface_hits(truth).distance
-    near = near_light(truth, distance)
+    seen = None
+    if orders is None:
+        truth = read_truth(loaded.scene)
+        distance = surface_hits(truth).distance
+        near = near_light(truth, distance)
+        shape = truth.height, truth.width
+    else:
+        clouds = read_clouds(loaded.scene)
+        seen = seen_clouds(clouds)
+        distance, near = seen.distance, np.zeros(len(seen.distance), dtype=bool)
+        shape = clouds.height, clouds.width
     batches, samples = batch_plan(budget, len(near))
     watch = _Watch(budget, near, progress)
     run = monte_carlo_batches(
@@ -115,15 +136,37 @@ def monte_carlo_reference(
         batches=batches if budget.samples is not None else min(batches, LARGEST_SEED - seed),
         samples=samples,
         first_seed=seed,
+        orders=orders,
         enough=None if budget.error is None else watch.enough,
         go_on=None if budget.seconds is None else watch.go_on,
         progress=watch.tell,
     )
     errors = relative_errors(run.batches, near)
     reached = None if budget.error is None else getattr(errors, budget.target) <= budget.error
-    distance = distance.reshape(truth.height, truth.width)
-    image = _layered_batches(loaded, estimator, run.batches, distance=distance)
+    image = _layered_batches(loaded, estimator, run.batches, distance=distance.reshape(shape))
+    if seen is not None:
+        transmittance = seen.transmittance.reshape(*shape, 3)
+        behind = np.isinf(distance).reshape(*shape, 1) * transmittance * clouds.sky
+        image = replace(image, layers=dict(image.layers) | {"opacity": 1 - transmittance, "background": behind})
     return MonteCarloReference(image, errors, reached, int(near.sum()), run.cached, run.damaged)
+
+
+def cloud_orders(words: str) -> tuple[str, ...]:
+    """Return the sets of orders that words name, disjoint: '1,2,3-4', 'sets' for the usual ones, 'all' for none.
+
+    Raises
+    ------
+    InputError
+        For words that name none, or the same order twice.
+    """
+    names = tuple(name for name in parse_orders(words) if name != "all")
+    ranges = sorted(order_range(name) for name in names)
+    for (_, last), (first, _) in pairwise(ranges):
+        if first <= last:
+            raise InputError(
+                f"--orders: got {words!r}, which names order {first} twice; wanted disjoint sets of orders"
+            )
+    return names
 
 
 class _Watch:
@@ -167,7 +210,7 @@ class _Watch:
 def _layered_batches(loaded: LoadedScene, estimator: str, batches: Batches, *, distance: NDArray[np.float64]) -> Image:
     shape = (*distance.shape, 3)
     layers = {}
-    for number, name in enumerate(LAYERS):
+    for number, name in enumerate(batches.layers):
         layers[name] = batches.mean[number].reshape(shape)
         layers[f"{name}_se"] = batches.standard_error[number].reshape(shape)
     attributes: dict[str, str | int | float] = {

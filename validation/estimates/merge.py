@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.monte_carlo.batches import LAYERS, combined_moments, parse_seed_ranges, seed_ranges
-from reference.storage.exr import Attribute, Image
+from reference.storage.exr import TOTAL, Attribute, Image
 
 Array = NDArray[np.float64]
 
@@ -63,8 +63,15 @@ def merged_references(files: Sequence[tuple[str, Image]]) -> Image:
     for part in parts[1:]:
         _check_same(parts[0], part)
     seeds = _all_seeds(parts)
-    layers = {}
-    for layer in LAYERS:
+    held = [frozenset(part.image.layers) for part in parts]
+    if any(names != held[0] for names in held):
+        odd = sorted(held[0].union(*held) - held[0].intersection(*held))
+        raise InputError(
+            f"the files to merge differ in their layers: {', '.join(odd)}; make all with the same --orders"
+        )
+    # Those without a standard error are the same in all files; the total is written anew.
+    layers = {name: values for name, values in parts[0].image.layers.items() if name != TOTAL}
+    for layer in [name for name in layers if f"{name}_se" in layers]:
         count, mean, squares = parts[0].moments(layer)
         for part in parts[1:]:
             other = part.moments(layer)
@@ -93,7 +100,7 @@ def _read(name: str, image: Image) -> _Part:
     if missing:
         raise InputError(
             f"{name} is no Monte Carlo reference of `airlight reference`: it lacks {', '.join(missing)}; "
-            "compute it with --estimator single-scatter or volpath"
+            "compute it with --estimator single-scatter, volpath or cloud-paths"
         )
     try:
         seeds = parse_seed_ranges(_of(header, "seeds"))

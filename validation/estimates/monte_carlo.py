@@ -20,10 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.monte_carlo.batches import LARGEST_SEED, Batches, merged
+from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, merged
+from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch, set_layers
+from reference.monte_carlo.cloud_paths.opacity import seen_clouds
 from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.monte_carlo.volpath.orders import volpath_orders_batch
 from reference.quadrature.surface import surface_hits
+from reference.scene.clouds import read_clouds
 from reference.scene.read import read_truth
 from reference.storage.cache import cache_folder, drop_arrays, is_kept, load_arrays, store_arrays, sweep
 from reference.storage.cache_size import make_room
@@ -31,11 +35,12 @@ from reference.storage.files import NO_SPACE
 from reference.storage.scene_digest import cache_key
 from reference.storage.stopping import hint_when_stopped
 from validation.estimates.light_on_ray import check_camera, check_rays
+from validation.slab.request import order_range
 
 Progress = Callable[[int, int, str], None]
 Trace = Callable[[int], Batches]  # from the seed
 
-ESTIMATORS = ("single-scatter", "volpath")
+ESTIMATORS = ("single-scatter", "volpath", "cloud-paths")
 BLOCK = 8  #: batches in a block
 _REVISIONS = {"volpath": {"revision": 2}}  # raised when the same seed gives other numbers than it did
 
@@ -58,6 +63,7 @@ def monte_carlo_batches(
     first_seed: int = 0,
     max_depth: int = 2,
     counts: NDArray[np.integer] | None = None,
+    orders: tuple[str, ...] | None = None,
     enough: Callable[[Batches], bool] | None = None,
     go_on: Callable[[int], bool] | None = None,
     progress: Progress | None = None,
@@ -69,7 +75,7 @@ def monte_carlo_batches(
     scene
         The `mi.Scene`.
     estimator
-        'single-scatter' or 'volpath'.
+        'single-scatter', 'volpath' or 'cloud-paths'.
     batches
         How many at most, at least 2.
     samples
@@ -81,6 +87,9 @@ def monte_carlo_batches(
     counts
         Samples of each pixel in each batch, (layers, pixels), with the mean `samples`, see
         `reference.monte_carlo.allocation`; volpath only, the same for all pixels by default.
+    orders
+        Names of disjoint sets of orders of scattering, '3-4', each with a layer of its own: for a scene of clouds, by
+        'volpath' or 'cloud-paths'.
     enough
         Asked after every block, whose last seed is one less than a multiple of eight, whether to stop.
     go_on
@@ -110,15 +119,20 @@ def monte_carlo_batches(
         )
     settings: dict[str, Any] = {"samples": samples} | ({"max_depth": max_depth} if max_depth != 2 else {})
     settings |= _REVISIONS.get(estimator, {})
+    settings |= {} if orders is None else {"orders": list(orders)}
     settings |= {} if counts is None else {"counts": hashlib.sha256(counts.astype("<u4").tobytes()).hexdigest()}
     folder = cache_key(scene, estimator, settings)
     make_room()
     sweep(cache_folder() / folder)
-    trace = _tracer(scene, estimator, samples, max_depth, counts)
+    layers: tuple[str, ...] = LAYERS
+    if orders is None:
+        trace = _tracer(scene, estimator, samples, max_depth, counts)
+    else:
+        layers, trace = _cloud_tracer(scene, estimator, samples, orders)
     tally: Counter[str] = Counter()
 
     def kept_or_traced(seed: int) -> Batches | None:
-        batch = _load(folder, range(seed, seed + 1), samples, tally)
+        batch = _load(folder, range(seed, seed + 1), samples, layers, tally)
         if batch is None:
             if go_on is not None and tally["done"] >= 2 and not go_on(tally["done"]):
                 return None
@@ -133,7 +147,7 @@ def monte_carlo_batches(
         with hint_when_stopped(lambda: _go_on(tally)):
             done = None
             for seeds in _blocks(first_seed, batches):
-                block, whole = _block(folder, seeds, samples, tally=tally, batch_of=kept_or_traced)
+                block, whole = _block(folder, seeds, samples, layers, tally=tally, batch_of=kept_or_traced)
                 if block is not None:
                     done = block if done is None else merged(done, block)
                 if not whole or (enough is not None and 2 <= tally["done"] < batches and enough(_all(done))):
@@ -165,6 +179,18 @@ def _tracer(scene, estimator: str, samples: int, max_depth: int, counts: NDArray
     raise ValueError(f"estimator: got {estimator!r} with max_depth {max_depth}, wanted one of {', '.join(ESTIMATORS)}")
 
 
+def _cloud_tracer(scene, estimator: str, samples: int, orders: tuple[str, ...]) -> tuple[tuple[str, ...], Trace]:
+    """Return the layers of a scene of clouds, and what traces them."""
+    clouds, sets = read_clouds(scene), [(name, order_range(name)) for name in orders]
+    if estimator == "volpath":
+        layers = set_layers(orders)[:-1]
+        return layers, lambda seed: volpath_orders_batch(clouds, seed, samples, sets=sets)
+    if estimator != "cloud-paths":
+        raise ValueError(f"estimator: got {estimator!r} with orders, wanted 'volpath' or 'cloud-paths'")
+    seen = seen_clouds(clouds).meets
+    return set_layers(orders), lambda seed: cloud_paths_batch(clouds, seed, samples, sets=sets, seen=seen)
+
+
 def _blocks(first_seed: int, batches: int) -> Iterator[range]:
     """Cut the seeds at the multiples of `BLOCK`."""
     start, end = first_seed, first_seed + batches
@@ -175,11 +201,17 @@ def _blocks(first_seed: int, batches: int) -> Iterator[range]:
 
 
 def _block(
-    folder: str, seeds: range, samples: int, *, tally: Counter[str], batch_of: Callable[[int], Batches | None]
+    folder: str,
+    seeds: range,
+    samples: int,
+    layers: tuple[str, ...],
+    *,
+    tally: Counter[str],
+    batch_of: Callable[[int], Batches | None],
 ) -> tuple[Batches | None, bool]:
     """Return the batches of some seeds added up, and whether they are all there."""
     full = len(seeds) == BLOCK
-    block = _load(folder, seeds, samples, tally) if full else None
+    block = _load(folder, seeds, samples, layers, tally) if full else None
     if block is not None:
         tally["done"] += BLOCK
         return block, True
@@ -206,7 +238,7 @@ def _store(folder: str, batches: Batches) -> None:
     store_arrays(_name(folder, range(batches.seeds[0], batches.seeds[-1] + 1)), arrays)
 
 
-def _load(folder: str, seeds: range, samples: int, tally: Counter[str]) -> Batches | None:
+def _load(folder: str, seeds: range, samples: int, layers: tuple[str, ...], tally: Counter[str]) -> Batches | None:
     name = _name(folder, seeds)
     stored = load_arrays(name)
     if stored is None:
@@ -217,7 +249,7 @@ def _load(folder: str, seeds: range, samples: int, tally: Counter[str]) -> Batch
         return None
     tally["cached"] += len(seeds)
     squares = stored["squares"] if len(seeds) > 1 else np.zeros_like(stored["mean"])
-    return Batches(tuple(seeds), samples, stored["mean"], squares, stored["totals"])
+    return Batches(tuple(seeds), samples, stored["mean"], squares, stored["totals"], layers)
 
 
 def _kept(tally: Counter[str]) -> str:

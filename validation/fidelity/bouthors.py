@@ -1,13 +1,156 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The rows of Bouthors, Neyret, Max, Bruneton, Crassin 2008."""
 
-from validation.fidelity.figures import at
-from validation.fidelity.row import AtMost, Bound, Equal, Row
+from validation.fidelity.figures import Take, at
+from validation.fidelity.row import AtLeast, AtMost, Bound, Equal, Evidence, Row
 
 _FORMULA = Equal(1e-9, "the printed formula over what it stands for, by quadrature")
 
 _MIE = "Mie's theory at 0.55 um for r_e = 6 um, gamma = 2"
 _SHARE = Equal(0.01, f"the share of the light by {_MIE}")
+
+_SLAB = "sums over orders of a slab of the paper's droplets"
+_SUN = "the sun at the zenith"
+
+
+def _share(name: str, thickness: float, sun: float) -> Take:
+    """Return what takes a share of Fig. 3 [%] at a thickness [m] and sun [degrees]."""
+
+    def take(evidence: Evidence) -> float:
+        rows = evidence["shares"]
+        return 100 * float(next(row[name] for row in rows if (row["thickness"], row["sun"]) == (thickness, sun)))
+
+    return take
+
+
+def _least_reflected(evidence: Evidence) -> float:
+    """Return the least share of orders 1 to 30 in what is reflected."""
+    return 100 * min(float(row["reflected_1_30"]) for row in evidence["shares"])
+
+
+def _of_reflectance(thickness: str, name: str, item: str, claim: str, tolerance: float, reason: str) -> Row:
+    """Return a row on the reflectance of a slab over that of the droplets."""
+    take = at("reflectance", thickness, name)
+    return Row("bouthors", item, claim, Bound(1), "cloud slab", take, Equal(tolerance, reason))
+
+
+#: What a slab decides. (`airlight published --paper bouthors` prints them too.)
+SLAB_ROWS: tuple[Row, ...] = (
+    Row(
+        "bouthors",
+        "Fig. 3, orders 31 and above, 100 m",
+        "isotropic orders (31 and above) begin to appear at thicknesses over 100 m: their share reflected at 100 m",
+        Bound(1),
+        "cloud slab",
+        _share("reflected_31_inf", 100.0, 0.0),
+        AtMost(f"to begin to appear is read as 1 % or less below; {_SLAB}, {_SUN}"),
+        unit="%",
+    ),
+    Row(
+        "bouthors",
+        "Fig. 3, orders 31 and above, 300 m",
+        "... and are there beyond: their share reflected at 300 m",
+        Bound(1),
+        "cloud slab",
+        _share("reflected_31_inf", 300.0, 0.0),
+        AtLeast(f"to be there is read as 1 % or more; {_SLAB}, {_SUN}"),
+        unit="%",
+    ),
+    Row(
+        "bouthors",
+        "Fig. 3, transmittance",
+        "anisotropic orders (1 to 30) play a role up to 1000 m in transmittance: their share at 1000 m",
+        Bound(1),
+        "cloud slab",
+        _share("transmitted_1_30", 1000.0, 0.0),
+        AtLeast(f"a role is read as 1 % or more; {_SLAB}, {_SUN}"),
+        unit="%",
+    ),
+    Row(
+        "bouthors",
+        "Fig. 3, reflectance",
+        "anisotropic orders contribute to 30 % - 100 % of the reflectance: the least share up to 1000 m",
+        30,
+        "cloud slab",
+        _least_reflected,
+        Equal(0.1, f"the lower end of the range; {_SLAB}, thicknesses to 1000 m, suns at 0 and 75 degrees"),
+        unit="%",
+    ),
+    Row(
+        "bouthors",
+        "Fig. 3, left, orders 19 to 30",
+        "even high orders (up to 30) show an anisotropic behaviour: largest over least radiance by azimuth",
+        Bound(1.1),
+        "cloud slab",
+        at("azimuth", "19-30"),
+        AtLeast("anisotropic is read as a tenth or more; t = 1000 m, d = 100 m, the sun at 75 degrees"),
+    ),
+    Row(
+        "bouthors",
+        "Fig. 3, left, orders 31 and above",
+        "orders over 30 show an isotropic behaviour: largest over least radiance by azimuth",
+        Bound(1.1),
+        "cloud slab",
+        at("azimuth", "31-inf"),
+        AtMost("isotropic is read as less than a tenth; t = 1000 m, d = 100 m, the sun at 75 degrees"),
+    ),
+    _of_reflectance(
+        "50",
+        "printed",
+        "eq. 4, reflectance at 50 m",
+        "reflectance of a slab of 50 m with the printed extinction over that with the droplets'",
+        0.02,
+        "both missing factors nearly cancel, and a quarter of the reflectance of a thin cloud stays",
+    ),
+    _of_reflectance(
+        "300",
+        "printed",
+        "eq. 4, reflectance at 300 m",
+        "the same at 300 m",
+        0.02,
+        "thicker clouds reflect most light whatever their extinction",
+    ),
+    _of_reflectance(
+        "1000",
+        "printed",
+        "eq. 4, reflectance at 1000 m",
+        "the same at 1000 m",
+        0.02,
+        "thicker clouds reflect most light whatever their extinction",
+    ),
+    _of_reflectance(
+        "50",
+        "half",
+        "A, half the density, 50 m",
+        "modified Mie yields equivalent results: reflectance of 50 m with half the density over that of full Mie",
+        0.02,
+        "half the density is less than what is left of the light, 56 %",
+    ),
+    _of_reflectance(
+        "50",
+        "modified",
+        "A, matched density, 50 m",
+        "the same with a density that loses what is cut",
+        0.005,
+        "what is cut is what the density loses",
+    ),
+    _of_reflectance(
+        "50",
+        "printed_g",
+        "Fig. 2, Henyey-Greenstein, 50 m",
+        "Henyey-Greenstein with g = .99 gives far from accurate effects: its reflectance of 50 m over that of Mie",
+        0.1,
+        "a function this forward reflects next to nothing; Mie's mean cosine is 0.85",
+    ),
+    _of_reflectance(
+        "300",
+        "matched",
+        "2.2, Henyey-Greenstein matched, 300 m",
+        "Henyey-Greenstein gives far from accurate effects: with Mie's g, reflectance of 300 m over that of Mie",
+        0.01,
+        "of the light that leaves a thick cloud the mean cosine decides; glory and fogbow are what it lacks",
+    ),
+)
 
 ROWS: tuple[Row, ...] = (
     Row(
@@ -141,4 +284,5 @@ ROWS: tuple[Row, ...] = (
         at("back"),
         AtMost("far from accurate is read as half or less; no glory and no fogbow can be left then"),
     ),
+    *SLAB_ROWS,
 )

@@ -10,6 +10,7 @@ Read in this order:
 - `baseline_runs.py`: measures the errors that baselines keep;
 - `baseline_files.py`: baselines as files, their comparison and their revisions;
 - `decomposition.py`: the error of an image by its causes, which add up to it;
+- `octave_fit.py`: the constants of octaves that fit a scene of clouds best;
 - `froxel_study.py`: which grid froxel fog needs, and the ghosts of its history;
 - `map_size.py`: error against the size of the shadow map, and the flicker of a light that moves;
 - `plane_stability.py`: hard cases for sums over shadow planes;

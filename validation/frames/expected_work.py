@@ -21,6 +21,7 @@ _STEP = 40e-9  # of a marched ray [s]
 _RAY = 2e-6  # of any other method, by light [s]
 _TRUTH = 100e-6  # of the quadrature, by ray [s]
 _SAMPLE = 1e-6  # of single-scatter and volpath [s]
+_PATH = 20e-6  # of a path through a cloud [s]
 _GPU = 100.0  # threads that a GPU is worth
 TIMED = 8  #: frames that timing takes where they are slow
 _FRAME_BYTES, _TRUTH_BYTES, _SAMPLED_BYTES = 200, 1500, 500  # by pixel
@@ -46,10 +47,10 @@ def truth_work(size: tuple[int, int], *, lights: int = 1, images: float = 1) -> 
     return Work(images * pixels * max(lights, 1) * _TRUTH, pixels * _TRUTH_BYTES)
 
 
-def sampled_work(size: tuple[int, int], samples: float) -> Work:
-    """Return the work of an image by random samples, so many in each pixel."""
+def sampled_work(size: tuple[int, int], samples: float, *, clouds: bool = False) -> Work:
+    """Return the work of an image by random samples, so many in each pixel, each a path through clouds or one step."""
     pixels = float(size[0]) * size[1]
-    return Work(pixels * samples * _SAMPLE, pixels * _SAMPLED_BYTES)
+    return Work(pixels * samples * (_PATH if clouds else _SAMPLE), pixels * _SAMPLED_BYTES)
 
 
 def steps_of(parameters: Iterable[tuple[str, Any]]) -> float:

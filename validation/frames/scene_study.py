@@ -20,7 +20,7 @@ from validation.estimates.quadrature import truth_image
 from validation.frames.benchmark import Apart, Measurement, measure, render_and_time_by_name
 from validation.metrics.flip import flip_hdr
 from validation.scenes.loading import LoadedScene, load_scene
-from validation.scenes.registry import SCENES
+from validation.scenes.registry import FOG_SCENES
 
 Progress = Callable[[float, str], None]
 
@@ -90,7 +90,7 @@ EFFORTS: dict[str, Effort] = {
         ),
         Effort(
             "default",
-            scenes=tuple(name for name in SCENES if name not in _HEAVY),
+            scenes=tuple(name for name in FOG_SCENES if name not in _HEAVY),
             image=(320, 240),
             timed=(320, 240),
             checked=(64, 48),
@@ -105,7 +105,7 @@ EFFORTS: dict[str, Effort] = {
         ),
         Effort(
             "full",
-            scenes=tuple(SCENES),
+            scenes=tuple(FOG_SCENES),
             image=(640, 480),
             timed=(800, 600),
             checked=(160, 120),

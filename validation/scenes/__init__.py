@@ -24,6 +24,13 @@ Read in this order:
 - `fence.py`: bars at four distances from a rectangular lamp;
 - `soft_hall.py`: a hall lit by a window;
 - `overlap.py`: two casters whose penumbrae overlap;
+- `cloud_parts.py`: droplets, sun and sky of the scenes of clouds;
+- `cloud_slab.py`: a slab of cloud;
+- `stratocumulus.py`: a layer of stratocumulus of about 130 000 triangles;
+- `cumulus.py`: a cumulus of about 5 000 triangles;
+- `step_cloud.py`: thin and thick cloud by turns;
+- `ring.py`: a ring of cloud;
+- `two_lobes.py`: a cloud of two lobes;
 - `probes.py`: small scenes for what the built-in ones lack, used by checks of the checks;
 - `numbers.py`: refuses numbers of which no finite image can come;
 - `changes.py`: camera, lights and media of a scene changed by name;
@@ -31,5 +38,5 @@ Read in this order:
 - `loading.py`: a scene by its name or from a Mitsuba XML file;
 - `animation.py`: the scenes of the frames of an animation.
 
-May import: `analytic`, `realtime.area_lights`, `realtime.scene`.
+May import: `analytic`, `realtime.area_lights`, `realtime.scene`, `validation.scenes.clouds`.
 """

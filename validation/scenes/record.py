@@ -28,3 +28,6 @@ class SceneRecord:
     purpose: str  #: one sentence: what the scene is for
     published: str  #: the published figure that the scene stands for
     animation: Animation = field(default_factory=Animation)  #: what moves in it
+    clouds: bool = (
+        False  #: whether light is scattered many times in it: then `cloud-paths` is its truth, and few methods fit
+    )

@@ -2,11 +2,14 @@
 """The built-in scenes: one registry for tests, benchmarks and figures.
 
 A function builds each scene from arbitrary, never round numbers, so that no constant of the code can hide behind a
-constant of the scene. Every command and report knows the scenes that have a `SceneRecord` in `SCENES`.
+constant of the scene. Every command and report knows the scenes that have a `SceneRecord` in `SCENES`. Those of
+`FOG_SCENES` scatter light once: the standard report, the baselines and the tests of all methods study these.
 """
 
+from validation.scenes.cloud_slab import SCENE as CLOUD_SLAB
 from validation.scenes.clutter import SCENE as CLUTTER
 from validation.scenes.colonnade import colonnade
+from validation.scenes.cumulus import SCENE as CUMULUS
 from validation.scenes.fence import SCENE as FENCE
 from validation.scenes.hall import SCENE as HALL
 from validation.scenes.omni_box import SCENE as OMNI_BOX
@@ -14,10 +17,14 @@ from validation.scenes.open_fog import open_fog
 from validation.scenes.overlap import SCENE as OVERLAP
 from validation.scenes.penumbra_plane import SCENE as PENUMBRA_PLANE
 from validation.scenes.record import Animation, SceneRecord
+from validation.scenes.ring import SCENE as RING
 from validation.scenes.soft_hall import SCENE as SOFT_HALL
 from validation.scenes.sphere_spot import sphere_spot
+from validation.scenes.step_cloud import SCENE as STEP_CLOUD
+from validation.scenes.stratocumulus import SCENE as STRATOCUMULUS
 from validation.scenes.tangle import SCENE as TANGLE
 from validation.scenes.three_media import SCENE as THREE_MEDIA
+from validation.scenes.two_lobes import SCENE as TWO_LOBES
 from validation.scenes.two_pens import two_pens
 from validation.scenes.windows import SCENE as WINDOWS
 
@@ -62,5 +69,14 @@ SCENES: dict[str, SceneRecord] = {
         FENCE,
         SOFT_HALL,
         OVERLAP,
+        CLOUD_SLAB,
+        STRATOCUMULUS,
+        CUMULUS,
+        STEP_CLOUD,
+        RING,
+        TWO_LOBES,
     )
 }
+
+#: Those without clouds.
+FOG_SCENES: dict[str, SceneRecord] = {name: record for name, record in SCENES.items() if not record.clouds}

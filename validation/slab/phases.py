@@ -15,14 +15,15 @@ from numpy.typing import NDArray
 
 from analytic.droplets import Droplets, Modified, optics
 from analytic.errors import InputError, nearest
-from realtime.clouds.slab_orders.droplets import droplet_phase
+from analytic.phase import PhaseFunction
+from realtime.clouds.slab_orders.droplets import HgDrainePhase, droplet_phase
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SlabPhase, tabulated_phase
 from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein, Tabulated
 from reference.monte_carlo.slab_walk.walk import Scattering
 
 Array = NDArray[np.float64]
 
-NAMES = ("isotropic", "hg:G", "mie", "mie-modified", "FILE.csv")
+NAMES = ("isotropic", "hg:G", "hg-draine", "mie", "mie-modified", "FILE.csv")
 #: |g| up to which the streams resolve Henyey and Greenstein's lobe
 LARGEST_G = 0.98
 _DROPLETS = (6.0, 2.0, 0.55)  #: r_e [um], gamma and wavelength [um] of Bouthors 2008
@@ -54,8 +55,8 @@ def phase_pair(name: str) -> PhasePair:
     Parameters
     ----------
     name
-        'isotropic', 'hg:G' with the mean cosine G, 'mie' (droplets of r_e = 6 um, green), 'mie-modified' (the same
-        without the peak below 5 degrees), or the path of a CSV file.
+        'isotropic', 'hg:G' with the mean cosine G, 'hg-draine:D' with the diameter of droplets D [um], 'mie' (droplets
+        of r_e = 6 um, green), 'mie-modified' (the same without the peak below 5 degrees), or the path of a CSV file.
 
     Raises
     ------
@@ -71,9 +72,28 @@ def phase_pair(name: str) -> PhasePair:
         angles, heights = read_phase_file(Path(name))
         return PhasePair(name, tabulated_phase(angles, heights), lambda: Tabulated(angles, heights))
     kind, *words = name.split(":")
+    if kind == "hg-draine":
+        return _hg_draine(name, words)
     if kind in ("mie", "mie-modified"):
         return _droplets(name, words, modified=kind == "mie-modified")
     raise InputError(f"phase: got {name!r}, wanted one of {', '.join(NAMES)}{nearest(name, NAMES)}")
+
+
+def _hg_draine(name: str, words: list[str]) -> PhasePair:
+    """Return the fit to droplets; the word is their diameter [um], 12 by default."""
+    diameter = float(words[0]) if words and _is_number(words[0]) else 12.0
+    if len(words) > 1 or not all(map(_is_number, words)) or not 5 <= diameter <= 50:
+        raise InputError(
+            f"phase: got {name!r}, wanted hg-draine:D with a diameter D of 5 to 50 um, for example hg-draine:12"
+        )
+
+    def sampled() -> Scattering:
+        angles = np.concatenate([[0.0], np.geomspace(1e-6, np.pi, _TABLE)])
+        angles[-1] = np.pi
+        function = PhaseFunction("hg-draine", diameter=diameter)
+        return Tabulated(angles, function.from_half(np.sin(angles / 2) ** 2, np.cos(angles / 2) ** 2))
+
+    return PhasePair(name, HgDrainePhase(diameter), sampled)
 
 
 def _droplets(name: str, words: list[str], *, modified: bool) -> PhasePair:

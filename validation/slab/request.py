@@ -89,7 +89,7 @@ def slab_request(
         sun=sun,
         phase=phase_pair(phase),
         albedo=albedo,
-        orders=_orders(orders),
+        orders=parse_orders(orders),
         depths=_depths(depths, tau),
         directions=_directions(directions),
     )
@@ -120,7 +120,14 @@ def order_range(name: str) -> tuple[int, float]:
     return first, last
 
 
-def _orders(given: str | Sequence[str | int]) -> tuple[str, ...]:
+def parse_orders(given: str | Sequence[str | int]) -> tuple[str, ...]:
+    """Return the names of sets of orders in the order given, each once; 'sets' stands for `SETS`.
+
+    Raises
+    ------
+    InputError
+        As `order_range`, and for none.
+    """
     words = given.split(",") if isinstance(given, str) else [str(word) for word in given]
     names = [name for word in words for name in (SETS if word.strip() == "sets" else (word.strip(),))]
     for name in names:

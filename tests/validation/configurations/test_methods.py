@@ -6,7 +6,7 @@ import pytest
 
 from analytic.errors import InputError
 from realtime.kernels.registry import KERNELS
-from realtime.methods.registry import METHODS
+from realtime.methods.registry import FOG_METHODS, METHODS
 from tests.helpers.scenes import tiny_scene
 from validation.configurations.kernel_names import find_kernel
 from validation.configurations.methods import (
@@ -95,8 +95,8 @@ def test_standard_configurations_are_valid_and_tell_apart():
 
 
 def test_every_method_has_a_standard_configuration():
-    assert {standard.method for standard in STANDARD} == set(METHODS)
-    assert {standard.method for standard in QUICK} == set(METHODS)
+    assert {standard.method for standard in STANDARD} == set(FOG_METHODS)
+    assert {standard.method for standard in QUICK} == set(FOG_METHODS)
     assert set(QUICK) <= set(STANDARD)
     assert {standard.kernel for standard in STANDARD} - {None} <= set(KERNELS)
 
@@ -107,7 +107,7 @@ def test_chosen_methods_bring_their_standard_configurations():
     )
     # Those whose standard configurations say their light points have their defaults too, for scenes without any.
     for_extent = {Configuration("soft-shafts"), Configuration("froxel-fog")}
-    assert set(chosen_configurations(list(METHODS))) == set(STANDARD) | for_extent
+    assert set(chosen_configurations(list(FOG_METHODS))) == set(STANDARD) | for_extent
     with refused("did you mean"):
         chosen_configurations(["unshadowed", "unshadwed"])
 

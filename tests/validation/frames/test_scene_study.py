@@ -9,7 +9,7 @@ from validation.configurations.methods import QUICK, STANDARD, Configuration
 from validation.frames import scene_study as study
 from validation.frames.benchmark import Measurement
 from validation.frames.scene_study import EFFORTS, Effort, open_study, wants_flip, with_flips
-from validation.scenes.registry import SCENES
+from validation.scenes.registry import FOG_SCENES
 
 TINY = Effort("tiny", (16, 12), (16, 12), (8, 6), {"volpath": 0.5}, {"volpath": 8}, 0.01)
 OWN = Configuration("mine.py:fog")
@@ -17,18 +17,18 @@ OWN = Configuration("mine.py:fog")
 
 def test_every_effort_studies_scenes_that_there_are():
     quick, default, full = (EFFORTS[name].scenes for name in ("quick", "default", "full"))
-    assert set(quick) < set(default) < set(full) == set(SCENES)
+    assert set(quick) < set(default) < set(full) == set(FOG_SCENES)
 
 
 def test_scenes_lit_by_lights_with_extent_are_compared_at_half_the_width(variant):
-    emitters = {name: SCENES[name].build().values() for name in SCENES}
+    emitters = {name: FOG_SCENES[name].build().values() for name in FOG_SCENES}
     wide = {name for name, parts in emitters.items() if any(isinstance(p, dict) and "emitter" in p for p in parts)}
     assert len(wide) == 4
     for effort in EFFORTS.values():
-        sizes = {name: effort.of(name) for name in SCENES}
+        sizes = {name: effort.of(name) for name in FOG_SCENES}
         width, height = effort.image
         assert {name for name, of in sizes.items() if of.image == (width // 2, height // 2)} == wide
-        assert all(sizes[name] == effort for name in set(SCENES) - wide)
+        assert all(sizes[name] == effort for name in set(FOG_SCENES) - wide)
         assert {of.timed for of in sizes.values()} == {effort.timed}
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
+from analytic.phase import PhaseFunction, hg_draine_moments
 from validation.slab.light import slab_numbers
 from validation.slab.phases import phase_pair, read_phase_file
 from validation.slab.request import SETS, order_range, slab_request
@@ -59,6 +60,23 @@ def test_orders_of_droplets_are_those_of_photons(phase, tau):
     _, z = compared(tau, 40.0, phase, 500_000, albedo=0.97, orders="1,2,3-4,5-6,7-inf", depths=[0.0, tau / 2])
     assert np.abs(z).max() < 4.5
     assert 0.3 < (z**2).mean() < 2.5
+
+
+@pytest.mark.parametrize("diameter", [5.0, 12.0, 31.7])
+def test_the_fit_to_droplets_is_the_same_on_both_sides(diameter):
+    pair = phase_pair(f"hg-draine:{diameter}")
+    assert pair.deterministic.moments(300) == pytest.approx(hg_draine_moments(diameter, 300), abs=1e-12)
+    cosines = np.linspace(-1, 1, 1001)
+    assert pair.deterministic.values(cosines) == pytest.approx(
+        PhaseFunction("hg-draine", diameter=diameter)(cosines), rel=1e-9
+    )
+    drawn = pair.sampled().cosines((np.arange(200_000) + 0.5) / 200_000)
+    assert drawn.mean() == pytest.approx(pair.deterministic.moments(2)[1], abs=1e-5)
+
+
+def test_orders_with_the_fit_to_droplets_are_those_of_photons():
+    _, z = compared(2.0, 30.0, "hg-draine:12", 100_000, orders="1,2,3-inf")
+    assert np.abs(z).max() < 4.5
 
 
 def test_a_table_of_a_function_is_the_function(tmp_path):
@@ -135,6 +153,8 @@ def test_names_of_orders():
         ({"phase": "hg:high"}, "wanted hg:G"),
         ({"phase": "isotopic"}, "did you mean 'isotropic'"),
         ({"phase": "mie:6:2:0.55:1"}, "for example mie:6:2:0.55"),
+        ({"phase": "hg-draine:3"}, "diameter D of 5 to 50 um"),
+        ({"phase": "hg-draine:12:3"}, "for example hg-draine:12"),
         ({"phase": "missing.csv"}, "wanted a CSV file"),
     ],
 )

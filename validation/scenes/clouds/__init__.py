@@ -1,0 +1,10 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shapes of clouds by formulas, as closed triangle meshes.
+
+Read in this order:
+
+- `surfaces.py`: closed surfaces from functions of points, and between two heights;
+- `lobes.py`: lobes with bumps as such functions.
+
+May import: nothing of ours.
+"""
