@@ -106,7 +106,8 @@ def render(
     loaded = opened(scene, size)
     read = read_scene(loaded.scene, precision)
     renderer = prepared(read, chosen)
-    image = layered_frame(loaded.name, chosen, render_frame(renderer))
+    layered = prepared(read, chosen, extra_layers=True) if renderer.method.layers else renderer
+    image = layered_frame(loaded.name, chosen, render_frame(layered))
     return Rendering(
         scene=loaded.name,
         image=sealed(image),

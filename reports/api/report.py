@@ -58,7 +58,7 @@ def report(
     >>> report.claims[0]  # doctest: +SKIP
     'The truth is confirmed by our own Mitsuba integrator in 1 of 1 comparisons: ...'
     """
-    from realtime.methods.registry import METHODS
+    from realtime.methods.registry import FOG_METHODS
     from reference.storage.files import ensure_folder
     from reports.api.tables import Report
     from reports.machine.environment import activate
@@ -72,7 +72,7 @@ def report(
         raise InputError(f"effort: got {effort!r}, wanted one of {', '.join(EFFORTS)}" + nearest(effort, EFFORTS))
     target = ensure_folder(folder)
     activate()
-    usual = QUICK if effort == "quick" else chosen_configurations(list(METHODS))
+    usual = QUICK if effort == "quick" else chosen_configurations(list(FOG_METHODS))
     chosen = usual if methods is None else chosen_methods(methods)
     asked = None if scenes is None else [os.fspath(path) for path in several(scenes)]
     names, shown = scenes_of_images(asked, images, EFFORTS[effort].scenes)

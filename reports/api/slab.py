@@ -85,7 +85,8 @@ def slab(
     sun
         Zenith angle of the sun [degrees], from 0 to below 90.
     phase
-        'isotropic', 'hg:G', 'mie', 'mie-modified', or the path of a CSV file of angles [degrees] and values.
+        'isotropic', 'hg:G', 'hg-draine:D', 'mie', 'mie-modified', or the path of a CSV file of angles [degrees] and
+        values.
     albedo
         Single-scattering albedo, 0 to 1.
     orders

@@ -33,6 +33,7 @@ Read in this order:
 - `render.py`: `airlight render`
 - `report.py`: `airlight report`
 - `slab.py`: `airlight slab`
+- `clouds.py`: `airlight clouds`
 - `stability.py`: `airlight stability`
 - `test.py`: `airlight test`
 - `view.py`: `airlight view`
@@ -41,7 +42,8 @@ May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`,
 `realtime.methods.shadow_planes`, `realtime.parameters`, `realtime.scene`, `realtime.shadow_maps`,
 `reference.storage`, `reports.data`, `reports.diff`, `reports.docs`, `reports.figures`, `reports.gallery`,
 `reports.interchange`, `reports.machine`, `reports.papers`, `reports.plotting`, `reports.report`, `reports.tables`,
-`reports.view`, `validation.certified`, `validation.comparison`, `validation.configurations`, `validation.diagnosis`,
-`validation.estimates`, `validation.fidelity`, `validation.fit`, `validation.frames`, `validation.kernels`,
-`validation.metrics`, `validation.mutations`, `validation.papers`, `validation.scenes`, `validation.slab`.
+`reports.view`, `validation.canonical`, `validation.certified`, `validation.comparison`, `validation.configurations`,
+`validation.diagnosis`, `validation.estimates`, `validation.fidelity`, `validation.fit`, `validation.frames`,
+`validation.kernels`, `validation.metrics`, `validation.mutations`, `validation.papers`, `validation.scenes`,
+`validation.slab`.
 """

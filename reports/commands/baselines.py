@@ -52,13 +52,13 @@ def baselines(
         write_baseline,
     )
     from validation.frames.baseline_runs import measure_baseline
-    from validation.scenes.registry import SCENES
+    from validation.scenes.registry import FOG_SCENES
 
-    names = list(dict.fromkeys(scenes or SCENES))
+    names = list(dict.fromkeys(scenes or FOG_SCENES))
     for name in names:
-        if name not in SCENES:
+        if name not in FOG_SCENES:
             raise InputError(
-                f"baselines: got {name!r}, wanted built-in scenes: {', '.join(SCENES)}{nearest(name, SCENES)}"
+                f"baselines: got {name!r}, wanted built-in scenes: {', '.join(FOG_SCENES)}{nearest(name, FOG_SCENES)}"
             )
     if because is not None and not update:
         raise InputError("baselines: --because is for --update; give both, or neither")
@@ -70,7 +70,7 @@ def baselines(
             step = part_of(progress, number / len(names), (number + 1) / len(names))
             measured[name] = measure_baseline(name, kept=kept[name], times=times, progress=step)
     moves = {name: compare_baseline(kept[name], measured[name]) for name in names}
-    stray = [] if scenes else stray_baselines(SCENES)
+    stray = [] if scenes else stray_baselines(FOG_SCENES)
     if update:
         # A missing reason is refused before the first file is written.
         new = [updated(kept[name], measured[name], because) for name in names]

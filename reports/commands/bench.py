@@ -24,6 +24,7 @@ from reports.commands.options import (
 )
 
 _SMALL = "64x48"  # of images in which faults are planted: thousands of pixels are enough
+_FIT_SIZE, _FIT_SAMPLES = (160, 120), 512  # of the truth of a fit that is not given
 _BATCHES = 4096  # at most: a comparison ends earlier if its interval is narrow enough
 
 
@@ -59,6 +60,18 @@ def bench(
     diagnosis: Annotated[
         bool, typer.Option("--diagnosis", help="Plant faults in scenes and count how often a diagnosis names them.")
     ] = False,
+    octaves: Annotated[
+        bool,
+        typer.Option("--fit-octaves", help="Find the constants of cloud-octaves that fit a scene of clouds best."),
+    ] = False,
+    against: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="With --fit-octaves: the truth, an EXR with the layer airlight; that of cloud-paths by default.",
+            show_default=False,
+        ),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -91,6 +104,9 @@ def bench(
     `light moved` a frame after the light moved. Exit status 1 if single-scatter does not confirm the truth within
     +-0.05 %, or volpath within +- the margin, or if a method of your own is at fault.
 
+    --fit-octaves prints the extinction, contribution and anisotropy of cloud-octaves with the least relative RMSE of
+    the airlight, beside those that halve everything; other parameters come by --set.
+
     --decompose prints by which causes each image is wrong: parts that add up to its error, differences of renders in
     which one cause after the other is gone.
     """
@@ -101,6 +117,11 @@ def bench(
     if output is not None and not decompose:
         raise InputError("--output: got a folder without --decompose, which alone writes images; add --decompose")
     named_kernels = named("--kernel", kernel, "--kernel", None)
+    if against is not None and not octaves:
+        raise InputError("--against: got an image without --fit-octaves, which alone takes one; add --fit-octaves")
+    if octaves:
+        _fit_octaves(scenes, size=size, against=against, settings=settings, json=json, markdown=markdown)
+        return
     if kernels:
         _refuse_scenes(scenes)
         _bench_kernels(named_kernels or None, phase=phase, json=json, markdown=markdown)
@@ -124,7 +145,7 @@ def bench(
     from validation.configurations.methods import rendered_lights
     from validation.frames.expected_work import check_work, frame_work, truth_work
     from validation.scenes.loading import load_scene, parse_size
-    from validation.scenes.registry import SCENES
+    from validation.scenes.registry import FOG_SCENES
 
     chosen = named_configurations(
         named("--method", method, "--methods", methods), named_kernels, settings or [], limit=method_limit
@@ -132,7 +153,7 @@ def bench(
     apart = partial(in_own_process, limit=method_limit)
     pixels = parse_size(size) if size else None
     activate()
-    names = scenes or list(SCENES)
+    names = scenes or list(FOG_SCENES)
     works = []
     for name in names:  # refuses unusable input before an hour of work, not after
         scene = read_scene(load_scene(name, pixels).scene)
@@ -375,11 +396,11 @@ def _bench_estimators(scenes: list[str] | None, *, size: str | None, force: bool
     from validation.estimates.efficiency import efficiency_lines, scene_efficiency, thin_fog
     from validation.frames.expected_work import check_work, sampled_work
     from validation.scenes.loading import load_scene, parse_size
-    from validation.scenes.registry import SCENES
+    from validation.scenes.registry import FOG_SCENES
 
     pixels = parse_size(size) if size else (160, 120)
     activate()
-    names = list(scenes or SCENES)
+    names = list(scenes or FOG_SCENES)
     loaded = {name: load_scene(name, pixels).scene for name in names}  # refuses unusable input before any work
     if not scenes:
         loaded = {"open-fog, optical depth 0.2": thin_fog(pixels)} | loaded
@@ -397,3 +418,75 @@ def _bench_estimators(scenes: list[str] | None, *, size: str | None, force: bool
     for name, efficiency in efficiencies.items():
         print(f"{name}, {pixels[0]} x {pixels[1]}")
         print("\n".join(f"  {line}" for line in efficiency_lines(efficiency)))
+
+
+def _fit_octaves(
+    scenes: list[str] | None, *, size: str | None, against: Path | None, settings, json: bool, markdown: bool
+) -> None:
+    """Print the constants of octaves that fit scenes of clouds best."""
+    from analytic.errors import InputError
+    from reference.storage.exr import read_exr
+    from reports.commands.printing import print_heading, print_tables
+    from reports.machine.environment import activate, describe_environment
+    from reports.machine.progress import part_of, progress_bar
+    from reports.tables.octave_fit import octave_table
+    from reports.tables.terminal import print_json
+    from validation.configurations.methods import configuration, parse_settings
+    from validation.metrics.errors import plain
+    from validation.scenes.loading import parse_size
+    from validation.scenes.registry import SCENES
+
+    names = scenes or [name for name, record in SCENES.items() if record.clouds]
+    if against is not None and len(names) != 1:
+        raise InputError(f"--against: got one image for {len(names)} scenes; name its scene")
+    if against is not None:
+        read_exr(against)  # unreadable files are refused before Mitsuba starts
+    parameters = dict(configuration("cloud-octaves", None, parse_settings(settings or [])).parameters)
+    pixels = parse_size(size) if size else None
+    activate()
+    fits = []
+    with progress_bar("bench --fit-octaves") as progress:
+        for number, name in enumerate(names):
+            step = part_of(progress, number / len(names), (number + 1) / len(names))
+            fits.append(_octave_fit(name, pixels, against, parameters, step))
+    if json:
+        print_json({"environment": describe_environment(), "fits": plain(fits)})
+        return
+    if markdown:
+        print_heading()
+    print_tables([octave_table(plain(fits))], as_markdown=markdown)
+    for fit in fits:
+        best = " ".join(f"--set {key}={fit['fitted'][key]:.3g}" for key in ("extinction", "contribution", "anisotropy"))
+        print(f"{fit['scene']}: airlight render {fit['scene']} --method cloud-octaves {best}")
+
+
+def _octave_fit(name: str, pixels, against: Path | None, parameters: dict[str, Any], progress) -> dict[str, Any]:
+    """Return the fit of one scene, at the size of the truth that is given."""
+    from dataclasses import asdict
+
+    from realtime.scene.read_scene import read_scene
+    from reference.storage.exr import layer, read_exr
+    from reports.commands.printing import print_notes
+    from reports.machine.progress import counted, part_of
+    from validation.estimates.budget import Budget
+    from validation.estimates.images import cloud_orders, monte_carlo_reference
+    from validation.frames.octave_fit import fit_octaves
+    from validation.scenes.loading import load_scene
+
+    if against is None:
+        loaded = load_scene(name, pixels or _FIT_SIZE)
+        part = part_of(progress, 0.0, 0.8)
+        budget, orders = Budget(samples=_FIT_SAMPLES), cloud_orders("sets")
+        image = monte_carlo_reference(loaded, "cloud-paths", budget=budget, orders=orders, progress=part).image
+    else:
+        image = read_exr(against)
+        height, width = layer(image, "airlight", str(against)).shape[:2]
+        loaded = load_scene(name, pixels or (width, height))
+    scene = read_scene(loaded.scene)
+    print_notes(scene.features.notes)
+    truth = layer(image, "airlight", str(against or name))
+    part = part_of(progress, 0.8 if against is None else 0.0, 1.0)
+    error = image.layers.get("airlight_se")
+    fit = fit_octaves(scene, truth, standard_error=error, parameters=parameters, progress=counted(part))
+    size = [scene.camera.width, scene.camera.height]
+    return {"scene": loaded.name, "size": size, "truth": str(against or "cloud-paths")} | asdict(fit)

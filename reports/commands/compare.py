@@ -69,6 +69,10 @@ def compare(
         Path | None,
         typer.Option(metavar="FILE", help="EXR file that is 0 in pixels to leave out.", show_default=False),
     ] = None,
+    by_order: Annotated[
+        bool,
+        typer.Option("--by-order", help="Compare the layers by order of scattering too, such as airlight_3_4."),
+    ] = False,
     metrics: Annotated[
         str,
         typer.Option(
@@ -121,6 +125,10 @@ def compare(
             raise InputError(f"{option}: the pixels of a file are what they are; this option goes with a scene")
     if difference is not None:
         check_difference("--difference", difference)
+    if by_order and scene is not None:
+        raise InputError(
+            "--by-order: compares two files; make the truth by airlight reference SCENE --estimator cloud-paths"
+        )
     if diagnose:
         if scene is None:
             raise InputError("--diagnose: it goes with a scene: airlight compare SCENE TEST.exr --diagnose")
@@ -138,7 +146,7 @@ def compare(
         "exposure": exposure,
     }
     if scene is None:
-        comparison: Any = _two_files(paths, "airlight" if layer is None else layer, **options)
+        comparison: Any = _two_files(paths, "airlight" if layer is None else layer, by_order=by_order, **options)
     else:
         comparison = _with_scene(scene, paths[0], layer=layer, holds=holds, pixel=pixel, **options)
     written = {}

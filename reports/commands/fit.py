@@ -70,10 +70,11 @@ def fit(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Find the parameters of media, lights and exposure that explain an image, each with its 95 % interval.
+    """Find the parameters of the fog that explain an image.
 
-    Pixels that disagree with what explains the others are left out. What the image cannot tell apart, such as albedo
-    and intensity in the airlight, is said, with a way out. See docs/diagnosis.md.
+    Each comes with its 95 % interval: parameters of media, lights and exposure. Pixels that disagree with what
+    explains the others are left out. What the image cannot tell apart, such as albedo and intensity in the
+    airlight, is said, with a way out. See docs/diagnosis.md.
     """
     from reference.storage.exr import read_exr
     from reports.machine.environment import activate

@@ -20,6 +20,7 @@ from reports.commands.baselines import baselines
 from reports.commands.bench import bench
 from reports.commands.cache import cache
 from reports.commands.certify import certify
+from reports.commands.clouds import clouds
 from reports.commands.compare import compare
 from reports.commands.completion import one_of
 from reports.commands.describe import describe
@@ -61,7 +62,7 @@ DONE, FAILED, WRONG_INPUT, MISSING, INTERRUPTED = 0, 1, 2, 3, 130
 _PANELS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start": (doctor, list_, render, view, cache),
     "Measure": (report, diff, bench, maps, stability),
-    "Images": (reference, compare, fit, merge, describe, integrate, slab, gallery),
+    "Images": (reference, compare, fit, merge, describe, integrate, slab, clouds, gallery),
     "Papers": (published, figures, fidelity),
     "Develop": (run_tests, docs, baselines, mutations, certify),
 }

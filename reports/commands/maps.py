@@ -52,7 +52,7 @@ def maps(
     from validation.configurations.methods import parse_settings
     from validation.metrics.errors import plain
     from validation.scenes.loading import parse_size
-    from validation.scenes.registry import SCENES
+    from validation.scenes.registry import FOG_SCENES
 
     pixels = parse_size(size)
     texels = parse_map_sizes("--sizes", sizes)
@@ -63,7 +63,7 @@ def maps(
     activate()
     call: Any = partial(in_own_process, _studied, name=method, limit=method_limit) if largest.own else _studied
     moves = {"frames": frames, "step": step} if flicker else None
-    studied = call(scenes or list(SCENES), pixels, texels, method, kernel, parameters, moves, force)
+    studied = call(scenes or list(FOG_SCENES), pixels, texels, method, kernel, parameters, moves, force)
     if json:
         scenes_data = [
             {"name": name, "method": errors.configuration.label, "errors": plain(errors), "flicker": plain(moving)}

@@ -62,7 +62,7 @@ def named_configurations(
         For unknown names, and for a kernel or a parameter that no method is named for.
     """
     from analytic.errors import InputError
-    from realtime.methods.registry import METHODS
+    from realtime.methods.registry import FOG_METHODS
     from validation.configurations.methods import chosen_configurations, parse_settings
 
     check_limit(limit)
@@ -73,7 +73,7 @@ def named_configurations(
         if name == ALL:
             if option:
                 raise InputError(f"{option}: got no single method that it is for; name methods by --method")
-            chosen += chosen_configurations(list(METHODS)) if usual is None else usual
+            chosen += chosen_configurations(list(FOG_METHODS)) if usual is None else usual
         elif option or ":" in name:
             chosen += [checked_configuration(name, kernel, given, limit=limit) for kernel in kernels or (None,)]
         else:

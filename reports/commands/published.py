@@ -9,7 +9,7 @@ import typer
 from reports.commands import completion
 from reports.commands.options import Force, Json, Markdown, OldScenes, listed, named
 
-PAPERS = ("biri", "billeter", "ali")
+PAPERS = ("biri", "billeter", "ali", "bouthors")
 
 
 def published(
@@ -26,7 +26,7 @@ def published(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="biri, billeter or ali; all by default.",
+            help="biri, billeter, ali or bouthors; all by default.",
             show_default=False,
             autocompletion=completion.one_of(*PAPERS),
         ),
@@ -53,14 +53,16 @@ def published(
 ) -> None:
     """Measure tables and figures of papers again.
 
-    The papers are Biri, Arques, Michelin 2006, Billeter, Sintorn, Assarsson 2010 and Ali 2016.
+    The papers are Biri, Arques, Michelin 2006, Billeter, Sintorn, Assarsson 2010, Ali 2016 and Bouthors, Neyret,
+    Max, Bruneton, Crassin 2008.
 
     biri: Tables 1 and 2 with `shadow-planes`: share of time by stage, frames a second; with `three-media`, the
     error of the constant R of section 4.2 by size and depth. billeter: Figures 6 and 7 and Table 1 with `light-
     volumes` and its peers: frames a second, static against adaptive tessellation, the passes, and which of the
     paper's conclusions hold here. ali: Fig. 5.8 with `soft-shafts` and what goes with it, by errors in the
-    penumbrae and times. Each at the published sizes, after the light moved, everything rebuilt or camera rays kept,
-    beside the published figures, with the error of the airlight.
+    penumbrae and times. bouthors: what a slab decides, Fig. 3, the printed extinction and densities. The others at
+    the published sizes, after the light moved, everything rebuilt or camera rays kept, beside the published figures,
+    with the error of the airlight.
     """
     from analytic.errors import InputError
     from reports.commands.maps import parse_map_sizes
@@ -95,6 +97,8 @@ def published(
             data |= _billeter(wanted, names[0], scale=scale, maps=sizes, limit=limit, progress=progress)
         if "ali" in papers and "fence" in wanted:
             data |= _ali(scale=scale, progress=progress)
+        if "bouthors" in papers and not (scenes or old_scenes):
+            data |= _bouthors(progress)
     if json:
         print_json({"environment": describe_environment()} | data)
     else:
@@ -107,6 +111,7 @@ def _print(data: dict[str, Any], *, as_markdown: bool) -> None:
     from reports.papers.ali import ali_tables
     from reports.papers.billeter import billeter_tables
     from reports.papers.biri import biri_notes, biri_tables
+    from reports.papers.bouthors import bouthors_tables
 
     if as_markdown:
         print_heading()
@@ -116,6 +121,8 @@ def _print(data: dict[str, Any], *, as_markdown: bool) -> None:
             print(f"\n{note}")
     if "ali" in data:
         print_tables(ali_tables(data["ali"]), as_markdown=as_markdown)
+    if "bouthors" in data:
+        print_tables(bouthors_tables(data["bouthors"]), as_markdown=as_markdown)
     if "billeter" in data:
         print_tables(billeter_tables(data["billeter"]), as_markdown=as_markdown)
         if data["billeter"]["conclusions"]:
@@ -133,6 +140,13 @@ def _ali(*, scale: float, progress: Callable) -> dict[str, Any]:
     return {"ali": study_data(shafts_study(size, progress=progress))}
 
 
+def _bouthors(progress: Callable) -> dict[str, Any]:
+    """Measure what a slab decides of Bouthors 2008."""
+    from validation.papers.bouthors import slab_study
+
+    return {"bouthors": slab_study(progress=progress)}
+
+
 def _wanted_scenes(scenes: Sequence[str], papers: Sequence[str]) -> list[str]:
     from analytic.errors import InputError, nearest
     from validation.papers.billeter_images import FIGURES
@@ -143,6 +157,7 @@ def _wanted_scenes(scenes: Sequence[str], papers: Sequence[str]) -> list[str]:
     of_paper = {
         "biri": [row.scene for row in PUBLISHED if row.scene in SCENES],
         "ali": ["fence"],
+        "bouthors": [],
         "billeter": [figure.scene for figure in FIGURES] + [view.scene for view in TABLE],
     }
     known = list(dict.fromkeys(name for paper in papers for name in of_paper[paper]))

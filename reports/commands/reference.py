@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from validation.scenes.loading import LoadedScene
 
 _USUAL_SPP = 2048
+_USUAL_CLOUD_SPP = 256
 
 
 class Estimator(StrEnum):
@@ -24,6 +25,7 @@ class Estimator(StrEnum):
     quadrature = "quadrature"
     single_scatter = "single-scatter"
     volpath = "volpath"
+    cloud_paths = "cloud-paths"
 
 
 class Pixel(StrEnum):
@@ -51,7 +53,10 @@ def reference(
     spp: Annotated[
         int | None,
         typer.Option(
-            min=64, metavar="N", help=f"Monte Carlo: samples a pixel, {_USUAL_SPP} by default.", show_default=False
+            min=64,
+            metavar="N",
+            help=f"Monte Carlo: samples a pixel, {_USUAL_SPP} by default, {_USUAL_CLOUD_SPP} of clouds.",
+            show_default=False,
         ),
     ] = None,
     target_error: Annotated[
@@ -83,6 +88,15 @@ def reference(
         int, typer.Option(min=0, metavar="N", help="Monte Carlo: seed of the first batch; the others count up.")
     ] = 0,
     change: Changes = None,
+    orders: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SETS",
+            help="cloud-paths, and volpath in clouds: layers by order of scattering, such as 1,2,3-4,5-inf; 'sets', "
+            "the default of cloud-paths, are those of Bouthors 2008, 'all' is none.",
+            show_default=False,
+        ),
+    ] = None,
     size: Size = None,
     force: Force = False,
     json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
@@ -94,6 +108,7 @@ def reference(
 
     Exit status 1 if the target error was not reached.
     """
+    from analytic.errors import InputError
     from realtime.scene.features import camera_notes
     from reference.storage.exr import write_exr
     from reference.storage.files import ensure_writable
@@ -102,14 +117,18 @@ def reference(
     from reports.machine.environment import activate, stamped
     from reports.machine.progress import progress_bar
     from validation.estimates.budget import Budget
-    from validation.estimates.images import quadrature_reference
+    from validation.estimates.images import cloud_orders, quadrature_reference
     from validation.frames.expected_work import check_work, sampled_work, truth_work
     from validation.scenes.changes import parse_changes
     from validation.scenes.loading import load_scene, parse_size
 
     sampled = estimator is not Estimator.quadrature
     _check_options(estimator, {"--spp": spp, "--target-error": target_error, "--time-budget": time_budget}, pixel)
-    usual = _USUAL_SPP if spp is None and target_error is None and time_budget is None else spp
+    if orders is not None and estimator not in (Estimator.volpath, Estimator.cloud_paths):
+        raise InputError(f"--orders: {estimator} knows single scattering alone; add --estimator cloud-paths or volpath")
+    chosen = cloud_orders(orders or "sets") if orders or estimator is Estimator.cloud_paths else None
+    most = _USUAL_SPP if chosen is None else _USUAL_CLOUD_SPP
+    usual = most if spp is None and target_error is None and time_budget is None else spp
     budget = Budget(samples=usual, error=target_error, seconds=time_budget, target=target.value) if sampled else None
     check_ending("--output", output, ".exr")
     ensure_writable(output)
@@ -122,14 +141,14 @@ def reference(
         area = 16 if pixel is Pixel.area else 1  # rays in a pixel
         work = truth_work(tuple(pixels), lights=len(loaded.scene.emitters()), images=area)
     else:
-        work = sampled_work(tuple(pixels), usual or 64)
+        work = sampled_work(tuple(pixels), usual or 64, clouds=chosen is not None)
     check_work(f"reference {loaded.name}, {pixels[0]} x {pixels[1]}, {estimator}", [work], force=force)
     estimate = None
     with progress_bar(f"{loaded.name}: {estimator}") as progress:
         if budget is None:
             image = quadrature_reference(loaded, pixel=pixel.value, progress=progress)
         else:
-            estimate = _sample(loaded, estimator, budget, seed=seed, progress=progress)
+            estimate = _sample(loaded, estimator, budget, orders=chosen, seed=seed, progress=progress)
             image = estimate.image
     write_exr(output, stamped(image))
     summary: dict[str, Any] = {"scene": loaded.name, "output": str(output), "estimator": str(estimator)}
@@ -154,13 +173,21 @@ def _check_options(estimator: Estimator, budgets: dict[str, Any], pixel: Pixel) 
 
 
 def _sample(
-    loaded: "LoadedScene", estimator: Estimator, budget: "Budget", *, seed: int, progress: "Progress"
+    loaded: "LoadedScene",
+    estimator: Estimator,
+    budget: "Budget",
+    *,
+    orders: tuple[str, ...] | None,
+    seed: int,
+    progress: "Progress",
 ) -> "MonteCarloReference":
     from reports.machine.progress import Interrupted
     from validation.estimates.images import monte_carlo_reference
 
     try:
-        return monte_carlo_reference(loaded, estimator.value, budget=budget, seed=seed, progress=progress)
+        return monte_carlo_reference(
+            loaded, estimator.value, budget=budget, seed=seed, orders=orders, progress=progress
+        )
     except KeyboardInterrupt as stop:
         if not stop.args:
             raise
@@ -190,7 +217,8 @@ def _print_summary(summary: dict[str, Any], *, json: bool) -> None:
         return
     print(f"{summary['output']}: {summary['scene']} by {summary['estimator']}")
     for name, mean in summary["means"].items():
-        print(f"  {name}: mean {', '.join(f'{value:.6g}' for value in mean)} W/(m^2 sr)")
+        unit = "" if name == "opacity" else " W/(m^2 sr)"
+        print(f"  {name}: mean {', '.join(f'{value:.6g}' for value in mean)}{unit}")
     if "batches" not in summary:
         return
     batches = summary["batches"]

@@ -205,14 +205,14 @@ def _check_work(name: str, scene, chosen, frames: int | None = None, *, force: b
     check_work(f"render {name}, {size[0]} x {size[1]}, {chosen.label}", [work], force=force)
 
 
-def _prepared(scene, chosen):
+def _prepared(scene, chosen, *, extra_layers: bool = False):
     """Return the frame renderer; print the notes on the scene, and the warnings of its casters."""
     from realtime.methods.shadow_planes.method import PlanePreparation
     from reports.commands.printing import print_notes
     from validation.configurations.methods import prepared
 
     print_notes(scene.features.notes)
-    renderer = prepared(scene, chosen)
+    renderer = prepared(scene, chosen, extra_layers=extra_layers)
     stages = renderer.groups.of_point if renderer.groups is not None else renderer
     if stages is not None and isinstance(stages.prepare, PlanePreparation):
         _warn(stages.prepare.casters.warnings)
@@ -236,6 +236,7 @@ def _render(
     from realtime.scene.read_scene import read_scene
     from reports.interchange.frames import write_frame
     from reports.machine.progress import progress_bar
+    from validation.configurations.methods import prepared
     from validation.configurations.timing import time_frame
     from validation.frames.expected_work import TIMED
     from validation.scenes.loading import load_scene
@@ -244,8 +245,12 @@ def _render(
     scene = read_scene(loaded.scene, precision)
     _check_work(loaded.name, scene, chosen, TIMED + samples if samples > 1 else None, force=force)
     renderer = _prepared(scene, chosen)
+    # A frame of its own has the further layers: they do not belong to what a frame costs.
+    layered = renderer
+    if outputs["exr"] is not None and samples == 1 and renderer.method.layers:
+        layered = prepared(scene, chosen, extra_layers=True)
     with progress_bar(f"{loaded.name}: {samples} rays a pixel") as progress:
-        frame = render_samples(renderer, samples, lambda done: progress(done, "the picture"))
+        frame = render_samples(layered, samples, lambda done: progress(done, "the picture"))
     curve = write_frame(loaded.name, chosen, frame, outputs=outputs, samples=samples)
     times = time_frame(renderer)
     files = [str(path) for path in outputs.values() if path is not None]
@@ -284,6 +289,7 @@ def _render_frames(
     """Render the frames of an animation, write them and return what they cost."""
     from dataclasses import replace
 
+    from realtime.methods.registry import find_method
     from realtime.scene.read_scene import read_scene
     from reports.interchange.frames import write_frames
     from reports.machine.progress import progress_bar
@@ -296,7 +302,8 @@ def _render_frames(
     if animate is not None:
         animation = replace(animation, moves=parse_moves(animate))
     _check_work(loaded.name, scene, chosen, frames, force=force)
-    renderer = _prepared(scene, chosen)
+    layered = outputs["exr"] is not None and bool(find_method(chosen.method).layers)
+    renderer = _prepared(scene, chosen, extra_layers=layered)
     with progress_bar(f"{loaded.name}: {frames} frames") as progress:
         written = write_frames(
             loaded.name, renderer, chosen, animation, frames=frames, outputs=outputs, progress=progress

@@ -14,7 +14,8 @@ def slab(
     phase: Annotated[
         str,
         typer.Option(
-            metavar="NAME", help="isotropic, hg:G, mie, mie-modified, or a CSV file of angles [degrees] and values."
+            metavar="NAME",
+            help="isotropic, hg:G, hg-draine:D, mie, mie-modified, or a CSV file of angles [degrees] and values.",
         ),
     ] = "isotropic",
     albedo: Annotated[float, typer.Option(metavar="A", help="Single-scattering albedo.")] = 1.0,

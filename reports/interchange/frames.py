@@ -79,7 +79,7 @@ def write_frames(
                 moved = 1e3 * (time.perf_counter() - start)
                 stages, kept, render_ms = timed_frame(renderer, scene, kept, **moved_parts(animation))
                 cost.append((moved, render_ms))
-                frame = image_frame(replace(renderer, scene=scene), stages)
+                frame = image_frame(replace(renderer, scene=scene), stages, kept.extra)
                 numbers = {kind: path and numbered(path, number, frames) for kind, path in outputs.items()}
                 curve = write_frame(name, chosen, frame, outputs=numbers, curve=curve)
                 done = number

@@ -41,6 +41,9 @@ _METHODS = {
     "light-volumes": ("green", "D"),
     "min-max": ("purple", "v"),
     "froxel-fog": ("orange", "h"),
+    # No chart has methods for fog and for clouds.
+    "cloud-octaves": ("orange", "P"),
+    "cloud-collectors": ("blue", "^"),
 }
 _OTHERS = (("wine", "X"), ("navy", "*"))  # methods of users and images of engines
 # Kernels that are variants of one idea share the colour.

@@ -20,7 +20,7 @@ from validation.frames.result_cache import (
     expected_seconds,
 )
 from validation.frames.scene_study import EFFORTS, Effort
-from validation.scenes.registry import SCENES
+from validation.scenes.registry import FOG_SCENES
 
 
 def fidelity_parts(
@@ -89,7 +89,7 @@ def measure_fidelity(
         Called with (share done, what) now and then.
     """
     effort = replace(EFFORTS["default"], fidelity=not quick)
-    parts = fidelity_parts(effort, tuple(SCENES), cache, rows=rows, reported=False)
+    parts = fidelity_parts(effort, tuple(FOG_SCENES), cache, rows=rows, reported=False)
     typical = [EXPERIMENTS[part.title].seconds for part in parts]
     seconds = {
         str(number): usual if (last := expected_seconds(part.entry)) is None else last

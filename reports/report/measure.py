@@ -41,7 +41,7 @@ from validation.frames.benchmark import Apart, render_by_name
 from validation.frames.result_cache import CachedResult, ResultCache, cached_result, now, sweep_results
 from validation.frames.scene_study import Effort, SceneStudy, open_study
 from validation.metrics.errors import plain
-from validation.scenes.registry import SCENES
+from validation.scenes.registry import FOG_SCENES
 
 
 def write_report(
@@ -144,7 +144,8 @@ def write_report(
                 **_counts(results),
                 "settings": plain(asdict(effort)),
                 "environment": environment,
-                "claims": claims(studied) + (unstudied(scenes, list(SCENES)) if tuple(scenes) == effort.scenes else []),
+                "claims": claims(studied)
+                + (unstudied(scenes, list(FOG_SCENES)) if tuple(scenes) == effort.scenes else []),
                 "scenes": studied,
                 "stability": stability[-1].data["kernels"] if stability else [],
                 "mutations": mutations[-1].data if mutations else None,

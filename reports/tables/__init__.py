@@ -15,10 +15,12 @@ Read in this order:
 - `kernels.py`: costs, levels and orders of kernels
 - `stability.py`: where kernels and sums of shadow planes break
 - `decomposition.py`: errors by cause
+- `octave_fit.py`: the constants of octaves that fit best
 - `map_size.py`: error and flicker against the size of the shadow map
 - `slab.py`: a slab by order of scattering
 - `diagnosis.py`: planted faults and the answers
 - `fit.py`: parameters that explain an image
+- `clouds.py`: tables of canonical transport and their errors
 - `checks.py`: baselines that moved, mutations, light left out
 - `lists.py`: scenes, methods, kernels
 - `scene.py`: the description of a scene for another renderer

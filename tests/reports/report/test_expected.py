@@ -14,7 +14,7 @@ from reports.report.papers import other_parts
 from validation.configurations.methods import STANDARD, Configuration
 from validation.frames.result_cache import cache_entry, result_cache, store_result
 from validation.frames.scene_study import EFFORTS
-from validation.scenes.registry import SCENES
+from validation.scenes.registry import FOG_SCENES
 
 MACHINE = {"processor": "abacus", "threads": "2"}
 EFFORT = replace(EFFORTS["default"], papers=())
@@ -106,8 +106,8 @@ def test_a_scene_of_the_users_own_may_have_changed(cache, tmp_path):
 def test_every_scene_and_part_has_its_usual_time():
     from reports.report.expected import _OTHERS, _TYPICAL
 
-    assert set(_TYPICAL) == set(SCENES)
-    asked = EFFORTS["full"], list(SCENES), result_cache(MACHINE)
+    assert set(_TYPICAL) == set(FOG_SCENES)
+    asked = EFFORTS["full"], list(FOG_SCENES), result_cache(MACHINE)
     full = {part.kind for part in (*other_parts(*asked), *fidelity_parts(*asked))}
     assert full == set(_OTHERS)
     assert PAGE_SECONDS > 0

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight clouds`: the tables that methods for clouds look up."""
+
+from typing import Annotated
+
+import typer
+
+from reports.commands.options import Json
+
+
+def clouds(
+    tables: Annotated[
+        bool, typer.Option("--tables", help="Make the tables of the canonical transport, or show those that are kept.")
+    ] = False,
+    phase: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME", help="isotropic, hg:G, mie, mie-modified, or a CSV file of angles [degrees] and values."
+        ),
+    ] = "mie-modified",
+    albedo: Annotated[float, typer.Option(metavar="A", help="Single-scattering albedo.")] = 1.0,
+    check: Annotated[int, typer.Option(metavar="N", help="Compare with the computation at so many random points.")] = 0,
+    fit: Annotated[
+        bool, typer.Option("--fit", help="Fit the 22 functions of Bouthors 2008 to the tables, and print their errors.")
+    ] = False,
+    seed: Annotated[int, typer.Option(metavar="N", help="Of the random points.")] = 0,
+    json: Json = False,
+) -> None:
+    """Make the tables that methods for clouds look up.
+
+    They hold light scattered in a slab by sets of orders, with where it entered: T, c and sigma. They are kept in the
+    cache, so that each phase function and albedo takes its minutes once. See docs/canonical-transport.md.
+    """
+    from analytic.errors import InputError
+    from reports.machine.environment import activate
+    from reports.machine.progress import progress_bar
+    from reports.tables.clouds import clouds_sentence, clouds_tables
+    from reports.tables.terminal import print_json, print_table
+    from validation.canonical.record import canonical_record
+
+    if not tables:
+        raise InputError("clouds: got nothing to do, wanted --tables, with --check or --fit if wanted")
+    if seed < 0:
+        raise InputError(f"--seed: got {seed}, wanted a whole number from 0 on")
+    activate()
+    with progress_bar("clouds") as progress:
+        record = canonical_record(phase, albedo, check=check, fit=fit, seed=seed, progress=progress)
+    if json:
+        print_json(record)
+        return
+    for each in clouds_tables(record):
+        print_table(each)
+    print(f"\n{clouds_sentence(record)}")
