@@ -34,7 +34,17 @@ ALLOWED = {
 # Methods are compared with one another. (The estimators of the truth: tests/test_independence.py.)
 METHODS = tuple(
     f"realtime.methods.{name}"
-    for name in ("unshadowed", "ray_march", "shadow_planes", "light_volumes", "epipolar", "froxel_fog", "soft_shafts")
+    for name in (
+        "unshadowed",
+        "ray_march",
+        "shadow_planes",
+        "light_volumes",
+        "epipolar",
+        "froxel_fog",
+        "soft_shafts",
+        "cloud_octaves",
+        "cloud_collectors",
+    )
 )
 
 

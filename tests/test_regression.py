@@ -8,14 +8,14 @@ import pytest
 
 from validation.frames.baseline_files import compare_baseline, read_baseline
 from validation.frames.baseline_runs import measure_baseline
-from validation.scenes.registry import SCENES
+from validation.scenes.registry import FOG_SCENES
 
 QUICK = ("open-fog", "sphere-spot")  # every method and every kernel; the other scenes take longer
 
 
 @pytest.mark.claim("baselines", tolerance="the band of each number in its baseline")
 @pytest.mark.parametrize(
-    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in SCENES]
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in FOG_SCENES]
 )
 def test_errors_are_those_of_the_baseline(name, variant):
     # Times are left to the command: a test may share the machine with others.

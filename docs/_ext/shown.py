@@ -35,7 +35,7 @@ def pictures(method: str) -> str:
         "sketch": f"How {method} works, seen from the side",
     }
     images = "\n".join(f"![{words[kind]}](gallery/{entry['file']})" for kind, entry in present.items())
-    return f"```{{container}} {'triple' if len(present) == 3 else 'pair'}\n{images}\n```\n\n*{_caption(present)}*"
+    return f"```{{container}} {('card', 'pair', 'triple')[len(present) - 1]}\n{images}\n```\n\n*{_caption(present)}*"
 
 
 def _of_method(method: str, kind: str) -> dict[str, Any] | None:
@@ -44,7 +44,9 @@ def _of_method(method: str, kind: str) -> dict[str, Any] | None:
 
 
 def _caption(present: dict[str, dict[str, Any]]) -> str:
-    rendered, error = present["method"], present["error"]
+    rendered, error = present["method"], present.get("error")
+    if error is None:
+        return f"What it renders, `{rendered['command']}`."
     text = (
         f"what it renders, `{rendered['command']}`, and its error: blue where it is too dark, red where it is too "
         f"bright, white below 1e-4 of the truth, full colour from 1 on; relative RMSE "
