@@ -43,6 +43,10 @@ def bench(
     settings: Settings = None,
     size: Size = None,
     kernels: Annotated[bool, typer.Option("--kernels", help="Time the kernels alone, on 480 000 rays.")] = False,
+    gradients: Annotated[
+        bool,
+        typer.Option("--gradients", help="With --kernels: what their derivatives cost, in place of time and error."),
+    ] = False,
     phase: Annotated[
         str | None,
         typer.Option(
@@ -124,8 +128,13 @@ def bench(
         return
     if kernels:
         _refuse_scenes(scenes)
-        _bench_kernels(named_kernels or None, phase=phase, json=json, markdown=markdown)
+        if gradients:
+            _bench_gradients(named_kernels or None, phase=phase, json=json, markdown=markdown)
+        else:
+            _bench_kernels(named_kernels or None, phase=phase, json=json, markdown=markdown)
         return
+    if gradients:
+        raise InputError("--gradients: they are those of kernels; add --kernels")
     if phase is not None:
         raise InputError("--phase: it is for kernels; add --kernels, a scene has its own phase function")
     if diagnosis:
@@ -360,6 +369,33 @@ def _bench_kernels(names: list[str] | None, *, phase: str | None, json: bool, ma
     print("ns/ray: the kernel alone by Dr.Jit's history, median; ~ is extrapolated from fewer steps.")
     if orders:
         print_tables([order_table(orders)], as_markdown=markdown)
+
+
+def _bench_gradients(names: list[str] | None, *, phase: str | None, json: bool, markdown: bool) -> None:
+    """Print what derivatives of kernels cost beside their values."""
+    from analytic.phase import phase_from_words
+    from realtime.kernels.registry import KERNELS
+    from reports.commands.printing import print_heading, print_tables
+    from reports.machine.environment import activate, describe_environment
+    from reports.machine.progress import counted, progress_bar
+    from reports.tables.kernels import gradient_table
+    from reports.tables.terminal import print_json
+    from validation.kernels.gradient_cost import PHASES, gradient_costs
+    from validation.metrics.errors import plain
+
+    phases = PHASES if phase is None else ((phase, phase_from_words(phase).g),)
+    activate()
+    with progress_bar("bench --gradients") as progress:
+        costs = plain(gradient_costs(names or list(KERNELS), phases, progress=counted(progress)))
+    if json:
+        print_json({"environment": describe_environment(), "gradients": costs})
+        return
+    if markdown:
+        print_heading()
+    print_tables([gradient_table(costs)], as_markdown=markdown)
+    print(
+        "ns/ray, medians of the kernels alone by Dr.Jit's history; all: by foot, height, both distances, sigma_t and g."
+    )
 
 
 def _bench_diagnosis(scenes: list[str] | None, *, size: str | None, json: bool, markdown: bool) -> None:

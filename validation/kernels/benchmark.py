@@ -181,7 +181,7 @@ def measure(
         if rays == 0 and expected is not None:
             device, wall = expected.device, expected.wall
         else:
-            device, wall = _times(_frozen(function, timed, rays), rays, seconds)
+            device, wall = times_per_ray(_frozen(function, timed, rays), rays, seconds)
     except (InputError, RealtimeInputError) as reason:
         return KernelCost(name, family, size, phase, g, refused=str(reason))
     error = relative_error(J, np.asarray(truth.value), "single")
@@ -299,8 +299,18 @@ def _affordable(ns: float | None, wanted: int) -> int:
     return rays if rays * _FEWEST >= wanted else 0
 
 
-def _times(work: Callable[[], Any], rays: int, seconds: float) -> tuple[Spread | None, Spread]:
-    """Return the time of the kernels alone, where the device tells it, and of the wall clock [ns a ray]."""
+def times_per_ray(work: Callable[[], Any], rays: int, seconds: float) -> tuple[Spread | None, Spread]:
+    """Return the time of the kernels alone, where the device tells it, and of the wall clock [ns a ray].
+
+    Parameters
+    ----------
+    work
+        Evaluates its results.
+    rays
+        How many it is about.
+    seconds
+        How long to time [s].
+    """
     wall = time_repeated(work, seconds=seconds)
     times: list[float] = []
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
