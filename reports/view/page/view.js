@@ -51,9 +51,11 @@ hear.mistake = ({message}) => { $("#mistake").textContent = message; };
 
 // Pictures --------------------------------------------------------------------------------------------------------
 
+// A canvas in memory: without a graphics card, one of the card's is drawn by the processors and read back.
+const CONTEXT = {alpha: false, willReadFrequently: true};
 const put = (canvas, [width, height], pixels) => {
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, {width, height});
-  canvas.getContext("2d").putImageData(new ImageData(pixels, width, height), 0, 0);
+  canvas.getContext("2d", CONTEXT).putImageData(new ImageData(pixels, width, height), 0, 0);
 };
 const arrivals = [];
 let browser = 0, costs = null;
@@ -336,7 +338,7 @@ hear.opened = (said) => {
   $("#run").checked = said.show.run;
   const colours = said.scale.colours, canvas = $("#colours");
   canvas.width = colours.length;
-  canvas.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(colours.flatMap((c) => [...c, 255])), colours.length, 1), 0, 0);
+  canvas.getContext("2d", CONTEXT).putImageData(new ImageData(new Uint8ClampedArray(colours.flatMap((c) => [...c, 255])), colours.length, 1), 0, 0);
   $("#below").textContent = `${percent(-said.scale.ceiling)} too dark`;
   $("#above").textContent = `${percent(said.scale.ceiling)} too bright, white below ${percent(said.scale.floor)}`;
   Object.assign(camera, {started: false, sent: 0, taken: 0});
