@@ -47,6 +47,7 @@ HYPOTHESES: tuple[Hypothesis, ...] = (*LIGHTS, *MEDIUM, *CAMERA, *ENCODING)
 RIGHT, UNEXPLAINED = "right", "unexplained"
 
 _REFINED = 5
+_PAIRS = 80  # a pair takes as long as a hypothesis
 _PARTNERS = 5  # of the best explanations that pairs are made of
 _BETTER = 0.7  # what a pair must leave of the error of one alone
 _MUCH = 0.2  # what an explanation must leave of the error to be named although more is wrong
@@ -271,6 +272,7 @@ def _pairs(
             pair = _in_order(partner, other)
             if partner.kind != other.kind and not costly and pair not in wanted:
                 wanted.append(pair)
+    wanted = wanted[:_PAIRS]  # those of the best partners come first
     explanations = []
     for number, pair in enumerate(wanted):
         if progress is not None:
