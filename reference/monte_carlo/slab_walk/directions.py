@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.monte_carlo.slab_walk.scattering import turned
-from reference.monte_carlo.slab_walk.walk import Slab
+from reference.monte_carlo.slab_walk.walk import Slab, next_scattering
 
 Array = NDArray[np.float64]
 
@@ -125,13 +124,7 @@ def _walk(
                     counts = np.bincount(places[before], weights * moment, shape[0] * shape[1]).reshape(shape)
                     for row in rows:
                         sums[field, row, plane] += counts
-        flight = random.standard_exponential(x.size)
-        end = z + w * flight
-        stays = (end >= 0) & (end <= slab.tau)
-        flight, u, v, w = flight[stays], u[stays], v[stays], w[stays]
-        x, y, z = x[stays] + u * flight, y[stays] + v * flight, end[stays]
-        cosines = slab.scattering.cosines(random.random(x.size))
-        direction = turned((u, v, w), cosines, 2 * np.pi * random.random(x.size))
+        (x, y, z), direction = next_scattering(slab, (x, y, z), direction, random)
         weight *= slab.albedo
         order += 1
     return sums / photons

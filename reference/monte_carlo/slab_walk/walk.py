@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from reference.monte_carlo.slab_walk.scattering import turned
 
 Array = NDArray[np.float64]
+Vectors = tuple[Array, Array, Array]
 
 #: Weight below which light that is absorbed is followed no more: what is lost is below rounding.
 _LEAST_WEIGHT = 1e-14
@@ -98,10 +99,7 @@ def walk(slab: Slab, photons: int, random: np.random.Generator) -> Counts:
     rows: list[Array] = []
     weight = 1.0
     while x.size and weight > _LEAST_WEIGHT:
-        u, v, w = direction
-        flight = random.standard_exponential(x.size)
-        end = z + w * flight
-        rising = w < 0
+        rising = direction[2] < 0
         row = np.zeros((2 + 3 * len(slab.depths), 3))
         row[0], _ = _passages(x, y, z, direction, rising, 0.0)
         row[1], _ = _passages(x, y, z, direction, ~rising, slab.tau)
@@ -111,15 +109,35 @@ def walk(slab: Slab, photons: int, random: np.random.Generator) -> Counts:
             down, down_fluence = _passages(x, y, z, direction, ~rising & (z < depth), depth)
             row[first : first + 3] = up, down, up_fluence + down_fluence
         rows.append(row * weight)
-        stays = (end >= 0) & (end <= slab.tau)
-        flight, u, v, w = flight[stays], u[stays], v[stays], w[stays]
-        x, y, z = x[stays] + u * flight, y[stays] + v * flight, end[stays]
-        cosines = slab.scattering.cosines(random.random(x.size))
-        direction = turned((u, v, w), cosines, 2 * np.pi * random.random(x.size))
+        (x, y, z), direction = next_scattering(slab, (x, y, z), direction, random)
         weight *= slab.albedo
     counts = np.moveaxis(np.array(rows), 0, -1) / photons
     depths = counts[2:].reshape(len(slab.depths), 3, 3, counts.shape[-1])
     return Counts(counts[0], counts[1], depths[:, 0], depths[:, 1], depths[:, 2])
+
+
+def next_scattering(
+    slab: Slab, place: Vectors, direction: Vectors, random: np.random.Generator
+) -> tuple[Vectors, Vectors]:
+    """Return the photons that scatter in the slab once more: where they do, and where they go from there.
+
+    Parameters
+    ----------
+    slab
+        The slab.
+    place, direction
+        x, y and the depth z, and the components along them, (photons,) each.
+    random
+        Where numbers come from.
+    """
+    (x, y, z), (u, v, w) = place, direction
+    flight = random.standard_exponential(x.size)
+    end = z + w * flight
+    stays = (end >= 0) & (end <= slab.tau)
+    flight, u, v, w = flight[stays], u[stays], v[stays], w[stays]
+    reached = x[stays] + u * flight, y[stays] + v * flight, end[stays]
+    cosines = slab.scattering.cosines(random.random(len(flight)))
+    return reached, turned((u, v, w), cosines, 2 * np.pi * random.random(len(flight)))
 
 
 def _passages(
