@@ -2,7 +2,7 @@
 """Options that several commands have, and lists in options."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -50,15 +50,14 @@ Settings = Annotated[
         show_default=False,
     ),
 ]
-Kernel = Annotated[
-    str | None,
-    typer.Option(
-        metavar="NAME",
-        help="Airlight kernel of the method, see `airlight list kernels`.",
-        show_default=False,
-        autocompletion=completion.kernels,
-    ),
-]
+_KERNEL: Any = typer.Option(
+    metavar="NAME",
+    help="Airlight kernel of the method, see `airlight list kernels`.",
+    show_default=False,
+    autocompletion=completion.kernels,
+)
+Kernel = Annotated[str | None, _KERNEL]
+GivenKernels = Annotated[list[str] | None, _KERNEL]  #: all that were given, for `single`, which refuses a second
 Size = Annotated[
     str | None,
     typer.Option(metavar="WxH", help="Width and height in pixels; the scene's own by default.", show_default=False),

@@ -10,7 +10,17 @@ from typing import Annotated, Any
 import typer
 
 from reports.commands import completion
-from reports.commands.options import USUAL_LIMIT, Changes, Force, MethodLimit, Scene, Settings, Size, single
+from reports.commands.options import (
+    USUAL_LIMIT,
+    Changes,
+    Force,
+    GivenKernels,
+    MethodLimit,
+    Scene,
+    Settings,
+    Size,
+    single,
+)
 
 
 def render(
@@ -25,15 +35,7 @@ def render(
             autocompletion=completion.methods,
         ),
     ] = None,
-    kernel: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            help="Airlight kernel of the method, see `airlight list kernels`.",
-            show_default=False,
-            autocompletion=completion.kernels,
-        ),
-    ] = None,
+    kernel: GivenKernels = None,
     settings: Settings = None,
     change: Changes = None,
     size: Size = None,

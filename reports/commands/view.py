@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from reports.commands import completion
-from reports.commands.options import Changes, Scene, Settings, single
+from reports.commands.options import Changes, GivenKernels, Scene, Settings, single
 
 
 def view(
@@ -21,15 +21,7 @@ def view(
             autocompletion=completion.methods,
         ),
     ] = None,
-    kernel: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            help="Airlight kernel of the method, see `airlight list kernels`.",
-            show_default=False,
-            autocompletion=completion.kernels,
-        ),
-    ] = None,
+    kernel: GivenKernels = None,
     settings: Settings = None,
     change: Changes = None,
     size: Annotated[str, typer.Option(metavar="WxH", help="Width and height in pixels.")] = "640x480",
