@@ -85,7 +85,6 @@ class Fit:
     left_out: int  #: of these, how many disagree with what explains the others
     noise: float  #: median of the relative residual, as a standard deviation
     confounded: tuple[Confounded, ...]
-    correlations: Array  #: of the parameters that are known, in their order, (n, n)
 
     def to_json(self) -> dict[str, Any]:
         """Return every number by name. A parameter of three channels has lists of three."""
@@ -353,7 +352,6 @@ def _fit(
     image, residual = model.image[kept], solution.residual[kept]
     mean = float(np.abs(image).mean()) if image.size else math.nan
     spread = float(np.sum((image - image.mean(axis=0)) ** 2)) if image.size else math.nan
-    scatter = np.sqrt(np.maximum(np.diag(solution.covariance), 1e-300))
     return Fit(
         *what,
         tuple(rows),
@@ -364,7 +362,6 @@ def _fit(
         int((~kept).sum()),
         1.4826 * float(np.median(_left(solution))) if _left(solution).size else math.nan,
         tuple(_confounded(group, unknowns, inner, error, what[2]) for group in groups),
-        solution.covariance / np.outer(scatter, scatter),
     )
 
 

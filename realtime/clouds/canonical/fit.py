@@ -215,23 +215,28 @@ def _fit_collector(samples: _Samples) -> tuple[Array, Array]:
     """Return E to M by direction, and N by direction and sun."""
     collector, n = np.zeros((_DIRECTIONS, 9)), np.zeros((_DIRECTIONS, _SUNS))
     for number in range(_DIRECTIONS):
-        part = (slice(None), slice(None), slice(None), number)
-        seen = samples.share[part] > _DIM
-        if seen.sum() < 40:
-            seen = samples.T[part] > 0
-        d, mu_l, phi, sigma = (each[part][seen] for each in (samples.d, samples.mu_l, samples.phi, samples.sigma))
-        sun = np.broadcast_to(np.arange(_SUNS)[:, None], samples.d[part].shape)[seen]
-        c_x, c_y = samples.c_x[part][seen], samples.c_y[part][seen]
-        phi_l = np.arccos(mu_l)
-
-        def errors(x: Array) -> Array:
-            along, across = _collector(x[:9], x[9 + sun], d, phi, phi_l)  # noqa: B023
-            return np.concatenate([(along - c_x) / sigma, (across - c_y) / sigma])  # noqa: B023
-
-        start = np.concatenate([[1.0, -0.5, 1.0, -0.2, -0.1, -0.5, 1.0, 0.5, 0.0], np.zeros(_SUNS)])
-        fitted = least_squares(errors, start, method="trf", max_nfev=60, loss="soft_l1")
-        collector[number], n[number] = fitted.x[:9], fitted.x[9:]
+        collector[number], n[number] = _fit_direction(samples, number)
     return collector, n
+
+
+def _fit_direction(samples: _Samples, number: int) -> tuple[Array, Array]:
+    """Return E to M of one direction, and N by sun."""
+    part = (slice(None), slice(None), slice(None), number)
+    seen = samples.share[part] > _DIM
+    if seen.sum() < 40:
+        seen = samples.T[part] > 0
+    d, mu_l, phi, sigma = (each[part][seen] for each in (samples.d, samples.mu_l, samples.phi, samples.sigma))
+    sun = np.broadcast_to(np.arange(_SUNS)[:, None], samples.d[part].shape)[seen]
+    c_x, c_y = samples.c_x[part][seen], samples.c_y[part][seen]
+    phi_l = np.arccos(mu_l)
+
+    def errors(x: Array) -> Array:
+        along, across = _collector(x[:9], x[9 + sun], d, phi, phi_l)
+        return np.concatenate([(along - c_x) / sigma, (across - c_y) / sigma])
+
+    start = np.concatenate([[1.0, -0.5, 1.0, -0.2, -0.1, -0.5, 1.0, 0.5, 0.0], np.zeros(_SUNS)])
+    fitted = least_squares(errors, start, method="trf", max_nfev=60, loss="soft_l1")
+    return fitted.x[:9], fitted.x[9:]
 
 
 def _collector(x: Array, n: Array, d: Array, phi: Array, phi_l: Array) -> tuple[Array, Array]:

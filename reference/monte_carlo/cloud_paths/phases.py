@@ -5,6 +5,8 @@ Both work with down = sin^2(angle/2), which two unit vectors give without cancel
 mean 1 over the sphere, so down is distributed with the density p on [0, 1].
 """
 
+from typing import Any, Protocol
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -16,19 +18,17 @@ from analytic.phase import PhaseFunction
 Array = NDArray[np.float64]
 
 
-class WalkPhase:
+class WalkPhase(Protocol):
     """A phase function."""
 
-    def value(self, down, up):
+    def value(self, down, up) -> Any:
         """Return p at sin^2 and cos^2 of half the scattering angle."""
-        raise NotImplementedError
 
-    def down(self, sampler, active):
+    def down(self, sampler, active) -> Any:
         """Return sin^2 of half a random scattering angle."""
-        raise NotImplementedError
 
 
-class HenyeyGreenstein(WalkPhase):
+class HenyeyGreenstein:
     """Henyey and Greenstein's function, isotropic for g = 0.
 
     The distribution's inverse is down = (1 - g) (1 - u) (r + 1 - g) / (2 (1 - g + 2 g u)), r = (1 - g^2)/(1 - g + 2 g
@@ -51,7 +51,7 @@ class HenyeyGreenstein(WalkPhase):
         return dr.clip(0.5 * (1 - g) * (1 - u) * below * ((1 - g * g) * below + 1 - g), 0.0, 1.0)
 
 
-class Rayleigh(WalkPhase):
+class Rayleigh:
     """Rayleigh's function; its cosines by Cardano's formula."""
 
     def value(self, down, up):
@@ -65,7 +65,7 @@ class Rayleigh(WalkPhase):
         return dr.clip(0.5 - 0.5 * dr.copysign(root - dr.rcp(root), z), 0.0, 1.0)
 
 
-class Tabulated(WalkPhase):
+class Tabulated:
     """Values at regularly spaced cosines, linear between them.
 
     A cell is drawn by the alias method (Walker 1977; Vose 1991), a place in it by the inverse of the linear density.

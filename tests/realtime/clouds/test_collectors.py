@@ -92,7 +92,10 @@ def test_as_printed_lengths_are_those_along_the_light(variant):
     horizontal = SLAB_TURN[:, 0]
     cosine = np.cos(np.deg2rad(75.0))
     light_map = _map(horizontal * np.sin(np.deg2rad(75.0)) - normal * cosine)
-    transport = lambda number, t, d, *angles: (t + 10 * d, 0 * t, 0 * t, 0 * t + 0.5)  # noqa: E731
+
+    def transport(number, t, d, *angles):
+        return t + 10 * d, 0 * t, 0 * t, 0 * t + 0.5
+
     point = MIDDLE + 0.1 * normal
     printed, corrected = (
         float(_search(light_map, transport, point, normal, along_light=choice).radiance[0]) for choice in (True, False)
@@ -147,7 +150,10 @@ def test_no_step_is_longer_than_sigma(variant):
 
     normal = SLAB_TURN[:, 2]
     light_map = _map(-normal)
-    transport = lambda number, t, d, *angles: (t, 0 * t + 30.0, 0 * t, 0 * t + 0.25)  # noqa: E731
+
+    def transport(number, t, d, *angles):
+        return t, 0 * t + 30.0, 0 * t, 0 * t + 0.25
+
     point = MIDDLE + 0.4 * normal
     ends = [
         np.array(_search(light_map, transport, point, normal, iterations=n).collector.centre).ravel() for n in (1, 2, 3)

@@ -111,7 +111,10 @@ def test_tables_are_kept_and_damaged_ones_are_made_again(tables, tmp_path, monke
     monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path))
     made = []
     small = Grid(4, 4, 4, 5, 4, 4, 4)
-    tell = lambda share, what: made.append(share)  # noqa: E731
+
+    def tell(share, what):
+        made.append(share)
+
     first = canonical_tables(HenyeyGreensteinPhase(0.0), 0.5, grid=small, progress=tell)
     count = len(made)
     again = canonical_tables(HenyeyGreensteinPhase(0.0), 0.5, grid=small, progress=tell)
