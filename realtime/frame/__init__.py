@@ -11,7 +11,6 @@ Read in this order:
 - `layers.py`: adaptive sampling around a method, passes over its image, and the composition.
 - `incremental.py`: the next frame of an animation, and the cache of what stood still.
 - `samples.py`: several rays of each pixel, for pictures.
-- `recorded.py`: functions that Dr.Jit records once and replays.
 
 May import: `realtime.area_lights`, `realtime.bounded_media`, `realtime.errors`, `realtime.kernels`,
 `realtime.methods.interface`, `realtime.numerics`, `realtime.parameters`, `realtime.rays`, `realtime.scene`,

@@ -24,13 +24,13 @@ from realtime.errors import InputError
 from realtime.frame.frame_view import frame_view
 from realtime.frame.layers import adaptive_layers, added, composed, image_passes
 from realtime.frame.light_on_ray import check_radiance
-from realtime.frame.recorded import Frozen
 from realtime.frame.surface import Cast
 from realtime.frame.surface_stages import no_surface, surface_stages
 from realtime.kernels.preparation import prepare_kernel, with_tables
 from realtime.methods.interface.layers import History
 from realtime.methods.interface.method import Method, Preparation, method_parameters
 from realtime.numerics.array_types import Metres, PerRay
+from realtime.numerics.recorded import Frozen
 from realtime.scene.camera import tiled_pixels
 from realtime.scene.light_points import with_light_points
 from realtime.scene.lights import Light

@@ -30,7 +30,6 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.clouds.bounds.crossings import next_crossing, optical_depths
 from realtime.clouds.bounds.surfaces import CloudSurfaces, cloud_surfaces
 from realtime.clouds.canonical.fit import fit_on_device, fit_tables
 from realtime.clouds.canonical.look_up import on_device
@@ -43,13 +42,14 @@ from realtime.clouds.collectors.transport_grid import transport_grid
 from realtime.clouds.light_maps.pyramid import LightMap, length_along_light, light_map, maps_memory
 from realtime.clouds.order_layers import OPACITY, order_layer
 from realtime.clouds.single_scattering.behind import light_on_surfaces, sky_behind
-from realtime.clouds.single_scattering.march import Beam, CloudRays, exact_leg, scattered
+from realtime.clouds.single_scattering.march import Beam, cloud_rays, exact_leg, scattered
 from realtime.clouds.single_scattering.opacity import opacity_of, printed_opacity
 from realtime.memory import check_memory
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.method import ErrorCause
 from realtime.methods.interface.view import View
 from realtime.numerics.array_types import types_of
+from realtime.numerics.recorded import Frozen
 from realtime.parameters import Parameters, parameter
 from realtime.scene.closed_mesh import boundary_scene
 from realtime.scene.medium import Clouds
@@ -154,12 +154,12 @@ def prepare_collectors(scene: Scene, parameters: CollectorParameters) -> Callabl
     fillings, left = _fillings(scene, parameters)
     surfaces = cloud_surfaces(scene)
     bodies = [boundary_scene((shape,)) for shape in scene.boundaries]
+    cast = Frozen(lambda bodies, lights: tuple(light_map(bodies, light, parameters.map) for light in lights))
 
-    def cast(scene: Scene) -> CloudState:
-        maps = tuple(light_map(bodies, light, parameters.map) for light in scene.lights)
-        return CloudState(surfaces, maps, fillings, left)
+    def state(scene: Scene) -> CloudState:
+        return CloudState(surfaces, cast(bodies, scene.lights), fillings, left)
 
-    return cast
+    return state
 
 
 def _fillings(scene: Scene, parameters: CollectorParameters) -> tuple[tuple[Filling, ...], tuple[Any, ...]]:
@@ -211,17 +211,17 @@ def cloud_collectors(view: View, state: CloudState, lists, *, kernel, parameters
         Values of the parameters.
     """
     assert view.medium.clouds is not None
-    Float, Color = type(view.distance), type(view.medium.albedo)
+    Color = type(view.medium.albedo)
     clouds = _as_dense(view.medium.clouds, parameters)
     thin = _without_peak(clouds, state)
     both = replace(clouds, sigma_t=(*clouds.sigma_t, *thin.sigma_t))
-    depths = optical_depths(state.surfaces, both, view.origin, view.direction, view.distance)
+    rays = cloud_rays(state.surfaces, both, view.origin, view.direction, view.distance)
     channels = len(clouds.sigma_t)
-    rays = CloudRays(state.surfaces, clouds, view.origin, view.direction, view.distance, depths[:channels])
-    thin_rays = replace(rays, clouds=thin, depths=depths[channels:])
+    thin_rays = replace(rays, clouds=thin, depths=rays.depths[channels:])
+    rays = replace(rays, clouds=clouds, depths=rays.depths[:channels])
     beams = [_beam(view, state, thin, number, parameters) for number in range(len(view.lights))]
     once = scattered(thin_rays, beams, steps=parameters.steps, printed=parameters.single == "printed")
-    first = next_crossing(state.surfaces, view.origin, view.direction, dr.zeros(Float, dr.width(view.direction)))
+    first = rays.first
     begin = dr.select(first.leaves, 0, first.distance)
     there = dr.isfinite(begin) & (begin < view.distance)
     entry = _Entry(view.origin + view.direction * dr.select(there, begin, 0), first.cloud, there)

@@ -8,7 +8,8 @@ Read in this order:
 - `error_free.py`: sums and products that keep their rounding errors;
 - `diamond_angle.py`: an azimuth without trigonometry;
 - `fast_exp.py`: exponentials for bounded arguments;
-- `gauss_legendre.py`: nodes and weights as constants of recorded kernels.
+- `gauss_legendre.py`: nodes and weights as constants of recorded kernels;
+- `recorded.py`: functions that Dr.Jit records once and replays.
 
 May import: `realtime.errors`.
 """

@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.frame.recorded import Frozen
+from realtime.numerics.recorded import Frozen
 from reports.plotting.colour_maps import NOT_FINITE
 from reports.plotting.pictures import tone_mapped
 

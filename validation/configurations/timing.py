@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.frame.incremental import FrameCache, next_frame
-from realtime.frame.recorded import Frozen
 from realtime.frame.renderer import (
     FrameRenderer,
     run_cast_and_shade,
@@ -26,6 +25,7 @@ from realtime.frame.renderer import (
     run_stages,
 )
 from realtime.frame.surface import cast_rays
+from realtime.numerics.recorded import Frozen
 from realtime.scene.animate import Objects, read_objects, turned_objects
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import Scene

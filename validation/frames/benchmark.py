@@ -9,9 +9,9 @@ from typing import Any
 
 from analytic.errors import InputError as TruthError
 from realtime.errors import InputError
-from realtime.frame.recorded import Frozen
 from realtime.frame.renderer import Frame, render_frame
 from realtime.methods.registry import find_method
+from realtime.numerics.recorded import Frozen
 from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import Scene, read_scene
 from reference.quadrature.ray_values import TruthImage

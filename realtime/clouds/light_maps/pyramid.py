@@ -32,7 +32,7 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.clouds.light_maps.surfaces import LitSurfaces, cast_surfaces
-from realtime.numerics.array_types import Metres, PerRay, bytes_of, four_numbers
+from realtime.numerics.array_types import Metres, PerRay, bytes_of, four_numbers, packed
 from realtime.scene.lights import Light
 from realtime.shadow_maps.projection import Projection, light_projection
 
@@ -67,14 +67,6 @@ class LightMap:
 
 
 @dataclass(frozen=True)
-class _Level:
-    """One level, row by row."""
-
-    heights: Any  #: A, A front, A back, A u
-    normals: Any  #: A n, A v
-
-
-@dataclass(frozen=True)
 class FilteredSurface:
     """The lit surface near some points, filtered."""
 
@@ -104,10 +96,7 @@ def filtered_map(surfaces: Sequence[LitSurfaces], light: Light) -> LightMap:
     texels = _texels_before(size, size.bit_length())
     heights, normals = (dr.empty(Float, 4 * texels * len(surfaces)) for _ in range(2))
     for number, cloud in enumerate(surfaces):
-        for finer, level in enumerate(_filled_levels(cloud, projection.parallel_axis)):
-            place = dr.arange(mi.UInt32, (size >> finer) ** 2) + (_texels_before(size, finer) + number * texels)
-            dr.scatter(heights, level.heights, place)
-            dr.scatter(normals, level.normals, place)
+        _add_levels((heights, normals), cloud, projection.parallel_axis, number * texels)
     assert projection.basis is not None
     across, up, _ = projection.basis
     texel = (2.0 / size) * dr.sqrt(dr.norm(across) * dr.norm(up))
@@ -115,32 +104,61 @@ def filtered_map(surfaces: Sequence[LitSurfaces], light: Light) -> LightMap:
     return LightMap(size, heights, normals, texel, light.position, projection)
 
 
-def _filled_levels(surfaces: LitSurfaces, axis: Any) -> list[_Level]:
-    """Return the levels of one cloud, without holes."""
-    Float = type(surfaces.front)
-    Four, size = four_numbers(Float), surfaces.size
-    texels = dr.arange(mi.UInt32, size * size)
-    row = texels // size
-    u, v = (dr.fma(Float(texel), 2.0 / size, 1.0 / size - 1) for texel in (texels - row * size, row))
-    cover = dr.select(surfaces.there, Float(1), 0)
-    levels = [
-        _Level(
-            Four(cover, surfaces.front, surfaces.back, cover * u),
-            Four(surfaces.normal.x, surfaces.normal.y, surfaces.normal.z, cover * v),
-        )
-    ]
-    while len(levels) < size.bit_length():
+def _add_levels(tables: tuple[Any, Any], surfaces: LitSurfaces, axis: Any, before: int) -> None:
+    """Write the levels of one cloud, without holes, behind so many texels of others.
+
+    The finest level is most of the memory: it goes where it belongs at once, and its holes are written again. Dr.Jit
+    would copy a table that the same kernel reads and writes, so that its holes are known beside it.
+    """
+    Float, size = type(tables[0]), surfaces.size
+    Four = four_numbers(Float)
+    for table, values in zip(tables, _finest(surfaces), strict=True):
+        dr.scatter(table, values, surfaces.place + before)
+    there = dr.empty(type(surfaces.there), size * size)
+    dr.scatter(there, surfaces.there, surfaces.place)
+    dr.eval(tables, there)
+    levels = [tuple(packed(_means(table, size // 2, before)) for table in tables)]
+    while len(levels) < size.bit_length() - 1:
         dr.eval(levels[-1])
-        side = size >> len(levels)
-        levels.append(_Level(*(_means(part, side) for part in (levels[-1].heights, levels[-1].normals))))
-    dark = _Level(Four(1, 0, 0, 0), Four(-axis.x, -axis.y, -axis.z, 0))
-    filled = [_filled(levels[-1], dark)]
-    for number in range(len(levels) - 2, -1, -1):
-        dr.eval(filled[0])
-        parent = _parents(size >> number)
-        coarser = _Level(*(dr.gather(Four, part, parent) for part in (filled[0].heights, filled[0].normals)))
-        filled.insert(0, _filled(levels[number], coarser))
-    return filled
+        levels.append(tuple(packed(_means(table, size >> (len(levels) + 1))) for table in levels[-1]))
+    coarser = packed(Four(Float(1), 0, 0, 0)), packed(Four(-axis.x, -axis.y, -axis.z, 0))
+    for number in range(len(levels), 0, -1):
+        dr.eval(levels[number - 1], coarser)
+        side = size >> number
+        texel = dr.arange(mi.UInt32, side * side)
+        own = tuple(dr.gather(Four, part, texel) for part in levels[number - 1])
+        hole = own[0].x == 0
+        values = [dr.select(hole, *pair) for pair in zip(_nearest(coarser, side, hole), own, strict=True)]
+        for table, value in zip(tables, values, strict=True):
+            dr.scatter(table, value, texel + (before + _texels_before(size, number)))
+        coarser = tuple(packed(value) for value in values)
+    dr.eval(coarser, tables)
+    for table, value in zip(tables, _nearest(coarser, size, ~there), strict=True):
+        dr.scatter(table, value, dr.arange(mi.UInt32, size * size) + before, ~there)
+    dr.eval(tables)
+
+
+def _finest(surfaces: LitSurfaces) -> tuple[Any, Any]:
+    """Return heights and normals of the finest level, with holes."""
+    Float, size, normal = type(surfaces.front), surfaces.size, surfaces.normal
+    Four = four_numbers(Float)
+    row = surfaces.place // size
+    u, v = (dr.fma(Float(texel), 2.0 / size, 1.0 / size - 1) for texel in (surfaces.place - row * size, row))
+    cover = dr.select(surfaces.there, Float(1), 0)
+    return (
+        Four(cover, surfaces.front, surfaces.back, cover * u),
+        Four(normal.x, normal.y, normal.z, cover * v),
+    )
+
+
+def _nearest(coarser: tuple[Any, Any], side: int, hole: Any) -> list[Any]:
+    """Return what holes of a level with so many texels on a side hold: what the next coarser level has there."""
+    Four, texel = four_numbers(type(coarser[0])), dr.arange(mi.UInt32, side * side)
+    row = texel // side
+    parent = (row // 2) * (side // 2) + (texel - row * side) // 2
+    values = [dr.gather(Four, part, parent, hole) for part in coarser]
+    weight = HOLE / values[0].x
+    return [value * weight for value in values]
 
 
 def maps_memory(Float: Any, size: int) -> int:
@@ -235,29 +253,12 @@ def _texels_before(size: int, level: Any) -> Any:
     return (size * size - side * side) // 3 * 4
 
 
-def _means(part: Any, side: int) -> Any:
-    """Return the means over squares of 2 x 2, (side, side)."""
-    texel = dr.arange(mi.UInt32, side * side)
+def _means(table: Any, side: int, before: int = 0) -> Any:
+    """Return the means over squares of 2 x 2, (side, side), of a level that lies behind so many texels of a table."""
+    Four, texel = four_numbers(type(table)), dr.arange(mi.UInt32, side * side)
     row = texel // side
-    first = 4 * row * side + 2 * (texel - row * side)
-    total = type(part)(0)
+    first = 4 * row * side + 2 * (texel - row * side) + before
+    total = Four(0)
     for place in (first, first + 1, first + 2 * side, first + 2 * side + 1):
-        total += dr.gather(type(part), part, place)
+        total += dr.gather(Four, table, place)
     return 0.25 * total
-
-
-def _parents(side: int) -> PerRay:
-    """Return the number of the coarser texel that holds each texel of a level."""
-    texel = dr.arange(mi.UInt32, side * side)
-    row = texel // side
-    return (row // 2) * (side // 2) + (texel - row * side) // 2
-
-
-def _filled(level: _Level, coarser: _Level) -> _Level:
-    """Return a level whose texels without cloud hold what the coarser one has there."""
-    hole = level.heights.x == 0
-    weight = HOLE / coarser.heights.x
-    return _Level(
-        dr.select(hole, coarser.heights * weight, level.heights),
-        dr.select(hole, coarser.normals * weight, level.normals),
-    )

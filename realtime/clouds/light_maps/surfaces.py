@@ -20,9 +20,10 @@ from realtime.shadow_maps.shadow_map import check_size, tiled_corners
 
 @dataclass(frozen=True)
 class LitSurfaces:
-    """What rays along the light meet of a cloud, row by row."""
+    """What rays along the light meet of a cloud, in squares of 4 x 4 texels."""
 
     size: int  #: texels on a side
+    place: Any  #: number of the texel of each ray, row by row
     there: Any  #: whether the ray meets the cloud
     front: Any  #: height of the first surface, 0 where there is none [m]
     back: Any  #: height of the last surface, 0 where there is none [m]
@@ -30,7 +31,7 @@ class LitSurfaces:
 
 
 def cast_surfaces(cloud, light: Light, size: int) -> LitSurfaces:
-    """Cast both rays of every texel.
+    """Cast both rays of every texel; nothing is evaluated, so that what reads it is computed with it.
 
     Parameters
     ----------
@@ -55,16 +56,10 @@ def cast_surfaces(cloud, light: Light, size: int) -> LitSurfaces:
     first = mi.Ray3f(mi.Point3f(start), mi.Vector3f(axis))
     last = mi.Ray3f(mi.Point3f(start + axis * depth), mi.Vector3f(-axis))
     hit = cloud.ray_intersect(first, mi.RayFlags.Minimal, True)
-    behind = cloud.ray_intersect_preliminary(last, coherent=True)
+    behind = cloud.ray_intersect_preliminary(last, coherent=True, active=hit.is_valid())
     # At a silhouette one of both rays may slip past: there is no cloud of any thickness.
     there = hit.is_valid() & behind.is_valid()
     front, back = dr.select(there, Float(depth) - Float(hit.t), 0), dr.select(there, Float(behind.t), 0)
     along = dr.dot(hit.n, mi.Vector3f(axis))
     normal = Vector(dr.select(there, dr.select(along > 0, -hit.n, hit.n), 0))
-    surfaces = LitSurfaces(size, *(dr.empty(type(value), size * size) for value in (there, front, back, normal)))
-    place = row * size + column
-    for array, value in ((surfaces.there, there), (surfaces.front, front), (surfaces.back, back)):
-        dr.scatter(array, value, place)
-    dr.scatter(surfaces.normal, normal, place)
-    dr.eval(surfaces)
-    return surfaces
+    return LitSurfaces(size, row * size + column, there, front, back, normal)

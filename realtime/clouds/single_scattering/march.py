@@ -25,12 +25,14 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.bounds.crossings import next_crossing, optical_depths
+from realtime.clouds.bounds.crossings import Crossing, optical_depths
+from realtime.clouds.bounds.stretches import Stretches, first_stretches, next_stretches
 from realtime.clouds.bounds.surfaces import CloudSurfaces
-from realtime.clouds.single_scattering.spacing import node_depth
+from realtime.clouds.single_scattering.spacing import node_depth, node_share
 from realtime.scene.lights import Light
 from realtime.scene.medium import Clouds
 
+_BETWEEN = -1.0  # in place of a distance, between two stretches
 _SERIES = 0.02  # below it (1 - exp(-d))/d is summed up: d^4/120 is left, 1e-9
 
 
@@ -44,6 +46,8 @@ class CloudRays:
     direction: Any  #: unit directions
     end: Any  #: distance to the visible surface, infinite where there is none [m]
     depths: tuple[Any, ...]  #: optical depth up to there, by channel [1]
+    first: Crossing
+    stretches: Stretches  #: the first ones
 
 
 @dataclass(frozen=True)
@@ -60,13 +64,13 @@ class Beam:
 
 
 def cloud_rays(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end) -> CloudRays:
-    """Return rays with their depths; arguments as of `realtime.clouds.bounds.crossings.optical_depths`.
+    """Return rays with their depths; arguments as of `realtime.clouds.bounds.stretches.first_stretches`.
 
     `surfaces` and `clouds` are the boundaries and what fills them, `origin` [m] and unit `direction` the rays, `end`
     may be infinite [m].
     """
-    depths = optical_depths(surfaces, clouds, origin, direction, end)
-    return CloudRays(surfaces, clouds, origin, direction, end, depths)
+    first, stretches, depths = first_stretches(surfaces, clouds, origin, direction, end)
+    return CloudRays(surfaces, clouds, origin, direction, end, depths, first, stretches)
 
 
 def exact_leg(surfaces: CloudSurfaces, clouds: Clouds, light: Light) -> Callable[[Any, Any], tuple[Any, ...]]:
@@ -110,68 +114,75 @@ def scattered(
         )
         return legs, shares
 
-    def body(x, edge, number, cloud, depths, legs, shares, sums, going):
-        # Where no stretch is open, look for the next crossing: its far end if the ray is in a cloud, else its start.
-        looks = going & (x >= edge)
-        crossing = next_crossing(rays.surfaces, rays.origin, rays.direction, x, looks)
-        opens = looks & crossing.leaves
-        jumps = looks & ~crossing.leaves
-        edge = dr.select(opens, dr.minimum(crossing.distance, rays.end), edge)
-        cloud = dr.select(opens, crossing.cloud, cloud)
-        steps_on = going & ~looks
-        sigma_t = tuple(dr.gather(Float, own, cloud, opens | steps_on) for own in clouds.sigma_t)
-        mean_sigma, mean_before = sum(sigma_t) / channels, sum(depths) / channels
-        ahead = (node_depth(number, steps, mean_depth) - mean_before) / mean_sigma
-        reach = dr.select(mean_sigma > 0, dr.maximum(ahead, 0), dr.inf)
-        to_edge = x + reach >= edge
-        target = dr.select(to_edge, edge, x + reach)
-        length = dr.select(steps_on, target - x, 0)
-        x = dr.select(jumps, crossing.distance, dr.select(steps_on, target, x))
-        point = rays.origin + rays.direction * dr.select(dr.isfinite(x), x, 0)
-        after = tuple(dr.fma(sigma, length, depth) for sigma, depth in zip(sigma_t, depths))
-        asks = opens | steps_on
-        new_legs, new_shares = legs_at(point, asks)
-        albedo = dr.gather(Color, clouds.albedo, cloud, steps_on)
-        phase = dr.gather(mi.UInt32, clouds.phase, cloud, steps_on) if several else None
-        sums = tuple(
-            tuple(
-                total + dr.select(steps_on, term * factor, 0)
-                for total, term, factor in zip(
-                    own,
-                    _terms(beam, sigma_t, length, (depths, after), (was, now), printed=printed),
-                    [albedo * share * (_chosen(values, phase) if several else 1) for values in beam.phases],
+    share = node_share(mean_depth, steps)
+
+    def march(stretches, *before):
+        """Return the state at the end of the stretches that are kept."""
+
+        def body(place, x, number, depths, legs, shares, sums, going):
+            begin, edge, cloud = stretches.chosen(place)
+            opens = x < 0
+            steps_on = ~opens
+            sigma_t = tuple(dr.gather(Float, own, cloud, going) for own in clouds.sigma_t)
+            mean_sigma, mean_before = sum(sigma_t) / channels, sum(depths) / channels
+            ahead = (node_depth(number, steps, share) - mean_before) / mean_sigma
+            reach = dr.select(mean_sigma > 0, dr.maximum(ahead, 0), dr.inf)
+            to_edge = x + reach >= edge
+            target = dr.select(opens, begin, dr.select(to_edge, edge, x + reach))
+            length = dr.select(opens, 0, target - x)
+            after = tuple(dr.fma(sigma, length, depth) for sigma, depth in zip(sigma_t, depths))
+            new_legs, new_shares = legs_at(rays.origin + rays.direction * target, going)
+            albedo = dr.gather(Color, clouds.albedo, cloud, going)
+            phase = dr.gather(mi.UInt32, clouds.phase, cloud, going) if several else None
+            sums = tuple(
+                tuple(
+                    total + dr.select(steps_on, term * factor, 0)
+                    for total, term, factor in zip(
+                        own,
+                        _terms(beam, sigma_t, length, (depths, after), (was, now), printed=printed),
+                        [albedo * lit * (_chosen(values, phase) if several else 1) for values in beam.phases],
+                        strict=True,
+                    )
+                )
+                for beam, own, was, now, lit in zip(
+                    beams,
+                    sums,
+                    legs,
+                    new_legs,
+                    [0.5 * (old + new) for old, new in zip(shares, new_shares)],
                     strict=True,
                 )
             )
-            for beam, own, was, now, share in zip(
-                beams, sums, legs, new_legs, [0.5 * (old + new) for old, new in zip(shares, new_shares)], strict=True
-            )
-        )
-        legs = tuple(
-            tuple(dr.select(asks, new, old) for new, old in zip(*pair)) for pair in zip(new_legs, legs, strict=True)
-        )
-        shares = tuple(dr.select(asks, new, old) for new, old in zip(new_shares, shares, strict=True))
-        number = dr.select(steps_on & ~to_edge, number + 1, number)
-        going &= x < rays.end
-        return x, edge, number, cloud, after, legs, shares, sums, going
+            closes = steps_on & to_edge
+            number = dr.select(steps_on & ~to_edge, number + 1, number)
+            place = dr.select(closes, place + 1, place)
+            x = dr.select(closes, _BETWEEN, target)
+            going = going & (place < stretches.count)  # `&=` would change the mask of the loop around this one
+            return place, x, number, after, new_legs, new_shares, sums, going
+
+        return dr.while_loop(state=before, cond=lambda *state: state[-1], body=body)
+
+    def more(fields, number, depths, legs, shares, sums, going):
+        stretches = Stretches(*fields)
+        start = dr.zeros(mi.UInt32, lanes), dr.full(Float, _BETWEEN, lanes)
+        _, _, *state, _ = march(stretches, *start, number, depths, legs, shares, sums, going)
+        stretches = next_stretches(rays.surfaces, rays.origin, rays.direction, rays.end, stretches)
+        return stretches.fields, *state, going & (stretches.count > 0)
 
     def zeros(count: int):
         return tuple(dr.zeros(Float, lanes) for _ in range(count))
 
-    zero = dr.zeros(Float, lanes)
     sums = tuple(tuple(dr.zeros(Color, lanes) for _ in beam.scales) for beam in beams)
     state = (
-        +zero,
-        +zero,
+        rays.stretches.fields,
         dr.full(mi.UInt32, 1, lanes),
-        dr.zeros(mi.UInt32, lanes),
         zeros(channels),
         tuple(zeros(channels) for _ in beams),
         tuple(dr.full(Float, 1, lanes) for _ in beams),
         sums,
-        (mean_depth > 0) & (zero < rays.end),
+        (mean_depth > 0) & (rays.stretches.count > 0),
     )
-    *_, sums, _ = dr.while_loop(state=state, cond=lambda *state: state[-1], body=body)
+    *_, sums, _ = dr.while_loop(state=state, cond=lambda *state: state[-1], body=more)
     return tuple(
         tuple(
             total * beam.irradiance * (0.25 * dr.inv_pi * (1 if several else values[0]))

@@ -15,9 +15,12 @@ SPREAD = 2.0  #: s
 _LEAST = 1e-30  # of the logarithm's argument: the last node is the end of the ray
 
 
-def node_depth(number, steps: int, total):
-    """Return tau_k of a `number` k [1], of `steps` N in a ray of the depth `total`; infinite from the last one on."""
-    Float = type(total)
-    share = (1 - dr.exp(-total / SPREAD)) / steps
-    depth = -SPREAD * dr.log(dr.maximum(1 - Float(number) * share, _LEAST))
+def node_share(total, steps: int):
+    """Return (1 - exp(-T/s))/N of rays of the depth `total` in so many `steps`."""
+    return (1 - dr.exp(-total / SPREAD)) / steps
+
+
+def node_depth(number, steps: int, share):
+    """Return tau_k of a `number` k [1], of `steps` N with their `share`; infinite from the last one on."""
+    depth = -SPREAD * dr.log(dr.maximum(1 - type(share)(number) * share, _LEAST))
     return dr.select(number >= steps, dr.inf, depth)

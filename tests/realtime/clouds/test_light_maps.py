@@ -62,9 +62,10 @@ def test_levels_are_means_over_the_cloud_alone(variant):
     from realtime.clouds.light_maps.pyramid import filtered_surface
 
     surfaces, light_map = _cube_map()
-    there = np.array(surfaces.there).reshape(SIZE, SIZE)
-    front, back = (np.array(value).reshape(SIZE, SIZE) for value in (surfaces.front, surfaces.back))
-    normal = np.array(surfaces.normal).T.reshape(SIZE, SIZE, 3)
+    in_rows = np.argsort(np.array(surfaces.place))
+    parts = (np.array(value)[in_rows] for value in (surfaces.there, surfaces.front, surfaces.back))
+    there, front, back = (part.reshape(SIZE, SIZE) for part in parts)
+    normal = np.array(surfaces.normal).T[in_rows].reshape(SIZE, SIZE, 3)
     level, checked = 3, 0
     side = 2**level
     basis = [np.array(vector, dtype=float).ravel() for vector in light_map.projection.basis]

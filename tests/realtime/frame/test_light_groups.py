@@ -9,12 +9,12 @@ import pytest
 
 from realtime.area_lights.shape import turned_area_light
 from realtime.frame.incremental import next_frame
-from realtime.frame.recorded import Frozen
 from realtime.frame.renderer import frame_renderer, image_frame, light_groups, render_frame, run_stages
 from realtime.kernels.registry import KERNELS
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.method import Method
 from realtime.methods.registry import METHODS
+from realtime.numerics.recorded import Frozen
 from realtime.scene.animate import with_area_lights
 from realtime.scene.light_points import with_light_points
 from realtime.scene.read_scene import read_scene

@@ -174,11 +174,11 @@ def test_filters_are_recorded_once(variant):
     import drjit as dr
     import mitsuba as mi
 
-    from realtime.frame.recorded import Frozen
     from realtime.image_filters.bilateral import bilateral
     from realtime.image_filters.guides import airlight_guide
     from realtime.image_filters.raster import Raster
     from realtime.numerics.aligned import aligned_array
+    from realtime.numerics.recorded import Frozen
 
     raster = Raster(WIDTH, HEIGHT)
     function = Frozen(lambda lanes: bilateral(lanes, raster, hd=1.2, guides=(airlight_guide(lanes, 0.5),)))

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from realtime.frame.recorded import Frozen
 from realtime.frame.renderer import frame_renderer, render_frame
 from realtime.methods.registry import METHODS, Method, find_method
+from realtime.numerics.recorded import Frozen
 from tests.helpers.scenes import tiny_scene
 
 SOURCE = """

@@ -9,7 +9,7 @@ import pytest
 from realtime.clouds.bounds.surfaces import cloud_surfaces
 from realtime.clouds.single_scattering.march import Beam, _step, cloud_rays, exact_leg, scattered
 from realtime.clouds.single_scattering.opacity import opacity, opacity_of, printed_opacity
-from realtime.clouds.single_scattering.spacing import node_depth
+from realtime.clouds.single_scattering.spacing import node_depth, node_share
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import SUN, cloud, crossings, length_inside, loaded, ring
 from validation.scenes.parts import placed
@@ -99,6 +99,24 @@ def test_order_one_with_64_steps(few):
     assert np.sqrt(np.mean((radiance - expected) ** 2)) < 0.005 * expected.mean()
 
 
+def test_stretches_that_are_not_kept_are_found_again(monkeypatch):
+    """Rays cross the ring twice: with one kept stretch the other is looked for after the first was marched."""
+    from realtime.clouds.bounds import stretches
+
+    random = np.random.default_rng(5)
+    ends = random.uniform(-130, 130, (2, 300, 3))
+    direction = ends[1] - ends[0]
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    origin = ends[0] - 500 * direction
+    assert np.count_nonzero([len(crossings(ring(), *ray)[0]) > 2 for ray in zip(origin, direction)]) > 20
+    scene = loaded(sun=SUN, ring=cloud("ring", ring(), COLOURED))
+    images = []
+    for kept in (1, 9):
+        monkeypatch.setattr(stretches, "KEPT", kept)
+        images += marched(scene, origin, direction, steps=8)
+    np.testing.assert_array_equal(*images)
+
+
 def test_octaves_have_their_own_legs(few):
     origin, direction, expected = few
     scene = loaded(sun=SUN, ring=cloud("ring", ring(), COLOURED))
@@ -169,7 +187,7 @@ def test_steps_against_the_integral_for_all_signs_of_the_leg():
 
 def test_nodes_end_where_the_ray_does():
     total = mi.Float([1e-3, 1.0, 50.0])
-    nodes = np.array([np.array(node_depth(mi.UInt32(number), 8, total)) for number in range(1, 9)])
+    nodes = np.array([np.array(node_depth(mi.UInt32(number), 8, node_share(total, 8))) for number in range(1, 9)])
     assert np.all(np.diff(nodes[:-1], axis=0) > 0)
     assert np.all(nodes[:-1] < np.array(total))
     assert np.all(np.isinf(nodes[-1]))

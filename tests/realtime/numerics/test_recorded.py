@@ -18,7 +18,7 @@ def test_nothing_is_collected_during_a_call(variant, collecting):
     import drjit as dr
     import mitsuba as mi
 
-    from realtime.frame.recorded import Frozen
+    from realtime.numerics.recorded import Frozen
 
     seen = []
 
@@ -37,7 +37,7 @@ def test_nothing_is_collected_during_a_call(variant, collecting):
 def test_an_error_lets_the_collector_go_on(variant, collecting):
     import mitsuba as mi
 
-    from realtime.frame.recorded import Frozen
+    from realtime.numerics.recorded import Frozen
 
     def refused(x):
         raise ValueError("no")
@@ -49,7 +49,7 @@ def test_an_error_lets_the_collector_go_on(variant, collecting):
 def test_a_collector_that_was_off_stays_off(variant):
     import mitsuba as mi
 
-    from realtime.frame.recorded import Frozen
+    from realtime.numerics.recorded import Frozen
 
     gc.disable()
     try:
