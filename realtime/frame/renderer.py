@@ -349,18 +349,18 @@ class GroupPreparation:
 
 def kept_groups(state: Any) -> int:
     """Return of how many groups of lights states like this are kept: not more than fill the room for them."""
-    return min(_MOST_KEPT, max(1, _ROOM // max(_bytes_in(state), 1)))
+    return min(_MOST_KEPT, max(1, _ROOM // max(bytes_in(state), 1)))
 
 
-def _bytes_in(value: Any) -> int:
+def bytes_in(value: Any) -> int:
     """Return the size of the Dr.Jit arrays in a state [bytes]."""
     if isinstance(value, tuple | list):
-        return sum(_bytes_in(item) for item in value)
+        return sum(bytes_in(item) for item in value)
     if is_dataclass(value):
-        return sum(_bytes_in(item) for item in vars(value).values())
+        return sum(bytes_in(item) for item in vars(value).values())
     if not dr.is_array_v(value):
         return 0
-    return sum(map(_bytes_in, value)) if dr.depth_v(value) > 1 else dr.width(value) * dr.itemsize_v(value)
+    return sum(map(bytes_in, value)) if dr.depth_v(value) > 1 else dr.width(value) * dr.itemsize_v(value)
 
 
 def light_groups(renderer: FrameRenderer) -> tuple[FrameRenderer, ...]:

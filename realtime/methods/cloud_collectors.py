@@ -36,13 +36,13 @@ from realtime.clouds.canonical.look_up import on_device
 from realtime.clouds.canonical.scene_phase import share_of_peak, slab_phase
 from realtime.clouds.canonical.sets import SETS
 from realtime.clouds.canonical.tables import canonical_tables
-from realtime.clouds.collectors.orders import light_of_orders
+from realtime.clouds.collectors.orders import OrdersLight, light_of_orders
 from realtime.clouds.collectors.search import Search
 from realtime.clouds.collectors.transport_grid import transport_grid
 from realtime.clouds.light_maps.pyramid import LightMap, length_along_light, light_map, maps_memory
 from realtime.clouds.order_layers import OPACITY, order_layer
 from realtime.clouds.single_scattering.behind import light_on_surfaces, sky_behind
-from realtime.clouds.single_scattering.march import Beam, cloud_rays, exact_leg, scattered
+from realtime.clouds.single_scattering.march import Beam, CloudRays, cloud_rays, exact_leg, scattered
 from realtime.clouds.single_scattering.opacity import opacity_of, printed_opacity
 from realtime.memory import check_memory
 from realtime.methods.interface.layers import Layers
@@ -210,41 +210,95 @@ def cloud_collectors(view: View, state: CloudState, lists, *, kernel, parameters
     parameters
         Values of the parameters.
     """
-    assert view.medium.clouds is not None
     Color = type(view.medium.albedo)
+    rays, thin_rays = _rays(view, state, parameters)
+    by_set, kept = [_scattered_once(view, state, thin_rays, parameters), *(Color(0) for _ in SETS)], []
+    entry = _entry(view, rays)
+    for number, (light, sun) in enumerate(zip(view.lights, state.maps)):
+        last = view.carried[number] if view.carried is not None else None
+        own = sun.of_cloud(entry.cloud)
+        found = _many_times(view, state, thin_rays.clouds, entry, own, last=last, parameters=parameters)
+        by_set[1:] = [sum_ + light.intensity * part for sum_, part in zip(by_set[1:], found.by_set)]
+        kept.append(found.collectors)
+    opacity = _opacity(view, state, rays, parameters)
+    layers = _with_opacity(view, state, rays, sum(by_set), opacity)
+    names = (order_layer(first) for first in (1, *(int(first) for first, _ in SETS)))
+    extra = dict(zip(names, by_set)) | {OPACITY: opacity} if view.extra_layers else None
+    return replace(layers, extra=extra, carried=tuple(kept) if carries(parameters) else None)
+
+
+def scattered_once(view: View, state: CloudState, lists, *, kernel, parameters: CollectorParameters) -> Layers:
+    """Return what `cloud_collectors` does without the sets of orders: order 1, opacity and what is seen behind it.
+
+    With this in its place a method's frame tells what that part of a frame costs.
+    """
+    rays, thin_rays = _rays(view, state, parameters)
+    once = _scattered_once(view, state, thin_rays, parameters)
+    return _with_opacity(view, state, rays, once, _opacity(view, state, rays, parameters))
+
+
+def missed_collectors(view: View, state: CloudState, lists, *, kernel, parameters: CollectorParameters) -> Layers:
+    """Return how far the searches of a frame ended from their fixed points, in place of light.
+
+    The layers `airlight_2` to `airlight_31_inf` hold the largest distance over the suns, channels and fillings [sigma]
+    and `airlight` is 1 where there is a cloud; collectors go on as they do in frames.
+    """
+    Color, Float = type(view.medium.albedo), type(view.distance)
+    rays, thin_rays = _rays(view, state, parameters)
+    entry = _entry(view, rays)
+    missed, kept = [Float(0) for _ in SETS], []
+    for number, sun in enumerate(state.maps):
+        last = view.carried[number] if view.carried is not None else None
+        own = sun.of_cloud(entry.cloud)
+        found = _many_times(view, state, thin_rays.clouds, entry, own, last=last, parameters=parameters)
+        missed = [dr.maximum(*pair) for pair in zip(missed, found.missed, strict=True)]
+        kept.append(found.collectors)
+    extra = {order_layer(int(first)): Color(value) for (first, _), value in zip(SETS, missed, strict=True)}
+    there = Color(dr.select(entry.there, Float(1), 0))
+    return Layers(there, None, None, None, extra, tuple(kept) if carries(parameters) else None)
+
+
+def _rays(view: View, state: CloudState, parameters: CollectorParameters) -> tuple[CloudRays, CloudRays]:
+    """Return camera rays through clouds as dense as they are, and through those without the peak."""
+    assert view.medium.clouds is not None
     clouds = _as_dense(view.medium.clouds, parameters)
     thin = _without_peak(clouds, state)
     both = replace(clouds, sigma_t=(*clouds.sigma_t, *thin.sigma_t))
     rays = cloud_rays(state.surfaces, both, view.origin, view.direction, view.distance)
     channels = len(clouds.sigma_t)
     thin_rays = replace(rays, clouds=thin, depths=rays.depths[channels:])
-    rays = replace(rays, clouds=clouds, depths=rays.depths[:channels])
-    beams = [_beam(view, state, thin, number, parameters) for number in range(len(view.lights))]
-    once = scattered(thin_rays, beams, steps=parameters.steps, printed=parameters.single == "printed")
+    return replace(rays, clouds=clouds, depths=rays.depths[:channels]), thin_rays
+
+
+def _entry(view: View, rays: CloudRays) -> _Entry:
+    """Return where camera rays meet a cloud."""
     first = rays.first
     begin = dr.select(first.leaves, 0, first.distance)
     there = dr.isfinite(begin) & (begin < view.distance)
-    entry = _Entry(view.origin + view.direction * dr.select(there, begin, 0), first.cloud, there)
-    by_set, kept = [sum(radiance for (radiance,) in once), *(Color(0) for _ in SETS)], []
-    for number, (light, sun) in enumerate(zip(view.lights, state.maps)):
-        last = view.carried[number] if view.carried is not None else None
-        shown = sun.of_cloud(first.cloud)
-        parts, collectors = _many_times(view, state, thin, entry, shown, last=last, parameters=parameters)
-        by_set[1:] = [sum_ + light.intensity * part for sum_, part in zip(by_set[1:], parts)]
-        kept.append(collectors)
+    return _Entry(view.origin + view.direction * dr.select(there, begin, 0), first.cloud, there)
+
+
+def _scattered_once(view: View, state: CloudState, thin_rays: CloudRays, parameters: CollectorParameters) -> Any:
+    """Return order 1, a colour [W/(m^2 sr)]."""
+    beams = [_beam(view, state, thin_rays.clouds, number, parameters) for number in range(len(view.lights))]
+    once = scattered(thin_rays, beams, steps=parameters.steps, printed=parameters.single == "printed")
+    return sum(radiance for (radiance,) in once)
+
+
+def _opacity(view: View, state: CloudState, rays: CloudRays, parameters: CollectorParameters) -> Any:
+    """Return the opacity, a colour."""
     if parameters.opacity == "printed":
-        opacity = printed_opacity(state.surfaces, clouds, view.origin, view.direction, view.distance)
-    else:
-        opacity = opacity_of(rays.depths, Color)
-    names = (order_layer(first) for first in (1, *(int(first) for first, _ in SETS)))
-    extra = dict(zip(names, by_set)) | {OPACITY: opacity} if view.extra_layers else None
+        return printed_opacity(state.surfaces, rays.clouds, view.origin, view.direction, view.distance)
+    return opacity_of(rays.depths, type(view.medium.albedo))
+
+
+def _with_opacity(view: View, state: CloudState, rays: CloudRays, in_scattered: Any, opacity: Any) -> Layers:
+    """Return layers with what is seen behind clouds."""
     return Layers(
-        sum(by_set),
-        tuple(light_on_surfaces(rays, exact_leg(state.surfaces, clouds, light)) for light in view.lights),
+        in_scattered,
+        tuple(light_on_surfaces(rays, exact_leg(state.surfaces, rays.clouds, light)) for light in view.lights),
         1 - opacity,
-        sky_behind(view.lights, view.distance, Color),
-        extra,
-        tuple(kept) if carries(parameters) else None,
+        sky_behind(view.lights, view.distance, type(view.medium.albedo)),
     )
 
 
@@ -284,20 +338,17 @@ def _beam(view: View, state: CloudState, clouds: Clouds, number: int, parameters
 
 def _many_times(
     view: View, state: CloudState, clouds: Clouds, entry: _Entry, sun: LightMap, *, last: Any, parameters: Any
-):
-    """Return the light of a sun that was scattered twice and more, for unit irradiance across the beam [1/sr].
+) -> OrdersLight:
+    """Return the light of a sun that was scattered twice and more.
 
-    Returns
-    -------
-    by_set
-        A colour for each set of orders.
-    kept
-        What the next frame takes as `last`: collectors by channel and filling. Of an interpolated frame, those of the
-        corners of tiles go on for all their pixels.
+    Its sets are colours; `missed` is the largest over channels and fillings; `collectors` are by channel and filling
+    what the next frame takes as `last`. Of an interpolated frame, those of the corners of tiles go on for all their
+    pixels.
     """
     Float, Color = type(view.distance), type(view.medium.albedo)
     search = Search(parameters.iterations, parameters.settled, parameters.thickness == "light")
-    sums, kept = [], []
+    sums, missed = [], [Float(0) for _ in SETS]
+    kept: list[Any] = []
     for channel, own in enumerate(clouds.sigma_t):
         sigma_t = dr.gather(Float, own, entry.cloud, entry.there)
         of_fillings, of_channel = [], []
@@ -317,6 +368,8 @@ def _many_times(
             )
             of_fillings.append(light.by_set)
             of_channel.append(light.collectors)
+            missed = [dr.maximum(*pair) for pair in zip(missed, light.missed, strict=True)]
         kept.append(tuple(of_channel))
         sums.append([sum(parts) for parts in zip(*of_fillings)])
-    return tuple(Color(*parts) for parts in zip(*(sums * (3 // len(sums))))), tuple(kept)
+    by_set = tuple(Color(*parts) for parts in zip(*(sums * (3 // len(sums)))))
+    return OrdersLight(by_set, tuple(missed), tuple(kept))

@@ -12,6 +12,7 @@ Read in this order:
 - `own_methods.py`: methods of the user's own
 - `baselines.py`: `airlight baselines`
 - `bench.py`: `airlight bench`
+- `bench_stages.py`: what its `--stages` does
 - `cache.py`: `airlight cache`
 - `certify.py`: `airlight certify`
 - `compare.py`: `airlight compare`

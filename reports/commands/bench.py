@@ -68,6 +68,10 @@ def bench(
         bool,
         typer.Option("--fit-octaves", help="Find the constants of cloud-octaves that fit a scene of clouds best."),
     ] = False,
+    stages: Annotated[
+        bool,
+        typer.Option("--stages", help="Time the stages of cloud-collectors, and count searches without end."),
+    ] = False,
     against: Annotated[
         Path | None,
         typer.Option(
@@ -111,6 +115,9 @@ def bench(
     --fit-octaves prints the extinction, contribution and anisotropy of cloud-octaves with the least relative RMSE of
     the airlight, beside those that halve everything; other parameters come by --set.
 
+    --stages prints what light maps, order 1 and frames of cloud-collectors take, stratocumulus by default, and in how
+    many pixels a search is far from its end; parameters come by --set.
+
     --decompose prints by which causes each image is wrong: parts that add up to its error, differences of renders in
     which one cause after the other is gone.
     """
@@ -125,6 +132,11 @@ def bench(
         raise InputError("--against: got an image without --fit-octaves, which alone takes one; add --fit-octaves")
     if octaves:
         _fit_octaves(scenes, size=size, against=against, settings=settings, json=json, markdown=markdown)
+        return
+    if stages:
+        from reports.commands.bench_stages import bench_stages
+
+        bench_stages(scenes, size=size, settings=settings, json=json, markdown=markdown)
         return
     if kernels:
         _refuse_scenes(scenes)

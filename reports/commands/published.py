@@ -60,7 +60,8 @@ def published(
     error of the constant R of section 4.2 by size and depth. billeter: Figures 6 and 7 and Table 1 with `light-
     volumes` and its peers: frames a second, static against adaptive tessellation, the passes, and which of the
     paper's conclusions hold here. ali: Fig. 5.8 with `soft-shafts` and what goes with it, by errors in the
-    penumbrae and times. bouthors: what a slab decides, Fig. 3, the printed extinction and densities. The others at
+    penumbrae and times. bouthors: what a slab decides, Fig. 3, the printed extinction and
+    densities, and the frames a second of section 9. The others at
     the published sizes, after the light moved, everything rebuilt or camera rays kept, beside the published figures,
     with the error of the airlight.
     """
@@ -141,10 +142,13 @@ def _ali(*, scale: float, progress: Callable) -> dict[str, Any]:
 
 
 def _bouthors(progress: Callable) -> dict[str, Any]:
-    """Measure what a slab decides of Bouthors 2008."""
+    """Measure what a slab decides of Bouthors 2008, and the frames a second of its clouds."""
+    from reports.machine.progress import part_of
     from validation.papers.bouthors import slab_study
+    from validation.papers.bouthors_frames import frames_study
 
-    return {"bouthors": slab_study(progress=progress)}
+    slab = slab_study(progress=part_of(progress, 0.0, 0.5))
+    return {"bouthors": slab | frames_study(progress=part_of(progress, 0.5, 1.0))}
 
 
 def _wanted_scenes(scenes: Sequence[str], papers: Sequence[str]) -> list[str]:

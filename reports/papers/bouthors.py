@@ -7,14 +7,14 @@ The data are `bouthors` of `airlight published --json`, see `validation.papers.b
 from collections.abc import Mapping
 from typing import Any
 
-from reports.tables.table import Row, Table, numbers, table, words
+from reports.tables.table import Measured, Row, Table, numbers, table, words
 
 Data = Mapping[str, Any]
 
 
 def bouthors_tables(data: Data) -> list[Table]:
-    """Return the tables: shares by thickness, change with the azimuth, reflectances, and the claims with verdicts."""
-    return [_shares(data), _azimuth(data), _reflectance(data), _verdicts(data)]
+    """Return the tables: shares by thickness, change with the azimuth, reflectances, rates, claims and verdicts."""
+    return [_shares(data), _azimuth(data), _reflectance(data), _rates(data), _verdicts(data)]
 
 
 def _shares(data: Data) -> Table:
@@ -53,11 +53,28 @@ def _reflectance(data: Data) -> Table:
     return table("Reflectance with what is printed, the sun at the zenith", columns, rows)
 
 
+def _rates(data: Data) -> Table:
+    from validation.papers.bouthors_frames import PUBLISHED
+
+    columns = (
+        *words(scene="scene"),
+        *numbers(published="published [1/s]", still="frame [ms]", moved="light moved [ms]"),
+    )
+    rows = []
+    for rate in PUBLISHED:
+        still, moved = (
+            Measured(timing["median_ms"], timing["low_ms"], timing["high_ms"])
+            for timing in (data["frames"][rate.scene][name] for name in ("frame", "light_moved"))
+        )
+        rows.append(Row({"scene": rate.scene, "published": rate.fps, "still": still, "moved": moved}))
+    return table("Section 9: frames with the collectors of the last one, 800 x 600", columns, rows)
+
+
 def _verdicts(data: Data) -> Table:
-    from validation.fidelity.bouthors import SLAB_ROWS
+    from validation.fidelity.bouthors import FRAME_ROWS, SLAB_ROWS
     from validation.fidelity.row import judge
 
-    judged = [judge(row, data) for row in SLAB_ROWS]
+    judged = [judge(row, data) for row in (*SLAB_ROWS, *FRAME_ROWS)]
     columns = (*words(item="where", claim="claim", verdict="verdict"), *numbers("measured", how={"digits": 3}))
     rows = [Row({name: row[name] for name in ("item", "claim", "verdict", "measured")}) for row in judged]
     return table("Which claims of Bouthors 2008 hold here", columns, rows)

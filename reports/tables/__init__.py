@@ -15,6 +15,7 @@ Read in this order:
 - `kernels.py`: costs, levels and orders of kernels
 - `stability.py`: where kernels and sums of shadow planes break
 - `decomposition.py`: errors by cause
+- `cloud_stages.py`: the stages of collectors for clouds, and their searches
 - `octave_fit.py`: the constants of octaves that fit best
 - `map_size.py`: error and flicker against the size of the shadow map
 - `slab.py`: a slab by order of scattering

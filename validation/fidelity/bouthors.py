@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The rows of Bouthors, Neyret, Max, Bruneton, Crassin 2008."""
 
-from validation.fidelity.figures import Take, at
-from validation.fidelity.row import AtLeast, AtMost, Bound, Equal, Evidence, Row
+from validation.fidelity.figures import Take, at, impossible, rate
+from validation.fidelity.row import DIFFERS, AtLeast, AtMost, Bound, Equal, Evidence, Row
+from validation.papers.bouthors_frames import PUBLISHED
 
 _FORMULA = Equal(1e-9, "the printed formula over what it stands for, by quadrature")
 
@@ -152,6 +153,45 @@ SLAB_ROWS: tuple[Row, ...] = (
     ),
 )
 
+_MACHINE = AtLeast(
+    "another machine, no graphics card, clouds of the same kinds: asked is whether the published rate is reached",
+    DIFFERS,
+)
+
+
+def _rate(scene: str) -> Take:
+    """Return what takes the frames a second of a scene."""
+    return lambda evidence: rate(evidence["frames"][scene]["light_moved"])
+
+
+#: Frames a second. (`airlight published --paper bouthors` prints them too.)
+FRAME_ROWS: tuple[Row, ...] = (
+    *(
+        Row(
+            "bouthors",
+            f"9, {published.scene}",
+            f"frames a second of {published.words}, 800 x 600",
+            published.fps,
+            "cloud frames",
+            _rate(published.scene),
+            _MACHINE,
+            unit="frames/s",
+            command="airlight published --paper bouthors",
+        )
+        for published in PUBLISHED
+    ),
+    Row(
+        "bouthors",
+        "9, procedural noise",
+        "frames a second of the cumulus with procedural noise, 800 x 600",
+        2,
+        "nothing",
+        impossible("no frame of cloud-collectors has procedural noise of 512^3 voxels"),
+        None,
+        unit="frames/s",
+    ),
+)
+
 ROWS: tuple[Row, ...] = (
     Row(
         "bouthors",
@@ -285,4 +325,5 @@ ROWS: tuple[Row, ...] = (
         AtMost("far from accurate is read as half or less; no glory and no fogbow can be left then"),
     ),
     *SLAB_ROWS,
+    *FRAME_ROWS,
 )

@@ -10,14 +10,15 @@ Read in this order:
 - `baseline_runs.py`: measures the errors that baselines keep;
 - `baseline_files.py`: baselines as files, their comparison and their revisions;
 - `decomposition.py`: the error of an image by its causes, which add up to it;
+- `cloud_stages.py`: the stages of collectors for clouds, and whether their searches converge;
 - `octave_fit.py`: the constants of octaves that fit a scene of clouds best;
 - `froxel_study.py`: which grid froxel fog needs, and the ghosts of its history;
 - `map_size.py`: error against the size of the shadow map, and the flicker of a light that moves;
 - `plane_stability.py`: hard cases for sums over shadow planes;
 - `zero_cost.py`: checks that what a scene does not need costs nothing.
 
-May import: `analytic`, `realtime.area_lights`, `realtime.errors`, `realtime.frame`, `realtime.kernels`,
-`realtime.memory`, `realtime.methods`, `realtime.parameters`, `realtime.scene`, `reference.quadrature`,
-`reference.scene`, `reference.storage`, `validation.configurations`, `validation.estimates`, `validation.metrics`,
-`validation.scenes`, `validation.statistics`.
+May import: `analytic`, `realtime.area_lights`, `realtime.clouds.canonical`, `realtime.errors`, `realtime.frame`,
+`realtime.kernels`, `realtime.memory`, `realtime.methods`, `realtime.parameters`, `realtime.scene`,
+`reference.quadrature`, `reference.scene`, `reference.storage`, `validation.configurations`, `validation.estimates`,
+`validation.metrics`, `validation.scenes`, `validation.statistics`.
 """

@@ -9,9 +9,10 @@ Read in this order:
 - `billeter_tessellation.py`: their Table 1;
 - `billeter_conclusions.py`: which of their conclusions hold here;
 - `ali.py`: the figures of Ali 2016 that captions describe;
-- `bouthors.py`: what a slab decides of Bouthors, Neyret, Max, Bruneton, Crassin 2008.
+- `bouthors.py`: what a slab decides of Bouthors, Neyret, Max, Bruneton, Crassin 2008;
+- `bouthors_frames.py`: their section 9, frames a second.
 
 May import: `analytic`, `realtime.clouds`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `realtime.scene`,
 `realtime.shadow_maps`, `realtime.tiles`, `reference.quadrature`, `reference.scene`, `validation.configurations`,
-`validation.estimates`, `validation.metrics`, `validation.oracles`, `validation.scenes`.
+`validation.estimates`, `validation.frames`, `validation.metrics`, `validation.oracles`, `validation.scenes`.
 """

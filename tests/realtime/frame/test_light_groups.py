@@ -282,6 +282,6 @@ def test_large_states_are_kept_of_few_points(variant, monkeypatch):
     scene = scene_of(changes={"size": (16, 12)})
     maps = renderer_of(scene, "light-volumes", points=5, map=64)
     wanted = render_frame(maps).airlight
-    monkeypatch.setattr(renderer, "_ROOM", 2 * renderer._bytes_in(maps.prepare(scene)[0]))
+    monkeypatch.setattr(renderer, "_ROOM", 2 * renderer.bytes_in(maps.prepare(scene)[0]))
     assert [state is None for state in maps.prepare(scene)] == [False] * 2 + [True] * 3
     np.testing.assert_array_equal(render_frame(maps).airlight, wanted)

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Clouds by collectors as a method: what a frame makes of a transport that is a formula here."""
 
-from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from tests.helpers.clouds import DROPLETS, cloud, cloud_scene, ring
+from tests.helpers.transport_formula import WEIGHTS, Formula, use_formula
 from validation.scenes.parts import camera, placed, rotation
 from validation.scenes.solids import box
 
@@ -17,44 +16,9 @@ TURN = rotation((0.3, 1.0, -0.2), 11.0)
 MIDDLE = np.array([3.1, 0.2, -60.0])
 
 
-@dataclass(frozen=True)
-class Formula:
-    """A canonical transport whose light tells all that it was asked."""
-
-    weights: Any  #: by set
-
-    def __call__(self, number, t, d, mu, cos_phi, sin_phi, mu_l):
-        import drjit as dr
-
-        weight = dr.gather(type(self.weights), self.weights, dr.uint32_array_t(type(self.weights))(number))
-        sine = dr.safe_sqrt(1 - mu * mu)
-        radiance = (
-            weight * (3 + mu + 0.7 * sine * cos_phi + 0.4 * sine * sin_phi) * mu_l * t / (1 + t) * dr.exp(-0.1 * d)
-        )
-        return radiance, -0.2 * sine * cos_phi, -0.2 * sine * sin_phi, 0.5 + 0 * t
-
-    @staticmethod
-    def radiance(t, d, mu, x, y, mu_l):
-        return (3 + mu + 0.7 * x + 0.4 * y) * mu_l * t / (1 + t) * np.exp(-0.1 * d)
-
-
-WEIGHTS = [0.02, 0.04, 0.03, 0.01, 0.05, 0.03, 0.02, 0.06]
-
-
 @pytest.fixture(autouse=True)
 def formula(monkeypatch):
-    import drjit as dr
-
-    import realtime.methods.cloud_collectors as method
-
-    def on_device(tables, types):
-        weights = types.scalar(WEIGHTS)
-        dr.make_opaque(weights)
-        return Formula(weights)
-
-    monkeypatch.setattr(method, "canonical_tables", lambda phase, albedo: SimpleNamespace(angular=None))
-    monkeypatch.setattr(method, "on_device", on_device)
-    monkeypatch.setattr(method, "transport_grid", lambda look_up, angular, sets: look_up)
+    use_formula(monkeypatch)
 
 
 def _sun(direction, irradiance=(3.1, 2.9, 2.3)) -> dict[str, Any]:
@@ -140,6 +104,26 @@ def test_the_layers_of_all_sets_add_up(variant):
     np.testing.assert_allclose(total, np.array(frame.airlight), rtol=1e-5)
     shares = [by_set[f"airlight_{name}"].mean() for name in names]
     np.testing.assert_allclose(np.array(shares) / shares[0], np.array(WEIGHTS) / WEIGHTS[0], rtol=1e-3)
+
+
+def test_order_one_alone_is_that_of_the_whole_frame(variant):
+    """What is timed by itself is what a frame does, to the bit."""
+    from dataclasses import replace
+
+    import mitsuba as mi
+
+    from realtime.frame.renderer import frame_renderer, render_frame
+    from realtime.methods.cloud_collectors import scattered_once
+    from realtime.methods.registry import METHODS
+    from realtime.scene.read_scene import read_scene
+
+    scene = _scene(sun=_sun(ALONG), ring=cloud("ring", ring()))
+    method = replace(METHODS["cloud-collectors"], render=scattered_once)
+    alone = render_frame(frame_renderer(read_scene(mi.load_dict(scene)), method))
+    whole = _frame(scene, extra_layers=True)
+    np.testing.assert_array_equal(alone.airlight, whole.extra["airlight_1"])
+    np.testing.assert_array_equal(alone.surface, whole.surface)
+    assert alone.airlight.max() > 0
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1e3])

@@ -6,7 +6,7 @@ from copy import deepcopy
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
 from realtime.clouds.slab_orders.slab import slab_light
 from reports.papers.bouthors import bouthors_tables
-from validation.fidelity.bouthors import SLAB_ROWS
+from validation.fidelity.bouthors import FRAME_ROWS, SLAB_ROWS
 from validation.fidelity.row import judge
 from validation.papers.bouthors import _reflectance, _shares
 
@@ -25,6 +25,10 @@ DATA = {
         for thickness in (50.0, 100.0, 300.0, 1000.0)
         for sun in (0.0, 75.0)
     ],
+    "frames": {
+        scene: {name: {"median_ms": 90.0, "low_ms": 88.0, "high_ms": 93.0} for name in ("frame", "light_moved")}
+        for scene in ("stratocumulus", "cumulus")
+    },
     "azimuth": {"2": 9.0, "19-30": 1.2, "31-inf": 1.01},
     "reflectance": {
         name: {"droplets": 0.1, "printed": 1.26, "modified": 1.0, "half": 0.9, "matched": 1.001, "printed_g": 0.05}
@@ -34,7 +38,9 @@ DATA = {
 
 
 def test_verdicts_follow_from_the_numbers_and_turn_with_them():
-    verdicts = {row.item: judge(row, DATA)["verdict"] for row in SLAB_ROWS}
+    verdicts = {row.item: judge(row, DATA)["verdict"] for row in (*SLAB_ROWS, *FRAME_ROWS)}
+    assert verdicts["9, stratocumulus"] == verdicts["9, cumulus"] == "reproduced"
+    assert verdicts["9, procedural noise"] == "impossible"
     for item in ("orders 31 and above, 100 m", "transmittance", "left, orders 19 to 30"):
         assert verdicts[f"Fig. 3, {item}"] == "reproduced"
     assert verdicts["Fig. 3, reflectance"] == verdicts["eq. 4, reflectance at 50 m"] == "refuted"
@@ -44,16 +50,18 @@ def test_verdicts_follow_from_the_numbers_and_turn_with_them():
     other["azimuth"] |= {"19-30": 1.0, "31-inf": 2.0}
     for row in other["shares"]:
         row |= {"reflected_31_inf": 0.2, "transmitted_1_30": 0.0, "reflected_1_30": 0.3}
-    turned = {row.item: judge(row, other)["verdict"] for row in SLAB_ROWS}
+    other["frames"]["stratocumulus"]["light_moved"] = {"median_ms": 120.0, "low_ms": 115.0, "high_ms": 130.0}
+    turned = {row.item: judge(row, other)["verdict"] for row in (*SLAB_ROWS, *FRAME_ROWS)}
+    assert turned["9, stratocumulus"] == "differs"
     assert turned["Fig. 3, reflectance"] == "reproduced"
     for item in ("orders 31 and above, 100 m", "transmittance", "left, orders 19 to 30", "left, orders 31 and above"):
         assert turned[f"Fig. 3, {item}"] == "refuted"
 
 
 def test_the_tables_show_every_row():
-    shares, azimuth, reflectance, verdicts = bouthors_tables(DATA)
-    assert (len(shares.rows), len(azimuth.rows), len(reflectance.rows)) == (8, 3, 3)
-    assert len(verdicts.rows) == len(SLAB_ROWS)
+    shares, azimuth, reflectance, rates, verdicts = bouthors_tables(DATA)
+    assert (len(shares.rows), len(azimuth.rows), len(reflectance.rows), len(rates.rows)) == (8, 3, 3, 2)
+    assert len(verdicts.rows) == len(SLAB_ROWS) + len(FRAME_ROWS)
 
 
 def test_shares_and_reflectance_are_those_of_the_slab():
