@@ -49,8 +49,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from realtime.methods.shadow_planes.plane_entries import FIRST, entry_words, in_bins
 from realtime.methods.shadow_planes.silhouettes import Silhouette, silhouette
 from realtime.methods.shadow_planes.spot_pyramid import NEARNESS, is_outside, ring_edges
+from realtime.methods.shadow_planes.wedges import Wedges, wedge_lists, wedges_pay
 from realtime.numerics.array_types import four_numbers, is_single
 from realtime.numerics.diamond_angle import TURN, host_diamond_angle
 from realtime.scene.lights import place_and_weight
@@ -59,12 +61,6 @@ from realtime.scene.mesh_adjacency import Casters
 Array = NDArray[np.float64]
 
 BINS = 64  #: of azimuth
-
-# An entry of a list: the number of a plane, the layers gained beyond it, and two marks.
-NUMBER = (1 << 24) - 1
-GAIN_SHIFT, GAIN_ZERO = 24, 32  #: gains from -32 to 31; a plane that gains more is there more than once
-FULL = 1 << 30  #: whatever ray of the tile: it lies in the span of the plane, and beyond the edge where it crosses it
-FIRST = 1 << 31  #: the first bin that holds the plane
 
 
 @dataclass(frozen=True)
@@ -83,6 +79,7 @@ class PlaneIndex:
     layers: Any  #: layers between the light and the camera
     aim: Any = None  #: where the pixels of the camera aim in the frame, see `realtime.methods.shadow_planes.pixel_rays`
     w: int = 1  #: last coordinate of the light's homogeneous position
+    wedges: Wedges | None = None  #: lists of the planes for all rays; None: tiles draw theirs from `entries`
 
 
 @dataclass(frozen=True)
@@ -172,15 +169,9 @@ def binned(planes: Planes) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
         First place of every bin of two turns, and the planes bin by bin, twice: a range of azimuths that passes 0 is
         then one run of places.
     """
-    low = np.maximum((planes.first * np.float32(BINS / TURN)).astype(np.int64), 0)
-    high = np.minimum((planes.last * np.float32(BINS / TURN)).astype(np.int64), BINS - 1)
-    width = high - low + 1
-    plane = np.repeat(np.arange(len(width), dtype=np.uint32), width)
-    step = np.arange(len(plane)) - np.repeat(np.cumsum(width) - width, width)
-    bins = (step + low[plane]).astype(np.uint16)
-    place = np.argsort(bins, kind="stable")
-    gain = (planes.gain.astype(np.int64) + GAIN_ZERO).astype(np.uint32) << np.uint32(GAIN_SHIFT)
-    entries = (plane + gain[plane] + np.where(step == 0, np.uint32(FIRST), np.uint32(0)))[place]
+    plane, bins, first = in_bins(planes.first, planes.last, BINS)
+    place = np.argsort(bins.astype(np.uint16), kind="stable")
+    entries = entry_words(plane, planes.gain, FIRST * first)[place]
     start = np.concatenate([[0], np.cumsum(np.tile(np.bincount(bins, minlength=BINS), 2))])
     return start.astype(np.uint32), np.tile(entries, 2)
 
@@ -276,8 +267,10 @@ def index_planes(
     *,
     used: NDArray[np.bool_],
     types,
+    order: str = "exact",
     ring: Array | None = None,
     aim: Callable[[Array], Any] | None = None,
+    tiles: Callable[[Array], tuple[Array, Array]] | None = None,
 ) -> PlaneIndex:
     """Find the shadow planes of a light and put them into bins for a camera.
 
@@ -293,10 +286,15 @@ def index_planes(
         By component, whether its shadow can be seen.
     types
         The array types to use, see `realtime.numerics.array_types`.
+    order
+        In which rays go over planes, see `realtime.methods.shadow_planes.wedges.wedge_lists`.
     ring
         Of a spot whose cone is a caster, see `realtime.methods.shadow_planes.spot_pyramid`.
     aim
         Axes of the frame -> where the pixels of the camera aim in it.
+    tiles
+        Axes of the frame -> azimuths of some tiles of rays and how wide each is, which decide whether there are wedges;
+        without them there are none.
     """
     basis = light_basis(light, camera)
     axes = basis.axes
@@ -308,9 +306,19 @@ def index_planes(
         layers += is_outside(ring, axes[2])
     planes = _parted(planes)
     start, entries = binned(planes)
-    spans = np.stack([planes.first, planes.last, planes.gain, planes.centre], axis=1)
     Float = types.scalar
     real = np.float32 if is_single(Float) else np.float64
+    wedges = None
+    if tiles is not None and wedges_pay(planes, *tiles(axes)):
+        start_of_wedge, in_order, bounds, scale = wedge_lists(planes, order=order)
+        wedges = Wedges(
+            mi.UInt32(_padded(start_of_wedge)),
+            mi.UInt32(_padded(in_order, 3)),
+            Float(_padded(bounds.astype(real), 3)),
+            Float(float(scale)),
+            basis.w,
+        )
+    spans = np.stack([planes.first, planes.last, planes.gain, planes.centre], axis=1)
     x_axis, y_axis, z_axis = (types.vector(*(float(c) for c in axis)) for axis in axes)
     index = PlaneIndex(
         x_axis,
@@ -325,6 +333,7 @@ def index_planes(
         Float(layers),
         aim(axes) if aim else None,
         basis.w,
+        wedges,
     )
     dr.make_opaque(index)
     return index
