@@ -122,7 +122,7 @@ def light_basis(light: Array, camera: Array) -> LightBasis:
 
 def shadow_planes(casters: Casters, edges: Silhouette, basis: LightBasis) -> Planes:
     """Return the shadow planes of silhouette edges in the frame of a light and a camera."""
-    return edge_planes(basis.coordinates(casters.vertices[edges.edges]), edges.coefficient, w=basis.w)
+    return edge_planes(basis.coordinates(casters.positions_of(edges.edges)), edges.coefficient, w=basis.w)
 
 
 def edge_planes(vertices: Array, coefficient: NDArray[np.int8], *, w: int = 1) -> Planes:
@@ -219,16 +219,13 @@ def layers_between(casters: Casters, light: Array, basis: LightBasis, *, used: N
     near = used & np.all((low <= np.maximum(far, camera)) & (high >= np.minimum(far, camera)), axis=1)
     if not near.any():
         return 0
-    # The axis runs through x = y = 0: most triangles lie aside, all three corners beyond it on one of four sides.
-    x, y = axes[:2] @ casters.vertices.T - (axes[:2] @ start)[:, None]
-    sides = (x > 0) | (x < 0).view(np.uint8) << 1 | (y > 0).view(np.uint8) << 2 | (y < 0).view(np.uint8) << 3
     number = np.flatnonzero(near[casters.component])
-    first, second, third = casters.triangles[number].T
-    number = number[sides[first] & sides[second] & sides[third] == 0]
+    number = number[_beside_axis(casters, number, start, axes)]
     if not len(number):
         return 0
     crossed = number[_crosses(casters, number, (start, direction), reach)]
-    sign = np.sign(casters.normals[crossed] @ l - w * casters.offsets[crossed])
+    normals, offsets = casters.planes_of(crossed)
+    sign = np.sign(normals @ l - w * offsets)
     component = casters.component[crossed]
     components = len(casters.closed)
     front, back = (
@@ -236,6 +233,21 @@ def layers_between(casters: Casters, light: Array, basis: LightBasis, *, used: N
         np.bincount(component[sign < 0], minlength=components),
     )
     return int(np.where(casters.closed, np.maximum(front, back), front + back).sum())
+
+
+def _beside_axis(casters: Casters, number, start: Array, axes: Array) -> NDArray[np.bool_]:
+    """Return of triangles whether they may meet the axis through `start`: most lie aside of it.
+
+    It runs through x = y = 0, and those have all three corners beyond it on one of four sides.
+    """
+    x, y = axes[:2] @ casters.vertices.T - (axes[:2] @ start)[:, None]
+    for vertices, placement in casters.placed_vertices():
+        turned = axes[:2] @ placement.rotation
+        here = axes[:2] @ (start - placement.shift)
+        x[vertices], y[vertices] = turned @ casters.vertices[vertices].T - here[:, None]
+    sides = (x > 0) | (x < 0).view(np.uint8) << 1 | (y > 0).view(np.uint8) << 2 | (y < 0).view(np.uint8) << 3
+    first, second, third = casters.triangles[number].T
+    return np.asarray(sides[first] & sides[second] & sides[third] == 0)
 
 
 def _crosses(casters: Casters, number, line: tuple[Array, Array], reach: tuple[float, float]) -> NDArray[np.bool_]:
@@ -249,14 +261,14 @@ def _crosses(casters: Casters, number, line: tuple[Array, Array], reach: tuple[f
     sides = []
     for k in range(3):
         tail, head = triangle[:, k], triangle[:, (k + 1) % 3]
-        low, high = casters.vertices[np.minimum(tail, head)] - start, casters.vertices[np.maximum(tail, head)] - start
+        low, high = (casters.positions_of(end(tail, head)) - start for end in (np.minimum, np.maximum))
         left = np.cross(low, high) @ direction >= 0
         sides.append(np.where(tail < head, left, ~left))
     inside = (sides[0] == sides[1]) & (sides[1] == sides[2])
     # The plane normal . p = offset is met at start + u direction.
-    normal = casters.normals[number]
+    normal, offset = casters.planes_of(number)
     with np.errstate(divide="ignore", invalid="ignore"):
-        u = (casters.offsets[number] - normal @ start) / (normal @ direction)
+        u = (offset - normal @ start) / (normal @ direction)
     return inside & (u > reach[0]) & (u < reach[1])
 
 
