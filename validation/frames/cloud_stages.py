@@ -43,12 +43,14 @@ PUBLISHED: Mapping[str, Any] = {
     "start": "cold",
     "iterations": 10,
 }
-WARM = {"start": "previous", "iterations": 3}
 SETTLED = 0.05  #: [sigma]
+#: Frames that go on: three steps at most, one where the collector of the last frame still is one.
+WARM = {"start": "previous", "iterations": 3, "settled": SETTLED}
 _SEARCHES: tuple[dict[str, Any], ...] = (
     {"start": "cold", "iterations": 10},
     *({"start": "previous", "iterations": count} for count in (1, 2, 3)),
 )
+_SET_HERE = ("start", "iterations", "settled", "tolerance")
 _FRAMES, _TURN = 7, 360  # frames of a search that goes on, and how many make a turn of the sun
 
 
@@ -93,7 +95,7 @@ def cloud_stages(
     scene
         From `realtime.scene.read_scene.read_scene`.
     parameters
-        Of `cloud-collectors`; `start`, `iterations` and `tolerance` are set here.
+        Of `cloud-collectors`; `start`, `iterations`, `settled` and `tolerance` are set here.
     seconds
         To spend on each timing.
     progress
@@ -106,7 +108,7 @@ def cloud_stages(
     """
     if scene.medium.clouds is None:
         raise InputError("--stages: the scene has no clouds; name scenes of clouds, such as stratocumulus")
-    given = {name: value for name, value in parameters.items() if name not in ("start", "iterations", "tolerance")}
+    given = {name: value for name, value in parameters.items() if name not in _SET_HERE}
     frames = _timed_frames(given)
     count, done = len(frames) + 1 + len(_SEARCHES), 0
 
