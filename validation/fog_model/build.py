@@ -84,6 +84,8 @@ def scattering_paths(
     hits = SurfaceHits(exact_distance(rays, hits.interaction, hits.distance, shapes), hits.interaction)
     open_rays = rays if shadows else replace(rays, occluders=mi.load_dict({"type": "scene"}))
     how: dict[str, Any] = {"shapes": shapes if shadows else None}
+    if shapes.others is None:
+        how["checks"] = 0  # intervals by geometry are what they are: random checks only say how far to trust them
     sources = light_sources(truth, points, seed, radius)
     lights = []
     for number, source in enumerate(sources):
