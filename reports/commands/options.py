@@ -125,26 +125,3 @@ def named(option: str, words: list[str] | None, old_option: str, old: str | None
     """
     first = [] if old is None else listed(old_option, old)
     return [*first, *(word for given in words or () for word in listed(option, given))]
-
-
-def numbers_by_name(option: str, text: str) -> dict[str, float]:
-    """Return the numbers of an option such as 'sigma_t=0.1,albedo=0.9'.
-
-    Raises
-    ------
-    InputError
-        If a part has another form, or a name is there twice.
-    """
-    numbers: dict[str, float] = {}
-    for part in listed(option, text) if text.strip() else []:
-        name, equals, value = part.partition("=")
-        try:
-            number = float(value)
-        except ValueError:
-            equals = ""
-        if not equals or not name.strip() or name.strip() in numbers:
-            from analytic.errors import InputError
-
-            raise InputError(f"{option}: got {part!r}, wanted NAME=VALUE, each name once, such as sigma_t=0.1")
-        numbers[name.strip()] = number
-    return numbers
