@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from reports.commands import completion
-from reports.commands.options import Json, listed
+from reports.commands.options import Holds, Json, Mask, PixelKind, listed
 
 
 def fit(
@@ -45,29 +45,9 @@ def fit(
             show_default=False,
         ),
     ] = None,
-    holds: Annotated[
-        str | None,
-        typer.Option(
-            "--as",
-            metavar="NAME",
-            help="What the layer holds: 'airlight', 'surface' or 'total'; what its name says by default.",
-            show_default=False,
-            autocompletion=completion.one_of("airlight", "surface", "total"),
-        ),
-    ] = None,
-    pixel: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="Pixels are values at their 'centre' or means over their 'area'; by default what fits.",
-            show_default=False,
-            autocompletion=completion.one_of("centre", "area"),
-        ),
-    ] = None,
-    mask: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="EXR file that is 0 in pixels to leave out.", show_default=False),
-    ] = None,
+    holds: Holds = None,
+    pixel: PixelKind = None,
+    mask: Mask = None,
     json: Json = False,
 ) -> None:
     """Find the parameters of the fog that explain an image.

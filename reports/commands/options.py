@@ -73,6 +73,31 @@ USUAL_LIMIT = LIMIT
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Markdown = Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")]
 OutputFile = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The file to write.")]
+Mask = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="EXR file that is 0 in pixels to leave out.", show_default=False),
+]
+#: Of `fit`, and of `compare` with a scene.
+Holds = Annotated[
+    str | None,
+    typer.Option(
+        "--as",
+        metavar="NAME",
+        help="What a layer of a scene holds, 'airlight', 'surface' or 'total'; what its name says by default.",
+        show_default=False,
+        autocompletion=completion.one_of("airlight", "surface", "total"),
+    ),
+]
+PixelKind = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help="Pixels of a scene's image are values at their 'centre' or means over their 'area'. By default what fits "
+        "is used: means take several times as long as values.",
+        show_default=False,
+        autocompletion=completion.one_of("centre", "area"),
+    ),
+]
 Changes = Annotated[
     list[str] | None,
     typer.Option(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from validation.comparison.whole_image import TURNS
 from validation.diagnosis.hypothesis import Hypothesis, Parameter
 from validation.diagnosis.prediction import Guess, Predictor
 
@@ -43,9 +44,7 @@ def _square(predictor: Predictor) -> bool:
 
 
 CAMERA = (
-    Hypothesis("flip", "camera", "the image is upside down", _undone(lambda image: image[::-1])),
-    Hypothesis("flip", "camera", "the image is mirrored left to right", _undone(lambda image: image[:, ::-1])),
-    Hypothesis("flip", "camera", "the image is turned by 180 degrees", _undone(lambda image: image[::-1, ::-1])),
+    *(Hypothesis("flip", "camera", f"the image is {words}", _undone(turn)) for words, turn in TURNS.items()),
     Hypothesis(
         "flip",
         "camera",

@@ -23,8 +23,9 @@ from reference.scene.camera import film_directions, pixel_centres
 from reference.scene.read import TruthScene, read_truth
 from reference.storage.exr import Image
 from validation.comparison.engine_layers import truth_layer
+from validation.comparison.whole_image import to_srgb
 from validation.diagnosis.diagnose import diagnose_image
-from validation.diagnosis.encoding import filmic, srgb
+from validation.diagnosis.encoding import filmic
 from validation.diagnosis.prediction import Scenery, changed_scene
 from validation.scenes.loading import load_scene
 
@@ -170,7 +171,7 @@ PLANTED = (
     Planted("shift", "half a pixel", _of_scene(lambda truth: _pixels(truth, lambda p, size: p - [0.5, 0.5]))),
     Planted("flip", "upside down", _of_image(lambda image: image[::-1])),
     Planted("flip", "mirrored", _of_image(lambda image: image[:, ::-1])),
-    Planted("transfer", "sRGB", _of_image(srgb)),
+    Planted("transfer", "sRGB", _of_image(to_srgb)),
     Planted("transfer", "gamma 2.2", _of_image(lambda image: image ** (1 / 2.2))),
     Planted("clamp", "a tenth cut off", _of_image(_clamped)),
     Planted("tone-map", "filmic", _of_image(filmic)),
