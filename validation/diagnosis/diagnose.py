@@ -191,7 +191,7 @@ def _ranked(
     cheap = [hypothesis for hypothesis in there if not hypothesis.costly]
     singles = _explained(predictor, cheap, progress, (0.0, 0.5))
     chosen = _best(right, singles, pixel)
-    if not is_explained(chosen) or (chosen is right and right.error > LEFT):
+    if not is_explained(chosen) or chosen.error > LEFT:
         costly = [hypothesis for hypothesis in there if hypothesis.costly]
         singles += _explained(predictor, costly, progress, (0.5, 0.75))
         chosen = _best(right, singles, pixel)
