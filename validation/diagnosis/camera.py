@@ -34,6 +34,10 @@ def _zoom(predictor: Predictor, guess: Guess, p: tuple[float, ...]) -> Guess:
     return replace(guess, scenery=replace(guess.scenery, zoom=float(f"{p[0]:.5g}")))
 
 
+def _vignette(predictor: Predictor, guess: Guess, p: tuple[float, ...]) -> Guess:
+    return replace(guess, vignette=p[0])
+
+
 def _wide(predictor: Predictor) -> bool:
     return predictor.shape[0] != predictor.shape[1]
 
@@ -77,5 +81,12 @@ CAMERA = (
             Parameter("right", -3.0, 3.0, (0.0,), step=0.1, unit="pixels"),
             Parameter("down", -3.0, 3.0, (0.0,), step=0.1, unit="pixels"),
         ),
+    ),
+    Hypothesis(
+        "vignette",
+        "camera",
+        "the image falls off to its corners: a vignette, cos^{0:.3g} of the angle from the camera's axis",
+        _vignette,
+        (Parameter("power", 0.0, 100.0, (4.0, 1.0, 12.0)),),
     ),
 )

@@ -306,11 +306,11 @@ def _rows(explanation: Explanation, weight: float) -> list[Ranked]:
 
 
 def _multiple_light(truth: TruthScene) -> Array | None:
-    """Return the light that the medium scattered more than once, by Mitsuba's path tracer, (pixels, 3)."""
+    """Return the light of higher orders by layer, (2, pixels, 3), by Mitsuba's path tracer."""
     if truth.width * truth.height > 1 << 17:
         return None  # minutes for one hypothesis
     parts = []
     for seed in range(_BATCH):
         whole, single = (volpath_batch(truth, seed, _SAMPLES, max_depth=depth).mean for depth in (64, 2))
-        parts.append((whole - single)[LAYERS.index("airlight")])
+        parts.append((whole - single)[[LAYERS.index(layer) for layer in ("airlight", "surface")]])
     return np.asarray(np.mean(parts, axis=0))

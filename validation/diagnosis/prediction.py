@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.scene.camera import camera_matrix
 from reference.scene.read import TruthScene
 from validation.fit.image_model import ImageModel, Task, image_model
 from validation.fog_model.fog import Fog
@@ -28,6 +29,7 @@ class Scenery:
     cone: float = 1.0  #: factor on the angles of spots
     edge: str = ""  #: of spots: 'hard', or 'smooth' from the axis on; the scene's own
     radius: float = 0.0  #: of spheres in the place of point lights [m]
+    blend: float = 0.0  #: share of 1 - cos(cut-off) in which spots fall off smoothly, as Blender's do
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,8 @@ class Guess:
 
     fog: Fog
     scenery: Scenery = field(default_factory=Scenery)
-    multiple: float = 0.0  #: share of the light of higher orders that is there
+    multiple: tuple[float, float] = (0.0, 0.0)  #: shares of the light of higher orders: airlight, surfaces
+    vignette: float = 0.0  #: power of the cosine to the camera's axis that dims the image
     values: tuple[Callable[[Array], Array], ...] = ()  #: what was done to the values, in this order
     undo: Callable[[Array], Array] | None = (
         None  #: takes back what was done to the grid, (height, width, 3) -> the same
@@ -50,7 +53,8 @@ class Predictor:
     task: Task
     shape: tuple[int, int]
     most: int = _MOST_RAYS
-    multiple: Callable[[], Array | None] | None = None  #: light of higher orders, (all pixels, 3), or None
+    multiple: Callable[[], Array | None] | None = None
+    """Light of higher orders in airlight and surfaces, (2, all pixels, 3), or None."""
     _models: dict[Scenery, ImageModel] = field(default_factory=dict)
 
     @property
@@ -69,6 +73,7 @@ class Predictor:
                 offset=scenery.offset,
                 zoom=scenery.zoom,
                 radius=scenery.radius,
+                blend=scenery.blend,
             )
         return self._models[scenery]
 
@@ -76,13 +81,20 @@ class Predictor:
         """Return the values of the pixels, (m, 3)."""
         model = self.model(guess.scenery)
         radiance = model.radiance(guess.fog)
-        if guess.multiple:
+        if any(guess.multiple):
             more = None if self.multiple is None else self.multiple()
             if more is not None:
-                radiance = radiance + guess.multiple * more[model.pixels]
+                radiance = radiance + sum(share * part[model.pixels] for share, part in zip(guess.multiple, more))
+        if guess.vignette:
+            radiance = radiance * self._cosines(model.pixels)[:, None] ** guess.vignette
         for change in guess.values:
             radiance = change(radiance)
         return radiance
+
+    def _cosines(self, pixels: NDArray[np.int64]) -> Array:
+        """Return the cosines of pixels to the axis of the camera, (m,)."""
+        truth = self.task.truth
+        return np.asarray(truth.direction[pixels] @ camera_matrix(truth.scene.sensors()[0])[:3, 2])
 
     def seen(self, guess: Guess) -> Array:
         """Return the values of the image in these pixels, (m, 3), with the fault of the grid taken back."""

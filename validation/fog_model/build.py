@@ -37,6 +37,7 @@ def scattering_paths(
     offset: tuple[float, float] = (0.0, 0.0),
     zoom: float = 1.0,
     radius: float = 0.0,
+    blend: float = 0.0,
     shadows: bool = True,
     airlight: bool = True,
     surface: bool = True,
@@ -61,6 +62,8 @@ def scattering_paths(
         Factor on the distance of all rays from the middle of the film, before they are moved.
     radius
         Of spheres that take the place of point lights, of the same intensity [m].
+    blend
+        Share of 1 - cos(cut-off), from the cut-off inwards, in which spots fall off smoothly, besides their own edge.
     shadows
         False where surfaces hide nothing from the lights.
     airlight, surface
@@ -89,6 +92,9 @@ def scattering_paths(
     for number, source in enumerate(sources):
         nodes = [_nodes(open_rays, light, hits.distance, how) for light in source.lights] if airlight else []
         lit = [surface_points(rays, light, hits, shadows=shadows) for light in source.lights] if surface else []
+        if blend:
+            nodes = [_blended(part, light, blend) for part, light in zip(nodes, source.lights, strict=True)]
+            lit = [_blended_surface(part, light, blend) for part, light in zip(lit, source.lights, strict=True)]
         lights.append(_light_paths(source.name, source.intensity, nodes, lit, len(truth.media) + 1))
         if progress is not None:
             progress((number + 1) / len(sources), "lit intervals")
@@ -159,6 +165,33 @@ def _as_sphere(name: str, light: TruthLight, points: int, seed: int, radius: flo
     plan = PointPlan(most=points, seed=seed)
     wide = TruthAreaLight("sphere", light.position, np.eye(3), np.full(2, radius), np.zeros(3), False, None)
     return Source(name, 4 * light.intensity / points, light_points(wide, square_points(plan, 0, 0, "sphere")))
+
+
+def blended_edge(towards: Array, light: TruthLight | DirectionalLight, blend: float) -> Array:
+    """Return what Blender's `spot_blend` leaves of a spot's intensity: smoothstep of the cosine, (n,).
+
+    Parameters
+    ----------
+    towards
+        Unit vectors from the light, (n, 3).
+    light
+        The light; others than spots stay as they are.
+    blend
+        Share of 1 - cos(cut-off) that the edge takes, from the cut-off inwards.
+    """
+    if isinstance(light, DirectionalLight) or light.axis is None:
+        return np.ones(len(towards))
+    outermost = np.cos(light.cutoff)
+    share = np.clip((towards @ light.axis - outermost) / ((1 - outermost) * blend), 0.0, 1.0)
+    return np.asarray(share * share * (3 - 2 * share))
+
+
+def _blended(nodes: Nodes, light: TruthLight | DirectionalLight, blend: float) -> Nodes:
+    return replace(nodes, weight=nodes.weight * blended_edge(nodes.towards, light, blend))
+
+
+def _blended_surface(points: SurfacePoints, light: TruthLight | DirectionalLight, blend: float) -> SurfacePoints:
+    return replace(points, radiance=points.radiance * blended_edge(points.towards, light, blend)[:, None])
 
 
 def _nodes(truth: TruthScene, light: TruthLight | DirectionalLight, distance: Array, how: dict[str, Any]) -> Nodes:
