@@ -187,16 +187,17 @@ def _ranked(
 ) -> tuple[Explanation, Explanation, list[Ranked], bool]:
     """Return the unchanged scene, the explanation that is chosen, all in order, and whether nothing is left."""
     right = explain(predictor, ())
+    pairs_of_pixels = predictor.pairs(right.guess)
     there = [hypothesis for hypothesis in HYPOTHESES if hypothesis.applies(predictor)]
     cheap = [hypothesis for hypothesis in there if not hypothesis.costly]
     singles = _explained(predictor, cheap, progress, (0.0, 0.5))
     chosen = _best(right, singles, pixel)
-    if not is_explained(chosen) or (chosen is right and right.error > LEFT):
+    if not is_explained(chosen, pairs_of_pixels) or (chosen is right and right.error > LEFT):
         costly = [hypothesis for hypothesis in there if hypothesis.costly]
         singles += _explained(predictor, costly, progress, (0.5, 0.75))
         chosen = _best(right, singles, pixel)
     pairs: list[Explanation] = []
-    if not is_explained(chosen):
+    if not is_explained(chosen, pairs_of_pixels):
         pairs = _pairs(predictor, right, singles, there, pixel, progress)
         best = _best(right, [chosen, *pairs] if chosen.hypotheses else pairs, pixel)
         if best.error < _BETTER * chosen.error:
@@ -217,7 +218,7 @@ def _ranked(
     elif len(chosen.hypotheses) == 1:
         # Between explanations that leave the same, the one with fewer numbers comes first.
         rows.sort(key=lambda row: row.name != chosen.hypotheses[0].name)
-    return right, chosen, rows, is_explained(chosen) or gains(chosen, right)
+    return right, chosen, rows, is_explained(chosen, pairs_of_pixels) or gains(chosen, right)
 
 
 def _explained(

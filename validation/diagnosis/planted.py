@@ -24,7 +24,7 @@ from reference.scene.read import TruthScene, read_truth
 from reference.storage.exr import Image
 from validation.comparison.engine_layers import truth_layer
 from validation.diagnosis.diagnose import diagnose_image
-from validation.diagnosis.encoding import filmic, srgb
+from validation.diagnosis.encoding import agx, blender_filmic, filmic, srgb
 from validation.diagnosis.prediction import Scenery, changed_scene
 from validation.scenes.loading import load_scene
 
@@ -141,6 +141,15 @@ def _shadowless(truth: TruthScene) -> Array | None:
     return total.reshape(truth.height, truth.width, 3)
 
 
+def _darker_corners(truth: TruthScene) -> Array:
+    """Return an image as a lens shows it: dimmed by the fourth power of the cosine, here 1/sqrt(1 + tan^2)."""
+    width, height = truth.width, truth.height
+    half = np.tan(0.5 * np.deg2rad(float(mi.traverse(truth.scene.sensors()[0])["x_fov"][0])))
+    column, row = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    across, along = half * (2 * column / width - 1), half * (2 * row - height) / width
+    return _total(_quadrature(truth)) / (1 + across**2 + along**2)[..., None] ** 2
+
+
 def _clamped(image: Array) -> Array | None:
     return np.minimum(image, np.quantile(image[image > 0], 0.9))
 
@@ -174,6 +183,10 @@ PLANTED = (
     Planted("transfer", "gamma 2.2", _of_image(lambda image: image ** (1 / 2.2))),
     Planted("clamp", "a tenth cut off", _of_image(_clamped)),
     Planted("tone-map", "filmic", _of_image(filmic)),
+    Planted("tone-map", "Blender's Filmic", _of_image(blender_filmic)),
+    Planted("tone-map", "Blender's AgX", _of_image(agx)),
+    Planted("black-level", "a twentieth of the mean added", _of_image(lambda image: image + 0.05 * image.mean())),
+    Planted("vignette", "corners darker by cos^4", _darker_corners),
     Planted("channels", "B, G, R", _of_image(_swapped)),
 )
 

@@ -13,7 +13,9 @@ from validation.fit.image_model import ImageModel, Task, image_model
 from validation.fog_model.fog import Fog
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
+APART = 2  #: pixels between those whose errors are compared: a filter that is wider than a pixel joins neighbours
 _MOST_RAYS = 3000
 _FLOOR = 0.01  # of the mean of an image: below it values count relative to this
 
@@ -69,6 +71,7 @@ class Predictor:
             self._models[scenery] = image_model(
                 replace(self.task, truth=truth),
                 most=self.most,
+                apart=APART,
                 shadows=scenery.shadows,
                 offset=scenery.offset,
                 zoom=scenery.zoom,
@@ -76,6 +79,24 @@ class Predictor:
                 blend=scenery.blend,
             )
         return self._models[scenery]
+
+    def pairs(self, guess: Guess) -> tuple[Index, Index]:
+        """Return which values belong to pixels and which to their neighbours, those of the next columns if it can be.
+
+        Returns
+        -------
+        tuple of numpy.ndarray
+            Two arrays of numbers of rows of `errors`.
+        """
+        pixels, width = self.model(guess.scenery).pixels, self.shape[1]
+        for apart in (1, APART) if len(pixels) == self.task.used.sum() else (APART,):
+            partner = np.searchsorted(pixels, pixels + apart)
+            row = np.flatnonzero(partner < len(pixels))
+            partner = partner[row]
+            there = (pixels[partner] == pixels[row] + apart) & (pixels[row] % width + apart < width)
+            if there.any():
+                return row[there], partner[there]
+        return np.empty(0, np.int64), np.empty(0, np.int64)
 
     def predicted(self, guess: Guess) -> Array:
         """Return the values of the pixels, (m, 3)."""
@@ -91,7 +112,7 @@ class Predictor:
             radiance = change(radiance)
         return radiance
 
-    def _cosines(self, pixels: NDArray[np.int64]) -> Array:
+    def _cosines(self, pixels: Index) -> Array:
         """Return the cosines of pixels to the axis of the camera, (m,)."""
         truth = self.task.truth
         return np.asarray(truth.direction[pixels] @ camera_matrix(truth.scene.sensors()[0])[:3, 2])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from reference.quadrature.light_points import PointPlan, light_points, square_points
 from reference.quadrature.surface import SurfaceHits, surface_hits
 from reference.scene.area_light import TruthAreaLight, is_area
-from reference.scene.camera import film_directions, pixel_centres
+from reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from reference.scene.directional_light import DirectionalLight, is_directional
 from reference.scene.read import TruthLight, TruthScene
 from reference.scene.shapes import read_shapes
@@ -89,12 +89,15 @@ def scattering_paths(
     how: dict[str, Any] = {"shapes": shapes if shadows else None}
     sources = light_sources(truth, points, seed, radius)
     lights = []
-    for number, source in enumerate(sources):
+    for number, given in enumerate(sources):
+        source = _spots_whole_within(given, blend) if blend else given
         nodes = [_nodes(open_rays, light, hits.distance, how) for light in source.lights] if airlight else []
         lit = [surface_points(rays, light, hits, shadows=shadows) for light in source.lights] if surface else []
         if blend:
-            nodes = [_blended(part, light, blend) for part, light in zip(nodes, source.lights, strict=True)]
-            lit = [_blended_surface(part, light, blend) for part, light in zip(lit, source.lights, strict=True)]
+            pairs = list(zip(nodes, source.lights))
+            nodes = [replace(part, weight=part.weight * _blended(part.towards, light)) for part, light in pairs]
+            points = list(zip(lit, source.lights))
+            lit = [replace(p, radiance=p.radiance * _blended(p.towards, light)[:, None]) for p, light in points]
         lights.append(_light_paths(source.name, source.intensity, nodes, lit, len(truth.media) + 1))
         if progress is not None:
             progress((number + 1) / len(sources), "lit intervals")
@@ -104,6 +107,7 @@ def scattering_paths(
         ray_pixel=np.repeat(np.arange(len(pixels)), max(1, rays_per_side) ** 2),
         rays_per_pixel=max(1, rays_per_side) ** 2,
         direction=directions,
+        axis=camera_matrix(truth.scene.sensors()[0])[:3, 2],
         media=(truth.medium, *truth.media),
         media_names=("medium", *(medium.name for medium in truth.media)),
         lights=tuple(lights),
@@ -167,31 +171,25 @@ def _as_sphere(name: str, light: TruthLight, points: int, seed: int, radius: flo
     return Source(name, 4 * light.intensity / points, light_points(wide, square_points(plan, 0, 0, "sphere")))
 
 
-def blended_edge(towards: Array, light: TruthLight | DirectionalLight, blend: float) -> Array:
-    """Return what Blender's `spot_blend` leaves of a spot's intensity: smoothstep of the cosine, (n,).
+def _spots_whole_within(source: "Source", blend: float) -> "Source":
+    """Return a light whose spots end their full intensity where that of Blender's `spot_blend` ends, a kink."""
 
-    Parameters
-    ----------
-    towards
-        Unit vectors from the light, (n, 3).
-    light
-        The light; others than spots stay as they are.
-    blend
-        Share of 1 - cos(cut-off) that the edge takes, from the cut-off inwards.
-    """
+    def spot(light: TruthLight | DirectionalLight) -> TruthLight | DirectionalLight:
+        if isinstance(light, DirectionalLight) or light.axis is None:
+            return light
+        return replace(light, beam=float(np.arccos(blend + (1 - blend) * np.cos(light.cutoff))))
+
+    return replace(source, lights=[spot(light) for light in source.lights])
+
+
+def _blended(towards: Array, light: TruthLight | DirectionalLight) -> Array:
+    """Return Blender's edge over that of a spot with the same ends, (n,): smoothstep of the cosine, linear in angle."""
     if isinstance(light, DirectionalLight) or light.axis is None:
         return np.ones(len(towards))
-    outermost = np.cos(light.cutoff)
-    share = np.clip((towards @ light.axis - outermost) / ((1 - outermost) * blend), 0.0, 1.0)
-    return np.asarray(share * share * (3 - 2 * share))
-
-
-def _blended(nodes: Nodes, light: TruthLight | DirectionalLight, blend: float) -> Nodes:
-    return replace(nodes, weight=nodes.weight * blended_edge(nodes.towards, light, blend))
-
-
-def _blended_surface(points: SurfacePoints, light: TruthLight | DirectionalLight, blend: float) -> SurfacePoints:
-    return replace(points, radiance=points.radiance * blended_edge(points.towards, light, blend)[:, None])
+    cosine = np.clip(towards @ light.axis, -1.0, 1.0)
+    share = np.clip((cosine - np.cos(light.cutoff)) / (np.cos(light.beam) - np.cos(light.cutoff)), 0.0, 1.0)
+    linear = np.clip((light.cutoff - np.arccos(cosine)) / (light.cutoff - light.beam), 0.0, 1.0)
+    return np.divide(share * share * (3 - 2 * share), linear, out=np.zeros(len(cosine)), where=linear > 0)
 
 
 def _nodes(truth: TruthScene, light: TruthLight | DirectionalLight, distance: Array, how: dict[str, Any]) -> Nodes:
