@@ -194,8 +194,12 @@ def _ranked(
     chosen = _best(right, singles, pixel)
     if not is_explained(chosen, pairs_of_pixels) or (chosen is right and right.error > LEFT):
         costly = [hypothesis for hypothesis in there if hypothesis.costly]
-        singles += _explained(predictor, costly, progress, (0.5, 0.75))
-        chosen = _best(right, singles, pixel)
+        for number, hypothesis in enumerate(costly):
+            share = 0.5 + 0.25 * number / len(costly)
+            singles += _explained(predictor, [hypothesis], progress, (share, share))
+            chosen = _best(right, singles, pixel)
+            if chosen.error <= LEFT and gains(chosen, right):
+                break  # nothing is left that another one could explain
     pairs: list[Explanation] = []
     if not is_explained(chosen, pairs_of_pixels):
         pairs = _pairs(predictor, right, singles, there, pixel, progress)

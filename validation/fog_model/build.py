@@ -3,6 +3,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import mitsuba as mi
@@ -94,10 +95,11 @@ def scattering_paths(
         nodes = [_nodes(open_rays, light, hits.distance, how) for light in source.lights] if airlight else []
         lit = [surface_points(rays, light, hits, shadows=shadows) for light in source.lights] if surface else []
         if blend:
-            pairs = list(zip(nodes, source.lights))
-            nodes = [replace(part, weight=part.weight * _blended(part.towards, light)) for part, light in pairs]
-            points = list(zip(lit, source.lights))
-            lit = [replace(p, radiance=p.radiance * _blended(p.towards, light)[:, None]) for p, light in points]
+            edges = [partial(_blended, light=light) for light in source.lights]
+            nodes = [replace(part, weight=part.weight * edge(part.towards)) for part, edge in zip(nodes, edges)]
+            lit = [
+                replace(part, radiance=part.radiance * edge(part.towards)[:, None]) for part, edge in zip(lit, edges)
+            ]
         lights.append(_light_paths(source.name, source.intensity, nodes, lit, len(truth.media) + 1))
         if progress is not None:
             progress((number + 1) / len(sources), "lit intervals")
