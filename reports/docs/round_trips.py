@@ -19,17 +19,20 @@ RECORD = "docs/data/cycles-faults.json"
 _PAGE = "docs/diagnosis.md"
 _BEGIN, _END = "<!-- cycles: begin -->\n", "<!-- cycles: end -->"
 _EXAMPLE = "docs/examples/cycles_faults.py"
-_SCENES = {"sphere-spot": "sphere-spot", "open-fog": "open-fog", "lobe-fog": "docs/examples/lobe-fog.xml"}
+#: Scenes that are rendered, and how to load them.
+SCENES = {"sphere-spot": "sphere-spot", "open-fog": "open-fog", "lobe-fog": "docs/examples/lobe-fog.xml"}
 _SIZE = (160, 120)
 
 
-def answers(folder: Path, *, python: str | None, samples: int, root: Path = ROOT) -> list[dict[str, Any]]:
-    """Render what is missing in a folder, diagnose all of it, and return a row for each image.
+def answers(name: str, folder: Path, *, python: str | None, samples: int, root: Path = ROOT) -> list[dict[str, Any]]:
+    """Render what is missing of a scene, diagnose all of it, and return a row for each image.
 
     Parameters
     ----------
+    name
+        Of `SCENES`.
     folder
-        With a folder of images for each scene.
+        Of its images; `faults.json` beside it says what was planted, if `python` is None.
     python
         An interpreter that has `bpy`; None: only images that are there are diagnosed.
     samples
@@ -39,36 +42,34 @@ def answers(folder: Path, *, python: str | None, samples: int, root: Path = ROOT
     """
     from validation.diagnosis.diagnose import diagnose_file
 
-    faults = (
-        json.loads((folder / "faults.json").read_text(encoding="utf-8")) if python is None else _listed(python, root)
-    )
+    scene = str(root / SCENES[name]) if SCENES[name].endswith(".xml") else SCENES[name]
+    if python is None:
+        faults = json.loads((folder.parent / "faults.json").read_text(encoding="utf-8"))
+    else:
+        faults = _listed(python, root)
+        render_faults(python, scene, folder, samples=samples, size=_SIZE, root=root)
     rows = []
-    for name, scene in _SCENES.items():
-        place = str(root / scene) if scene.endswith(".xml") else scene
-        if python is not None:
-            render_faults(python, place, folder / name, samples=samples, size=_SIZE, root=root)
-        for fault, said in faults.items():
-            path = folder / name / f"{fault}.exr"
-            if path.exists():
-                found = diagnose_file(path, place, pixel="area")
-                first = found.ranked[0]
-                rows.append(
-                    {
-                        "scene": name,
-                        "fault": fault,
-                        **said,
-                        "first": found.first,
-                        "right": found.first == said["planted"],
-                        "says": first.words,
-                        "together": list(first.together),
-                        "residual": found.residual,
-                        "left": found.left,
-                    }
-                )
-                print(
-                    f"{name} {fault}: {found.first}, {100 * found.residual:.3g} % -> {100 * found.left:.3g} %",
-                    flush=True,
-                )
+    for fault, said in faults.items():
+        path = folder / f"{fault}.exr"
+        if not path.exists():
+            continue  # a scene that cannot have it
+        diagnosis = diagnose_file(path, scene, pixel="area")
+        first = diagnosis.ranked[0]
+        rows.append(
+            {
+                "scene": name,
+                "fault": fault,
+                **said,
+                "first": diagnosis.first,
+                "right": diagnosis.first == said["planted"],
+                "says": first.words,
+                "together": list(first.together),
+                "residual": diagnosis.residual,
+                "left": diagnosis.left,
+            }
+        )
+        off, left = _percent(diagnosis.residual), _percent(diagnosis.left)
+        print(f"{name}, {fault}: {diagnosis.first}, {off} off, {left} left", flush=True)
     return rows
 
 
@@ -165,6 +166,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--images", type=Path, help="folder of images, one folder for each scene")
     parser.add_argument("--python", help="an interpreter that has `bpy`; without it only what is there is diagnosed")
     parser.add_argument("--samples", type=int, default=192, help="paths per pixel")
+    parser.add_argument("--scenes", nargs="*", choices=SCENES, default=list(SCENES), help="others keep their rows")
     chosen = parser.parse_args(arguments)
     if chosen.images is not None:
         from datetime import UTC, datetime
@@ -172,9 +174,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         from reports.machine.environment import activate
 
         activate()
-        rows = answers(chosen.images, python=chosen.python, samples=chosen.samples)
-        record = {"measured": f"{datetime.now(UTC):%Y-%m-%d}", "blender": "5.0.1", "rows": rows}
-        write_text(ROOT / RECORD, json.dumps(record, indent=1, ensure_ascii=False) + "\n")
+        for name in chosen.scenes:
+            rows = answers(name, chosen.images / name, python=chosen.python, samples=chosen.samples)
+            kept = json.loads((ROOT / RECORD).read_text(encoding="utf-8"))["rows"] if (ROOT / RECORD).exists() else []
+            rows += [row for row in kept if row["scene"] != name]
+            rows.sort(key=lambda row: list(SCENES).index(row["scene"]))
+            record = {"measured": f"{datetime.now(UTC):%Y-%m-%d}", "blender": "5.0.1", "rows": rows}
+            write_text(ROOT / RECORD, json.dumps(record, indent=1, ensure_ascii=False) + "\n")
     write_text(ROOT / _PAGE, current_page())
 
 

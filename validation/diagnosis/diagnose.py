@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
 from analytic.errors import InputError
 from reference.monte_carlo.batches import LAYERS
@@ -55,6 +56,7 @@ _ALIKE = 5.0  # evidence by which explanations may differ and still be as good a
 _SHOWN = 8
 _BATCH = 4  # batches of 16 paths a pixel for the light of multiple scattering
 _SAMPLES = 16
+_SMOOTH = 40  # of the width of an image: the width of the filter for that light
 
 
 @dataclass(frozen=True)
@@ -318,4 +320,7 @@ def _multiple_light(truth: TruthScene) -> Array | None:
     for seed in range(_BATCH):
         whole, single = (volpath_batch(truth, seed, _SAMPLES, max_depth=depth).mean for depth in (64, 2))
         parts.append((whole - single)[[LAYERS.index(layer) for layer in ("airlight", "surface")]])
-    return np.asarray(np.mean(parts, axis=0))
+    image = np.mean(parts, axis=0).reshape(2, truth.height, truth.width, 3)
+    # Light of higher orders is smooth but for edges, and noisy.
+    width = truth.width / _SMOOTH
+    return np.asarray(gaussian_filter(image, (0, width, width, 0)).reshape(2, -1, 3))
