@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from validation.comparison.whole_image import SRGB, channel_order, to_srgb
 from validation.diagnosis.hypothesis import Hypothesis, Parameter
 from validation.diagnosis.prediction import Guess, Predictor
 
@@ -22,15 +23,9 @@ def _values(change: Any) -> Any:
     return changed
 
 
-def srgb(radiance: Array) -> Array:
-    """Return values encoded by IEC 61966-2-1."""
-    linear = np.maximum(radiance, 0.0)
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-
-
 def srgb_in_8_bits(radiance: Array) -> Array:
     """Return what is left of values that were written in 8 bits by that curve, as numbers from 0 to 1."""
-    return np.round(255 * np.clip(srgb(radiance), 0.0, 1.0)) / 255
+    return np.round(255 * np.clip(to_srgb(radiance), 0.0, 1.0)) / 255
 
 
 def gamma(radiance: Array, exponent: float) -> Array:
@@ -83,7 +78,7 @@ def agx(radiance: Array) -> Array:
     """Return Blender's view transform AgX, which it begins with."""
     encoded = _by_stops(_AGX, radiance @ _AGX_BEFORE.T)
     linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
-    return np.clip(srgb(linear @ _AGX_AFTER.T), 0.0, 1.0)
+    return np.clip(to_srgb(linear @ _AGX_AFTER.T), 0.0, 1.0)
 
 
 def _top(predictor: Predictor) -> float:
@@ -114,16 +109,13 @@ def _coloured(predictor: Predictor) -> bool:
     return bool(np.ptp(np.nan_to_num(values), axis=1).max() > 1e-6 * np.nanmax(np.abs(values)))
 
 
-def _order(order: tuple[int, ...]) -> Any:
-    return _values(lambda radiance: radiance[:, list(order)])
-
-
-def _letters(order: tuple[int, ...]) -> str:
-    return ", ".join("RGB"[channel] for channel in order)
+def _order(order: tuple[int, ...]) -> Hypothesis:
+    words, change = channel_order(order)
+    return Hypothesis("channels", "values", f"the image is {words}", _values(change), applies=_coloured)
 
 
 ENCODING = (
-    Hypothesis("transfer", "values", "the values are encoded by the sRGB curve: write linear ones", _values(srgb)),
+    Hypothesis("transfer", "values", f"the image is {SRGB}", _values(to_srgb)),
     Hypothesis("transfer", "values", "the values were written in 8 bits by the sRGB curve", _values(srgb_in_8_bits)),
     Hypothesis(
         "transfer",
@@ -140,13 +132,13 @@ ENCODING = (
         "tone-map",
         "values",
         "the values went through the tone curve x/(1 + x), then the sRGB curve",
-        _values(lambda radiance: srgb(reinhard(radiance))),
+        _values(lambda radiance: to_srgb(reinhard(radiance))),
     ),
     Hypothesis(
         "tone-map",
         "values",
         "the values went through a filmic (ACES) tone curve, then the sRGB curve",
-        _values(lambda radiance: srgb(filmic(radiance))),
+        _values(lambda radiance: to_srgb(filmic(radiance))),
     ),
     Hypothesis(
         "tone-map", "values", "the values went through Blender's view transform Filmic", _values(blender_filmic)
@@ -160,11 +152,5 @@ ENCODING = (
         (Parameter("level", 1e-30, 1e30, (1.0,), logarithmic=True),),
         begin=_darkest,
     ),
-    *(
-        Hypothesis(
-            "channels", "values", f"the channels are in the order {_letters(order)}", _order(order), applies=_coloured
-        )
-        for order in permutations(range(3))
-        if order != (0, 1, 2)
-    ),
+    *(_order(order) for order in permutations(range(3)) if order != (0, 1, 2)),
 )

@@ -70,10 +70,14 @@ def _lobe(fog: Fog, g: float) -> Fog:
     return replace(fog, g=(g,) * len(fog.g))
 
 
-def _unit(fog: Fog, factor: float) -> Fog:
-    """Return what lengths times a factor make of it: airlight and surfaces fall as its square, paths grow with it."""
-    scaled = _extinction(fog, factor)
-    return replace(scaled, exposure=_colour([value / factor**2 for value in scaled.exposure]))
+def _unit(predictor: Predictor, guess: Guess, p: tuple[float, ...]) -> Guess:
+    """Return what lengths times a factor make of it: paths grow with it, and light from points falls as its square.
+
+    Irradiance and radiance, of lights that are far or have extent, are what they were.
+    """
+    near = len(predictor.task.truth.lights)
+    intensity = (value / p[0] ** 2 if light < near else value for light, value in enumerate(guess.fog.intensity))
+    return replace(guess, fog=replace(_extinction(guess.fog, p[0]), intensity=tuple(intensity)))
 
 
 def _multiple(predictor: Predictor, guess: Guess, p: tuple[float, ...]) -> Guess:
@@ -192,7 +196,7 @@ MEDIUM = (
         "unit-length",
         "medium",
         "lengths are {0:.4g} times what they should be: another unit of length",
-        _fog(_unit),
+        _unit,
         (Parameter("factor", 1e-4, 1e4, (0.01, 100.0, 0.1, 10.0, 0.3048, 3.2808, 0.001, 1000.0), logarithmic=True),),
     ),
     # Where the fog before it is dark, a near plane is a factor with all digits of one that engines have.

@@ -88,6 +88,8 @@ def scattering_paths(
     hits = SurfaceHits(exact_distance(rays, hits.interaction, hits.distance, shapes), hits.interaction)
     open_rays = rays if shadows else replace(rays, occluders=mi.load_dict({"type": "scene"}))
     how: dict[str, Any] = {"shapes": shapes if shadows else None}
+    if shapes.others is None:
+        how["checks"] = 0  # intervals by geometry are what they are: random checks only say how far to trust them
     sources = light_sources(truth, points, seed, radius)
     lights = []
     for number, given in enumerate(sources):
@@ -99,6 +101,14 @@ def scattering_paths(
             nodes = [replace(part, weight=part.weight * edge(part.towards)) for part, edge in zip(nodes, edges)]
             lit = [
                 replace(part, radiance=part.radiance * edge(part.towards)[:, None]) for part, edge in zip(lit, edges)
+            ]
+        if source.centre is not None:
+            nodes = [
+                replace(part, weight=part.weight / _level(part, at, source)) for part, at in zip(nodes, source.lights)
+            ]
+            lit = [
+                replace(part, radiance=part.radiance / _level(part, at, source)[:, None])
+                for part, at in zip(lit, source.lights)
             ]
         lights.append(_light_paths(source.name, source.intensity, nodes, lit, len(truth.media) + 1))
         if progress is not None:
@@ -133,6 +143,7 @@ class Source:
     name: str  #: its id
     intensity: Array  #: what multiplies the paths from it, (3,)
     lights: Sequence[TruthLight | DirectionalLight]  #: that stand for it
+    centre: Array | None = None  #: of a sphere, (3,) [m]
 
 
 def light_sources(truth: TruthScene, points: int = _POINTS, seed: int = 0, radius: float = 0.0) -> list[Source]:
@@ -156,6 +167,7 @@ def light_sources(truth: TruthScene, points: int = _POINTS, seed: int = 0, radiu
             light.name,
             light.radiance * light.area / points,
             light_points(light, square_points(plan, number, 0, light.kind)),
+            light.centre if light.kind == "sphere" else None,
         )
         for number, light in enumerate(truth.area)
     ]
@@ -170,14 +182,30 @@ def _as_sphere(name: str, light: TruthLight, points: int, seed: int, radius: flo
     """
     plan = PointPlan(most=points, seed=seed)
     wide = TruthAreaLight("sphere", light.position, np.eye(3), np.full(2, radius), np.zeros(3), False, None)
-    return Source(name, 4 * light.intensity / points, light_points(wide, square_points(plan, 0, 0, "sphere")))
+    return Source(
+        name, 4 * light.intensity / points, light_points(wide, square_points(plan, 0, 0, "sphere")), light.position
+    )
+
+
+def _level(points: Nodes | SurfacePoints, light: TruthLight | DirectionalLight, sphere: Source) -> Array:
+    """Return what the points on a sphere together send its way, as a multiple of what the sphere sends there, (n,).
+
+    Seen from afar along d, N points with the normals n_i send 4/N sum max(n_i . d, 0) of the sphere's intensity, which
+    is 1 for many points and 10 % off for sixteen.
+    """
+    if not isinstance(light, TruthLight) or sphere.centre is None:
+        return np.ones(len(points.r))
+    way = light.position - sphere.centre + points.r[:, None] * points.towards
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    normals = np.stack([np.asarray(each.axis) for each in sphere.lights if isinstance(each, TruthLight)])
+    return np.asarray(4 * np.maximum(way @ normals.T, 0).mean(axis=1))
 
 
 def _spots_whole_within(source: "Source", blend: float) -> "Source":
     """Return a light whose spots end their full intensity where that of Blender's `spot_blend` ends, a kink."""
 
     def spot(light: TruthLight | DirectionalLight) -> TruthLight | DirectionalLight:
-        if isinstance(light, DirectionalLight) or light.axis is None:
+        if isinstance(light, DirectionalLight) or light.axis is None or light.cosine:
             return light
         return replace(light, beam=float(np.arccos(blend + (1 - blend) * np.cos(light.cutoff))))
 
@@ -186,7 +214,7 @@ def _spots_whole_within(source: "Source", blend: float) -> "Source":
 
 def _blended(towards: Array, light: TruthLight | DirectionalLight) -> Array:
     """Return Blender's edge over that of a spot with the same ends, (n,): smoothstep of the cosine, linear in angle."""
-    if isinstance(light, DirectionalLight) or light.axis is None:
+    if isinstance(light, DirectionalLight) or light.axis is None or light.cosine:
         return np.ones(len(towards))
     cosine = np.clip(towards @ light.axis, -1.0, 1.0)
     share = np.clip((cosine - np.cos(light.cutoff)) / (np.cos(light.beam) - np.cos(light.cutoff)), 0.0, 1.0)

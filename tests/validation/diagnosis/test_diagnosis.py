@@ -11,9 +11,10 @@ from analytic.errors import InputError
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_truth
 from reference.storage.exr import Image, write_exr
+from validation.comparison.whole_image import to_srgb
 from validation.diagnosis.diagnose import HYPOTHESES, diagnose_file, diagnose_image
 from validation.diagnosis.diagnosis_text import diagnosis_lines
-from validation.diagnosis.encoding import gamma, srgb, srgb_in_8_bits
+from validation.diagnosis.encoding import gamma, srgb_in_8_bits
 from validation.diagnosis.planted import PLANTED
 from validation.diagnosis.prediction import Scenery, changed_scene
 from validation.fog_model.build import scattering_paths
@@ -168,7 +169,7 @@ def test_every_hypothesis_has_a_name_a_kind_and_words_for_its_numbers():
 
 def test_encodings_are_what_their_standards_say():
     values = np.array([[0.0, 0.0031308, 0.18]])
-    assert srgb(values) == pytest.approx(np.array([[0.0, 0.04045, 0.461356]]), abs=1e-5)
+    assert to_srgb(values) == pytest.approx(np.array([[0.0, 0.04045, 0.461356]]), abs=1e-5)
     assert srgb_in_8_bits(values) * 255 == pytest.approx(np.array([[0, 10, 118]]))
     assert gamma(np.array([[0.25]]), 2.0) == pytest.approx(np.array([[0.5]]))
 
