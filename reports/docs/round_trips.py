@@ -10,7 +10,7 @@ it only draws the table.
 import argparse
 import json
 import subprocess
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +24,10 @@ SCENES = {"sphere-spot": "sphere-spot", "open-fog": "open-fog", "lobe-fog": "doc
 _SIZE = (160, 120)
 
 
-def answers(name: str, folder: Path, *, python: str | None, samples: int, root: Path = ROOT) -> list[dict[str, Any]]:
-    """Render what is missing of a scene, diagnose all of it, and return a row for each image.
+def answers(
+    name: str, folder: Path, *, python: str | None, samples: int, root: Path = ROOT
+) -> Iterator[dict[str, Any]]:
+    """Render what is missing of a scene, diagnose all of it, and yield a row for each image.
 
     Parameters
     ----------
@@ -48,29 +50,25 @@ def answers(name: str, folder: Path, *, python: str | None, samples: int, root: 
     else:
         faults = _listed(python, root)
         render_faults(python, scene, folder, samples=samples, size=_SIZE, root=root)
-    rows = []
     for fault, said in faults.items():
         path = folder / f"{fault}.exr"
         if not path.exists():
             continue  # a scene that cannot have it
         diagnosis = diagnose_file(path, scene, pixel="area")
         first = diagnosis.ranked[0]
-        rows.append(
-            {
-                "scene": name,
-                "fault": fault,
-                **said,
-                "first": diagnosis.first,
-                "right": diagnosis.first == said["planted"],
-                "says": first.words,
-                "together": list(first.together),
-                "residual": diagnosis.residual,
-                "left": diagnosis.left,
-            }
-        )
         off, left = _percent(diagnosis.residual), _percent(diagnosis.left)
         print(f"{name}, {fault}: {diagnosis.first}, {off} off, {left} left", flush=True)
-    return rows
+        yield {
+            "scene": name,
+            "fault": fault,
+            **said,
+            "first": diagnosis.first,
+            "right": diagnosis.first == said["planted"],
+            "says": first.words,
+            "together": list(first.together),
+            "residual": diagnosis.residual,
+            "left": diagnosis.left,
+        }
 
 
 def render_faults(
@@ -175,12 +173,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
         activate()
         for name in chosen.scenes:
-            rows = answers(name, chosen.images / name, python=chosen.python, samples=chosen.samples)
-            kept = json.loads((ROOT / RECORD).read_text(encoding="utf-8"))["rows"] if (ROOT / RECORD).exists() else []
-            rows += [row for row in kept if row["scene"] != name]
-            rows.sort(key=lambda row: list(SCENES).index(row["scene"]))
-            record = {"measured": f"{datetime.now(UTC):%Y-%m-%d}", "blender": "5.0.1", "rows": rows}
-            write_text(ROOT / RECORD, json.dumps(record, indent=1, ensure_ascii=False) + "\n")
+            for row in answers(name, chosen.images / name, python=chosen.python, samples=chosen.samples):
+                kept = (
+                    json.loads((ROOT / RECORD).read_text(encoding="utf-8"))["rows"] if (ROOT / RECORD).exists() else []
+                )
+                rows = [each for each in kept if (each["scene"], each["fault"]) != (name, row["fault"])] + [row]
+                rows.sort(key=lambda each: list(SCENES).index(each["scene"]))
+                record = {"measured": f"{datetime.now(UTC):%Y-%m-%d}", "blender": "5.0.1", "rows": rows}
+                write_text(ROOT / RECORD, json.dumps(record, indent=1, ensure_ascii=False) + "\n")
     write_text(ROOT / _PAGE, current_page())
 
 

@@ -92,6 +92,11 @@ def _near(predictor: Predictor, guess: Guess, p: tuple[float, ...]) -> Guess:
     return replace(guess, fog=replace(guess.fog, near=p[0]))
 
 
+def _exact_near(predictor: Predictor, guess: Guess, p: tuple[float, ...]) -> Guess:
+    near = float(f"{p[0]:.4g}")
+    return replace(guess, fog=replace(guess.fog, near=near), scenery=replace(guess.scenery, near=near))
+
+
 def _usual_near(distance: float) -> Any:
     return lambda predictor, guess, p: replace(guess, fog=replace(guess.fog, near=distance))
 
@@ -216,6 +221,16 @@ MEDIUM = (
         "the medium is missing up to {0:.4g} m before the camera: its near plane",
         _near,
         (Parameter("distance", 0.0, np.inf, (0.05, 0.2, 0.5, 1.0), unit="m"),),
+        applies=_surrounds,
+    ),
+    # The same without the steps that whole nodes make.
+    Hypothesis(
+        "near-plane",
+        "medium",
+        "the medium is missing up to {0:.4g} m before the camera: its near plane",
+        _exact_near,
+        (Parameter("distance", 0.0, np.inf, (0.1, 0.3, 1.0), step=0.02, unit="m"),),
+        costly=True,
         applies=_surrounds,
     ),
     Hypothesis(

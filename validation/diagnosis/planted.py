@@ -189,7 +189,7 @@ def _in_feet(truth: TruthScene) -> TruthScene:
 
 def _near_plane(truth: TruthScene) -> Array | None:
     """Return None, too, where all that is seen lies behind the plane: the fault is a factor then, exp(sigma_t near)."""
-    images = [_of_model(lambda truth: not truth.media, {"near": near})(truth) for near in (0.7, 0.0)]
+    images = [_of_model(lambda truth: not truth.media, {"near": near}, near=near)(truth) for near in (0.7, 0.0)]
     if images[0] is None or images[1] is None:
         return None
     lit = images[1] > 0

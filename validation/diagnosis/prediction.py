@@ -31,6 +31,7 @@ class Scenery:
     cone: float = 1.0  #: factor on the angles of spots
     edge: str = ""  #: of spots: 'hard', or 'smooth' from the axis on; the scene's own
     radius: float = 0.0  #: of spheres in the place of point lights [m]
+    near: float = 0.0  #: distance along the axis where the medium begins; the fog's own is only that of its nodes [m]
     blend: float = 0.0  #: share of 1 - cos(cut-off) in which spots fall off smoothly, as Blender's do
 
 
@@ -77,6 +78,7 @@ class Predictor:
                 zoom=scenery.zoom,
                 radius=scenery.radius,
                 blend=scenery.blend,
+                near=scenery.near,
             )
         return self._models[scenery]
 

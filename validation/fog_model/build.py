@@ -39,6 +39,7 @@ def scattering_paths(
     zoom: float = 1.0,
     radius: float = 0.0,
     blend: float = 0.0,
+    near: float = 0.0,
     shadows: bool = True,
     airlight: bool = True,
     surface: bool = True,
@@ -65,6 +66,8 @@ def scattering_paths(
         Of spheres that take the place of point lights, of the same intensity [m].
     blend
         Share of 1 - cos(cut-off), from the cut-off inwards, in which spots fall off smoothly, besides their own edge.
+    near
+        Distance along the camera's axis before which point and spot lights have no nodes [m].
     shadows
         False where surfaces hide nothing from the lights.
     airlight, surface
@@ -90,11 +93,13 @@ def scattering_paths(
     how: dict[str, Any] = {"shapes": shapes if shadows else None}
     if shapes.others is None:
         how["checks"] = 0  # intervals by geometry are what they are: random checks only say how far to trust them
+    axis = camera_matrix(truth.scene.sensors()[0])[:3, 2]
+    begin = near / (directions @ axis) if near > 0 else None
     sources = light_sources(truth, points, seed, radius)
     lights = []
     for number, given in enumerate(sources):
         source = _spots_whole_within(given, blend) if blend else given
-        nodes = [_nodes(open_rays, light, hits.distance, how) for light in source.lights] if airlight else []
+        nodes = [_nodes(open_rays, light, hits.distance, how, begin) for light in source.lights] if airlight else []
         lit = [surface_points(rays, light, hits, shadows=shadows) for light in source.lights] if surface else []
         if blend:
             edges = [partial(_blended, light=light) for light in source.lights]
@@ -119,7 +124,7 @@ def scattering_paths(
         ray_pixel=np.repeat(np.arange(len(pixels)), max(1, rays_per_side) ** 2),
         rays_per_pixel=max(1, rays_per_side) ** 2,
         direction=directions,
-        axis=camera_matrix(truth.scene.sensors()[0])[:3, 2],
+        axis=axis,
         media=(truth.medium, *truth.media),
         media_names=("medium", *(medium.name for medium in truth.media)),
         lights=tuple(lights),
@@ -207,7 +212,7 @@ def _spots_whole_within(source: "Source", blend: float) -> "Source":
     def spot(light: TruthLight | DirectionalLight) -> TruthLight | DirectionalLight:
         if isinstance(light, DirectionalLight) or light.axis is None or light.cosine:
             return light
-        return replace(light, beam=float(np.arccos(blend + (1 - blend) * np.cos(light.cutoff))))
+        return replace(light, beam=float(np.arccos(min(blend + (1 - blend) * np.cos(light.cutoff), 1.0))))
 
     return replace(source, lights=[spot(light) for light in source.lights])
 
@@ -222,12 +227,14 @@ def _blended(towards: Array, light: TruthLight | DirectionalLight) -> Array:
     return np.divide(share * share * (3 - 2 * share), linear, out=np.zeros(len(cosine)), where=linear > 0)
 
 
-def _nodes(truth: TruthScene, light: TruthLight | DirectionalLight, distance: Array, how: dict[str, Any]) -> Nodes:
+def _nodes(
+    truth: TruthScene, light: TruthLight | DirectionalLight, distance: Array, how: dict[str, Any], begin: Array | None
+) -> Nodes:
     if isinstance(light, DirectionalLight):
         if not truth.media:
             return _light_paths("", np.zeros(3), [], [], 1).nodes  # nothing scatters
         return directional_nodes(truth, light, distance, how)
-    return point_nodes(truth, light, distance, how)
+    return point_nodes(truth, light, distance, how, begin)
 
 
 def _light_paths(

@@ -173,12 +173,12 @@ def _airlight(light: _DeviceLight, fog: Fog, number: int, channel: int) -> Any:
         source = dr.select(light.medium == medium, value, source)
     r = light.nodes.r if place is None else place.r
     falls = dr.rcp(dr.square(r)) if _is_right(fog) else dr.exp(-fog.distance_power * dr.log(r))
-    strength = (
-        light.strength
-        if _begins(fog)
-        else dr.select(light.nodes.camera[0] >= fog.near * light.nodes.slant, light.strength, 0)
-    )
+    strength = light.strength if _begins(fog) else light.strength * _behind_near(light.nodes, fog)
     return source * strength * falls * _dimmed(light.nodes, fog, channel, place)
+
+
+def _behind_near(nodes: _Legs, fog: Fog) -> Any:
+    return dr.select(nodes.camera[0] >= fog.near * nodes.slant, 1.0, 0.0)
 
 
 def _surface(light: _DeviceLight, fog: Fog, number: int, channel: int) -> Any:
