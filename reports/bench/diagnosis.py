@@ -13,17 +13,18 @@ def print_diagnoses(scenes: list[str] | None, *, size: str | None, json: bool, m
     from reports.machine.progress import progress_bar
     from reports.tables.diagnosis import answers_sentence, answers_table
     from reports.tables.terminal import print_json
+    from validation.frames.result_cache import now
     from validation.scenes.loading import parse_size
-    from validation.scenes.registry import SCENES
+    from validation.scenes.registry import FOG_SCENES
 
     pixels = parse_size(size or _SMALL)
     activate()
     from validation.diagnosis.planted import planted_answers
 
     with progress_bar("bench --diagnosis") as progress:
-        rows = planted_answers(scenes or list(SCENES), pixels, progress=progress)
+        rows = planted_answers(scenes or list(FOG_SCENES), pixels, progress=progress)
     if json:
-        print_json({"environment": describe_environment(), "size": list(pixels), "diagnosis": rows})
+        print_json({"measured": now(), "environment": describe_environment(), "size": list(pixels), "diagnosis": rows})
     else:
         if markdown:
             print_heading()

@@ -6,6 +6,7 @@ Read in this order:
 - `build.py`: runs Sphinx
 - `data.py`: numbers and pictures of a report, and whether they are stale
 - `fidelity.py`: the page of verdicts on papers
+- `diagnosis.py`: the table of planted faults
 - `full_run.py`: the last full run of all tests
 - `live_view.py`: the picture of the live view
 - `round_trips.py`: faults planted in Blender's Cycles, and what the diagnosis said

@@ -194,7 +194,7 @@ def _ranked(
     cheap = [hypothesis for hypothesis in there if not hypothesis.costly]
     singles = _explained(predictor, cheap, progress, (0.0, 0.5))
     chosen = _best(right, singles, pixel)
-    if not is_explained(chosen, pairs_of_pixels) or (chosen is right and right.error > LEFT):
+    if not is_explained(chosen, pairs_of_pixels) or chosen.error > LEFT:
         costly = [hypothesis for hypothesis in there if hypothesis.costly]
         for number, hypothesis in enumerate(costly):
             share = 0.5 + 0.25 * number / len(costly)

@@ -203,6 +203,7 @@ MEDIUM = (
         "lengths are {0:.4g} times what they should be: another unit of length",
         _unit,
         (Parameter("factor", 1e-4, 1e4, (0.01, 100.0, 0.1, 10.0, 0.3048, 3.2808, 0.001, 1000.0), logarithmic=True),),
+        applies=lambda predictor: bool(predictor.task.truth.lights),
     ),
     # Where the fog before it is dark, a near plane is a factor with all digits of one that engines have.
     *(

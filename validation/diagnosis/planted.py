@@ -181,8 +181,13 @@ def _point_lights(truth: TruthScene) -> bool:
     return any(light.axis is None for light in truth.lights)
 
 
-def _in_feet(truth: TruthScene) -> TruthScene:
-    """Return a scene whose lengths are 1/0.3048 times as long, brought back to size: lamps and media are not."""
+def _in_feet(truth: TruthScene) -> TruthScene | None:
+    """Return a scene whose lengths are 1/0.3048 times as long, brought back to size: lamps and media are not.
+
+    Without lamps that is another extinction, and nothing else.
+    """
+    if not truth.lights:
+        return None
     lights = tuple(replace(light, intensity=light.intensity * _FOOT**2) for light in truth.lights)
     return replace(_optics(lambda s, a: (s / _FOOT, a))(truth), lights=lights)
 
@@ -248,10 +253,30 @@ PLANTED = (
 )
 
 
+def _and_then(name: str, words: str, then: str, change: Callable[[Array], Array | None]) -> Planted:
+    """Return a fault of `PLANTED`, by its words, with another one done to its image."""
+    (first,) = (planted for planted in PLANTED if planted.words == words)
+
+    def image(truth: TruthScene) -> Array | None:
+        values = first.image(truth)
+        return None if values is None else change(values)
+
+    return Planted(f"{first.name} and {name}", f"{words}, and {then}", image)
+
+
+PAIRS = (
+    _and_then("factor", "the extinction 1.4 times", "0.7 times as bright", lambda image: 0.7 * image),
+    _and_then("flip", "another g", "upside down", lambda image: image[::-1]),
+    _and_then("transfer", "the way from the light not attenuated", "sRGB", to_srgb),
+    _and_then("channels", "no absorption", "B, G, R", _swapped),
+)  #: two faults of different kinds: a diagnosis should name both
+
+
 def planted_answers(
     scenes: Sequence[str], size: tuple[int, int], *, progress: Progress | None = None
 ) -> list[dict[str, Any]]:
-    """Plant every fault in scenes and return the answers, a row each: 'scene', 'planted', 'words', 'first', 'right'.
+    """Plant every fault in scenes and return the answers, a row each: 'scene', 'planted', 'words', 'first',
+    'answer' with both of two faults, 'pair', 'right'.
 
     Parameters
     ----------
@@ -271,21 +296,24 @@ def planted_answers(
     for number, name in enumerate(scenes):
         loaded = load_scene(name, size)
         truth = read_truth(loaded.scene)
-        for turn, planted in enumerate(PLANTED):
+        for turn, planted in enumerate((*PLANTED, *PAIRS)):
             if progress is not None:
-                share = (number + turn / len(PLANTED)) / len(scenes)
+                share = (number + turn / len((*PLANTED, *PAIRS))) / len(scenes)
                 progress(share, f"{loaded.name}: {planted.words}")
             image = planted.image(truth)
             if image is None:
                 continue
             diagnosis = diagnose_image(Image({_HOLDS: image}), loaded, layer=_HOLDS, pixel="centre")
+            answer = " and ".join(diagnosis.ranked[0].together) or diagnosis.first
             rows.append(
                 {
                     "scene": loaded.name,
                     "planted": planted.name,
                     "words": planted.words,
                     "first": diagnosis.first,
-                    "right": diagnosis.first == planted.name,
+                    "answer": answer,
+                    "pair": planted in PAIRS,
+                    "right": planted.name == (answer if planted in PAIRS else diagnosis.first),
                     "residual": diagnosis.residual,
                     "left": diagnosis.left,
                 }
