@@ -52,7 +52,7 @@ def filmic(radiance: Array) -> Array:
 # Blender's view transforms: a curve of log2(x/0.18) at even places, as Blender 5.0.1 wrote greys into a file.
 _STOPS = np.linspace(-10.0, 6.5, 23)
 _FILMIC = (
-    0.0, 0.003, 0.0074, 0.0136, 0.0224, 0.0348, 0.0522, 0.0764, 0.1095, 0.1538, 0.2113, 0.2833,
+    1.5e-5, 0.003, 0.0074, 0.0136, 0.0224, 0.0348, 0.0522, 0.0764, 0.1095, 0.1538, 0.2113, 0.2833,
     0.3694, 0.4664, 0.5677, 0.6668, 0.7571, 0.8336, 0.8941, 0.9388, 0.9697, 0.9892, 1.0,
 )  # fmt: skip
 _AGX = (

@@ -17,7 +17,7 @@ def images(tmp_path_factory):
     """Return a folder with images of a scene: a right one, and faults of medium, light, camera and values."""
     folder = tmp_path_factory.mktemp("cycles")
     names = ["right", "extinction-0.9", "near-0.1", "spot-half", "linear-falloff", "shift-1", "black-level", "agx"]
-    render_faults(cycles_python(), "sphere-spot", folder, samples=64, size=_SIZE, faults=names)
+    render_faults(cycles_python(), "sphere-spot", folder, samples=256, size=_SIZE, faults=names)
     return folder
 
 
