@@ -83,7 +83,7 @@ def compare(
     Exit status 1 if the test image has values that are negative or not finite, or if the bias is not shown to be within
     the margin.
 
-    --diagnose predicts the image that each of some forty faults would make, of medium, lights, camera and encoding, and
+    --diagnose predicts the image that each of some sixty faults would make, of medium, lights, camera and encoding, and
     ranks them by evidence: what is wrong, by how much, and what is left over. See docs/diagnosis.md.
     """
     from analytic.errors import InputError

@@ -9,9 +9,11 @@ Read in this order:
 - `diagnosis.py`: the table of planted faults
 - `full_run.py`: the last full run of all tests
 - `live_view.py`: the picture of the live view
+- `round_trips.py`: faults planted in Blender's Cycles, and what the diagnosis said
 - `release.py`: one number, a source distribution, a wheel
 - `verification.py`: the page of claims and of the tests that protect them
 
-May import: `analytic`, `reference.storage`, `reports.data`, `reports.machine`, `reports.papers`, `reports.tables`,
-`validation.configurations`, `validation.fidelity`, `validation.frames`, `validation.scenes`.
+May import: `analytic`, `reference.storage`, `reports.data`, `reports.interchange`, `reports.machine`, `reports.papers`,
+`reports.tables`, `validation.configurations`, `validation.diagnosis`, `validation.fidelity`,
+`validation.frames`, `validation.scenes`.
 """

@@ -45,6 +45,10 @@ def _zoom(predictor: Predictor, guess: Guess, p: tuple[float, ...]) -> Guess:
     return replace(guess, scenery=replace(guess.scenery, zoom=float(f"{p[0]:.5g}")))
 
 
+def _vignette(predictor: Predictor, guess: Guess, p: tuple[float, ...]) -> Guess:
+    return replace(guess, vignette=p[0])
+
+
 def _wide(predictor: Predictor) -> bool:
     return predictor.shape[0] != predictor.shape[1]
 
@@ -87,5 +91,12 @@ CAMERA = (
             Parameter("down", -3.0, 3.0, (0.0,), step=0.1, unit="pixels"),
         ),
         begin=_corners,
+    ),
+    Hypothesis(
+        "vignette",
+        "camera",
+        "the image falls off to its corners: a vignette, cos^{0:.3g} of the angle from the camera's axis",
+        _vignette,
+        (Parameter("power", 0.0, 100.0, (4.0, 1.0, 12.0)),),
     ),
 )

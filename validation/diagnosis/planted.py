@@ -25,7 +25,7 @@ from reference.storage.exr import Image
 from validation.comparison.engine_layers import truth_layer
 from validation.comparison.whole_image import to_srgb
 from validation.diagnosis.diagnose import diagnose_image
-from validation.diagnosis.encoding import filmic
+from validation.diagnosis.encoding import agx, blender_filmic, filmic
 from validation.diagnosis.prediction import Scenery, changed_scene
 from validation.fog_model.build import scattering_paths
 from validation.fog_model.fog import scene_fog
@@ -152,6 +152,15 @@ def _shadowless(truth: TruthScene) -> Array | None:
     return total.reshape(truth.height, truth.width, 3)
 
 
+def _darker_corners(truth: TruthScene) -> Array:
+    """Return an image as a lens shows it: dimmed by the fourth power of the cosine, here 1/sqrt(1 + tan^2)."""
+    width, height = truth.width, truth.height
+    half = np.tan(0.5 * np.deg2rad(float(mi.traverse(truth.scene.sensors()[0])["x_fov"][0])))
+    column, row = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    across, along = half * (2 * column / width - 1), half * (2 * row - height) / width
+    return _total(_quadrature(truth)) / (1 + across**2 + along**2)[..., None] ** 2
+
+
 def _of_model(wanted: Callable[[TruthScene], bool], laws: Mapping[str, Any], **how: Any) -> Make:
     """Return a fault of a law that the truth cannot have, or of a light: by sums over nodes, as the hypotheses are."""
 
@@ -185,7 +194,7 @@ def _in_feet(truth: TruthScene) -> TruthScene | None:
 
 def _near_plane(truth: TruthScene) -> Array | None:
     """Return None, too, where all that is seen lies behind the plane: the fault is a factor then, exp(sigma_t near)."""
-    images = [_of_model(lambda truth: not truth.media, {"near": near})(truth) for near in (0.7, 0.0)]
+    images = [_of_model(lambda truth: not truth.media, {"near": near}, near=near)(truth) for near in (0.7, 0.0)]
     if images[0] is None or images[1] is None:
         return None
     lit = images[1] > 0
@@ -236,6 +245,10 @@ PLANTED = (
     Planted("transfer", "gamma 2.2", _of_image(lambda image: image ** (1 / 2.2))),
     Planted("clamp", "a tenth cut off", _of_image(_clamped)),
     Planted("tone-map", "filmic", _of_image(filmic)),
+    Planted("tone-map", "Blender's Filmic", _of_image(blender_filmic)),
+    Planted("tone-map", "Blender's AgX", _of_image(agx)),
+    Planted("black-level", "a twentieth of the mean added", _of_image(lambda image: image + 0.05 * image.mean())),
+    Planted("vignette", "corners darker by cos^4", _darker_corners),
     Planted("channels", "B, G, R", _of_image(_swapped)),
 )
 

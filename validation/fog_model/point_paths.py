@@ -25,7 +25,9 @@ _AT_LIGHT = 1e-290  # height [m] below which a ray meets the light
 _NEAR_ZERO = 1e-15  # height over distance below which a light beside a piece may as well be at this height
 
 
-def point_nodes(truth: TruthScene, light: TruthLight, distance: Array, how: dict[str, Any]) -> Nodes:
+def point_nodes(
+    truth: TruthScene, light: TruthLight, distance: Array, how: dict[str, Any], begin: Array | None = None
+) -> Nodes:
     """Return the nodes of a point or spot light on the lit parts of all rays.
 
     Parameters
@@ -38,10 +40,14 @@ def point_nodes(truth: TruthScene, light: TruthLight, distance: Array, how: dict
         To the visible surface, (rays,) [m].
     how
         What `reference.visibility.lit_intervals.lit_intervals` takes.
+    begin
+        Distance before which a ray has no nodes, (rays,) [m].
     """
     reach = lit_rays(truth, light, distance, how)
     rays = reach.rays
     ray, x0, x1 = lit_stretches(light, rays, reach.lit)
+    if begin is not None:
+        x0 = np.maximum(x0, begin[ray])
     used = x1 > x0
     ray, x0, x1 = ray[used], x0[used], x1[used]
     if reach.segments is None:
