@@ -9,8 +9,8 @@ def bench_stages(scenes: list[str] | None, *, size: str | None, settings, json: 
     from dataclasses import asdict
 
     from realtime.scene.read_scene import read_scene
-    from reports.commands.printing import print_heading, print_notes, print_tables
     from reports.machine.environment import activate, describe_environment
+    from reports.machine.printing import print_heading, print_notes, print_tables
     from reports.machine.progress import counted, part_of, progress_bar
     from reports.tables.cloud_stages import cloud_stages_tables
     from reports.tables.terminal import print_json
