@@ -149,6 +149,11 @@ def _check_clouds(scene: Scene, method: Method) -> None:
     """Refuse clouds and skies where a method does not know them, and where it does what clouds cannot have."""
     features, name = scene.features, method.name
     if not method.renders_clouds:
+        if features.uneven:
+            raise InputError(
+                f"method {name}: the scene has a HeterogeneousMedium, and this method knows homogeneous ones only; use "
+                "cloud-collectors or cloud-octaves"
+            )
         if features.concave:
             raise InputError(
                 f"method {name}: the bounds of the media are not all convex, and these rays cross convex bounds only "

@@ -39,11 +39,26 @@ from realtime.clouds.canonical.tables import canonical_tables
 from realtime.clouds.collectors.orders import OrdersLight, light_of_orders
 from realtime.clouds.collectors.search import Search
 from realtime.clouds.collectors.transport_grid import transport_grid
-from realtime.clouds.light_maps.pyramid import LightMap, length_along_light, light_map, maps_memory
+from realtime.clouds.hypertexture.light_depths import (
+    LightDepths,
+    depths_memory,
+    leg_by_depths,
+    leg_through,
+    light_depths,
+)
+from realtime.clouds.hypertexture.lit_surface import dense_surface, lit_dense_surface
+from realtime.clouds.hypertexture.scattered import light_once, opacity_as_printed, with_densities
+from realtime.clouds.light_maps.pyramid import (
+    LightMap,
+    filtered_map,
+    length_along_light,
+    light_map,
+    maps_memory,
+)
 from realtime.clouds.order_layers import OPACITY, order_layer
 from realtime.clouds.single_scattering.behind import light_on_surfaces, sky_behind
-from realtime.clouds.single_scattering.march import Beam, CloudRays, cloud_rays, exact_leg, scattered
-from realtime.clouds.single_scattering.opacity import opacity_of, printed_opacity
+from realtime.clouds.single_scattering.march import Beam, CloudRays, cloud_rays
+from realtime.clouds.single_scattering.opacity import opacity_of
 from realtime.memory import check_memory
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.method import ErrorCause
@@ -104,6 +119,15 @@ class CollectorParameters(Parameters):
         "map", "the way of the sun's light to a point by the light map, or by cast rays", choices=("map", "exact")
     )
     steps: int = parameter(16, "steps of single scattering along a ray", least=1, most=4096)
+    threshold: float = parameter(
+        0.5,
+        "density, as a share of the largest, from which on a cloud with a grid of densities has its surface",
+        above=0,
+        below=1,
+    )
+    stride: float = parameter(
+        1.0, "longest step through a grid of densities where a ray enters", above=0, most=100, unit="voxels"
+    )
     map: int = map_size(512, "texels on a side of the maps of a sun")
     tolerance: float = tolerance()
 
@@ -124,6 +148,10 @@ class CloudState:
     maps: tuple[LightMap, ...]  #: by sun
     fillings: tuple[Filling, ...]
     left: tuple[Any, ...]  #: by channel, what is left of the extinction of each cloud without the peak [1]
+    stride: Any  #: longest step through a grid of densities [voxels]
+    threshold: Any  #: density at the surface of a cloud with a grid [1]
+    depths: tuple[tuple[LightDepths, ...], ...] = ()  #: by sun and cloud, where clouds have densities
+    body: Any = None  #: by cloud the mean density above the threshold [1]; None where none has densities
 
 
 @dataclass(frozen=True)
@@ -149,16 +177,43 @@ def prepare_collectors(scene: Scene, parameters: CollectorParameters) -> Callabl
         If the maps need more memory than the machine has.
     """
     suns, clouds = len(scene.lights), len(scene.boundaries)
-    needed = suns * clouds * maps_memory(type(scene.camera.origin.x), parameters.map)
+    Float, density = type(scene.camera.origin.x), scene.medium.clouds and scene.medium.clouds.density
+    of_each = maps_memory(Float, parameters.map) + (depths_memory(Float) if density else 0)
+    needed = suns * clouds * of_each
     check_memory(f"map: {parameters.map} texels for {suns} sun(s) and {clouds} cloud(s)", needed, "use a smaller map")
     fillings, left = _fillings(scene, parameters)
     surfaces = cloud_surfaces(scene)
     bodies = [boundary_scene((shape,)) for shape in scene.boundaries]
+    stride, threshold = (dr.opaque(Float, value) for value in (parameters.stride, parameters.threshold))
     cast = Frozen(lambda bodies, lights: tuple(light_map(bodies, light, parameters.map) for light in lights))
 
     def state(scene: Scene) -> CloudState:
-        return CloudState(surfaces, cast(bodies, scene.lights), fillings, left)
+        return CloudState(surfaces, cast(bodies, scene.lights), fillings, left, stride, threshold)
 
+    def marched(scene: Scene) -> CloudState:
+        filled = scene.medium.clouds
+        assert filled is not None
+        depths = tuple(
+            tuple(light_depths(surfaces, filled, light, cloud=cloud, stride=stride) for cloud in range(clouds))
+            for light in scene.lights
+        )
+        settings = {"threshold": parameters.threshold, "stride": stride}
+        maps = tuple(
+            filtered_map(
+                [
+                    lit_dense_surface(surfaces, filled, light, parameters.map, cloud=cloud, **settings)
+                    for cloud in range(clouds)
+                ],
+                light,
+            )
+            for light in scene.lights
+        )
+        return CloudState(surfaces, maps, fillings, left, stride, threshold, depths, body)
+
+    if density:
+        body = Float([density.mean_above(cloud, parameters.threshold) for cloud in range(clouds)])
+        dr.make_opaque(body)
+        return marched
     return state
 
 
@@ -213,7 +268,7 @@ def cloud_collectors(view: View, state: CloudState, lists, *, kernel, parameters
     Color = type(view.medium.albedo)
     rays, thin_rays = _rays(view, state, parameters)
     by_set, kept = [_scattered_once(view, state, thin_rays, parameters), *(Color(0) for _ in SETS)], []
-    entry = _entry(view, rays)
+    entry = _entry(view, state, rays)
     for number, (light, sun) in enumerate(zip(view.lights, state.maps)):
         last = view.carried[number] if view.carried is not None else None
         own = sun.of_cloud(entry.cloud)
@@ -245,7 +300,7 @@ def missed_collectors(view: View, state: CloudState, lists, *, kernel, parameter
     """
     Color, Float = type(view.medium.albedo), type(view.distance)
     rays, thin_rays = _rays(view, state, parameters)
-    entry = _entry(view, rays)
+    entry = _entry(view, state, rays)
     missed, kept = [Float(0) for _ in SETS], []
     for number, sun in enumerate(state.maps):
         last = view.carried[number] if view.carried is not None else None
@@ -266,12 +321,27 @@ def _rays(view: View, state: CloudState, parameters: CollectorParameters) -> tup
     both = replace(clouds, sigma_t=(*clouds.sigma_t, *thin.sigma_t))
     rays = cloud_rays(state.surfaces, both, view.origin, view.direction, view.distance)
     channels = len(clouds.sigma_t)
+    rays = with_densities(rays, state.stride)
     thin_rays = replace(rays, clouds=thin, depths=rays.depths[channels:])
     return replace(rays, clouds=clouds, depths=rays.depths[:channels]), thin_rays
 
 
-def _entry(view: View, rays: CloudRays) -> _Entry:
+def _entry(view: View, state: CloudState, rays: CloudRays) -> _Entry:
     """Return where camera rays meet a cloud."""
+    clouds = view.medium.clouds
+    assert clouds is not None
+    if clouds.density is not None:
+        met = dense_surface(
+            state.surfaces,
+            clouds,
+            view.origin,
+            view.direction,
+            view.distance,
+            threshold=state.threshold,
+            stride=state.stride,
+        )
+        there = dr.isfinite(met.distance)
+        return _Entry(view.origin + view.direction * dr.select(there, met.distance, 0), met.cloud, there)
     first = rays.first
     begin = dr.select(first.leaves, 0, first.distance)
     there = dr.isfinite(begin) & (begin < view.distance)
@@ -281,14 +351,18 @@ def _entry(view: View, rays: CloudRays) -> _Entry:
 def _scattered_once(view: View, state: CloudState, thin_rays: CloudRays, parameters: CollectorParameters) -> Any:
     """Return order 1, a colour [W/(m^2 sr)]."""
     beams = [_beam(view, state, thin_rays.clouds, number, parameters) for number in range(len(view.lights))]
-    once = scattered(thin_rays, beams, steps=parameters.steps, printed=parameters.single == "printed")
+    once = light_once(
+        thin_rays, beams, steps=parameters.steps, stride=state.stride, printed=parameters.single == "printed"
+    )
     return sum(radiance for (radiance,) in once)
 
 
 def _opacity(view: View, state: CloudState, rays: CloudRays, parameters: CollectorParameters) -> Any:
     """Return the opacity, a colour."""
     if parameters.opacity == "printed":
-        return printed_opacity(state.surfaces, rays.clouds, view.origin, view.direction, view.distance)
+        return opacity_as_printed(
+            state.surfaces, rays.clouds, view.origin, view.direction, view.distance, stride=state.stride
+        )
     return opacity_of(rays.depths, type(view.medium.albedo))
 
 
@@ -296,7 +370,10 @@ def _with_opacity(view: View, state: CloudState, rays: CloudRays, in_scattered: 
     """Return layers with what is seen behind clouds."""
     return Layers(
         in_scattered,
-        tuple(light_on_surfaces(rays, exact_leg(state.surfaces, rays.clouds, light)) for light in view.lights),
+        tuple(
+            light_on_surfaces(rays, leg_through(state.surfaces, rays.clouds, light, stride=state.stride))
+            for light in view.lights
+        ),
         1 - opacity,
         sky_behind(view.lights, view.distance, type(view.medium.albedo)),
     )
@@ -330,7 +407,10 @@ def _beam(view: View, state: CloudState, clouds: Clouds, number: int, parameters
             depths = [dr.fma(kappa, length, depth) for kappa, depth in zip(kappas, depths)]
         return tuple(depths)
 
-    leg = by_map if parameters.legs == "map" else exact_leg(state.surfaces, clouds, light)
+    if parameters.legs == "exact":
+        leg: Callable[..., Any] = leg_through(state.surfaces, clouds, light, stride=state.stride)
+    else:
+        leg = leg_by_depths(clouds, state.depths[number]) if state.depths else by_map
     lit = (lambda point, active: view.visible(point, light)) if view.features.shadows else None
     cosine = -dr.dot(view.direction, light.axis)
     return Beam(light.intensity, (Float(1),), (tuple(phase.evaluate(cosine) for phase in clouds.phases),), leg, lit)
@@ -351,6 +431,8 @@ def _many_times(
     kept: list[Any] = []
     for channel, own in enumerate(clouds.sigma_t):
         sigma_t = dr.gather(Float, own, entry.cloud, entry.there)
+        if state.body is not None:
+            sigma_t *= dr.gather(Float, state.body, entry.cloud, entry.there)
         of_fillings, of_channel = [], []
         for number, filling in enumerate(state.fillings):
             filled = entry.there & (dr.gather(mi.UInt32, filling.clouds[channel], entry.cloud, entry.there) != 0)

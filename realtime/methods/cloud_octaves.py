@@ -14,7 +14,7 @@ counts as the order n + 1, which it stands for.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -23,14 +23,17 @@ import numpy as np
 
 from realtime.clouds.bounds.crossings import sum_over_stretches
 from realtime.clouds.bounds.surfaces import CloudSurfaces, cloud_surfaces
+from realtime.clouds.hypertexture.light_depths import LightDepths, leg_by_depths, leg_through, light_depths
+from realtime.clouds.hypertexture.scattered import light_once, opacity_as_printed, with_densities
 from realtime.clouds.order_layers import OPACITY, order_layer
 from realtime.clouds.single_scattering.behind import light_on_surfaces, sky_behind
-from realtime.clouds.single_scattering.march import Beam, cloud_rays, exact_leg, scattered
-from realtime.clouds.single_scattering.opacity import opacity_of, printed_opacity
+from realtime.clouds.single_scattering.march import Beam, cloud_rays, exact_leg
+from realtime.clouds.single_scattering.opacity import opacity_of
 from realtime.errors import InputError
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.view import View
 from realtime.parameters import Parameters, parameter
+from realtime.scene.density import Density
 from realtime.scene.lights import Light
 from realtime.scene.medium import Clouds
 from realtime.scene.phase import HenyeyGreenstein, Phase, named_phase
@@ -69,6 +72,9 @@ class CloudOctavesParameters(Parameters):
     steps: int = parameter(32, "steps of every ray", least=1)
     light_steps: int = parameter(0, "samples of the density on a leg, as engines take; 0: its exact depth", least=0)
     light_reach: float = parameter(0.0, "how far these samples go; 0: through all clouds", least=0, unit="m")
+    stride: float = parameter(
+        1.0, "longest step through a grid of densities where a ray enters", above=0, most=100, unit="voxels"
+    )
     single: str = parameter("corrected", "equation 1 of Bouthors 2008", choices=("corrected", "printed"))
     opacity: str = parameter("corrected", "equation 2 of Bouthors 2008", choices=("corrected", "printed"))
 
@@ -83,6 +89,8 @@ class OctaveState:
     anisotropy: Any
     means: Any  #: by phase function of the clouds, its mean cosine [1]
     reach: Any  #: how far samples on a leg go [m]
+    stride: Any  #: longest step through a grid of densities [voxels]
+    depths: tuple[tuple[LightDepths, ...], ...] = ()  #: by light and cloud, where clouds have densities
 
 
 def prepare_cloud_octaves(scene: Scene, parameters: CloudOctavesParameters) -> Callable[[Scene], OctaveState]:
@@ -102,9 +110,25 @@ def prepare_cloud_octaves(scene: Scene, parameters: CloudOctavesParameters) -> C
         anisotropy=dr.opaque(Float, parameters.anisotropy),
         means=Float(means),
         reach=dr.opaque(Float, parameters.light_reach or size),
+        stride=dr.opaque(Float, parameters.stride),
     )
     dr.make_opaque(state.means)
-    return lambda now: state
+    if clouds.density is None or parameters.light_steps:
+        return lambda now: state
+
+    def with_depths(now: Scene) -> OctaveState:
+        of_clouds = range(len(scene.boundaries))
+        return replace(
+            state,
+            depths=tuple(
+                tuple(
+                    light_depths(state.surfaces, clouds, light, cloud=cloud, stride=state.stride) for cloud in of_clouds
+                )
+                for light in now.lights
+            ),
+        )
+
+    return with_depths
 
 
 def cloud_octaves(view: View, state: OctaveState, lists, *, kernel, parameters: CloudOctavesParameters) -> Layers:
@@ -129,16 +153,18 @@ def cloud_octaves(view: View, state: OctaveState, lists, *, kernel, parameters: 
     clouds, surfaces = view.medium.clouds, state.surfaces
     assert clouds is not None
     Color = type(clouds.albedo)
-    rays = cloud_rays(surfaces, clouds, view.origin, view.direction, view.distance)
-    beams = [_beam(view, state, light, parameters) for light in view.lights]
-    by_light = scattered(rays, beams, steps=parameters.steps, printed=parameters.single == "printed")
+    rays = with_densities(cloud_rays(surfaces, clouds, view.origin, view.direction, view.distance), state.stride)
+    beams = [_beam(view, state, number, parameters) for number in range(len(view.lights))]
+    by_light = light_once(
+        rays, beams, steps=parameters.steps, stride=state.stride, printed=parameters.single == "printed"
+    )
     by_octave = [sum(own) for own in zip(*by_light)]
     amount, amounts = type(view.distance)(1), []
     for radiance in by_octave:
         amounts.append(amount * radiance)
         amount = amount * state.contribution
     if parameters.opacity == "printed":
-        opacity = printed_opacity(surfaces, clouds, view.origin, view.direction, view.distance)
+        opacity = opacity_as_printed(surfaces, clouds, view.origin, view.direction, view.distance, stride=state.stride)
     else:
         opacity = opacity_of(rays.depths, Color)
     extra: dict[str, Any] = {}
@@ -149,7 +175,9 @@ def cloud_octaves(view: View, state: OctaveState, lists, *, kernel, parameters: 
         extra[OPACITY] = opacity
     return Layers(
         sum(amounts),
-        tuple(light_on_surfaces(rays, exact_leg(surfaces, clouds, light)) for light in view.lights),
+        tuple(
+            light_on_surfaces(rays, leg_through(surfaces, clouds, light, stride=state.stride)) for light in view.lights
+        ),
         1 - opacity,
         sky_behind(view.lights, view.distance, Color),
         extra,
@@ -171,9 +199,9 @@ def _phases(clouds: Clouds, parameters: CloudOctavesParameters, Float: Any) -> t
     return (named_phase(parameters.phase, Float=Float),) * len(clouds.phases)
 
 
-def _beam(view: View, state: OctaveState, light: Light, parameters: CloudOctavesParameters) -> Beam:
+def _beam(view: View, state: OctaveState, number: int, parameters: CloudOctavesParameters) -> Beam:
     """Return a light with the depths of its legs and its phase functions by octave."""
-    clouds, surfaces = view.medium.clouds, state.surfaces
+    clouds, surfaces, light = view.medium.clouds, state.surfaces, view.lights[number]
     assert clouds is not None
     Float = type(view.distance)
     cosine = -dr.dot(view.direction, light.axis)  # forward where the eye looks into the sun
@@ -189,7 +217,7 @@ def _beam(view: View, state: OctaveState, light: Light, parameters: CloudOctaves
             own = tuple(HenyeyGreenstein(sharp * mean) for mean in means)
             sharp = sharp * state.anisotropy
         phases.append(tuple(phase.evaluate(cosine) for phase in own))
-    leg = exact_leg(surfaces, clouds, light)
+    leg = leg_by_depths(clouds, state.depths[number]) if state.depths else exact_leg(surfaces, clouds, light)
     if parameters.light_steps:
         leg = _sampled_leg(state, clouds, light, parameters.light_steps)
     lit = (lambda point, active: view.visible(point, light)) if view.features.shadows else None
@@ -200,14 +228,18 @@ def _sampled_leg(state: OctaveState, clouds: Clouds, light: Light, steps: int):
     """Return legs by samples of the density in the middles of equal steps, as a march through a grid takes them."""
 
     def leg(point, active):
-        Float = type(point.x)
+        Float, origin = type(point.x), point
         step = state.reach / steps
 
         def samples_before(x):
             return dr.minimum(dr.ceil(x / step - 0.5), steps)
 
         def add(depths, begin, end, cloud, inside):
-            length = dr.select(inside, step * (samples_before(end) - samples_before(begin)), 0)
+            if clouds.density is None:
+                length = dr.select(inside, step * (samples_before(end) - samples_before(begin)), 0)
+            else:
+                place = origin, samples_before(begin), samples_before(end)
+                length = step * _sum_of_samples(clouds.density, *place, -light.axis * step, cloud, inside)
             kappas = (dr.gather(Float, sigma_t, cloud, inside) for sigma_t in clouds.sigma_t)
             return tuple(dr.fma(kappa, length, depth) for kappa, depth in zip(kappas, depths))
 
@@ -215,3 +247,18 @@ def _sampled_leg(state: OctaveState, clouds: Clouds, light: Light, steps: int):
         return sum_over_stretches(state.surfaces, point, -light.axis, Float(dr.inf), nothing, add, active)
 
     return leg
+
+
+def _sum_of_samples(density: Density, origin, first, last, step, cloud, inside):
+    """Return the sum of the densities at the samples of a leg from one number to before another."""
+
+    def add(number, total):
+        rho = density.at(origin + step * (number + 0.5), cloud, inside)
+        return number + 1, total + rho
+
+    _, total = dr.while_loop(
+        state=(+first, dr.zeros(type(first), dr.width(origin))),
+        cond=lambda number, total: inside & (number < last),
+        body=add,
+    )
+    return total

@@ -150,7 +150,7 @@ METHODS: dict[str, Method] = {
         "clouds: single scattering that is extinguished less with every octave, what engines do",
         "Wrenninge 2013; Hillaire 2016",
         prepare=prepare_cloud_octaves,
-        prepared_from=frozenset({"geometry"}),
+        prepared_from=frozenset({"geometry", "light"}),
         uses_kernel=never,
         casts_rays=always,
         provides_visibility=always,

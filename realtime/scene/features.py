@@ -22,6 +22,7 @@ class SceneFeatures:
     area_lights: tuple[str, ...] = ()  #: the shapes of lights with extent: 'rectangle', 'disk' or 'sphere'
     clear: bool = False  #: bounded: nothing fills the space between the media
     concave: tuple[str, ...] = ()  #: shapes that bound media and are not all convex: clouds
+    uneven: int = 0  #: clouds whose density differs from place to place
     sky: str = ""  #: the axis from which a uniform sky shines, '' where there is none; it is seen behind the scene
     notes: tuple[str, ...] = ()  #: what the user should know of this scene
 
@@ -52,6 +53,7 @@ def describe(features: SceneFeatures) -> dict[str, str]:
         if features.isotropic
         else "anisotropic: split at the foot point",
         "medium": f"{len(features.concave)} clouds in clear air, bounded by meshes: rays cast at them"
+        + f", {features.uneven} with a grid of densities: marched" * bool(features.uneven)
         if features.concave
         else f"bounded, in {'clear air' if features.clear else 'another medium'}: rays clipped, no kernel"
         if features.bounded

@@ -7,6 +7,7 @@ from typing import Any
 
 import drjit as dr
 
+from realtime.scene.density import Density
 from realtime.scene.phase import Phase
 
 
@@ -38,12 +39,13 @@ class BoundedMedium:
 
 @dataclass(frozen=True)
 class Clouds:
-    """Homogeneous media within closed bounds of any shape, disjoint, in clear air: tables with an entry for each."""
+    """Media within closed bounds of any shape, disjoint, in clear air: tables with an entry for each."""
 
-    sigma_t: tuple[Any, ...]  #: extinction [1/m], by channel
+    sigma_t: tuple[Any, ...]  #: extinction [1/m], by channel; the largest of a cloud with a density
     albedo: Any  #: single-scattering albedos, RGB [1]
     phases: tuple[Phase, ...]  #: those that differ
     phase: Any  #: the number of each cloud's phase function
+    density: Density | None = None  #: from place to place; None where all clouds are homogeneous
 
 
 def per_extinction(medium: Medium, function: Callable[[Any], Any]):

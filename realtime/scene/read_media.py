@@ -3,7 +3,7 @@
 
 A shape with the material `null` and an interior medium is the boundary of a medium: light passes, nothing is seen of
 it. All of them lie in one medium, the camera's own or, for a camera inside one of them, its exterior; none is a vacuum.
-In clear air a boundary may be any closed mesh: a cloud.
+In clear air a boundary may be any closed mesh, a cloud, and its medium may have a density from place to place.
 """
 
 from collections.abc import Sequence
@@ -18,6 +18,7 @@ from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes
 from realtime.scene.closed_mesh import ClosedMesh, check_bodies, encloses
 from realtime.scene.convex_bounds import Bounds, holds, mean_distance, overlap, plane_neighbours, read_bounds
+from realtime.scene.density import DensityGrid, density_on_device, read_density
 from realtime.scene.medium import BoundedMedium, Clouds, Medium
 from realtime.scene.phase import HenyeyGreenstein, Isotropic, Phase, named_phase, tabulated
 
@@ -88,7 +89,7 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[Cl
     medium
         In clear air with `clouds`, whatever the bounds; with `bounded_media` only where all bounds are convex.
     meshes
-        The bounds where not all of them are convex; then all are meshes.
+        The bounds where not all of them are convex, or a medium is not homogeneous; then all are meshes.
 
     Raises
     ------
@@ -104,8 +105,9 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[Cl
         return _homogeneous(sensor.get_medium(), types), ()
     shapes = [read_bounds(shape) for shape in boundaries]
     bounds = [convex for convex, _ in shapes if convex is not None]
-    all_convex = len(bounds) == len(boundaries)
-    meshes = () if all_convex else _closed_meshes(shapes)
+    uneven = [shape.id() for shape in boundaries if not shape.interior_medium().is_homogeneous()]
+    all_convex = len(bounds) == len(boundaries) and not uneven
+    meshes = () if all_convex else _closed_meshes(shapes, uneven)
     if all_convex:
         _check_disjoint(bounds)
     else:
@@ -113,10 +115,15 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[Cl
     around = _surrounding(sensor, boundaries, meshes or bounds)
     if around is not None and not all_convex:
         raise InputError(
-            f"shape '{_first_concave(shapes)}' bounds a medium within another one and is not convex; wanted convex "
-            "bounds there, or clear air around it: remove the exterior medium, and the camera's"
+            f"shape '{_first_cloud(shapes, uneven)}' bounds a medium within another one and is not convex, or that "
+            "medium is not homogeneous; wanted clear air around it: remove the exterior medium, and the camera's"
         )
-    media = [_homogeneous(shape.interior_medium(), types) for shape in boundaries]
+    # By the names of the meshes: casting rays at shapes gave these others.
+    grids = [
+        read_density(shape.interior_medium(), meshes[number]) if meshes and meshes[number].name in uneven else None
+        for number, shape in enumerate(boundaries)
+    ]
+    media = [_filling(shape.interior_medium(), grid, types) for shape, grid in zip(boundaries, grids, strict=True)]
     ambient = _clear(types) if around is None else _homogeneous(around, types)
     channels = max(len(medium.sigma_t) for medium in [ambient, *media])
     media = [_in_channels(medium, channels) for medium in media]
@@ -126,22 +133,29 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[Cl
         else ()
     )
     clouds = _clouds(media, boundaries, types) if around is None else None
+    if clouds is not None and uneven:
+        clouds = replace(clouds, density=density_on_device(grids, types))
     return replace(_in_channels(ambient, channels), bounded_media=bounded_media, clouds=clouds), meshes
 
 
-def _closed_meshes(shapes: Sequence[tuple[Bounds | None, ClosedMesh | None]]) -> tuple[ClosedMesh, ...]:
-    """Return the meshes of shapes of which one at least is not convex."""
+def _closed_meshes(
+    shapes: Sequence[tuple[Bounds | None, ClosedMesh | None]], uneven: Sequence[str]
+) -> tuple[ClosedMesh, ...]:
+    """Return the meshes of shapes of which one at least is not convex, or named in `uneven`."""
     for bounds, mesh in shapes:
         if mesh is None and bounds is not None:
+            cloud = _first_cloud(shapes, uneven)
+            flaw = "bounds a HeterogeneousMedium" if cloud in uneven else "is not convex"
             raise InputError(
-                f"shape '{bounds.name}' is a sphere, and shape '{_first_concave(shapes)}' is not convex; wanted meshes "
-                "for all of them: replace the sphere by a mesh"
+                f"shape '{bounds.name}' is a sphere, and shape '{cloud}' {flaw}; wanted meshes for all of them: "
+                "replace the sphere by a mesh"
             )
     return tuple(mesh for _, mesh in shapes if mesh is not None)
 
 
-def _first_concave(shapes: Sequence[tuple[Bounds | None, ClosedMesh | None]]) -> str:
-    return next(mesh.name for bounds, mesh in shapes if bounds is None and mesh is not None)
+def _first_cloud(shapes: Sequence[tuple[Bounds | None, ClosedMesh | None]], uneven: Sequence[str]) -> str:
+    concave = (mesh.name for bounds, mesh in shapes if bounds is None and mesh is not None)
+    return next(iter((*concave, *uneven)))
 
 
 def _clouds(media: list[Medium], boundaries, types: ArrayTypes) -> Clouds:
@@ -227,6 +241,23 @@ def _in_channels(medium: Medium, channels: int) -> Medium:
     return replace(medium, sigma_t=tuple(dr.opaque(type(grey), float(grey[0])) for _ in range(channels)))
 
 
+def _filling(medium, grid: DensityGrid | None, types: ArrayTypes) -> Medium:
+    """Return the medium of a boundary, one with a grid by its largest extinction."""
+    if grid is None:
+        return _homogeneous(medium, types)
+    albedo = np.array(mi.traverse(medium)["albedo.value.value"], dtype=np.float64).reshape(-1)
+    albedo = np.broadcast_to(albedo, 3)
+    _check_albedo(albedo)
+    color = types.color(*(float(value) for value in albedo))
+    dr.make_opaque(color)
+    return Medium((dr.opaque(types.scalar, grid.largest),), color, _read_phase(medium.phase_function(), types))
+
+
+def _check_albedo(albedo) -> None:
+    if np.any(albedo > 1 + 1e-6):
+        raise InputError(f"the medium's albedo is {albedo.tolist()}; wanted values from 0 to 1")
+
+
 def _homogeneous(medium, types: ArrayTypes) -> Medium:
     if not medium.is_homogeneous():
         raise InputError(f"the medium is a {medium.class_name()}; wanted a medium of type 'homogeneous'")
@@ -237,8 +268,7 @@ def _homogeneous(medium, types: ArrayTypes) -> Medium:
         if not np.all(np.isfinite(values)) or np.any(values < 0):
             raise InputError(f"the medium's {name} is {values.tolist()}; wanted finite values of 0 or more [1/m]")
     albedo = np.divide(scattering, extinction, out=np.zeros(3), where=extinction > 0)
-    if np.any(albedo > 1 + 1e-6):
-        raise InputError(f"the medium's albedo is {albedo.tolist()}; wanted values from 0 to 1")
+    _check_albedo(albedo)
     grey = extinction[0] == extinction[1] == extinction[2]
     sigma = tuple(dr.opaque(types.scalar, float(value)) for value in (extinction[:1] if grey else extinction))
     color = types.color(*(float(value) for value in albedo))

@@ -285,9 +285,17 @@ def _scene_features(
         soft_spots=any(light.beam is not None for light in lights),
         area_lights=tuple(light.kind for light in area_lights),
         concave=tuple(mesh.name for mesh in bodies.meshes),
+        uneven=_uneven(medium),
         sky=next((_axis_name(light) for light in lights if light.sky is not None), ""),
         notes=tuple(dict.fromkeys(notes)),
     )
+
+
+def _uneven(medium: Medium) -> int:
+    """Return how many clouds have a grid of densities."""
+    if medium.clouds is None or medium.clouds.density is None:
+        return 0
+    return int(np.count_nonzero(np.isfinite(np.array(medium.clouds.density.voxel))))
 
 
 def _axis_name(light: Light) -> str:

@@ -11,6 +11,7 @@ Read in this order:
 - `area_light.py`: lights with extent, read and checked;
 - `read.py`: the whole scene: lights, media, camera rays;
 - `closed_mesh.py`: whether meshes bound bodies apart from one another;
+- `cloud_density.py`: clouds whose density differs from place to place;
 - `clouds.py`: scenes of clouds: media of any shape, suns and a sky;
 - `shapes.py`: opaque shapes as triangles and spheres;
 - `shadow_epsilon.py`: how far short of the light Mitsuba's shadow rays end.

@@ -15,17 +15,19 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from reference.scene.closed_mesh import check_apart, check_closed, enclosing
+from reference.scene.cloud_density import CloudDensity, read_cloud_density
 from reference.scene.directional_light import DirectionalLight, is_directional, read_directional
-from reference.scene.read import CLEAR_AIR, TruthMedium, read_medium, scene_of, sorted_shapes
+from reference.scene.read import CLEAR_AIR, TruthMedium, read_medium, read_scattering, scene_of, sorted_shapes
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Cloud(TruthMedium):
-    """A homogeneous medium within a closed surface."""
+    """A medium within a closed surface."""
 
     shape: Any  #: Mitsuba's shape that bounds it
+    density: CloudDensity | None = None  #: over `sigma_t`, the largest extinction; None for a homogeneous medium
 
     @property
     def name(self) -> str:
@@ -124,7 +126,12 @@ def _radiance(emitter) -> Array:
 
 
 def _read_cloud(shape) -> Cloud:
-    inside = read_medium(shape.interior_medium(), f"the medium of shape '{shape.id()}'")
+    medium, name = shape.interior_medium(), f"the medium of shape '{shape.id()}'"
+    if not medium.is_homogeneous():
+        density = read_cloud_density(shape, name)
+        sigma_t = np.full(3, density.largest)
+        return Cloud(sigma_t, *read_scattering(medium), medium, shape=shape, density=density)
+    inside = read_medium(medium, name)
     return Cloud(inside.sigma_t, inside.albedo, inside.phase, inside.plugin, shape=shape)
 
 

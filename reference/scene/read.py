@@ -207,7 +207,12 @@ def read_medium(medium, name: str) -> TruthMedium:
         raise InputError(f"{name} is a {medium.class_name()}; wanted a medium of type 'homogeneous'")
     parameters = mi.traverse(medium)
     sigma_t = _rgb(parameters["sigma_t.value.value"]) * float(parameters["scale"])
-    return TruthMedium(sigma_t, _rgb(parameters["albedo.value.value"]), _read_phase(medium.phase_function()), medium)
+    return TruthMedium(sigma_t, *read_scattering(medium), medium)
+
+
+def read_scattering(medium) -> tuple[Array, PhaseFunction]:
+    """Return the albedo of a medium, RGB, one number or colour everywhere, and its phase function."""
+    return _rgb(mi.traverse(medium)["albedo.value.value"]), _read_phase(medium.phase_function())
 
 
 def _read_phase(phase) -> PhaseFunction:

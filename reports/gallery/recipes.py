@@ -12,7 +12,9 @@ _CLOUDS = ("cloud-octaves", (), 1)  # seconds a frame
 _OTHERWISE = {
     "tangle": ("light-volumes", ("map=1024",), SAMPLES),
     **dict.fromkeys(("penumbra-plane", "fence", "soft-hall", "overlap"), _SOFT),
-    **dict.fromkeys(("cloud-slab", "stratocumulus", "cumulus", "step-cloud", "ring", "two-lobes"), _CLOUDS),
+    **dict.fromkeys(
+        ("cloud-slab", "stratocumulus", "cumulus", "cumulus-detail", "step-cloud", "ring", "two-lobes"), _CLOUDS
+    ),
 }
 #: The scene in which a method is shown, and its settings, where that is not `hall` and its defaults.
 _METHOD_SCENES = {

@@ -75,3 +75,24 @@ def length_inside(mesh, origin, direction, end=np.inf):
     distance, leaves = crossings(mesh, origin, direction)
     before = np.concatenate([[0.0], distance[:-1]]) if len(distance) else distance
     return float(np.sum((np.minimum(distance, end) - np.minimum(before, end))[leaves]))
+
+
+def dense(values, low, high, sigma_t=0.0363, **changes) -> dict[str, Any]:
+    """Return droplets whose extinction is `sigma_t` times a grid of values (z, y, x) between two corners [m]."""
+    low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
+    box = mi.ScalarTransform4f().translate(low.tolist()).scale((high - low).tolist())
+    values = np.asarray(values, dtype=np.float32)[..., None]
+    volume = {"type": "gridvolume", "grid": mi.VolumeGrid(values), "to_world": box}
+    return DROPLETS | {"type": "heterogeneous", "sigma_t": volume, "scale": sigma_t} | changes
+
+
+def linear_between(values, low, high, points):
+    """Return what such a grid holds at points (n, 3) [m], linear between the middles of its voxels, in float64."""
+    counts = np.array(values.shape[::-1])
+    place = np.clip((points - np.asarray(low)) / (np.asarray(high) - np.asarray(low)) * counts - 0.5, 0, counts - 1)
+    cell = np.minimum(place.astype(int), np.maximum(counts - 2, 0))
+    share, total = place - cell, np.zeros(len(points))
+    for corner in np.ndindex(2, 2, 2):
+        x, y, z = np.minimum(cell + corner, counts - 1).T
+        total += np.where(corner, share, 1 - share).prod(axis=1) * values[z, y, x]
+    return total

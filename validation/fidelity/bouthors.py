@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The rows of Bouthors, Neyret, Max, Bruneton, Crassin 2008."""
 
-from validation.fidelity.figures import Take, at, impossible, rate
+from validation.fidelity.figures import Take, at, rate
 from validation.fidelity.row import DIFFERS, AtLeast, AtMost, Bound, Equal, Evidence, Row
 from validation.papers.bouthors_frames import PUBLISHED
 
@@ -179,16 +179,6 @@ FRAME_ROWS: tuple[Row, ...] = (
             command="airlight published --paper bouthors",
         )
         for published in PUBLISHED
-    ),
-    Row(
-        "bouthors",
-        "9, procedural noise",
-        "frames a second of the cumulus with procedural noise, 800 x 600",
-        2,
-        "nothing",
-        impossible("no frame of cloud-collectors has procedural noise of 512^3 voxels"),
-        None,
-        unit="frames/s",
     ),
 )
 

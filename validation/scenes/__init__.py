@@ -28,6 +28,7 @@ Read in this order:
 - `cloud_slab.py`: a slab of cloud;
 - `stratocumulus.py`: a layer of stratocumulus of about 130 000 triangles;
 - `cumulus.py`: a cumulus of about 5 000 triangles;
+- `cumulus_detail.py`: the cumulus with hypertexture;
 - `step_cloud.py`: thin and thick cloud by turns;
 - `ring.py`: a ring of cloud;
 - `two_lobes.py`: a cloud of two lobes;

@@ -10,6 +10,7 @@ from validation.scenes.cloud_slab import SCENE as CLOUD_SLAB
 from validation.scenes.clutter import SCENE as CLUTTER
 from validation.scenes.colonnade import colonnade
 from validation.scenes.cumulus import SCENE as CUMULUS
+from validation.scenes.cumulus_detail import SCENE as CUMULUS_DETAIL
 from validation.scenes.fence import SCENE as FENCE
 from validation.scenes.hall import SCENE as HALL
 from validation.scenes.omni_box import SCENE as OMNI_BOX
@@ -72,6 +73,7 @@ SCENES: dict[str, SceneRecord] = {
         CLOUD_SLAB,
         STRATOCUMULUS,
         CUMULUS,
+        CUMULUS_DETAIL,
         STEP_CLOUD,
         RING,
         TWO_LOBES,

@@ -2,7 +2,8 @@
 """How much clouds let through along the pixel-centre rays, up to the visible surface or to infinity, without samples.
 
 Mitsuba's ray casts find the triangles that a ray crosses; where it crosses their planes is computed in float64. A
-stretch lies in a cloud if it ends at a face of it seen from inside, as in the walk.
+stretch lies in a cloud if it ends at a face of it seen from inside, as in the walk. Densities
+are summed up by small steps.
 """
 
 from dataclasses import dataclass
@@ -59,6 +60,10 @@ def seen_clouds(clouds: CloudScene) -> SeenClouds:
             within = np.where(on, np.where(leaves, number, -1), within)
             inside[left[on]] = np.where(leaves[on], -1, number)
         stretch = np.maximum(length - passed[left], 0.0)
+        for number, cloud in enumerate(clouds.clouds):
+            own = within == number
+            if cloud.density is not None:
+                stretch[own] = cloud.density.along(clouds.origin, way[own], passed[left][own], stretch[own])
         depth[left] += np.where(within[:, None] >= 0, extinction[within] * stretch[:, None], 0.0)
         passed[left] = np.maximum(length, passed[left])
         distance[left[opaque]] = length[opaque]

@@ -12,6 +12,7 @@ import mitsuba as mi
 import numpy as np
 
 from reference.monte_carlo.cloud_paths.phases import WalkPhase, walk_phase
+from reference.scene.cloud_density import CloudDensity
 from reference.scene.clouds import CloudScene
 
 _FOUR_PI = 4 * np.pi
@@ -34,6 +35,7 @@ class WalkScene:
     suns: tuple[tuple[Any, Any, float], ...]  #: direction to each, irradiance over 4 pi and probability, probability
     has_surfaces: bool
     beyond: float  #: how far past a crossing the next ray starts [m]
+    densities: tuple[tuple[int, CloudDensity], ...] = ()  #: of the media that have one, with their numbers
 
     @property
     def has_suns(self) -> bool:
@@ -44,6 +46,21 @@ class WalkScene:
     def has_sky(self) -> bool:
         """Whether the sky shines."""
         return any(value > 0 for value in self.sky)
+
+    def density(self, medium, point, active):
+        """Return the extinction at places in media over the largest one of these."""
+        rho = mi.Float(1)
+        for number, density in self.densities:
+            own = active & (medium == number)
+            rho = dr.select(own, density.at(point, own), rho)
+        return rho
+
+    def uneven(self, medium):
+        """Return which media have a density."""
+        has_one = mi.Bool(False)
+        for number, _ in self.densities:
+            has_one |= medium == number
+        return has_one
 
     def random_sun(self, sampler, active):
         """Return the number of a sun, drawn by irradiance."""
@@ -131,4 +148,5 @@ def walk_scene(clouds: CloudScene, channel: int) -> WalkScene:
         suns=tuple(suns),
         has_surfaces=bool(clouds.occluders.shapes()),
         beyond=_BEYOND * max(float(reach), float(np.abs(clouds.origin).max())),
+        densities=tuple((n, each.density) for n, each in enumerate(clouds.clouds, 1) if each.density is not None),
     )

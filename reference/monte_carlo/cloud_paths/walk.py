@@ -25,6 +25,11 @@ seen from outside, or nothing, clear air; before an opaque surface, where the pa
 doubles or hides mends itself at the next face. After a crossing a ray starts a little further on, which is added to the
 length of its next stretch.
 
+A cloud with a density has its largest extinction for `sigma_t`, and the share rho of it at each place. Flights go as if
+it had the largest everywhere, and where one ends it is scattered with the probability rho, otherwise it flies on (delta
+tracking, Woodcock 1965). A shadow ray has such flights too, and goes on with the factor 1 - rho where one ends (ratio
+tracking, Novak, Selle, Jarosz 2014), or by the roulette above. Each flight casts the ray of its turn anew.
+
 A lane of the loop follows the samples of one pixel one after another, so that lanes end at nearly the same time.
 """
 
@@ -156,14 +161,25 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
     scatters = flies & (within > 0) & (optical > depth)
     crosses, meets = boundary & ~scatters, opaque & ~scatters
     escapes = active & ~hit
-    begins = scatters & is_main
     scattered_at = o + d * (depth / dr.maximum(sigma_t, dr.smallest(mi.Float)) - gap)
     shadow = active & ~flies
+    stays = thins = mi.Bool(False)
+    if scene.densities:
+        uneven, free = scene.uneven(within), -dr.log(1 - sampler.next_1d(active))
+        thins = shadow & uneven & (free < optical)
+        place = o + d * (free / dr.maximum(sigma_t, dr.smallest(mi.Float)) - gap)
+        scattered_at = dr.select(thins, place, scattered_at)
+        rho = scene.density(within, scattered_at, scatters | thins)
+        stays = thins | (scatters & (sampler.next_1d(active) >= rho))
+        scatters &= ~stays
+        crosses, meets, leaves = crosses & ~thins, meets & ~thins, leaves & ~thins
+        optical = dr.select(thins, -dr.log(dr.maximum(1 - rho, 0)), dr.select(shadow & uneven, 0, optical))
+    begins = scatters & is_main
     depth = dr.select(shadow, depth + optical, depth - optical)
 
     # Shadow rays add their light, or end in the dark, or by roulette where they leave a cloud.
     lit = dr.exp(-dr.select(shadow, depth, 0.0))
-    arrives, dims = shadow & escapes, shadow & leaves
+    arrives, dims = shadow & escapes, shadow & (leaves | thins)
     arriving = value * lit
     place = target * lanes + lane
     for number in range(3):
@@ -233,9 +249,10 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
 
     flown = resumes_any | turns_aside | over
     free = -dr.log(1 - sampler.next_1d(active))
-    depth = dr.select(flown, free, dr.select(begins_shadow, 0.0, depth))
+    depth = dr.select(flown | (stays & flies), free, dr.select(begins_shadow, 0.0, depth))
     forward = scene.beyond
     next_o = dr.select(crosses, o + d * (si.t + forward), o)
+    next_o = dr.select(stays, scattered_at, next_o)
     next_o = dr.select(begins_shadow, shadow_from, next_o)
     next_o = dr.select(resumes_any | turns_aside, x, next_o)
     o = dr.select(over, rays.o, next_o)
@@ -243,9 +260,9 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
     next_d = dr.select(resumes | turns_aside, new, next_d)
     next_d = dr.select(reflected, w, next_d)
     d = dr.select(over, rays.d, next_d)
-    gap = dr.select(crosses, forward, dr.select(flown | begins_shadow, 0.0, gap))
+    gap = dr.select(crosses, forward, dr.select(flown | begins_shadow | stays, 0.0, gap))
     next_medium = dr.select(crosses, dr.select(leaves, 0, kind), medium)
-    next_medium = dr.select(scatters, within, next_medium)
+    next_medium = dr.select(scatters | stays, within, next_medium)
     next_medium = dr.select(resumes_any | turns_aside, cloud, next_medium)
     medium = dr.select(over, scene.camera_medium, next_medium)
     next_mode = dr.select(begins_shadow, dr.select(reflects, SURFACE_SHADOW, mode + 2), mode)

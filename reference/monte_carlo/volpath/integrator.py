@@ -167,7 +167,9 @@ def _grey_media(truth: TruthScene, channel: int, scattering: bool) -> Iterator[A
             # Shapes may share a medium.
             if medium.plugin is not None and all(medium.plugin != plugin for plugin, _ in own):
                 parameters = mi.traverse(medium.plugin)
-                own.append((medium.plugin, {key: type(parameters[key])(parameters[key]) for key in _VALUES}))
+                # The extinction of a grid is grey already.
+                known = (key for key in _VALUES if key in parameters)
+                own.append((medium.plugin, {key: type(parameters[key])(parameters[key]) for key in known}))
                 sigma_t = float(medium.sigma_t[channel]) / float(parameters["scale"] or 1.0)
                 _set_values(medium.plugin, sigma_t, medium.albedo if scattering else np.zeros(3))
         yield truth.scene.sensors()[0].get_medium()
@@ -183,6 +185,8 @@ def _set_values(plugin: Any, sigma_t: float, albedo: Array) -> None:
     """Set the extinction, before the medium's scale, and the albedo."""
     parameters = mi.traverse(plugin)
     for key, value in zip(_VALUES, (np.full(3, sigma_t), albedo), strict=True):
+        if key not in parameters:
+            continue
         kind = type(parameters[key])
         # A grey number of Mitsuba is one value, a colour three.
         parameters[key] = kind(*(float(v) for v in value)) if "Color" in kind.__name__ else kind(float(value[0]))

@@ -90,6 +90,7 @@ def test_sphere_turns_its_axis_to_the_light_and_lies_in_the_cone():
         ("overlap", 94),
         ("cloud-slab", 12),
         ("cumulus", 5_120),
+        ("cumulus-detail", 5_120),
         ("stratocumulus", 129_596),
         ("step-cloud", 216),
         ("ring", 7_654),

@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""How much of a cloud lies between a sun and a point, in a map: what a leg of single scattering looks up.
+
+A ray of the light through each texel marches through a cloud. It keeps l = int rho dx, in metres of full density, at
+layers whose heights lie
+
+    h_k = front - (front - back) (k/K)^2,        k = 0 .. K,
+
+between the first and the last place of the ray with any density: narrow where the light comes in and much of it is
+left, wide behind. A look-up is linear in k between two layers, and between the four nearest texels, each with its own
+front and back. That is a deep shadow map (Lokovic and Veach 2000), which the paper names as its future work: a depth
+map alone takes the way from the first surface for cloud of one density, without wisps and gaps. The depth of a leg is
+sigma_t l, so that other extinctions need no new map.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from realtime.clouds.bounds.surfaces import CloudSurfaces
+from realtime.clouds.hypertexture.march import march, marched_depths, middle_density, voxel
+from realtime.clouds.single_scattering.march import exact_leg
+from realtime.numerics.array_types import Metres, bytes_of
+from realtime.scene.lights import Light
+from realtime.scene.medium import Clouds
+from realtime.shadow_maps.projection import Projection, light_projection, map_ray
+from realtime.shadow_maps.shadow_map import tiled_corners
+
+SIZE, LAYERS = 256, 64  #: texels on a side, layers of each
+
+
+@dataclass(frozen=True)
+class LightDepths:
+    """What lies between one sun and the points of one cloud; row by row, the layers of a texel one after the other."""
+
+    size: int
+    layers: int
+    lengths: Any  #: l at the K + 1 heights of each texel [m]
+    front: Any  #: by texel [m]
+    back: Any  #: by texel [m]
+    position: Any  #: middle of the rectangle where heights are 0 [m]
+    projection: Projection
+
+    def at(self, point, active: Any = True) -> Metres:
+        """Return l of points [m]."""
+        u, v, height, _ = self.projection.homogeneous(mi.UInt32(0), point - self.position, 1)
+        Float = type(height)
+        (column, x), (row, y) = (_cell(dr.fma(0.5 * self.size, place + 1, -0.5), self.size, Float) for place in (u, v))
+        total = Float(0)
+        for down, weight_down in ((0, 1 - y), (1, y)):
+            for along, weight_along in ((0, 1 - x), (1, x)):
+                texel = (row + down) * self.size + column + along
+                front, back = (dr.gather(Float, own, texel, active) for own in (self.front, self.back))
+                share = dr.clip((front - height) / dr.maximum(front - back, 1e-20), 0, 1)
+                layer, between = _cell(dr.sqrt(share) * self.layers, self.layers + 1, Float)
+                first = texel * (self.layers + 1) + layer
+                near, far = (dr.gather(Float, self.lengths, place, active) for place in (first, first + 1))
+                total = dr.fma(weight_down * weight_along, dr.lerp(near, far, between), total)
+        return total
+
+
+def _cell(place, count: int, Float) -> tuple[Any, Any]:
+    """Return the number of the entry before a place, at most the last but one, and the share of the way to the next."""
+    inside = dr.clip(place, 0, count - 1)
+    number = dr.minimum(mi.UInt32(inside), count - 2)
+    return number, inside - Float(number)
+
+
+def light_depths(
+    surfaces: CloudSurfaces,
+    clouds: Clouds,
+    light: Light,
+    *,
+    cloud: int,
+    stride: Any,
+    size: int = SIZE,
+    layers: int = LAYERS,
+) -> LightDepths:
+    """Return what lies between a sun and all points of a cloud.
+
+    Parameters
+    ----------
+    surfaces, clouds
+        The boundaries, and what fills them, with a density.
+    light
+        A directional light, with an extent that holds the clouds.
+    cloud
+        The number of the cloud.
+    stride
+        How long the steps are at most [voxels].
+    size, layers
+        Texels on a side; layers of each.
+    """
+    Float = type(light.position.x)
+    _, row, column = tiled_corners(1, size)
+    u, v = (dr.fma(mi.Float64(texel), 2.0 / size, 1.0 / size - 1) for texel in (column, row))
+    start, axis = map_ray(light, mi.UInt32(0), u, v)
+    Vector = type(light.position)
+    origin, direction, texel = Vector(start), Vector(axis) + dr.zeros(Vector, size * size), row * size + column
+    top = Float(light.extent.depth)
+    dr.eval(origin, direction, texel)
+    nothing = dr.full(Float, dr.inf, size * size), dr.zeros(Float, size * size)
+
+    def full_step(total, x, number, inside):
+        return stride * voxel(clouds, number, inside)
+
+    def widen(total, begin, end, number, inside):
+        first, last = total
+        rho = middle_density(clouds, origin, direction, begin, _finite(begin, end), number, inside)
+        there = inside & (number == cloud) & (rho > 0)
+        return (dr.select(there, dr.minimum(first, begin), first), dr.select(there, end, last)), inside
+
+    first, last = march(surfaces, origin, direction, Float(dr.inf), nothing, step=full_step, add=widen)
+    there = dr.isfinite(first)
+    first, last = dr.select(there, first, 0), dr.select(there, last, 0)
+    dr.eval(first, last)
+    lengths = dr.zeros(Float, size * size * (layers + 1))
+
+    def to_layer(total, x, number, inside):
+        layer, *_ = total
+        ahead = first + (last - first) * dr.square(Float(layer + 1) / layers) - x
+        return dr.minimum(dr.maximum(ahead, 0), full_step(total, x, number, inside))
+
+    def add(total, begin, end, number, inside):
+        layer, length = total
+        own = inside & (number == cloud)
+        rho = middle_density(clouds, origin, direction, begin, end, number, own)
+        length = dr.select(own, dr.fma(rho, end - begin, length), length)
+        # A step ends at a layer's end at the latest, or a rounding of the distance behind it.
+        share = dr.clip((end - first) / dr.maximum(last - first, 1e-20), 0, 1)
+        reached = dr.minimum(mi.UInt32(dr.fma(dr.sqrt(share), layers, 1e-3)), layers)
+        # What the next layer has if the ray leaves the cloud before it; a later step writes over it.
+        dr.scatter(lengths, length, texel * (layers + 1) + dr.minimum(reached + 1, layers), own)
+        dr.scatter(lengths, length, texel * (layers + 1) + reached, own & (reached > layer))
+        return (dr.select(inside, dr.maximum(layer, reached), layer), length), inside & (end < last)
+
+    nothing = dr.zeros(mi.UInt32, size * size), dr.zeros(Float, size * size)
+    march(surfaces, origin, direction, last, nothing, step=to_layer, add=add, active=there)
+    # Layers in clear air, where no step ends, have what the one before them has.
+    lengths = dr.block_prefix_reduce(dr.ReduceOp.Max, lengths, layers + 1, exclusive=False)
+    arrays = []
+    for distance in (first, last):
+        heights = dr.zeros(Float, size * size)
+        dr.scatter(heights, dr.select(there, top - distance, 0), texel)
+        arrays.append(heights)
+    dr.eval(lengths, arrays)
+    front, back = arrays
+    return LightDepths(size, layers, lengths, front, back, light.position, light_projection(light))
+
+
+def leg_by_depths(clouds: Clouds, by_cloud: tuple[LightDepths, ...]) -> Callable[[Any, Any], tuple[Any, ...]]:
+    """Return the function from points [m] and active lanes to the depths of legs by channel, by maps."""
+
+    def leg(point, active):
+        Float = type(point.x)
+        depths = [Float(0) for _ in clouds.sigma_t]
+        for cloud, own in enumerate(by_cloud):
+            length = own.at(point, active)
+            kappas = (dr.gather(Float, sigma_t, mi.UInt32(cloud)) for sigma_t in clouds.sigma_t)
+            depths = [dr.fma(kappa, length, depth) for kappa, depth in zip(kappas, depths)]
+        return tuple(depths)
+
+    return leg
+
+
+def marched_leg(
+    surfaces: CloudSurfaces, clouds: Clouds, light: Light, *, stride: Any
+) -> Callable[[Any, Any], tuple[Any, ...]]:
+    """Return the function from points [m] and active lanes to the depths of legs from a light, by marches."""
+
+    def leg(point, active):
+        end = type(point.x)(dr.inf)
+        return marched_depths(surfaces, clouds, point, -light.axis, end, stride=stride, seen=False, active=active)
+
+    return leg
+
+
+def leg_through(
+    surfaces: CloudSurfaces, clouds: Clouds, light: Light, *, stride: Any
+) -> Callable[[Any, Any], tuple[Any, ...]]:
+    """Return the function from points [m] and active lanes to the depths of legs by cast rays and marches."""
+    if clouds.density is None:
+        return exact_leg(surfaces, clouds, light)
+    return marched_leg(surfaces, clouds, light, stride=stride)
+
+
+def _finite(begin, end):
+    return dr.select(dr.isfinite(end), end, begin)
+
+
+def depths_memory(Float: Any) -> int:
+    """Return how much the map of a cloud and a sun takes [bytes]."""
+    return SIZE * SIZE * (LAYERS + 3) * bytes_of(Float)

@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Light that was scattered once in clouds with densities, and their opacity as printed.
+
+The sum of `realtime.clouds.single_scattering.march` with the extinction kappa rho of each step, and the legs of the
+light linear on it. Nodes lie at
+
+    tau_k = -s log(1 - (k/N) (1 - exp(-T/s)))
+
+as there, T the depth that a ray had if the density were 1 everywhere: from a node at the depth tau to the next it is at
+most -s log(1 - exp(tau/s) (1 - exp(-T/s))/N) at full density, so that a cloud of one density has the nodes of a
+homogeneous one. No step is longer than those of `realtime.clouds.hypertexture.march`, which see the voxels.
+
+Printed (Bouthors 2008, eqs 1 and 2) are e_{i+1} - e_i for the light of a step, and for its opacity the same over kappa
+rho, with exp(-kappa_i rho_i x): the local extinction times the whole distance since the first cloud.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from realtime.clouds.bounds.crossings import optical_depths
+from realtime.clouds.bounds.surfaces import CloudSurfaces
+from realtime.clouds.hypertexture.march import OPAQUE, march, marched_depths, middle_density, voxel
+from realtime.clouds.single_scattering.march import Beam, CloudRays, scattered
+from realtime.clouds.single_scattering.opacity import printed_opacity
+from realtime.clouds.single_scattering.spacing import SPREAD
+from realtime.scene.medium import Clouds
+
+_SERIES = 0.02  # below it (1 - exp(-d))/d is summed up: d^4/120 is left, 1e-9
+
+
+def with_densities(rays: CloudRays, stride: Any) -> CloudRays:
+    """Return rays with their depths by the densities of clouds, where they have any."""
+    if rays.clouds.density is None:
+        return rays
+    depths = marched_depths(rays.surfaces, rays.clouds, rays.origin, rays.direction, rays.end, stride=stride, seen=True)
+    return replace(rays, depths=depths)
+
+
+def light_once(
+    rays: CloudRays, beams: Sequence[Beam], *, steps: int, stride: Any, printed: bool = False
+) -> tuple[tuple[Any, ...], ...]:
+    """Return the radiance that clouds with or without densities scatter once, see `marched_light`."""
+    if rays.clouds.density is None:
+        return scattered(rays, beams, steps=steps, printed=printed)
+    return marched_light(rays, beams, steps=steps, stride=stride, printed=printed)
+
+
+def opacity_as_printed(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end, *, stride: Any) -> Any:
+    """Return what is printed for the opacity of clouds with or without densities, a colour [m]."""
+    if clouds.density is None:
+        return printed_opacity(surfaces, clouds, origin, direction, end)
+    return marched_printed_opacity(surfaces, clouds, origin, direction, end, stride=stride)
+
+
+def marched_light(
+    rays: CloudRays, beams: Sequence[Beam], *, steps: int, stride: Any, printed: bool = False
+) -> tuple[tuple[Any, ...], ...]:
+    """Return the radiance that clouds scatter once into rays, by beam and octave, RGB [W/(m^2 sr)].
+
+    Parameters
+    ----------
+    rays, beams, steps, printed
+        As for `realtime.clouds.single_scattering.march.scattered`.
+    stride
+        The longest step where a ray enters [voxels].
+
+    References
+    ----------
+    Bouthors, Neyret, Max, Bruneton, Crassin 2008, sections 6.2 and 8.
+    """
+    clouds, Float, Color = rays.clouds, type(rays.direction.x), type(rays.clouds.albedo)
+    channels, lanes = len(clouds.sigma_t), dr.width(rays.direction)
+    bound = optical_depths(rays.surfaces, clouds, rays.origin, rays.direction, rays.end)
+    share = (1 - dr.exp(-sum(bound) / (channels * SPREAD))) / steps
+
+    def legs_at(x, active):
+        point = rays.origin + rays.direction * dr.select(dr.isfinite(x), x, 0)
+        legs = tuple(beam.leg(point, active) for beam in beams)
+        lit = tuple(Float(1) if beam.lit is None else dr.select(beam.lit(point, active), Float(1), 0) for beam in beams)
+        return legs, lit
+
+    def step(total, x, cloud, inside):
+        _, depths, *_ = total
+        tau = sum(depths) / channels
+        kappa = sum(dr.gather(Float, own, cloud, inside) for own in clouds.sigma_t) / channels
+        growth = dr.exp(dr.minimum(tau, OPAQUE) / SPREAD)
+        left = 1 - share * growth
+        node = dr.select(left > 0, -SPREAD * dr.log(dr.maximum(left, 1e-30)) / kappa, dr.inf)
+        return dr.minimum(node, stride * voxel(clouds, cloud, inside) * growth)
+
+    def add(total, begin, end, cloud, inside):
+        last, depths, legs, lit, sums = total
+        # Where a stretch begins, so do the legs.
+        first_legs, first_lit = legs_at(begin, inside & (begin != last))
+        fresh = begin != last
+        legs = tuple(
+            tuple(dr.select(fresh, new, old) for new, old in zip(*pair)) for pair in zip(first_legs, legs, strict=True)
+        )
+        lit = tuple(dr.select(fresh, new, old) for new, old in zip(first_lit, lit, strict=True))
+        next_legs, next_lit = legs_at(end, inside)
+        rho = middle_density(clouds, rays.origin, rays.direction, begin, end, cloud, inside)
+        length = dr.select(inside, rho * (end - begin), 0)
+        own = tuple(dr.gather(Float, sigma_t, cloud, inside) * length for sigma_t in clouds.sigma_t)
+        after = tuple(depth + part for depth, part in zip(depths, own))
+        albedo = dr.gather(Color, clouds.albedo, cloud, inside)
+        phase = dr.gather(mi.UInt32, clouds.phase, cloud, inside)
+        new_sums = []
+        for beam, was, leg, next_leg, shown, next_shown in zip(
+            beams, sums, legs, next_legs, lit, next_lit, strict=True
+        ):
+            new_sums.append(
+                tuple(
+                    sum_
+                    + dr.select(inside, _light(own, (depths, after), (leg, next_leg), scale, printed, Color), 0)
+                    * (albedo * (0.5 * (shown + next_shown) * _chosen(values, phase)))
+                    for sum_, scale, values in zip(was, beam.scales, beam.phases, strict=True)
+                )
+            )
+        legs = tuple(
+            tuple(dr.select(inside, new, old) for new, old in zip(*pair)) for pair in zip(next_legs, legs, strict=True)
+        )
+        lit = tuple(dr.select(inside, new, old) for new, old in zip(next_lit, lit, strict=True))
+        return (dr.select(inside, end, last), after, legs, lit, tuple(new_sums)), _shown(after)
+
+    total = (
+        dr.full(Float, -1, lanes),
+        tuple(dr.zeros(Float, lanes) for _ in range(channels)),
+        tuple(tuple(dr.zeros(Float, lanes) for _ in range(channels)) for _ in beams),
+        tuple(dr.zeros(Float, lanes) for _ in beams),
+        tuple(tuple(dr.zeros(Color, lanes) for _ in beam.scales) for beam in beams),
+    )
+    *_, sums = march(rays.surfaces, rays.origin, rays.direction, rays.end, total, step=step, add=add)
+    return tuple(
+        tuple(sum_ * beam.irradiance * (0.25 * dr.inv_pi) for sum_ in own)
+        for own, beam in zip(sums, beams, strict=True)
+    )
+
+
+def marched_printed_opacity(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end, *, stride: Any) -> Any:
+    """Return what is printed for the opacity, a colour [m]; arguments as of `marched_depths`."""
+    Float, Color, lanes = type(direction.x), type(clouds.albedo), dr.width(direction)
+
+    def add(total, begin, finish, cloud, inside):
+        first, sums = total
+        first = dr.select(inside & ~dr.isfinite(first), begin, first)
+        rho = middle_density(clouds, origin, direction, begin, finish, cloud, inside)
+        near, far = (dr.select(inside, place - first, 0) for place in (begin, finish))
+        kappas = [dr.gather(Float, sigma_t, cloud, inside) * rho for sigma_t in clouds.sigma_t]
+        terms = [
+            dr.select(inside & (kappa > 0), (dr.exp(-kappa * far) - dr.exp(-kappa * near)) / kappa, 0)
+            for kappa in kappas
+        ]
+        return (first, tuple(own + term for own, term in zip(sums, terms))), inside
+
+    def step(total, x, cloud, inside):
+        return stride * voxel(clouds, cloud, inside)
+
+    nothing = dr.full(Float, dr.inf, lanes), tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
+    _, sums = march(surfaces, origin, direction, end, nothing, step=step, add=add)
+    return Color(*(sums * (3 // len(sums))))
+
+
+def _light(own, depths, legs, scale, printed: bool, Color) -> Any:
+    """Return the integral over a step of its `own` depths, from `depths` and `legs` at its ends, a colour."""
+    parts = []
+    for part, eye, next_eye, leg, next_leg in zip(own, *depths, *legs, strict=True):
+        first, last = eye + scale * leg, next_eye + scale * next_leg
+        if printed:
+            parts.append(dr.exp(-last) - dr.exp(-first))
+            continue
+        change = dr.abs(part + scale * (next_leg - leg))
+        series = dr.fma(change, dr.fma(change, dr.fma(change, -1 / 24, 1 / 6), -0.5), 1)
+        share = dr.select(change < _SERIES, series, (1 - dr.exp(-change)) / dr.maximum(change, _SERIES))
+        parts.append(part * dr.exp(-dr.minimum(first, last)) * share)
+    return Color(*(parts * (3 // len(parts))))
+
+
+def _shown(depths: tuple[Any, ...]) -> Any:
+    shown = depths[0] < OPAQUE
+    for depth in depths[1:]:
+        shown |= depth < OPAQUE
+    return shown
+
+
+def _chosen(values: tuple[Any, ...], number) -> Any:
+    """Return the value of a number."""
+    chosen = values[0]
+    for place, value in enumerate(values[1:], 1):
+        chosen = dr.select(number == place, value, chosen)
+    return chosen

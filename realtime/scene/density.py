@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Clouds whose density differs from place to place: the grids of Mitsuba's `heterogeneous` media.
+
+A grid of values of which the largest is rho_max gives the extinction
+
+    sigma_t(p) = scale rho_max rho(p),        rho = values / rho_max  in [0, 1],
+
+linear between the centres of voxels (at (i + 1/2)/n of the grid's box, as Mitsuba has it) and constant beyond the
+outermost ones. `Clouds.sigma_t` is scale rho_max, the largest extinction: code that knows extinctions alone has a bound
+in it. `Clouds.density` says rho.
+
+Mitsuba tells Python a volume's values, its box and, in words of six digits, its transform. A transform from the words
+whose translation is that which takes the middle of the box to the middle of the grid is right to 1e-6 of the grid.
+What is read is then compared with what Mitsuba itself finds at some points, so nothing else can be taken for a grid
+that is linear between voxels.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.errors import InputError
+from realtime.numerics.array_types import ArrayTypes, PerRay, four_numbers
+from realtime.scene.closed_mesh import ClosedMesh
+
+Array = NDArray[np.float64]
+
+_POINTS = 512  # at which a grid is compared with Mitsuba's
+_DIFFERENCE = 2e-3  # from it, of the largest value: a grid read well differs by rounding, 1e-4 where voxels are noise
+_BEYOND = 1e-4  # how far a hull may reach beyond its grid, as a share of that
+
+
+@dataclass(frozen=True)
+class DensityGrid:
+    """The grid of one cloud."""
+
+    values: NDArray[np.float32]  #: rho from 0 to 1, (z, y, x)
+    largest: float  #: extinction where rho is 1 [1/m]
+    to_grid: Array  #: from places [m] to the unit cube, (3, 4)
+
+    @property
+    def voxel(self) -> float:
+        """The width of a voxel along its shortest side [m]."""
+        sides = np.linalg.norm(np.linalg.inv(self.to_grid[:, :3]), axis=0)
+        return float((sides / self.values.shape[::-1]).min())
+
+
+@dataclass(frozen=True)
+class Density:
+    """The density of all clouds of a scene, on the device; one without a grid has the density 1 everywhere."""
+
+    table: Any  #: four numbers a voxel: rho there, at its neighbour in x, in y, and in both
+    first: Any  #: by cloud, the number of its first voxel
+    counts: tuple[Any, Any, Any]  #: by cloud, voxels along x, y, z
+    rows: tuple[Any, ...]  #: by cloud, twelve numbers: from places [m] to voxels, whole numbers at their centres
+    voxel: Any  #: by cloud, the width of a voxel, infinite where there is no grid [m]
+
+    def at(self, point, cloud: PerRay, active: Any = True) -> PerRay:
+        """Return rho at places [m] in clouds of some numbers [1]."""
+        Float = type(point.x)
+        Four = four_numbers(Float)
+        x, y, z = self.rows_at(point, cloud, active)
+        nx, ny, nz = (dr.gather(mi.UInt32, count, cloud, active) for count in self.counts)
+        (i, u), (j, v), (k, w) = (_cell(place, count) for place, count in ((x, nx), (y, ny), (z, nz)))
+        voxel = dr.gather(mi.UInt32, self.first, cloud, active) + (k * ny + j) * nx + i
+        near = dr.gather(Four, self.table, voxel, active)
+        far = dr.gather(Four, self.table, voxel + dr.select(k + 1 < nz, nx * ny, 0), active)
+        four = dr.lerp(near, far, w)
+        return dr.lerp(dr.lerp(four.x, four.y, u), dr.lerp(four.z, four.w, u), v)
+
+    def rows_at(self, point, cloud: PerRay, active: Any) -> tuple[Any, Any, Any]:
+        """Return places in voxels."""
+        Float = type(point.x)
+        row = [dr.gather(Float, number, cloud, active) for number in self.rows]
+        x, y, z = (
+            dr.fma(row[n], point.x, dr.fma(row[n + 1], point.y, dr.fma(row[n + 2], point.z, row[n + 3])))
+            for n in (0, 4, 8)
+        )
+        return x, y, z
+
+    def mean_above(self, cloud: int, threshold: float) -> float:
+        """Return the mean of rho over the voxels of a cloud in which it is above a threshold, 1 without any."""
+        count = int(np.prod([int(count[cloud]) for count in self.counts]))
+        voxel = dr.arange(mi.UInt32, count) + int(self.first[cloud])
+        rho = dr.gather(type(self.table), self.table, 4 * voxel)
+        above = rho > threshold
+        total = float(dr.sum(mi.Float64(dr.select(above, rho, 0)))[0])
+        share = int(dr.count(above)[0])
+        return total / share if share else 1.0
+
+
+def _cell(place, count) -> tuple[Any, Any]:
+    """Return the number of the voxel before a place, and the share of the way to the next."""
+    Float = type(place)
+    inside = dr.clip(place, 0, Float(count - 1))
+    number = mi.UInt32(inside)
+    return number, inside - Float(number)
+
+
+def read_density(medium: Any, mesh: ClosedMesh) -> DensityGrid:
+    """Return the grid of a Mitsuba medium within a mesh.
+
+    Raises
+    ------
+    InputError
+        For a `heterogeneous` medium whose extinction is no grid of one channel, linear between voxels, that covers the
+        mesh, or whose albedo is not the same everywhere.
+    """
+    name, parameters = f"the {medium.class_name()} of shape '{mesh.name}'", mi.traverse(medium)
+    if "sigma_t.data" not in parameters:
+        raise InputError(f"{name} has an extinction that is no grid; wanted a 'gridvolume' as sigma_t")
+    if "albedo.value.value" not in parameters:
+        raise InputError(
+            f"{name} has an albedo that differs from place to place; wanted one number or colour: a 'constvolume'"
+        )
+    values = np.array(parameters["sigma_t.data"], dtype=np.float64)
+    if values.ndim == 4 and values.shape[3] > 1:
+        raise InputError(
+            f"{name} has an extinction of {values.shape[3]} channels on its grid; wanted one channel: clouds are grey"
+        )
+    values = values.reshape(values.shape[:3])
+    wrong = ~(np.isfinite(values) & (values >= 0))
+    if wrong.any():
+        z, y, x = (int(index) for index in np.argwhere(wrong)[0])
+        raise InputError(
+            f"{name} has {values[z, y, x]:g} in voxel ({x}, {y}, {z}), and {int(wrong.sum())} such in all; wanted "
+            "finite densities of 0 or more"
+        )
+    scale, largest = float(np.array(parameters["scale"]).ravel()[0]), float(values.max())
+    if not (scale >= 0 and np.isfinite(scale)):
+        raise InputError(f"{name} has the scale {scale:g}; wanted a finite number of 0 or more")
+    if not largest * scale > 0:
+        raise InputError(f"{name} is empty: its grid is 0 everywhere; wanted densities above 0 somewhere, or no cloud")
+    grid = DensityGrid((values / largest).astype(np.float32), largest * scale, _transform(medium))
+    reach = grid.to_grid[:, :3] @ mesh.vertices.T + grid.to_grid[:, 3:]
+    beyond = (reach < -_BEYOND) | (reach > 1 + _BEYOND)
+    if beyond.any():
+        vertex = int(np.argmax(beyond.any(axis=0)))
+        place = ", ".join(f"{x:.6g}" for x in mesh.vertices[vertex])
+        raise InputError(
+            f"{name} has a grid that does not cover the shape: vertex {mesh.own[vertex]} at ({place}) lies beside it; "
+            "wanted a to_world of the volume whose unit cube holds the shape"
+        )
+    _compare(name, medium, grid)
+    return grid
+
+
+def _transform(medium: Any) -> Array:
+    """Return the transform of the volume of a medium, (3, 4)."""
+    words = str(medium).partition("sigma_t =")[2]
+    rows = re.search(r"matrix=\[(.*?)\]\]", words, re.S)
+    box = re.search(r"min = \[(.*?)\],\s*max = \[(.*?)\]", words, re.S)
+    if rows is None or box is None:
+        raise InputError(f"Mitsuba says nothing of the grid of the {medium.class_name()}; wanted a 'gridvolume'")
+    matrix = np.array([float(number) for number in re.findall(r"[-+\w.]+", rows[1])]).reshape(4, 4)[:3, :3]
+    return np.column_stack([matrix, 0.5 - matrix @ _middle(medium, box)])
+
+
+def _middle(medium: Any, words: re.Match) -> Array:
+    """Return the middle of the box of a medium [m]: by Mitsuba's rays, to all digits."""
+    low, high = (np.array([float(number) for number in part.split(",")]) for part in words.groups())
+    rough, size = 0.5 * (low + high), high - low
+    middle = np.empty(3)
+    for axis in range(3):
+        way = np.eye(3)[axis]
+        start = mi.Point3f(*(float(c) for c in rough - way * (rough[axis] - low[axis] + size[axis])))
+        meets, near, far = medium.intersect_aabb(mi.Ray3f(start, mi.Vector3f(*(float(c) for c in way))))
+        middle[axis] = float(start[axis][0]) + 0.5 * (float(near[0]) + float(far[0])) if meets[0] else rough[axis]
+    return middle
+
+
+def _compare(name: str, medium: Any, grid: DensityGrid) -> None:
+    """Refuse a medium whose extinction is another one than the grid's."""
+    share = np.random.default_rng(1).random((_POINTS, 3))
+    places = np.linalg.solve(grid.to_grid[:, :3], (share.T - grid.to_grid[:, 3:]))
+    interaction = dr.zeros(mi.MediumInteraction3f, _POINTS)
+    interaction.p = mi.Point3f(*(mi.Float(row) for row in places))
+    _, _, sigma_t = medium.get_scattering_coefficients(interaction)
+    own = grid.largest * density_at(grid.values, share)
+    worst = float(np.abs(np.array(sigma_t)[0] - own).max()) / grid.largest
+    if worst > _DIFFERENCE:
+        raise InputError(
+            f"{name} has a grid that is not read as Mitsuba reads it, by {worst:.2g} of its largest value; wanted a "
+            "'gridvolume' with the filter_type 'trilinear'"
+        )
+
+
+def density_at(values: NDArray[np.float32], share: Array) -> Array:
+    """Return what a grid (z, y, x) holds at places in the unit cube, (n, 3)."""
+    counts = np.array(values.shape[::-1])
+    place = np.clip(share * counts - 0.5, 0, counts - 1)
+    cell = np.minimum(place.astype(np.int64), np.maximum(counts - 2, 0))
+    offset = place - cell
+    total = np.zeros(len(share))
+    for corner in np.ndindex(2, 2, 2):
+        x, y, z = np.minimum(cell + corner, counts - 1).T
+        total += np.where(corner, offset, 1 - offset).prod(axis=1) * values[z, y, x]
+    return total
+
+
+def density_on_device(grids: list[DensityGrid | None], types: ArrayTypes) -> Density:
+    """Return the density of clouds by their grids, None for a homogeneous one."""
+    tables, counts, rows, voxels = [], [], [], []
+    for grid in grids:
+        values = np.ones((1, 1, 1), dtype=np.float32) if grid is None else grid.values
+        count = values.shape[::-1]
+        to_grid = np.zeros((3, 4)) if grid is None else grid.to_grid
+        to_voxels = to_grid * np.array(count)[:, None]
+        to_voxels[:, 3] -= 0.5
+        x_next = np.concatenate([values[:, :, 1:], values[:, :, -1:]], axis=2)
+        y_next, both = (np.concatenate([own[:, 1:], own[:, -1:]], axis=1) for own in (values, x_next))
+        tables.append(np.stack([values, x_next, y_next, both], axis=-1).reshape(-1, 4))
+        counts.append(count)
+        rows.append(to_voxels.ravel())
+        voxels.append(np.inf if grid is None else grid.voxel)
+    first = np.cumsum([0] + [len(table) for table in tables[:-1]])
+    density = Density(
+        types.scalar(np.concatenate(tables).ravel()),
+        mi.UInt32(first),
+        tuple(mi.UInt32(column) for column in np.array(counts).T),
+        tuple(types.scalar(column) for column in np.array(rows).T),
+        types.scalar(voxels),
+    )
+    dr.make_opaque(density.table, density.first, density.counts, density.rows, density.voxel)
+    return density

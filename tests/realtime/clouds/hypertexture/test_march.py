@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: depths and light of clouds with densities are right, and those of a homogeneous cloud where the grid is even.
+
+A transport by a formula stands for the tables of `cloud-collectors`.
+"""
+
+from itertools import pairwise
+from types import SimpleNamespace
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from realtime.clouds.bounds.surfaces import cloud_surfaces
+from realtime.clouds.hypertexture.light_depths import light_depths, marched_leg
+from realtime.clouds.hypertexture.lit_surface import dense_surface, lit_dense_surface
+from realtime.clouds.hypertexture.march import marched_depths
+from realtime.clouds.light_maps.surfaces import cast_surfaces
+from realtime.frame.renderer import frame_renderer, render_frame
+from realtime.methods.registry import METHODS
+from realtime.scene.camera import ray_directions
+from realtime.scene.closed_mesh import boundary_scene
+from realtime.scene.read_scene import read_scene
+from tests.helpers.clouds import SUN, TURN, cloud, cloud_scene, crossings, dense, linear_between, ring
+from validation.scenes.parts import placed
+from validation.scenes.solids import box
+
+pytestmark = pytest.mark.usefixtures("variant")
+
+LOW, HIGH = np.array([-131.7, -117.3, -141.9]), np.array([139.1, 121.7, 143.3])
+#: Waves that a coarse grid holds, with zeros: rho may be 0 at the hull.
+WAVES = 0.021, 0.029, 0.037
+SKY = {"type": "constant", "radiance": {"type": "rgb", "value": [0.07, 0.11, 0.19]}}
+
+
+@pytest.fixture(autouse=True)
+def transport(monkeypatch):
+    import realtime.methods.cloud_collectors as method
+
+    def formula(number, t, d, mu, cos_phi, sin_phi, mu_l):
+        return (
+            (2 + mu) * mu_l * t / (1 + t) * dr.exp(-0.1 * d) / (3 + type(t)(number)),
+            -0.2 * mu,
+            0.1 * mu,
+            0.5 + 0 * t,
+        )
+
+    monkeypatch.setattr(method, "canonical_tables", lambda phase, albedo: SimpleNamespace(angular=None))
+    monkeypatch.setattr(method, "on_device", lambda tables, types: formula)
+    monkeypatch.setattr(method, "transport_grid", lambda look_up, angular, sets: look_up)
+
+
+def waves(voxels):
+    """Return a smooth density on a grid of about so many voxels along each axis."""
+    counts = (voxels, voxels + 3, voxels - 2)
+    along = [low + (high - low) * (np.arange(n) + 0.5) / n for low, high, n in zip(LOW, HIGH, counts)]
+    z, y, x = np.meshgrid(along[2], along[1], along[0], indexing="ij")
+    product = np.cos(WAVES[0] * x + 0.3) * np.cos(WAVES[1] * y - 0.9) * np.cos(WAVES[2] * z + 0.2)
+    return np.clip(0.8 * product + 0.45, 0, 1)
+
+
+def uneven(values=None, **parts):
+    values = waves(13) if values is None else values
+    return mi.load_dict(cloud_scene(sun=SUN, ring=cloud("ring", ring(), dense(values, LOW, HIGH)), **parts))
+
+
+def even_and_homogeneous(**parts):
+    """Return scenes of a box, in which light maps that know both ends of a cloud alone know all of it."""
+    mesh = placed(box((111.0, 97.0, 83.0)), (3.7, -2.1, 1.9), TURN)
+    even = cloud("box", mesh, dense(np.ones((2, 3, 4)), LOW, HIGH))
+    return [mi.load_dict(cloud_scene(sun=SUN, box=shape, **parts)) for shape in (even, cloud("box", mesh))]
+
+
+def rendered(scene, name, precision="single", **parameters):
+    method = METHODS[name]
+    return render_frame(frame_renderer(read_scene(scene, precision), method, extra_layers=True, **parameters))
+
+
+def rays_of(scene, precision="single"):
+    read = read_scene(scene, precision)
+    pixel = mi.UInt32(np.arange(16 * 12, dtype=np.uint32))
+    return read, ray_directions(read.camera, pixel)[0]
+
+
+def exact_depths(values, read, direction, sigma_t=0.0363):
+    """Return the depths of rays by small steps through all triangles in float64."""
+    origin, mesh = np.array(read.camera.origin, dtype=float).ravel(), ring()
+    depths = []
+    for way in np.array(direction, dtype=float).T:
+        distance, leaves = crossings(mesh, origin, way)
+        depth, before = 0.0, 0.0
+        for end, leaving in zip(distance, leaves):
+            if leaving:
+                places = before + (end - before) * (np.arange(4000) + 0.5) / 4000
+                rho = linear_between(values, LOW, HIGH, origin + places[:, None] * way) / values.max()
+                depth += sigma_t * rho.mean() * (end - before)
+            before = end
+        depths.append(depth)
+    return np.array(depths)
+
+
+@pytest.mark.claim("hypertexture-depths", tolerance="2 % of the mean with a step a voxel; falls with its square")
+def test_depths_are_the_sums_of_the_grid_and_converge():
+    values = waves(13)
+    read, direction = rays_of(uneven(values))
+    surfaces, clouds = cloud_surfaces(read), read.medium.clouds
+    expected = exact_depths(values / 1.0, read, direction, 0.0363 * values.max())
+    errors = []
+    for stride in (2.0, 1.0, 0.5, 0.25):
+        (found,) = marched_depths(
+            surfaces, clouds, read.camera.origin, direction, mi.Float(dr.inf), stride=mi.Float(stride), seen=False
+        )
+        errors.append(np.sqrt(np.mean((np.array(found) - expected) ** 2)) / expected.mean())
+    assert errors[1] < 0.02
+    assert errors[3] < 0.3 * errors[1]
+    (seen,) = marched_depths(
+        surfaces, clouds, read.camera.origin, direction, mi.Float(dr.inf), stride=mi.Float(0.25), seen=True
+    )
+    np.testing.assert_allclose(np.exp(-np.array(seen)), np.exp(-expected), atol=2e-3)
+
+
+@pytest.mark.claim("hypertexture-even", tolerance="1e-5 of opacity, 1 % of light: the map of depths has 256 texels")
+@pytest.mark.parametrize("name", ["cloud-octaves", "cloud-collectors"])
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_an_even_grid_is_a_homogeneous_cloud(name, precision):
+    even, homogeneous = even_and_homogeneous(sky=SKY)
+    grid, plain = (rendered(scene, name, precision) for scene in (even, homogeneous))
+    np.testing.assert_allclose(grid.extra["opacity"], plain.extra["opacity"], atol=1e-5)
+    np.testing.assert_allclose(grid.surface, plain.surface, atol=1e-5)
+    assert set(grid.extra) == set(plain.extra)
+    for layer, light in plain.extra.items():
+        mean, other = np.mean(light), np.array(grid.extra[layer])
+        assert np.mean(other) == pytest.approx(mean, rel=0.01), layer
+        assert np.sqrt(np.mean((other - light) ** 2)) < 0.05 * mean, layer
+
+
+@pytest.mark.parametrize("name", ["cloud-octaves", "cloud-collectors"])
+def test_the_printed_equations_run_on_grids(name):
+    even, homogeneous = even_and_homogeneous()
+    printed = {"single": "printed", "opacity": "printed"}
+    grid, plain = (rendered(scene, name, **printed) for scene in (even, homogeneous))
+    # Printed, a stretch is cut where the steps are: its sum telescopes for even extinction.
+    np.testing.assert_allclose(grid.extra["opacity"], plain.extra["opacity"], atol=2e-3)
+    assert np.mean(grid.extra["airlight_1"]) == pytest.approx(np.mean(plain.extra["airlight_1"]), rel=0.02)
+    assert np.mean(grid.extra["airlight_1"]) < 0
+
+
+@pytest.mark.claim("hypertexture-converges", tolerance="none: errors that shrink at least by half")
+@pytest.mark.parametrize("name", ["cloud-octaves", "cloud-collectors"])
+def test_finer_grids_of_a_smooth_field_converge(name):
+    images = [np.array(rendered(uneven(waves(n)), name).airlight) for n in (12, 24, 48, 96)]
+    steps = [np.sqrt(np.mean((a - b) ** 2)) / images[-1].mean() for a, b in pairwise(images)]
+    assert steps[1] < 0.6 * steps[0]
+    assert steps[2] < 0.6 * steps[1]
+    assert steps[2] < 0.02
+
+
+@pytest.mark.claim("hypertexture-legs", tolerance="0.05 of depth in the mean, of legs of 2.5: 256 texels, 64 layers")
+def test_the_map_of_a_sun_holds_the_depths_of_legs():
+    """In and between the limbs of the ring, where the map must know the gap."""
+    read = read_scene(uneven())
+    surfaces, clouds, light = cloud_surfaces(read), read.medium.clouds, read.lights[0]
+    random = np.random.default_rng(3)
+    points = mi.Vector3f(random.uniform(LOW, HIGH, (4000, 3)).T)
+    stride = mi.Float(0.25)
+    (expected,) = (np.array(leg) for leg in marched_leg(surfaces, clouds, light, stride=stride)(points, True))
+    found = (
+        0.0363 * waves(13).max() * np.array(light_depths(surfaces, clouds, light, cloud=0, stride=stride).at(points))
+    )
+    assert expected.max() > 2
+    deep = expected > 0.1
+    assert np.abs(found - expected)[deep].mean() < 0.05
+    assert found.mean() == pytest.approx(expected.mean(), rel=0.02)
+
+
+def test_legs_by_samples_are_those_of_a_march():
+    few, many = (rendered(uneven(), "cloud-octaves", light_steps=steps) for steps in (24, 384))
+    marched = rendered(uneven(), "cloud-octaves")
+    assert np.mean(many.airlight) == pytest.approx(np.mean(marched.airlight), rel=0.01)
+    assert np.mean(few.airlight) == pytest.approx(np.mean(marched.airlight), rel=0.1)
+
+
+def test_the_surface_is_where_the_density_passes_the_threshold():
+    values = waves(13)
+    read, direction = rays_of(uneven(values), "double")
+    surfaces, clouds = cloud_surfaces(read), read.medium.clouds
+    met = dense_surface(
+        surfaces, clouds, read.camera.origin, direction, mi.Float64(dr.inf), threshold=0.5, stride=mi.Float64(0.1)
+    )
+    there, hull = np.isfinite(np.array(met.distance)), np.array(met.hull)
+    points = np.array(read.camera.origin + direction * dr.select(dr.isfinite(met.distance), met.distance, 0)).T
+    rho = linear_between(values / values.max(), LOW, HIGH, points)
+    passes = there & ~hull
+    assert passes.sum() > 5
+    np.testing.assert_allclose(rho[passes], 0.5, atol=5e-3)
+    assert np.all(rho[there & hull] > 0.5)
+    assert (~there).any()
+
+
+def test_the_light_map_of_an_even_grid_is_that_of_the_mesh():
+    read = read_scene(uneven(np.ones((2, 2, 2))))
+    surfaces, clouds, light = cloud_surfaces(read), read.medium.clouds, read.lights[0]
+    own = lit_dense_surface(surfaces, clouds, light, 64, cloud=0, threshold=0.5, stride=mi.Float(1))
+    cast = cast_surfaces(boundary_scene(read.boundaries), light, 64)
+    np.testing.assert_array_equal(own.there, cast.there)
+    np.testing.assert_allclose(own.front, cast.front, atol=0.01)
+    np.testing.assert_allclose(np.array(own.normal), np.array(cast.normal), atol=1e-5)
+    # What lies between two limbs is no cloud here; the mesh alone takes it for one.
+    thickness, filled = np.array(own.front) - np.array(own.back), np.array(cast.front) - np.array(cast.back)
+    assert np.all(thickness <= filled + 0.02)
+    assert thickness.sum() < 0.9 * filled.sum()

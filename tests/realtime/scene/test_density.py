@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: grids of densities are read as Mitsuba reads them, and what is none of a cloud is refused in one line."""
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from realtime.errors import InputError
+from realtime.frame.renderer import frame_renderer
+from realtime.kernels.exact import exact
+from realtime.methods.registry import FOG_METHODS, METHODS
+from realtime.scene.density import density_at
+from realtime.scene.read_scene import read_scene
+from tests.helpers.clouds import SUN, cloud, cloud_scene, dense, linear_between, ring
+from validation.scenes.parts import placed
+from validation.scenes.solids import box
+
+pytestmark = pytest.mark.usefixtures("variant")
+
+LOW, HIGH = np.array([-131.7, -117.3, -141.9]), np.array([139.1, 121.7, 143.3])
+RANDOM = np.random.default_rng(7)
+ROUGH = RANDOM.random((5, 7, 6)) ** 2
+
+
+def grid_scene(medium=None, **changes):
+    medium = medium or dense(ROUGH, LOW, HIGH, **changes)
+    return mi.load_dict(cloud_scene(sun=SUN, ring=cloud("ring", ring(), medium)))
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_a_grid_is_linear_between_its_voxels(precision):
+    """On the device, in the reader's check and in Mitsuba alike; beyond the outermost voxels it is constant."""
+    scene = grid_scene()
+    density = read_scene(scene, precision).medium.clouds.density
+    points = np.concatenate([RANDOM.uniform(LOW, HIGH, (400, 3)), [LOW, HIGH, LOW + (HIGH - LOW) * 0.01]])
+    vector = type(read_scene(scene, precision).camera.origin)
+    found = np.array(density.at(vector(points.T), mi.UInt32(0)))
+    expected = linear_between(ROUGH, LOW, HIGH, points) / ROUGH.max()
+    np.testing.assert_allclose(found, expected, atol=2e-5 if precision == "single" else 5e-6)
+    values = (ROUGH / ROUGH.max()).astype(np.float32)
+    np.testing.assert_allclose(density_at(values, (points - LOW) / (HIGH - LOW)), expected, atol=1e-6)
+
+
+def test_the_largest_extinction_stands_for_the_cloud_and_a_homogeneous_one_is_even():
+    apart = placed(box((50.0, 60.0, 70.0)), (413.0, 17.0, 9.0))
+    medium = dense(7.3 * ROUGH, LOW, HIGH, sigma_t=0.017)
+    scene = mi.load_dict(cloud_scene(sun=SUN, ring=cloud("ring", ring(), medium), box=cloud("box", apart)))
+    read = read_scene(scene)
+    clouds = read.medium.clouds
+    np.testing.assert_allclose(clouds.sigma_t[0], [0.017 * 7.3 * ROUGH.max(), 0.0363], rtol=1e-5)
+    places = mi.Point3f([413.0, 3.71], [17.0, -0.13], [9.0, 2.03])
+    even = np.array(clouds.density.at(places, mi.UInt32([1, 1])))
+    np.testing.assert_array_equal(even, 1)
+    assert np.isinf(np.array(clouds.density.voxel)[1])
+    assert read.features.uneven == 1
+
+
+def test_a_turned_grid_far_away():
+    """The transform comes from words of six digits and a box: right to a share of the grid, wherever that is."""
+    middle = np.array([71_903.0, -51_307.0, 31_711.0])
+    turn = (
+        mi.ScalarTransform4f()
+        .translate(middle.tolist())
+        .rotate([2 / 7, 6 / 7, -3 / 7], 37.0)
+        .scale([307.0, 331.0, 293.0])
+    )
+    to_world = turn @ mi.ScalarTransform4f().translate([-0.5, -0.5, -0.5])
+    medium = dense(ROUGH, LOW, HIGH)
+    medium["sigma_t"] |= {"to_world": to_world}
+    vertices, faces = ring()
+    shape = cloud("ring", (vertices + middle, faces), medium)
+    scene = mi.load_dict(cloud_scene(sun=SUN, ring=shape, origin=tuple(middle + np.array([30.8, -400.9, 57.0]))))
+    density = read_scene(scene, "double").medium.clouds.density
+    share = RANDOM.random((300, 3))
+    matrix = np.array(to_world.matrix, dtype=np.float64).reshape(4, 4)
+    points = share @ matrix[:3, :3].T + matrix[:3, 3]
+    found = np.array(density.at(mi.Vector3d(points.T), mi.UInt32(0)))
+    # Mitsuba's box in float32 is right to 0.004 m of 50 m wide voxels here.
+    np.testing.assert_allclose(found, linear_between(ROUGH, np.zeros(3), np.ones(3), share) / ROUGH.max(), atol=5e-4)
+
+
+def changed(values):
+    rough = ROUGH.copy()
+    rough[2, 3, 1] = values
+    return {"values": rough}
+
+
+@pytest.mark.claim("hypertexture-refused", tolerance="none: an error and its words")
+@pytest.mark.parametrize(
+    ("medium", "words"),
+    [
+        (lambda: dense(changed(-0.1)["values"], LOW, HIGH), r"has -0.1 in voxel \(1, 3, 2\), and 1 such"),
+        (lambda: dense(changed(np.nan)["values"], LOW, HIGH), r"has nan in voxel \(1, 3, 2\)"),
+        (lambda: dense(changed(np.inf)["values"], LOW, HIGH), r"has inf in voxel"),
+        (lambda: dense(0 * ROUGH, LOW, HIGH), "is empty: its grid is 0 everywhere"),
+        (lambda: dense(ROUGH, LOW, HIGH, sigma_t=0.0), "is empty"),
+        (lambda: dense(ROUGH, LOW, HIGH * (1, 1, 0.1)), r"does not cover the shape: vertex \d+ at \("),
+        (lambda: dense(ROUGH, LOW, HIGH) | {"sigma_t": 0.1}, "is no grid"),
+        (
+            lambda: dense(ROUGH, LOW, HIGH, albedo={"type": "gridvolume", "grid": mi.VolumeGrid(ROUGH[..., None])}),
+            "an albedo that differs from place to place",
+        ),
+        (
+            lambda: dense(ROUGH, LOW, HIGH) | {
+                "sigma_t": {"type": "gridvolume", "grid": mi.VolumeGrid(np.full((2, 2, 2, 3), 0.5, dtype=np.float32))}
+            },
+            "3 channels",
+        ),
+        (
+            lambda: (medium := dense(ROUGH, LOW, HIGH)) | {"sigma_t": medium["sigma_t"] | {"filter_type": "nearest"}},
+            "filter_type 'trilinear'",
+        ),
+    ],
+)  # fmt: skip
+def test_what_is_no_density_is_refused_by_name(medium, words):
+    with pytest.raises(InputError, match=words) as refusal:
+        read_scene(grid_scene(medium()))
+    assert "of shape 'ring'" in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.claim("hypertexture-refused", tolerance="none: an error and its words")
+@pytest.mark.parametrize("name", FOG_METHODS)
+def test_methods_for_fog_refuse_a_density_and_name_those_for_clouds(name):
+    convex = placed(box((50.0, 60.0, 70.0)), (3.0, 1.0, 2.0))
+    read = read_scene(mi.load_dict(cloud_scene(sun=SUN, box=cloud("box", convex, dense(ROUGH, LOW, HIGH)))))
+    kernel = {"kernel": exact} if METHODS[name].uses_kernel(METHODS[name].parameters()) else {}
+    with pytest.raises(InputError, match=r"HeterogeneousMedium.*cloud-collectors or cloud-octaves") as refusal:
+        frame_renderer(read, METHODS[name], **kernel)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_density_lies_in_a_mesh_in_clear_air():
+    ball = {"type": "sphere", "radius": 90.0, "bsdf": {"type": "null"}, "interior": dense(ROUGH, LOW, HIGH)}
+    with pytest.raises(InputError, match="is a sphere, and shape 'ball' bounds a HeterogeneousMedium"):
+        read_scene(mi.load_dict(cloud_scene(sun=SUN, ball=ball)))
+    open_mesh = ring()[0], ring()[1][1:]
+    with pytest.raises(InputError, match="not a closed surface: edge"):
+        read_scene(mi.load_dict(cloud_scene(sun=SUN, ring=cloud("ring", open_mesh, dense(ROUGH, LOW, HIGH)))))
+
+
+def test_the_mean_above_a_threshold():
+    density = read_scene(grid_scene()).medium.clouds.density
+    rho = ROUGH / ROUGH.max()
+    assert density.mean_above(0, 0.4) == pytest.approx(rho[rho > 0.4].mean(), rel=1e-6)

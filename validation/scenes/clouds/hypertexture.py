@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Hypertexture (Perlin and Hoffert 1989; Bouthors et al. 2008, section 8): a cloud's density by distance and noise.
+
+With D the distance from the surface into the cloud, 0 on it, the density is
+
+    rho(p) = S(D(p) + noise(p)),
+
+S a sigmoid from 0 to 1. Here S is 3 u^2 - 2 u^3 between two depths, so that it is 0 and 1 exactly outside them: the
+core is homogeneous, and where the first depth is above all of the noise, the surface is empty.
+
+The noise is a sum of octaves of gradient noise (Perlin 1985, with the fade of Perlin 2002): gradients of unit length at
+the points with whole coordinates, by a hash of these and a seed (Jarzynski and Olano 2020), their planes blended by 6
+t^5 - 15 t^4 + 10 t^3. It is continuous with its first two derivatives, 0 at the whole points, and below sqrt(3)/2.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from validation.scenes.clouds.surfaces import Mesh
+
+Array = NDArray[np.float64]
+
+NOISE_BOUND = 0.75**0.5  #: of one octave: half the diagonal of a cell, between its corners' planes
+SAMPLING = 11.0  #: between the points of a mesh of which the nearest is taken [m]
+
+
+def gradient_noise(points: Array, seed: int) -> Array:
+    """Return one octave of gradient noise at points (n, 3) in cells of size 1, (n,), within `NOISE_BOUND`.
+
+    The gradients of all cells of the box around the points are in memory.
+    """
+    cell = np.floor(points)
+    offset = points - cell
+    low = cell.min(axis=0).astype(np.int64)
+    counts = tuple(int(n) for n in cell.max(axis=0).astype(np.int64) - low + 2)
+    lattice = np.stack(np.unravel_index(np.arange(np.prod(counts)), counts), axis=1) + low
+    gradients = _gradients(lattice, seed)
+    first = np.ravel_multi_index(tuple((cell.astype(np.int64) - low).T), counts)
+    fade = offset**3 * (offset * (6 * offset - 15) + 10)
+    total = np.zeros(len(points))
+    for corner in np.ndindex(2, 2, 2):
+        gradient = gradients[first + np.ravel_multi_index(corner, counts)]
+        weight = np.where(corner, fade, 1 - fade).prod(axis=1)
+        total += weight * np.einsum("ij,ij->i", gradient, offset - corner)
+    return total
+
+
+def octaves(points: Array, size: float, count: int, seed: int) -> Array:
+    """Return noise at points (n, 3) [m], (n,), within -1 and 1.
+
+    Parameters
+    ----------
+    points
+        Where [m].
+    size
+        Of the cells of the first octave [m]; each one's are half as large, and count half as much, as the last one's.
+    count
+        How many octaves.
+    seed
+        Of the first; the others follow.
+    """
+    weights = 0.5 ** np.arange(count)
+    total = np.zeros(len(points))
+    for octave, weight in enumerate(weights):
+        total += weight * gradient_noise(points * (2**octave / size), seed + octave)
+    return total / (weights.sum() * NOISE_BOUND)
+
+
+def sigmoid(depth: Array, empty: float, full: float) -> Array:
+    """Return S: 0 up to the depth `empty` [m], 1 from the depth `full` [m] on."""
+    u = np.clip((depth - empty) / (full - empty), 0.0, 1.0)
+    return np.asarray(u * u * (3 - 2 * u))
+
+
+def grid_points(low: Array, high: Array, counts: tuple[int, int, int]) -> Array:
+    """Return the centres of the voxels of a box, (z, y, x, 3) [m], Mitsuba's order; `counts` along x, y, z."""
+    along = [
+        first + (last - first) * (np.arange(n) + 0.5) / n for first, last, n in zip(low, high, counts, strict=True)
+    ]
+    z, y, x = np.meshgrid(along[2], along[1], along[0], indexing="ij")
+    return np.stack([x, y, z], axis=-1)
+
+
+def inside(mesh: Mesh, points: Array) -> NDArray[np.bool_]:
+    """Return which points of a lattice lie within a closed mesh, (z, y, x).
+
+    Parameters
+    ----------
+    mesh
+        Closed, seen from outside counter-clockwise.
+    points
+        From `grid_points`, (z, y, x, 3) [m].
+    """
+    vertices, faces = mesh
+    x, y, z = points[0, 0, :, 0], points[0, :, 0, 1], points[:, 0, 0, 2]
+    corners = vertices[faces]
+    # Columns may lie on edges of a regular mesh: a little beside it they meet one face, not two or none.
+    x, y = x + 1e-7 * (x[1] - x[0]), y + 1.7e-7 * (y[1] - y[0])
+    ends = [np.searchsorted(own, corners[:, :, axis]) for axis, own in enumerate((x, y))]
+    (x_low, x_high), (y_low, y_high) = ((end.min(axis=1), end.max(axis=1)) for end in ends)
+    triangle = np.repeat(np.arange(len(faces)), (x_high - x_low) * (y_high - y_low))
+    number = np.arange(len(triangle)) - np.searchsorted(triangle, triangle)
+    column = x_low[triangle] + number % np.maximum(x_high - x_low, 1)[triangle]
+    row = y_low[triangle] + number // np.maximum(x_high - x_low, 1)[triangle]
+    place = np.stack([x[column], y[row]], axis=1)
+    a, b, c = (corners[triangle, corner] for corner in range(3))
+    areas = [_twice_area(first[:, :2], second[:, :2], place) for first, second in ((b, c), (c, a), (a, b))]
+    whole = np.sum(areas, axis=0)
+    crosses = np.logical_or(np.all(np.array(areas) > 0, axis=0), np.all(np.array(areas) < 0, axis=0))
+    height = np.sum([area * corner[:, 2] for area, corner in zip(areas, (a, b, c))], axis=0) / np.where(
+        crosses, whole, 1.0
+    )
+    # A line upwards leaves the mesh where it meets a face from inside: as many times as it entered it, plus one.
+    leaves = np.zeros((len(z) + 1, len(y), len(x)), dtype=np.int64)
+    below = np.searchsorted(z, height[crosses])
+    np.add.at(leaves, (below, row[crosses], column[crosses]), np.sign(whole[crosses]).astype(np.int64))
+    return np.asarray(leaves[::-1].cumsum(axis=0)[::-1][1:] > 0)
+
+
+def distance_into(mesh: Mesh, points: Array) -> Array:
+    """Return the distance of points, (n, 3) [m], from a mesh, (n,) [m].
+
+    It is that of the nearest of points on the mesh, `SAMPLING` apart at most: 0.5 m too long at a depth of 40 m.
+    """
+    vertices, faces = mesh
+    corners = vertices[faces]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    parts = np.ceil(longest / SAMPLING).astype(np.int64)
+    samples = []
+    for count in np.unique(parts):
+        i, j = (index.ravel() for index in np.meshgrid(np.arange(count + 1), np.arange(count + 1), indexing="ij"))
+        weights = np.stack([i, j, count - i - j], axis=1)[i + j <= count] / count
+        samples.append(np.einsum("wc,tcx->twx", weights, corners[parts == count]).reshape(-1, 3))
+    return np.asarray(cKDTree(np.unique(np.concatenate(samples), axis=0)).query(points)[0])
+
+
+def _gradients(cell: NDArray[np.int64], seed: int) -> Array:
+    """Return unit vectors by whole coordinates, (n, 3): `pcg3d` of Jarzynski and Olano 2020, in wrapping integers."""
+    v = (cell + np.array([seed, 3 * seed + 1, 7 * seed + 5])).astype(np.uint32)
+    v = v * np.uint32(1664525) + np.uint32(1013904223)
+    for _ in range(2):
+        for axis in range(3):
+            v[:, axis] += v[:, (axis + 1) % 3] * v[:, (axis + 2) % 3]
+        v ^= v >> np.uint32(16)
+    height = (v[:, 0] + 0.5) * 2.0**-31 - 1
+    angle = v[:, 1] * (2.0**-31 * np.pi)
+    across = np.sqrt(1 - height**2)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), height], axis=1)
+
+
+def _twice_area(first: Array, second: Array, place: Array) -> Array:
+    """Return twice the signed area of triangles in the plane, (n,)."""
+    to_first, to_second = first - place, second - place
+    return np.asarray(to_first[:, 0] * to_second[:, 1] - to_first[:, 1] * to_second[:, 0])
