@@ -3,8 +3,12 @@ r"""Clouds by collectors: light scattered many times, without a walk through the
 
 Where a camera ray meets a cloud, or at the camera if that is within one, light leaves towards the eye. Single
 scattering is integrated along the ray. The light of each set of orders from 2 on is the canonical transport from the
-collector that `realtime.clouds.collectors` finds for it. Each sun has its own maps and searches; a uniform sky is one
-more sun, which shines from above (`Light.sky`). What is behind is seen through the transmittance of the ray.
+collector that `realtime.clouds.collectors` finds for it. Each sun has its own maps and searches. A uniform sky has no
+direction and needs no search (`realtime.clouds.uniform_sky`); `sky=beams` makes it one more sun, which shines from
+above (`Light.sky`), as the paper does. What is behind is seen through the transmittance of the ray.
+
+Other clouds dim the light of all orders on its way to a cloud, and opaque shapes hide it: for order 1 along the ray,
+for the others at the collector, over whose width the shade of other clouds is a mean.
 
 The peak of a phase function below five degrees is cut from the orders from 2 on, as light in the peak hardly leaves its
 way: with f the share of the peak and a the albedo, the density is (1 - a f) sigma_t and the albedo a (1 - f)/(1 - a f);
@@ -38,13 +42,14 @@ from realtime.clouds.canonical.scene_phase import share_of_peak, slab_phase
 from realtime.clouds.canonical.sets import SETS
 from realtime.clouds.canonical.tables import canonical_tables
 from realtime.clouds.collectors.orders import light_of_orders
-from realtime.clouds.collectors.search import Search
+from realtime.clouds.collectors.search import Collector, Search
 from realtime.clouds.collectors.transport_grid import transport_grid
-from realtime.clouds.light_maps.pyramid import LightMap, length_along_light, light_map, maps_memory
+from realtime.clouds.light_maps.pyramid import LightMap, length_along_light, light_map, maps_memory, shade
 from realtime.clouds.order_layers import OPACITY, order_layer
 from realtime.clouds.single_scattering.behind import light_on_surfaces, sky_behind
 from realtime.clouds.single_scattering.march import Beam, CloudRays, exact_leg, scattered
 from realtime.clouds.single_scattering.opacity import opacity_of, printed_opacity
+from realtime.clouds.uniform_sky.light import SkyEscapes, beams_of, sky_escapes, sky_light
 from realtime.memory import check_memory
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.method import ErrorCause
@@ -84,6 +89,21 @@ class CollectorParameters(Parameters):
     thickness: str = parameter(
         "slab", "slabs as thick as they are across, or along the light, as printed", choices=("slab", "light")
     )
+    normals: str = parameter(
+        "slopes",
+        "a filtered surface has the mean slope of the lit side, or the mean of its unit normals, as printed",
+        choices=("slopes", "printed"),
+    )
+    cover: str = parameter(
+        "share",
+        "light enters through the share of a collector that is cloud, or through all of it, as printed",
+        choices=("share", "printed"),
+    )
+    way: str = parameter(
+        "ray",
+        "light comes from as far behind a point as the ray is in cloud, or the slab reaches, as printed",
+        choices=("ray", "printed"),
+    )
     kappa: str = parameter(
         "mie",
         "the extinction of the scene, or 24.5 % more, which is what eq. 4 has for droplets",
@@ -103,6 +123,11 @@ class CollectorParameters(Parameters):
     legs: str = parameter(
         "map", "the way of the sun's light to a point by the light map, or by cast rays", choices=("map", "exact")
     )
+    sky: str = parameter(
+        "uniform",
+        "the light of a sky, the same from everywhere, or a beam from above of pi times its radiance, as printed",
+        choices=("uniform", "beams"),
+    )
     steps: int = parameter(16, "steps of single scattering along a ray", least=1, most=4096)
     map: int = map_size(512, "texels on a side of the maps of a sun")
     tolerance: float = tolerance()
@@ -121,9 +146,10 @@ class CloudState:
     """What frames need of clouds and suns."""
 
     surfaces: CloudSurfaces
-    maps: tuple[LightMap, ...]  #: by sun
+    maps: tuple[LightMap | None, ...]  #: by light, None for a sky that is no beam
     fillings: tuple[Filling, ...]
     left: tuple[Any, ...]  #: by channel, what is left of the extinction of each cloud without the peak [1]
+    escapes: SkyEscapes | None  #: where there is a sky that is no beam
 
 
 @dataclass(frozen=True)
@@ -148,16 +174,23 @@ def prepare_collectors(scene: Scene, parameters: CollectorParameters) -> Callabl
     InputError
         If the maps need more memory than the machine has.
     """
-    suns, clouds = len(scene.lights), len(scene.boundaries)
-    needed = suns * clouds * maps_memory(type(scene.camera.origin.x), parameters.map)
-    check_memory(f"map: {parameters.map} texels for {suns} sun(s) and {clouds} cloud(s)", needed, "use a smaller map")
+    suns, clouds = beams_of(scene.lights, parameters.sky), len(scene.boundaries)
+    needed = len(suns) * clouds * maps_memory(type(scene.camera.origin.x), parameters.map)
+    check_memory(
+        f"map: {parameters.map} texels for {len(suns)} sun(s) and {clouds} cloud(s)", needed, "use a smaller map"
+    )
     fillings, left = _fillings(scene, parameters)
     surfaces = cloud_surfaces(scene)
     bodies = [boundary_scene((shape,)) for shape in scene.boundaries]
+    uniform = len(suns) < len(scene.lights)
+    escapes = sky_escapes(scene) if uniform else None
 
     def cast(scene: Scene) -> CloudState:
-        maps = tuple(light_map(bodies, light, parameters.map) for light in scene.lights)
-        return CloudState(surfaces, maps, fillings, left)
+        maps = tuple(
+            light_map(bodies, light, parameters.map, slopes=parameters.normals == "slopes") if number in suns else None
+            for number, light in enumerate(scene.lights)
+        )
+        return CloudState(surfaces, maps, fillings, left, escapes)
 
     return cast
 
@@ -219,19 +252,23 @@ def cloud_collectors(view: View, state: CloudState, lists, *, kernel, parameters
     channels = len(clouds.sigma_t)
     rays = CloudRays(state.surfaces, clouds, view.origin, view.direction, view.distance, depths[:channels])
     thin_rays = replace(rays, clouds=thin, depths=depths[channels:])
-    beams = [_beam(view, state, thin, number, parameters) for number in range(len(view.lights))]
+    suns = beams_of(view.lights, parameters.sky)
+    beams = [_beam(view, state, thin, number, parameters) for number in suns]
     once = scattered(thin_rays, beams, steps=parameters.steps, printed=parameters.single == "printed")
     first = next_crossing(state.surfaces, view.origin, view.direction, dr.zeros(Float, dr.width(view.direction)))
     begin = dr.select(first.leaves, 0, first.distance)
     there = dr.isfinite(begin) & (begin < view.distance)
     entry = _Entry(view.origin + view.direction * dr.select(there, begin, 0), first.cloud, there)
-    by_set, kept = [sum(radiance for (radiance,) in once), *(Color(0) for _ in SETS)], []
-    for number, (light, sun) in enumerate(zip(view.lights, state.maps)):
+    by_set, kept = [sum((radiance for (radiance,) in once), Color(0)), *(Color(0) for _ in SETS)], []
+    for number, sun in enumerate(suns):
         last = view.carried[number] if view.carried is not None else None
-        shown = sun.of_cloud(first.cloud)
-        parts, collectors = _many_times(view, state, thin, entry, shown, last=last, parameters=parameters)
-        by_set[1:] = [sum_ + light.intensity * part for sum_, part in zip(by_set[1:], parts)]
+        parts, collectors = _many_times(view, state, thin_rays, entry, sun, last=last, parameters=parameters)
+        by_set[1:] = [sum_ + view.lights[sun].intensity * part for sum_, part in zip(by_set[1:], parts)]
         kept.append(collectors)
+    for number, light in enumerate(view.lights):
+        if state.escapes is not None and number not in suns:
+            of_sky = sky_light(state.escapes, light, rays, view.visible if view.features.shadows else None)
+            by_set = [sum_ + part for sum_, part in zip(by_set, of_sky)]
     if parameters.opacity == "printed":
         opacity = printed_opacity(state.surfaces, clouds, view.origin, view.direction, view.distance)
     else:
@@ -267,6 +304,7 @@ def _beam(view: View, state: CloudState, clouds: Clouds, number: int, parameters
     """Return a sun as points in clouds see it that scatter once."""
     light, sun = view.lights[number], state.maps[number]
     Float = type(view.distance)
+    assert sun is not None
 
     def by_map(point, active):
         depths = [Float(0) for _ in clouds.sigma_t]
@@ -282,10 +320,8 @@ def _beam(view: View, state: CloudState, clouds: Clouds, number: int, parameters
     return Beam(light.intensity, (Float(1),), (tuple(phase.evaluate(cosine) for phase in clouds.phases),), leg, lit)
 
 
-def _many_times(
-    view: View, state: CloudState, clouds: Clouds, entry: _Entry, sun: LightMap, *, last: Any, parameters: Any
-):
-    """Return the light of a sun that was scattered twice and more, for unit irradiance across the beam [1/sr].
+def _many_times(view: View, state: CloudState, rays: CloudRays, entry: _Entry, sun: int, *, last: Any, parameters: Any):
+    """Return the light of the sun of a number that was scattered twice and more, for unit irradiance [1/sr].
 
     Returns
     -------
@@ -296,27 +332,63 @@ def _many_times(
         corners of tiles go on for all their pixels.
     """
     Float, Color = type(view.distance), type(view.medium.albedo)
-    search = Search(parameters.iterations, parameters.settled, parameters.thickness == "light")
+    search = Search(
+        parameters.iterations,
+        parameters.settled,
+        parameters.thickness == "light",
+        covered=parameters.cover == "share",
+        as_ray=parameters.way == "ray",
+    )
+    light_map = state.maps[sun]
+    assert light_map is not None
     sums, kept = [], []
-    for channel, own in enumerate(clouds.sigma_t):
+    for channel, own in enumerate(rays.clouds.sigma_t):
         sigma_t = dr.gather(Float, own, entry.cloud, entry.there)
         of_fillings, of_channel = [], []
         for number, filling in enumerate(state.fillings):
             filled = entry.there & (dr.gather(mi.UInt32, filling.clouds[channel], entry.cloud, entry.there) != 0)
             light = light_of_orders(
-                sun,
+                light_map.of_cloud(entry.cloud),
                 filling.transport,
                 sets=len(SETS),
                 point=entry.point,
                 toward=-view.direction,
                 extinction=dr.select(filled, sigma_t, 1),
+                behind=rays.depths[channel],
                 search=search,
                 last=None if last is None else last[channel][number],
                 place=view.tile if view.layout is Layout.SOME else None,
                 active=filled,
             )
-            of_fillings.append(light.by_set)
+            lit = [_reaching(view, light_map, own, entry, sun, collector) for collector in light.collectors]
+            of_fillings.append(tuple(radiance * share for radiance, share in zip(light.by_set, lit)))
             of_channel.append(light.collectors)
         kept.append(tuple(of_channel))
         sums.append([sum(parts) for parts in zip(*of_fillings)])
     return tuple(Color(*parts) for parts in zip(*(sums * (3 // len(sums))))), tuple(kept)
+
+
+def _reaching(view: View, light_map: LightMap, sigma_t: Any, entry: _Entry, sun: int, collector: Collector) -> Any:
+    """Return the share of a sun's light that other clouds and opaque shapes leave to a collector [1].
+
+    `sigma_t` is the extinction of each cloud, one channel [1/m].
+    """
+    Float, clouds = type(view.distance), dr.width(sigma_t)
+    centre, share = entry.point + collector.centre, Float(1)
+
+    def behind(number, share):
+        cover, length = shade(light_map.of_cloud(number), centre, collector.width)
+        dimmed = 1 - cover * (1 - dr.exp(-dr.gather(Float, sigma_t, number) * length))
+        return number + 1, dr.select(number == entry.cloud, share, share * dimmed)
+
+    if clouds > 1:
+        lanes = dr.width(centre)
+        _, share = dr.while_loop(
+            state=(dr.zeros(mi.UInt32, lanes), dr.full(Float, 1, lanes)),
+            cond=lambda number, share: number < clouds,
+            body=behind,
+            labels=("number", "share"),
+        )
+    if view.features.shadows:
+        share = dr.select(view.visible(centre, view.lights[sun]), share, 0)
+    return share

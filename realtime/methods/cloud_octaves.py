@@ -23,10 +23,11 @@ import numpy as np
 
 from realtime.clouds.bounds.crossings import sum_over_stretches
 from realtime.clouds.bounds.surfaces import CloudSurfaces, cloud_surfaces
-from realtime.clouds.order_layers import OPACITY, order_layer
+from realtime.clouds.order_layers import OPACITY, ORDER_LAYERS, order_layer
 from realtime.clouds.single_scattering.behind import light_on_surfaces, sky_behind
 from realtime.clouds.single_scattering.march import Beam, cloud_rays, exact_leg, scattered
 from realtime.clouds.single_scattering.opacity import opacity_of, printed_opacity
+from realtime.clouds.uniform_sky.light import SkyEscapes, beams_of, sky_escapes, sky_light
 from realtime.errors import InputError
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.view import View
@@ -69,6 +70,11 @@ class CloudOctavesParameters(Parameters):
     steps: int = parameter(32, "steps of every ray", least=1)
     light_steps: int = parameter(0, "samples of the density on a leg, as engines take; 0: its exact depth", least=0)
     light_reach: float = parameter(0.0, "how far these samples go; 0: through all clouds", least=0, unit="m")
+    sky: str = parameter(
+        "uniform",
+        "the light of a sky, the same from everywhere, or octaves of a beam from above of pi times its radiance",
+        choices=("uniform", "beams"),
+    )
     single: str = parameter("corrected", "equation 1 of Bouthors 2008", choices=("corrected", "printed"))
     opacity: str = parameter("corrected", "equation 2 of Bouthors 2008", choices=("corrected", "printed"))
 
@@ -83,6 +89,7 @@ class OctaveState:
     anisotropy: Any
     means: Any  #: by phase function of the clouds, its mean cosine [1]
     reach: Any  #: how far samples on a leg go [m]
+    escapes: SkyEscapes | None  #: where there is a sky that is no beam
 
 
 def prepare_cloud_octaves(scene: Scene, parameters: CloudOctavesParameters) -> Callable[[Scene], OctaveState]:
@@ -95,6 +102,7 @@ def prepare_cloud_octaves(scene: Scene, parameters: CloudOctavesParameters) -> C
     for shape in scene.boundaries:
         box.expand(shape.bbox())
     size = float(np.linalg.norm(np.array(box.max) - np.array(box.min)))
+    uniform = len(beams_of(scene.lights, parameters.sky)) < len(scene.lights)
     state = OctaveState(
         cloud_surfaces(scene),
         extinction=dr.opaque(Float, parameters.extinction),
@@ -102,6 +110,7 @@ def prepare_cloud_octaves(scene: Scene, parameters: CloudOctavesParameters) -> C
         anisotropy=dr.opaque(Float, parameters.anisotropy),
         means=Float(means),
         reach=dr.opaque(Float, parameters.light_reach or size),
+        escapes=sky_escapes(scene) if uniform else None,
     )
     dr.make_opaque(state.means)
     return lambda now: state
@@ -130,25 +139,30 @@ def cloud_octaves(view: View, state: OctaveState, lists, *, kernel, parameters: 
     assert clouds is not None
     Color = type(clouds.albedo)
     rays = cloud_rays(surfaces, clouds, view.origin, view.direction, view.distance)
-    beams = [_beam(view, state, light, parameters) for light in view.lights]
+    suns = beams_of(view.lights, parameters.sky)
+    beams = [_beam(view, state, view.lights[number], parameters) for number in suns]
     by_light = scattered(rays, beams, steps=parameters.steps, printed=parameters.single == "printed")
     by_octave = [sum(own) for own in zip(*by_light)]
     amount, amounts = type(view.distance)(1), []
     for radiance in by_octave:
         amounts.append(amount * radiance)
         amount = amount * state.contribution
+    parts = [(order_layer(octave + 1), radiance) for octave, radiance in enumerate(amounts)]
+    for number, light in enumerate(view.lights):
+        if state.escapes is not None and number not in suns:
+            of_sky = sky_light(state.escapes, light, rays, view.visible if view.features.shadows else None)
+            parts += zip(ORDER_LAYERS, of_sky)
     if parameters.opacity == "printed":
         opacity = printed_opacity(surfaces, clouds, view.origin, view.direction, view.distance)
     else:
         opacity = opacity_of(rays.depths, Color)
     extra: dict[str, Any] = {}
     if view.extra_layers:
-        for octave, radiance in enumerate(amounts):
-            name = order_layer(octave + 1)
+        for name, radiance in parts:
             extra[name] = extra[name] + radiance if name in extra else radiance
         extra[OPACITY] = opacity
     return Layers(
-        sum(amounts),
+        sum((radiance for _, radiance in parts), Color(0)),
         tuple(light_on_surfaces(rays, exact_leg(surfaces, clouds, light)) for light in view.lights),
         1 - opacity,
         sky_behind(view.lights, view.distance, Color),
