@@ -152,4 +152,6 @@ def _budget(given: dict[str, Any], target: Any, *, usual: int) -> "Budget":
             raise InputError(f"{name}: got {given[name]!r}, wanted {words} above 0")
     if target not in ("pooled", "worst"):
         raise InputError(f"target: got {target!r}, wanted 'pooled' or 'worst'")
-    return Budget(samples=given["samples"] if named else usual, error=given["error"], seconds=given["seconds"], target=target)
+    return Budget(
+        samples=given["samples"] if named else usual, error=given["error"], seconds=given["seconds"], target=target
+    )

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from PIL import Image
+from scipy.ndimage import gaussian_filter
 
 from analytic.errors import InputError, nearest
 from realtime.frame.samples import render_samples
@@ -23,14 +24,28 @@ from realtime.scene.read_scene import read_scene
 from reference.storage.files import ensure_folder, temporary_folder, write_bytes, write_text
 from reports.data.reader import read_report
 from reports.docs.build import source_folder
-from reports.gallery.recipes import SIZE, SMALL, STRIP, TUTORIAL, Picture, pictures, scene_picture
+from reports.gallery.recipes import (
+    ENLARGED,
+    SIZE,
+    SMALL,
+    STRIP,
+    TRUTH_SAMPLES,
+    TRUTH_SIZE,
+    TUTORIAL,
+    Picture,
+    pictures,
+    scene_picture,
+)
 from reports.gallery.sketches import sketch
 from reports.machine.environment import MissingError, versions
 from reports.plotting.pictures import error_map, preview, tone_curve
 from validation.configurations.methods import configuration, parse_settings, prepared
+from validation.estimates.budget import Budget
+from validation.estimates.images import cloud_orders, monte_carlo_reference
 from validation.estimates.quadrature import truth_image
 from validation.frames.baseline_files import read_baseline
 from validation.metrics.errors import error_metrics
+from validation.scenes.changes import parse_changes
 from validation.scenes.loading import LoadedScene, load_scene
 from validation.scenes.registry import SCENES
 
@@ -120,6 +135,8 @@ def _pixels(picture: Picture) -> tuple[Pixels, dict[str, Any]]:
         return _page(), {}
     if picture.kind == "sketch":
         return sketch(picture.method, SIZE), {}
+    if picture.kind == "truth":
+        return _beside_truth(picture), {}
     if picture.kind == "scene":
         return _rendered(picture, SIZE), {}
     if picture.kind == "method":
@@ -152,6 +169,23 @@ def _page() -> Pixels:
     return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB").resize((1040, 800), Image.Resampling.LANCZOS))
 
 
+def _beside_truth(picture: Picture) -> Pixels:
+    """Return the truth of clouds and a method side by side, in one exposure, smoothed alike: the truth has noise."""
+    loaded, frame = _frame(picture, TRUTH_SIZE)
+    truth = monte_carlo_reference(
+        loaded, "cloud-paths", budget=Budget(samples=TRUTH_SAMPLES), orders=cloud_orders("sets")
+    ).image.layers
+    shown = [sum(truth[name] for name in ("airlight", "surface", "background")), frame.airlight + frame.surface]
+    smooth = [gaussian_filter(np.asarray(image, dtype=np.float64), (0.8, 0.8, 0)) for image in shown]
+    curve = tone_curve(smooth[1])
+    size = tuple(side * ENLARGED for side in TRUTH_SIZE)
+    parts = [
+        np.asarray(Image.fromarray(preview(image, curve)).resize(size, Image.Resampling.BICUBIC)) for image in smooth
+    ]
+    gap = np.full((size[1], 6, 3), 255, np.uint8)
+    return np.concatenate([parts[0], gap, parts[1]], axis=1)
+
+
 def _rendered(picture: Picture, size: tuple[int, int]) -> Pixels:
     _, frame = _frame(picture, size)
     total = np.asarray(frame.airlight + frame.surface, dtype=np.float64)
@@ -169,9 +203,9 @@ def _tutorial_scene() -> str:
     return page.partition("```xml\n")[2].partition("```")[0]
 
 
-def _loaded(scene: str, size: tuple[int, int]) -> LoadedScene:
+def _loaded(scene: str, size: tuple[int, int], changes: Iterable[str]) -> LoadedScene:
     if scene != TUTORIAL:
-        return load_scene(scene, size)
+        return load_scene(scene, size, parse_changes(changes))
     with temporary_folder() as folder:
         path = folder / TUTORIAL
         path.write_text(_tutorial_scene(), encoding="utf-8")
@@ -179,7 +213,7 @@ def _loaded(scene: str, size: tuple[int, int]) -> LoadedScene:
 
 
 def _frame(picture: Picture, size: tuple[int, int]):
-    loaded = _loaded(picture.scene, size)
+    loaded = _loaded(picture.scene, size, picture.changes)
     chosen = configuration(picture.method, None, parse_settings(picture.settings))
     return loaded, render_samples(prepared(read_scene(loaded.scene), chosen), picture.samples)
 

@@ -55,6 +55,7 @@ def test_the_finest_level_holds_the_faces_of_a_box(variant):
     assert np.quantile(np.abs(np.array(surface.thickness) - thickness), 0.9) < 2 * texel
 
 
+@pytest.mark.claim("collector-slopes", tolerance="1e-4 of the cosine, against 0.05 by unit normals")
 def test_normals_of_levels_are_those_of_mean_slopes(variant):
     """Through a saw tooth whose steep sides hide, the mean plane is level: its unit normals lean towards the light."""
     import mitsuba as mi

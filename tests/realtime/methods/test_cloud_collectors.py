@@ -248,6 +248,7 @@ def test_the_last_frame_s_collectors_go_on(variant, tolerance, bound):
     assert renderer.render.n_recordings <= 3
 
 
+@pytest.mark.claim("collector-shade", tolerance="1 % in the middle of the shade and beside it")
 def test_another_cloud_in_the_light_dims_and_changes_no_thickness(variant):
     """Each cloud has its own maps: clear air between two is no matter, and light fades on its way through the other."""
     normal, side = np.asarray(TURN)[:, 2], 20.0

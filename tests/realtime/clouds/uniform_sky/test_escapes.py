@@ -21,6 +21,7 @@ def test_in_a_thin_slab_light_is_scattered_once():
     np.testing.assert_allclose(shares[COSINES // 2, :2], [0.7, 0.0], atol=2e-3)
 
 
+@pytest.mark.claim("uniform-sky-orders", tolerance="four standard errors of 200 000 photons")
 def test_shares_are_those_of_photons():
     """Isotropic photons that enter at mu = 1: how often they are scattered until they leave."""
     random, tau, count = np.random.default_rng(5), 2.3, 200_000
