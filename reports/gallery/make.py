@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 from PIL import Image
-from scipy.ndimage import gaussian_filter
 
 from analytic.errors import InputError, nearest
 from realtime.frame.samples import render_samples
@@ -25,12 +24,9 @@ from reference.storage.files import ensure_folder, temporary_folder, write_bytes
 from reports.data.reader import read_report
 from reports.docs.build import source_folder
 from reports.gallery.recipes import (
-    ENLARGED,
     SIZE,
     SMALL,
     STRIP,
-    TRUTH_SAMPLES,
-    TRUTH_SIZE,
     TUTORIAL,
     Picture,
     pictures,
@@ -40,8 +36,6 @@ from reports.gallery.sketches import sketch
 from reports.machine.environment import MissingError, versions
 from reports.plotting.pictures import error_map, preview, tone_curve
 from validation.configurations.methods import configuration, parse_settings, prepared
-from validation.estimates.budget import Budget
-from validation.estimates.images import cloud_orders, monte_carlo_reference
 from validation.estimates.quadrature import truth_image
 from validation.frames.baseline_files import read_baseline
 from validation.metrics.errors import error_metrics
@@ -135,8 +129,6 @@ def _pixels(picture: Picture) -> tuple[Pixels, dict[str, Any]]:
         return _page(), {}
     if picture.kind == "sketch":
         return sketch(picture.method, SIZE), {}
-    if picture.kind == "truth":
-        return _beside_truth(picture), {}
     if picture.kind == "scene":
         return _rendered(picture, SIZE), {}
     if picture.kind == "method":
@@ -167,23 +159,6 @@ def _page() -> Pixels:
         shot = window.screenshot()
         browser.close()
     return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB").resize((1040, 800), Image.Resampling.LANCZOS))
-
-
-def _beside_truth(picture: Picture) -> Pixels:
-    """Return the truth of clouds and a method side by side, in one exposure, smoothed alike: the truth has noise."""
-    loaded, frame = _frame(picture, TRUTH_SIZE)
-    truth = monte_carlo_reference(
-        loaded, "cloud-paths", budget=Budget(samples=TRUTH_SAMPLES), orders=cloud_orders("sets")
-    ).image.layers
-    shown = [sum(truth[name] for name in ("airlight", "surface", "background")), frame.airlight + frame.surface]
-    smooth = [gaussian_filter(np.asarray(image, dtype=np.float64), (0.8, 0.8, 0)) for image in shown]
-    curve = tone_curve(smooth[1])
-    size = tuple(side * ENLARGED for side in TRUTH_SIZE)
-    parts = [
-        np.asarray(Image.fromarray(preview(image, curve)).resize(size, Image.Resampling.BICUBIC)) for image in smooth
-    ]
-    gap = np.full((size[1], 6, 3), 255, np.uint8)
-    return np.concatenate([parts[0], gap, parts[1]], axis=1)
 
 
 def _rendered(picture: Picture, size: tuple[int, int]) -> Pixels:

@@ -36,8 +36,6 @@ _VIEWS = {
         ("camera.origin=517,-491,1911", "camera.target=-594,19,590", "camera.fov=97"),
     ),
 }
-#: Truth and method side by side: as many samples a pixel, and how the image is shown.
-TRUTHS, TRUTH_SAMPLES, TRUTH_SIZE, ENLARGED = ("stratocumulus", "cumulus"), 1024, (160, 120), 3
 TUTORIAL = "gate.xml"  #: the scene of docs/tutorial.md, in which it stands
 STRIP = ("hall", "clutter", "three-media", "windows")  #: at the top of the README
 
@@ -47,7 +45,7 @@ class Picture:
     """A picture of the gallery."""
 
     name: str
-    #: "scene", "method" (what it renders), "error", "sketch", "truth" (and a method), "strip", "page" (of a report)
+    #: "scene", "method" (what it renders), "error", "sketch", "strip" or "page" (of a report)
     kind: str
     scene: str  #: that it shows; the first of a strip
     method: str = ""
@@ -103,8 +101,6 @@ def pictures() -> Iterator[Picture]:
             yield sketch
     for name, (scene, changes) in _VIEWS.items():
         yield Picture(name, "method", scene, "cloud-collectors", changes=changes)
-    for scene in TRUTHS:
-        yield Picture(f"truth-{scene}", "truth", scene, "cloud-collectors")
     yield Picture("strip", "strip", STRIP[0])
     yield Picture("report-page", "page", "")
     yield Picture("tutorial-gate", "scene", TUTORIAL, "shadow-planes", (), SAMPLES)
