@@ -5,7 +5,10 @@
 """
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from typing import TypeVar
+
+Value = TypeVar("Value")
 
 
 class InputError(ValueError):
@@ -20,3 +23,37 @@ def nearest(word: str, known: Iterable[str]) -> str:
     """Return '; did you mean X?' for the end of a message about `word`, an empty string where nothing known is near."""
     close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.4)
     return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def named_values(option: str, words: Iterable[str], read: Callable[[str], Value], wanted: str) -> dict[str, Value]:
+    """Return values by name from words of the form 'NAME=VALUE'.
+
+    Parameters
+    ----------
+    option
+        Where the words stand, for messages.
+    words
+        What the user wrote.
+    read
+        Returns the value of a text that is not empty, or raises ValueError.
+    wanted
+        What a word should look like, for messages.
+
+    Raises
+    ------
+    InputError
+        If a word has another form, or two words give one name different values.
+    """
+    values: dict[str, Value] = {}
+    for word in words:
+        name, _, text = (part.strip() for part in word.partition("="))
+        try:
+            if not name or not text:
+                raise ValueError(word)
+            value = read(text)
+        except ValueError:
+            raise InputError(f"{option}: got {word!r}, wanted {wanted}") from None
+        if values.setdefault(name, value) != value:
+            first = next(each.strip() for each in words if each.partition("=")[0].strip() == name)
+            raise InputError(f"{option}: got {first} and {word.strip()}, wanted one of them: each name once")
+    return values

@@ -15,6 +15,7 @@ Read in this order:
 - `gallery/`: the pictures of README and documentation;
 - `report/`: measures what a report asks for and writes it;
 - `api/`: the functions of `import airlight` and their results;
+- `bench/`: what `airlight bench` prints;
 - `view/`: the live view in the browser;
 - `commands/`: the commands, one module each;
 - `docs/`: builds the documentation.

@@ -127,6 +127,11 @@ def table(
             "kernel table: a spot that falls off between beam and cut-off, or a light with extent, is not tabulated; "
             "use the kernel 'quadrature', or a spot with beam_width = cutoff_angle"
         )
+    if dr.grad_enabled((geometry.foot, geometry.height, x0, x1), medium.sigma_t):
+        raise InputError(
+            "kernel table: what is read between entries of a table has no derivative worth the name; use the kernel "
+            "'exact'"
+        )
     records = upload_table(type(geometry.height), form=form, size=size) if tables is None else tables
     difference = _sun if form == "sun" else _tail
     return per_extinction(medium, lambda sigma_t: difference(geometry, (x0, x1), sigma_t, records, size))

@@ -22,6 +22,14 @@ def host_diamond_angle(x, y):
         return _diamond_angle(x, y, np.where)
 
 
+def host_direction(angle):
+    """Return the unit vectors (..., 2) at diamond angles, NumPy, of any turn."""
+    angle = np.asarray(angle, dtype=np.float64) % TURN
+    x = np.where(angle < 2, 1 - angle, angle - 3)
+    y = np.where(angle < 1, angle, np.where(angle < 3, 2 - angle, angle - 4))
+    return np.stack([x, y], axis=-1) / np.hypot(x, y)[..., None]
+
+
 def _diamond_angle(x, y, select):
     total = abs(x) + abs(y)
     share = y / total

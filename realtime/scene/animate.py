@@ -23,7 +23,7 @@ from realtime.numerics.array_types import types_of
 from realtime.scene.directional_extent import directional_fields, extent_spheres
 from realtime.scene.lights import DirectionalExtent, Light
 from realtime.scene.medium import Medium
-from realtime.scene.mesh_adjacency import Casters
+from realtime.scene.mesh_adjacency import Casters, Placement
 from realtime.scene.read_scene import Scene
 from realtime.scene.triangle_table import read_facets
 
@@ -94,7 +94,9 @@ def with_area_lights(scene: Scene, area_lights: Sequence[AreaLight]) -> Scene:
         parameters[key] = type(parameters[key])(mi.Matrix4f(matrix.astype(np.float32)))
     parameters.update()
     moved = {light.name: caster_vertices(light) for light in black}
-    return replace(scene, area_lights=tuple(area_lights), positions={**scene.positions, **moved})
+    placements = {name: placement for name, placement in scene.placements.items() if name not in moved}
+    positions = {**scene.positions, **moved}
+    return replace(scene, area_lights=tuple(area_lights), positions=positions, placements=placements)
 
 
 def thicker_medium(medium: Medium, factor: float) -> Medium:
@@ -174,13 +176,19 @@ def turned_objects(scene: Scene, objects: Objects, turn: Array) -> Scene:
     turn
         Rotation matrix, (3, 3).
     """
-    positions = {}
+    positions, placements = {}, {}
     for name, vertices in objects.vertices.items():
         middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
         positions[name] = (vertices - middle) @ turn.T + middle
+        placements[name] = Placement(turn, middle - turn @ middle, vertices)
     moved = replace_positions(objects.parameters, positions)
     facets = scene.facets and read_facets(scene.geometry, types_of(type(scene.camera.origin.x)))
-    return replace(scene, positions={**scene.positions, **moved}, facets=facets)
+    return replace(
+        scene,
+        positions={**scene.positions, **moved},
+        placements={**scene.placements, **placements},
+        facets=facets,
+    )
 
 
 def closed_shapes(casters: Casters) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ triangles meet two entries: their sum is the same whichever way they are paired.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import drjit as dr
@@ -28,6 +28,24 @@ from realtime.errors import InputError
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where a shape that moved as a whole stands: a point p of it as it was is at `rotation` p + `shift`."""
+
+    rotation: Array  #: (3, 3)
+    shift: Array  #: [m], (3,)
+    start: Array  #: its vertices before, as Mitsuba had them [m], (vertices, 3)
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """A shape of casters that stands elsewhere."""
+
+    placement: Placement
+    positions: Array  #: of the shape's own vertices as they are now [m]
+    own: Index  #: which of them each vertex of the casters is
 
 
 @dataclass(frozen=True)
@@ -47,11 +65,47 @@ class Casters:
     boxes: Array  #: by component: lower and upper corner of its bounding box [m], (components, 2, 3)
     shapes: tuple[tuple[str, int, Index], ...]  #: name, its first vertex, and which of the shape's own each one is
     warnings: tuple[str, ...] = ()  #: what is odd about the meshes, by name
+    read: tuple[NDArray[np.float32], ...] = ()  #: by shape, its own vertices as they were read [m]
+    placed: Mapping[int, _Placed] = field(default_factory=dict)  #: by number, shapes that stand elsewhere as a whole
 
     @property
     def none(self) -> int:
         """The number that stands for no triangle."""
         return len(self.triangles)
+
+    def shapes_of(self, vertices: NDArray[Any]) -> NDArray[np.int64]:
+        """Return the numbers of the shapes that vertices are of."""
+        firsts = np.array([first for _, first, _ in self.shapes], dtype=np.int64)
+        return np.searchsorted(firsts, vertices, side="right") - 1
+
+    def positions_of(self, vertices: NDArray[Any]) -> Array:
+        """Return where some vertices are [m], (..., 3)."""
+        here = self.vertices[vertices]
+        for number, placed in self.placed.items():
+            first = self.shapes[number][1]
+            own = (vertices >= first) & (vertices < first + len(placed.own))
+            here[own] = placed.positions[placed.own[vertices[own] - first]]
+        return here
+
+    def planes_of(self, triangles: NDArray[Any]) -> tuple[Array, Array]:
+        """Return normals [m^2], (n, 3), and offsets [m^3], (n,), of some triangles where they are."""
+        if not self.placed:
+            return self.normals[triangles], self.offsets[triangles]
+        return _planes_at(self.positions_of(self.triangles[triangles]))
+
+    def placed_vertices(self) -> list[tuple[slice, Placement]]:
+        """Return of the shapes that stand elsewhere as a whole which vertices are theirs, and where they stand."""
+        firsts = [first for _, first, _ in self.shapes] + [len(self.vertices)]
+        return [(slice(firsts[number], firsts[number + 1]), own.placement) for number, own in self.placed.items()]
+
+    def seen_by_placed(self, point: Array, w: int) -> list[tuple[slice, Array]]:
+        """Return of the same shapes their triangles, and a place (w = 1) or direction (w = 0) as their space has it."""
+        # Shape after shape: whether a triangle is of a shape before another changes once.
+        first = self.triangles[:, 0]
+        return [
+            (slice(*np.searchsorted(first, [own.start, own.stop])), (point - w * at.shift) @ at.rotation)
+            for own, at in self.placed_vertices()
+        ]
 
     def of_shape(self, name: str) -> NDArray[np.bool_]:
         """Return which components are of a shape."""
@@ -100,10 +154,11 @@ def make_casters(meshes) -> Casters:
         (name, vertices (n, 3) [m], triangles (m, 3)) each. Triangles with a vertex twice and repeated ones are left
         out, the latter with a warning.
     """
-    parts, warnings, shapes, first_vertex, first_component = [], [], [], 0, 0
+    parts, warnings, shapes, read, first_vertex, first_component = [], [], [], [], 0, 0
     for name, vertices, triangles in meshes:
         part, remarks, own = _mesh_part(name, vertices, triangles)
         shapes.append((name, first_vertex, own))
+        read.append(np.asarray(vertices, dtype=np.float32))
         parts.append(_shifted(part, first_vertex, first_component))
         first_vertex += len(part["vertices"])
         first_component += len(part["closed"])
@@ -115,10 +170,10 @@ def make_casters(meshes) -> Casters:
         count = len(part["triangles"])
         for side in ("left", "right"):
             part[side] = np.where(part[side] == count, first_triangle[-1], part[side] + first)
-    joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+    joined: dict[str, Any] = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     for key in ("triangles", "edges", "left", "right", "component"):
         joined[key] = np.ascontiguousarray(joined[key], dtype=np.int32)
-    return Casters(**joined, shapes=tuple(shapes), warnings=tuple(warnings))
+    return Casters(**joined, shapes=tuple(shapes), warnings=tuple(warnings), read=tuple(read))
 
 
 def moved(casters: Casters, vertices: Array) -> Casters:
@@ -145,6 +200,49 @@ def mesh_triangles(mesh) -> tuple[Array, NDArray[np.int64]]:
     position = mesh.vertex_position(dr.arange(mi.UInt32, mesh.vertex_count()))
     face = mesh.face_indices(dr.arange(mi.UInt32, mesh.face_count()))
     return np.array(position, dtype=np.float64).T.copy(), np.array(face, dtype=np.int64).T.copy()
+
+
+def with_placements(casters: Casters, positions: Mapping[str, Array], placements: Mapping[str, Placement]) -> Casters:
+    """Return what `with_positions` does, with no work on the triangles of shapes that moved as a whole.
+
+    Their vertices, normals and offsets stay those of the space in which the shapes were read; what of casters takes a
+    place asks for that. A shape without a placement, or with one from another start than what was
+    read, moves vertex by vertex.
+    """
+    if not positions:
+        return casters
+    placed: dict[int, _Placed] = {}
+    others: dict[str, Array] = {}
+    boxes = casters.boxes.copy()
+    owner = casters.shapes_of(casters.triangles[_first_of(casters.component), 0])
+    for number, (name, _, own) in enumerate(casters.shapes):
+        if name not in positions:
+            continue
+        placement = placements.get(name)
+        if placement is None or not np.array_equal(placement.start, casters.read[number]):
+            others[name] = positions[name]
+            continue
+        placed[number] = _Placed(placement, positions[name], own)
+        boxes[owner == number] = _turned_boxes(boxes[owner == number], placement)
+    standing = with_positions(casters, others)
+    if others:
+        moved_otherwise = ~np.isin(owner, list(placed))
+        boxes[moved_otherwise] = standing.boxes[moved_otherwise]
+    return replace(standing, boxes=boxes, placed=placed)
+
+
+def _first_of(component: Index) -> NDArray[np.int64]:
+    """Return by component one of its triangles."""
+    first = np.zeros(int(component.max(initial=-1)) + 1, dtype=np.int64)
+    first[component] = np.arange(len(component))
+    return first
+
+
+def _turned_boxes(boxes: Array, placement: Placement) -> Array:
+    """Return boxes about turned boxes, (boxes, 2, 3)."""
+    middle, half = boxes.mean(axis=1) @ placement.rotation.T + placement.shift, 0.5 * (boxes[:, 1] - boxes[:, 0])
+    reach = half @ np.abs(placement.rotation).T * (1 + 1e-6)  # vertices are rounded to float32
+    return np.stack([middle - reach, middle + reach], axis=1)
 
 
 def _triangles(shape) -> tuple[Array, NDArray[np.int64]]:
@@ -211,7 +309,11 @@ def _shifted(part: dict[str, Any], vertex: int, component: int) -> dict[str, Any
 
 
 def _planes(vertices: Array, triangles) -> tuple[Array, Array]:
-    corner = vertices[triangles]
+    return _planes_at(vertices[triangles])
+
+
+def _planes_at(corner: Array) -> tuple[Array, Array]:
+    """Return normals and offsets of triangles with corners (triangles, 3, 3)."""
     normals = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     return normals, np.einsum("ij,ij->i", normals, corner[:, 0])
 

@@ -24,6 +24,7 @@ from realtime.scene.directional_extent import directional_fields, distance_befor
 from realtime.scene.features import SceneFeatures, camera_notes
 from realtime.scene.lights import Light, spot_fields
 from realtime.scene.medium import Medium
+from realtime.scene.mesh_adjacency import Placement
 from realtime.scene.read_media import opaque_scene, read_medium, sort_shapes
 from realtime.scene.triangle_table import Facets, read_facets
 
@@ -41,6 +42,7 @@ class Scene:
     features: SceneFeatures
     facets: Facets | None = None  #: the triangles, where a table says all that shading needs
     positions: Mapping[str, Any] = field(default_factory=dict)  #: vertices of the shapes that moved, by name [m]
+    placements: Mapping[str, Placement] = field(default_factory=dict)  #: of those that moved as a whole, by name
     area_lights: tuple[AreaLight, ...] = ()  #: those with extent, of which methods render points
     boundaries: tuple[Any, ...] = ()  #: Mitsuba's shapes around bounded media, in the order of `Medium.clouds`
 

@@ -32,7 +32,13 @@ _SHORT = 2e-6  # relative to the coordinates: how far before its point a leg end
 
 
 def directional_intervals(
-    truth: TruthScene, rays: ParallelRays, *, samples: int = 256, edges: str = "auto", shapes: Shapes | None = None
+    truth: TruthScene,
+    rays: ParallelRays,
+    *,
+    samples: int = 256,
+    edges: str = "auto",
+    shapes: Shapes | None = None,
+    checks: int | None = None,
 ) -> LitIntervals:
     """Find the lit intervals of rays and have them checked, as shares of the way from `rays.first` to `rays.last`.
 
@@ -50,7 +56,7 @@ def directional_intervals(
         lambda known: parallel_intervals(rays, known),
         ROUNDING * scale / length,
     )
-    return found_intervals(truth, legs, ends=rays.ends, samples=samples, edges=edges, shapes=shapes)
+    return found_intervals(truth, legs, ends=rays.ends, samples=samples, edges=edges, shapes=shapes, checks=checks)
 
 
 def edge_scale(truth: TruthScene, rays: ParallelRays) -> Array:

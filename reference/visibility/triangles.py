@@ -34,6 +34,7 @@ Index = NDArray[np.int64]
 
 RAYS = 256  # rays taken at once: pairs of a few hundred rays with their triangles stay in the processor's cache
 SLACK = 1e-9  # added to the culling angles [rad]: float64 rounding of an angle is 1e-15, of a near vertex some more
+_ROUNDED = 1e-12  # wider than the rounding of an azimuth [rad]
 _MERGE = 1e-12  # gaps between shadows below this share of a ray are rounding: neighbouring triangles share an edge
 
 #: Relative uncertainty of the distance of an edge: float64 rounding, a digit lost on a near vertex, and `_MERGE`.
@@ -199,13 +200,39 @@ def near_pairs(azimuth: Array, reach: tuple[Array, Array], cones: Reaches) -> tu
     touched = (first <= turn) | (first + (azimuth[-1] - azimuth[0]) >= 2 * np.pi)
     touched &= (cones.camera < at_camera.max()) & (cones.before < at_end.max())
     triangle = np.flatnonzero(touched)
-    turned = first[triangle] + (azimuth - azimuth[0])[:, None]
+    row, column = _azimuths_within(first[triangle], turn[triangle], azimuth - azimuth[0])
+    near = cones.camera[triangle[column]] < at_camera[row]
+    near &= cones.before[triangle[column]] < at_end[row]
+    return row[near], triangle[column[near]]
+
+
+def _azimuths_within(first: Array, turn: Array, beyond: Array) -> tuple[Index, Index]:
+    """Return the pairs (ray, triangle) whose azimuths meet, by ray and then by triangle.
+
+    A ray at first + beyond, less a turn where it is more than one, must not be beyond the width: as rays ascend, those
+    of a triangle are two runs. Each is taken somewhat wider, and then its rays are asked.
+
+    Parameters
+    ----------
+    first, turn
+        By triangle, how far the first ray is from where it begins, and how far it reaches [rad].
+    beyond
+        By ray, how far it is from the first one, ascending [rad].
+    """
+    wraps = 2 * np.pi - first
+    before, end = (
+        np.searchsorted(beyond, far + _ROUNDED, side="right") for far in (np.minimum(turn - first, wraps), turn + wraps)
+    )
+    begins = np.concatenate([np.zeros_like(before), np.maximum(np.searchsorted(beyond, wraps - _ROUNDED), before)])
+    lengths = np.maximum(np.concatenate([before, end]) - begins, 0)
+    column = np.repeat(np.tile(np.arange(len(first)), 2), lengths)
+    row = np.arange(len(column)) - np.repeat(np.cumsum(lengths) - lengths - begins, lengths)
+    turned = first[column] + beyond[row]
     turned -= 2 * np.pi * (turned >= 2 * np.pi)
-    near = turned <= turn[triangle]
-    near &= cones.camera[triangle] < at_camera[:, None]
-    near &= cones.before[triangle] < at_end[:, None]
-    row, column = np.nonzero(near)
-    return row, triangle[column]
+    kept = turned <= turn[column]
+    row, column = row[kept], column[kept]
+    order = np.argsort(row * len(first) + column)
+    return row[order], column[order]
 
 
 def lit_of_chunk(shadows: Shadows, ends: tuple[Array, Array], used: Index) -> tuple[Array, Array, Array]:

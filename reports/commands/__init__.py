@@ -7,7 +7,6 @@ Read in this order:
 - `main.py`: the command line: the commands, and how mistakes are reported
 - `help.py`: how `--help` is drawn
 - `completion.py`: what the shell completes
-- `printing.py`: how commands print the tables of one run
 - `options.py`: options that several commands have
 - `own_methods.py`: methods of the user's own
 - `baselines.py`: `airlight baselines`
@@ -39,8 +38,8 @@ Read in this order:
 - `view.py`: `airlight view`
 
 May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.methods`,
-`realtime.methods.shadow_planes`, `realtime.parameters`, `realtime.scene`, `realtime.shadow_maps`,
-`reference.storage`, `reports.data`, `reports.diff`, `reports.docs`, `reports.figures`, `reports.gallery`,
+`realtime.methods.shadow_planes`, `realtime.parameters`, `realtime.scene`, `realtime.shadow_maps`, `reference.storage`,
+`reports.bench`, `reports.data`, `reports.diff`, `reports.docs`, `reports.figures`, `reports.gallery`,
 `reports.interchange`, `reports.machine`, `reports.papers`, `reports.plotting`, `reports.report`, `reports.tables`,
 `reports.view`, `validation.canonical`, `validation.certified`, `validation.comparison`, `validation.configurations`,
 `validation.diagnosis`, `validation.estimates`, `validation.fidelity`, `validation.fit`, `validation.frames`,

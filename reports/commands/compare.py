@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from reports.commands import completion
-from reports.commands.options import Json
+from reports.commands.options import Holds, Json, Mask, PixelKind
 
 
 def compare(
@@ -30,26 +30,8 @@ def compare(
             show_default=False,
         ),
     ] = None,
-    holds: Annotated[
-        str | None,
-        typer.Option(
-            "--as",
-            metavar="NAME",
-            help="With a scene: what the layer holds, 'airlight', 'surface' or 'total'; what its name says by default.",
-            show_default=False,
-            autocompletion=completion.one_of("airlight", "surface", "total"),
-        ),
-    ] = None,
-    pixel: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="With a scene: the truth at the 'centre' of each pixel, or its mean over the 'area'. By default both "
-            "are computed and kept and what fits is used; the means take several times as long as the centres.",
-            show_default=False,
-            autocompletion=completion.one_of("centre", "area"),
-        ),
-    ] = None,
+    holds: Holds = None,
+    pixel: PixelKind = None,
     difference: Annotated[
         Path | None,
         typer.Option(
@@ -65,10 +47,7 @@ def compare(
             metavar="SHARE", help="Largest relative bias that counts as agreement, such as 0.005.", show_default=False
         ),
     ] = None,
-    mask: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="EXR file that is 0 in pixels to leave out.", show_default=False),
-    ] = None,
+    mask: Mask = None,
     by_order: Annotated[
         bool,
         typer.Option("--by-order", help="Compare the layers by order of scattering too, such as airlight_3_4."),
@@ -104,7 +83,7 @@ def compare(
     Exit status 1 if the test image has values that are negative or not finite, or if the bias is not shown to be within
     the margin.
 
-    --diagnose predicts the image that each of some forty faults would make, of medium, lights, camera and encoding, and
+    --diagnose predicts the image that each of some sixty faults would make, of medium, lights, camera and encoding, and
     ranks them by evidence: what is wrong, by how much, and what is left over. See docs/diagnosis.md.
     """
     from analytic.errors import InputError

@@ -25,8 +25,8 @@ def fidelity(
     is kept from an earlier run.
     """
     from analytic.errors import InputError
-    from reports.commands.printing import print_heading, print_tables
     from reports.machine.environment import activate, describe_environment
+    from reports.machine.printing import print_heading, print_tables
     from reports.machine.progress import progress_bar
     from reports.papers.fidelity import count_words, fidelity_tables
     from reports.report.fidelity import measure_fidelity

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from reports.commands import completion
-from reports.commands.options import Json, listed, numbers_by_name
+from reports.commands.options import Holds, Json, Mask, PixelKind, listed
 
 
 def fit(
@@ -45,29 +45,9 @@ def fit(
             show_default=False,
         ),
     ] = None,
-    holds: Annotated[
-        str | None,
-        typer.Option(
-            "--as",
-            metavar="NAME",
-            help="What the layer holds: 'airlight', 'surface' or 'total'; what its name says by default.",
-            show_default=False,
-            autocompletion=completion.one_of("airlight", "surface", "total"),
-        ),
-    ] = None,
-    pixel: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="Pixels are values at their 'centre' or means over their 'area'; by default what fits.",
-            show_default=False,
-            autocompletion=completion.one_of("centre", "area"),
-        ),
-    ] = None,
-    mask: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="EXR file that is 0 in pixels to leave out.", show_default=False),
-    ] = None,
+    holds: Holds = None,
+    pixel: PixelKind = None,
+    mask: Mask = None,
     json: Json = False,
 ) -> None:
     """Find the parameters of the fog that explain an image.
@@ -76,13 +56,16 @@ def fit(
     explains the others are left out. What the image cannot tell apart, such as albedo and intensity in the
     airlight, is said, with a way out. See docs/diagnosis.md.
     """
+    from analytic.errors import named_values
     from reference.storage.exr import read_exr
     from reports.machine.environment import activate
     from reports.machine.progress import progress_bar
     from reports.tables.fit import parameters_table
     from reports.tables.terminal import print_json, print_table
 
-    names, starts = listed("--parameters", parameters), numbers_by_name("--start", start)
+    names = listed("--parameters", parameters)
+    words = listed("--start", start) if start.strip() else []
+    starts = named_values("--start", words, float, "NAME=VALUE, such as sigma_t=0.1")
     read_exr(image)  # unreadable files are refused before Mitsuba starts
     activate()
     from validation.fit.fit import fit_file

@@ -45,9 +45,9 @@ def maps(
     """
     from analytic.errors import InputError
     from reports.commands.own_methods import checked_configuration
-    from reports.commands.printing import print_heading
     from reports.machine.environment import activate, describe_environment
     from reports.machine.own_process import in_own_process
+    from reports.machine.printing import print_heading
     from reports.tables.terminal import print_json
     from validation.configurations.methods import parse_settings
     from validation.metrics.errors import plain

@@ -61,7 +61,7 @@ def mutations(
 
 
 def _print_results(study: "MutationStudy") -> None:
-    from reports.commands.printing import print_tables
+    from reports.machine.printing import print_tables
     from reports.tables.checks import control_table, mutation_table
     from validation.metrics.errors import plain
 

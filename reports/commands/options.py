@@ -73,6 +73,31 @@ USUAL_LIMIT = LIMIT
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Markdown = Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")]
 OutputFile = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The file to write.")]
+Mask = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="EXR file that is 0 in pixels to leave out.", show_default=False),
+]
+#: Of `fit`, and of `compare` with a scene.
+Holds = Annotated[
+    str | None,
+    typer.Option(
+        "--as",
+        metavar="NAME",
+        help="What a layer of a scene holds, 'airlight', 'surface' or 'total'; what its name says by default.",
+        show_default=False,
+        autocompletion=completion.one_of("airlight", "surface", "total"),
+    ),
+]
+PixelKind = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help="Pixels of a scene's image are values at their 'centre' or means over their 'area'. By default what fits "
+        "is used: means take several times as long as values.",
+        show_default=False,
+        autocompletion=completion.one_of("centre", "area"),
+    ),
+]
 Changes = Annotated[
     list[str] | None,
     typer.Option(
@@ -125,26 +150,3 @@ def named(option: str, words: list[str] | None, old_option: str, old: str | None
     """
     first = [] if old is None else listed(old_option, old)
     return [*first, *(word for given in words or () for word in listed(option, given))]
-
-
-def numbers_by_name(option: str, text: str) -> dict[str, float]:
-    """Return the numbers of an option such as 'sigma_t=0.1,albedo=0.9'.
-
-    Raises
-    ------
-    InputError
-        If a part has another form, or a name is there twice.
-    """
-    numbers: dict[str, float] = {}
-    for part in listed(option, text) if text.strip() else []:
-        name, equals, value = part.partition("=")
-        try:
-            number = float(value)
-        except ValueError:
-            equals = ""
-        if not equals or not name.strip() or name.strip() in numbers:
-            from analytic.errors import InputError
-
-            raise InputError(f"{option}: got {part!r}, wanted NAME=VALUE, each name once, such as sigma_t=0.1")
-        numbers[name.strip()] = number
-    return numbers

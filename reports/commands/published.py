@@ -107,7 +107,7 @@ def published(
 
 def _print(data: dict[str, Any], *, as_markdown: bool) -> None:
     """Print the tables of the papers and what follows from them."""
-    from reports.commands.printing import print_heading, print_tables
+    from reports.machine.printing import print_heading, print_tables
     from reports.papers.ali import ali_tables
     from reports.papers.billeter import billeter_tables
     from reports.papers.biri import biri_notes, biri_tables

@@ -112,9 +112,9 @@ def reference(
     from realtime.scene.features import camera_notes
     from reference.storage.exr import write_exr
     from reference.storage.files import ensure_writable
-    from reports.commands.printing import print_notes
     from reports.interchange.frames import check_ending
     from reports.machine.environment import activate, stamped
+    from reports.machine.printing import print_notes
     from reports.machine.progress import progress_bar
     from validation.estimates.budget import Budget
     from validation.estimates.images import cloud_orders, quadrature_reference

@@ -210,7 +210,7 @@ def _check_work(name: str, scene, chosen, frames: int | None = None, *, force: b
 def _prepared(scene, chosen, *, extra_layers: bool = False):
     """Return the frame renderer; print the notes on the scene, and the warnings of its casters."""
     from realtime.methods.shadow_planes.method import PlanePreparation
-    from reports.commands.printing import print_notes
+    from reports.machine.printing import print_notes
     from validation.configurations.methods import prepared
 
     print_notes(scene.features.notes)

@@ -168,8 +168,8 @@ def _measured(
     """Measure and write a report; unusable input is refused before the work begins."""
     from reference.storage.files import ensure_folder
     from reports.commands.own_methods import named_configurations
-    from reports.commands.printing import print_notes
     from reports.machine.environment import activate
+    from reports.machine.printing import print_notes
     from reports.machine.progress import progress_bar
     from reports.report.asked import notes_on, scenes_of_images
     from reports.report.measure import write_report

@@ -6,11 +6,14 @@ Read in this order:
 - `build.py`: runs Sphinx
 - `data.py`: numbers and pictures of a report, and whether they are stale
 - `fidelity.py`: the page of verdicts on papers
+- `diagnosis.py`: the table of planted faults
 - `full_run.py`: the last full run of all tests
 - `live_view.py`: the picture of the live view
+- `round_trips.py`: faults planted in Blender's Cycles, and what the diagnosis said
 - `release.py`: one number, a source distribution, a wheel
 - `verification.py`: the page of claims and of the tests that protect them
 
-May import: `analytic`, `reference.storage`, `reports.data`, `reports.machine`, `reports.papers`, `reports.tables`,
-`validation.configurations`, `validation.fidelity`, `validation.frames`, `validation.scenes`.
+May import: `analytic`, `reference.storage`, `reports.data`, `reports.interchange`, `reports.machine`, `reports.papers`,
+`reports.tables`, `validation.configurations`, `validation.diagnosis`, `validation.fidelity`,
+`validation.frames`, `validation.scenes`.
 """

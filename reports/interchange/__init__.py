@@ -5,6 +5,7 @@ Read in this order:
 
 - `scene.py`: a scene in numbers
 - `recipes.py`: these numbers in the words of two renderers
+- `cycles.py`: these numbers as properties of Blender's module `bpy`
 - `meshes.py`: its shapes as triangles
 - `gltf.py`: the scene as glTF
 - `frames.py`: frames of an animation as files

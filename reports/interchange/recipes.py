@@ -8,8 +8,15 @@ import math
 from typing import Any
 
 _CYCLES = (
-    "Cycles, all `Max Bounces` 0 but Transparent 1024, `Clamp` 0, light threshold 0, no denoiser, no adaptive sampling",
+    "camera: Sensor Fit Auto, Shift 0, Clip Start 1e-6 m, as its own 0.1 m takes away the medium before it; it "
+    "looks along its -z, y up; no depth of field",
+    "axes and lengths as here: right-handed, one unit is a metre, Unit Scale 1; its glTF importer turns y up to z up",
+    "Cycles, all `Max Bounces` 0 but Transparent 1024, as they count from the first scattering on; `Clamp` 0, light "
+    "threshold 0, no denoiser, no adaptive sampling, Film Exposure 1, not transparent; the World without Background",
     "Pixel filter Box; write 32-bit EXR, or multi-layer with the pass Volume Direct, which is the airlight",
+    "View Transform Raw, Look None, Exposure 0, Gamma 1: an EXR is linear whatever these say, a PNG is not",
+    "surfaces: Diffuse BSDF of the reflectance, Roughness 0; Shadow Terminator offsets 0",
+    "`--json` has all of this as names and values of Blender's Python, `properties`",
 )
 _LUXCORE = (
     "`path.pathdepth.total` 1, `path.clamping.variance.maxvalue` 0, `film.filter.type` BOX of width 0.5, output RGB",
@@ -75,7 +82,8 @@ def _cycles_area(light: dict[str, Any], name: str) -> str:
 
 
 def _cycles_media(phases: set[str]) -> str:
-    line = "media: Volume Coefficients with sigma_s and sigma_a as Scatter and Absorption, on the world or the body"
+    line = "media: Volume Coefficients with sigma_s and sigma_a as Scatter and Absorption, on the world or the body, "
+    line += "or Volume Scatter and Volume Absorption, both of Density sigma_t and Color albedo; Anisotropy is g"
     kinds = {"hg": "Henyey-Greenstein", "isotropic": "Henyey-Greenstein of anisotropy 0", "rayleigh": "Rayleigh"}
     named = [kinds[name] for name in sorted(phases) if name in kinds]
     line += f"; phase {', '.join(named)}" if named else ""

@@ -11,6 +11,7 @@ from reference.scene.area_light import TruthAreaLight
 from reference.scene.camera import camera_matrix
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import TruthLight, TruthMedium, TruthScene, read_truth
+from reports.interchange.cycles import cycles_properties
 from reports.interchange.recipes import recipes
 from validation.scenes.loading import LoadedScene
 
@@ -50,8 +51,9 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
     -------
     dict
         `scene`, `source`, `purpose`, `up`, `handedness`, `camera`, `medium`, `bounded_media`, `lights`, `surfaces`,
-        `radiance`, `file`, `recipes`. Lengths in metres, angles in degrees, extinction in 1/m, intensity in W/sr,
-        power in W. The shapes of lights with extent are among the lights, not the surfaces.
+        `radiance`, `file`, `recipes`, and `properties`, the scene as `reports.interchange.cycles.cycles_properties`
+        returns it. Lengths in metres, angles in degrees, extinction in 1/m, intensity in W/sr, power in W. The shapes
+        of lights with extent are among the lights, not the surfaces.
 
     Raises
     ------
@@ -83,7 +85,7 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
             },
         },
     }
-    return described | {"recipes": recipes(described)}
+    return described | {"recipes": recipes(described), "properties": {"Cycles": cycles_properties(described)}}
 
 
 def up_axis(up: Array) -> str:

@@ -11,6 +11,7 @@ Read in this order:
 - `probe.py`: one kernel in a process of its own
 - `own_process.py`: the user's own code in a process of its own
 - `doctor.py`: examines all of these
+- `printing.py`: how commands print the tables of one run
 
 May import: `analytic`, `realtime.errors`, `reference.scene`, `reference.storage`, `reports.tables`.
 """

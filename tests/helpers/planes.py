@@ -17,13 +17,18 @@ def casters_of(*names):
     return make_casters([(name, *ALL[name]()) for name in names])
 
 
-def index_of(casters, light=LIGHT, camera=CAMERA, precision="single"):
-    """Return the index of the shadow planes of all components."""
+def index_of(casters, light=LIGHT, camera=CAMERA, precision="single", *, wedges=False, order="exact"):
+    """Return the index of the shadow planes of all components; with `wedges`, as for tiles wider than most planes."""
     from realtime.numerics.array_types import array_types
 
     used = np.ones(len(casters.closed), dtype=bool)
     light, camera = np.asarray(light, dtype=float), np.asarray(camera, dtype=float)
-    return index_planes(casters, light, camera, used=used, types=array_types(precision))
+    wide = (np.arange(0, 4, 0.1), np.full(40, 99.0)) if wedges else None
+    index = index_planes(
+        casters, light, camera, used=used, types=array_types(precision), order=order, tiles=wide and (lambda axes: wide)
+    )
+    assert (index.wedges is not None) == wedges
+    return index
 
 
 def bundles(count, *, spread, light=LIGHT, camera=CAMERA, seed=1):
@@ -116,7 +121,7 @@ def drawn_lists(index, ways, end, *, order="exact"):
 
 def listed_planes(lists):
     """Return by tile the numbers of the planes that count, in order, and whether each is marked as full."""
-    from realtime.methods.shadow_planes.plane_table import FIRST, FULL, NUMBER
+    from realtime.methods.shadow_planes.plane_entries import FIRST, FULL, NUMBER
 
     entries, source = np.array(lists.entries), lists.source
     by_tile = []
@@ -128,8 +133,8 @@ def listed_planes(lists):
     return by_tile
 
 
-def rays_of(index, lists, ways):
-    """Return the rays of a walk over lists."""
+def rays_of(index, lists, ways, end=None):
+    """Return the rays of a walk over lists up to a distance `end`, without an end by default."""
     import drjit as dr
     import mitsuba as mi
 
@@ -138,4 +143,5 @@ def rays_of(index, lists, ways):
 
     Float = type(index.distance)
     tile = dr.arange(mi.UInt32, len(ways)) // TILE
-    return ray_planes(lists, *(Float(np.ascontiguousarray(part)) for part in ways.T), tile=tile)
+    ray_end = Float(0) if end is None else index.distance / Float(np.asarray(end, dtype=np.float64))
+    return ray_planes(lists, *(Float(np.ascontiguousarray(part)) for part in ways.T), tile=tile, ray_end=ray_end)

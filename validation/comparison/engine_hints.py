@@ -11,13 +11,13 @@ the reference.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from validation.comparison.whole_image import SRGB, TURNS, Change, channel_order, from_srgb
 from validation.metrics.errors import FLOOR
 
 Array = NDArray[np.float64]
@@ -28,20 +28,10 @@ OUTLIERS = 0.01  #: share of the lit values that may be as wrong as they like
 
 _LARGEST = 700.0  # the logarithm of a number that a float can hold
 
-_TURNS: dict[str, Callable[[Array], Array]] = {
-    "": lambda image: image,
-    "upside down (flip it vertically)": lambda image: image[::-1],
-    "mirrored left to right (a left-handed camera or an axis of the scene)": lambda image: image[:, ::-1],
-    "turned by 180 degrees": lambda image: image[::-1, ::-1],
-}
-_ORDERS: dict[str, Callable[[Array], Array]] = {
-    "": lambda image: image,
-    "in the channel order B, G, R": lambda image: image[..., ::-1],
-}
-_CURVES: dict[str, Callable[[Array], Array]] = {
-    "": lambda image: image,
-    "encoded by the sRGB curve (write linear values)": lambda image: _from_srgb(image),
-}
+_SAME: dict[str, Change] = {"": lambda image: image}
+_TURNS = _SAME | dict(TURNS)
+_ORDERS = _SAME | dict([channel_order((2, 1, 0))])
+_CURVES = _SAME | {SRGB: from_srgb}
 _NAMED = {
     "pi": math.pi,
     "2 pi": 2 * math.pi,
@@ -171,10 +161,3 @@ def _clipped(ref: Array, tst: Array) -> tuple[str, ...]:
         f"{count} values stop at {top:.4g} where the truth goes up to {np.nanmax(ref[stopped]):.4g}: write floats, "
         "without a tone curve",
     )
-
-
-def _from_srgb(image: Array) -> Array:
-    """Return the linear values of those encoded by IEC 61966-2-1."""
-    low = image / 12.92
-    with np.errstate(invalid="ignore"):
-        return np.where(image <= 0.04045, low, ((np.maximum(image, 0) + 0.055) / 1.055) ** 2.4)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from analytic.errors import InputError
+from analytic.errors import InputError, named_values
 from realtime.errors import InputError as MethodError
 from realtime.frame.renderer import FrameRenderer, frame_renderer
 from realtime.methods.interface.method import method_parameters
@@ -159,17 +159,9 @@ def parse_settings(settings: Sequence[str]) -> dict[str, str]:
     Raises
     ------
     InputError
-        If a word has another form, or two words give one name different values.
+        As of `analytic.errors.named_values`.
     """
-    pairs: dict[str, str] = {}
-    for setting in settings:
-        name, separator, value = setting.partition("=")
-        if not separator or not name or not value:
-            raise InputError(f"--set: got {setting!r}, wanted NAME=VALUE, for example steps=100")
-        name, value = name.strip(), value.strip()
-        if pairs.setdefault(name, value) != value:
-            raise InputError(f"--set: got {name}={pairs[name]} and {name}={value}, wanted one of them")
-    return pairs
+    return named_values("--set", settings, str, "NAME=VALUE, for example steps=100")
 
 
 def prepared(scene: Scene, chosen: Configuration, *, extra_layers: bool = False) -> FrameRenderer:

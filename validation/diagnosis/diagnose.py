@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
 from analytic.errors import InputError
 from reference.monte_carlo.batches import LAYERS
@@ -55,6 +56,7 @@ _ALIKE = 5.0  # evidence by which explanations may differ and still be as good a
 _SHOWN = 8
 _BATCH = 4  # batches of 16 paths a pixel for the light of multiple scattering
 _SAMPLES = 16
+_SMOOTH = 40  # of the width of an image: the width of the filter for that light
 
 
 @dataclass(frozen=True)
@@ -187,16 +189,21 @@ def _ranked(
 ) -> tuple[Explanation, Explanation, list[Ranked], bool]:
     """Return the unchanged scene, the explanation that is chosen, all in order, and whether nothing is left."""
     right = explain(predictor, ())
+    pairs_of_pixels = predictor.pairs(right.guess)
     there = [hypothesis for hypothesis in HYPOTHESES if hypothesis.applies(predictor)]
     cheap = [hypothesis for hypothesis in there if not hypothesis.costly]
     singles = _explained(predictor, cheap, progress, (0.0, 0.5))
     chosen = _best(right, singles, pixel)
-    if not is_explained(chosen) or (chosen is right and right.error > LEFT):
+    if not is_explained(chosen, pairs_of_pixels) or chosen.error > LEFT:
         costly = [hypothesis for hypothesis in there if hypothesis.costly]
-        singles += _explained(predictor, costly, progress, (0.5, 0.75))
-        chosen = _best(right, singles, pixel)
+        for number, hypothesis in enumerate(costly):
+            share = 0.5 + 0.25 * number / len(costly)
+            singles += _explained(predictor, [hypothesis], progress, (share, share))
+            chosen = _best(right, singles, pixel)
+            if chosen.error <= LEFT and gains(chosen, right):
+                break  # nothing is left that another one could explain
     pairs: list[Explanation] = []
-    if not is_explained(chosen):
+    if not is_explained(chosen, pairs_of_pixels):
         pairs = _pairs(predictor, right, singles, there, pixel, progress)
         best = _best(right, [chosen, *pairs] if chosen.hypotheses else pairs, pixel)
         if best.error < _BETTER * chosen.error:
@@ -217,7 +224,7 @@ def _ranked(
     elif len(chosen.hypotheses) == 1:
         # Between explanations that leave the same, the one with fewer numbers comes first.
         rows.sort(key=lambda row: row.name != chosen.hypotheses[0].name)
-    return right, chosen, rows, is_explained(chosen) or gains(chosen, right)
+    return right, chosen, rows, is_explained(chosen, pairs_of_pixels) or gains(chosen, right)
 
 
 def _explained(
@@ -306,11 +313,14 @@ def _rows(explanation: Explanation, weight: float) -> list[Ranked]:
 
 
 def _multiple_light(truth: TruthScene) -> Array | None:
-    """Return the light that the medium scattered more than once, by Mitsuba's path tracer, (pixels, 3)."""
+    """Return the light of higher orders by layer, (2, pixels, 3), by Mitsuba's path tracer."""
     if truth.width * truth.height > 1 << 17:
         return None  # minutes for one hypothesis
     parts = []
     for seed in range(_BATCH):
         whole, single = (volpath_batch(truth, seed, _SAMPLES, max_depth=depth).mean for depth in (64, 2))
-        parts.append((whole - single)[LAYERS.index("airlight")])
-    return np.asarray(np.mean(parts, axis=0))
+        parts.append((whole - single)[[LAYERS.index(layer) for layer in ("airlight", "surface")]])
+    image = np.mean(parts, axis=0).reshape(2, truth.height, truth.width, 3)
+    # Light of higher orders is smooth but for edges, and noisy.
+    width = truth.width / _SMOOTH
+    return np.asarray(gaussian_filter(image, (0, width, width, 0)).reshape(2, -1, 3))

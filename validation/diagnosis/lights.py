@@ -43,6 +43,10 @@ def _cone(predictor: Predictor, guess: Guess, p: tuple[float, ...]) -> Guess:
     return replace(guess, scenery=replace(guess.scenery, cone=_rounded(p[0])))
 
 
+def _blend(predictor: Predictor, guess: Guess, p: tuple[float, ...]) -> Guess:
+    return replace(guess, scenery=replace(guess.scenery, blend=_rounded(p[0])))
+
+
 def _rounded(value: float) -> float:
     """Return a value with few digits: sceneries that differ by less share their paths."""
     return float(f"{value:.4g}")
@@ -119,6 +123,15 @@ LIGHTS = (
         "light",
         "spots fall off from their axis on, not from the beam's edge",
         _scenery(edge="smooth"),
+        applies=_spots,
+    ),
+    Hypothesis(
+        "spot-falloff",
+        "light",
+        "spots fall off as Blender's with a blend of {0:.3g}, which its own is 0.15: smoothly by the cosine",
+        _blend,
+        (Parameter("blend", 0.01, 1.0, (0.15, 0.5, 1.0), step=0.01),),
+        costly=True,
         applies=_spots,
     ),
     Hypothesis(

@@ -70,18 +70,35 @@ def _lobe(fog: Fog, g: float) -> Fog:
     return replace(fog, g=(g,) * len(fog.g))
 
 
-def _unit(fog: Fog, factor: float) -> Fog:
-    """Return what lengths times a factor make of it: airlight and surfaces fall as its square, paths grow with it."""
-    scaled = _extinction(fog, factor)
-    return replace(scaled, exposure=_colour([value / factor**2 for value in scaled.exposure]))
+def _unit(predictor: Predictor, guess: Guess, p: tuple[float, ...]) -> Guess:
+    """Return what lengths times a factor make of it: paths grow with it, and light from points falls as its square.
+
+    Irradiance and radiance, of lights that are far or have extent, are what they were.
+    """
+    near = len(predictor.task.truth.lights)
+    intensity = (value / p[0] ** 2 if light < near else value for light, value in enumerate(guess.fog.intensity))
+    return replace(guess, fog=replace(_extinction(guess.fog, p[0]), intensity=tuple(intensity)))
 
 
 def _multiple(predictor: Predictor, guess: Guess, p: tuple[float, ...]) -> Guess:
-    return replace(guess, multiple=p[0])
+    return replace(guess, multiple=(p[0] if predictor.task.holds != "surface" else 0.0, 0.0))
+
+
+def _all_orders(predictor: Predictor, guess: Guess, p: tuple[float, ...]) -> Guess:
+    return replace(guess, multiple=(p[0], p[0]))
 
 
 def _near(predictor: Predictor, guess: Guess, p: tuple[float, ...]) -> Guess:
     return replace(guess, fog=replace(guess.fog, near=p[0]))
+
+
+def _exact_near(predictor: Predictor, guess: Guess, p: tuple[float, ...]) -> Guess:
+    near = float(f"{p[0]:.4g}")
+    return replace(guess, fog=replace(guess.fog, near=near), scenery=replace(guess.scenery, near=near))
+
+
+def _usual_near(distance: float) -> Any:
+    return lambda predictor, guess, p: replace(guess, fog=replace(guess.fog, near=distance))
 
 
 def _has_g(predictor: Predictor) -> bool:
@@ -97,6 +114,10 @@ def _has_no_g(predictor: Predictor) -> bool:
     return not _has_g(predictor) and any(medium.phase.is_constant for medium in media)
 
 
+def _surrounds(predictor: Predictor) -> bool:
+    return not predictor.task.truth.media
+
+
 def _absorbs(predictor: Predictor) -> bool:
     fog = predictor.fog
     return any(s > 0 and a < 1 - 1e-6 for ss, aa in zip(fog.sigma_t, fog.albedo) for s, a in zip(ss, aa))
@@ -107,6 +128,7 @@ def _shines(predictor: Predictor) -> bool:
 
 
 _FACTOR = (0.5, 0.7, 1.4, 2.0)
+_USUAL_NEAR = (0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0)  # of cameras in engines and modelling programs [m]
 
 MEDIUM = (
     Hypothesis(
@@ -179,8 +201,20 @@ MEDIUM = (
         "unit-length",
         "medium",
         "lengths are {0:.4g} times what they should be: another unit of length",
-        _fog(_unit),
+        _unit,
         (Parameter("factor", 1e-4, 1e4, (0.01, 100.0, 0.1, 10.0, 0.3048, 3.2808, 0.001, 1000.0), logarithmic=True),),
+        applies=lambda predictor: bool(predictor.task.truth.lights),
+    ),
+    # Where the fog before it is dark, a near plane is a factor with all digits of one that engines have.
+    *(
+        Hypothesis(
+            "near-plane",
+            "medium",
+            f"the medium is missing up to {distance:g} m before the camera: a usual near plane",
+            _usual_near(distance),
+            applies=_surrounds,
+        )
+        for distance in _USUAL_NEAR
     ),
     Hypothesis(
         "near-plane",
@@ -188,7 +222,17 @@ MEDIUM = (
         "the medium is missing up to {0:.4g} m before the camera: its near plane",
         _near,
         (Parameter("distance", 0.0, np.inf, (0.05, 0.2, 0.5, 1.0), unit="m"),),
-        applies=lambda predictor: not predictor.task.truth.media,
+        applies=_surrounds,
+    ),
+    # The same without the steps that whole nodes make.
+    Hypothesis(
+        "near-plane",
+        "medium",
+        "the medium is missing up to {0:.4g} m before the camera: its near plane",
+        _exact_near,
+        (Parameter("distance", 0.0, np.inf, (0.1, 0.3, 1.0), step=0.02, unit="m"),),
+        costly=True,
+        applies=_surrounds,
     ),
     Hypothesis(
         "multiple",
@@ -198,5 +242,14 @@ MEDIUM = (
         (Parameter("share", 0.0, 3.0, (1.0,)),),
         costly=True,
         applies=_shines,
+    ),
+    Hypothesis(
+        "multiple",
+        "medium",
+        "{0:.3g} times the light of higher orders is included, between surfaces and of the medium",
+        _all_orders,
+        (Parameter("share", 0.0, 3.0, (1.0,)),),
+        costly=True,
+        applies=lambda predictor: predictor.task.holds == "total",
     ),
 )

@@ -6,7 +6,7 @@ Where a fault is one of the scene, such as another extinction, the image is the 
 was done to an image is done to that of the right scene.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,16 +23,23 @@ from reference.scene.camera import film_directions, pixel_centres
 from reference.scene.read import TruthScene, read_truth
 from reference.storage.exr import Image
 from validation.comparison.engine_layers import truth_layer
+from validation.comparison.whole_image import to_srgb
 from validation.diagnosis.diagnose import diagnose_image
-from validation.diagnosis.encoding import filmic, srgb
+from validation.diagnosis.encoding import agx, blender_filmic, filmic
 from validation.diagnosis.prediction import Scenery, changed_scene
+from validation.fog_model.build import scattering_paths
+from validation.fog_model.fog import scene_fog
+from validation.fog_model.radiance import as_array, fog_total, on_device
 from validation.scenes.loading import load_scene
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
-_SAMPLES = 64  # of visibility: images of planted faults are small
+_SAMPLES = 16  # of visibility, where it is not exact: images of planted faults are small
 _HOLDS = "total"
+_FOOT = 0.3048  # [m]
+
+Make = Callable[[TruthScene], Array | None]
 
 
 @dataclass(frozen=True)
@@ -41,7 +48,7 @@ class Planted:
 
     name: str
     words: str
-    image: Callable[[TruthScene], Array | None]  #: (height, width, 3); None where the scene cannot have it
+    image: Make  #: (height, width, 3); None where the scene cannot have it
 
 
 def _quadrature(truth: TruthScene, **how: Any) -> TruthImage:
@@ -113,6 +120,10 @@ def _spots(truth: TruthScene) -> bool:
     return any(light.axis is not None for light in truth.lights)
 
 
+def _soft(truth: TruthScene) -> bool:
+    return any(light.axis is not None and 0 < light.beam < light.cutoff for light in truth.lights)
+
+
 def _pixels(truth: TruthScene, change: Callable[[Array, tuple[int, int]], Array]) -> TruthScene:
     """Return a scene whose rays go through other places on the film."""
     size = truth.width, truth.height
@@ -141,6 +152,55 @@ def _shadowless(truth: TruthScene) -> Array | None:
     return total.reshape(truth.height, truth.width, 3)
 
 
+def _darker_corners(truth: TruthScene) -> Array:
+    """Return an image as a lens shows it: dimmed by the fourth power of the cosine, here 1/sqrt(1 + tan^2)."""
+    width, height = truth.width, truth.height
+    half = np.tan(0.5 * np.deg2rad(float(mi.traverse(truth.scene.sensors()[0])["x_fov"][0])))
+    column, row = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    across, along = half * (2 * column / width - 1), half * (2 * row - height) / width
+    return _total(_quadrature(truth)) / (1 + across**2 + along**2)[..., None] ** 2
+
+
+def _of_model(wanted: Callable[[TruthScene], bool], laws: Mapping[str, Any], **how: Any) -> Make:
+    """Return a fault of a law that the truth cannot have, or of a light: by sums over nodes, as the hypotheses are."""
+
+    def image(truth: TruthScene) -> Array | None:
+        if not wanted(truth):
+            return None
+        paths = on_device(scattering_paths(truth, **how))
+        return as_array(fog_total(paths, replace(scene_fog(truth), **laws))).reshape(truth.height, truth.width, 3)
+
+    return image
+
+
+def _near_lights(truth: TruthScene) -> bool:
+    return bool(truth.lights)
+
+
+def _point_lights(truth: TruthScene) -> bool:
+    return any(light.axis is None for light in truth.lights)
+
+
+def _in_feet(truth: TruthScene) -> TruthScene | None:
+    """Return a scene whose lengths are 1/0.3048 times as long, brought back to size: lamps and media are not.
+
+    Without lamps that is another extinction, and nothing else.
+    """
+    if not truth.lights:
+        return None
+    lights = tuple(replace(light, intensity=light.intensity * _FOOT**2) for light in truth.lights)
+    return replace(_optics(lambda s, a: (s / _FOOT, a))(truth), lights=lights)
+
+
+def _near_plane(truth: TruthScene) -> Array | None:
+    """Return None, too, where all that is seen lies behind the plane: the fault is a factor then, exp(sigma_t near)."""
+    images = [_of_model(lambda truth: not truth.media, {"near": near}, near=near)(truth) for near in (0.7, 0.0)]
+    if images[0] is None or images[1] is None:
+        return None
+    lit = images[1] > 0
+    return images[0] if np.ptp(images[0][lit] / images[1][lit]) > 1e-3 else None
+
+
 def _clamped(image: Array) -> Array | None:
     return np.minimum(image, np.quantile(image[image > 0], 0.9))
 
@@ -154,34 +214,69 @@ PLANTED = (
     Planted("factor", "1.07 times as bright", _of_image(lambda image: 1.07 * image)),
     Planted("factor", "4 pi times as bright", _of_image(lambda image: 4 * np.pi * image)),
     Planted("extinction", "the extinction 1.4 times", _of_scene(_optics(lambda s, a: (1.4 * s, a)))),
+    Planted("unit-length", "feet for metres", _of_scene(_in_feet)),
     Planted("absorption", "no absorption", _of_scene(_optics(_absorption(0.0)))),
     Planted("albedo", "the albedo twice", _of_scene(_optics(lambda s, a: (s, a * a)))),
+    Planted("albedo", "the albedo left out", _of_scene(_optics(lambda s, a: (s, np.ones_like(a))))),
+    Planted("sigma-s", "extinction for scattering", _of_scene(_optics(lambda s, a: (s / np.maximum(a, 1e-9), a)))),
     Planted("g-sign", "g with the other sign", _of_scene(_phase(_negative_g))),
     Planted("g", "another g", _of_scene(_phase(_other_g))),
     Planted("light-leg", "the way from the light not attenuated", _light_leg),
+    Planted("camera-leg", "the way to the camera not attenuated", _of_model(lambda truth: True, {"camera_leg": 0.0})),
+    Planted("near-plane", "no medium up to 0.7 m", _near_plane),
+    Planted(
+        "distance-law", "one over the distance", _of_model(lambda truth: bool(truth.lights), {"distance_power": 1.0})
+    ),
+    Planted("light-radius", "lamps of 0.23 m", _of_model(_point_lights, {}, radius=0.23, points=256, seed=7)),
     Planted("no-shadow", "no shadows", _shadowless),
     Planted("spot-angle", "cones twice as wide", _of_scene(_scenery(_spots, cone=2.0))),
+    Planted("spot-angle", "cones half as wide", _of_scene(_scenery(_spots, cone=0.5))),
+    Planted("spot-falloff", "spots without falloff", _of_scene(_scenery(_soft, edge="hard"))),
     Planted(
         "light-position",
         "the light moved",
-        _of_scene(_scenery(lambda truth: bool(truth.lights), moved=(0.07, -0.05, 0.09))),
+        _of_scene(_scenery(_near_lights, moved=(0.07, -0.05, 0.09))),
     ),
     Planted("fov-axis", "the other field of view", _of_scene(lambda truth: _pixels(truth, _other_axis))),
     Planted("shift", "half a pixel", _of_scene(lambda truth: _pixels(truth, lambda p, size: p - [0.5, 0.5]))),
     Planted("flip", "upside down", _of_image(lambda image: image[::-1])),
     Planted("flip", "mirrored", _of_image(lambda image: image[:, ::-1])),
-    Planted("transfer", "sRGB", _of_image(srgb)),
+    Planted("transfer", "sRGB", _of_image(to_srgb)),
     Planted("transfer", "gamma 2.2", _of_image(lambda image: image ** (1 / 2.2))),
     Planted("clamp", "a tenth cut off", _of_image(_clamped)),
     Planted("tone-map", "filmic", _of_image(filmic)),
+    Planted("tone-map", "Blender's Filmic", _of_image(blender_filmic)),
+    Planted("tone-map", "Blender's AgX", _of_image(agx)),
+    Planted("black-level", "a twentieth of the mean added", _of_image(lambda image: image + 0.05 * image.mean())),
+    Planted("vignette", "corners darker by cos^4", _darker_corners),
     Planted("channels", "B, G, R", _of_image(_swapped)),
 )
+
+
+def _and_then(name: str, words: str, then: str, change: Callable[[Array], Array | None]) -> Planted:
+    """Return a fault of `PLANTED`, by its words, with another one done to its image."""
+    (first,) = (planted for planted in PLANTED if planted.words == words)
+
+    def image(truth: TruthScene) -> Array | None:
+        values = first.image(truth)
+        return None if values is None else change(values)
+
+    return Planted(f"{first.name} and {name}", f"{words}, and {then}", image)
+
+
+PAIRS = (
+    _and_then("factor", "the extinction 1.4 times", "0.7 times as bright", lambda image: 0.7 * image),
+    _and_then("flip", "another g", "upside down", lambda image: image[::-1]),
+    _and_then("transfer", "the way from the light not attenuated", "sRGB", to_srgb),
+    _and_then("channels", "no absorption", "B, G, R", _swapped),
+)  #: two faults of different kinds: a diagnosis should name both
 
 
 def planted_answers(
     scenes: Sequence[str], size: tuple[int, int], *, progress: Progress | None = None
 ) -> list[dict[str, Any]]:
-    """Plant every fault in scenes and return the answers, a row each: 'scene', 'planted', 'words', 'first', 'right'.
+    """Plant every fault in scenes and return the answers, a row each: 'scene', 'planted', 'words', 'first',
+    'answer' with both of two faults, 'pair', 'right'.
 
     Parameters
     ----------
@@ -201,21 +296,24 @@ def planted_answers(
     for number, name in enumerate(scenes):
         loaded = load_scene(name, size)
         truth = read_truth(loaded.scene)
-        for turn, planted in enumerate(PLANTED):
+        for turn, planted in enumerate((*PLANTED, *PAIRS)):
             if progress is not None:
-                share = (number + turn / len(PLANTED)) / len(scenes)
+                share = (number + turn / len((*PLANTED, *PAIRS))) / len(scenes)
                 progress(share, f"{loaded.name}: {planted.words}")
             image = planted.image(truth)
             if image is None:
                 continue
             diagnosis = diagnose_image(Image({_HOLDS: image}), loaded, layer=_HOLDS, pixel="centre")
+            answer = " and ".join(diagnosis.ranked[0].together) or diagnosis.first
             rows.append(
                 {
                     "scene": loaded.name,
                     "planted": planted.name,
                     "words": planted.words,
                     "first": diagnosis.first,
-                    "right": diagnosis.first == planted.name,
+                    "answer": answer,
+                    "pair": planted in PAIRS,
+                    "right": planted.name == (answer if planted in PAIRS else diagnosis.first),
                     "residual": diagnosis.residual,
                     "left": diagnosis.left,
                 }

@@ -7,12 +7,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.scene.camera import camera_matrix
 from reference.scene.read import TruthScene
 from validation.fit.image_model import ImageModel, Task, image_model
 from validation.fog_model.fog import Fog
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
+APART = 2  #: pixels between those whose errors are compared: a filter that is wider than a pixel joins neighbours
 _MOST_RAYS = 3000
 _FLOOR = 0.01  # of the mean of an image: below it values count relative to this
 
@@ -28,6 +31,8 @@ class Scenery:
     cone: float = 1.0  #: factor on the angles of spots
     edge: str = ""  #: of spots: 'hard', or 'smooth' from the axis on; the scene's own
     radius: float = 0.0  #: of spheres in the place of point lights [m]
+    near: float = 0.0  #: distance along the axis where the medium begins; the fog's own is only that of its nodes [m]
+    blend: float = 0.0  #: share of 1 - cos(cut-off) in which spots fall off smoothly, as Blender's do
 
 
 @dataclass(frozen=True)
@@ -36,7 +41,8 @@ class Guess:
 
     fog: Fog
     scenery: Scenery = field(default_factory=Scenery)
-    multiple: float = 0.0  #: share of the light of higher orders that is there
+    multiple: tuple[float, float] = (0.0, 0.0)  #: shares of the light of higher orders: airlight, surfaces
+    vignette: float = 0.0  #: power of the cosine to the camera's axis that dims the image
     values: tuple[Callable[[Array], Array], ...] = ()  #: what was done to the values, in this order
     undo: Callable[[Array], Array] | None = (
         None  #: takes back what was done to the grid, (height, width, 3) -> the same
@@ -50,7 +56,8 @@ class Predictor:
     task: Task
     shape: tuple[int, int]
     most: int = _MOST_RAYS
-    multiple: Callable[[], Array | None] | None = None  #: light of higher orders, (all pixels, 3), or None
+    multiple: Callable[[], Array | None] | None = None
+    """Light of higher orders in airlight and surfaces, (2, all pixels, 3), or None."""
     _models: dict[Scenery, ImageModel] = field(default_factory=dict)
 
     @property
@@ -65,24 +72,52 @@ class Predictor:
             self._models[scenery] = image_model(
                 replace(self.task, truth=truth),
                 most=self.most,
+                apart=APART,
                 shadows=scenery.shadows,
                 offset=scenery.offset,
                 zoom=scenery.zoom,
                 radius=scenery.radius,
+                blend=scenery.blend,
+                near=scenery.near,
             )
         return self._models[scenery]
+
+    def pairs(self, guess: Guess) -> tuple[Index, Index]:
+        """Return which values belong to pixels and which to their neighbours, those of the next columns if it can be.
+
+        Returns
+        -------
+        tuple of numpy.ndarray
+            Two arrays of numbers of rows of `errors`.
+        """
+        pixels, width = self.model(guess.scenery).pixels, self.shape[1]
+        for apart in (1, APART) if len(pixels) == self.task.used.sum() else (APART,):
+            partner = np.searchsorted(pixels, pixels + apart)
+            row = np.flatnonzero(partner < len(pixels))
+            partner = partner[row]
+            there = (pixels[partner] == pixels[row] + apart) & (pixels[row] % width + apart < width)
+            if there.any():
+                return row[there], partner[there]
+        return np.empty(0, np.int64), np.empty(0, np.int64)
 
     def predicted(self, guess: Guess) -> Array:
         """Return the values of the pixels, (m, 3)."""
         model = self.model(guess.scenery)
         radiance = model.radiance(guess.fog)
-        if guess.multiple:
+        if any(guess.multiple):
             more = None if self.multiple is None else self.multiple()
             if more is not None:
-                radiance = radiance + guess.multiple * more[model.pixels]
+                radiance = radiance + sum(share * part[model.pixels] for share, part in zip(guess.multiple, more))
+        if guess.vignette:
+            radiance = radiance * self._cosines(model.pixels)[:, None] ** guess.vignette
         for change in guess.values:
             radiance = change(radiance)
         return radiance
+
+    def _cosines(self, pixels: Index) -> Array:
+        """Return the cosines of pixels to the axis of the camera, (m,)."""
+        truth = self.task.truth
+        return np.asarray(truth.direction[pixels] @ camera_matrix(truth.scene.sensors()[0])[:3, 2])
 
     def seen(self, guess: Guess) -> Array:
         """Return the values of the image in these pixels, (m, 3), with the fault of the grid taken back."""

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 _LEAST_SCALE = 1e-6
 _TURNS = 5
 _COARSE = 0.02
+_LITTLE = 0.9  # share of the loss that a step leaves which gains little
 _SIMPLEX = 0.1  # first step, of a logarithm or in units of the parameter
 
 
@@ -101,7 +102,7 @@ def _improved(
     low, high = _inward(parameters, [p.low for p in parameters]), _inward(parameters, [p.high for p in parameters])
     if any(parameter.step for parameter in parameters):
         steps = np.array([parameter.step or 1e-4 for parameter in parameters])
-        return _by_differences(errors, loss, inner, scale, (steps, low, high))
+        return _by_differences(errors, loss, inner, scale, (steps, low, high), fine=fine)
     if len(parameters) == 1:
         step = 0.7 if parameters[0].logarithmic else max(0.3 * abs(inner[0]), 0.1)
         bounds = max(float(low[0]), inner[0] - step), min(float(high[0]), inner[0] + step)
@@ -123,8 +124,13 @@ def _by_differences(
     inner: Array,
     scale: float,
     steps_and_ends: tuple[Array, Array, Array],
+    *,
+    fine: bool,
 ) -> Array:
-    """Return the end of a few steps of Gauss and Newton with Cauchy's weights, halved while they make it worse."""
+    """Return the end of a few steps of Gauss and Newton with Cauchy's weights, halved while they make it worse.
+
+    Each loss costs new paths: a search that need not be fine ends where a step gains little.
+    """
     steps, low, high = steps_and_ends
     least = loss(inner)
     for _ in range(_TURNS):
@@ -136,7 +142,7 @@ def _by_differences(
         )
         weights = 1 / (1 + (left / scale) ** 2)
         move = -np.linalg.lstsq(slopes * np.sqrt(weights)[:, None], left * np.sqrt(weights), rcond=1e-10)[0]
-        for _ in range(4):
+        for _ in range(4 if fine else 2):
             trial = np.clip(inner + move, low, high)
             reached = loss(trial)
             if reached < least:
@@ -144,7 +150,7 @@ def _by_differences(
             move = 0.5 * move
         else:
             return inner
-        small = np.all(np.abs(trial - inner) < 0.02 * steps)
+        small = np.all(np.abs(trial - inner) < 0.02 * steps) or (not fine and reached > _LITTLE * least)
         inner, least = trial, reached
         if small:
             break

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from validation.diagnosis.search import Explanation
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 LEAST_EVIDENCE = 20.0  #: e^20 to one: what nobody doubts
 LEAST_EFFECT = 0.002  #: mean relative change of the image: less is no fault
@@ -49,11 +50,11 @@ def effect(explanation: Explanation, right: Explanation) -> float:
     return float(np.mean(np.abs(explanation.errors - right.errors)))
 
 
-def is_explained(explanation: Explanation) -> bool:
-    """Return whether what an explanation leaves is noise, or little."""
+def is_explained(explanation: Explanation, pairs: tuple[Index, Index]) -> bool:
+    """Return whether what an explanation leaves is noise, or little; `pairs` are those of `Predictor.pairs`."""
     errors = np.sort(np.abs(explanation.errors).mean(axis=1))
     usual = float(errors[: max(1, int((1 - _WORST) * len(errors)))].mean())
-    return usual <= LEFT or correlation(explanation.errors) <= _NOISE
+    return usual <= LEFT or correlation(explanation.errors, pairs) <= _NOISE
 
 
 def gains(explanation: Explanation, right: Explanation) -> bool:
@@ -61,10 +62,11 @@ def gains(explanation: Explanation, right: Explanation) -> bool:
     return bool(explanation.hypotheses) and explanation.error <= right.error / _GAIN
 
 
-def correlation(errors: Array) -> float:
-    """Return the correlation of the errors of neighbours in a row of pixels, clipped at three scales."""
+def correlation(errors: Array, pairs: tuple[Index, Index]) -> float:
+    """Return the correlation of the errors of neighbours, clipped at three scales."""
     means = errors.mean(axis=1)
     scale = 1.4826 * float(np.median(np.abs(means)))
     clipped = np.clip(means, -3 * scale, 3 * scale)
     power = float(np.mean(clipped**2))
-    return float(np.mean(clipped[1:] * clipped[:-1])) / power if power > 0 else 0.0
+    here, there = pairs
+    return float(np.mean(clipped[here] * clipped[there])) / power if power > 0 and len(here) else 0.0

@@ -24,6 +24,7 @@ Bools = NDArray[np.bool_]
 _MOST_RAYS = 20_000  # that a fit looks at, each with some nodes for every light: more say nothing new of few numbers
 _SIDE = 3  # rays along a side of a pixel, for means over its area
 _AREA_POINTS = 16  # of lights with extent
+_SPHERE_POINTS = 64  # of a sphere in the place of a point light: its rays pass by close
 _HUGE = 1e100  # whose square is a number too
 _SATURATED = 8  # values that stop at the largest one
 
@@ -87,7 +88,7 @@ class ImageModel:
 
 
 def image_model(
-    task: Task, *, most: int = _MOST_RAYS, seed: int = 0, progress: Progress | None = None, **how: Any
+    task: Task, *, most: int = _MOST_RAYS, apart: int = 0, seed: int = 0, progress: Progress | None = None, **how: Any
 ) -> ImageModel:
     """Return the model of an image.
 
@@ -97,6 +98,8 @@ def image_model(
         The image.
     most
         Rays at most.
+    apart
+        Where not all pixels take part, they are chosen as pairs so far apart in a row; 0: each by itself [pixels].
     seed
         Of the choice of pixels, and of the places of rays in them.
     progress
@@ -106,13 +109,15 @@ def image_model(
     """
     rays = (_SIDE**2 if task.area else 1) * (_AREA_POINTS if task.truth.area else 1)
     pixels = _some(np.flatnonzero(task.used), max(64, most // rays), seed)
+    if apart and len(pixels) < np.count_nonzero(task.used):
+        pixels = _with_partners(pixels[::2], task, apart)
     paths = scattering_paths(
         task.truth,
         pixels=pixels,
         rays_per_side=_SIDE if task.area else 0,
         airlight=task.holds != SURFACE,
         surface=task.holds != AIRLIGHT,
-        points=_AREA_POINTS,
+        points=_SPHERE_POINTS if how.get("radius") else _AREA_POINTS,
         seed=seed,
         progress=progress,
         **how,
@@ -137,6 +142,14 @@ def usable_pixels(values: Array) -> Bools:
     largest = values[finite].max()
     stopped: Bools = np.asarray(np.any(values == largest, axis=1) & finite)
     return finite & ~stopped if largest > 0 and np.count_nonzero(stopped) >= _SATURATED else finite
+
+
+def _with_partners(pixels: Index, task: Task, apart: int) -> Index:
+    """Return pixels, and those to the right of them that can take part too."""
+    partners = pixels + apart
+    there = (pixels % task.truth.width + apart < task.truth.width) & (partners < len(task.used))
+    partners = partners[there]
+    return np.asarray(np.union1d(pixels, partners[task.used[partners]]), dtype=np.int64)
 
 
 def _some(pixels: Index, most: int, seed: int) -> Index:

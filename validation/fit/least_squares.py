@@ -98,7 +98,11 @@ def _search(model: ImageModel, unknowns: Sequence[Unknown], start: Array, steps:
 
 
 def _trials(model: ImageModel, unknowns: Sequence[Unknown]) -> list[tuple[float, Array]]:
-    """Return starts with their losses: all extinctions times a factor, with some g, and the factor that fits best."""
+    """Return starts with their losses: all extinctions times a factor, with some g, and the factor that fits best.
+
+    The extinctions are those to begin with and, where these differ from one another, their mean: channels whose starts
+    lie decades apart lead to no common end.
+    """
     given = np.array([unknown.scale.inward(unknown.start) for unknown in unknowns])
     sigmas = [n for n, unknown in enumerate(unknowns) if unknown.kind == "sigma_t"]
     gs = [n for n, unknown in enumerate(unknowns) if unknown.kind == "phase.g"]
@@ -106,8 +110,11 @@ def _trials(model: ImageModel, unknowns: Sequence[Unknown]) -> list[tuple[float,
     # Of several that multiply the same, such as albedo and exposure, only the first kind takes the factor.
     chosen = [n for n in factors if unknowns[n].kind == unknowns[factors[0]].kind]
     trials = []
-    for times, g in product(_SIGMA_STARTS if sigmas else (1.0,), (None, *_G_STARTS) if gs else (None,)):
-        trial = given.copy()
+    grey = given.copy()
+    grey[sigmas] = given[sigmas].mean() if sigmas else 0.0
+    bases = (given,) if np.array_equal(grey, given) else (given, grey)
+    for base, times, g in product(bases, _SIGMA_STARTS if sigmas else (1.0,), (None, *_G_STARTS) if gs else (None,)):
+        trial = base.copy()
         trial[sigmas] += math.log(times)
         trial[gs] = given[gs] if g is None else math.atanh(g)
         radiance = model.values(unknowns, trial)

@@ -9,6 +9,7 @@ Read in this order:
 
 - `paths.py`: nodes on lit intervals and lit surface points, as arrays;
 - `nodes.py`: nodes on pieces of rays;
+- `lengths.py`: how much of a line lies in each medium;
 - `point_paths.py`: those of point and spot lights, and of points of lights with extent;
 - `directional_paths.py`: those of directional lights;
 - `surface_paths.py`: the surfaces that lights reach;

@@ -3,6 +3,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import mitsuba as mi
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from reference.quadrature.light_points import PointPlan, light_points, square_points
 from reference.quadrature.surface import SurfaceHits, surface_hits
 from reference.scene.area_light import TruthAreaLight, is_area
-from reference.scene.camera import film_directions, pixel_centres
+from reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from reference.scene.directional_light import DirectionalLight, is_directional
 from reference.scene.read import TruthLight, TruthScene
 from reference.scene.shapes import read_shapes
@@ -37,6 +38,8 @@ def scattering_paths(
     offset: tuple[float, float] = (0.0, 0.0),
     zoom: float = 1.0,
     radius: float = 0.0,
+    blend: float = 0.0,
+    near: float = 0.0,
     shadows: bool = True,
     airlight: bool = True,
     surface: bool = True,
@@ -61,6 +64,10 @@ def scattering_paths(
         Factor on the distance of all rays from the middle of the film, before they are moved.
     radius
         Of spheres that take the place of point lights, of the same intensity [m].
+    blend
+        Share of 1 - cos(cut-off), from the cut-off inwards, in which spots fall off smoothly, besides their own edge.
+    near
+        Distance along the camera's axis before which point and spot lights have no nodes [m].
     shadows
         False where surfaces hide nothing from the lights.
     airlight, surface
@@ -84,11 +91,30 @@ def scattering_paths(
     hits = SurfaceHits(exact_distance(rays, hits.interaction, hits.distance, shapes), hits.interaction)
     open_rays = rays if shadows else replace(rays, occluders=mi.load_dict({"type": "scene"}))
     how: dict[str, Any] = {"shapes": shapes if shadows else None}
+    if shapes.others is None:
+        how["checks"] = 0  # intervals by geometry are what they are: random checks only say how far to trust them
+    axis = camera_matrix(truth.scene.sensors()[0])[:3, 2]
+    begin = near / (directions @ axis) if near > 0 else None
     sources = light_sources(truth, points, seed, radius)
     lights = []
-    for number, source in enumerate(sources):
-        nodes = [_nodes(open_rays, light, hits.distance, how) for light in source.lights] if airlight else []
+    for number, given in enumerate(sources):
+        source = _spots_whole_within(given, blend) if blend else given
+        nodes = [_nodes(open_rays, light, hits.distance, how, begin) for light in source.lights] if airlight else []
         lit = [surface_points(rays, light, hits, shadows=shadows) for light in source.lights] if surface else []
+        if blend:
+            edges = [partial(_blended, light=light) for light in source.lights]
+            nodes = [replace(part, weight=part.weight * edge(part.towards)) for part, edge in zip(nodes, edges)]
+            lit = [
+                replace(part, radiance=part.radiance * edge(part.towards)[:, None]) for part, edge in zip(lit, edges)
+            ]
+        if source.centre is not None:
+            nodes = [
+                replace(part, weight=part.weight / _level(part, at, source)) for part, at in zip(nodes, source.lights)
+            ]
+            lit = [
+                replace(part, radiance=part.radiance / _level(part, at, source)[:, None])
+                for part, at in zip(lit, source.lights)
+            ]
         lights.append(_light_paths(source.name, source.intensity, nodes, lit, len(truth.media) + 1))
         if progress is not None:
             progress((number + 1) / len(sources), "lit intervals")
@@ -98,6 +124,7 @@ def scattering_paths(
         ray_pixel=np.repeat(np.arange(len(pixels)), max(1, rays_per_side) ** 2),
         rays_per_pixel=max(1, rays_per_side) ** 2,
         direction=directions,
+        axis=axis,
         media=(truth.medium, *truth.media),
         media_names=("medium", *(medium.name for medium in truth.media)),
         lights=tuple(lights),
@@ -121,6 +148,7 @@ class Source:
     name: str  #: its id
     intensity: Array  #: what multiplies the paths from it, (3,)
     lights: Sequence[TruthLight | DirectionalLight]  #: that stand for it
+    centre: Array | None = None  #: of a sphere, (3,) [m]
 
 
 def light_sources(truth: TruthScene, points: int = _POINTS, seed: int = 0, radius: float = 0.0) -> list[Source]:
@@ -144,6 +172,7 @@ def light_sources(truth: TruthScene, points: int = _POINTS, seed: int = 0, radiu
             light.name,
             light.radiance * light.area / points,
             light_points(light, square_points(plan, number, 0, light.kind)),
+            light.centre if light.kind == "sphere" else None,
         )
         for number, light in enumerate(truth.area)
     ]
@@ -158,15 +187,54 @@ def _as_sphere(name: str, light: TruthLight, points: int, seed: int, radius: flo
     """
     plan = PointPlan(most=points, seed=seed)
     wide = TruthAreaLight("sphere", light.position, np.eye(3), np.full(2, radius), np.zeros(3), False, None)
-    return Source(name, 4 * light.intensity / points, light_points(wide, square_points(plan, 0, 0, "sphere")))
+    return Source(
+        name, 4 * light.intensity / points, light_points(wide, square_points(plan, 0, 0, "sphere")), light.position
+    )
 
 
-def _nodes(truth: TruthScene, light: TruthLight | DirectionalLight, distance: Array, how: dict[str, Any]) -> Nodes:
+def _level(points: Nodes | SurfacePoints, light: TruthLight | DirectionalLight, sphere: Source) -> Array:
+    """Return what the points on a sphere together send its way, as a multiple of what the sphere sends there, (n,).
+
+    Seen from afar along d, N points with the normals n_i send 4/N sum max(n_i . d, 0) of the sphere's intensity, which
+    is 1 for many points and 10 % off for sixteen.
+    """
+    if not isinstance(light, TruthLight) or sphere.centre is None:
+        return np.ones(len(points.r))
+    way = light.position - sphere.centre + points.r[:, None] * points.towards
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    normals = np.stack([np.asarray(each.axis) for each in sphere.lights if isinstance(each, TruthLight)])
+    return np.asarray(4 * np.maximum(way @ normals.T, 0).mean(axis=1))
+
+
+def _spots_whole_within(source: "Source", blend: float) -> "Source":
+    """Return a light whose spots end their full intensity where that of Blender's `spot_blend` ends, a kink."""
+
+    def spot(light: TruthLight | DirectionalLight) -> TruthLight | DirectionalLight:
+        if isinstance(light, DirectionalLight) or light.axis is None or light.cosine:
+            return light
+        return replace(light, beam=float(np.arccos(min(blend + (1 - blend) * np.cos(light.cutoff), 1.0))))
+
+    return replace(source, lights=[spot(light) for light in source.lights])
+
+
+def _blended(towards: Array, light: TruthLight | DirectionalLight) -> Array:
+    """Return Blender's edge over that of a spot with the same ends, (n,): smoothstep of the cosine, linear in angle."""
+    if isinstance(light, DirectionalLight) or light.axis is None or light.cosine:
+        return np.ones(len(towards))
+    cosine = np.clip(towards @ light.axis, -1.0, 1.0)
+    share = np.clip((cosine - np.cos(light.cutoff)) / (np.cos(light.beam) - np.cos(light.cutoff)), 0.0, 1.0)
+    linear = np.clip((light.cutoff - np.arccos(cosine)) / (light.cutoff - light.beam), 0.0, 1.0)
+    return np.divide(share * share * (3 - 2 * share), linear, out=np.zeros(len(cosine)), where=linear > 0)
+
+
+def _nodes(
+    truth: TruthScene, light: TruthLight | DirectionalLight, distance: Array, how: dict[str, Any], begin: Array | None
+) -> Nodes:
     if isinstance(light, DirectionalLight):
         if not truth.media:
             return _light_paths("", np.zeros(3), [], [], 1).nodes  # nothing scatters
         return directional_nodes(truth, light, distance, how)
-    return point_nodes(truth, light, distance, how)
+    return point_nodes(truth, light, distance, how, begin)
 
 
 def _light_paths(

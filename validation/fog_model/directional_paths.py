@@ -16,9 +16,9 @@ from reference.quadrature.directional_sums import kinks
 from reference.quadrature.pieces import Crossed, cut_pieces
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import TruthScene
+from validation.fog_model.lengths import lengths
 from validation.fog_model.nodes import panel_nodes
 from validation.fog_model.paths import Nodes
-from validation.fog_model.point_paths import lengths
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,6 @@ def directional_nodes(truth: TruthScene, light: DirectionalLight, distance: Arra
     ray, medium = pieces.ray[owner], pieces.medium[owner] + 1
     x = pieces.x0[owner] + width[owner] * share
     direction = truth.direction[ray]
-    towards = np.broadcast_to(-light.direction, direction.shape)
     nothing = np.zeros_like(x)
     return Nodes(
         ray,
@@ -51,6 +50,6 @@ def directional_nodes(truth: TruthScene, light: DirectionalLight, distance: Arra
         rays.cosine[ray],
         weight * width[owner],
         lengths(truth, truth.origin, direction, nothing, x),
-        lengths(truth, truth.origin + x[:, None] * direction, towards, nothing, np.full(len(x), np.inf)),
+        lengths(truth, truth.origin + x[:, None] * direction, -light.direction, nothing, np.full(len(x), np.inf)),
         np.zeros_like(direction),
     )

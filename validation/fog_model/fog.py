@@ -21,7 +21,7 @@ class Fog:
     exposure: Colour = (1.0, 1.0, 1.0)  #: factor on the image [1]
     camera_leg: Any = 1.0  #: share of the extinction that dims the way to the camera [1]
     light_leg: Any = 1.0  #: share of the extinction that dims the way from the light [1]
-    near: Any = 0.0  #: medium without bounds is missing before this distance from the camera [m]
+    near: Any = 0.0  #: medium without bounds is missing before the plane at this distance along the camera's axis [m]
     distance_power: Any = 2.0  #: the irradiance falls as the distance to this power [1]
 
     def with_entry(self, name: str, number: int, value: Any) -> "Fog":

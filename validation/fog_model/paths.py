@@ -71,6 +71,7 @@ class ScatteringPaths:
     ray_pixel: Index  #: by ray, which of these pixels it belongs to, (rays,)
     rays_per_pixel: int
     direction: Array  #: of the rays, unit, (rays, 3)
+    axis: Array  #: of the camera, unit, (3,)
     media: tuple[TruthMedium, ...]  #: that without bounds first
     media_names: tuple[str, ...]
     lights: tuple[LightPaths, ...]

@@ -11,8 +11,8 @@ from reference.quadrature.light_airlight import lit_rays
 from reference.quadrature.pieces import Setup, cut_pieces
 from reference.quadrature.unbounded import lit_stretches
 from reference.scene.read import TruthLight, TruthScene
-from reference.visibility.line_crossings import crossings
 from reference.visibility.spot_cone import falloff
+from validation.fog_model.lengths import lengths
 from validation.fog_model.nodes import panel_nodes
 from validation.fog_model.paths import AROUND, Nodes
 
@@ -25,7 +25,9 @@ _AT_LIGHT = 1e-290  # height [m] below which a ray meets the light
 _NEAR_ZERO = 1e-15  # height over distance below which a light beside a piece may as well be at this height
 
 
-def point_nodes(truth: TruthScene, light: TruthLight, distance: Array, how: dict[str, Any]) -> Nodes:
+def point_nodes(
+    truth: TruthScene, light: TruthLight, distance: Array, how: dict[str, Any], begin: Array | None = None
+) -> Nodes:
     """Return the nodes of a point or spot light on the lit parts of all rays.
 
     Parameters
@@ -38,10 +40,14 @@ def point_nodes(truth: TruthScene, light: TruthLight, distance: Array, how: dict
         To the visible surface, (rays,) [m].
     how
         What `reference.visibility.lit_intervals.lit_intervals` takes.
+    begin
+        Distance before which a ray has no nodes, (rays,) [m].
     """
     reach = lit_rays(truth, light, distance, how)
     rays = reach.rays
     ray, x0, x1 = lit_stretches(light, rays, reach.lit)
+    if begin is not None:
+        x0 = np.maximum(x0, begin[ray])
     used = x1 > x0
     ray, x0, x1 = ray[used], x0[used], x1[used]
     if reach.segments is None:
@@ -75,27 +81,6 @@ def point_nodes(truth: TruthScene, light: TruthLight, distance: Array, how: dict
         lengths(truth, light.position, towards, np.zeros_like(x), r),
         towards,
     )
-
-
-def lengths(truth: TruthScene, origin: Array, direction: Array, low: Array, high: Array) -> Array:
-    """Return how much of parts of straight lines lies in each medium, that without bounds first, (n, media) [m].
-
-    Parameters
-    ----------
-    truth
-        The scene.
-    origin, direction
-        Of the lines, (n, 3), the origin also (3,) [m].
-    low, high
-        Distances between which the lines are looked at, (n,) [m]; `high` may be infinite where nothing surrounds the
-        media: the length around them is then not finite and multiplies no extinction.
-    """
-    inside = []
-    for medium in truth.media:
-        enter, leave = crossings(medium.bounds, origin, direction)
-        inside.append(np.maximum(np.minimum(leave, high) - np.maximum(enter, low), 0.0))
-    around = np.where(np.isfinite(high), high, 0.0) - np.where(np.isfinite(high), low, 0.0) - sum(inside)
-    return np.stack([np.maximum(around, 0.0), *inside], axis=1)
 
 
 def _reach(truth: TruthScene) -> float:

@@ -41,6 +41,7 @@ class _Legs:
     leg: tuple[Any, ...]
     towards: Any
     direction: Any  # of the rays
+    slant: Any  # length of a ray over that along the camera's axis
 
 
 @dataclass(frozen=True)
@@ -102,8 +103,9 @@ def _legs(paths: ScatteringPaths, points: Nodes | SurfacePoints) -> _Legs:
         leg,
         mi.Vector3d(points.towards.T),
         mi.Vector3d(paths.direction[points.ray].T),
+        mi.Float64(1 / (paths.direction[points.ray] @ paths.axis)),
     )
-    dr.eval(legs.pixel, legs.r, legs.camera, legs.leg, legs.towards, legs.direction)
+    dr.eval(legs.pixel, legs.r, legs.camera, legs.leg, legs.towards, legs.direction, legs.slant)
     return legs
 
 
@@ -171,8 +173,12 @@ def _airlight(light: _DeviceLight, fog: Fog, number: int, channel: int) -> Any:
         source = dr.select(light.medium == medium, value, source)
     r = light.nodes.r if place is None else place.r
     falls = dr.rcp(dr.square(r)) if _is_right(fog) else dr.exp(-fog.distance_power * dr.log(r))
-    strength = light.strength if _begins(fog) else dr.select(light.nodes.camera[0] >= fog.near, light.strength, 0)
+    strength = light.strength if _begins(fog) else light.strength * _behind_near(light.nodes, fog)
     return source * strength * falls * _dimmed(light.nodes, fog, channel, place)
+
+
+def _behind_near(nodes: _Legs, fog: Fog) -> Any:
+    return dr.select(nodes.camera[0] >= fog.near * nodes.slant, 1.0, 0.0)
 
 
 def _surface(light: _DeviceLight, fog: Fog, number: int, channel: int) -> Any:
@@ -215,7 +221,7 @@ def _dimmed(legs: _Legs, fog: Fog, channel: int, place: _Place | None) -> Any:
     longer = 1.0 if place is None else place.r / legs.r
     camera_legs = list(legs.camera)
     if not _begins(fog):
-        camera_legs[0] = dr.maximum(camera_legs[0] - fog.near, 0)
+        camera_legs[0] = dr.maximum(camera_legs[0] - fog.near * legs.slant, 0)
     parts = [
         sigma_t[channel] * (fog.camera_leg * camera + fog.light_leg * leg * longer)
         for sigma_t, camera, leg in zip(fog.sigma_t, camera_legs, legs.leg, strict=True)

@@ -14,8 +14,8 @@ from reference.quadrature.surface import SurfaceHits
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import TruthLight, TruthScene
 from reference.visibility.spot_cone import falloff
+from validation.fog_model.lengths import lengths
 from validation.fog_model.paths import SurfacePoints
-from validation.fog_model.point_paths import lengths
 
 Array = NDArray[np.float64]
 
@@ -42,13 +42,13 @@ def surface_points(
     if isinstance(light, DirectionalLight):
         towards, r = np.broadcast_to(-light.direction, point.shape), np.ones(len(point))
         shadow_ray = interaction.spawn_ray(mi.Vector3f(towards.T))
-        arriving, reach = np.ones(len(point)), np.full(len(point), np.inf)
+        arriving = np.ones(len(point))
     else:
         way = light.position - point
         r = np.linalg.norm(way, axis=1)
         towards = way / np.maximum(r, np.finfo(float).tiny)[:, None]
         shadow_ray = interaction.spawn_ray_to(mi.Point3f(*(float(c) for c in light.position)))
-        arriving, reach = _profile(light, -towards) / np.maximum(r, np.finfo(float).tiny) ** 2, r
+        arriving = _profile(light, -towards) / np.maximum(r, np.finfo(float).tiny) ** 2
     facing = interaction.is_valid()
     local = interaction.to_local(mi.Vector3f(towards.T))
     reflected = interaction.bsdf().eval(mi.BSDFContext(), interaction, local, facing)
@@ -58,12 +58,16 @@ def surface_points(
         lit &= ~np.array(truth.occluders.ray_test(shadow_ray, facing), dtype=bool)
     ray = np.flatnonzero(lit)
     nothing = np.zeros(len(ray))
+    if isinstance(light, DirectionalLight):
+        leg = lengths(truth, point[ray], -light.direction, nothing, np.full(len(ray), np.inf))
+    else:
+        leg = lengths(truth, light.position, -towards[ray], nothing, r[ray])
     return SurfacePoints(
         ray,
         radiance[ray],
         r[ray],
         lengths(truth, truth.origin, truth.direction[ray], nothing, hits.distance[ray]),
-        lengths(truth, point[ray], towards[ray], nothing, reach[ray]),
+        leg,
         0 * towards[ray] if isinstance(light, DirectionalLight) else -towards[ray],
     )
 

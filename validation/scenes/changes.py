@@ -27,7 +27,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError, nearest
+from analytic.errors import InputError, named_values, nearest
 from validation.scenes.numbers import LARGEST_LENGTH, LARGEST_LIGHT
 
 Array = NDArray[np.float64]
@@ -58,28 +58,16 @@ def changeable(scene) -> dict[str, Changeable]:
     return {item.name: item for item in found}
 
 
-def parse_changes(words: Iterable[str]) -> dict[str, Values]:
+def parse_changes(words: Sequence[str]) -> dict[str, Values]:
     """Return values by name from words of the form 'NAME=VALUE' or 'NAME=X,Y,Z'.
 
     Raises
     ------
     InputError
-        If a word has another form, or two words give one name different values.
+        As of `analytic.errors.named_values`.
     """
-    changes: dict[str, Values] = {}
-    for word in words:
-        name, separator, text = word.partition("=")
-        try:
-            values = tuple(float(number) for number in text.split(","))
-        except ValueError:
-            values = ()
-        if not (name.strip() and separator and values):
-            raise InputError(
-                f"--change: got {word!r}, wanted NAME=NUMBER or NAME=X,Y,Z, for example medium.sigma_t=0.1"
-            )
-        if changes.setdefault(name.strip(), values) != values:
-            raise InputError(f"--change: got two values of {name.strip()}, wanted one of them")
-    return changes
+    wanted = "NAME=NUMBER or NAME=X,Y,Z, for example medium.sigma_t=0.1"
+    return named_values("--change", words, lambda text: tuple(float(number) for number in text.split(",")), wanted)
 
 
 def change_words(changes: Mapping[str, Sequence[float]]) -> list[str]:

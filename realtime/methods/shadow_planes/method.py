@@ -34,7 +34,7 @@ from realtime.errors import InputError
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.methods.interface.view import View, rays_in_media
-from realtime.methods.shadow_planes.pixel_rays import aim_at, read_spot, seen_rays, seen_ways
+from realtime.methods.shadow_planes.pixel_rays import aim_at, read_spot, seen_rays, seen_ways, tile_azimuths
 from realtime.methods.shadow_planes.plane_table import PlaneIndex, index_planes
 from realtime.methods.shadow_planes.published_crossings import Buffer, reaches, sum_crossings
 from realtime.methods.shadow_planes.published_media import check_vertices, sum_in_media
@@ -43,12 +43,13 @@ from realtime.methods.shadow_planes.spot_pyramid import cone_ring
 from realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_intervals
 from realtime.methods.shadow_planes.tile_lists import Lists, tile_lists
 from realtime.methods.shadow_planes.view_culling import components_in_view
+from realtime.methods.shadow_planes.wedges import Wedges
 from realtime.numerics.array_types import ArrayTypes, types_of
 from realtime.parameters import Parameters, parameter
 from realtime.scene.camera import HostCamera, read_camera
 from realtime.scene.light_points import source_shape
 from realtime.scene.lights import Light, host_position
-from realtime.scene.mesh_adjacency import Casters, read_casters, with_positions
+from realtime.scene.mesh_adjacency import Casters, read_casters, with_placements
 from realtime.scene.read_scene import Scene
 from realtime.tiles.adaptive_sampling import tolerance
 from realtime.tiles.layout import Layout
@@ -138,6 +139,7 @@ class PlanePreparation:
 
     casters: Casters
     cone: int = 0  #: edges of the cone of a spot; 0: no planes for it
+    order: str = "exact"  #: in which rays go over planes
 
     def __call__(self, scene: Scene) -> tuple[PlaneIndex, ...]:
         """Return the planes of every light of a scene."""
@@ -149,14 +151,16 @@ class PlanePreparation:
         camera = read_camera(scene.camera)
         types = types_of(type(scene.camera.origin.x))
         each = [
-            plane_finder(here, camera, light, cone=self.cone, types=types, own=source_shape(scene, light))
+            plane_finder(
+                here, camera, light, cone=self.cone, order=self.order, types=types, own=source_shape(scene, light)
+            )
             for light in scene.lights
         ]
         return lambda: tuple(find() for find in each)
 
     def standing(self, scene: Scene) -> Casters:
         """Return the casters where they are in a scene."""
-        return with_positions(self.casters, scene.positions)
+        return with_placements(self.casters, scene.positions, scene.placements)
 
 
 def prepare_shadow_planes(scene: Scene, parameters: ShadowPlaneParameters) -> PlanePreparation:
@@ -167,11 +171,18 @@ def prepare_shadow_planes(scene: Scene, parameters: ShadowPlaneParameters) -> Pl
     InputError
         For casters without triangles.
     """
-    return PlanePreparation(read_casters(scene.geometry, scene.area_lights), parameters.cone)
+    return PlanePreparation(read_casters(scene.geometry, scene.area_lights), parameters.cone, parameters.order)
 
 
 def plane_finder(
-    casters: Casters, camera: HostCamera, light: Light, *, cone: int = 0, types: ArrayTypes, own: str | None = None
+    casters: Casters,
+    camera: HostCamera,
+    light: Light,
+    *,
+    cone: int = 0,
+    order: str = "exact",
+    types: ArrayTypes,
+    own: str | None = None,
 ) -> Callable[[], PlaneIndex]:
     """Return what finds the shadow planes of one light, as a camera needs them; `cone` edges bound a spot.
 
@@ -190,7 +201,10 @@ def plane_finder(
         if own is not None:
             used &= ~casters.of_shape(own)
         aim = partial(aim_at, camera, spot=seen, types=types)
-        return index_planes(casters, position, camera.origin, used=used, types=types, ring=ring, aim=aim)
+        tiles = partial(tile_azimuths, camera)
+        return index_planes(
+            casters, position, camera.origin, used=used, types=types, order=order, ring=ring, aim=aim, tiles=tiles
+        )
 
     return find
 
@@ -198,7 +212,7 @@ def plane_finder(
 def shadow_planes(
     view: View,
     state: tuple[PlaneIndex, ...],
-    lists: tuple[Lists, ...],
+    lists: tuple[Lists | Wedges, ...],
     *,
     kernel,
     parameters: ShadowPlaneParameters,
@@ -262,7 +276,8 @@ def shadow_planes(
             continue
         index = state[number]
         seen = seen_rays(index.aim, view.camera, view.pixel, index.distance, light)
-        rays = ray_planes(lists[number], seen.x, seen.y, seen.z, tile=view.tile)
+        ray_end = index.distance / view.distance
+        rays = ray_planes(lists[number], seen.x, seen.y, seen.z, tile=view.tile, ray_end=ray_end)
         airlight = ray_airlight(view, light, kernel, media, geometry=seen.geometry)
         if parameters.segments:
             differences = parameters.sum == "gamma"
@@ -289,7 +304,7 @@ def shadow_planes(
 
 
 def _drawn(
-    planes: tuple[PlaneIndex, Lists, RayPlanes],
+    planes: tuple[PlaneIndex, Lists | Wedges, RayPlanes],
     airlight: RayAirlight,
     parameters: ShadowPlaneParameters,
     *,
@@ -345,13 +360,15 @@ def _ambient_fog(view: View, ambient: float, in_media: tuple[LitRay, ...]):
 
 def cull_shadow_planes(
     view: View, state: tuple[PlaneIndex, ...], parameters: ShadowPlaneParameters
-) -> tuple[Lists, ...]:
+) -> tuple[Lists | Wedges, ...]:
     """Return by light the planes that concern each tile of the image."""
     return tuple(tile_planes(view, index, order=parameters.order) for index in state)
 
 
-def tile_planes(view: View, index: PlaneIndex, *, order: str) -> Lists:
+def tile_planes(view: View, index: PlaneIndex, *, order: str) -> Lists | Wedges:
     """Return the planes that concern each tile of the image."""
+    if index.wedges is not None:
+        return index.wedges
 
     def rays(lane):
         pixel = dr.gather(mi.UInt32, view.pixel, lane)
@@ -360,7 +377,7 @@ def tile_planes(view: View, index: PlaneIndex, *, order: str) -> Lists:
     return tile_lists(index, rays, view.distance, order=order, square=view.layout is Layout.SQUARES)
 
 
-def _segments(index: PlaneIndex, lists: Lists, rays: RayPlanes, airlight: RayAirlight, *, differences: bool):
+def _segments(index: PlaneIndex, lists: Lists | Wedges, rays: RayPlanes, airlight: RayAirlight, *, differences: bool):
     """Sum the lit segments of one light."""
     view = airlight.view
 

@@ -49,8 +49,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from realtime.methods.shadow_planes.plane_entries import FIRST, entry_words, in_bins
 from realtime.methods.shadow_planes.silhouettes import Silhouette, silhouette
 from realtime.methods.shadow_planes.spot_pyramid import NEARNESS, is_outside, ring_edges
+from realtime.methods.shadow_planes.wedges import Wedges, wedge_lists, wedges_pay
 from realtime.numerics.array_types import four_numbers, is_single
 from realtime.numerics.diamond_angle import TURN, host_diamond_angle
 from realtime.scene.lights import place_and_weight
@@ -59,12 +61,6 @@ from realtime.scene.mesh_adjacency import Casters
 Array = NDArray[np.float64]
 
 BINS = 64  #: of azimuth
-
-# An entry of a list: the number of a plane, the layers gained beyond it, and two marks.
-NUMBER = (1 << 24) - 1
-GAIN_SHIFT, GAIN_ZERO = 24, 32  #: gains from -32 to 31; a plane that gains more is there more than once
-FULL = 1 << 30  #: whatever ray of the tile: it lies in the span of the plane, and beyond the edge where it crosses it
-FIRST = 1 << 31  #: the first bin that holds the plane
 
 
 @dataclass(frozen=True)
@@ -83,6 +79,7 @@ class PlaneIndex:
     layers: Any  #: layers between the light and the camera
     aim: Any = None  #: where the pixels of the camera aim in the frame, see `realtime.methods.shadow_planes.pixel_rays`
     w: int = 1  #: last coordinate of the light's homogeneous position
+    wedges: Wedges | None = None  #: lists of the planes for all rays; None: tiles draw theirs from `entries`
 
 
 @dataclass(frozen=True)
@@ -125,7 +122,7 @@ def light_basis(light: Array, camera: Array) -> LightBasis:
 
 def shadow_planes(casters: Casters, edges: Silhouette, basis: LightBasis) -> Planes:
     """Return the shadow planes of silhouette edges in the frame of a light and a camera."""
-    return edge_planes(basis.coordinates(casters.vertices[edges.edges]), edges.coefficient, w=basis.w)
+    return edge_planes(basis.coordinates(casters.positions_of(edges.edges)), edges.coefficient, w=basis.w)
 
 
 def edge_planes(vertices: Array, coefficient: NDArray[np.int8], *, w: int = 1) -> Planes:
@@ -172,15 +169,9 @@ def binned(planes: Planes) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
         First place of every bin of two turns, and the planes bin by bin, twice: a range of azimuths that passes 0 is
         then one run of places.
     """
-    low = np.maximum((planes.first * np.float32(BINS / TURN)).astype(np.int64), 0)
-    high = np.minimum((planes.last * np.float32(BINS / TURN)).astype(np.int64), BINS - 1)
-    width = high - low + 1
-    plane = np.repeat(np.arange(len(width), dtype=np.uint32), width)
-    step = np.arange(len(plane)) - np.repeat(np.cumsum(width) - width, width)
-    bins = (step + low[plane]).astype(np.uint16)
-    place = np.argsort(bins, kind="stable")
-    gain = (planes.gain.astype(np.int64) + GAIN_ZERO).astype(np.uint32) << np.uint32(GAIN_SHIFT)
-    entries = (plane + gain[plane] + np.where(step == 0, np.uint32(FIRST), np.uint32(0)))[place]
+    plane, bins, first = in_bins(planes.first, planes.last, BINS)
+    place = np.argsort(bins.astype(np.uint16), kind="stable")
+    entries = entry_words(plane, planes.gain, FIRST * first)[place]
     start = np.concatenate([[0], np.cumsum(np.tile(np.bincount(bins, minlength=BINS), 2))])
     return start.astype(np.uint32), np.tile(entries, 2)
 
@@ -228,16 +219,13 @@ def layers_between(casters: Casters, light: Array, basis: LightBasis, *, used: N
     near = used & np.all((low <= np.maximum(far, camera)) & (high >= np.minimum(far, camera)), axis=1)
     if not near.any():
         return 0
-    # The axis runs through x = y = 0: most triangles lie aside, all three corners beyond it on one of four sides.
-    x, y = axes[:2] @ casters.vertices.T - (axes[:2] @ start)[:, None]
-    sides = (x > 0) | (x < 0).view(np.uint8) << 1 | (y > 0).view(np.uint8) << 2 | (y < 0).view(np.uint8) << 3
     number = np.flatnonzero(near[casters.component])
-    first, second, third = casters.triangles[number].T
-    number = number[sides[first] & sides[second] & sides[third] == 0]
+    number = number[_beside_axis(casters, number, start, axes)]
     if not len(number):
         return 0
     crossed = number[_crosses(casters, number, (start, direction), reach)]
-    sign = np.sign(casters.normals[crossed] @ l - w * casters.offsets[crossed])
+    normals, offsets = casters.planes_of(crossed)
+    sign = np.sign(normals @ l - w * offsets)
     component = casters.component[crossed]
     components = len(casters.closed)
     front, back = (
@@ -245,6 +233,21 @@ def layers_between(casters: Casters, light: Array, basis: LightBasis, *, used: N
         np.bincount(component[sign < 0], minlength=components),
     )
     return int(np.where(casters.closed, np.maximum(front, back), front + back).sum())
+
+
+def _beside_axis(casters: Casters, number, start: Array, axes: Array) -> NDArray[np.bool_]:
+    """Return of triangles whether they may meet the axis through `start`: most lie aside of it.
+
+    It runs through x = y = 0, and those have all three corners beyond it on one of four sides.
+    """
+    x, y = axes[:2] @ casters.vertices.T - (axes[:2] @ start)[:, None]
+    for vertices, placement in casters.placed_vertices():
+        turned = axes[:2] @ placement.rotation
+        here = axes[:2] @ (start - placement.shift)
+        x[vertices], y[vertices] = turned @ casters.vertices[vertices].T - here[:, None]
+    sides = (x > 0) | (x < 0).view(np.uint8) << 1 | (y > 0).view(np.uint8) << 2 | (y < 0).view(np.uint8) << 3
+    first, second, third = casters.triangles[number].T
+    return np.asarray(sides[first] & sides[second] & sides[third] == 0)
 
 
 def _crosses(casters: Casters, number, line: tuple[Array, Array], reach: tuple[float, float]) -> NDArray[np.bool_]:
@@ -258,14 +261,14 @@ def _crosses(casters: Casters, number, line: tuple[Array, Array], reach: tuple[f
     sides = []
     for k in range(3):
         tail, head = triangle[:, k], triangle[:, (k + 1) % 3]
-        low, high = casters.vertices[np.minimum(tail, head)] - start, casters.vertices[np.maximum(tail, head)] - start
+        low, high = (casters.positions_of(end(tail, head)) - start for end in (np.minimum, np.maximum))
         left = np.cross(low, high) @ direction >= 0
         sides.append(np.where(tail < head, left, ~left))
     inside = (sides[0] == sides[1]) & (sides[1] == sides[2])
     # The plane normal . p = offset is met at start + u direction.
-    normal = casters.normals[number]
+    normal, offset = casters.planes_of(number)
     with np.errstate(divide="ignore", invalid="ignore"):
-        u = (casters.offsets[number] - normal @ start) / (normal @ direction)
+        u = (offset - normal @ start) / (normal @ direction)
     return inside & (u > reach[0]) & (u < reach[1])
 
 
@@ -276,8 +279,10 @@ def index_planes(
     *,
     used: NDArray[np.bool_],
     types,
+    order: str = "exact",
     ring: Array | None = None,
     aim: Callable[[Array], Any] | None = None,
+    tiles: Callable[[Array], tuple[Array, Array]] | None = None,
 ) -> PlaneIndex:
     """Find the shadow planes of a light and put them into bins for a camera.
 
@@ -293,10 +298,15 @@ def index_planes(
         By component, whether its shadow can be seen.
     types
         The array types to use, see `realtime.numerics.array_types`.
+    order
+        In which rays go over planes, see `realtime.methods.shadow_planes.wedges.wedge_lists`.
     ring
         Of a spot whose cone is a caster, see `realtime.methods.shadow_planes.spot_pyramid`.
     aim
         Axes of the frame -> where the pixels of the camera aim in it.
+    tiles
+        Axes of the frame -> azimuths of some tiles of rays and how wide each is, which decide whether there are wedges;
+        without them there are none.
     """
     basis = light_basis(light, camera)
     axes = basis.axes
@@ -308,9 +318,19 @@ def index_planes(
         layers += is_outside(ring, axes[2])
     planes = _parted(planes)
     start, entries = binned(planes)
-    spans = np.stack([planes.first, planes.last, planes.gain, planes.centre], axis=1)
     Float = types.scalar
     real = np.float32 if is_single(Float) else np.float64
+    wedges = None
+    if tiles is not None and wedges_pay(planes, *tiles(axes)):
+        start_of_wedge, in_order, bounds, scale = wedge_lists(planes, order=order)
+        wedges = Wedges(
+            mi.UInt32(_padded(start_of_wedge)),
+            mi.UInt32(_padded(in_order, 3)),
+            Float(_padded(bounds.astype(real), 3)),
+            Float(float(scale)),
+            basis.w,
+        )
+    spans = np.stack([planes.first, planes.last, planes.gain, planes.centre], axis=1)
     x_axis, y_axis, z_axis = (types.vector(*(float(c) for c in axis)) for axis in axes)
     index = PlaneIndex(
         x_axis,
@@ -325,6 +345,7 @@ def index_planes(
         Float(layers),
         aim(axes) if aim else None,
         basis.w,
+        wedges,
     )
     dr.make_opaque(index)
     return index

@@ -29,6 +29,7 @@ import mitsuba as mi
 from realtime.methods.shadow_planes.plane_table import PlaneIndex
 from realtime.methods.shadow_planes.sweep import RayPlanes, read_plane
 from realtime.methods.shadow_planes.tile_lists import Lists
+from realtime.methods.shadow_planes.wedges import Wedges
 from realtime.tiles.candidate_lists import over_lists
 
 
@@ -66,7 +67,7 @@ class _Draw:
 
 def sum_crossings(
     index: PlaneIndex,
-    lists: Lists,
+    lists: Lists | Wedges,
     ray: RayPlanes,
     distance,
     gammas,
@@ -147,7 +148,7 @@ def sum_crossings(
     return keep(draw.total - dr.select(enters, entry.gamma, 0)), lit
 
 
-def reaches(index: PlaneIndex, lists: Lists, ray: RayPlanes, distance):
+def reaches(index: PlaneIndex, lists: Lists | Wedges, ray: RayPlanes, distance):
     """Return whether the light reaches the points of rays at a distance [m]."""
     return _layers_at_end(index, lists, ray, index.distance / distance) <= 0
 
@@ -163,7 +164,9 @@ def _entry_key(index: PlaneIndex, ray: RayPlanes, entry: Entry, order: str):
     return -along * dr.rsqrt(dr.fma(along, along, beside * beside))
 
 
-def _next(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, draw: _Draw, order: str, entry_key) -> _Draw:
+def _next(
+    index: PlaneIndex, lists: Lists | Wedges, ray: RayPlanes, ray_end, draw: _Draw, order: str, entry_key
+) -> _Draw:
     """Read one plane: the next of the list, or the next crossing of a list without order."""
     place, key = _sought(index, lists, ray, ray_end, draw, order)
     place = dr.select(ray.sorted, draw.place, place)
@@ -196,7 +199,7 @@ def _next(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, draw: _Draw,
     )
 
 
-def _sought(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, draw: _Draw, order: str):
+def _sought(index: PlaneIndex, lists: Lists | Wedges, ray: RayPlanes, ray_end, draw: _Draw, order: str):
     """Return the place in a list without order of the crossing that comes after the last one, and its key.
 
     That is the largest key below the last, of crossings of one key the first in the list that was not drawn: the order
@@ -218,7 +221,7 @@ def _sought(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, draw: _Dra
     return over_lists(count, look, (count + dr.zeros(mi.UInt32, width), dr.full(Float, -dr.inf, width)))
 
 
-def _layers_at_end(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end):
+def _layers_at_end(index: PlaneIndex, lists: Lists | Wedges, ray: RayPlanes, ray_end):
     """Return the layers over the visible surface."""
     Float, width = type(ray.x), dr.width(ray.x)
 

@@ -40,6 +40,7 @@ from realtime.methods.shadow_planes.published_crossings import Buffer, Entry, su
 from realtime.methods.shadow_planes.published_mesh import mesh_gamma, surface_gamma
 from realtime.methods.shadow_planes.sweep import RayPlanes
 from realtime.methods.shadow_planes.tile_lists import Lists
+from realtime.methods.shadow_planes.wedges import Wedges
 
 
 def check_vertices(view: View) -> None:
@@ -60,7 +61,7 @@ def sum_in_media(
     view: View,
     media: PlacedRay,
     index: PlaneIndex,
-    lists: Lists,
+    lists: Lists | Wedges,
     rays: RayPlanes,
     *,
     rows: int,

@@ -28,8 +28,10 @@ import mitsuba as mi
 
 from realtime.intervals.lit_intervals import LitIntervals, add_waiting, close_interval, no_intervals, sum_at_end
 from realtime.intervals.nearest_crossings import exchange, filled, insert, pop
-from realtime.methods.shadow_planes.plane_table import FULL, GAIN_SHIFT, GAIN_ZERO, NUMBER, PlaneIndex, plane_crossing
-from realtime.methods.shadow_planes.tile_lists import Lists, Source, entry_at
+from realtime.methods.shadow_planes.plane_entries import FULL, GAIN_SHIFT, GAIN_ZERO, NUMBER, Source, entry_at
+from realtime.methods.shadow_planes.plane_table import PlaneIndex, plane_crossing
+from realtime.methods.shadow_planes.tile_lists import Lists
+from realtime.methods.shadow_planes.wedges import Wedges
 from realtime.numerics.array_types import two_numbers
 from realtime.numerics.diamond_angle import diamond_angle
 
@@ -49,16 +51,16 @@ class RayPlanes:
     sorted: Any  #: whether they are in order
 
 
-def ray_planes(lists: Lists, x, y, z, *, tile) -> RayPlanes:
-    """Return camera rays, unit directions (x, y, z) in the basis of a light, with the planes of their tiles.
+def ray_planes(lists: Lists | Wedges, x, y, z, *, tile, ray_end) -> RayPlanes:
+    """Return camera rays, unit directions (x, y, z) in the basis of a light, with the planes that concern them.
 
-    `tile` is that of `View`.
+    `tile` is that of `View`, `ray_end` the quotient D/x at the end of each.
     """
-    source = dr.gather(Source, lists.source, tile)
-    return RayPlanes(x, y, z, diamond_angle(x, y), source, dr.gather(mi.Bool, lists.sorted, tile))
+    azimuth = diamond_angle(x, y)
+    return RayPlanes(x, y, z, azimuth, *lists.of_rays(tile, azimuth, (x, y, z), ray_end))
 
 
-def read_plane(index: PlaneIndex, lists: Lists, ray: RayPlanes, k, active):
+def read_plane(index: PlaneIndex, lists: Lists | Wedges, ray: RayPlanes, k, active):
     """Return the quotient D/x of a plane, whether the ray crosses it, the layers gained, and the plane's number.
 
     Parameters
@@ -75,22 +77,28 @@ def read_plane(index: PlaneIndex, lists: Lists, ray: RayPlanes, k, active):
     Float = type(ray.x)
     quotient, beyond = plane_crossing(index, number, (ray.x, ray.y, ray.z), counts)
 
-    def looked_up(number, azimuth, quotient, beyond, unsure):
+    def within(number, azimuth, unsure):
         first, last = dr.gather(two_numbers(Float), index.spans, 2 * number, unsure)
-        return (azimuth >= first) & (azimuth < last) & beyond & (quotient > 0)
+        return (azimuth >= first) & (azimuth < last)
 
+    def looked_up(number, azimuth, quotient, beyond, unsure):
+        return within(number, azimuth, unsure) & beyond & (quotient > 0)
+
+    if lists.by_wedge:
+        counts &= beyond & (quotient > 0)
     unsure = counts & ((entry & FULL) == 0)
+    asked = (number, ray.azimuth, unsure) if lists.by_wedge else (number, ray.azimuth, quotient, beyond, unsure)
     crossed = dr.if_stmt(
-        args=(number, ray.azimuth, quotient, beyond, unsure),
+        args=asked,
         cond=unsure,
-        true_fn=looked_up,
+        true_fn=within if lists.by_wedge else looked_up,
         false_fn=lambda *_: mi.Bool(True),
     )
     gain = Float(mi.Int32((entry >> GAIN_SHIFT) & 63) - GAIN_ZERO)
     return quotient, counts & crossed, gain, number
 
 
-def sum_lit_intervals(index: PlaneIndex, lists: Lists, ray: RayPlanes, segment, integral, zero):
+def sum_lit_intervals(index: PlaneIndex, lists: Lists | Wedges, ray: RayPlanes, segment, integral, zero):
     """Add up an integral over the lit intervals of every ray.
 
     Parameters
@@ -139,7 +147,7 @@ class _Sweep:
     """What stays the same during a walk."""
 
     index: PlaneIndex
-    lists: Lists
+    lists: Lists | Wedges
     ray: RayPlanes
     ray_end: Any  #: D/x at the end of the ray
     integral: Callable[[Any, Any], Any]  #: between two quotients D/x

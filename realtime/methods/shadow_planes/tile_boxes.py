@@ -15,9 +15,10 @@ from typing import Any
 
 import drjit as dr
 
-from realtime.methods.shadow_planes.plane_table import NUMBER, TURN, PlaneIndex
+from realtime.methods.shadow_planes.plane_entries import NUMBER
+from realtime.methods.shadow_planes.plane_table import PlaneIndex
 from realtime.numerics.array_types import four_numbers, two_numbers
-from realtime.numerics.diamond_angle import diamond_angle
+from realtime.numerics.diamond_angle import TURN, diamond_angle
 from realtime.tiles.candidate_lists import bounding, farthest, members
 
 _SLACK = 1e-5  # of the terms of a sum: float32 rounding, with room to spare

@@ -13,31 +13,15 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.shadow_planes.plane_table import BINS, FIRST, FULL, NUMBER, TURN, PlaneIndex
+from realtime.methods.shadow_planes.plane_entries import FIRST, FULL, NUMBER, ROOM, Source, entry_at
+from realtime.methods.shadow_planes.plane_table import BINS, PlaneIndex
 from realtime.methods.shadow_planes.tile_boxes import Box, block_boxes, tile_boxes, touches
 from realtime.numerics.array_types import four_numbers
+from realtime.numerics.diamond_angle import TURN
 from realtime.tiles.candidate_lists import over_lists
 from realtime.tiles.layout import TILE
 
-ROOM = 32  #: entries for each tile and, fourfold, for each block, on average
 LEAST = 1 << 18  #: entries for all tiles, and for all blocks: tiles of small images see more
-
-
-@dataclass
-class Source:
-    """Where to read entries: a run of places."""
-
-    first: Any
-    count: Any
-    all_before: Any  #: places below this one count even where the entry is not the first of its plane
-
-
-def entry_at(entries, source: Source, k, active):
-    """Return the k-th of the `entries` of a source and whether it counts there."""
-    place = source.first + k
-    active = active & (k < source.count)
-    entry = dr.gather(mi.UInt32, entries, place, active)
-    return entry, active & (((entry & FIRST) != 0) | (place < source.all_before))
 
 
 def tile_lists(index: PlaneIndex, rays, distance, *, order: str, square: bool) -> "Lists":
@@ -87,11 +71,19 @@ def bin_source(index: PlaneIndex, box: Box) -> Source:
 
 @dataclass
 class Lists:
-    """The planes that concern each box."""
+    """The planes that concern each box.
+
+    An entry is marked `FULL` where every ray of the box crosses the plane.
+    """
 
     entries: Any  #: what the sources read
     source: Source
     sorted: Any  #: whether a box has a list of its own, in the order that was asked for
+    by_wedge = False  #: see `realtime.methods.shadow_planes.wedges.Wedges`
+
+    def of_rays(self, tile, azimuth, way, ray_end) -> tuple[Source, Any]:
+        """Return which entries the rays of tiles have to look at, and whether they are in order."""
+        return dr.gather(Source, self.source, tile), dr.gather(mi.Bool, self.sorted, tile)
 
 
 def listed(

@@ -13,7 +13,7 @@ from realtime.scene.animate import (
     turned_light,
     turned_objects,
 )
-from realtime.scene.mesh_adjacency import read_casters, with_positions
+from realtime.scene.mesh_adjacency import read_casters, with_placements, with_positions
 from tests.helpers.scenes import spot, tiny_scene
 from validation.scenes.parts import rotation
 
@@ -87,6 +87,55 @@ def test_turned_objects_are_where_rays_meet_them_and_where_casters_are(pens):
     for turned, reread in ((here.vertices, again.vertices), (here.boxes[:, 0], again.boxes[:, 0])):
         np.testing.assert_array_equal(np.unique(turned, axis=0), np.unique(reread, axis=0))
     np.testing.assert_allclose(np.sort(here.offsets), np.sort(again.offsets), rtol=0, atol=1e-15)
+
+
+def silhouette_in(casters, light):
+    """The ends of the silhouette edges with what they gain, as numbers to compare: one row each, in their order."""
+    from realtime.methods.shadow_planes.silhouettes import silhouette
+
+    seen = silhouette(casters, light)
+    return np.concatenate([casters.positions_of(seen.edges).reshape(-1, 6), seen.coefficient[:, None]], axis=1)
+
+
+@pytest.mark.parametrize("w", [1, 0])
+def test_shapes_that_turn_as_a_whole_keep_their_planes(pens, w):
+    """Their triangles stay as they are: silhouettes and layers are those of vertices moved one by one."""
+    from realtime.methods.shadow_planes.plane_table import layers_between, light_basis
+
+    casters = read_casters(pens.geometry)
+    moved = turned_objects(pens, read_objects(pens, ["pens"]), rotation((0.3, -0.2, 1), 37.0))
+    whole = with_placements(casters, moved.positions, moved.placements)
+    one_by_one = with_positions(casters, moved.positions)
+    assert whole.normals is casters.normals
+    assert len(whole.placed) == 1
+    middle = one_by_one.vertices.mean(axis=0)
+    for light in ((1.3, -0.7, 2.9), tuple(middle + 0.01), (-3.1, 0.4, 0.8)):
+        position = np.array([*light, w])
+        np.testing.assert_array_equal(silhouette_in(whole, position), silhouette_in(one_by_one, position))
+        for camera in (middle, middle + np.array([2.1, 0.3, 0.2]), np.array([-4.1, 2.7, 1.9])):
+            basis = light_basis(position, camera)
+            used = np.ones(len(casters.closed), dtype=bool)
+            counted = (layers_between(here, position, basis, used=used) for here in (whole, one_by_one))
+            assert len(set(counted)) == 1
+    assert np.all(whole.boxes[:, 0] <= one_by_one.boxes[:, 0])
+    assert np.all(whole.boxes[:, 1] >= one_by_one.boxes[:, 1])
+
+
+def test_shapes_that_moved_otherwise_are_moved_one_by_one(pens):
+    """Without a placement, or with one that starts from other vertices than were read."""
+    casters = read_casters(pens.geometry)
+    moved = turned_objects(pens, read_objects(pens, ["pens", "flag"]), rotation((0, 0, 1), 37.0))
+    other = replace(moved.placements["pens"], start=moved.placements["pens"].start + 0.01)
+    for placements in ({}, {"pens": other}):
+        here = with_placements(casters, moved.positions, placements)
+        there = with_positions(casters, moved.positions)
+        assert not here.placed
+        for name in ("vertices", "normals", "offsets", "boxes"):
+            np.testing.assert_array_equal(getattr(here, name), getattr(there, name))
+    mixed = with_placements(casters, moved.positions, {"flag": moved.placements["flag"]})
+    light = np.array([1.3, -0.7, 2.9])
+    assert len(mixed.placed) == 1
+    np.testing.assert_array_equal(silhouette_in(mixed, light), silhouette_in(there, light))
 
 
 def test_a_whole_turn_ends_where_it_began(pens):

@@ -156,3 +156,22 @@ def test_order_of_triangles_and_rays_does_not_matter(variant):
         shapes=Shapes(triangles),
     )
     assert lit_lengths(other, ends) == pytest.approx(lit_lengths(plain, ends)[turned], abs=1e-13)
+
+
+def test_pairs_of_rays_and_triangles_are_those_of_asking_each():
+    from reference.visibility.triangles import SLACK, Reaches, near_pairs
+
+    generator = np.random.default_rng(8)
+    for _ in range(20):
+        width = generator.random(90) * generator.choice([1e-9, 0.02, 3.0])
+        begin = generator.uniform(-np.pi, np.pi, 90)
+        # Some rays lie where a triangle begins, or ends, or on each other.
+        ends = np.mod(begin + width + np.pi, 2 * np.pi) - np.pi
+        azimuth = np.sort(np.concatenate([generator.choice(begin, 9), generator.choice(ends, 9), begin[:2], begin[:2]]))
+        cones = Reaches(begin, width, generator.random(90), generator.random(90))
+        reach = generator.random(len(azimuth)) + 0.3, generator.random(len(azimuth)) + 0.3
+        beyond = np.mod(azimuth[0] - begin + SLACK, 2 * np.pi) + (azimuth - azimuth[0])[:, None]
+        beyond -= 2 * np.pi * (beyond >= 2 * np.pi)
+        near = (beyond <= width + 2 * SLACK) & (cones.camera < reach[0][:, None]) & (cones.before < reach[1][:, None])
+        row, triangle = near_pairs(azimuth, reach, cones)
+        assert list(zip(row, triangle, strict=True)) == list(zip(*np.nonzero(near), strict=True))

@@ -294,8 +294,8 @@ def test_times_on_a_gpu_stand_beside_its_name():
 
 def test_the_headings_of_tables_name_the_gpu(monkeypatch, capsys):
     from reports.api.tables import BenchTable
-    from reports.commands.printing import print_heading
     from reports.machine import environment as module
+    from reports.machine.printing import print_heading
 
     machine = {"processor": "P", "threads": 2, "variant": "cuda_ad_rgb", "device": "A GPU"}
     monkeypatch.setattr(module, "describe_environment", lambda: machine)

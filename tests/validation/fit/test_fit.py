@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
+from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_truth
 from reference.storage.exr import Image, write_exr
+from tests.helpers.aside import write_scenes
 from validation.estimates.quadrature import truth_image
 from validation.fit.confounding import confounded_groups
 from validation.fit.fit import fit_file, fit_image, said_pixel
@@ -80,6 +82,21 @@ def test_a_fog_with_three_extinctions_has_a_list_of_three(variant, tmp_path):
     assert numbers["albedo"]["value"] == pytest.approx(0.83, rel=1e-4)
     by_channel = fitted(image, scene, ["sigma_t.g"], layer="airlight").to_json()["parameters"]
     assert list(by_channel) == ["sigma_t.g"]
+
+
+@pytest.mark.slow
+def test_channels_that_begin_decades_apart_find_their_extinctions(variant, tmp_path):
+    """From these starts themselves a search ends where the residual is five times the noise."""
+    (scene,) = (str(path) for path in write_scenes(tmp_path) if path.stem == "two-lamps")
+    loaded = load_scene(scene, (80, 60))
+    truth = read_truth(loaded.scene)
+    sigma_t = truth.medium.sigma_t * np.array([1.3, 1.1, 0.8])
+    airlight = quadrature_image(replace(truth, medium=replace(truth.medium, sigma_t=sigma_t)), samples=16).airlight
+    noisy = airlight * (1 + 0.01 * np.random.default_rng(2).standard_normal(airlight.shape))
+    starts = {"sigma_t.r": 2.0, "sigma_t.g": 0.01, "sigma_t.b": 1.0, "phase.g": -0.7}
+    names = ["sigma_t", "phase.g", "intensity"]
+    fit = fit_image(Image({"airlight": noisy}), loaded, names, pixel="centre", starts=starts)
+    assert [each.value for each in fit.parameters] == pytest.approx([*sigma_t, 0.37, 1.0, 1.0], rel=5e-3)
 
 
 def test_each_of_several_lights_has_a_factor(variant, tmp_path):

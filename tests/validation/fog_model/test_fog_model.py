@@ -10,8 +10,10 @@ import pytest
 
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_truth
+from reference.visibility.line_crossings import crossings
 from validation.fog_model.build import scattering_paths
 from validation.fog_model.fog import scene_fog
+from validation.fog_model.lengths import lengths
 from validation.fog_model.nodes import panel_nodes
 from validation.fog_model.radiance import as_array, fog_airlight, fog_surface, fog_total, on_device
 from validation.scenes.loading import load_scene
@@ -141,3 +143,27 @@ def test_an_image_has_only_the_pixels_that_are_asked_for(variant):
     part = scattering_paths(truth, pixels=some)
     assert list(part.pixels) == [31, 77, 200]
     assert as_array(fog_total(on_device(part), fog)) == pytest.approx(whole[part.pixels], rel=1e-12)
+
+
+def test_lengths_of_lines_that_share_a_place_or_a_way_are_those_of_any(variant):
+    truth = read_truth(load_scene("three-media", SIZE).scene)
+    generator = np.random.default_rng(5)
+    direction = generator.normal(size=(300, 3))
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    origin, far, nothing = generator.uniform(-6, 6, (300, 3)), generator.uniform(0, 20, 300), np.zeros(300)
+    for places, ways in ((origin[0], direction), (origin, direction[0])):
+        measured = lengths(truth, places, ways, nothing, far)
+        for number, medium in enumerate(truth.media, 1):
+            all_places, all_ways = (np.broadcast_to(each, (300, 3)) for each in (places, ways))
+            enter, leave = crossings(medium.bounds, all_places, all_ways)
+            wanted = np.maximum(np.minimum(leave, far) - np.maximum(enter, 0), 0)
+            assert wanted.any()
+            np.testing.assert_allclose(measured[:, number], wanted, atol=1e-12)
+
+
+def test_few_points_on_a_sphere_send_what_the_sphere_sends(variant):
+    """Far from a point light a sphere of its intensity looks like it; sixteen points as they are would be 3 % off."""
+    truth = read_truth(load_scene("open-fog", SIZE).scene)
+    fog = scene_fog(truth)
+    point, sphere = (as_array(fog_airlight(on_device(scattering_paths(truth, radius=r)), fog)) for r in (0.0, 0.01))
+    assert np.median(relative(sphere, point)) < 2e-3

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What derivatives cost: every kernel has a row, those that refuse a phase function say why."""
 
+import pytest
+
 from reports.tables.drawing import text
 from reports.tables.kernels import gradient_table
 from validation.kernels.gradient_cost import gradient_costs
@@ -19,3 +21,11 @@ def test_costs_of_a_kernel_and_a_refusal(variant):
     printed = text(gradient_table(plain(costs)))
     assert "refused" in printed
     assert "by sigma_t over value" in printed
+
+
+@pytest.mark.parametrize("name", ["table", "table-tail"])
+def test_a_table_has_no_derivative_and_says_so(variant, name):
+    """Its values are piecewise bilinear: the derivatives that Dr.Jit would return are those of the pieces."""
+    (table,) = gradient_costs([name], [("isotropic", 0.0)], rays=512, seconds=0.01)
+    assert "no derivative" in table.refused
+    assert "use the kernel 'exact'" in table.refused

@@ -151,5 +151,5 @@ def test_a_medium_without_a_description_of_its_own_keeps_its_phase_function():
 
 
 def test_two_values_of_one_name_are_refused():
-    with pytest.raises(InputError, match=r"two values of medium\.g"):
+    with pytest.raises(InputError, match=r"medium\.g=0\.1 and medium\.g=0\.2, wanted one of them"):
         parse_changes(["medium.g=0.1", "medium.g=0.2"])

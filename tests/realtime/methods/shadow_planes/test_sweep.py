@@ -126,8 +126,7 @@ def test_more_planes_at_one_place_than_a_ray_collects_at_once(variant, in_order)
     """Beside every plane ten that add a layer there and ten that take it away again: the same segments."""
     import mitsuba as mi
 
-    from realtime.methods.shadow_planes.plane_table import GAIN_SHIFT, GAIN_ZERO
-    from realtime.methods.shadow_planes.tile_lists import Source
+    from realtime.methods.shadow_planes.plane_entries import GAIN_SHIFT, GAIN_ZERO, Source
 
     index = index_of(casters_of("torus", "open cylinder"))
     ways = bundles(320, spread=0.01)

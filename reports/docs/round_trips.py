@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The table of faults that were planted in Blender's Cycles, and what the diagnosis said, in docs/diagnosis.md.
+
+`python -m reports.docs.round_trips --python PYTHON --images FOLDER` describes scenes, lets an interpreter with `bpy`
+render them with faults by docs/examples/cycles_faults.py, diagnoses what is in the folder, writes the answers into
+`docs/data/cycles-faults.json` and draws the table anew. Images that are there are not rendered again. Without arguments
+it only draws the table.
+"""
+
+import argparse
+import json
+import subprocess
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[2]
+RECORD = "docs/data/cycles-faults.json"
+_PAGE = "docs/diagnosis.md"
+_BEGIN, _END = "<!-- cycles: begin -->\n", "<!-- cycles: end -->"
+_EXAMPLE = "docs/examples/cycles_faults.py"
+#: Scenes that are rendered, and how to load them.
+SCENES = {"sphere-spot": "sphere-spot", "open-fog": "open-fog", "lobe-fog": "docs/examples/lobe-fog.xml"}
+_SIZE = (160, 120)
+
+
+def answers(
+    name: str, folder: Path, *, python: str | None, samples: int, root: Path = ROOT
+) -> Iterator[dict[str, Any]]:
+    """Render what is missing of a scene, diagnose all of it, and yield a row for each image.
+
+    Parameters
+    ----------
+    name
+        Of `SCENES`.
+    folder
+        Of its images; `faults.json` beside it says what was planted, if `python` is None.
+    python
+        An interpreter that has `bpy`; None: only images that are there are diagnosed.
+    samples
+        Paths per pixel of what is rendered.
+    root
+        The checkout.
+    """
+    from validation.diagnosis.diagnose import diagnose_file
+
+    scene = str(root / SCENES[name]) if SCENES[name].endswith(".xml") else SCENES[name]
+    if python is None:
+        faults = json.loads((folder.parent / "faults.json").read_text(encoding="utf-8"))
+    else:
+        faults = _listed(python, root)
+        render_faults(python, scene, folder, samples=samples, size=_SIZE, root=root)
+    for fault, said in faults.items():
+        path = folder / f"{fault}.exr"
+        if not path.exists():
+            continue  # a scene that cannot have it
+        diagnosis = diagnose_file(path, scene, pixel="area")
+        first = diagnosis.ranked[0]
+        off, left = _percent(diagnosis.residual), _percent(diagnosis.left)
+        print(f"{name}, {fault}: {diagnosis.first}, {off} off, {left} left", flush=True)
+        yield {
+            "scene": name,
+            "fault": fault,
+            **said,
+            "first": diagnosis.first,
+            "right": diagnosis.first == said["planted"],
+            "says": first.words,
+            "together": list(first.together),
+            "residual": diagnosis.residual,
+            "left": diagnosis.left,
+        }
+
+
+def render_faults(
+    python: str,
+    scene: str,
+    folder: Path,
+    *,
+    samples: int,
+    size: tuple[int, int],
+    faults: Sequence[str] | None = None,
+    root: Path = ROOT,
+) -> None:
+    """Render a scene with faults by Cycles, each into FOLDER/FAULT.exr, from its description alone.
+
+    Parameters
+    ----------
+    python
+        An interpreter that has `bpy`.
+    scene
+        A built-in scene or a Mitsuba XML file.
+    folder
+        Where the images go; those that are there are kept.
+    samples, size
+        Paths per pixel; width and height [pixels].
+    faults
+        Which of `cycles_faults.py --list`; all by default.
+    root
+        The checkout.
+    """
+    from reports.interchange.gltf import write_gltf
+    from reports.interchange.scene import describe_scene
+    from validation.scenes.loading import load_scene
+
+    folder.mkdir(parents=True, exist_ok=True)
+    loaded = load_scene(scene, size)
+    described, gltf = folder / "described.json", folder / "meshes.glb"
+    described.write_text(json.dumps(describe_scene(loaded)), encoding="utf-8")
+    write_gltf(gltf, loaded)
+    wanted = [fault for fault in faults or _listed(python, root) if not (folder / f"{fault}.exr").exists()]
+    if wanted:
+        options = ["--samples", str(samples), "--faults", *wanted]
+        command = [python, str(root / _EXAMPLE), str(described), str(gltf), str(folder), *options]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+
+
+def _listed(python: str, root: Path) -> dict[str, Any]:
+    command = [python, str(root / _EXAMPLE), "--list"]
+    listed: dict[str, Any] = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    return listed
+
+
+def page(text: str, record: Mapping[str, Any]) -> str:
+    """Return the page with its generated part made anew."""
+    before, rest = text.split(_BEGIN)
+    return f"{before}{_BEGIN}{_drawn(record)}{_END}{rest.split(_END)[1]}"
+
+
+def _drawn(record: Mapping[str, Any]) -> str:
+    rows = record["rows"]
+    faults = [row for row in rows if row["planted"] != "right"]
+    right = [row for row in rows if row["planted"] == "right"]
+    named = sum(row["right"] for row in faults)
+    lines = [
+        f"{named} of {len(faults)} faults are named first; {sum(row['right'] for row in right)} of {len(right)} right "
+        f"images are called right ({record['measured']}, Blender {record['blender']}, 160 x 120 pixels).",
+        "",
+        "| scene | what was set wrong | should be named | first | what it says | off | left |",
+        "| --- | --- | --- | --- | --- | ---: | ---: |",
+    ]
+    for row in rows:
+        first = f"`{row['first']}`" if row["right"] else f"**`{row['first']}`**"
+        says = row["says"] + (f" (with {' and '.join(row['together'])})" if row["together"] else "")
+        cells = [row["scene"], row["words"], f"`{row['planted']}`", first, says, _percent(row["residual"])]
+        lines.append(f"| {' | '.join([*cells, _percent(row['left'])])} |")
+    return "\n".join([*lines, ""])
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %"
+
+
+def current_page(root: Path = ROOT) -> str:
+    """Return what docs/diagnosis.md should hold."""
+    record = json.loads((root / RECORD).read_text(encoding="utf-8"))
+    return page((root / _PAGE).read_text(encoding="utf-8"), record)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Read the command line, measure if asked, and draw the table."""
+    from reference.storage.files import write_text
+
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--images", type=Path, help="folder of images, one folder for each scene")
+    parser.add_argument("--python", help="an interpreter that has `bpy`; without it only what is there is diagnosed")
+    parser.add_argument("--samples", type=int, default=192, help="paths per pixel")
+    parser.add_argument("--scenes", nargs="*", choices=SCENES, default=list(SCENES), help="others keep their rows")
+    chosen = parser.parse_args(arguments)
+    if chosen.images is not None:
+        from datetime import UTC, datetime
+
+        from reports.machine.environment import activate
+
+        activate()
+        for name in chosen.scenes:
+            for row in answers(name, chosen.images / name, python=chosen.python, samples=chosen.samples):
+                kept = (
+                    json.loads((ROOT / RECORD).read_text(encoding="utf-8"))["rows"] if (ROOT / RECORD).exists() else []
+                )
+                rows = [each for each in kept if (each["scene"], each["fault"]) != (name, row["fault"])] + [row]
+                rows.sort(key=lambda each: list(SCENES).index(each["scene"]))
+                record = {"measured": f"{datetime.now(UTC):%Y-%m-%d}", "blender": "5.0.1", "rows": rows}
+                write_text(ROOT / RECORD, json.dumps(record, indent=1, ensure_ascii=False) + "\n")
+    write_text(ROOT / _PAGE, current_page())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A scene as properties of `bpy`, Blender's module: all that Cycles needs besides the meshes.
+
+Every number that a script would have to know is here, so that it knows nothing: it creates what is listed and assigns
+the properties by their names, see docs/examples/render_cycles.py. Blender 5.0.1 was tried.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+#: Of the scene: one scattering or reflection, no limit on values, means over pixels, linear values.
+_SCENE: dict[str, Any] = {
+    "render.engine": "CYCLES",
+    "unit_settings.scale_length": 1.0,
+    "cycles.max_bounces": 0,  # counted after the first scattering or reflection
+    "cycles.diffuse_bounces": 0,
+    "cycles.volume_bounces": 0,
+    "cycles.transparent_max_bounces": 1024,  # the bounds of media are crossed as transparent surfaces
+    "cycles.sample_clamp_direct": 0.0,
+    "cycles.sample_clamp_indirect": 0.0,
+    "cycles.light_sampling_threshold": 0.0,
+    "cycles.use_adaptive_sampling": False,
+    "cycles.use_denoising": False,
+    "cycles.film_exposure": 1.0,
+    "cycles.pixel_filter_type": "BOX",
+    "render.film_transparent": False,
+    "render.use_motion_blur": False,
+    "render.use_border": False,
+    "render.resolution_percentage": 100,
+    "render.pixel_aspect_x": 1.0,
+    "render.pixel_aspect_y": 1.0,
+    "display_settings.display_device": "sRGB",
+    "view_settings.view_transform": "Raw",
+    "view_settings.look": "None",
+    "view_settings.exposure": 0.0,
+    "view_settings.gamma": 1.0,
+}
+#: Of a file that holds what was rendered.
+_FILE = {"file_format": "OPEN_EXR", "color_mode": "RGB", "color_depth": "32", "exr_codec": "ZIP"}
+_LAYERED_FILE = {"media_type": "MULTI_LAYER_IMAGE", "color_depth": "32", "exr_codec": "ZIP"}
+_PHASES = {"isotropic": "HENYEY_GREENSTEIN", "hg": "HENYEY_GREENSTEIN", "rayleigh": "RAYLEIGH"}
+_KINDS = {"point": "POINT", "spot": "SPOT", "directional": "SUN"}
+
+
+def cycles_properties(described: dict[str, Any]) -> dict[str, Any]:
+    """Return what to create in Blender and which properties to assign.
+
+    Parameters
+    ----------
+    described
+        What `reports.interchange.scene.describe_scene` found.
+
+    Returns
+    -------
+    dict
+        `scene`, `image_settings` and `layered_image_settings`: properties by name. `camera` and each of `lights`:
+        `data` (properties) and `matrix_world` (4 x 4, rows); lights also `type`. `world` and each of `media`, by mesh:
+        `phase` and `inputs` of a node "Volume Coefficients", None where there is no medium. `materials`, by mesh:
+        `inputs` of a node "Diffuse BSDF" and whether it is `two_sided`, black from behind otherwise. `objects`:
+        properties of every mesh. What Cycles does not have is a dictionary with `cannot`, the reason in words.
+    """
+    camera = described["camera"]
+    width, height = camera["size"]
+    medium = described["medium"]
+    return {
+        "scene": _SCENE | {"render.resolution_x": width, "render.resolution_y": height},
+        "image_settings": _FILE,
+        "layered_image_settings": _LAYERED_FILE,
+        "camera": {
+            "data": {
+                "type": "PERSP",
+                "sensor_fit": "HORIZONTAL",
+                "angle": math.radians(camera["fov_horizontal"]),
+                "shift_x": 0.0,
+                "shift_y": 0.0,
+                "clip_start": 1e-6,  # Blender's own, 0.1 m, takes away the medium before it
+                "clip_end": 1e6,
+                "dof.use_dof": False,
+            },
+            # Blender's cameras look along -z, with y up in the image.
+            "matrix_world": _matrix(camera["right"], camera["up"], _negative(camera["forward"]), camera["position"]),
+        },
+        "lights": [_light(light) for light in described["lights"]],
+        "world": None if medium is None else _volume(medium),
+        "media": {bounded["name"]: _volume(bounded) for bounded in described["bounded_media"]},
+        "materials": {surface["name"]: _material(surface) for surface in described["surfaces"]},
+        "objects": {"cycles.shadow_terminator_offset": 0.0, "cycles.shadow_terminator_geometry_offset": 0.0},
+    }
+
+
+def _light(light: dict[str, Any]) -> dict[str, Any]:
+    """Return a light; its power is that of a lamp that shines as on its axis in all directions."""
+    if light["kind"] == "area":
+        return {"cannot": "lights with extent were not tried in Cycles"}
+    if light["kind"] == "spot" and light["beam_angle"] < light["cutoff_angle"]:
+        return {"cannot": "the edge of Blender's spots is another function of the angle"}
+    directional = light["kind"] == "directional"
+    values = light["irradiance" if directional else "intensity"]
+    brightest = max(values)
+    data: dict[str, Any] = {
+        "color": [value / brightest if brightest > 0 else 1.0 for value in values],
+        "exposure": 0.0,
+        "energy": brightest if directional else 4 * math.pi * brightest,
+        "normalize": True,
+    }
+    if directional:
+        data["angle"] = 0.0
+    else:
+        data |= {"shadow_soft_size": 0.0, "use_soft_falloff": False}
+    if light["kind"] == "spot":
+        data |= {"spot_size": 2 * math.radians(light["cutoff_angle"]), "spot_blend": 0.0}  # the whole angle
+    backward = _negative(light.get("axis", (0.0, 0.0, -1.0)))
+    side = np.cross(backward, np.eye(3)[int(np.argmin(np.abs(backward)))])
+    side /= np.linalg.norm(side)
+    place = light.get("position", (0.0, 0.0, 0.0))
+    matrix = _matrix(side.tolist(), np.cross(backward, side).tolist(), backward, place)
+    return {"type": _KINDS[light["kind"]], "data": data, "matrix_world": matrix}
+
+
+def _volume(medium: dict[str, Any]) -> dict[str, Any]:
+    """Return a homogeneous medium by sigma_s and sigma_a [1/m], which no colour picker touches."""
+    phase = medium["phase"]
+    if phase["name"] not in _PHASES:
+        return {"cannot": f"Cycles has no {phase['name']} phase function"}
+    inputs = {"Scatter Coefficients": medium["sigma_s"], "Absorption Coefficients": medium["sigma_a"]}
+    if phase["name"] != "rayleigh":
+        inputs["Anisotropy"] = phase.get("g", 0.0)  # g > 0 scatters forward
+    return {"phase": _PHASES[phase["name"]], "inputs": inputs}
+
+
+def _material(surface: dict[str, Any]) -> dict[str, Any]:
+    if surface["textured"] or not surface["diffuse"]:
+        return {"cannot": "a surface with one colour that is diffuse is wanted"}
+    return {"inputs": {"Color": [*surface["reflectance"], 1.0], "Roughness": 0.0}, "two_sided": surface["two_sided"]}
+
+
+def _negative(vector: Any) -> list[float]:
+    return [-float(value) + 0.0 for value in vector]
+
+
+def _matrix(x: Any, y: Any, z: Any, place: Any) -> list[list[float]]:
+    """Return the rows of the matrix whose columns are three axes and a place."""
+    return [[float(x[i]), float(y[i]), float(z[i]), float(place[i])] for i in range(3)] + [[0.0, 0.0, 0.0, 1.0]]
