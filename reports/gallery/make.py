@@ -9,7 +9,7 @@ import hashlib
 import io
 import json
 import shutil
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -178,7 +178,7 @@ def _tutorial_scene() -> str:
     return page.partition("```xml\n")[2].partition("```")[0]
 
 
-def _loaded(scene: str, size: tuple[int, int], changes: Iterable[str]) -> LoadedScene:
+def _loaded(scene: str, size: tuple[int, int], changes: Sequence[str]) -> LoadedScene:
     if scene != TUTORIAL:
         return load_scene(scene, size, parse_changes(changes))
     with temporary_folder() as folder:
