@@ -3,8 +3,12 @@ r"""Clouds by collectors: light scattered many times, without a walk through the
 
 Where a camera ray meets a cloud, or at the camera if that is within one, light leaves towards the eye. Single
 scattering is integrated along the ray. The light of each set of orders from 2 on is the canonical transport from the
-collector that `realtime.clouds.collectors` finds for it. Each sun has its own maps and searches; a uniform sky is one
-more sun, which shines from above (`Light.sky`). What is behind is seen through the transmittance of the ray.
+collector that `realtime.clouds.collectors` finds for it. Each sun has its own maps and searches. A uniform sky has no
+direction and needs no search (`realtime.clouds.uniform_sky`); `sky=beams` makes it one more sun, which shines from
+above (`Light.sky`), as the paper does. What is behind is seen through the transmittance of the ray.
+
+Other clouds dim the light of all orders on its way to a cloud, and opaque shapes hide it: for order 1 along the ray,
+for the others at the collector, over whose width the shade of other clouds is a mean.
 
 The peak of a phase function below five degrees is cut from the orders from 2 on, as light in the peak hardly leaves its
 way: with f the share of the peak and a the albedo, the density is (1 - a f) sigma_t and the albedo a (1 - f)/(1 - a f);
@@ -37,7 +41,7 @@ from realtime.clouds.canonical.scene_phase import share_of_peak, slab_phase
 from realtime.clouds.canonical.sets import SETS
 from realtime.clouds.canonical.tables import canonical_tables
 from realtime.clouds.collectors.orders import OrdersLight, light_of_orders
-from realtime.clouds.collectors.search import Search
+from realtime.clouds.collectors.search import Collector, Search
 from realtime.clouds.collectors.transport_grid import transport_grid
 from realtime.clouds.hypertexture.light_depths import (
     LightDepths,
@@ -54,11 +58,13 @@ from realtime.clouds.light_maps.pyramid import (
     length_along_light,
     light_map,
     maps_memory,
+    shade,
 )
 from realtime.clouds.order_layers import OPACITY, order_layer
 from realtime.clouds.single_scattering.behind import light_on_surfaces, sky_behind
 from realtime.clouds.single_scattering.march import Beam, CloudRays, cloud_rays
 from realtime.clouds.single_scattering.opacity import opacity_of
+from realtime.clouds.uniform_sky.light import SkyEscapes, beams_of, sky_escapes, sky_light
 from realtime.memory import check_memory
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.method import ErrorCause
@@ -99,6 +105,21 @@ class CollectorParameters(Parameters):
     thickness: str = parameter(
         "slab", "slabs as thick as they are across, or along the light, as printed", choices=("slab", "light")
     )
+    normals: str = parameter(
+        "slopes",
+        "a filtered surface has the mean slope of the lit side, or the mean of its unit normals, as printed",
+        choices=("slopes", "printed"),
+    )
+    cover: str = parameter(
+        "share",
+        "light enters through the share of a collector that is cloud, or through all of it, as printed",
+        choices=("share", "printed"),
+    )
+    way: str = parameter(
+        "ray",
+        "light comes from as far behind a point as the ray is in cloud, or the slab reaches, as printed",
+        choices=("ray", "printed"),
+    )
     kappa: str = parameter(
         "mie",
         "the extinction of the scene, or 24.5 % more, which is what eq. 4 has for droplets",
@@ -117,6 +138,11 @@ class CollectorParameters(Parameters):
     )
     legs: str = parameter(
         "map", "the way of the sun's light to a point by the light map, or by cast rays", choices=("map", "exact")
+    )
+    sky: str = parameter(
+        "uniform",
+        "the light of a sky, the same from everywhere, or a beam from above of pi times its radiance, as printed",
+        choices=("uniform", "beams"),
     )
     steps: int = parameter(16, "steps of single scattering along a ray", least=1, most=4096)
     threshold: float = parameter(
@@ -145,13 +171,14 @@ class CloudState:
     """What frames need of clouds and suns."""
 
     surfaces: CloudSurfaces
-    maps: tuple[LightMap, ...]  #: by sun
+    maps: tuple[LightMap | None, ...]  #: by light, None for a sky that is no beam
     fillings: tuple[Filling, ...]
     left: tuple[Any, ...]  #: by channel, what is left of the extinction of each cloud without the peak [1]
     stride: Any  #: longest step through a grid of densities [voxels]
     threshold: Any  #: density at the surface of a cloud with a grid [1]
     depths: tuple[tuple[LightDepths, ...], ...] = ()  #: by sun and cloud, where clouds have densities
     body: Any = None  #: by cloud the mean density above the threshold [1]; None where none has densities
+    escapes: SkyEscapes | None = None  #: where there is a sky that is no beam
 
 
 @dataclass(frozen=True)
@@ -176,19 +203,29 @@ def prepare_collectors(scene: Scene, parameters: CollectorParameters) -> Callabl
     InputError
         If the maps need more memory than the machine has.
     """
-    suns, clouds = len(scene.lights), len(scene.boundaries)
-    Float, density = type(scene.camera.origin.x), scene.medium.clouds and scene.medium.clouds.density
+    filled, clouds = scene.medium.clouds, len(scene.boundaries)
+    assert filled is not None
+    suns = beams_of(scene.lights, parameters.sky, filled)
+    Float, density = type(scene.camera.origin.x), filled.density
     of_each = maps_memory(Float, parameters.map) + (depths_memory(Float) if density else 0)
-    needed = suns * clouds * of_each
-    check_memory(f"map: {parameters.map} texels for {suns} sun(s) and {clouds} cloud(s)", needed, "use a smaller map")
+    needed = len(suns) * clouds * of_each
+    check_memory(
+        f"map: {parameters.map} texels for {len(suns)} sun(s) and {clouds} cloud(s)", needed, "use a smaller map"
+    )
     fillings, left = _fillings(scene, parameters)
     surfaces = cloud_surfaces(scene)
     bodies = [boundary_scene((shape,)) for shape in scene.boundaries]
     stride, threshold = (dr.opaque(Float, value) for value in (parameters.stride, parameters.threshold))
-    cast = Frozen(lambda bodies, lights: tuple(light_map(bodies, light, parameters.map) for light in lights))
+    slopes = parameters.normals == "slopes"
+    cast = Frozen(
+        lambda bodies, lights: tuple(light_map(bodies, light, parameters.map, slopes=slopes) for light in lights)
+    )
+    escapes = sky_escapes(scene) if len(suns) < len(scene.lights) else None
 
     def state(scene: Scene) -> CloudState:
-        return CloudState(surfaces, cast(bodies, scene.lights), fillings, left, stride, threshold)
+        made = dict(zip(suns, cast(bodies, [scene.lights[number] for number in suns])))
+        maps = tuple(made.get(number) for number in range(len(scene.lights)))
+        return CloudState(surfaces, maps, fillings, left, stride, threshold, escapes=escapes)
 
     def marched(scene: Scene) -> CloudState:
         filled = scene.medium.clouds
@@ -205,6 +242,7 @@ def prepare_collectors(scene: Scene, parameters: CollectorParameters) -> Callabl
                     for cloud in range(clouds)
                 ],
                 light,
+                slopes=slopes,
             )
             for light in scene.lights
         )
@@ -269,12 +307,16 @@ def cloud_collectors(view: View, state: CloudState, lists, *, kernel, parameters
     rays, thin_rays = _rays(view, state, parameters)
     by_set, kept = [_scattered_once(view, state, thin_rays, parameters), *(Color(0) for _ in SETS)], []
     entry = _entry(view, state, rays)
-    for number, (light, sun) in enumerate(zip(view.lights, state.maps)):
+    suns = _suns(view, parameters)
+    for number, sun in enumerate(suns):
         last = view.carried[number] if view.carried is not None else None
-        own = sun.of_cloud(entry.cloud)
-        found = _many_times(view, state, thin_rays.clouds, entry, own, last=last, parameters=parameters)
-        by_set[1:] = [sum_ + light.intensity * part for sum_, part in zip(by_set[1:], found.by_set)]
-        kept.append(found.collectors)
+        orders = _many_times(view, state, thin_rays, entry, sun, last=last, parameters=parameters)
+        by_set[1:] = [sum_ + view.lights[sun].intensity * part for sum_, part in zip(by_set[1:], orders.by_set)]
+        kept.append(orders.collectors)
+    for number, light in enumerate(view.lights):
+        if state.escapes is not None and number not in suns:
+            of_sky = sky_light(state.escapes, light, rays, view.visible if view.features.shadows else None)
+            by_set = [sum_ + part for sum_, part in zip(by_set, of_sky)]
     opacity = _opacity(view, state, rays, parameters)
     layers = _with_opacity(view, state, rays, sum(by_set), opacity)
     names = (order_layer(first) for first in (1, *(int(first) for first, _ in SETS)))
@@ -302,15 +344,20 @@ def missed_collectors(view: View, state: CloudState, lists, *, kernel, parameter
     rays, thin_rays = _rays(view, state, parameters)
     entry = _entry(view, state, rays)
     missed, kept = [Float(0) for _ in SETS], []
-    for number, sun in enumerate(state.maps):
+    for number, sun in enumerate(_suns(view, parameters)):
         last = view.carried[number] if view.carried is not None else None
-        own = sun.of_cloud(entry.cloud)
-        found = _many_times(view, state, thin_rays.clouds, entry, own, last=last, parameters=parameters)
-        missed = [dr.maximum(*pair) for pair in zip(missed, found.missed, strict=True)]
-        kept.append(found.collectors)
+        orders = _many_times(view, state, thin_rays, entry, sun, last=last, parameters=parameters)
+        missed = [dr.maximum(*pair) for pair in zip(missed, orders.missed, strict=True)]
+        kept.append(orders.collectors)
     extra = {order_layer(int(first)): Color(value) for (first, _), value in zip(SETS, missed, strict=True)}
     there = Color(dr.select(entry.there, Float(1), 0))
     return Layers(there, None, None, None, extra, tuple(kept) if carries(parameters) else None)
+
+
+def _suns(view: View, parameters: CollectorParameters) -> list[int]:
+    """Return the numbers of the lights that shine from one direction."""
+    assert view.medium.clouds is not None
+    return beams_of(view.lights, parameters.sky, view.medium.clouds)
 
 
 def _rays(view: View, state: CloudState, parameters: CollectorParameters) -> tuple[CloudRays, CloudRays]:
@@ -350,11 +397,11 @@ def _entry(view: View, state: CloudState, rays: CloudRays) -> _Entry:
 
 def _scattered_once(view: View, state: CloudState, thin_rays: CloudRays, parameters: CollectorParameters) -> Any:
     """Return order 1, a colour [W/(m^2 sr)]."""
-    beams = [_beam(view, state, thin_rays.clouds, number, parameters) for number in range(len(view.lights))]
+    beams = [_beam(view, state, thin_rays.clouds, number, parameters) for number in _suns(view, parameters)]
     once = light_once(
         thin_rays, beams, steps=parameters.steps, stride=state.stride, printed=parameters.single == "printed"
     )
-    return sum(radiance for (radiance,) in once)
+    return sum((radiance for (radiance,) in once), type(view.medium.albedo)(0))
 
 
 def _opacity(view: View, state: CloudState, rays: CloudRays, parameters: CollectorParameters) -> Any:
@@ -398,6 +445,7 @@ def _beam(view: View, state: CloudState, clouds: Clouds, number: int, parameters
     """Return a sun as points in clouds see it that scatter once."""
     light, sun = view.lights[number], state.maps[number]
     Float = type(view.distance)
+    assert sun is not None
 
     def by_map(point, active):
         depths = [Float(0) for _ in clouds.sigma_t]
@@ -417,41 +465,77 @@ def _beam(view: View, state: CloudState, clouds: Clouds, number: int, parameters
 
 
 def _many_times(
-    view: View, state: CloudState, clouds: Clouds, entry: _Entry, sun: LightMap, *, last: Any, parameters: Any
+    view: View, state: CloudState, rays: CloudRays, entry: _Entry, sun: int, *, last: Any, parameters: Any
 ) -> OrdersLight:
-    """Return the light of a sun that was scattered twice and more.
+    """Return the light of the sun of a number that was scattered twice and more, for unit irradiance [1/sr].
 
     Its sets are colours; `missed` is the largest over channels and fillings; `collectors` are by channel and filling
     what the next frame takes as `last`. Of an interpolated frame, those of the corners of tiles go on for all their
     pixels.
     """
     Float, Color = type(view.distance), type(view.medium.albedo)
-    search = Search(parameters.iterations, parameters.settled, parameters.thickness == "light")
+    search = Search(
+        parameters.iterations,
+        parameters.settled,
+        parameters.thickness == "light",
+        covered=parameters.cover == "share",
+        as_ray=parameters.way == "ray",
+    )
+    of_sun = state.maps[sun]
+    assert of_sun is not None
     sums, missed = [], [Float(0) for _ in SETS]
     kept: list[Any] = []
-    for channel, own in enumerate(clouds.sigma_t):
-        sigma_t = dr.gather(Float, own, entry.cloud, entry.there)
+    for channel, own in enumerate(rays.clouds.sigma_t):
         if state.body is not None:
-            sigma_t *= dr.gather(Float, state.body, entry.cloud, entry.there)
+            own = own * state.body
+        sigma_t = dr.gather(Float, own, entry.cloud, entry.there)
         of_fillings, of_channel = [], []
         for number, filling in enumerate(state.fillings):
             filled = entry.there & (dr.gather(mi.UInt32, filling.clouds[channel], entry.cloud, entry.there) != 0)
             light = light_of_orders(
-                sun,
+                of_sun.of_cloud(entry.cloud),
                 filling.transport,
                 sets=len(SETS),
                 point=entry.point,
                 toward=-view.direction,
                 extinction=dr.select(filled, sigma_t, 1),
+                behind=rays.depths[channel],
                 search=search,
                 last=None if last is None else last[channel][number],
                 place=view.tile if view.layout is Layout.SOME else None,
                 active=filled,
             )
-            of_fillings.append(light.by_set)
+            lit = [_reaching(view, of_sun, own, entry, sun, collector) for collector in light.collectors]
+            of_fillings.append(tuple(radiance * share for radiance, share in zip(light.by_set, lit)))
             of_channel.append(light.collectors)
             missed = [dr.maximum(*pair) for pair in zip(missed, light.missed, strict=True)]
         kept.append(tuple(of_channel))
         sums.append([sum(parts) for parts in zip(*of_fillings)])
     by_set = tuple(Color(*parts) for parts in zip(*(sums * (3 // len(sums)))))
     return OrdersLight(by_set, tuple(missed), tuple(kept))
+
+
+def _reaching(view: View, of_sun: LightMap, sigma_t: Any, entry: _Entry, sun: int, collector: Collector) -> Any:
+    """Return the share of a sun's light that other clouds and opaque shapes leave to a collector [1].
+
+    `sigma_t` is the extinction of each cloud, one channel [1/m].
+    """
+    Float, clouds = type(view.distance), dr.width(sigma_t)
+    centre, share = entry.point + collector.centre, Float(1)
+
+    def behind(number, share):
+        cover, length = shade(of_sun.of_cloud(number), centre, collector.width)
+        dimmed = 1 - cover * (1 - dr.exp(-dr.gather(Float, sigma_t, number) * length))
+        return number + 1, dr.select(number == entry.cloud, share, share * dimmed)
+
+    if clouds > 1:
+        lanes = dr.width(centre)
+        _, share = dr.while_loop(
+            state=(dr.zeros(mi.UInt32, lanes), dr.full(Float, 1, lanes)),
+            cond=lambda number, share: number < clouds,
+            body=behind,
+            labels=("number", "share"),
+        )
+    if view.features.shadows:
+        share = dr.select(view.visible(centre, view.lights[sun]), share, 0)
+    return share

@@ -25,10 +25,11 @@ from realtime.clouds.bounds.crossings import sum_over_stretches
 from realtime.clouds.bounds.surfaces import CloudSurfaces, cloud_surfaces
 from realtime.clouds.hypertexture.light_depths import LightDepths, leg_by_depths, leg_through, light_depths
 from realtime.clouds.hypertexture.scattered import light_once, opacity_as_printed, with_densities
-from realtime.clouds.order_layers import OPACITY, order_layer
+from realtime.clouds.order_layers import OPACITY, ORDER_LAYERS, order_layer
 from realtime.clouds.single_scattering.behind import light_on_surfaces, sky_behind
 from realtime.clouds.single_scattering.march import Beam, cloud_rays, exact_leg
 from realtime.clouds.single_scattering.opacity import opacity_of
+from realtime.clouds.uniform_sky.light import SkyEscapes, beams_of, sky_escapes, sky_light
 from realtime.errors import InputError
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.view import View
@@ -75,6 +76,11 @@ class CloudOctavesParameters(Parameters):
     stride: float = parameter(
         1.0, "longest step through a grid of densities where a ray enters", above=0, most=100, unit="voxels"
     )
+    sky: str = parameter(
+        "uniform",
+        "the light of a sky, the same from everywhere, or octaves of a beam from above of pi times its radiance",
+        choices=("uniform", "beams"),
+    )
     single: str = parameter("corrected", "equation 1 of Bouthors 2008", choices=("corrected", "printed"))
     opacity: str = parameter("corrected", "equation 2 of Bouthors 2008", choices=("corrected", "printed"))
 
@@ -91,6 +97,7 @@ class OctaveState:
     reach: Any  #: how far samples on a leg go [m]
     stride: Any  #: longest step through a grid of densities [voxels]
     depths: tuple[tuple[LightDepths, ...], ...] = ()  #: by light and cloud, where clouds have densities
+    escapes: SkyEscapes | None = None  #: where there is a sky that is no beam
 
 
 def prepare_cloud_octaves(scene: Scene, parameters: CloudOctavesParameters) -> Callable[[Scene], OctaveState]:
@@ -103,6 +110,7 @@ def prepare_cloud_octaves(scene: Scene, parameters: CloudOctavesParameters) -> C
     for shape in scene.boundaries:
         box.expand(shape.bbox())
     size = float(np.linalg.norm(np.array(box.max) - np.array(box.min)))
+    uniform = len(beams_of(scene.lights, parameters.sky, clouds)) < len(scene.lights)
     state = OctaveState(
         cloud_surfaces(scene),
         extinction=dr.opaque(Float, parameters.extinction),
@@ -111,6 +119,7 @@ def prepare_cloud_octaves(scene: Scene, parameters: CloudOctavesParameters) -> C
         means=Float(means),
         reach=dr.opaque(Float, parameters.light_reach or size),
         stride=dr.opaque(Float, parameters.stride),
+        escapes=sky_escapes(scene) if uniform else None,
     )
     dr.make_opaque(state.means)
     if clouds.density is None or parameters.light_steps:
@@ -154,7 +163,8 @@ def cloud_octaves(view: View, state: OctaveState, lists, *, kernel, parameters: 
     assert clouds is not None
     Color = type(clouds.albedo)
     rays = with_densities(cloud_rays(surfaces, clouds, view.origin, view.direction, view.distance), state.stride)
-    beams = [_beam(view, state, number, parameters) for number in range(len(view.lights))]
+    suns = beams_of(view.lights, parameters.sky, clouds)
+    beams = [_beam(view, state, number, parameters) for number in suns]
     by_light = light_once(
         rays, beams, steps=parameters.steps, stride=state.stride, printed=parameters.single == "printed"
     )
@@ -163,18 +173,22 @@ def cloud_octaves(view: View, state: OctaveState, lists, *, kernel, parameters: 
     for radiance in by_octave:
         amounts.append(amount * radiance)
         amount = amount * state.contribution
+    parts = [(order_layer(octave + 1), radiance) for octave, radiance in enumerate(amounts)]
+    for number, light in enumerate(view.lights):
+        if state.escapes is not None and number not in suns:
+            of_sky = sky_light(state.escapes, light, rays, view.visible if view.features.shadows else None)
+            parts += zip(ORDER_LAYERS, of_sky)
     if parameters.opacity == "printed":
         opacity = opacity_as_printed(surfaces, clouds, view.origin, view.direction, view.distance, stride=state.stride)
     else:
         opacity = opacity_of(rays.depths, Color)
     extra: dict[str, Any] = {}
     if view.extra_layers:
-        for octave, radiance in enumerate(amounts):
-            name = order_layer(octave + 1)
+        for name, radiance in parts:
             extra[name] = extra[name] + radiance if name in extra else radiance
         extra[OPACITY] = opacity
     return Layers(
-        sum(amounts),
+        sum((radiance for _, radiance in parts), Color(0)),
         tuple(
             light_on_surfaces(rays, leg_through(surfaces, clouds, light, stride=state.stride)) for light in view.lights
         ),

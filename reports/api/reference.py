@@ -12,12 +12,13 @@ if TYPE_CHECKING:
     from validation.estimates.budget import Budget
 
 USUAL_SAMPLES = 2048  #: samples a pixel of a sampling estimator without a budget
+USUAL_CLOUD_SAMPLES = 256  #: of one that traces clouds
 
 
 @one_error
 def reference(
     scene: SceneLike,
-    estimator: Literal["quadrature", "single-scatter", "volpath"] = "quadrature",
+    estimator: Literal["quadrature", "single-scatter", "volpath", "cloud-paths"] = "quadrature",
     *,
     size: Size | None = None,
     pixel: Literal["centre", "area"] = "centre",
@@ -26,6 +27,7 @@ def reference(
     seconds: float | None = None,
     target: Literal["pooled", "worst"] = "pooled",
     seed: int = 0,
+    orders: str | None = None,
     progress: Progress = None,
 ) -> "Reference":
     """Compute the truth of a scene, with its error; what was computed before comes from the cache.
@@ -36,18 +38,21 @@ def reference(
         See `load_scene`.
     estimator
         'quadrature', with a bound of the error in every pixel; or by random samples, with standard errors,
-        'single-scatter' and 'volpath'.
+        'single-scatter' and 'volpath'; of clouds, whose light is scattered many times, 'cloud-paths'.
     size
         Width and height [pixels], or 'WxH'; the scene's own by default.
     pixel
         Of the quadrature: the radiance at a pixel's 'centre', or the mean over its 'area'.
     samples, error, seconds
-        When an estimator that samples stops: at so many samples a pixel (2048 where none of the three is given), at a
-        relative standard error, or after a time [s].
+        When an estimator that samples stops: at so many samples a pixel (2048 where none of the three is given, 256
+        of clouds), at a relative standard error, or after a time [s].
     target
         Whether `error` is that of the image, 'pooled', or of its 'worst' pixel.
     seed
         Of the first batch of samples; the others count up.
+    orders
+        Of clouds, by 'cloud-paths' and 'volpath': layers by order of scattering, such as '1,2,3-4,5-inf'; 'sets', which
+        'cloud-paths' has by itself, are those of `airlight reference`, 'all' is none.
     progress
         Called with (share done, what); True shows a bar.
 
@@ -66,23 +71,27 @@ def reference(
     >>> traced.standard_error.shape
     (24, 32, 3)
     """
-    known = ("quadrature", "single-scatter", "volpath")
+    known = ("quadrature", "single-scatter", "volpath", "cloud-paths")
     if estimator not in known:
         raise InputError(f"estimator: got {estimator!r}, wanted one of {', '.join(known)}" + nearest(estimator, known))
+    if orders is not None and estimator not in ("volpath", "cloud-paths"):
+        raise InputError(f"orders: {estimator} knows single scattering alone; take 'cloud-paths' or 'volpath'")
     given = {"samples": samples, "error": error, "seconds": seconds}
     if estimator == "quadrature":
         named = [name for name, value in given.items() if value is not None]
         if named:
-            raise InputError(f"{named[0]}: is for 'single-scatter' and 'volpath'; leave it out, or take one of these")
+            others = "'single-scatter', 'volpath' and 'cloud-paths'"
+            raise InputError(f"{named[0]}: is for {others}; leave it out, or take one of these")
         with telling(progress, "quadrature") as callback:
             return _quadrature(opened(scene, size), pixel, callback)
     if pixel != "centre":
         raise InputError(
             f"pixel: got {pixel!r}, but {estimator} traces pixel centres; leave it out or take 'quadrature'"
         )
-    budget = _budget(given, target)
+    wanted = orders or ("sets" if estimator == "cloud-paths" else None)
+    budget = _budget(given, target, usual=USUAL_SAMPLES if wanted is None else USUAL_CLOUD_SAMPLES)
     with telling(progress, estimator) as callback:
-        return _sampled(opened(scene, size), estimator, budget, seed=seed, callback=callback)
+        return _sampled(opened(scene, size), estimator, budget, seed=seed, orders=wanted, callback=callback)
 
 
 def _quadrature(loaded: OpenScene, pixel: str, callback: Callable[[float, str], None]) -> "Reference":
@@ -106,12 +115,19 @@ def _quadrature(loaded: OpenScene, pixel: str, callback: Callable[[float, str], 
 
 
 def _sampled(
-    loaded: OpenScene, estimator: str, budget: "Budget", *, seed: int, callback: Callable[[float, str], None]
+    loaded: OpenScene,
+    estimator: str,
+    budget: "Budget",
+    *,
+    seed: int,
+    orders: str | None,
+    callback: Callable[[float, str], None],
 ) -> "Reference":
     from reports.api.results import Reference, sealed
-    from validation.estimates.images import monte_carlo_reference
+    from validation.estimates.images import cloud_orders, monte_carlo_reference
 
-    estimate = monte_carlo_reference(loaded, estimator, budget=budget, seed=seed, progress=callback)
+    chosen = cloud_orders(orders) if orders else None
+    estimate = monte_carlo_reference(loaded, estimator, budget=budget, seed=seed, orders=chosen, progress=callback)
     attributes = {name.removeprefix("airlight:"): value for name, value in estimate.image.attributes.items()}
     details: dict[str, Any] = {name: attributes[name] for name in ("spp", "batches", "seeds")}
     details |= {"cached": estimate.cached, "masked": estimate.masked, "reached": estimate.reached}
@@ -124,7 +140,7 @@ def _sampled(
     )
 
 
-def _budget(given: dict[str, Any], target: Any) -> "Budget":
+def _budget(given: dict[str, Any], target: Any, *, usual: int) -> "Budget":
     from validation.estimates.budget import Budget
 
     named = [name for name, value in given.items() if value is not None]
@@ -136,5 +152,6 @@ def _budget(given: dict[str, Any], target: Any) -> "Budget":
             raise InputError(f"{name}: got {given[name]!r}, wanted {words} above 0")
     if target not in ("pooled", "worst"):
         raise InputError(f"target: got {target!r}, wanted 'pooled' or 'worst'")
-    usual = given["samples"] if named else USUAL_SAMPLES
-    return Budget(samples=usual, error=given["error"], seconds=given["seconds"], target=target)
+    return Budget(
+        samples=given["samples"] if named else usual, error=given["error"], seconds=given["seconds"], target=target
+    )

@@ -77,8 +77,19 @@ class LayeredImage(Pictured):
 
     @cached_property
     def total(self) -> Array:
-        """All light, airlight and surface [W/(m^2 sr)], (height, width, 3)."""
-        return read_only(self.airlight + self.surface)
+        """All light, airlight, surface and the sky behind [W/(m^2 sr)], (height, width, 3)."""
+        background = self.image.layers.get("background")
+        return read_only(self.airlight + self.surface + (0.0 if background is None else background))
+
+    def layer(self, name: str) -> Array:
+        """Return a layer by its name, such as 'airlight_3_4' or 'opacity', (height, width, 3).
+
+        Raises
+        ------
+        InputError
+            For a layer that the image has not.
+        """
+        return image_layer(self.image, name)
 
     @property
     def depth(self) -> Array:
@@ -203,7 +214,7 @@ class Rendering(LayeredImage):
 class Reference(LayeredImage):
     """The truth of a scene, with its error."""
 
-    estimator: str  #: 'quadrature', 'single-scatter' or 'volpath'
+    estimator: str  #: 'quadrature', 'single-scatter', 'volpath' or 'cloud-paths'
     relative_error: float  #: of the airlight: the mean bound over the mean, or the relative standard error of the image
     details: Mapping[str, Any] = field(
         default_factory=dict

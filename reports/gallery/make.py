@@ -9,7 +9,7 @@ import hashlib
 import io
 import json
 import shutil
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,15 @@ from realtime.scene.read_scene import read_scene
 from reference.storage.files import ensure_folder, temporary_folder, write_bytes, write_text
 from reports.data.reader import read_report
 from reports.docs.build import source_folder
-from reports.gallery.recipes import SIZE, SMALL, STRIP, TUTORIAL, Picture, pictures, scene_picture
+from reports.gallery.recipes import (
+    SIZE,
+    SMALL,
+    STRIP,
+    TUTORIAL,
+    Picture,
+    pictures,
+    scene_picture,
+)
 from reports.gallery.sketches import sketch
 from reports.machine.environment import MissingError, versions
 from reports.plotting.pictures import error_map, preview, tone_curve
@@ -31,6 +39,7 @@ from validation.configurations.methods import configuration, parse_settings, pre
 from validation.estimates.quadrature import truth_image
 from validation.frames.baseline_files import read_baseline
 from validation.metrics.errors import error_metrics
+from validation.scenes.changes import parse_changes
 from validation.scenes.loading import LoadedScene, load_scene
 from validation.scenes.registry import SCENES
 
@@ -169,9 +178,9 @@ def _tutorial_scene() -> str:
     return page.partition("```xml\n")[2].partition("```")[0]
 
 
-def _loaded(scene: str, size: tuple[int, int]) -> LoadedScene:
+def _loaded(scene: str, size: tuple[int, int], changes: Sequence[str]) -> LoadedScene:
     if scene != TUTORIAL:
-        return load_scene(scene, size)
+        return load_scene(scene, size, parse_changes(changes))
     with temporary_folder() as folder:
         path = folder / TUTORIAL
         path.write_text(_tutorial_scene(), encoding="utf-8")
@@ -179,7 +188,7 @@ def _loaded(scene: str, size: tuple[int, int]) -> LoadedScene:
 
 
 def _frame(picture: Picture, size: tuple[int, int]):
-    loaded = _loaded(picture.scene, size)
+    loaded = _loaded(picture.scene, size, picture.changes)
     chosen = configuration(picture.method, None, parse_settings(picture.settings))
     return loaded, render_samples(prepared(read_scene(loaded.scene), chosen), picture.samples)
 

@@ -24,6 +24,20 @@ _METHOD_SCENES = {
 }
 #: Methods without a map of their errors: the truth of clouds takes hours without noise.
 _NO_ERROR = ("cloud-octaves", "cloud-collectors")
+#: Clouds in other lights and from elsewhere, by `cloud-collectors`: the scene, and what is changed in it.
+_VIEWS = {
+    "cloud-noon": ("cumulus", ("light.direction=0.13,0.17,-0.98",)),
+    "cloud-dusk": ("cumulus", ("light.direction=0.93,0.34,-0.13", "light.irradiance=3.3,1.7,0.67")),
+    "cloud-silver-lining": ("cumulus", ("light.direction=0.11,-0.95,-0.29",)),
+    "cloud-glory": (
+        "stratocumulus",
+        ("camera.origin=917,-791,2411", "camera.target=-194,-281,1090", "camera.fov=17"),
+    ),
+    "cloud-fogbow": (
+        "stratocumulus",
+        ("camera.origin=517,-491,1911", "camera.target=-594,19,590", "camera.fov=97"),
+    ),
+}
 TUTORIAL = "gate.xml"  #: the scene of docs/tutorial.md, in which it stands
 STRIP = ("hall", "clutter", "three-media", "windows")  #: at the top of the README
 
@@ -33,11 +47,13 @@ class Picture:
     """A picture of the gallery."""
 
     name: str
-    kind: str  #: "scene", "method" (what it renders), "error", "sketch", "strip" or "page" (of a report)
+    #: "scene", "method" (what it renders), "error", "sketch", "strip" or "page" (of a report)
+    kind: str
     scene: str  #: that it shows; the first of a strip
     method: str = ""
     settings: tuple[str, ...] = ()
     samples: int = 1  #: rays a pixel
+    changes: tuple[str, ...] = ()  #: of the scene, as `--change` takes them
 
     @property
     def file(self) -> str:
@@ -51,6 +67,7 @@ class Picture:
             return f"airlight gallery {self.name}"
         width, height = SIZE if self.kind == "scene" else SMALL
         words = [f"airlight render {self.scene} --method {self.method}", *(f"--set {word}" for word in self.settings)]
+        words += [f"--change {word}" for word in self.changes]
         words += [f"--size {width}x{height}", f"--samples {self.samples}" if self.samples > 1 else ""]
         return " ".join([*filter(None, words), f"--preview {self.scene.removesuffix('.xml')}.png"])
 
@@ -84,6 +101,8 @@ def pictures() -> Iterator[Picture]:
         yield from (rendered,) if method in _NO_ERROR else (rendered, error)
         if method in SKETCHES:
             yield sketch
+    for name, (scene, changes) in _VIEWS.items():
+        yield Picture(name, "method", scene, "cloud-collectors", changes=changes)
     yield Picture("strip", "strip", STRIP[0])
     yield Picture("report-page", "page", "")
     yield Picture("tutorial-gate", "scene", TUTORIAL, "shadow-planes", (), SAMPLES)

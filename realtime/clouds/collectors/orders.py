@@ -32,6 +32,7 @@ def light_of_orders(
     point,
     toward,
     extinction,
+    behind,
     search: Search,
     last: tuple[Collector, ...] | None = None,
     place: Any = None,
@@ -41,7 +42,7 @@ def light_of_orders(
 
     Parameters
     ----------
-    light_map, transport, point, toward, extinction, search, active
+    light_map, transport, point, toward, extinction, behind, search, active
         See `realtime.clouds.collectors.search.collector_light`.
     sets
         How many sets there are, numbers from 0 on.
@@ -61,6 +62,7 @@ def light_of_orders(
             point=point,
             toward=toward,
             extinction=extinction,
+            behind=behind,
             start=start,
             search=search,
             active=active,

@@ -19,6 +19,13 @@ to p: where both are large it is no contraction, and steps overshoot.
   last one is negative). The mean of the map and the identity with the weight w has the slope 1 - w (1 - s), which is
   within (-1, 1) for every s from 1 - 2/w on: -3 for w = 1/2, -7 for 1/4.
 * *Start*. c = p, and sigma so large that the whole lit surface is one plane; or the collector of the last frame.
+* *Cover*. Light enters where there is cloud. Of the collector's width the share A of the filtered map is cloud, so the
+  light of the slab, whose face has no end, counts A times; the paper counts it whole.
+* *Way*. The ray behind p has the depth T in clouds, and the slab L along the same direction: d/|mu| upwards,
+  (t - d)/mu downwards. Light that was scattered into the ray on the way T, not L, is what the eye gets: it counts
+  (1 - exp(-T))/(1 - exp(-L)) times, as if its source were even. Where the ray leaves the slab through the lit face
+  (mu < 0), p lies |mu| T deep at least, as there is cloud so far. The paper takes L: then silhouettes of thin parts are
+  too bright, and slopes that face away from the sun are black.
 * *End*. After `iterations` steps; or in those rays that take no more than a share `settled` of sigma as their step. The
   light is that of the last slab: F gives it with the place and the width.
 
@@ -26,18 +33,20 @@ The distance |F - c'| / sigma of the last step says how far the search is from i
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.collectors.tangent_slab import tangent_slab
+from realtime.clouds.collectors.tangent_slab import TangentSlab, tangent_slab
 from realtime.clouds.light_maps.pyramid import LightMap, filtered_surface
 
 #: ``transport(set_number, t, d, mu, cos_phi, sin_phi, mu_l)`` -> T [1/sr], c_x, c_y, sigma [mean free paths].
 Transport = Callable[..., tuple[Any, Any, Any, Any]]
 
+_SKIN = 0.01  #: of a slab, which is left on the way out of it [mean free paths]
+_LEVEL = 1e-4  #: cosine of a direction that never leaves
 _NARROWEST = 1e-3  #: width of a collector [mean free paths]: where no light comes there is none
 
 
@@ -66,6 +75,10 @@ class Search:
     iterations: int = 10
     settled: float = 0.0  #: step at which a ray has found its collector [`Collector.width`]; 0: none has
     along_light: bool = False  #: whether slabs are as thick as the cloud is along the light, as printed
+    covered: bool = True  #: whether light enters only where there is cloud; as printed: everywhere
+    as_ray: bool = (
+        True  #: whether light comes from as far behind the point as the ray is in cloud; as printed: the slab
+    )
 
 
 def cold_start(light_map: LightMap, point) -> Collector:
@@ -81,6 +94,7 @@ def collector_light(
     point,
     toward,
     extinction,
+    behind: Any,
     start: Collector,
     search: Search,
     active: Any = True,
@@ -101,6 +115,8 @@ def collector_light(
         Unit directions in which light leaves them.
     extinction
         Of the cloud [1/m].
+    behind
+        Optical depth of the clouds on the ray behind each point.
     start
         With which the search starts.
     search
@@ -121,9 +137,15 @@ def collector_light(
             extinction=extinction,
             along_light=search.along_light,
         )
+        if search.as_ray:
+            slab = _reaching_behind(slab, behind)
         found, c_x, c_y, spread = transport(
             set_number, slab.thickness, slab.depth, slab.mu, slab.cos_phi, slab.sin_phi, slab.mu_l
         )
+        if search.as_ray:
+            found *= (1 - dr.exp(-behind)) / (1 - dr.exp(-_way(slab)))
+        if search.covered:
+            found *= dr.minimum(surface.cover, 1)
         path = dr.rcp(extinction)
         wanted = slab.foot + slab.along * (c_x * path) + slab.beside * (c_y * path)
         new_width = dr.maximum(spread, _NARROWEST) * path
@@ -155,3 +177,17 @@ def collector_light(
         labels=("index", "going", "centre", "width", "last", "weight", "radiance", "missed"),
     )
     return CollectorLight(Collector(centre, width), radiance, missed, steps)
+
+
+def _reaching_behind(slab: TangentSlab, behind: Any) -> TangentSlab:
+    """Return a slab with the point so deep that there is something of it behind."""
+    skin = dr.minimum(_SKIN, 0.5 * slab.thickness)
+    deep = dr.maximum(slab.depth, dr.maximum(skin, -slab.mu * behind))
+    depth = dr.select(slab.mu < 0, dr.minimum(deep, slab.thickness), dr.minimum(slab.depth, slab.thickness - skin))
+    return replace(slab, depth=depth)
+
+
+def _way(slab: TangentSlab) -> Any:
+    """Return the optical length of the slab behind the point."""
+    across = dr.select(slab.mu < 0, slab.depth, slab.thickness - slab.depth)
+    return dr.maximum(across / dr.maximum(dr.abs(slab.mu), _LEVEL), 1e-4)

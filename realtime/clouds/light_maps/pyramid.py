@@ -11,6 +11,12 @@ for nothing (Bouthors 2008, section 7; Dachsbacher and Stamminger 2003). The mea
 says *where* the mean of the heights is. Over the middle of a cloud it is the place that was asked for; at a silhouette
 it lies on the side of the cloud, and a tangent plane through the mean height must go through it there.
 
+*Normals*. The plane that touches a filtered surface has its mean slope. So n is 1 long along the light, (slope, 1), as
+means of these are. Slopes are differences of the heights of neighbouring texels, whose sum over many texels is the
+difference of their ends: what a bump hides counts as the step that it is. A mean of unit normals, as printed, has too
+much of what faces the light, where a map sees most, and nothing of what is hidden. On clouds with bumps it leans
+towards the light, and slabs across it are too thick.
+
 *Width*. A mean over a square of width w has the variance w^2/12 along each axis, and what is linear between such means
 adds the w^2/6 of a tent: w^2/4 together. So the level of a filter of standard deviation sigma is
 
@@ -76,7 +82,7 @@ class FilteredSurface:
     normal: Any  #: of unit length, towards the light
 
 
-def light_map(clouds: Sequence[Any], light: Light, size: int) -> LightMap:
+def light_map(clouds: Sequence[Any], light: Light, size: int, *, slopes: bool = True) -> LightMap:
     """Return the map of clouds under one directional light.
 
     Parameters
@@ -85,14 +91,18 @@ def light_map(clouds: Sequence[Any], light: Light, size: int) -> LightMap:
         By cloud a Mitsuba scene of its boundary alone.
     light, size
         See `cast_surfaces`, which says what is refused, too.
+    slopes
+        Whether normals are those of mean slopes, or means of unit normals, as printed.
     """
-    return filtered_map([cast_surfaces(cloud, light, size) for cloud in clouds], light)
+    return filtered_map([cast_surfaces(cloud, light, size) for cloud in clouds], light, slopes=slopes)
 
 
-def filtered_map(surfaces: Sequence[LitSurfaces], light: Light) -> LightMap:
-    """Return all levels of a map from the finest of each cloud."""
+def filtered_map(surfaces: Sequence[LitSurfaces], light: Light, *, slopes: bool = True) -> LightMap:
+    """Return all levels of a map from the finest of each cloud; `slopes` as of `light_map`."""
     Float = type(light.position.x)
     size, projection = surfaces[0].size, light_projection(light)
+    if slopes:
+        surfaces = [replace(cloud, normal=slope_normals(cloud, projection)) for cloud in surfaces]
     texels = _texels_before(size, size.bit_length())
     heights, normals = (dr.empty(Float, 4 * texels * len(surfaces)) for _ in range(2))
     for number, cloud in enumerate(surfaces):
@@ -102,6 +112,36 @@ def filtered_map(surfaces: Sequence[LitSurfaces], light: Light) -> LightMap:
     texel = (2.0 / size) * dr.sqrt(dr.norm(across) * dr.norm(up))
     dr.eval(heights, normals, texel)
     return LightMap(size, heights, normals, texel, light.position, projection)
+
+
+def slope_normals(surfaces: LitSurfaces, projection: Projection) -> Any:
+    """Return normals that are 1 long along the light, from differences of heights; 0 where there is no cloud."""
+    assert projection.basis is not None
+    size, Float = surfaces.size, type(surfaces.front)
+    across, up, axis = projection.basis
+    row, column = surfaces.place // size, surfaces.place % size
+    # Neighbours are found row by row.
+    fronts, there = dr.empty(Float, size * size), dr.empty(type(surfaces.there), size * size)
+    dr.scatter(fronts, surfaces.front, surfaces.place)
+    dr.scatter(there, surfaces.there, surfaces.place)
+    dr.eval(fronts, there)
+
+    def slope(place, stride: int, width):
+        def side(inside, neighbour):
+            inside &= dr.gather(type(there), there, neighbour, inside)
+            return inside, dr.gather(Float, fronts, neighbour, inside)
+
+        above, high = side(place + 1 < size, surfaces.place + stride)
+        below, low = side(place > 0, surfaces.place - stride)
+        high, low = dr.select(above, high, surfaces.front), dr.select(below, low, surfaces.front)
+        count = dr.select(above, Float(1), 0) + dr.select(below, Float(1), 0)
+        return dr.select(count > 0, (high - low) / dr.maximum(count * width, 1e-30), 0)
+
+    normal = -axis
+    for direction, place, stride in ((across, column, 1), (up, row, size)):
+        width = dr.norm(direction)
+        normal = normal - direction / width * slope(place, stride, 2 / size * width)
+    return dr.select(surfaces.there, normal, 0)
 
 
 def _add_levels(tables: tuple[Any, Any], surfaces: LitSurfaces, axis: Any, before: int) -> None:
@@ -202,6 +242,21 @@ def filtered_surface(light_map: LightMap, point, width: Metres) -> FilteredSurfa
     across, up, axis = light_map.projection.basis
     middle = light_map.position + across * (u * inverse) + up * (v * inverse) - axis * (front * inverse)
     return FilteredSurface(cover, middle, (front - back) * inverse, dr.normalize(type(point)(*normal)))
+
+
+def shade(light_map: LightMap, point, width: Metres) -> tuple[PerRay, Metres]:
+    """Return the share of a filter's width over which a cloud lies, and how much of it is above the points [m].
+
+    Parameters are those of `filtered_surface`; above is where the light comes from, and the length along it.
+    """
+    level = dr.clip(dr.log2(dr.maximum(2 * width / light_map.texel, 1)), 0, light_map.levels - 1)
+    fine = dr.minimum(mi.UInt32(level), light_map.levels - 1)
+    coarse = dr.minimum(fine + 1, light_map.levels - 1)
+    u, v, height, _ = light_map.projection.homogeneous(mi.UInt32(0), point - light_map.position, 1)
+    sums = [_between_texels(light_map, light_map.heights, (u, v), number) for number in (fine, coarse)]
+    cover, front, back, _ = dr.lerp(*sums, level - type(width)(fine))
+    length = dr.clip(front - height * cover, 0, front - back) / cover
+    return cover, length
 
 
 def length_along_light(light_map: LightMap, point, active: Any = True) -> Metres:

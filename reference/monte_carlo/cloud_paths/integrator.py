@@ -79,7 +79,8 @@ def cloud_paths_batch(
             sampler.seed((seed * 3 + number) * (1 + len(pixels) * streams // _LANES) + place, len(part) * streams)
             directions = dr.normalize(mi.Vector3f(np.repeat(clouds.direction[part], streams, axis=0).T))
             rays = mi.Ray3f(mi.Point3f(*(float(c) for c in clouds.origin)), directions)
-            walked, _ = walk(scene, targets, sampler, rays, samples=samples // streams, side=SIDE)
+            side = SIDE if scene.has_suns else 0.0  # flights are drawn about suns
+            walked, _ = walk(scene, targets, sampler, rays, samples=samples // streams, side=side)
             for channel in channels:
                 lanes = np.array(walked[channel], dtype=np.float64).reshape(targets.count, len(part), streams)
                 sums[:, part, channel] = lanes.sum(axis=2)

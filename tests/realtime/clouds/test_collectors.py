@@ -30,7 +30,7 @@ def _vectors(points):
     return mi.Vector3f(np.asarray(points, dtype=np.float32).reshape(-1, 3).T)
 
 
-def _search(light_map, transport, points, towards, **options):
+def _search(light_map, transport, points, towards, *, behind=100.0, **options):
     import mitsuba as mi
 
     from realtime.clouds.collectors.search import Search, cold_start, collector_light
@@ -43,8 +43,9 @@ def _search(light_map, transport, points, towards, **options):
         point=point,
         toward=toward,
         extinction=mi.Float(EXTINCTION),
+        behind=mi.Float(behind),
         start=cold_start(light_map, point),
-        search=Search(**options),
+        search=Search(**({"covered": False, "as_ray": False} | options)),
     )
 
 

@@ -8,12 +8,16 @@ import pytest
 
 from tests.helpers.clouds import DROPLETS, cloud, cloud_scene, ring
 from tests.helpers.transport_formula import WEIGHTS, Formula, use_formula
-from validation.scenes.parts import camera, placed, rotation
+from validation.scenes.parts import camera, mitsuba_mesh, placed, rotation
 from validation.scenes.solids import box
 
 THICKNESS, EXTINCTION = 143.7, 0.0363
 TURN = rotation((0.3, 1.0, -0.2), 11.0)
 MIDDLE = np.array([3.1, 0.2, -60.0])
+
+
+#: Light of the formula does not fade where there is no slab behind a point.
+WHOLE = {"way": "printed"}
 
 
 @pytest.fixture(autouse=True)
@@ -141,12 +145,12 @@ def test_both_precisions_agree(variant):
     np.testing.assert_allclose(single, double, rtol=2e-3, atol=1e-4)
 
 
-def test_suns_add_up_and_so_does_a_sky(variant):
+def test_suns_add_up_and_so_does_a_sky_as_a_beam(variant):
     other = _sun((-0.6, 0.3, -0.7), (0.7, 0.9, 1.9))
     sky = {"type": "constant", "radiance": {"type": "rgb", "value": [0.11, 0.17, 0.31]}}
     above = _sun((0.0, 0.0, -1.0), np.pi * np.array([0.11, 0.17, 0.31]))
     parts = {"sun": _sun(ALONG), "other": other, "sky": sky}
-    both = _airlight(_scene(slab=_slab(), **parts))
+    both = _airlight(_scene(slab=_slab(), **parts), sky="beams")
     alone = sum(_airlight(_scene(slab=_slab(), lamp=lamp)) for lamp in (parts["sun"], other, above))
     np.testing.assert_allclose(both, alone, rtol=2e-3)
 
@@ -213,8 +217,8 @@ def test_the_last_frame_s_collectors_go_on(variant, tolerance, bound):
     from realtime.frame.incremental import next_frame
 
     scene = cloud_scene((64, 48), origin=(30.83, -400.91, 57.03), sun=_sun(ALONG), ring=cloud("ring", ring()))
-    whole = _airlight(scene, iterations=40, tolerance=tolerance)
-    options = {"peak": "full", "tolerance": tolerance, "extra_layers": True}
+    whole = _airlight(scene, iterations=40, tolerance=tolerance, **WHOLE)
+    options = {"peak": "full", "tolerance": tolerance, "extra_layers": True} | WHOLE
     renderer = _renderer(scene, start="previous", iterations=3, **options)
     still = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
     from realtime.frame.renderer import image_frame
@@ -230,12 +234,42 @@ def test_the_last_frame_s_collectors_go_on(variant, tolerance, bound):
     assert renderer.render.n_recordings <= 3
 
 
-def test_another_cloud_in_the_light_changes_no_thickness(variant):
-    """Each cloud has its own maps: clear air between two is no matter."""
-    far = cloud("far", placed(box((300.0, 300.0, 20.0)), tuple(MIDDLE - 900.0 * ALONG), TURN))
+@pytest.mark.claim("collector-shade", tolerance="1 % in the middle of the shade and beside it")
+def test_another_cloud_in_the_light_dims_and_changes_no_thickness(variant):
+    """Each cloud has its own maps: clear air between two is no matter, and light fades on its way through the other."""
+    normal, side = np.asarray(TURN)[:, 2], 20.0
+    far = cloud("far", placed(box((300.0, 300.0, side)), tuple(MIDDLE - 900.0 * ALONG), TURN))
     alone = _airlight(_scene(sun=_sun(ALONG), slab=_slab()), map=1024)
     both = _airlight(_scene(sun=_sun(ALONG), slab=_slab(), far=far), map=1024)
-    np.testing.assert_allclose(both, alone, rtol=1e-2)
+    share = both / np.maximum(alone, 1e-9)
+    faded = np.exp(-EXTINCTION * side / -(ALONG @ normal))
+    assert share.max() < 1.01
+    assert np.mean(np.abs(share - faded) < 0.01) > 0.1  # in the middle of the shade
+    assert np.mean(np.abs(share - 1) < 0.01) > 0.2  # beside it
+    assert share[alone > 0].min() > 0.98 * faded
+
+
+def test_an_opaque_shape_in_the_light_leaves_a_shadow_in_all_orders(variant):
+    plate = placed(box((300.0, 300.0, 2.0)), tuple(MIDDLE - 400.0 * ALONG), TURN)
+    alone = _airlight(_scene(sun=_sun(ALONG), slab=_slab()), map=1024)
+    shaded = _airlight(_scene(sun=_sun(ALONG), slab=_slab(), plate=mitsuba_mesh("plate", plate, (0.5,) * 3)), map=1024)
+    lit = shaded / np.maximum(alone, 1e-9)
+    assert np.mean(lit == 0) > 0.05
+    assert np.mean(np.abs(lit - 1) < 0.02) > 0.2
+
+
+@pytest.mark.claim("uniform-sky-total", tolerance="1e-3: the shares of a slab add up to 1, in float32")
+@pytest.mark.parametrize("shape", ["slab", "ring"])
+def test_of_a_uniform_sky_comes_as_much_as_clouds_take(variant, shape):
+    """A cloud that absorbs nothing cannot be told from the sky around it; layers add up, and order 1 is a part."""
+    body = _slab() if shape == "slab" else cloud("ring", ring())
+    sky = {"type": "constant", "radiance": {"type": "rgb", "value": [0.11, 0.17, 0.31]}}
+    frame = _frame(_scene(sky=sky, cloud=body), extra_layers=True)
+    total = np.array([0.11, 0.17, 0.31]) * np.array(frame.extra["opacity"])
+    np.testing.assert_allclose(frame.airlight, total, rtol=1e-3, atol=1e-5)
+    layers = {name: np.array(layer) for name, layer in frame.extra.items() if name != "opacity"}
+    np.testing.assert_allclose(sum(layers.values()), total, rtol=1e-3, atol=1e-5)
+    assert 0.02 * total.mean() < layers["airlight_1"].mean() < 0.6 * total.mean()
 
 
 def test_wrong_values_are_refused(variant):

@@ -88,15 +88,24 @@ def test_layers_cost_nothing_and_change_nothing_where_nobody_asks():
 
 
 def test_the_sky_is_seen_through_clouds_and_lights_them_from_above():
-    """A sky alone: behind it shines L, and the slab gets pi L from above."""
+    """A sky alone: behind it shines L, and as a beam the slab gets pi L from above."""
     parts = {"origin": (30.0, -40.0, 700.0), "sky": SKY, "slab": cloud("slab", slab())}
-    frame = rendered(mi.load_dict(cloud_scene(**parts)), octaves=1, extra_layers=True)
+    frame = rendered(mi.load_dict(cloud_scene(**parts)), octaves=1, sky="beams", extra_layers=True)
     sky = np.array(SKY["radiance"]["value"])
     assert frame.surface == pytest.approx((1 - frame.extra[OPACITY]) * sky, rel=1e-5)
     down = SUN | {"direction": [0, 0, -1.0], "irradiance": {"type": "rgb", "value": list(np.pi * sky)}}
     lit = rendered(mi.load_dict(cloud_scene(**(parts | {"sky": down}))), octaves=1)
     assert frame.airlight == pytest.approx(lit.airlight, rel=1e-5)
     assert lit.surface.max() == 0
+
+
+def test_a_uniform_sky_gives_back_what_clouds_take_of_it():
+    """The same light of all orders as `cloud-collectors` has, whatever the octaves."""
+    scene = mi.load_dict(cloud_scene(origin=(30.0, -40.0, 700.0), sky=SKY, slab=cloud("slab", slab())))
+    frame = rendered(scene, octaves=2, extra_layers=True)
+    taken = frame.extra[OPACITY] * np.array(SKY["radiance"]["value"])
+    assert frame.airlight == pytest.approx(taken, rel=1e-3)
+    assert frame.extra["airlight_1"].mean() < 0.9 * taken.mean()
 
 
 def test_light_that_came_through_a_cloud_falls_on_the_ground():

@@ -248,9 +248,22 @@ def test_a_truth_by_samples_with_its_standard_error(variant):
     assert np.max(np.abs(traced.airlight - truth.airlight) / traced.standard_error) < 8
 
 
+def test_the_truth_of_clouds_by_order(variant):
+    traced = airlight.reference("cloud-slab", "cloud-paths", size=TINY, samples=64, orders="1,2-inf")
+    parts = traced.layer("airlight_1"), traced.layer("airlight_2_inf")
+    assert min(part.mean() for part in parts) > 0
+    np.testing.assert_allclose(sum(parts), traced.airlight, rtol=1e-6)
+    np.testing.assert_allclose(traced.total, traced.airlight + traced.surface + traced.layer("background"), rtol=1e-6)
+    assert traced.standard_error.shape == (12, 16, 3)
+    assert traced.size == TINY
+    with pytest.raises(airlight.InputError, match="airlight_9"):
+        traced.layer("airlight_9")
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        ({"orders": "1,2-inf"}, "orders: quadrature knows single scattering alone"),
         ({"estimator": "quadratur"}, "did you mean 'quadrature'"),
         ({"samples": 64}, "samples: is for 'single-scatter'"),
         ({"estimator": "volpath", "pixel": "area"}, "traces pixel centres"),

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""The light that clouds scatter from a uniform sky into rays, by set of orders.
+
+A ray of the depth T in clouds, under a sky of the radiance L, gets of all orders L (1 - exp(-T)) where nothing is
+absorbed: as much as the clouds take from the sky behind. `escapes.py` says why, and how a slab shares it among the
+orders. The slab that stands for the cloud has its face where the ray first meets the cloud, with the cosine mu between
+ray and normal there, and the thickness t = mu T, through which the ray has the same depth T, but at most 2 V/S, with
+which it has the mean chord 4 V/S of a cloud of the volume V and the surface S: light leaves a body to all sides. A
+camera in a cloud looks across its slab.
+
+With absorption the sum is that of the slab. Opaque shapes hide the same share of the sky from all orders: of eight
+directions from the place of entry, those that they block.
+"""
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from realtime.clouds.bounds.crossings import next_crossing
+from realtime.clouds.canonical.scene_phase import slab_phase
+from realtime.clouds.order_layers import ORDER_LAYERS
+from realtime.clouds.single_scattering.march import CloudRays
+from realtime.clouds.single_scattering.opacity import opacity_of
+from realtime.clouds.uniform_sky.escapes import COSINES, THICKEST, THICKNESSES, THINNEST, escapes
+from realtime.numerics.array_types import types_of
+from realtime.scene.lights import Light
+from realtime.scene.medium import Clouds
+from realtime.scene.mesh_adjacency import mesh_triangles
+from realtime.scene.read_scene import Scene
+
+#: (point [m], light) -> whether no opaque shape is between them.
+Visible = Callable[[Any, Light], Any]
+
+_SETS = len(ORDER_LAYERS)
+
+
+@dataclass(frozen=True)
+class SkyEscapes:
+    """The shares of `escapes.py` on the device."""
+
+    shares: Any  #: medium after medium, (thicknesses, cosines, sets)
+    media: tuple[Any, ...]  #: by channel, the number of the medium that fills each cloud
+    widths: Any  #: by cloud, 2 V/S [m]
+
+
+def beams_of(lights: Sequence[Light], sky: str, clouds: Clouds) -> list[int]:
+    """Return the numbers of the lights that shine from one direction: all, or all but a 'uniform' `sky`.
+
+    No slab stands for a cloud whose density differs from place to place: its sky is a beam.
+    """
+    uniform = sky == "uniform" and clouds.density is None
+    return [number for number, light in enumerate(lights) if light.sky is None or not uniform]
+
+
+def sky_escapes(scene: Scene) -> SkyEscapes:
+    """Return the shares of all media of the clouds of a scene; made once."""
+    clouds, types = scene.medium.clouds, types_of(type(scene.camera.origin.x))
+    assert clouds is not None
+    phases = np.array(clouds.phase)
+    albedos = np.array(clouds.albedo, dtype=np.float64).reshape(3, -1)
+    filled = [[(int(phase), float(albedo)) for phase, albedo in zip(phases, row)] for row in albedos]
+    media = sorted({medium for row in filled for medium in row})
+    known = [slab_phase(phase, types) for phase in clouds.phases]
+    tables = np.concatenate([escapes(known[phase], albedo).ravel() for phase, albedo in media])
+    made = SkyEscapes(
+        types.scalar(tables),
+        tuple(mi.UInt32([media.index(medium) for medium in row]) for row in filled),
+        types.scalar([_slab_width(shape) for shape in scene.boundaries]),
+    )
+    dr.make_opaque(made)
+    return made
+
+
+def sky_light(known: SkyEscapes, light: Light, rays: CloudRays, visible: Visible | None) -> tuple[Any, ...]:
+    """Return the light of a sky by set of orders, colours, in the order of `ORDER_LAYERS` [W/(m^2 sr)].
+
+    Parameters
+    ----------
+    known
+        From `sky_escapes`.
+    light
+        That of the sky.
+    rays
+        Through the clouds as they are.
+    visible
+        (point [m], light) -> whether no opaque shape is between them; None where nothing casts a shadow.
+    """
+    Float, Color = type(rays.direction.x), type(light.sky)
+    first = next_crossing(rays.surfaces, rays.origin, rays.direction, dr.zeros(Float, dr.width(rays.direction)))
+    mu = dr.select(first.leaves, 1, dr.minimum(dr.abs(dr.dot(first.normal, rays.direction)), 1))
+    by_channel = []
+    for channel in range(3):
+        depth = rays.depths[min(channel, len(rays.depths) - 1)]
+        sigma_t = dr.gather(Float, rays.clouds.sigma_t[min(channel, len(rays.depths) - 1)], first.cloud)
+        thickness = dr.minimum(depth * mu, sigma_t * dr.gather(Float, known.widths, first.cloud))
+        medium = dr.gather(mi.UInt32, known.media[channel], first.cloud)
+        by_channel.append(_shares(known.shares, medium, thickness, mu))
+    radiance = light.sky * opacity_of(rays.depths, Color)
+    if visible is not None:
+        begin = dr.select(first.leaves | ~dr.isfinite(first.distance), 0, first.distance)
+        radiance *= _seen_share(light, rays.origin + rays.direction * begin, visible)
+    return tuple(radiance * Color(*parts) for parts in zip(*by_channel))
+
+
+def _slab_width(shape: Any) -> float:
+    """Return 2 V/S of a shape [m]."""
+    if not shape.is_mesh():  # a sphere
+        return float(np.max(np.array(shape.bbox().max) - np.array(shape.bbox().min))) / 3
+    vertices, faces = mesh_triangles(shape)
+    a, b, c = np.moveaxis((vertices - vertices.mean(axis=0))[faces], 1, 0)
+    areas = np.cross(b - a, c - a) / 2
+    return float(2 * abs(np.sum(a * areas)) / 3 / np.linalg.norm(areas, axis=1).sum())
+
+
+def _seen_share(light: Light, point: Any, visible: Visible) -> Any:
+    """Return the share of the sky that opaque shapes leave to points [1]."""
+    Float, Vector = type(point.x), type(point)
+    corners = itertools.product((-1, 1), repeat=3)
+    axes = [Vector(*(sign * (1 / 3) ** 0.5 for sign in corner)) for corner in corners]
+    seen = [dr.select(visible(point, replace(light, axis=axis)), Float(1), 0) for axis in axes]
+    return sum(seen) / len(seen)
+
+
+def _shares(table: Any, medium: Any, thickness: Any, mu: Any) -> list[Any]:
+    """Return the shares of all sets, linear in the logarithm of the thickness and in mu."""
+    Float = type(mu)
+    step = np.log(THICKEST / THINNEST) / (THICKNESSES - 1)
+    along = dr.log(dr.clip(thickness, THINNEST, THICKEST) / THINNEST) / step
+    total = [dr.zeros(Float, dr.width(mu)) for _ in range(_SETS)]
+    for row, down in _neighbours(along, THICKNESSES):
+        for column, across in _neighbours(mu * (COSINES - 1), COSINES):
+            first = ((medium * THICKNESSES + row) * COSINES + column) * _SETS
+            weight = down * across
+            total = [dr.fma(weight, dr.gather(Float, table, first + number), sum_) for number, sum_ in enumerate(total)]
+    return total
+
+
+def _neighbours(position: Any, count: int) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
+    """Return both entries beside a position from 0 to `count` - 1, with their weights."""
+    lower = dr.minimum(mi.UInt32(position), count - 2)
+    share = position - type(position)(lower)
+    return (lower, 1 - share), (lower + 1, share)
