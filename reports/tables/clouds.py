@@ -13,7 +13,7 @@ _QUANTITIES = (("T", "T, relative"), ("c", "c, of sigma"), ("sigma", "sigma, rel
 
 def clouds_tables(record: Record) -> list[Table]:
     """Return the tables of what `airlight clouds --tables --json` prints."""
-    columns = (Column("orders", "orders", words=True), Column("coefficients", "waves"), Column("mb", "MB"))
+    columns = (Column("orders", "orders", words=True), Column("coefficients", "products"), Column("mb", "MB"))
     rows = [{**row, "mb": row["bytes"] / 1e6} for row in record["sets"]]
     tables = [table("Tables of the canonical transport by set of orders", columns, rows)]
     for name, title in (

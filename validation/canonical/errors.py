@@ -2,13 +2,14 @@
 """Errors of a look-up of the canonical transport at random points, by set of orders.
 
 Thicknesses are uniform in their logarithm from 0.01 to 200; shares of the depth, cosines of directions and of suns
-(from 0.02) and azimuths are uniform. `TOGETHER` points share a thickness, whose computation is what takes time. The
-computation has more streams and modes than the one that tables are made of, and float64.
+(from 0.02) and azimuths are uniform. `TOGETHER` points share a slab, a thickness and a sun, whose computation is what
+takes time. It has more streams and modes than the one that tables are made of, and float64.
 
 A set that holds less than `NEGLIGIBLE` of the light at a point is left out there, and counted.
 """
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,9 +27,12 @@ from realtime.numerics.array_types import ArrayTypes
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
-TOGETHER = 20
+TOGETHER = 16
 NEGLIGIBLE = 1e-6
-_STREAMS, _MODES, _NODES = 48, 36, 6
+#: Streams of slabs thinner than so much.
+_STREAMS = (0.3, 64), (10.0, 48), (np.inf, 40)
+_MODES, _NODES = 47, 5
+_WORKERS = 2
 
 
 @dataclass(frozen=True)
@@ -66,28 +70,41 @@ def random_points(
         Called with (share done, what).
     """
     random = np.random.default_rng(seed)
-    parts: list[tuple[Array, Array]] = []
-    groups = [min(TOGETHER, count - start) for start in range(0, count, TOGETHER)]
-    for number, size in enumerate(groups):
-        if progress is not None:
-            progress(number / len(groups), f"point {number * TOGETHER} of {count}")
-        t = float(np.exp(random.uniform(np.log(THINNEST), np.log(THICKEST))))
+    slabs = []
+    for start in range(0, count, TOGETHER):
+        size = min(TOGETHER, count - start)
+        t, mu_l = np.exp(random.uniform(np.log(THINNEST), np.log(THICKEST))), random.uniform(LOWEST_SUN, 1)
         d, mu = np.sort(random.uniform(0, t, size)), random.uniform(-1, 1, size)
-        phi, mu_l = random.uniform(0, 2 * np.pi, size), random.uniform(LOWEST_SUN, 1, size)
-        parts.append((np.stack([np.full(size, t), d, mu, phi, mu_l]), transport_at(phase, albedo, t, d, mu, phi, mu_l)))
+        slabs.append(np.stack([np.full(size, t), d, mu, random.uniform(0, 2 * np.pi, size), np.full(size, mu_l)]))
+    parts: list[tuple[Array, Array]] = []
+    with ThreadPoolExecutor(_WORKERS) as pool:
+        for given, values in zip(slabs, pool.map(lambda each: transport_at(phase, albedo, *each), slabs), strict=True):
+            parts.append((given, values))
+            if progress is not None:
+                progress(len(parts) / len(slabs), f"slab {len(parts)} of {len(slabs)}")
     given, values = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
     return Points(*given, *values)
 
 
 def transport_at(
-    phase: SlabPhase, albedo: float, t: float, d: Array, mu: Array, phi: Array, mu_l: Array, *, streams: int = _STREAMS
+    phase: SlabPhase, albedo: float, t: Array, d: Array, mu: Array, phi: Array, mu_l: Array, *, streams: int = 0
 ) -> Array:
-    """Return T, c_x, c_y and sigma by set at points of one slab, (4, sets, N)."""
+    """Return T, c_x, c_y and sigma by set at points of one slab, (4, sets, N); `streams` 0: as many as it needs."""
+    thickness = float(np.max(t))
+    streams = streams or next(count for below, count in _STREAMS if thickness < below)
     slabs = DirectionalMoments(
-        phase, albedo, mu, streams=streams, modes=_MODES, nodes=_NODES, negligible=1e-5, single=False
+        phase,
+        albedo,
+        mu,
+        streams=streams,
+        modes=min(_MODES, 2 * streams - 1),
+        nodes=_NODES,
+        negligible=1e-5,
+        single=False,
     )
+    suns, of_point = np.unique(mu_l, return_inverse=True)
     place = np.arange(d.size)
-    modes = slabs(t, mu_l, list(d))[:, :, :, place, place, place]
+    modes = slabs(thickness, suns, list(d))[:, :, :, of_point, place, place]
     m = np.arange(modes.shape[1])[:, None]
     cosines, sines = np.cos(m * phi), np.sin(m * phi)
     twice, once = np.where(m > 0, 2.0, 1.0), np.where(m > 0, 1.0, 0.5)

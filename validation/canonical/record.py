@@ -10,9 +10,9 @@ from analytic.errors import InputError
 from realtime.clouds.canonical.fit import fit_on_device, fit_tables
 from realtime.clouds.canonical.look_up import on_device
 from realtime.clouds.canonical.sets import set_name
-from realtime.clouds.canonical.tables import LENGTHS, WAVES, Grid, canonical_tables
+from realtime.clouds.canonical.tables import RANKS, Grid, canonical_tables
 from realtime.numerics.array_types import array_types
-from validation.canonical.errors import look_up_errors, looked_up_points, random_points
+from validation.canonical.errors import TOGETHER, look_up_errors, looked_up_points, random_points
 from validation.slab.phases import phase_pair
 
 Progress = Callable[[float, str], None]
@@ -71,10 +71,10 @@ def canonical_record(
     sets = [
         {
             "orders": set_name(number),
-            "bytes": int(waves.nbytes + lengths.nbytes),
-            "coefficients": WAVES[number] + sum(LENGTHS[number]),
+            "bytes": int(products.nbytes + shapes.nbytes),
+            "coefficients": sum(RANKS[number]),
         }
-        for number, (waves, lengths) in enumerate(zip(tables.waves, tables.lengths, strict=True))
+        for number, (products, shapes) in enumerate(zip(tables.coefficients, tables.shapes, strict=True))
     ]
     record: dict[str, Any] = {
         "phase": pair.name,
@@ -97,7 +97,14 @@ def canonical_record(
             progress=lambda share, what: tell(0.5 + (0.25 if fit else 0.5) * share, what),
         )
         rows = look_up_errors(look_up, types, points)
-        record["check"] = {"points": check, "seed": seed, "seconds": time.perf_counter() - began, "sets": rows}
+        slabs = -(-check // TOGETHER)
+        record["check"] = {
+            "points": check,
+            "slabs": slabs,
+            "seed": seed,
+            "seconds": time.perf_counter() - began,
+            "sets": rows,
+        }
     if fit:
         began = time.perf_counter()
         fitted = fit_tables(look_up, types, progress=lambda share, what: tell(0.75 + 0.25 * share, what))

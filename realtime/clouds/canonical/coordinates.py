@@ -1,32 +1,38 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The coordinates of the tables: smooth in what transport depends on, so that few entries serve.
+"""The coordinates of the tables, and the steep factors that they leave out, so that few entries serve.
 
     thickness    log(t + 0.02), for t from 0.01 to 200
     depth        a(d)/(a(d) + a(t - d)), a(z) = log(1 + z/0.1): 0 at the lit face, 1 at the other, fine at both
     sun          sqrt(2 asin(mu_L)/pi), for mu_L from 0.02 to 1: fine where the sun is low
-    direction    v in mu = sin(pi/2 (0.75 v + 0.25 v^3)): finer at the horizon, even in the angle at the normal, since
-                 waves of the azimuth grow with its sine there
+    direction    v in mu = +-(1 - cos(pi v))/2, v from -1 to 1: fine at the horizon, where light comes from within
+                 abs(mu) mean free paths of depth, and even in the angle at the normal, since waves of the azimuth grow
+                 with its sine there
 
 What is looked up is not T, c and sigma but what is left of them without their steep factors. With L the way from the
 point back to where the line of sight enters the slab, and P_s the phase function scattered n times, the mean over the
 orders of the set,
 
-    T = P_s(cos Theta) (1 - exp(-L)) exp(b + F),     L = d/|mu| for mu < 0, (t - d)/mu for mu > 0,
+    T = P_s(cos Theta) (1 - exp(-L)) exp(r + b + F),     L = d/|mu| for mu < 0, (t - d)/mu for mu > 0,
 
-where 1 - exp(-L) leaves the mean of the source along that way, finite and smooth at mu = 0 and at both faces, P_s holds
-lobe, glory and fogbow, and b(t, d, mu_L), the logarithm of the mean of the source over directions, has a table of its
-own in three coordinates. F is a series of cosines of the azimuth whose coefficients have a table in four coordinates.
+where 1 - exp(-L) leaves the mean of the source along that way, finite and smooth at mu = 0 and at both faces, and P_s
+holds lobe, glory and fogbow. r(t, d) is what an order does by itself. With n the first order of the set and m the mean
+of its orders, each less 1,
+
+    r = n log(t/(t + 0.02)) + m log(1 + d/m) - d        (31-inf: the first term alone):
+
+thin slabs scatter with the power n of their thickness, and deep in thick ones the light of an order is d^m exp(-d), as
+in Poisson's distribution. b(t, d, mu_L), the mean of the logarithm over directions, is smooth after that.
 
 On that way light comes a length s from its last scattering. Where the source is even, s has the mean and the variance
 
     <s> = 1 - L e^{-L}/(1 - e^{-L}),     <s^2> = 2 - (L^2 + 2 L) e^{-L}/(1 - e^{-L}),
 
 which change from L/2 to 1 within |mu| about as small as t: these are left out too. With w the horizontal part of the
-direction, D_b and s_b the mean and the spread of the mean over directions,
+direction and log s_b(t, d, mu_L) a mean over directions,
 
-    D = (D_b, 0) + w <s> + s_b (X, Y),     sigma^2 = s_b^2 exp(2 Z) + |w|^2 (<s^2> - <s>^2)/2,
+    D = w <s> + s_b (X, Y),     sigma^2 = s_b^2 exp(2 Z) + |w|^2 (<s^2> - <s>^2)/2.
 
-X and Z series of cosines, Y of sines.
+F, X, Y and Z are sums of products, see `low_rank.py`.
 """
 
 import math
@@ -35,17 +41,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from realtime.clouds.canonical.sets import SETS
+
 Array = NDArray[Any]
 
 THINNEST, THICKEST = 0.01, 200.0
 LOWEST_SUN = 0.02
 THICKNESS_SHIFT = 0.02
 DEPTH_SCALE = 0.1
-_LINEAR = 0.75
+HORIZON = 5e-4  #: cosine of the entries at mu = 0
 SHORT = 0.05  #: way below which series take the place of differences
-#: v = 2 r sinh(asinh(..)/3) inverts 0.75 v + 0.25 v^3 = a: r^2 = 0.75/(3 0.25), and the argument is a/(2 0.25 r^3).
-DIRECTION_ROOT = math.sqrt(_LINEAR / (3 * (1 - _LINEAR)))
-DIRECTION_ARGUMENT = 1 / (2 * (1 - _LINEAR) * DIRECTION_ROOT**3)
 
 
 def thicknesses(count: int) -> Array:
@@ -71,8 +76,8 @@ def suns(count: int) -> Array:
 def directions(count: int) -> Array:
     """Return cosines of directions at even steps, an odd number of them: the one in the middle is just off 0."""
     places = np.linspace(-1.0, 1.0, count)
-    values = np.sin((_LINEAR * places + (1 - _LINEAR) * places**3) * (np.pi / 2))
-    values[count // 2] = 2e-3
+    values = np.sign(places) * (1 - np.cos(np.pi * places)) / 2
+    values[count // 2] = HORIZON
     return values
 
 
@@ -93,6 +98,19 @@ def depths(count: int, t: float) -> Array:
     values = (low + high) / 2
     values[0], values[-1] = 1e-4 * t, (1 - 1e-4) * t
     return values
+
+
+def powers(number: int) -> tuple[int, float]:
+    """Return n and m of r for a set of orders; m is 0 for the set without end."""
+    first, last = SETS[number]
+    return first - 1, (first + last) / 2 - 1 if math.isfinite(last) else 0.0
+
+
+def reference(number: int, t: float | Array, d: Array) -> Array:
+    """Return r of a set at depths in a slab."""
+    n, m = powers(number)
+    deep = m * np.log1p(d / m) - d if m else 0.0
+    return n * np.log(t / (t + THICKNESS_SHIFT)) + deep + 0.0 * d
 
 
 def way_behind(d: Array, t: float | Array, mu: Array) -> Array:

@@ -37,6 +37,7 @@ _THICKNESSES, _DEPTHS, _SUNS, _DIRECTIONS, _AZIMUTHS = 10, 10, 5, 13, 3
 _ANGLES = 61  #: of P
 _LEAST_D, _LEAST_SUM = 1.01, 1.05
 _FLOOR = 0.02  #: of the brightest of a thickness, below which errors count less
+_LARGEST = 1e6  #: of a parameter, which without light nothing else bounds
 _ROUNDS = 1  #: of P, fitted to what is left of T
 _DIM = 1e-3  #: of all sets' light, below which a collector does not count
 
@@ -273,11 +274,11 @@ def fit_on_device(fitted: tuple[FittedSet, ...], types: ArrayTypes) -> "DeviceFi
         each = fitted[number]
         by_name = {"p": each.p, "of_directions": each.of_directions, "of_suns": each.of_suns}
         by_name |= {"collector": each.collector, "n": each.n}
-        return {name: Float(np.ascontiguousarray(values).ravel()) for name, values in by_name.items()}
+        return {name: Float(np.clip(values, -_LARGEST, _LARGEST).ravel()) for name, values in by_name.items()}
 
     made = DeviceFit(
         tuple(arrays(number) for number in range(len(fitted))),
-        tuple(tuple(float(value) for value in each.spread) for each in fitted),
+        tuple(tuple(float(np.clip(value, -_LARGEST, _LARGEST)) for value in each.spread) for each in fitted),
     )
     dr.make_opaque(made)
     return made
@@ -311,7 +312,7 @@ class DeviceFit:
         (n,) = _along(Float, table["n"], [direction, height], 1)
         b = b1 - b2
         ratio = dr.log(d + shift) / dr.log(dr.maximum(b + shift, _LEAST_SUM))
-        T = p * mu_l * ratio * dr.exp(log_a + log_x - 0.5 * dr.square((d - b) / c))
+        T = p * mu_l * ratio * dr.exp(dr.clip(log_a + log_x, -200, 50) - 0.5 * dr.square((d - b) / c))
         depth = dr.log(1 + dr.abs(e) * d)
         c_x = (i + j * (cos_phi * dr.sin(k * phi_l) + ell * phi_l)) * depth + m + n * cos_phi
         c_y = sin_phi * (f * dr.sin(g * phi_l) * depth + h * dr.sin(phi_l))

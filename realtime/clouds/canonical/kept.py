@@ -4,6 +4,10 @@
 The folder is that of `reference/storage/cache.py`, which this side does not import: AIRLIGHT_CACHE_DIR, or `airlight`
 in the user's cache folder. A file that is damaged or from elsewhere counts as none. With AIRLIGHT_CACHE_SIZE=0 nothing
 is kept.
+
+The name of a file tells how tables were made; which medium they are of, the moments of its phase function and its
+albedo, stands in it. A phase function that a scene holds as a table in single precision has its moments to 1e-5, and
+finds the tables of the function that the table was made of.
 """
 
 import os
@@ -12,45 +16,68 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from contextlib import suppress
+from hashlib import blake2b
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-_CHECK = "checksum"
+Array = NDArray[Any]
+
+_CHECK, _MEDIUM = "checksum", "medium"
 
 
-def kept_path(digest: str) -> Path:
-    """Return where tables lie."""
+def _folder() -> Path:
     own = os.environ.get("AIRLIGHT_CACHE_DIR")
     base = os.environ.get("XDG_CACHE_HOME")
-    folder = Path(own) if own else (Path(base) if base else Path.home() / ".cache") / "airlight"
-    return folder / f"canonical-{digest}.npz"
+    return Path(own) if own else (Path(base) if base else Path.home() / ".cache") / "airlight"
 
 
-def load_kept(digest: str) -> dict[str, Any] | None:
-    """Return the arrays under a digest, None where there are none or the file is damaged."""
-    path = kept_path(digest)
+def load_kept(digest: str, medium: Array, same: Array) -> dict[str, Any] | None:
+    """Return the arrays under a digest of a medium, None where there are none or the file is damaged.
+
+    Parameters
+    ----------
+    digest
+        Of how tables were made.
+    medium
+        Numbers that tell it from others.
+    same
+        By how much each may differ.
+    """
+    for path in sorted(_folder().glob(f"canonical-{digest}-*.npz")):
+        arrays = _read(path, medium, same)
+        if arrays is not None:
+            with suppress(OSError):
+                os.utime(path)  # what was used longest ago is dropped first
+            return arrays
+    return None
+
+
+def _read(path: Path, medium: Array, same: Array) -> dict[str, Any] | None:
+    """Return the arrays of a file, None where it is of another medium or damaged."""
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
+            if not np.all(np.abs(stored[_MEDIUM] - medium) <= same):
+                return None
             arrays = {name: stored[name] for name in stored.files}
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
         return None
     if int(arrays.pop(_CHECK, -1)) != _checksum(arrays):
         return None
-    with suppress(OSError):
-        os.utime(path)  # what was used longest ago is dropped first
     return arrays
 
 
-def keep(digest: str, arrays: Mapping[str, Any]) -> None:
-    """Write arrays under a digest; where the folder cannot be written, nothing is kept."""
+def keep(digest: str, medium: Array, arrays: Mapping[str, Any]) -> None:
+    """Write arrays under a digest of a medium; where the folder cannot be written, nothing is kept."""
     if os.environ.get("AIRLIGHT_CACHE_SIZE", "").strip() == "0":
         return
     buffer = BytesIO()
-    np.savez(buffer, **{**arrays, _CHECK: np.int64(_checksum(arrays))})
-    path = kept_path(digest)
+    whole = {**arrays, _MEDIUM: medium}
+    np.savez(buffer, **{**whole, _CHECK: np.int64(_checksum(whole))})
+    path = _folder() / f"canonical-{digest}-{blake2b(medium.tobytes(), digest_size=8).hexdigest()}.npz"
     temporary = path.with_name(f".{path.stem}-{uuid.uuid4().hex}.npz")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

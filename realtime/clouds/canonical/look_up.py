@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The canonical transport on the device: linear between entries, waves of the azimuth on top.
+"""The canonical transport on the device: sums of products of what depends on the place and on the direction.
 
-Tables are kept with the fewest entries that cubics need. Here, once, the cubic through the four nearest entries puts
-more of them along thickness and depth, so that a frame reads no more than its neighbours: one look-up reads 8 packets
-of four numbers of the means, 16 corners of one or two packets of four for T, and 16 of one to four for c and
-sigma. Who does not use T does not pay for it. All arrays take about 200 MB.
+Tables are kept with the fewest entries that cubics need. Here, once, splines put more of them along every coordinate,
+so that a frame reads no more than the corners of a simplex (`simplex.py`): of a place in the slab (t, d, mu_L) four
+entries of the means b and log s_b, and four of the coefficients, of a direction (mu, phi) three of the shapes, in
+packets of four products. Who does not use T does not pay for it. All arrays take about 250 MB.
 
 Outside the tables:
 
@@ -24,18 +24,23 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
 
 from realtime.clouds.canonical import coordinates
 from realtime.clouds.canonical.angular import ENTRIES
-from realtime.clouds.canonical.sets import SETS
-from realtime.clouds.canonical.tables import LENGTHS, WAVES, CanonicalTables
+from realtime.clouds.canonical.simplex import around
+from realtime.clouds.canonical.tables import RANKS, CanonicalTables
 from realtime.numerics.array_types import ArrayTypes
+
+Array = NDArray[Any]
 
 #: (set_number, t, d, mu, cos_phi, sin_phi, mu_l) -> T [1/sr], c_x, c_y, sigma [mean free paths]
 LookUp = Callable[..., tuple[Any, Any, Any, Any]]
 
-_FINER_MEANS, _FINER = 3, 2  #: times as many steps of thickness and depth
-_FINER_LENGTHS = 2  #: the first sets, whose lengths need them too
+_FINER_MEANS = 4, 4, 6  #: times as many steps of thickness, depth and sun
+_FINER = 2, 2, 2
+_DIRECTIONS, _AZIMUTHS = 129, 65  #: entries of shapes
 _NEAR = 50.0  #: distance from a face that points of thicker slabs keep [mean free paths]
 
 
@@ -45,17 +50,17 @@ def on_device(tables: CanonicalTables, types: ArrayTypes) -> "DeviceTables":
     They are float32, whatever is stored: a look-up of halves takes four times as long, and its code is compiled fifteen
     times as long.
     """
-    means = [_refined(each, _FINER_MEANS) for each in tables.means]
-    waves = [_refined(each, _FINER) for each in tables.waves]
-    lengths = [_refined(each, _FINER if number < _FINER_LENGTHS else 1) for number, each in enumerate(tables.lengths)]
-    groups = means, waves, lengths
-    arrays = [tuple(mi.Float(each.ravel().astype(np.float32)) for each in group) for group in groups]
+    means = [_finer(each, _FINER_MEANS) for each in tables.means]
+    products = [_finer(each, _FINER) for each in tables.coefficients]
+    shapes = [_fine_shapes(each, ranks) for each, ranks in zip(tables.shapes, RANKS, strict=True)]
+    arrays = [tuple(mi.Float(each.ravel().astype(np.float32)) for each in group) for group in (means, products, shapes)]
     made = DeviceTables(
         arrays[0],
         arrays[1],
         arrays[2],
         tuple(types.scalar(each) for each in tables.angular),
-        tuple(tuple(each.shape[:-1] for each in group) for group in groups),
+        means[0].shape[:3],
+        products[0].shape[:3],
     )
     dr.make_opaque(made)
     return made
@@ -75,10 +80,11 @@ class DeviceTables:
     """
 
     means: tuple[Any, ...]
-    waves: tuple[Any, ...]
-    lengths: tuple[Any, ...]
+    coefficients: tuple[Any, ...]
+    shapes: tuple[Any, ...]
     angular: tuple[Any, ...]
-    shapes: tuple[tuple[tuple[int, ...], ...], ...]  #: of means, waves and lengths by set
+    of_means: tuple[int, ...]  #: entries of thickness, depth and sun
+    of_coefficients: tuple[int, ...]
 
     def __call__(self, set_number: int, t, d, mu, cos_phi, sin_phi, mu_l):
         """Return T [1/sr], c_x, c_y, sigma [mean free paths]; see above."""
@@ -86,7 +92,6 @@ class DeviceTables:
         lowest = math.log(coordinates.THINNEST + coordinates.THICKNESS_SHIFT)
         highest = math.log(coordinates.THICKEST + coordinates.THICKNESS_SHIFT)
         low_sun = coordinates.lowest_sun_coordinate()
-        first = SETS[set_number][0]
         d = dr.clip(d, 0, t)
         mu = dr.clip(mu, -1, 1)
         behind = dr.select(mu < 0, d, t - d) / dr.maximum(dr.abs(mu), 1e-6)
@@ -97,24 +102,33 @@ class DeviceTables:
 
         upper = dr.log(1 + d_inside / coordinates.DEPTH_SCALE)
         lower = dr.log(1 + (t_inside - d_inside) / coordinates.DEPTH_SCALE)
-        shares = (
+        place = (
             (dr.log(t_inside + coordinates.THICKNESS_SHIFT) - lowest) / (highest - lowest),
             upper / (upper + lower),
             (dr.sqrt(dr.asin(sun) * (2 / math.pi)) - low_sun) / (1 - low_sun),
-            direction_share(mu),
         )
-        counts = LENGTHS[set_number]
+        from_place = around(place, self.of_coefficients)
+        azimuth = dr.safe_acos(cos_phi) * dr.inv_pi
+        from_direction = around((direction_share(mu), azimuth), (_DIRECTIONS, _AZIMUTHS))
+        ranks = RANKS[set_number]
+        packets = sum(ranks) // 4
+        ends = [sum(ranks[:which]) // 4 for which in range(5)]
 
-        def entries(group: int, table, packets: int) -> list[Any]:
-            shape = self.shapes[group][set_number]
-            return _linear(shares[: len(shape)], shape, lambda index: _read(mi.Vector4f, table, index, packets))
+        def between(kind, table, entries, packets: int, number: int) -> Any:
+            return sum(dr.gather(kind, table, index * packets + number) * weight for index, weight in entries)
 
-        b, mean, log_spread, _ = entries(0, self.means[set_number], 1)
-        f = entries(1, self.waves[set_number], WAVES[set_number] // 4)
-        values = entries(2, self.lengths[set_number], sum(counts) // 4)
-        ends = [sum(counts[:place]) for place in range(4)]
-        x, y, z = (values[low:high] for low, high in pairwise(ends))
+        def summed(low: int, high: int) -> Any:
+            """Return a sum of products."""
+            return sum(
+                dr.dot(
+                    between(mi.Vector4f, self.coefficients[set_number], from_place, packets, number),
+                    between(mi.Vector4f, self.shapes[set_number], from_direction, packets, number),
+                )
+                for number in range(low, high)
+            )
 
+        b, log_spread = between(mi.Vector2f, self.means[set_number], around(place, self.of_means), 1, 0)
+        f, x, y, z = (summed(low, high) for low, high in pairwise(ends))
         cosine = dr.fma(dr.safe_sqrt((1 - mu * mu) * (1 - sun * sun)), cos_phi, -mu * sun)
         scattered = _scattered(self.angular[set_number], cosine, Float)
         # Series take the place of differences where the way is short.
@@ -126,11 +140,15 @@ class DeviceTables:
         far_variance = dr.fma(-(behind + 2) * behind, share, 2) - far * far
         square = dr.square(behind)
         variance = dr.select(is_short, square * (1 / 12 - square * (1 / 240)), dr.maximum(far_variance, 0))
-        T = scattered * passed * dr.exp(b + _cosines(f, cos_phi)) * dimmed * thinner ** (first - 1)
+        power, mean_power = coordinates.powers(set_number)
+        steep = power * dr.log(t_inside / (t_inside + coordinates.THICKNESS_SHIFT))
+        if mean_power:
+            steep += mean_power * dr.log(1 + d_inside * (1 / mean_power)) - d_inside
+        T = scattered * passed * dr.exp(steep + b + f) * dimmed * thinner**power
         spread, sine = dr.exp(log_spread), dr.safe_sqrt((1 - mu) * (1 + mu))
-        c_x = -dr.fma(spread, _cosines(x, cos_phi), dr.fma(sine * cos_phi, on_way, mean))
-        c_y = -dr.fma(spread, _sines(y, cos_phi, sin_phi), sine * sin_phi * on_way)
-        sigma = dr.sqrt(dr.square(spread * dr.exp(_cosines(z, cos_phi))) + 0.5 * sine * sine * variance)
+        c_x = -dr.fma(spread, x, sine * cos_phi * on_way)
+        c_y = -dr.fma(spread, dr.mulsign(y, sin_phi), sine * sin_phi * on_way)
+        sigma = dr.sqrt(dr.square(spread * dr.exp(z)) + 0.5 * sine * sine * variance)
         return T, c_x, c_y, sigma
 
 
@@ -147,66 +165,48 @@ def _inside(t, d):
 
 def direction_share(mu):
     """Return the coordinate of a direction, from 0 to 1."""
-    argument = dr.asin(mu) * (2 / math.pi * coordinates.DIRECTION_ARGUMENT)
-    # asinh without cancellation of negative arguments
-    height = dr.abs(argument)
-    third = dr.log(height + dr.sqrt(dr.fma(height, height, 1))) * (1 / 3)
-    grown = dr.exp(third)
-    v = coordinates.DIRECTION_ROOT * (grown - 1 / grown)
+    v = dr.safe_acos(dr.fma(-2, dr.abs(mu), 1)) * dr.inv_pi
     return dr.fma(dr.mulsign(v, mu), 0.5, 0.5)
 
 
-def _refined(table, times: int):
-    """Return a table with so many times the steps along its first two axes, by cubics through the nearest entries."""
-    for axis in (0, 1) if times > 1 else ():
+def _finer(table: Array, times: tuple[int, ...]) -> Array:
+    """Return a table with so many times the steps along its first axes, by splines."""
+    for axis, finer in enumerate(times):
         count = table.shape[axis]
-        places = np.arange((count - 1) * times + 1) / times
-        first = np.clip(places.astype(np.int64) - 1, 0, count - 4)
-        u = places - first - 1
-        weights = (
-            -u * (u - 1) * (u - 2) / 6,
-            (u + 1) * (u - 1) * (u - 2) / 2,
-            -(u + 1) * u * (u - 2) / 2,
-            (u + 1) * u * (u - 1) / 6,
-        )
-        along = [-1 if other == axis else 1 for other in range(table.ndim)]
-        parts = [
-            weight.reshape(along).astype(np.float32) * np.take(table, first + step, axis=axis)
-            for step, weight in enumerate(weights)
-        ]
-        table = sum(parts[1:], start=parts[0])
+        table = np.moveaxis(_spline(count, (count - 1) * finer + 1) @ np.moveaxis(table, axis, -2), -2, axis)
     return table
 
 
-def _linear(shares, counts: tuple[int, ...], read: Callable[[Any], list[Any]]) -> list[Any]:
-    """Return what `read` gives at the entries around a place, linear in every coordinate.
+def _spline(count: int, finer: int) -> Array:
+    """Return what takes values at even steps to values at finer ones, (finer, count)."""
+    spline = make_interp_spline(np.linspace(0, 1, count), np.eye(count), k=min(3, count - 1))
+    return np.asarray(spline(np.linspace(0, 1, finer)), dtype=np.float32)
 
-    `shares` are coordinates from 0 to 1, `counts` the entries along them, the last of which lie side by side.
+
+def _fine_shapes(shapes: Array, ranks: tuple[int, ...]) -> Array:
+    """Return shapes (directions, azimuths, products) at the entries that frames read.
+
+    Along the azimuth they are cosines, those of Y sines; along the direction a spline in each hemisphere.
     """
-    corner: Any = mi.UInt32(0)
-    weights = []
-    for share, count in zip(shares, counts):
-        position = dr.clip(share, 0, 1) * (count - 1)
-        cell = dr.minimum(mi.UInt32(position), count - 2)
-        corner = corner * count + cell
-        weights.append(position - type(position)(cell))
-    strides = [math.prod(counts[place + 1 :]) for place in range(len(counts))]
-
-    def between(axis: int, offset: int) -> list[Any]:
-        if axis == len(counts):
-            return read(corner + offset)
-        low, high = between(axis + 1, offset), between(axis + 1, offset + strides[axis])
-        return [dr.fma(weights[axis], b - a, a) for a, b in zip(low, high)]
-
-    return between(0, 0)
-
-
-def _read(packet, table, index, packets: int) -> list[Any]:
-    """Return the numbers of an entry, in packets of four."""
-    numbers: list[Any] = []
-    for number in range(packets):
-        numbers.extend(mi.Vector4f(dr.gather(packet, table, packets * index + number)))
-    return numbers
+    directions, count, _ = shapes.shape
+    middles = (np.arange(count) + 0.5) * np.pi / count
+    azimuths = np.linspace(0, np.pi, _AZIMUTHS)
+    waves, from_one = np.arange(count), np.arange(1, count + 1)
+    cosines = np.cos(np.outer(azimuths, waves)) * np.where(waves > 0, 2, 1) @ np.cos(np.outer(waves, middles)) / count
+    halves = np.where(from_one < count, 2, 1)
+    sines = np.sin(np.outer(azimuths, from_one)) * halves @ np.sin(np.outer(from_one, middles)) / count
+    ends = np.cumsum([0, *ranks])
+    parts = [
+        np.tensordot(sines if which == 2 else cosines, shapes[..., low:high], axes=(1, 1))
+        for which, (low, high) in enumerate(pairwise(ends))
+    ]
+    fine = np.concatenate(parts, axis=-1)
+    middle = directions // 2
+    spline = _spline(middle + 1, _DIRECTIONS // 2 + 1)
+    below, above = (
+        np.tensordot(spline, fine[:, half], axes=(1, 1)) for half in (slice(middle + 1), slice(middle, None))
+    )
+    return np.concatenate([below, above[1:]])
 
 
 def _scattered(table, cosine, Float):
@@ -215,19 +215,3 @@ def _scattered(table, cosine, Float):
     cell = dr.minimum(mi.UInt32(position), ENTRIES - 2)
     low, high = dr.gather(Float, table, cell), dr.gather(Float, table, cell + 1)
     return dr.lerp(low, high, position - Float(cell))
-
-
-def _cosines(coefficients, cos_phi):
-    """Return sum_m a_m cos(m phi) by Clenshaw's recurrence."""
-    after, now = 0, 0
-    for coefficient in reversed(coefficients[1:]):
-        now, after = coefficient + 2 * cos_phi * now - after, now
-    return coefficients[0] + cos_phi * now - after
-
-
-def _sines(coefficients, cos_phi, sin_phi):
-    """Return sum_m a_m sin(m phi), m from 1 on."""
-    after, now = 0, 0
-    for coefficient in reversed(coefficients):
-        now, after = coefficient + 2 * cos_phi * now - after, now
-    return sin_phi * now

@@ -2,8 +2,9 @@
 """The tables of one phase function and albedo, made once and kept on disk."""
 
 import hashlib
+import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -15,6 +16,7 @@ from realtime.clouds.canonical import coordinates
 from realtime.clouds.canonical.angular import at_angle, repeated_scattering
 from realtime.clouds.canonical.directional_moments import DirectionalMoments
 from realtime.clouds.canonical.kept import keep, load_kept
+from realtime.clouds.canonical.low_rank import coefficients, direction_shapes
 from realtime.clouds.canonical.sets import SETS
 from realtime.clouds.slab_orders.phases import SlabPhase
 from realtime.errors import InputError
@@ -22,45 +24,45 @@ from realtime.errors import InputError
 Array = NDArray[Any]
 Progress = Callable[[float, str], None]
 
-#: Raise this when the meaning or the accuracy of a table changes.
-VERSION = 1
+_LOG = logging.getLogger(__name__)
+_PATIENCE = 5.0  #: seconds between lines of the log
 
-#: Coefficients of F by set: their error is below that of the grid. They are read in packets of four.
-WAVES: tuple[int, ...] = (8, 8, 4, 4, 4, 4, 4, 4)
-#: Coefficients of X, Y and Z by set; their sums are multiples of four.
-LENGTHS: tuple[tuple[int, int, int], ...] = (
-    (6, 5, 5),
-    (6, 5, 5),
-    (4, 4, 4),
-    (4, 4, 4),
-    (3, 3, 2),
-    (3, 3, 2),
-    (3, 2, 3),
-    (2, 1, 1),
+#: Raise this when the meaning or the accuracy of a table changes.
+VERSION = 2
+
+#: Products of F, X, Y and Z by set. They are read in packets of four.
+RANKS: tuple[tuple[int, int, int, int], ...] = (
+    (36, 32, 20, 12),
+    (24, 16, 12, 8),
+    (16, 12, 8, 8),
+    (16, 12, 8, 4),
+    (12, 8, 8, 4),
+    (12, 8, 4, 4),
+    (8, 8, 4, 4),
+    (8, 8, 8, 4),
 )
-_AZIMUTHS = 16  #: where series are fitted
-_AVERAGED = 12  #: directions of the mean over directions
-_STREAMS = 12  #: of means, which divide and multiply again, so that they need be smooth, not exact
-_DIMMEST = 1e-30  #: source [1/sr] below which there is no light: F, X, Y and Z are 0
-_LARGEST = 20.0  #: of |F|
+_TOLD_APART = 300  #: moments by which phase functions are told apart
+#: By which media may differ that share tables. In thick slabs light is scattered thousands of times.
+_SAME_MOMENT, _SAME_ALBEDO = 2e-5, 1e-6
+_LEARNT = 3  #: shapes are learnt from every third thickness
+#: Streams of slabs thinner than so much: in thin ones most light goes within their thickness of the horizon.
+_STREAMS = (0.3, 48), (10.0, 32), (np.inf, 24)
+_MODES, _NODES, _NEGLIGIBLE = 31, 4, 1e-4
+_DIMMEST = 1e-30  #: radiance [1/sr] below which there is no light
+_SHARE = 1e-6  #: of the light of all sets, below which a place does not count for shapes
+_LEAST_WEIGHT = 0.2  #: of an entry over the mean, so that no place or direction is forgotten
+_LARGEST_SHIFT, _LARGEST_SPREAD = 8.0, 3.0  #: of |X|, |Y| and of |Z|, where there is hardly any light
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Entries of the tables along each coordinate; X, Y and Z have every other direction."""
+    """Entries of the tables along each coordinate."""
 
-    thicknesses: int = 15
-    depths: int = 15
-    suns: int = 17
-    directions: int = 45
-    fine_thicknesses: int = 32
-    fine_depths: int = 32
-    fine_suns: int = 20
-
-    @property
-    def other_directions(self) -> int:
-        """Every other direction, the first and the last among them."""
-        return (self.directions + 1) // 2
+    thicknesses: int = 36
+    depths: int = 29
+    suns: int = 14
+    directions: int = 33
+    azimuths: int = 16
 
 
 @dataclass(frozen=True)
@@ -72,11 +74,11 @@ class CanonicalTables:
     grid
         Numbers of entries.
     means
-        (sets, thicknesses, depths, suns, 4) of the fine grid, float32: b, D_b [mean free paths], log s_b, and 0.
-    waves
-        By set (thicknesses, depths, suns, directions, coefficients), float16: of F.
-    lengths
-        By set (thicknesses, depths, suns, other directions, coefficients), float16: of X, Y and Z in turn.
+        (sets, thicknesses, depths, suns, 2), float32: b and log s_b [mean free paths].
+    coefficients
+        By set (thicknesses, depths, suns, products), float16: of F, X, Y and Z in turn.
+    shapes
+        By set (directions, azimuths, products), float32, at the middles of even steps of the azimuth from 0 to pi.
     angular
         (sets, entries), float32: P_s at even angles.
     seconds
@@ -85,15 +87,15 @@ class CanonicalTables:
 
     grid: Grid
     means: Array
-    waves: tuple[Array, ...]
-    lengths: tuple[Array, ...]
+    coefficients: tuple[Array, ...]
+    shapes: tuple[Array, ...]
     angular: Array
     seconds: float
 
     @property
     def size(self) -> int:
         """Bytes of all tables."""
-        return self.means.nbytes + self.angular.nbytes + sum(each.nbytes for each in (*self.waves, *self.lengths))
+        return self.means.nbytes + self.angular.nbytes + sum(each.nbytes for each in (*self.coefficients, *self.shapes))
 
 
 def canonical_tables(
@@ -110,7 +112,7 @@ def canonical_tables(
     grid
         Numbers of entries.
     progress
-        Called with (share done, what) while tables are made.
+        Called with (share done, what) while tables are made; without it the log says how far they are.
 
     Raises
     ------
@@ -122,25 +124,44 @@ def canonical_tables(
             f"albedo: got {albedo:g}, wanted more than 0, at most 1: without scattering there are no tables"
         )
     grid = grid or Grid()
-    digest = tables_digest(phase, albedo, grid)
-    arrays = load_kept(digest)
+    digest, medium = tables_digest(grid), np.append(phase.moments(_TOLD_APART), albedo)
+    same = np.append(np.full(_TOLD_APART, _SAME_MOMENT), _SAME_ALBEDO)
+    arrays = load_kept(digest, medium, same)
     if arrays is None:
-        tables = make_tables(phase, albedo, grid, progress=progress)
-        named = {f"waves_{number}": each for number, each in enumerate(tables.waves)}
-        named |= {f"lengths_{number}": each for number, each in enumerate(tables.lengths)}
+        tables = make_tables(phase, albedo, grid, progress=progress or _logged())
+        named = {f"coefficients_{number}": each for number, each in enumerate(tables.coefficients)}
+        named |= {f"shapes_{number}": each for number, each in enumerate(tables.shapes)}
         fixed = {"means": tables.means, "angular": tables.angular, "seconds": np.float64(tables.seconds)}
-        keep(digest, fixed | named)
+        keep(digest, medium, fixed | named)
         return tables
-    waves, lengths = (tuple(arrays[f"{name}_{number}"] for number in range(len(SETS))) for name in ("waves", "lengths"))
-    return CanonicalTables(grid, arrays["means"], waves, lengths, arrays["angular"], float(arrays["seconds"]))
+    products, shapes = (
+        tuple(arrays[f"{name}_{number}"] for number in range(len(SETS))) for name in ("coefficients", "shapes")
+    )
+    return CanonicalTables(grid, arrays["means"], products, shapes, arrays["angular"], float(arrays["seconds"]))
 
 
-def tables_digest(phase: SlabPhase, albedo: float, grid: Grid) -> str:
-    """Return the name of tables: what decides their numbers, the phase function by its moments."""
-    digest = hashlib.blake2b(digest_size=16)
-    digest.update(repr((VERSION, round(albedo, 9), sorted(asdict(grid).items()), WAVES, LENGTHS)).encode())
-    digest.update(np.round(phase.moments(300), 6).astype(np.float32).tobytes())
-    return digest.hexdigest()
+def _logged() -> Progress:
+    """Return what writes a line into the log now and then: a frame waits for minutes, which looks like a hanging one.
+
+    It is a warning, so that it reaches the error stream where nobody has set up a log.
+    """
+    began = last = time.monotonic()
+
+    def tell(share: float, what: str) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last > _PATIENCE and 0 < share < 1:
+            last = now
+            left = (now - began) * (1 - share) / share
+            _LOG.warning("tables of clouds, made once: %.0f %%, about %.0f s left, %s", 100 * share, left, what)
+
+    return tell
+
+
+def tables_digest(grid: Grid) -> str:
+    """Return what names tables of whatever medium: how their numbers are made."""
+    made = VERSION, sorted(asdict(grid).items()), RANKS
+    return hashlib.blake2b(repr(made).encode(), digest_size=8).hexdigest()
 
 
 def make_tables(
@@ -149,108 +170,144 @@ def make_tables(
     """Make tables; parameters as above, with the number of threads."""
     tell, began = progress or (lambda share, what: None), time.perf_counter()
     angular = repeated_scattering(phase)
-    fine = coordinates.thicknesses(grid.fine_thicknesses)
-    coarse = coordinates.thicknesses(grid.thicknesses)
-    fine_suns, suns, mu = (
-        coordinates.suns(grid.fine_suns),
-        coordinates.suns(grid.suns),
-        coordinates.directions(grid.directions),
-    )
-    averaged = np.sin(((np.arange(_AVERAGED) + 0.5) / _AVERAGED * 2 - 1) * (np.pi / 2))
-    means = DirectionalMoments(phase, albedo, averaged, streams=_STREAMS, nodes=4, modes=1, single=False)
-    detailed = DirectionalMoments(phase, albedo, mu)
+    t, suns = coordinates.thicknesses(grid.thicknesses), coordinates.suns(grid.suns)
+    mu = coordinates.directions(grid.directions)
+    azimuths = (np.arange(grid.azimuths) + 0.5) * np.pi / grid.azimuths
+    slabs = [
+        DirectionalMoments(phase, albedo, mu, streams=streams, modes=_MODES, nodes=_NODES, negligible=_NEGLIGIBLE)
+        for _, streams in _STREAMS
+    ]
+    weights = np.repeat(_widths(mu, -1.0, 1.0), azimuths.size)
 
-    def fine_part(t: float) -> Array:
-        return _means(means, t, fine_suns, coordinates.depths(grid.fine_depths, t))
+    def fields(place: int) -> list[_Fields]:
+        fitting = next(each for each, (below, _) in zip(slabs, _STREAMS, strict=True) if t[place] < below)
+        return _fields(fitting, angular, float(t[place]), suns, grid.depths, azimuths=azimuths, weights=weights)
 
-    def coarse_part(t: float) -> list[tuple[Array, Array]]:
-        depths = coordinates.depths(grid.depths, t)
-        mean = _means(means, t, suns, depths)
-        light = detailed(t, suns, list(depths))
-        return [_coefficients(light[s], mean[s], angular[s], s, t, suns, depths, mu) for s in range(len(SETS))]
+    def part(place: int) -> list[_Part]:
+        return [_part(each, weights, shapes) for each, shapes in zip(fields(place), learnt, strict=True)]
 
+    # Shapes are learnt from some thicknesses first; those in between need no memory after they are done.
+    first = sorted({*range(0, t.size, _LEARNT), t.size - 1}, reverse=True)
+    others = [place for place in range(t.size - 1, -1, -1) if place not in first]
+    parts: dict[int, list[_Part]] = {}
     with ThreadPoolExecutor(workers) as pool:
-        # The thickest take longest and come first.
-        done = []
-        for number, part in enumerate(pool.map(coarse_part, coarse[::-1])):
-            done.append(part)
-            tell(0.8 * (number + 1) / coarse.size, f"thickness {coarse[::-1][number]:.3g}")
-        fine_done = []
-        for number, mean in enumerate(pool.map(fine_part, fine[::-1])):
-            fine_done.append(mean)
-            tell(0.8 + 0.2 * (number + 1) / fine.size, "means over directions")
-    waves, lengths = (
-        tuple(np.stack([part[s][which] for part in done[::-1]]).astype(np.float16) for s in range(len(SETS)))
-        for which in (0, 1)
-    )
-    stacked = np.stack(fine_done[::-1], axis=1)
-    packed = np.concatenate([stacked, np.zeros_like(stacked[..., :1])], axis=-1)
+        samples = []
+        for place, sample in zip(first, pool.map(fields, first), strict=True):
+            samples.append(sample)
+            tell(len(samples) / (t.size + 1), f"thickness {t[place]:.3g}")
+        learnt = [_learnt(of_set, weights, ranks) for of_set, ranks in zip(zip(*samples, strict=True), RANKS)]
+        for place, sample in zip(first, samples, strict=True):
+            parts[place] = [_part(each, weights, shapes) for each, shapes in zip(sample, learnt, strict=True)]
+        samples.clear()
+        for place, done in zip(others, pool.map(part, others), strict=True):
+            parts[place] = done
+            tell(len(parts) / (t.size + 1), f"thickness {t[place]:.3g}")
+    by_set = [[parts[place][number] for place in range(t.size)] for number in range(len(SETS))]
+    means = np.stack([_filled(np.stack([each.means for each in of_set])) for of_set in by_set])
     return CanonicalTables(
-        grid, packed.astype(np.float32), waves, lengths, angular.astype(np.float32), time.perf_counter() - began
+        grid,
+        means.astype(np.float32),
+        tuple(np.stack([each.coefficients for each in of_set]).astype(np.float16) for of_set in by_set),
+        tuple(np.concatenate(shapes).T.reshape(mu.size, azimuths.size, -1).astype(np.float32) for shapes in learnt),
+        angular.astype(np.float32),
+        time.perf_counter() - began,
     )
 
 
-def _means(slabs: DirectionalMoments, t: float, suns: Array, depths: Array) -> Array:
-    """Return b, D_b, log s_b of a slab, (sets, depths, suns, 3)."""
-    light = slabs(t, suns, list(depths))
-    mu = slabs.wanted
-    weights = np.sqrt((1 - mu) * (1 + mu))
-    source = light[:, 0] / -np.expm1(-coordinates.way_behind(depths[:, None], t, mu))
-    b, first, second = (
-        ((source[:, field] * weights).sum(-1) / weights.sum()).transpose(0, 2, 1) for field in (0, 1, 3)
-    )
-    b = np.maximum(b, 1e-300)
-    mean = first / b
-    spread = np.maximum(second / b - mean**2, 1e-12) / 2
-    return np.stack([np.log(b), mean, np.log(spread) / 2], axis=-1)
+@dataclass(frozen=True)
+class _Fields:
+    """A set in one slab. `values` has F, X, Y and Z (4, depths, suns, directions and azimuths); `means` b and log s_b.
 
-
-def _coefficients(
-    light: Array, means: Array, angular: Array, number: int, t: float, suns: Array, depths: Array, mu: Array
-) -> tuple[Array, Array]:
-    """Return the coefficients of one set, of F and of the lengths, (depths, suns, directions, coefficients) each.
-
-    `light` is (modes, 4, suns, depths, directions), `means` (depths, suns, 3).
+    Means are NaN where there is no light; `places` are weights of depths and suns for F and Z, and for X and Y.
     """
-    azimuths = (np.arange(_AZIMUTHS) + 0.5) * np.pi / _AZIMUTHS
-    m0, x, y, square = (field.transpose(1, 0, 2, 3) for field in at_azimuths(light, azimuths))
-    cosines = -mu[:, None] * suns[:, None, None] + np.sqrt(
-        (1 - mu[:, None] ** 2) * (1 - suns[:, None, None] ** 2)
-    ) * np.cos(azimuths)
-    source = m0 / -np.expm1(-coordinates.way_behind(depths[:, None], t, mu))[:, None, :, None]
-    source = source / at_angle(angular, cosines)
-    dark = source < _DIMMEST
-    safe = np.where(dark, 1.0, m0)
-    b, mean, log_spread = (means[..., field, None, None] for field in range(3))
-    spread = np.exp(log_spread)
-    way, variance = (
-        each[:, None, :, None] for each in coordinates.last_way(coordinates.way_behind(depths[:, None], t, mu))
-    )
-    sines = np.sqrt(1 - mu[:, None] ** 2)
-    d_x, d_y = x / safe, y / safe
-    square = square / safe - d_x**2 - d_y**2
-    square = np.maximum(square - sines**2 * variance, 1e-3 * np.maximum(square, 1e-12))
-    f = np.clip(np.log(np.where(dark, 1.0, source)) - b, -_LARGEST, _LARGEST)
-    x, y = (
-        (each - mean_part - sines * wave * way) / spread
-        for each, mean_part, wave in ((d_x, mean, np.cos(azimuths)), (d_y, 0.0, np.sin(azimuths)))
-    )
-    f, x, y, z = (np.where(dark, 0.0, each) for each in (f, x, y, np.log(square / 2) / 2 - log_spread))
-    of_x, of_y, of_z = LENGTHS[number]
-    waves = _cosines(f, WAVES[number], azimuths)
-    lengths = [_cosines(x, of_x, azimuths), _sines(y, of_y, azimuths), _cosines(z, of_z, azimuths)]
-    return waves, np.concatenate(lengths, axis=-1)[:, :, ::2]
+
+    values: Array
+    means: Array
+    places: tuple[Array, Array]
 
 
-def _cosines(values: Array, count: int, azimuths: Array) -> Array:
-    """Return coefficients of cos(m phi), m from 0 on, of values at even azimuths."""
-    orders = np.arange(count)[:, None]
-    return values @ (np.cos(orders * azimuths) * np.where(orders > 0, 2, 1) / _AZIMUTHS).T
+@dataclass(frozen=True)
+class _Part:
+    """The means of a set in one slab (depths, suns, 2), and the coefficients (depths, suns, products)."""
+
+    means: Array
+    coefficients: Array
 
 
-def _sines(values: Array, count: int, azimuths: Array) -> Array:
-    """Return coefficients of sin(m phi), m from 1 on."""
-    return values @ (np.sin(np.arange(1, count + 1)[:, None] * azimuths) * 2 / _AZIMUTHS).T
+def _fields(
+    slabs: DirectionalMoments, angular: Array, t: float, suns: Array, count: int, *, azimuths: Array, weights: Array
+) -> list[_Fields]:
+    """Return all sets in one slab."""
+    depths, mu = coordinates.depths(count, t), slabs.wanted
+    light = slabs(t, suns, list(depths))
+    moments = [
+        [field.transpose(1, 0, 2, 3) for field in at_azimuths(light[number], azimuths)] for number in range(len(SETS))
+    ]
+    total = sum(np.maximum(of_set[0], 0) for of_set in moments)
+    sines = np.sqrt(1 - mu**2)[:, None]
+    cosines = -mu[:, None] * suns[:, None, None] + sines * np.sqrt(1 - suns[:, None, None] ** 2) * np.cos(azimuths)
+    ways = coordinates.way_behind(depths[:, None], t, mu)
+    passed = np.log(-np.expm1(-ways))[:, None, :, None]
+    way, variance = (each[:, None, :, None] for each in coordinates.last_way(ways))
+    measure = np.outer(_widths(depths / t, 0.0, 1.0), _widths(suns, 0.0, 1.0))
+    result = []
+    for number, (m0, x, y, square) in enumerate(moments):
+        lit = m0 > _DIMMEST
+        safe = np.where(lit, m0, 1.0)
+        d_x, d_y = x / safe, y / safe
+        whole = np.maximum(square / safe - d_x**2 - d_y**2, 1e-12) / 2
+        own = np.maximum(whole - sines**2 * variance / 2, 1e-3 * whole)
+        f = np.log(safe) - passed - np.log(at_angle(angular[number], cosines))
+        f, x, y, z = (
+            np.where(lit, each, 0.0).reshape(*measure.shape, -1)
+            for each in (f, d_x - sines * np.cos(azimuths) * way, d_y - sines * np.sin(azimuths) * way, np.log(own) / 2)
+        )
+        seen = lit.reshape(f.shape)
+        counted = np.maximum((seen * weights).sum(-1, keepdims=True), 1e-300)
+        b, log_spread = ((each * weights).sum(-1, keepdims=True) / counted for each in (f, z))
+        spread = np.exp(log_spread)
+        shift = (np.where(seen, each / spread, 0.0).clip(-_LARGEST_SHIFT, _LARGEST_SHIFT) for each in (x, y))
+        z = np.where(seen, z - log_spread, 0.0).clip(-_LARGEST_SPREAD, _LARGEST_SPREAD)
+        values = np.stack([np.where(seen, f - b, 0.0), *shift, z])
+        b = b - coordinates.reference(number, t, depths)[:, None, None]
+        means = np.where(seen.any(-1, keepdims=True), np.concatenate([b, log_spread], axis=-1), np.nan)
+        counts = ((m0 > _SHARE * total) & lit).reshape(f.shape) * weights
+        bright = measure * np.maximum(counts.sum(-1), _SHARE)
+        finer = np.minimum(spread / np.sqrt(np.where(lit, whole, 1.0)).reshape(f.shape), 3.0)
+        result.append(_Fields(values.astype(np.float32), means, (bright, bright * (finer**2 * weights).sum(-1))))
+    return result
+
+
+def _learnt(samples: Sequence[_Fields], weights: Array, ranks: tuple[int, ...]) -> list[Array]:
+    """Return the shapes of F, X, Y and Z of one set, (products, directions and azimuths) each."""
+    shapes = []
+    for which, rank in enumerate(ranks):
+        values = np.concatenate([sample.values[which].reshape(-1, weights.size) for sample in samples])
+        places = np.concatenate([sample.places[which in (1, 2)].ravel() for sample in samples])
+        shapes.append(direction_shapes(values.astype(np.float64), places, weights, rank))
+    return shapes
+
+
+def _part(fields: _Fields, weights: Array, shapes: Sequence[Array]) -> _Part:
+    """Return what tables keep of the fields of a set in one slab."""
+    of_each = [coefficients(values, weights, own) for values, own in zip(fields.values, shapes, strict=True)]
+    return _Part(fields.means, np.concatenate(of_each, axis=-1))
+
+
+def _widths(places: Array, low: float, high: float) -> Array:
+    """Return the widths of the cells around places over their mean, small ones raised: weights of entries."""
+    edges = np.concatenate([[low], (places[1:] + places[:-1]) / 2, [high]])
+    widths = np.diff(edges) / np.diff(edges).mean()
+    return np.maximum(widths, _LEAST_WEIGHT) / np.maximum(widths, _LEAST_WEIGHT).sum()
+
+
+def _filled(means: Array) -> Array:
+    """Return means (thicknesses, depths, suns, 2) that go on where there is no light, so that cubics stay calm."""
+    for axis, order in ((1, 1), (0, -1), (2, -1), (1, -1), (0, 1)):
+        along = np.moveaxis(means, axis, 0)[::order]
+        for step in range(1, len(along)):
+            along[step] = np.where(np.isnan(along[step]), along[step - 1], along[step])
+    return np.nan_to_num(means)
 
 
 def at_azimuths(light: Array, azimuths: Array) -> tuple[Array, Array, Array, Array]:

@@ -35,7 +35,7 @@ def test_a_slab_is_exact_to_two_percent(variant, monkeypatch, peak):
 
     for name, value in (("THINNEST", 3.0), ("THICKEST", 4.8), ("LOWEST_SUN", 0.7)):
         monkeypatch.setattr(coordinates, name, value)
-    few = Grid(thicknesses=4, depths=10, suns=4, directions=33, fine_thicknesses=5, fine_depths=24, fine_suns=5)
+    few = Grid(thicknesses=4, depths=12, suns=4, directions=25, azimuths=10)
     monkeypatch.setattr(method, "canonical_tables", lambda phase, albedo: canonical_tables(phase, albedo, grid=few))
     monkeypatch.setattr(grid, "SIDES", (4, 8, 4, 33, 9))
     monkeypatch.setattr(grid, "FINE", (5, 24, 5))

@@ -9,7 +9,7 @@ from reports.commands.main import WRONG_INPUT, run
 from reports.tables.clouds import clouds_sentence, clouds_tables
 from validation.canonical.record import canonical_record
 
-SMALL = Grid(4, 4, 4, 7, 4, 4, 4)
+SMALL = Grid(4, 4, 4, 7, 8)
 
 
 @pytest.mark.slow
@@ -18,7 +18,7 @@ def test_the_record_has_the_names_of_the_page(variant, own_cache):
     assert list(first) == ["phase", "albedo", "bytes", "seconds", "kept", "grid", "sets", "check"]
     assert not first["kept"]
     assert [row["orders"] for row in first["sets"]] == ["2", "3-4", "5-6", "7-8", "9-12", "13-18", "19-30", "31-inf"]
-    assert list(first["check"]) == ["points", "seed", "seconds", "sets"]
+    assert list(first["check"]) == ["points", "slabs", "seed", "seconds", "sets"]
     row = first["check"]["sets"][0]
     assert list(row) == ["orders", "points", "negligible", "T", "c", "sigma"]
     assert row["points"] + row["negligible"] == 2
