@@ -24,9 +24,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from realtime.clouds.slab_orders.phases import SlabPhase
+
 Array = NDArray[Any]
 
 _CHECK, _MEDIUM = "checksum", "medium"
+_TOLD_APART = 300  #: moments by which phase functions are told apart
+#: By which media may differ that share tables. In thick slabs light is scattered thousands of times.
+_SAME_MOMENT, _SAME_ALBEDO = 2e-5, 1e-6
 
 
 def _folder() -> Path:
@@ -35,7 +40,12 @@ def _folder() -> Path:
     return Path(own) if own else (Path(base) if base else Path.home() / ".cache") / "airlight"
 
 
-def load_kept(digest: str, medium: Array, same: Array) -> dict[str, Any] | None:
+def medium_numbers(phase: SlabPhase, albedo: float) -> Array:
+    """Return what tells a medium from others: moments of its phase function, and its albedo."""
+    return np.append(phase.moments(_TOLD_APART), albedo)
+
+
+def load_kept(digest: str, medium: Array) -> dict[str, Any] | None:
     """Return the arrays under a digest of a medium, None where there are none or the file is damaged.
 
     Parameters
@@ -43,12 +53,10 @@ def load_kept(digest: str, medium: Array, same: Array) -> dict[str, Any] | None:
     digest
         Of how tables were made.
     medium
-        Numbers that tell it from others.
-    same
-        By how much each may differ.
+        From `medium_numbers`.
     """
     for path in sorted(_folder().glob(f"canonical-{digest}-*.npz")):
-        arrays = _read(path, medium, same)
+        arrays = _read(path, medium)
         if arrays is not None:
             with suppress(OSError):
                 os.utime(path)  # what was used longest ago is dropped first
@@ -56,11 +64,12 @@ def load_kept(digest: str, medium: Array, same: Array) -> dict[str, Any] | None:
     return None
 
 
-def _read(path: Path, medium: Array, same: Array) -> dict[str, Any] | None:
+def _read(path: Path, medium: Array) -> dict[str, Any] | None:
     """Return the arrays of a file, None where it is of another medium or damaged."""
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
-            if not np.all(np.abs(stored[_MEDIUM] - medium) <= same):
+            apart = np.abs(stored[_MEDIUM] - medium)
+            if np.any(apart[:-1] > _SAME_MOMENT) or apart[-1] > _SAME_ALBEDO:
                 return None
             arrays = {name: stored[name] for name in stored.files}
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):

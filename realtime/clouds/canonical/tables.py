@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from realtime.clouds.canonical import coordinates
 from realtime.clouds.canonical.angular import at_angle, repeated_scattering
 from realtime.clouds.canonical.directional_moments import DirectionalMoments
-from realtime.clouds.canonical.kept import keep, load_kept
+from realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
 from realtime.clouds.canonical.low_rank import coefficients, direction_shapes
 from realtime.clouds.canonical.sets import SETS
 from realtime.clouds.slab_orders.phases import SlabPhase
@@ -41,9 +41,6 @@ RANKS: tuple[tuple[int, int, int, int], ...] = (
     (8, 8, 4, 4),
     (8, 8, 8, 4),
 )
-_TOLD_APART = 300  #: moments by which phase functions are told apart
-#: By which media may differ that share tables. In thick slabs light is scattered thousands of times.
-_SAME_MOMENT, _SAME_ALBEDO = 2e-5, 1e-6
 _LEARNT = 3  #: shapes are learnt from every third thickness
 #: Streams of slabs thinner than so much: in thin ones most light goes within their thickness of the horizon.
 _STREAMS = (0.3, 48), (10.0, 32), (np.inf, 24)
@@ -124,9 +121,8 @@ def canonical_tables(
             f"albedo: got {albedo:g}, wanted more than 0, at most 1: without scattering there are no tables"
         )
     grid = grid or Grid()
-    digest, medium = tables_digest(grid), np.append(phase.moments(_TOLD_APART), albedo)
-    same = np.append(np.full(_TOLD_APART, _SAME_MOMENT), _SAME_ALBEDO)
-    arrays = load_kept(digest, medium, same)
+    digest, medium = tables_digest(grid), medium_numbers(phase, albedo)
+    arrays = load_kept(digest, medium)
     if arrays is None:
         tables = make_tables(phase, albedo, grid, progress=progress or _logged())
         named = {f"coefficients_{number}": each for number, each in enumerate(tables.coefficients)}

@@ -21,7 +21,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.clouds.canonical.kept import keep, load_kept
+from realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
 from realtime.clouds.order_layers import FIRST_ORDERS
 from realtime.clouds.slab_orders.depth_panels import Transport, depth_panels
 from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes
@@ -51,13 +51,13 @@ def escapes(phase: SlabPhase, albedo: float) -> Array:
     phase, albedo
         Of the medium, the albedo in [0, 1].
     """
-    digest = hashlib.blake2b(digest_size=16)
-    digest.update(repr(("escapes", _VERSION, round(albedo, 9), THINNEST, THICKEST, THICKNESSES, COSINES)).encode())
-    digest.update(np.round(phase.moments(2 * _STREAMS + 1), 6).astype(np.float32).tobytes())
-    arrays = load_kept(digest.hexdigest())
+    made = "escapes", _VERSION, _STREAMS, THINNEST, THICKEST, THICKNESSES, COSINES
+    digest = hashlib.blake2b(repr(made).encode(), digest_size=8).hexdigest()
+    medium = medium_numbers(phase, albedo)
+    arrays = load_kept(digest, medium)
     if arrays is None:
         arrays = {"shares": np.stack([slab_escapes(t, phase, albedo) for t in thicknesses()])}
-        keep(digest.hexdigest(), arrays)
+        keep(digest, medium, arrays)
     return np.asarray(arrays["shares"])
 
 
