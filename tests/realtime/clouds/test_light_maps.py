@@ -89,6 +89,7 @@ def _saw(width=1.0):
     tilted = np.tile([[-(0.5**0.5)], [0.0], [0.5**0.5]], count)
     return LitSurfaces(
         SIZE,
+        mi.UInt32(np.arange(count, dtype=np.uint32)),
         mi.Bool(np.ones(count, dtype=bool)),
         mi.Float(200.0 + width * (column % 8)),
         mi.Float(np.full(count, 100.0)),

@@ -125,7 +125,8 @@ def test_depths_are_the_sums_of_the_grid_and_converge():
 @pytest.mark.parametrize("precision", ["single", "double"])
 def test_an_even_grid_is_a_homogeneous_cloud(name, precision):
     even, homogeneous = even_and_homogeneous(sky=SKY)
-    grid, plain = (rendered(scene, name, precision) for scene in (even, homogeneous))
+    # A uniform sky needs a slab, which no grid has: it is a beam there.
+    grid, plain = (rendered(scene, name, precision, sky="beams") for scene in (even, homogeneous))
     np.testing.assert_allclose(grid.extra["opacity"], plain.extra["opacity"], atol=1e-5)
     np.testing.assert_allclose(grid.surface, plain.surface, atol=1e-5)
     assert set(grid.extra) == set(plain.extra)
@@ -149,7 +150,9 @@ def test_the_printed_equations_run_on_grids(name):
 @pytest.mark.claim("hypertexture-converges", tolerance="none: errors that shrink at least by half")
 @pytest.mark.parametrize("name", ["cloud-octaves", "cloud-collectors"])
 def test_finer_grids_of_a_smooth_field_converge(name):
-    images = [np.array(rendered(uneven(waves(n)), name).airlight) for n in (12, 24, 48, 96)]
+    # Light of the formula does not fade where there is no slab behind a point, which `way=ray` divides by.
+    whole = {"way": "printed"} if name == "cloud-collectors" else {}
+    images = [np.array(rendered(uneven(waves(n)), name, **whole).airlight) for n in (12, 24, 48, 96)]
     steps = [np.sqrt(np.mean((a - b) ** 2)) / images[-1].mean() for a, b in pairwise(images)]
     assert steps[1] < 0.6 * steps[0]
     assert steps[2] < 0.6 * steps[1]
