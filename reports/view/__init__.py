@@ -17,7 +17,7 @@ Read in this order:
 `page/` holds the page.
 
 May import: `analytic`, `realtime.area_lights`, `realtime.errors`, `realtime.frame`, `realtime.kernels`,
-`realtime.methods`, `realtime.parameters`, `realtime.scene`, `reference.quadrature`, `reference.scene`,
-`reference.storage`, `reports.machine`, `reports.plotting`, `validation.configurations`, `validation.metrics`,
-`validation.scenes`.
+`realtime.methods`, `realtime.numerics`, `realtime.parameters`, `realtime.scene`, `reference.quadrature`,
+`reference.scene`, `reference.storage`, `reports.machine`, `reports.plotting`, `validation.configurations`,
+`validation.metrics`, `validation.scenes`.
 """

@@ -8,5 +8,5 @@ Read in this order:
 - `timing.py`: medians of frames and of their stages.
 
 May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.methods`,
-`realtime.parameters`, `realtime.scene`, `validation.scenes`.
+`realtime.numerics`, `realtime.parameters`, `realtime.scene`, `validation.scenes`.
 """

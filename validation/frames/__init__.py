@@ -18,7 +18,7 @@ Read in this order:
 - `zero_cost.py`: checks that what a scene does not need costs nothing.
 
 May import: `analytic`, `realtime.area_lights`, `realtime.clouds.canonical`, `realtime.errors`, `realtime.frame`,
-`realtime.kernels`, `realtime.memory`, `realtime.methods`, `realtime.parameters`, `realtime.scene`,
+`realtime.kernels`, `realtime.memory`, `realtime.methods`, `realtime.numerics`, `realtime.parameters`, `realtime.scene`,
 `reference.quadrature`, `reference.scene`, `reference.storage`, `validation.configurations`, `validation.estimates`,
 `validation.metrics`, `validation.scenes`, `validation.statistics`.
 """
