@@ -478,7 +478,8 @@ def _many_times(
         parameters.iterations,
         parameters.settled,
         parameters.thickness == "light",
-        covered=parameters.cover == "share",
+        # Where a density stays below the threshold the map has no cloud, but light passes there, too.
+        covered=parameters.cover == "share" and state.body is None,
         as_ray=parameters.way == "ray",
     )
     of_sun = state.maps[sun]

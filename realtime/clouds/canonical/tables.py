@@ -32,7 +32,7 @@ VERSION = 2
 
 #: Products of F, X, Y and Z by set. They are read in packets of four.
 RANKS: tuple[tuple[int, int, int, int], ...] = (
-    (36, 32, 20, 12),
+    (44, 32, 20, 20),
     (24, 16, 12, 8),
     (16, 12, 8, 8),
     (16, 12, 8, 4),
@@ -56,7 +56,7 @@ class Grid:
     """Entries of the tables along each coordinate."""
 
     thicknesses: int = 36
-    depths: int = 29
+    depths: int = 33
     suns: int = 14
     directions: int = 33
     azimuths: int = 16

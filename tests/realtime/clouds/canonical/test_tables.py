@@ -67,7 +67,7 @@ def test_at_entries_look_ups_are_the_computation(look_up):
         T, c_x, c_y, sigma = values(look_up, number, t, d, mu, phi, mu_l)
         assert pytest.approx(exact[0, number], rel=1e-3) == T
         # The spread of order 2 has most of the products that are cut off.
-        assert sigma == pytest.approx(exact[3, number], rel=6e-3 if number else 0.015)
+        assert sigma == pytest.approx(exact[3, number], rel=6e-3)
         off = np.hypot(c_x - exact[1, number], c_y - exact[2, number]) / exact[3, number]
         assert off.max() < 0.01
 
