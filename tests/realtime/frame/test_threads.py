@@ -12,12 +12,16 @@ from reports.machine.environment import activate
 activate()
 import drjit as dr
 import numpy as np
+import pytest
 from realtime.frame.renderer import render_frame
 from realtime.methods.registry import METHODS
 from realtime.scene.read_scene import read_scene
+from tests.helpers.transport_formula import use_formula
 from validation.configurations.methods import configuration, prepared
 from validation.scenes.loading import load_scene
 
+# The tables of clouds take minutes to make, and are the same whoever draws.
+use_formula(pytest.MonkeyPatch())
 # As many pixels as several blocks of work have, so that each of the threads gets some.
 fog, clouds = (read_scene(load_scene(name, (128, 96)).scene) for name in ("sphere-spot", "cumulus"))
 for method in METHODS.values():
