@@ -194,8 +194,7 @@ def turned_objects(scene: Scene, objects: Objects, turn: Array) -> Scene:
 def closed_shapes(casters: Casters) -> tuple[str, ...]:
     """Return the names of the shapes all of whose components are closed: things, not floors and walls."""
     names = []
-    firsts = [first for _, first, _ in casters.shapes]
-    owner = np.searchsorted(firsts, casters.triangles[:, 0], side="right") - 1
+    owner = casters.shapes_of(casters.triangles[:, 0])
     for number, (name, _, _) in enumerate(casters.shapes):
         components = np.unique(casters.component[owner == number])
         if len(components) and casters.closed[components].all():

@@ -109,8 +109,7 @@ class Casters:
 
     def of_shape(self, name: str) -> NDArray[np.bool_]:
         """Return which components are of a shape."""
-        firsts = np.array([first for _, first, _ in self.shapes])
-        owner = np.searchsorted(firsts, self.triangles[:, 0], side="right") - 1
+        owner = self.shapes_of(self.triangles[:, 0])
         numbers = [number for number, (own, _, _) in enumerate(self.shapes) if own == name]
         result = np.zeros(len(self.closed), dtype=bool)
         result[self.component[np.isin(owner, numbers)]] = True

@@ -17,6 +17,7 @@ GAIN_SHIFT, GAIN_ZERO = 24, 32  #: gains from -32 to 31; a plane that gains more
 FULL = 1 << 30  #: whatever ray the list is for: it lies in the span of the plane; see `Lists` and `Wedges`
 FIRST = 1 << 31  #: the first bin that holds the plane
 
+BINS = 64  #: of azimuth, from which tiles draw
 ROOM = 32  #: entries for each tile and, fourfold, for each block, on average
 
 

@@ -49,7 +49,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.methods.shadow_planes.plane_entries import FIRST, entry_words, in_bins
+from realtime.methods.shadow_planes.plane_entries import BINS, FIRST, entry_words, in_bins
 from realtime.methods.shadow_planes.silhouettes import Silhouette, silhouette
 from realtime.methods.shadow_planes.spot_pyramid import NEARNESS, is_outside, ring_edges
 from realtime.methods.shadow_planes.wedges import Wedges, wedge_lists, wedges_pay
@@ -59,8 +59,6 @@ from realtime.scene.lights import place_and_weight
 from realtime.scene.mesh_adjacency import Casters
 
 Array = NDArray[np.float64]
-
-BINS = 64  #: of azimuth
 
 
 @dataclass(frozen=True)
@@ -321,7 +319,7 @@ def index_planes(
     Float = types.scalar
     real = np.float32 if is_single(Float) else np.float64
     wedges = None
-    if tiles is not None and wedges_pay(planes, *tiles(axes)):
+    if tiles is not None and wedges_pay(start, entries, *tiles(axes)):
         start_of_wedge, in_order, bounds, scale = wedge_lists(planes, order=order)
         wedges = Wedges(
             mi.UInt32(_padded(start_of_wedge)),

@@ -13,8 +13,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.shadow_planes.plane_entries import FIRST, FULL, NUMBER, ROOM, Source, entry_at
-from realtime.methods.shadow_planes.plane_table import BINS, PlaneIndex
+from realtime.methods.shadow_planes.plane_entries import BINS, FIRST, FULL, NUMBER, ROOM, Source, entry_at
+from realtime.methods.shadow_planes.plane_table import PlaneIndex
 from realtime.methods.shadow_planes.tile_boxes import Box, block_boxes, tile_boxes, touches
 from realtime.numerics.array_types import four_numbers
 from realtime.numerics.diamond_angle import TURN

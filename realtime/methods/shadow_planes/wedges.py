@@ -29,14 +29,13 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.methods.shadow_planes.plane_entries import FULL, ROOM, Source, entry_words, in_bins
+from realtime.methods.shadow_planes.plane_entries import BINS, FIRST, FULL, ROOM, Source, entry_words, in_bins
 from realtime.numerics.diamond_angle import TURN, host_direction
 
 Array = NDArray[np.float64]
 
 _FINE = 4  #: wedges that a plane spans on average: lists are a quarter longer than what is at an azimuth
 _LEAST, _MOST = 1 << 6, 1 << 16  #: wedges
-_COARSE = 64  # bins of azimuth to count in
 # Measured at 800 x 600 on a busy machine, tiles against wedges: with 2.0 times the planes of an azimuth 204 to 232 ms
 # (`hall`), with 3.2 and 5.5 times 572 to 192 and 9887 to 221 ms (bumpy spheres, 82 and 328 thousand triangles).
 _TIMES, _MANY = 3, 4
@@ -83,7 +82,7 @@ class Wedges:
         return Source(first, low - first, low), mi.Bool(True)
 
 
-def wedges_pay(planes, azimuth: Array, width: Array) -> bool:
+def wedges_pay(start: NDArray[np.uint32], entries: NDArray[np.uint32], azimuth: Array, width: Array) -> bool:
     """Return whether wedges are to serve a frame and not lists of tiles.
 
     Tiles draw planes by where they are along a ray too, which wedges do not: those they beat where a tile's azimuths
@@ -91,18 +90,19 @@ def wedges_pay(planes, azimuth: Array, width: Array) -> bool:
 
     Parameters
     ----------
-    planes
-        See `wedge_lists`.
+    start, entries
+        The planes by bins of azimuth, see `realtime.methods.shadow_planes.plane_table.binned`.
     azimuth, width
         Of some tiles of the image, diamond angles.
     """
     if not len(azimuth):
         return False
-    _, number, is_first = in_bins(planes.first, planes.last, _COARSE)
-    all_planes, begins = (np.bincount(bins, minlength=_COARSE) for bins in (number, number[is_first]))
-    bins = np.minimum((azimuth * (_COARSE / TURN)).astype(np.int64), _COARSE - 1)
+    ends = start[: BINS + 1].astype(np.int64)
+    first_marks = np.cumsum(np.append(0, (entries[: ends[-1]] & FIRST) != 0))
+    all_planes, begins = np.diff(ends), np.diff(first_marks[ends])
+    bins = np.minimum((azimuth * (BINS / TURN)).astype(np.int64), BINS - 1)
     at_azimuth = (all_planes - begins)[bins]  # the mean over the bin: a plane ends in as many as it begins in
-    of_tile = at_azimuth + begins[bins] * width * (_COARSE / TURN)
+    of_tile = at_azimuth + begins[bins] * width * (BINS / TURN)
     planes_at, planes_of = float(np.mean(at_azimuth)), float(np.mean(of_tile))
     return planes_of > max(ROOM, min(_TIMES * planes_at, _MANY * ROOM))
 

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from realtime.methods.shadow_planes.plane_entries import FIRST, GAIN_SHIFT, GAIN_ZERO, NUMBER
-from realtime.methods.shadow_planes.plane_table import BINS, binned, layers_between, light_basis, shadow_planes
+from realtime.methods.shadow_planes.plane_entries import BINS, FIRST, GAIN_SHIFT, GAIN_ZERO, NUMBER
+from realtime.methods.shadow_planes.plane_table import binned, layers_between, light_basis, shadow_planes
 from realtime.methods.shadow_planes.silhouettes import silhouette
 from realtime.numerics.diamond_angle import host_diamond_angle
 from realtime.scene.mesh_adjacency import make_casters

@@ -124,7 +124,7 @@ def test_planes_marked_full_are_at_all_azimuths_of_their_wedge(variant):
 @pytest.mark.parametrize(("width", "finer"), [(0.002, False), (4.0, True)])
 def test_wedges_serve_where_planes_are_finer_than_tiles(variant, width, finer):
     """The same planes, seen by narrow and by wide tiles."""
-    from realtime.methods.shadow_planes.plane_table import light_basis, shadow_planes
+    from realtime.methods.shadow_planes.plane_table import binned, light_basis, shadow_planes
     from realtime.methods.shadow_planes.silhouettes import silhouette
     from realtime.methods.shadow_planes.wedges import wedges_pay
 
@@ -134,7 +134,7 @@ def test_wedges_serve_where_planes_are_finer_than_tiles(variant, width, finer):
     whole = planes.first < planes.last  # none across azimuth 0
     planes = type(planes)(*(getattr(planes, name)[whole] for name in planes.__dataclass_fields__))
     azimuth = np.linspace(0, 3.9, 40)
-    assert wedges_pay(planes, azimuth, np.full(40, width)) == finer
+    assert wedges_pay(*binned(planes), azimuth, np.full(40, width)) == finer
 
 
 def test_a_scene_without_planes_needs_no_wedges(variant):
