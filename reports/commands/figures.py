@@ -25,6 +25,7 @@ FIGURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "froxels": ("froxels", ("quick", "progress")),
     "slab-orders": ("slab_orders", ("quick", "progress")),
     "map-size": ("map_size", ("quick", "progress")),
+    "scaling": ("scaling", ("quick", "progress")),
     "stages": ("stages", ("quick", "progress", "published")),
     "published": ("published", ("quick", "progress", "published")),
     "paper-images": ("paper_images", ("quick",)),
