@@ -14,5 +14,5 @@ Read in this order:
 
 May import: `analytic.errors`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `realtime.scene`,
 `reference.quadrature`, `reference.storage`, `validation.configurations`, `validation.estimates`, `validation.metrics`,
-`validation.scenes`.
+`validation.random_scenes`, `validation.scenes`.
 """

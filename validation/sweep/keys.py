@@ -16,8 +16,9 @@ from importlib.metadata import version
 from pathlib import Path
 
 from analytic.errors import InputError
+from validation.scenes.random_scene import PREFIX, is_random
 from validation.scenes.registry import SCENES
-from validation.sweep.study import RANDOM, Cell
+from validation.sweep.study import Cell
 
 #: Raise this number when rows change their meaning without a change of the source code that `source_digest` covers.
 GENERATION = 1
@@ -111,8 +112,11 @@ def scene_identity(scene: str) -> str:
     InputError
         If the file cannot be read.
     """
-    if scene in SCENES or scene.startswith(RANDOM):
+    if scene in SCENES:
         return scene
+    if is_random(scene):
+        seed, _, options = scene.removeprefix(PREFIX).partition(":")
+        return f"{PREFIX}{seed}" + (f":{_drawn_from(options)}" if options else "")
     path = Path(scene)
     try:
         content = path.read_bytes()
@@ -126,6 +130,19 @@ def scene_identity(scene: str) -> str:
     return digest.hexdigest()
 
 
+@lru_cache(maxsize=8)
+def _drawn_from(options: str) -> str:
+    """Return a digest of the files that the options of random scenes name: ranges, and meshes in the order of names."""
+    digest = hashlib.sha256()
+    for option in options.split(":"):
+        kind, _, name = option.partition("=")
+        place = Path(name)
+        for path in sorted(place.iterdir()) if place.is_dir() else [place]:
+            if path.is_file():
+                digest.update(f"|{kind} {path.name} ".encode() + hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
+
+
 def scene_identities(scenes: Iterable[str]) -> dict[str, str]:
     """Return the digests of those scenes that are files, by name."""
-    return {name: scene_identity(name) for name in scenes if not (name in SCENES or name.startswith(RANDOM))}
+    return {name: scene_identity(name) for name in scenes if not (name in SCENES or is_random(name))}

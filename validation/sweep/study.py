@@ -16,6 +16,8 @@
     [random]
     count = 100                                             # random:0 to random:99
     first = 0
+    meshes = "meshes"                                       # a folder, as of `--meshes`
+    ranges = "ranges.toml"                                  # a file, as of `--ranges`
 
     [parameters.ray-march]
     steps = [16, 100]                                       # a list has a cell for each of its values
@@ -35,13 +37,14 @@ from analytic.errors import InputError, nearest
 from realtime.methods.registry import METHODS
 from validation.configurations.kernel_names import find_kernel
 from validation.configurations.methods import QUICK, STANDARD, Configuration, configuration
+from validation.random_scenes.ranges import ranges_from, read_ranges
 from validation.scenes.changes import change_words
 from validation.scenes.loading import parse_size
+from validation.scenes.random_scene import PREFIX, is_random, random_name
 from validation.scenes.registry import SCENES
 from validation.sweep.row import TIMES
 
 SIZE = (160, 120)  #: of the images where a study gives none [pixels]
-RANDOM = "random:"  #: begins the names of random scenes
 
 _METHOD_SETS = ("all", "standard")
 _LONGEST = 86400.0
@@ -72,6 +75,8 @@ class RandomScenes:
 
     count: int = 0
     first: int = 0  #: seed of the first
+    meshes: Path | None = None  #: folder of meshes that take part
+    ranges: Path | None = None  #: TOML file of what is drawn
 
 
 @dataclass(frozen=True)
@@ -103,7 +108,8 @@ class Study:
         """Yield the scenes, random ones last."""
         yield from self.scenes
         seeds = range(self.random.first, self.random.first + self.random.count)
-        yield from (f"{RANDOM}{seed}" for seed in seeds)
+        options = random_name(PREFIX, self.random.meshes, self.random.ranges).removeprefix(PREFIX)
+        yield from (f"{PREFIX}{seed}{options}" for seed in seeds)
 
     def images(self) -> Iterator[tuple[Cell, ...]]:
         """Yield the cells of one image after the other: they share a truth."""
@@ -178,7 +184,7 @@ def parse_study(data: Mapping[str, Any], *, folder: Path = Path(), name: str = "
     given = Study(
         name=_word("name", data.get("name", name)),
         scenes=tuple(_scene(item, folder) for item in _list("scenes", data.get("scenes", []), empty=True)),
-        random=_random(data.get("random", {})),
+        random=_random(data.get("random", {}), folder),
         sizes=_once("sizes", sizes),
         configurations=_configurations(data),
         media=_once("media", tuple(_medium(item) for item in _list("media", data.get("media", [{}])))),
@@ -248,6 +254,12 @@ def _of_method(
             yield configuration(method, kernel, dict(plain.parameters))
 
 
+def seed_of(scene: str) -> int | None:
+    """Return the seed of a random scene; None for others."""
+    seed = scene.removeprefix(PREFIX).partition(":")[0]
+    return int(seed) if is_random(scene) and seed.isascii() and seed.isdigit() else None
+
+
 def map_side(chosen: Configuration) -> int | None:
     """Return the side of the shadow map of a configuration [pixels]; None for a method without one."""
     if chosen.method not in METHODS:
@@ -263,11 +275,10 @@ def _scene(item: Any, folder: Path) -> str:
         if SCENES[word].clouds:
             raise InputError(f"scenes: {word} scatters light many times; a sweep is of single scattering, leave it out")
         return word
-    if word.startswith(RANDOM):
-        seed = word.removeprefix(RANDOM)
-        if not (seed.isascii() and seed.isdigit()):
+    if is_random(word):
+        if seed_of(word) is None:
             raise InputError(f"scenes: got {word!r}, wanted random:SEED with a whole number from 0 on")
-        return f"{RANDOM}{int(seed)}"
+        return word
     path = folder / word
     if not path.is_file():
         raise InputError(
@@ -277,11 +288,18 @@ def _scene(item: Any, folder: Path) -> str:
     return str(path.resolve())
 
 
-def _random(table: Any) -> RandomScenes:
+def _random(table: Any, folder: Path) -> RandomScenes:
     given = _table("random", table)
     _known("random.", given, [item.name for item in fields(RandomScenes)])
     count = _number("random.count", given.get("count", 0), 0, _MOST_SCENES)
-    return RandomScenes(count, _number("random.first", given.get("first", 0), 0, 2**62))
+    first = _number("random.first", given.get("first", 0), 0, 2**62)
+    places = {name: folder / _word(f"random.{name}", given[name]) for name in ("meshes", "ranges") if name in given}
+    drawn = RandomScenes(count, first, **{name: place.resolve() for name, place in places.items()})
+    if drawn.ranges is not None:
+        read_ranges(drawn.ranges)  # refuses what cannot be drawn
+    if drawn.meshes is not None:
+        ranges_from({"meshes": str(drawn.meshes)}, "random")
+    return drawn
 
 
 def _medium(item: Any) -> tuple[str, ...]:

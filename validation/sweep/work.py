@@ -36,7 +36,7 @@ from validation.metrics.errors import FLOOR, error_metrics
 from validation.metrics.flip import flip_hdr
 from validation.metrics.other_tools import published_errors
 from validation.sweep.row import PROPERTY
-from validation.sweep.study import RANDOM, Cell, map_side
+from validation.sweep.study import Cell, map_side, seed_of
 from validation.sweep.truth import CellTruth
 
 Array = NDArray[np.float64]
@@ -63,10 +63,9 @@ class Rendered:
 def cell_columns(cell: Cell) -> dict[str, Any]:
     """Return the columns that say which cell a row is of, without its key."""
     chosen = cell.chosen
-    seed = int(cell.scene.removeprefix(RANDOM)) if cell.scene.startswith(RANDOM) else None
     return {
         "scene": cell.scene,
-        "seed": seed,
+        "seed": seed_of(cell.scene),
         "medium": " ".join(cell.medium) or None,
         "method": chosen.method,
         "kernel": chosen.kernel,
