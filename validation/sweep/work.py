@@ -104,7 +104,7 @@ def cell_row(
     row = cell_columns(cell) | {PROPERTY + name: float(value) for name, value in properties.items()}
     row |= _truth_columns(truth)
     try:
-        rendered = _render(scene, cell.chosen, timed=cell.times != "none")
+        rendered = _render(scene, cell.chosen, timed=cell.times == "with")
     except (InputError, TruthError) as error:
         return row | {"status": "refused", "reason": str(error)}
     row |= {"status": "done", **rendered.numbers, **error_columns(truth, rendered.frame, scene, cell)}
@@ -116,6 +116,17 @@ def cell_row(
     row["work_ms"] = 1e3 * (time.perf_counter() - begin)
     row["cpu_ms"] = 1e3 * (time.process_time() - spent)
     return row
+
+
+def cell_times(cell: Cell, scene: Scene) -> dict[str, Any]:
+    """Return the columns of the costs of a cell that can be rendered, its times among them.
+
+    Raises
+    ------
+    realtime.errors.InputError
+        If the method refuses the scene.
+    """
+    return dict(_render(scene, cell.chosen, timed=True).numbers)
 
 
 def stated_bound(chosen: Configuration, scene: Scene) -> float | None:
