@@ -164,7 +164,7 @@ def error_columns(truth: CellTruth, frame: Frame, scene: Scene, cell: Cell) -> d
         floor = FLOOR * truth.airlight.mean()
         allowed = row["bound"] * np.maximum(truth.airlight, floor) + truth.bound
         row["outside_bound"] = int((~(np.abs(test - truth.airlight) <= allowed)).any(axis=2).sum())
-    if scene.features.surfaces:
+    if scene.features.surfaces and truth.surface is not None:
         surface = error_metrics(truth.surface, np.asarray(frame.surface, dtype=np.float64))
         row |= {f"surface_{name}": getattr(surface, name) for name in ("relative_rmse", "p99", "max", "nonfinite")}
     if cell.flip:
