@@ -160,7 +160,9 @@ def _local(workers: int) -> Iterator[Any]:
     # Dask would pause a worker near its limit, and wait for memory that only the next task gives back.
     memory = {f"distributed.worker.memory.{name}": False for name in ("target", "spill", "pause")}
     # Other tasks' deaths count against a task that only waited on the same worker: we count ourselves.
-    counts = {"distributed.scheduler.allowed-failures": 10}
+    counts: dict[str, object] = {"distributed.scheduler.allowed-failures": 10}
+    # No truth waits behind another that takes minutes while somebody has nothing to do.
+    counts["distributed.scheduler.worker-saturation"] = 1.0
     # A cluster that is told of a death waits so long and then forgets the worker, though another process stands in.
     counts["distributed.deploy.lost-worker-timeout"] = 86400
     with temporary_folder() as folder, dask.config.set(memory | counts), ExitStack() as stack:

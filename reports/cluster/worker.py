@@ -19,7 +19,8 @@ from typing import Any
 TOLD = "told"  #: status of what is left in the cluster of an answer that was told
 ALONE = "alone"  #: the Dask resource of a worker on whose host nothing else runs
 _GRACE = 2.0  # after its limit a task has so long until its process ends: who waits has given it up by then [s]
-_FLUSH = 1.0 * 2**30  # resident memory from which compiled kernels and free memory are given back [bytes]
+_FREE = 0.6 * 2**30  # resident memory from which free memory is given back [bytes]
+_FLUSH = 1.0 * 2**30  # the same of compiled kernels, which are read from the disk again [bytes]
 _RETIRE = 1.6 * 2**30  # resident memory at which a worker is started anew, between two tasks [bytes]
 _LARGE = 200_000  # an answer that takes more is fetched, others are told [bytes]
 _SENT = 0.004  # until what a worker says is on its way, twice the interval of Dask's batches [s]
@@ -131,7 +132,7 @@ def _answer(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Answer:
 
 def _give_back(worker: Any) -> None:
     """Give memory back where there is much of it, and start the worker anew where that does not help."""
-    if _resident() < _FLUSH:
+    if _resident() < _FREE:
         return
     import gc
     import sys
@@ -140,8 +141,9 @@ def _give_back(worker: Any) -> None:
     if "drjit" in sys.modules:
         import drjit as dr
 
-        dr.flush_kernel_cache()
         dr.flush_malloc_cache()
+        if _resident() > _FLUSH:
+            dr.flush_kernel_cache()
     if _resident() > _RETIRE and worker.nanny:
         worker.loop.add_callback(worker.close_gracefully, restart=True)
 

@@ -6,7 +6,6 @@ from dataclasses import Field, fields
 from typing import Any
 
 from reference.quadrature.image import quadrature_image
-from reference.quadrature.light_points import PointPlan
 from reference.quadrature.ray_values import TruthImage
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_truth
@@ -17,7 +16,7 @@ from validation.estimates.light_on_ray import check_camera, check_rays, check_va
 
 Progress = Callable[[int, int, str], None]
 
-_USUAL: dict[str, Any] = {"samples": 256, "shadow_scale": 1.0, "pixel": "centre", "plan": None}
+_USUAL: dict[str, Any] = {"samples": 256, "shadow_scale": 1.0, "pixel": "centre"}
 
 
 def truth_image(
@@ -26,7 +25,6 @@ def truth_image(
     samples: int = 256,
     shadow_scale: float = 1.0,
     pixel: str = "centre",
-    plan: PointPlan | None = None,
     progress: Progress | None = None,
 ) -> TruthImage:
     """Return the quadrature truth of a Mitsuba scene at its own size, (height, width, 3) [W/(m^2 sr)].
@@ -35,7 +33,7 @@ def truth_image(
     ----------
     scene
         The `mi.Scene`.
-    samples, shadow_scale, pixel, plan, progress
+    samples, shadow_scale, pixel, progress
         See `reference.quadrature.image.quadrature_image`.
 
     Raises
@@ -43,7 +41,7 @@ def truth_image(
     InputError
         For a scene that cannot be read, and for radiance that is not finite, see `validation.estimates.light_on_ray`.
     """
-    settings: dict[str, Any] = {"samples": samples, "shadow_scale": shadow_scale, "pixel": pixel, "plan": plan}
+    settings: dict[str, Any] = {"samples": samples, "shadow_scale": shadow_scale, "pixel": pixel}
     key = _key(scene, settings)
     stored = load_arrays(key)
     if stored is not None and _needed(False) <= set(stored) <= _needed(True):
@@ -76,11 +74,8 @@ def has_truth(scene, *, pixel: str = "centre") -> bool:
 
 def _key(scene, settings: Mapping[str, Any]) -> str:
     """Return the name of a truth; it holds only what differs from the usual, so that older images are found."""
-    plan, pixel = settings["plan"], settings["pixel"]
     named = {name: settings[name] for name in ("samples", "shadow_scale")}
-    named |= {} if pixel == "centre" else {"pixel": pixel}
-    # Points stand for lights with extent alone: without them every plan gives the same image.
-    named |= {"plan": repr(plan)} if plan is not None and _has_extent(scene) else {}
+    named |= {} if settings["pixel"] == "centre" else {"pixel": settings["pixel"]}
     # What a renderer's own shadow rays see also depends on where they start.
     named |= {} if settings["shadow_scale"] == 1 else {"shadow_start": True}
     return cache_key(scene, "quadrature", named)
@@ -109,10 +104,6 @@ class _Parts:
         """Forget all parts."""
         for name in self._names:
             drop_arrays(name)
-
-
-def _has_extent(scene) -> bool:
-    return any(emitter.get_shape() is not None for emitter in scene.emitters())
 
 
 def _needed(every: bool) -> set[str]:

@@ -103,7 +103,7 @@ _ERRORS = (
         "pixels",
         {
             "pixels": "compared",
-            "masked": "left out: beside a light, where Monte Carlo has no truth",
+            "masked": "left out: seven of eight where a light has an extent, whose truth is dear",
             "nonfinite": "with NaN or infinity in the method's image; left out of every average",
             "negative": "with a negative value in the method's image",
             "outside_bound": "whose error exceeds the truth's bound and `bound`; null where the method states none",
@@ -197,7 +197,7 @@ _COST = (
             "frame_ms_low": "first quartile of a frame",
             "frame_ms_high": "third quartile of a frame",
             "frame_cpu_ms": "least processor time of a frame, of all threads: what a busy machine changes least",
-            "airlight_ms": "median of the airlight of a frame alone",
+            "airlight_ms": "median of the airlight of a frame alone; of a slow frame that of the whole",
             "work_ms": "that the cell took from its beginning to its row",
             "cpu_ms": "processor time of that, of all threads",
         },

@@ -109,7 +109,10 @@ def cell_row(
         return row | {"status": "refused", "reason": str(error)}
     row |= {"status": "done", **rendered.numbers, **error_columns(truth, rendered.frame, scene, cell)}
     if paint is not None:
-        row["picture"] = paint(truth.airlight, np.asarray(rendered.frame.airlight, dtype=np.float64))
+        shown = np.asarray(rendered.frame.airlight, dtype=np.float64)
+        # Pixels without a truth are shown as if they were right.
+        known = truth.airlight if truth.mask is None else np.where(truth.mask[..., None], truth.airlight, shown)
+        row["picture"] = paint(known, shown)
     row["rays"] = scene.camera.width * scene.camera.height
     row["lights"] = rendered_lights(scene, cell.chosen)
     row["peak_mib"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
@@ -145,15 +148,16 @@ def stated_bound(chosen: Configuration, scene: Scene) -> float | None:
 def error_columns(truth: CellTruth, frame: Frame, scene: Scene, cell: Cell) -> dict[str, Any]:
     """Return the errors of a frame against the truth by all metrics."""
     test = np.asarray(frame.airlight, dtype=np.float64)
-    metrics = asdict(error_metrics(truth.airlight, test))
-    published = asdict(published_errors(truth.airlight, test))
-    normalised = asdict(published_errors(truth.airlight, test, unit=None))
-    colour = asdict(colour_difference(truth.airlight, test))
+    mask = truth.mask
+    metrics = asdict(error_metrics(truth.airlight, test, mask=mask))
+    published = asdict(published_errors(truth.airlight, test, mask=mask))
+    normalised = asdict(published_errors(truth.airlight, test, unit=None, mask=mask))
+    colour = asdict(colour_difference(truth.airlight, test, mask=mask))
     others = ("mse", "mae", "psnr", "relative", "relative_max", "dark_max", "dark", *_OWN_UNITS)
     finite = np.isfinite(test).all(axis=2)
     row = {
         **metrics,
-        "masked": 0,
+        "masked": 0 if mask is None else int((~mask).sum()),
         "mean": float(test[finite].mean()) if finite.any() else None,
         **{name: published[name] for name in others},
         **{f"normalised.{name}": normalised[name] for name in _OWN_UNITS},
@@ -161,25 +165,27 @@ def error_columns(truth: CellTruth, frame: Frame, scene: Scene, cell: Cell) -> d
         "bound": stated_bound(cell.chosen, scene),
     }
     if row["bound"] is not None:
-        floor = FLOOR * truth.airlight.mean()
+        floor = FLOOR * truth.airlight.mean()  # of all pixels: who states a bound has a truth in each
         allowed = row["bound"] * np.maximum(truth.airlight, floor) + truth.bound
         row["outside_bound"] = int((~(np.abs(test - truth.airlight) <= allowed)).any(axis=2).sum())
     if scene.features.surfaces and truth.surface is not None:
         surface = error_metrics(truth.surface, np.asarray(frame.surface, dtype=np.float64))
         row |= {f"surface_{name}": getattr(surface, name) for name in ("relative_rmse", "p99", "max", "nonfinite")}
     if cell.flip:
-        row["flip"] = flip_hdr(truth.airlight, test).value
+        row["flip"] = flip_hdr(truth.airlight, test, mask=mask).value
     return row
 
 
 def _truth_columns(truth: CellTruth) -> dict[str, Any]:
-    mean = float(truth.airlight.mean())
+    kept = np.ones(truth.airlight.shape[:2], dtype=bool) if truth.mask is None else truth.mask
+    airlight, bound = truth.airlight[kept], truth.bound[kept]
+    mean = float(airlight.mean())
     known = mean > 0
     return {
         "truth": truth.estimator,
         "truth_mean": mean,
-        "truth_error": float(truth.bound.mean()) / mean if known else None,
-        "truth_worst": float((truth.bound / np.maximum(truth.airlight, FLOOR * mean)).max()) if known else None,
+        "truth_error": float(bound.mean()) / mean if known else None,
+        "truth_worst": float((bound / np.maximum(airlight, FLOOR * mean)).max()) if known else None,
         "truth_s": truth.seconds,
         "truth_cpu_s": truth.processor_seconds,
         "crossings": truth.crossings,
@@ -219,20 +225,23 @@ def _times(renderer: FrameRenderer, scene: Scene, state: Any) -> dict[str, Any]:
     prepare = _timed(lambda: dr.eval(renderer.prepare(scene)))
     frames, processor = _repeated(lambda: run_stages(renderer, state))
     low, median, high = (float(value) for value in np.percentile(frames, [25, 50, 75]))
-    cast, by_light = run_cast_and_shade(renderer)
-    dr.eval(cast, by_light)
-    airlight, _ = _repeated(
-        lambda: evaluated(
-            cast, by_light, run_method(renderer, state, cast, by_light, run_cull(renderer, state, cast.distance))
+    airlight = median  # camera rays and surfaces take little of a frame that is slow, and it takes too long to ask
+    if median < _SLOW:
+        cast, by_light = run_cast_and_shade(renderer)
+        dr.eval(cast, by_light)
+        times, _ = _repeated(
+            lambda: evaluated(
+                cast, by_light, run_method(renderer, state, cast, by_light, run_cull(renderer, state, cast.distance))
+            )
         )
-    )
+        airlight = float(np.median(times))
     return {
         "prepare_ms": prepare,
         "frame_ms": median,
         "frame_ms_low": low,
         "frame_ms_high": high,
         "frame_cpu_ms": min(processor),
-        "airlight_ms": float(np.median(airlight)),
+        "airlight_ms": airlight,
         "frames": len(frames),
     }
 

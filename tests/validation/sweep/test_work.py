@@ -8,6 +8,7 @@ import pytest
 
 from realtime.scene.read_scene import read_scene
 from validation.configurations.methods import configuration, prepared
+from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import error_metrics
 from validation.scenes.loading import load_scene
 from validation.sweep import work
@@ -81,3 +82,20 @@ def test_what_is_not_finite_is_counted_and_kept_out_of_the_errors(monkeypatch):
     assert (row["status"], row["nonfinite"], row["negative"]) == ("done", 1, 1)
     assert row["outside_bound"] == 2
     assert row["max"] > 0.5
+
+
+@pytest.mark.usefixtures("variant")
+def test_under_a_light_with_extent_an_eighth_of_the_pixels_has_a_truth(own_cache):
+    loaded = load_cell(Cell("penumbra-plane", (32, 24), (), configuration("unshadowed")))
+    truth = cell_truth(loaded)
+    assert truth.mask is not None
+    assert int(truth.mask.sum()) == 32 * 24 // 8
+    assert truth.surface is None
+    whole = truth_image(loaded.scene)
+    assert whole.airlight_se is not None
+    difference = np.abs(truth.airlight - whole.airlight)[truth.mask]
+    # The bound is three standard errors and the whole truth has its own: one pixel in a hundred may be beyond.
+    assert (difference > truth.bound[truth.mask] + 3 * whole.airlight_se[truth.mask]).mean() < 0.02
+    again = cell_truth(loaded)
+    assert (again.airlight == truth.airlight).all()
+    assert again.seconds == truth.seconds
