@@ -345,9 +345,14 @@ def _of_pixels(renderer: FrameRenderer, pixel: PerRay) -> FrameRenderer:
 
 def image_frame(renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None = None) -> Frame:
     """Bring `stages`, what `run_stages` returned, to the host in the order of the image, and `extra` layers."""
-    frame = _with_part(None, renderer, stages, extra)
+    frame = unchecked_frame(renderer, stages, extra)
     check_radiance(renderer.scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
     return frame
+
+
+def unchecked_frame(renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None = None) -> Frame:
+    """Do what `image_frame` does, and return radiance that is not finite too, for whoever counts it."""
+    return _with_part(None, renderer, stages, extra)
 
 
 def _with_part(frame: Frame | None, renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None) -> Frame:

@@ -111,24 +111,33 @@ def joined(meshes: Sequence[Mesh]) -> Mesh:
 def mitsuba_mesh(name: str, mesh: Mesh, reflectance: Sequence[float]):
     """Return a Mitsuba mesh with flat shading and a two-sided diffuse material of RGB `reflectance` [1], 0 to 1."""
     diffuse = {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(reflectance)}}
-    return mesh_with_material(name, mesh, mi.load_dict({"type": "twosided", "bsdf": diffuse}))
+    return mesh_with_material(name, mesh, {"type": "twosided", "bsdf": diffuse})
 
 
 def mesh_with_material(name: str, mesh: Mesh, material):
-    """Return a Mitsuba mesh with flat shading and a Mitsuba `material`."""
+    """Return a Mitsuba mesh with flat shading and a `material`, a dictionary or Mitsuba's own."""
     return _mesh(name, mesh, {"mesh_bsdf": material})
 
 
-def medium_boundary(name: str, mesh: Mesh, medium: dict[str, Any]):
-    """Return a Mitsuba mesh of the material `null` around a medium, the boundary of a bounded medium."""
-    described = {"mesh_bsdf": {"type": "null"}, "interior": medium | {"id": f"{name}-medium"}}
-    return _mesh(name, mesh, {key: mi.load_dict(plugin) for key, plugin in described.items()})
+def medium_boundary(name: str, mesh: Mesh, medium: Any, around: Any = None):
+    """Return a Mitsuba mesh of the material `null` around a medium, the boundary of a bounded medium.
+
+    Parameters
+    ----------
+    name, mesh
+        Of the shape.
+    medium, around
+        What is inside of it, and outside where that is no clear air: dictionaries or media of Mitsuba.
+    """
+    inside = medium | {"id": f"{name}-medium"} if isinstance(medium, dict) else medium
+    outside = {} if around is None else {"exterior": around}
+    return _mesh(name, mesh, {"mesh_bsdf": {"type": "null"}, "interior": inside} | outside)
 
 
 def _mesh(name: str, mesh: Mesh, plugins: dict[str, Any]):
     properties = mi.Properties()
     for key, plugin in plugins.items():
-        properties[key] = plugin
+        properties[key] = mi.load_dict(plugin) if isinstance(plugin, dict) else plugin
     vertices, faces = mesh
     result = mi.Mesh(name, vertex_count=len(vertices), face_count=len(faces), props=properties)
     parameters = mi.traverse(result)
