@@ -18,7 +18,8 @@ Read in this order:
 - `fidelity/`: a verdict for every claim of these papers;
 - `slab/`: a slab by order of scattering, on both sides;
 - `canonical/`: tables of light scattered in a slab, as frames look them up, against their computation;
-- `comparison/`: images from files and engines against the truth.
+- `comparison/`: images from files and engines against the truth;
+- `sweep/`: studies of many scenes, and their rows.
 
 `baselines/` holds the known errors of every configuration as JSON files.
 
