@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a sweep says, from its Parquet alone: claims with their intervals, figures, a page, a digest.
+
+Read in this order:
+
+- `read.py`: the Parquet by columns
+- `samples.py`: one sample a scene for each configuration
+- `claims.py`: shares of scenes within an error, with intervals
+- `correlations.py`: which property of a scene goes with error
+- `worst.py`: the worst scenes of each configuration
+- `faults.py`: refusals, and what is wrong whatever the error
+
+May import: `analytic.errors`, `validation.statistics`, `validation.sweep`.
+"""

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claims: in what share of the scenes a configuration keeps an error, with the interval of that share.
+
+A scene counts as within an error if its image was made, all its pixels are finite, and the relative RMSE is at most
+the error. A refusal is no try: refused scenes are counted apart. A cell that failed, hung or died is a try that missed.
+
+Where truth and error differ by less than the truth's own error nothing is decided. Such a scene is within at the upper
+end of the interval and not at the lower one: the interval holds the share whatever the exact truth would have said.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from reports.sweep.samples import FAULTS, Sample
+from validation.statistics.intervals import LEVEL, binomial_interval
+
+TARGETS = (0.1, 0.01, 0.001)  #: relative RMSE of claims, as shares
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A share of scenes and its interval."""
+
+    label: str  #: of the configuration
+    name: str  #: its short name
+    target: float  #: relative RMSE [1]
+    tries: int  #: scenes that count
+    within: int  #: of these, within the error for sure
+    undecided: int  #: of these, with an error nearer to the target than the truth is exact
+    low: float
+    high: float
+    level: float = LEVEL
+
+    @property
+    def share(self) -> float | None:
+        """Of the scenes that are within the error for sure; None of no scene."""
+        return self.within / self.tries if self.tries else None
+
+    @property
+    def text(self) -> str:
+        """The claim as a sentence."""
+        if not self.tries:
+            return f"{self.name}: no scene was tried."
+        within = f"{self.name}: within {written(self.target)} in {percent(self.share or 0.0, self.tries)} % of "
+        within += f"{self.tries} scenes, {percent(self.low, self.tries)} to {percent(self.high, self.tries)} %"
+        if not self.undecided:
+            return f"{within}."
+        scenes = "one scene" if self.undecided == 1 else f"{self.undecided} scenes"
+        return f"{within}; the truth is not exact enough to tell in {scenes}."
+
+
+def claim(sample: Sample, target: float, level: float = LEVEL) -> Claim:
+    """Return in what share of the scenes a configuration keeps an error.
+
+    Parameters
+    ----------
+    sample
+        Of the configuration.
+    target
+        Relative RMSE [1].
+    level
+        Of confidence [1]; of this claim alone, not of several together.
+    """
+    measured = sample.measured
+    finite = measured & (sample.nonfinite == 0)
+    surely = finite & (sample.errors + sample.truth_errors <= target)
+    possibly = finite & (sample.errors - sample.truth_errors <= target)
+    tries = int(measured.sum()) + sample.count(*FAULTS)
+    within, at_most = int(surely.sum()), int(possibly.sum())
+    low, high = binomial_interval(within, tries, level)[0], binomial_interval(at_most, tries, level)[1]
+    return Claim(sample.label, sample.name, target, tries, within, at_most - within, low, high, level)
+
+
+def claims(made: Sequence[Sample], targets: Sequence[float] = TARGETS) -> list[Claim]:
+    """Return the claims of every configuration, one for each error."""
+    return [claim(sample, target) for sample in made for target in targets]
+
+
+def best_claim(made: Sequence[Claim], target: float) -> Claim | None:
+    """Return the claim on an error whose share is largest; None where no scene was tried."""
+    return max(
+        (each for each in made if each.target == target and each.tries),
+        key=lambda each: each.share or 0.0,
+        default=None,
+    )
+
+
+def percent(share: float, trials: int) -> str:
+    """Return a share in per cent, to the digits that so many trials can tell apart, never rounded up to all or none."""
+    places = max(0, int(np.ceil(np.log10(max(trials, 1)))) - 2)
+    text = f"{100 * share:.{places}f}"
+    if share < 1 and float(text) == 100:
+        text = f"{100 - 10.0**-places:.{places}f}"
+    if share > 0 and float(text) == 0:
+        text = f"{10.0**-places:.{places}f}"
+    return text
+
+
+def written(target: float) -> str:
+    """Return an error as claims name it: 1e-3, or 0.05 where it is no power of ten."""
+    exponent = np.log10(target)
+    return f"1e{exponent:.0f}" if np.isclose(exponent, np.round(exponent), atol=1e-9) else f"{target:g}"
