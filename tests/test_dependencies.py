@@ -56,7 +56,9 @@ def imported(*folders):
 def test_what_the_product_imports_is_declared():
     undeclared = {name: file for name, file in imported(*PRODUCT).items() if name not in declared()}
     # What an extra is for, in the folder that does it, and nowhere else.
-    for folder, extra in (("reports/view/", "view"), ("reports/docs/", "test")):
+    folders = {"view": ["reports/view/"], "test": ["reports/docs/"], "sweep": ["validation/sweep/", "reports/cluster/"]}
+    folders["sweep"].append("reports/sweep/")
+    for folder, extra in ((folder, extra) for extra, places in folders.items() for folder in places):
         extras = declared(extra)
         undeclared = {n: file for n, file in undeclared.items() if not (n in extras and file.startswith(folder))}
     assert not undeclared
@@ -73,7 +75,7 @@ def test_what_is_declared_is_imported():
 def test_what_only_tests_and_pages_import_is_declared_for_them():
     own = {path.stem for path in (ROOT / "docs/_ext").glob("*.py")}
     assert set(imported("docs/conf.py", "docs/_ext")) - own <= set(declared()) | set(declared("docs"))
-    assert set(imported("tests")) - own <= set(declared()) | set(declared("test", "docs", "view"))
+    assert set(imported("tests")) - own <= set(declared()) | set(declared("test", "docs", "view", "sweep"))
 
 
 @pytest.mark.parametrize("name", sorted(declared()))

@@ -296,6 +296,6 @@ def _checked(name: str, value: Any) -> Any:
         value = value.item()
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return None
-    if not isinstance(value, _TYPES[kind]) or (isinstance(value, bool) and kind != "bool"):
+    if type(value) not in _TYPES[kind]:  # a truth value is an integer to `isinstance`
         raise InputError(f"row: got {value!r} in the column {name}, wanted {kind}")
     return float(value) if kind == "float64" else value
