@@ -9,6 +9,13 @@ Read in this order:
 - `correlations.py`: which property of a scene goes with error
 - `worst.py`: the worst scenes of each configuration
 - `faults.py`: refusals, and what is wrong whatever the error
+- `summary.py`: all of these, worked out once
+- `tables.py`: tables of them
+- `figures.py`: figures of them
+- `page.py`: the page
+- `digest.py`: the digest in Markdown
+- `write.py`: all files
 
-May import: `analytic.errors`, `validation.statistics`, `validation.sweep`.
+May import: `analytic.errors`, `reference.storage`, `reports.page`, `reports.plotting`, `reports.tables`,
+`validation.statistics`, `validation.sweep`.
 """

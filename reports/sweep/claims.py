@@ -29,6 +29,7 @@ class Claim:
     tries: int  #: scenes that count
     within: int  #: of these, within the error for sure
     undecided: int  #: of these, with an error nearer to the target than the truth is exact
+    refused: int  #: scenes beside these
     low: float
     high: float
     level: float = LEVEL
@@ -39,16 +40,19 @@ class Claim:
         return self.within / self.tries if self.tries else None
 
     @property
+    def share_words(self) -> str:
+        """The share with its interval, and what is not in it, in words."""
+        words = f"in {percent(self.share or 0.0, self.tries)} % of {scenes_words(self.tries)}, "
+        words += f"{percent(self.low, self.tries)} to {percent(self.high, self.tries)} %"
+        if self.undecided:
+            words += f"; the truth is not exact enough to tell in {scenes_words(self.undecided)}"
+        return words + (f"; {self.refused} more refused" if self.refused else "")
+
+    @property
     def text(self) -> str:
         """The claim as a sentence."""
-        if not self.tries:
-            return f"{self.name}: no scene was tried."
-        within = f"{self.name}: within {written(self.target)} in {percent(self.share or 0.0, self.tries)} % of "
-        within += f"{self.tries} scenes, {percent(self.low, self.tries)} to {percent(self.high, self.tries)} %"
-        if not self.undecided:
-            return f"{within}."
-        scenes = "one scene" if self.undecided == 1 else f"{self.undecided} scenes"
-        return f"{within}; the truth is not exact enough to tell in {scenes}."
+        within = f"within {written(self.target)} {self.share_words}" if self.tries else "no scene was tried"
+        return f"{self.name}: {within}."
 
 
 def claim(sample: Sample, target: float, level: float = LEVEL) -> Claim:
@@ -70,7 +74,9 @@ def claim(sample: Sample, target: float, level: float = LEVEL) -> Claim:
     tries = int(measured.sum()) + sample.count(*FAULTS)
     within, at_most = int(surely.sum()), int(possibly.sum())
     low, high = binomial_interval(within, tries, level)[0], binomial_interval(at_most, tries, level)[1]
-    return Claim(sample.label, sample.name, target, tries, within, at_most - within, low, high, level)
+    return Claim(
+        sample.label, sample.name, target, tries, within, at_most - within, sample.count("refused"), low, high, level
+    )
 
 
 def claims(made: Sequence[Sample], targets: Sequence[float] = TARGETS) -> list[Claim]:
@@ -79,12 +85,13 @@ def claims(made: Sequence[Sample], targets: Sequence[float] = TARGETS) -> list[C
 
 
 def best_claim(made: Sequence[Claim], target: float) -> Claim | None:
-    """Return the claim on an error whose share is largest; None where no scene was tried."""
-    return max(
-        (each for each in made if each.target == target and each.tries),
-        key=lambda each: each.share or 0.0,
-        default=None,
-    )
+    """Return the claim on an error that promises most, by the lower end of its interval; None where none was tried."""
+    return max((each for each in made if each.target == target and each.tries), key=lambda each: each.low, default=None)
+
+
+def scenes_words(count: int) -> str:
+    """Return how many scenes, in words."""
+    return "one scene" if count == 1 else f"{count} scenes"
 
 
 def percent(share: float, trials: int) -> str:

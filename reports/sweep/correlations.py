@@ -9,7 +9,7 @@ All intervals hold together with the level (Bonferroni): each has the level 1 - 
 hundreds of these, some would be away from zero by chance otherwise.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,21 +106,30 @@ def property_words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def sentence(name: str, chosen: Sequence[Correlation]) -> str:
-    """Return in plain words what goes with the error of a configuration.
+def sentences(strongest_of: Mapping[str, Sequence[Correlation]]) -> list[str]:
+    """Return in plain words what goes with the error of each configuration, and last of which nothing does.
 
     Parameters
     ----------
-    name
-        Of the configuration.
-    chosen
-        From `strongest`.
+    strongest_of
+        From `strongest`, by the short name of the configuration.
     """
-    if not chosen:
-        return f"{name}: no property goes with its error for sure."
+    made = [sentence(name, chosen) for name, chosen in strongest_of.items() if chosen]
+    without = [name for name, chosen in strongest_of.items() if not chosen]
+    if not without:
+        return made
+    return [*made, f"No property goes for sure with the error of {_listed(without)}."]
+
+
+def sentence(name: str, chosen: Sequence[Correlation]) -> str:
+    """Return in plain words what goes with the error of a configuration; `chosen` from `strongest`, at least one."""
     parts = []
     for verb, several in (("grows", [c for c in chosen if c.r > 0]), ("falls", [c for c in chosen if c.r < 0])):
         if several:
             named = [f"{property_words(c.property)} ({c.r:+.2f}, {c.low:+.2f} to {c.high:+.2f})" for c in several]
-            parts.append(f"{verb} with {' and '.join([', '.join(named[:-1]), named[-1]] if named[1:] else named)}")
+            parts.append(f"{verb} with {_listed(named)}")
     return f"{name}: the error {', and it '.join(parts)}."
+
+
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The Parquet of a sweep, read by columns: without Mitsuba, and without a scene."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,12 +19,15 @@ Texts = NDArray[np.object_]
 Numbers = NDArray[np.float64]
 
 #: Columns without which nothing can be said.
-_NEEDED = ("key", "scene", "seed", "method", "label", "status", "reason", "relative_rmse", "rmse", "truth_error")
+_NEEDED = (
+    *("key", "scene", "seed", "medium", "method", "label", "status", "reason"),
+    *("relative_rmse", "rmse", "truth_error"),
+)
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """Rows by columns, as many as the Parquet has, one of each key."""
+    """Rows by columns, one of each key, sorted: the order in which they were finished is chance."""
 
     path: Path
     columns: Mapping[str, NDArray[Any]] = field(repr=False)  #: texts as objects, None for null; numbers with NaN
@@ -51,7 +55,7 @@ class Sweep:
         import pyarrow.compute as pc
         import pyarrow.parquet as pq
 
-        if "picture" not in pq.read_schema(self.path).names:
+        if not keys or "picture" not in pq.read_schema(self.path).names:
             return {}
         wanted = pc.field("key").isin(list(keys)) & pc.field("picture").is_valid()
         found = pq.read_table(self.path, columns=["key", "picture"], filters=wanted)
@@ -103,10 +107,18 @@ def read_sweep(path: Path | str) -> Sweep:
     if unknown:
         raise InputError(f"{file} has the status {unknown[0]!r}, wanted one of {', '.join(STATUSES)}; run it again")
     _, first = np.unique(columns["key"].astype(str), return_index=True)
-    kept = np.sort(first)
+    order = [
+        tuple(natural(columns[name][row] or "") for name in ("scene", "method", "label", "medium")) for row in first
+    ]
+    kept = first[sorted(range(len(first)), key=order.__getitem__)]
     columns = {name: values[kept] for name, values in columns.items()}
     properties = tuple(sorted(name.removeprefix(PROPERTY) for name in columns if name.startswith(PROPERTY)))
     return Sweep(file, columns, properties)
+
+
+def natural(text: str) -> tuple[str | int, ...]:
+    """Return what sorts text as a reader does: random:9 before random:10."""
+    return tuple(int(part) if place % 2 else part for place, part in enumerate(re.split(r"(\d+)", text)))
 
 
 def _file_of(path: Path) -> Path:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reports.sweep.read import Numbers, Sweep
+from reports.sweep.read import Numbers, Sweep, natural
 
 FAULTS = ("failed", "hung", "aborted")  #: what became of a cell that neither ended nor was refused
 
@@ -32,7 +32,7 @@ class Sample:
     errors: Numbers  #: relative RMSE [1]: infinite where the image has no finite pixel, NaN where nothing was measured
     truth_errors: Numbers  #: the truth's own, over its mean [1]; 0 where it says nothing
     nonfinite: Numbers  #: pixels with NaN or infinity, in all cells of a scene
-    times: Numbers  #: of a frame [ms], where it was timed with the machine to itself; NaN elsewhere
+    times: Numbers  #: of a frame [ms], see `comparable_times`; NaN elsewhere
 
     @property
     def measured(self) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
@@ -50,19 +50,19 @@ def drawn_at_random(sweep: Sweep) -> bool:
 
 
 def samples(sweep: Sweep) -> list[Sample]:
-    """Return the sample of every configuration, in the order in which the sweep has them."""
+    """Return the sample of every configuration, sorted by method and label."""
     labels, scenes, statuses = (sweep.texts(name) for name in ("label", "scene", "status"))
     methods, errors = sweep.texts("method"), errors_of(sweep)
     truth_errors = np.nan_to_num(sweep.numbers("truth_error"), nan=0.0)
     nonfinite = np.nan_to_num(sweep.numbers("nonfinite"), nan=0.0)
-    alone = sweep.numbers("timed_alone") == 1
-    times = np.where(alone, sweep.numbers("frame_ms"), np.nan)
+    times = np.where(comparable_times(sweep), sweep.numbers("frame_ms"), np.nan)
     counted = np.isfinite(sweep.numbers("seed")) if drawn_at_random(sweep) else np.ones(len(sweep), dtype=bool)
     groups: dict[tuple[str, str, str], dict[str, list[int]]] = {}
     for row, label in enumerate(labels):
         if counted[row]:
             group = groups.setdefault((label, methods[row], _size(sweep, row)), {})
             group.setdefault(scenes[row], []).append(row)
+    groups = dict(sorted(groups.items(), key=lambda item: tuple(map(natural, (item[0][1], item[0][0], item[0][2])))))
     several = Counter((label, method) for label, method, _ in groups)
     full = [f"{label}{size}" if several[label, method] > 1 else label for label, method, size in groups]
     names = short_names([method for _, method, _ in groups], full)
@@ -86,6 +86,19 @@ def samples(sweep: Sweep) -> list[Sample]:
             )
         )
     return made
+
+
+def comparable_times(sweep: Sweep) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
+    """Return which rows have times that may be compared with one another.
+
+    Those that were taken while nothing else of the sweep ran on the host, on the host, device and threads that have the
+    most such rows.
+    """
+    hosts, devices = sweep.texts("host"), sweep.texts("device")
+    places = list(zip(hosts, devices, np.nan_to_num(sweep.numbers("threads")).tolist()))
+    alone = sweep.numbers("timed_alone") == 1
+    most = Counter(place for place, timed in zip(places, alone) if timed).most_common(1)
+    return alone & np.array([bool(most) and place == most[0][0] for place in places], dtype=bool)
 
 
 def errors_of(sweep: Sweep) -> Numbers:

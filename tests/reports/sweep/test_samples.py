@@ -21,11 +21,25 @@ def test_parquet_is_read_as_it_was_written(tmp_path):
     several = rows(4)
     sweep = read_sweep(write_rows(tmp_path / FILE, several).parent)
     assert len(sweep) == len(several) == 20
-    assert list(sweep.texts("scene")) == [each["scene"] for each in several]
-    np.testing.assert_array_equal(sweep.numbers("relative_rmse"), [each["relative_rmse"] or np.nan for each in several])
+    by_key = {each["key"]: each for each in several}
+    for place, key in enumerate(sweep.texts("key")):
+        wanted = by_key.pop(key)
+        assert sweep.texts("scene")[place] == wanted["scene"]
+        assert sweep.property("lights")[place] == wanted["property.lights"]
+        errors = [wanted["relative_rmse"] or np.nan]
+        np.testing.assert_array_equal(sweep.numbers("relative_rmse")[place : place + 1], errors)
+    assert not by_key
     assert sweep.properties == ("light_distance", "lights", "optical_depth", "silhouettes", "triangles")
-    np.testing.assert_array_equal(sweep.property("lights"), [each["property.lights"] for each in several])
     assert set(sweep.numbers("timed_alone")[sweep.texts("status") == "done"]) == {1.0}
+
+
+def test_order_in_which_rows_were_finished_does_not_matter(tmp_path):
+    several = rows(12)
+    first = read_sweep(write_rows(tmp_path / "a.parquet", several))
+    second = read_sweep(write_rows(tmp_path / "b.parquet", several[::-1]))
+    assert list(first.texts("key")) == list(second.texts("key"))
+    assert list(dict.fromkeys(first.texts("scene"))) == [f"random:{n}" for n in range(12)]  # 9 before 10
+    assert [each.label for each in samples(first)] == [each.label for each in samples(second)]
 
 
 def test_same_key_counts_once(sweep_of):
@@ -108,13 +122,13 @@ def test_named_scenes_are_no_sample_where_scenes_were_drawn(sweep_of):
     (drawn,) = samples(sweep_of([row(), row("hall"), row("random:7")]))
     assert drawn.scenes == ("random:0", "random:7")
     (named,) = samples(sweep_of([row("hall"), row("clutter")]))
-    assert named.scenes == ("hall", "clutter")
+    assert named.scenes == ("clutter", "hall")
 
 
 def test_sizes_of_an_image_are_configurations(sweep_of):
     made = samples(sweep_of([row(), row(width=320, height=240), row("random:1", method="min-max")]))
-    assert [sample.label for sample in made] == ["ray-march at 160 x 120", "ray-march at 320 x 240", "min-max"]
-    assert [sample.name for sample in made] == ["ray-march at 160 x 120", "ray-march at 320 x 240", "min-max"]
+    wanted = ["min-max", "ray-march at 160 x 120", "ray-march at 320 x 240"]
+    assert [sample.label for sample in made] == [sample.name for sample in made] == wanted
 
 
 def test_black_truth_and_image_without_a_number(sweep_of):
@@ -132,6 +146,13 @@ def test_black_truth_and_image_without_a_number(sweep_of):
 def test_times_count_only_where_the_machine_had_nothing_else_to_do(sweep_of):
     (sample,) = samples(sweep_of([row(frame_ms=2.0), row("random:1", frame_ms=1.0, timed_alone=False)]))
     np.testing.assert_array_equal(sample.times, [2.0, np.nan])
+
+
+def test_times_of_several_hosts_are_not_compared(sweep_of):
+    several = [row(f"random:{n}", host="there" if n > 1 else "here", threads=8 if n == 4 else 2) for n in range(5)]
+    (sample,) = samples(sweep_of(several))
+    # Two rows each of both hosts with two threads: the first of them in the sweep, and never a mixture.
+    assert list(np.isfinite(sample.times)) == [True, True, False, False, False]
 
 
 def test_fastest_is_counted_where_all_were_timed_alone(sweep_of):
