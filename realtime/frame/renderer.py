@@ -307,17 +307,22 @@ def render_frame(renderer: FrameRenderer) -> Frame:
 
 def image_frame(renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None = None) -> Frame:
     """Bring `stages`, what `run_stages` returned, to the host in the order of the image, and `extra` layers."""
+    frame = unchecked_frame(renderer, stages, extra)
+    check_radiance(renderer.scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
+    return frame
+
+
+def unchecked_frame(renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None = None) -> Frame:
+    """Do what `image_frame` does, and return radiance that is not finite too, for whoever counts it."""
     distance, surface, airlight = stages
     height, width = renderer.scene.camera.height, renderer.scene.camera.width
     shown = {name: _colour(renderer, values) for name, values in (extra or {}).items()}
-    frame = Frame(
+    return Frame(
         _image(renderer, airlight, (height, width, 3)),
         _image(renderer, surface, (height, width, 3)),
         _image(renderer, distance, (height, width)),
         {name: _image(renderer, values, (height, width, 3)) for name, values in shown.items()},
     )
-    check_radiance(renderer.scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
-    return frame
 
 
 def run_stages(renderer: FrameRenderer, state):

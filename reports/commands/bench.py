@@ -19,12 +19,15 @@ from reports.commands.options import (
     Force,
     Json,
     Markdown,
+    Meshes,
     MethodLimit,
     Methods,
     OldMethods,
+    Ranges,
     Scenes,
     Settings,
     Size,
+    drawn_from,
     named,
 )
 
@@ -43,6 +46,8 @@ def bench(
     ] = None,
     settings: Settings = None,
     size: Size = None,
+    meshes: Meshes = None,
+    ranges: Ranges = None,
     kernels: Annotated[bool, typer.Option("--kernels", help="Time the kernels alone, on 480 000 rays.")] = False,
     gradients: Annotated[
         bool,
@@ -128,6 +133,7 @@ def bench(
         raise InputError(f"--margin: got {margin:g}, wanted a share between 0 and 1, such as 0.002 for 0.2 %")
     if output is not None and not decompose:
         raise InputError("--output: got a folder without --decompose, which alone writes images; add --decompose")
+    scenes = drawn_from(scenes or [], meshes, ranges) or None
     named_kernels = named("--kernel", kernel, "--kernel", None)
     if against is not None and not octaves:
         raise InputError("--against: got an image without --fit-octaves, which alone takes one; add --fit-octaves")

@@ -177,9 +177,10 @@ def _scene_and_files(scene: str | None, words: list[str]) -> tuple[str | None, l
 
 
 def _names_scene(word: str) -> bool:
-    """Return whether a word is meant as a scene: a built-in one, an XML file, or a name that no file has."""
+    """Return whether a word is meant as a scene: a built-in or random one, an XML file, or a name that no file has."""
     path = Path(word)
-    return word in completion.scene_names() or path.suffix.lower() == ".xml" or not (path.suffix or path.exists())
+    known = word in completion.scene_names() or word.startswith("random:")
+    return known or path.suffix.lower() == ".xml" or not (path.suffix or path.exists())
 
 
 def _images(paths: list[Path], layer: str):

@@ -6,12 +6,14 @@ from typing import Annotated
 
 import typer
 
-from reports.commands.options import Json, Scene, Size
+from reports.commands.options import Json, Meshes, Ranges, Scene, Size, drawn_from
 
 
 def describe(
     scene: Scene,
     size: Size = None,
+    meshes: Meshes = None,
+    ranges: Ranges = None,
     gltf: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Write the scene as binary glTF 2.0, a .glb file.", show_default=False),
@@ -39,6 +41,7 @@ def describe(
         ensure_writable(gltf)
     pixels = parse_size(size) if size else None
     activate()
+    (scene,) = drawn_from([scene], meshes, ranges)
     loaded = load_scene(scene, pixels)
     described = describe_scene(loaded)
     written = None if gltf is None else write_gltf(gltf, loaded)

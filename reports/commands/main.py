@@ -43,6 +43,7 @@ from reports.commands.render import render
 from reports.commands.report import report
 from reports.commands.slab import slab
 from reports.commands.stability import stability
+from reports.commands.sweep import sweep
 from reports.commands.test import run_tests
 from reports.commands.view import view
 from reports.machine.environment import (
@@ -61,7 +62,7 @@ DONE, FAILED, WRONG_INPUT, MISSING, INTERRUPTED = 0, 1, 2, 3, 130
 #: The panels of --help, by what one wants to do, and their commands in its order.
 _PANELS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start": (doctor, list_, render, view, cache),
-    "Measure": (report, diff, bench, maps, stability),
+    "Measure": (report, diff, bench, sweep, maps, stability),
     "Images": (reference, compare, fit, merge, describe, integrate, slab, clouds, gallery),
     "Papers": (published, figures, fidelity),
     "Develop": (run_tests, docs, baselines, mutations, certify),

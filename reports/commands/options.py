@@ -13,7 +13,7 @@ Scene = Annotated[
     str,
     typer.Argument(
         metavar="SCENE",
-        help="A built-in scene or a Mitsuba XML file.",
+        help="A built-in scene, random:SEED or a Mitsuba XML file.",
         show_default=False,
         autocompletion=completion.scenes,
     ),
@@ -22,7 +22,7 @@ Scenes = Annotated[
     list[str] | None,
     typer.Argument(
         metavar="SCENE",
-        help="Built-in scenes and Mitsuba XML files; all built-in ones by default.",
+        help="Built-in scenes, random:SEED and Mitsuba XML files; all built-in ones by default.",
         show_default=False,
         autocompletion=completion.scenes,
     ),
@@ -107,6 +107,42 @@ Changes = Annotated[
         show_default=False,
     ),
 ]
+
+
+#: Of commands that take a random scene, for `drawn_from`.
+Meshes = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="DIR",
+        help="Of random scenes: a folder of .obj and .ply files that take part as casters.",
+        show_default=False,
+    ),
+]
+Ranges = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Of random scenes: a TOML table of what is drawn from where to where.",
+        show_default=False,
+    ),
+]
+
+
+def drawn_from(scenes: list[str], meshes: Path | None, ranges: Path | None) -> list[str]:
+    """Return the names of scenes, of random ones with what `--meshes` and `--ranges` gave.
+
+    Raises
+    ------
+    InputError
+        If one of them is given and no scene is a random one.
+    """
+    if meshes is None and ranges is None:
+        return scenes
+    from validation.scenes.random_scene import is_random, random_name
+
+    if not any(map(is_random, scenes)):
+        random_name(scenes[0] if scenes else "", meshes, ranges)
+    return [random_name(scene, meshes, ranges) if is_random(scene) else scene for scene in scenes]
 
 
 def single(option: str, words: list[str] | None) -> str | None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from reports.commands.options import Changes, Force, Scene, Size
+from reports.commands.options import Changes, Force, Meshes, Ranges, Scene, Size, drawn_from
 
 if TYPE_CHECKING:
     from reports.machine.progress import Progress
@@ -98,6 +98,8 @@ def reference(
         ),
     ] = None,
     size: Size = None,
+    meshes: Meshes = None,
+    ranges: Ranges = None,
     force: Force = False,
     json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
 ) -> None:
@@ -134,6 +136,7 @@ def reference(
     ensure_writable(output)
     changes = parse_changes(change or [])
     activate()
+    (scene,) = drawn_from([scene], meshes, ranges)
     loaded = load_scene(scene, parse_size(size) if size else None, changes)
     print_notes(camera_notes(loaded.scene))
     pixels = loaded.scene.sensors()[0].film().size() if loaded.scene.sensors() else (1, 1)

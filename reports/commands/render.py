@@ -15,10 +15,13 @@ from reports.commands.options import (
     Changes,
     Force,
     GivenKernels,
+    Meshes,
     MethodLimit,
+    Ranges,
     Scene,
     Settings,
     Size,
+    drawn_from,
     single,
 )
 
@@ -38,6 +41,8 @@ def render(
     kernel: GivenKernels = None,
     settings: Settings = None,
     change: Changes = None,
+    meshes: Meshes = None,
+    ranges: Ranges = None,
     size: Size = None,
     precision: Annotated[
         str,
@@ -109,6 +114,7 @@ def render(
     pixels = parse_size(size) if size else None
     changes = parse_changes(change or [])
     variant = activate()
+    (scene,) = drawn_from([scene], meshes, ranges)
     call = partial(in_own_process, name=name, limit=method_limit) if chosen.own else _call
     if plan:
         _print_plan(call(_plan, scene, pixels, changes, precision, chosen), json=json)

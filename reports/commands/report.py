@@ -12,11 +12,14 @@ from reports.commands import completion
 from reports.commands.options import (
     USUAL_LIMIT,
     Force,
+    Meshes,
     MethodLimit,
     Methods,
     OldMethods,
     OldScenes,
+    Ranges,
     Settings,
+    drawn_from,
     named,
 )
 
@@ -26,7 +29,7 @@ def report(
         list[str] | None,
         typer.Argument(
             metavar="SCENE",
-            help="Built-in scenes and Mitsuba XML files; four with --quick, all with --full.",
+            help="Built-in scenes, random:SEED and Mitsuba XML files; four with --quick, all with --full.",
             show_default=False,
             autocompletion=completion.scenes,
         ),
@@ -44,6 +47,8 @@ def report(
         ),
     ] = None,
     settings: Settings = None,
+    meshes: Meshes = None,
+    ranges: Ranges = None,
     images: Annotated[
         Path | None,
         typer.Option(
@@ -117,7 +122,7 @@ def report(
         data = _measured(
             target,
             effort,
-            scenes=named("SCENE", None, "--scenes", old_scenes) + (scenes or []),
+            scenes=drawn_from(named("SCENE", None, "--scenes", old_scenes) + (scenes or []), meshes, ranges),
             methods=named("--method", method, "--methods", methods),
             kernels=named("--kernel", kernel, "--kernel", None),
             settings=settings or [],

@@ -14,6 +14,7 @@ from reference.scene.read import TruthLight, TruthMedium, TruthScene, read_truth
 from reports.interchange.cycles import cycles_properties
 from reports.interchange.recipes import recipes
 from validation.scenes.loading import LoadedScene
+from validation.scenes.random_scene import drawn_values, is_random
 
 Array = NDArray[np.float64]
 
@@ -52,8 +53,8 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
     dict
         `scene`, `source`, `purpose`, `up`, `handedness`, `camera`, `medium`, `bounded_media`, `lights`, `surfaces`,
         `radiance`, `file`, `recipes`, and `properties`, the scene as `reports.interchange.cycles.cycles_properties`
-        returns it. Lengths in metres, angles in degrees, extinction in 1/m, intensity in W/sr, power in W. The shapes
-        of lights with extent are among the lights, not the surfaces.
+        returns it; of a random scene also `drawn`. Lengths in metres, angles in degrees, extinction in 1/m, intensity
+        in W/sr, power in W. The shapes of lights with extent are among the lights, not the surfaces.
 
     Raises
     ------
@@ -77,7 +78,7 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
         "surfaces": [surface(shape) for shape in truth.occluders.shapes() if not shape.is_emitter()],
         "radiance": CONVENTION,
         "file": {
-            "name": f"{loaded.name}.exr",
+            "name": f"{loaded.name.partition(':meshes=')[0].partition(':ranges=')[0]}.exr",
             "format": "OpenEXR, one part of scan lines, half or float",
             "layers": {
                 "airlight": "airlight.R, airlight.G, airlight.B: the in-scattered light alone, if the engine has it",
@@ -85,7 +86,8 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
             },
         },
     }
-    return described | {"recipes": recipes(described), "properties": {"Cycles": cycles_properties(described)}}
+    drawn = {"drawn": drawn_values(loaded.name)} if loaded.path is None and is_random(loaded.name) else {}
+    return described | drawn | {"recipes": recipes(described), "properties": {"Cycles": cycles_properties(described)}}
 
 
 def up_axis(up: Array) -> str:

@@ -15,6 +15,7 @@ from typing import Any
 from validation.configurations.methods import Configuration
 from validation.frames.result_cache import CacheEntry, ResultCache, cache_entry, expected_seconds
 from validation.frames.scene_study import Effort, wants_flip
+from validation.scenes.random_scene import is_random
 from validation.scenes.registry import SCENES
 
 #: Rough seconds of a default report on two threads of an AMD EPYC: the truth, its checks, multiple scattering, and
@@ -54,7 +55,7 @@ class SceneEntries:
     @classmethod
     def of(cls, cache: ResultCache, name_or_path: str, effort: Effort) -> "SceneEntries":
         """Return the places of a scene's results, as it is named on the command line."""
-        path = None if name_or_path in SCENES else Path(name_or_path)
+        path = None if name_or_path in SCENES or is_random(name_or_path) else Path(name_or_path)
         return cls(cache, path.stem if path else name_or_path, path, effort)
 
     def part(self, kind: str, fingerprint: Mapping[str, Any] | None = None) -> CacheEntry:

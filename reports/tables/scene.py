@@ -43,12 +43,34 @@ def _rows(described: dict[str, Any]) -> Iterator[Cells]:
     for light in described["lights"]:
         yield from _light(light)
     yield from _surfaces(described["surfaces"])
+    yield from _drawn(described.get("drawn", {}))
     yield "radiance", "", described["radiance"]
     file = described["file"]
     yield "file to write", "", f"{file['name']}: {file['format']}; {'; '.join(file['layers'].values())}"
     for renderer, lines in described["recipes"].items():
         for number, line in enumerate(lines):
             yield "" if number else f"in {renderer}", "", line
+
+
+def _drawn(drawn: dict[str, Any]) -> Iterator[Cells]:
+    """Yield what was drawn for a random scene, a row for each part."""
+    if not drawn:
+        return
+    yield (
+        "drawn",
+        "seed",
+        f"{drawn['seed']}, draws before this one that let too little light through: {drawn['attempt']}",
+    )
+    yield "", "stage", f"a ball of {drawn['scale']:.5g} m about {_vector(drawn['centre'])}"
+    for part in (drawn["camera"] | {"name": "camera"}, *drawn["media"], *drawn["lights"], *drawn["casters"]):
+        yield "", part["name"], ", ".join(f"{key} {_short(value)}" for key, value in part.items() if key != "name")
+    yield "", "reach", ", ".join(f"{key.replace('_', ' ')} {_short(value)}" for key, value in drawn["reach"].items())
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, tuple | list):
+        return "(" + ", ".join(_short(each) for each in value) + ")"
+    return f"{value:.5g}" if isinstance(value, float) else str(value)
 
 
 def _camera(camera: dict[str, Any]) -> Iterator[Cells]:

@@ -6,6 +6,7 @@ from dataclasses import Field, fields
 from typing import Any
 
 from reference.quadrature.image import quadrature_image
+from reference.quadrature.light_points import PointPlan
 from reference.quadrature.ray_values import TruthImage
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_truth
@@ -23,6 +24,7 @@ def truth_image(
     samples: int = 256,
     shadow_scale: float = 1.0,
     pixel: str = "centre",
+    plan: PointPlan | None = None,
     progress: Progress | None = None,
 ) -> TruthImage:
     """Return the quadrature truth of a Mitsuba scene at its own size, (height, width, 3) [W/(m^2 sr)].
@@ -31,7 +33,7 @@ def truth_image(
     ----------
     scene
         The `mi.Scene`.
-    samples, shadow_scale, pixel, progress
+    samples, shadow_scale, pixel, plan, progress
         See `reference.quadrature.image.quadrature_image`.
 
     Raises
@@ -42,6 +44,8 @@ def truth_image(
     # The key names only what differs from the usual, so that images that were kept before are found.
     settings: dict[str, Any] = {"samples": samples, "shadow_scale": shadow_scale}
     settings |= {} if pixel == "centre" else {"pixel": pixel}
+    # Points stand for lights with extent alone: without them every plan gives the same image.
+    settings |= {"plan": repr(plan)} if plan is not None and _has_extent(scene) else {}
     # What a renderer's own shadow rays see also depends on where they start.
     named = settings if shadow_scale == 1 else settings | {"shadow_start": True}
     key = cache_key(scene, "quadrature", named)
@@ -56,7 +60,8 @@ def truth_image(
     parts = _Parts(key)
     # Only lights with extent take so long that a run is worth going on with.
     keep = parts if truth.area and pixel == "centre" else None
-    image = quadrature_image(truth, **settings, keep=keep, progress=progress)
+    how: dict[str, Any] = {"samples": samples, "shadow_scale": shadow_scale, "pixel": pixel, "plan": plan}
+    image = quadrature_image(truth, **how, keep=keep, progress=progress)
     check_values(truth, image)
     values = {field.name: getattr(image, field.name) for field in fields(TruthImage)}
     store_arrays(key, {name: value for name, value in values.items() if value is not None})
@@ -82,6 +87,10 @@ class _Parts:
         """Forget all parts."""
         for name in self._names:
             drop_arrays(name)
+
+
+def _has_extent(scene) -> bool:
+    return any(emitter.get_shape() is not None for emitter in scene.emitters())
 
 
 def _needed(every: bool) -> set[str]:

@@ -32,6 +32,7 @@ Read in this order:
 - `step_cloud.py`: thin and thick cloud by turns;
 - `ring.py`: a ring of cloud;
 - `two_lobes.py`: a cloud of two lobes;
+- `random_scene.py`: scenes drawn from a seed;
 - `probes.py`: small scenes for what the built-in ones lack, used by checks of the checks;
 - `numbers.py`: refuses numbers of which no finite image can come;
 - `changes.py`: camera, lights and media of a scene changed by name;
@@ -39,5 +40,6 @@ Read in this order:
 - `loading.py`: a scene by its name or from a Mitsuba XML file;
 - `animation.py`: the scenes of the frames of an animation.
 
-May import: `analytic`, `realtime.area_lights`, `realtime.scene`, `validation.scenes.clouds`.
+May import: `analytic`, `realtime.area_lights`, `realtime.scene`, `validation.random_scenes`,
+`validation.scenes.clouds`.
 """

@@ -17,7 +17,8 @@ from analytic.errors import InputError, nearest
 from validation.scenes.changes import change_scene, isotropic_media
 from validation.scenes.lobes import scene_with_lobes
 from validation.scenes.numbers import check_numbers
-from validation.scenes.record import Animation
+from validation.scenes.random_scene import is_random, random_record
+from validation.scenes.record import Animation, SceneRecord
 from validation.scenes.registry import SCENES
 
 _LARGEST = 16384
@@ -28,11 +29,11 @@ _DEEPEST = 200  # elements in one another; a scene has about ten
 class LoadedScene:
     """A Mitsuba scene and where it came from."""
 
-    name: str  #: name of the built-in scene, or stem of the file
+    name: str  #: name of the built-in or random scene, or stem of the file
     scene: Any  #: the `mi.Scene`
     purpose: str  #: one sentence: what the scene is for
     published: str  #: the published figure that it stands for; empty for a file
-    path: Path | None = None  #: of the file; None for a built-in scene
+    path: Path | None = None  #: of the file; None for a built-in or random scene
     animation: Animation = field(default_factory=Animation)  #: what moves in it
 
 
@@ -46,7 +47,7 @@ def load_scene(
     Parameters
     ----------
     name_or_path
-        A name of `validation.scenes.registry.SCENES`, or the path of a Mitsuba scene file.
+        A name of `validation.scenes.registry.SCENES`, `random:SEED`, or the path of a Mitsuba scene file.
     size
         Width and height of the image [pixels]; the scene's own by default.
     changes
@@ -60,8 +61,8 @@ def load_scene(
         check whether the methods or the truth support the scene: `realtime.scene.read_scene.read_scene` and
         `reference.scene.read.read_truth` do.
     """
-    if name_or_path in SCENES:
-        record = SCENES[name_or_path]
+    record = find_record(name_or_path)
+    if record is not None:
         built = mi.load_dict(record.build())
         loaded = LoadedScene(record.name, built, record.purpose, record.published, animation=record.animation)
     else:
@@ -70,7 +71,7 @@ def load_scene(
     isotropic = isotropic_media(loaded.scene) if changes else {}
     lobes = {isotropic[name]: value[0] for name, value in changes.items() if name in isotropic and any(value)}
     if lobes:
-        scene = scene_with_lobes(name_or_path if loaded.path else SCENES[name_or_path].build(), lobes)
+        scene = scene_with_lobes(name_or_path if record is None else record.build(), lobes)
         name_shapes(scene)
         loaded = replace(loaded, scene=scene)
     if size is not None:
@@ -79,6 +80,17 @@ def load_scene(
     if changes:
         change_scene(loaded.scene, changes)
     return loaded
+
+
+def find_record(name: str) -> SceneRecord | None:
+    """Return the record of a built-in or random scene, None for what must be a path.
+
+    Raises
+    ------
+    InputError
+        For a random scene that cannot be drawn.
+    """
+    return random_record(name) if is_random(name) else SCENES.get(name)
 
 
 def parse_size(text: str) -> tuple[int, int]:

@@ -114,15 +114,25 @@ def mitsuba_mesh(name: str, mesh: Mesh, reflectance: Sequence[float]):
     return _mesh(name, mesh, {"mesh_bsdf": {"type": "twosided", "bsdf": diffuse}})
 
 
-def medium_boundary(name: str, mesh: Mesh, medium: dict[str, Any]):
-    """Return a Mitsuba mesh of the material `null` around a medium, the boundary of a bounded medium."""
-    return _mesh(name, mesh, {"mesh_bsdf": {"type": "null"}, "interior": medium | {"id": f"{name}-medium"}})
+def medium_boundary(name: str, mesh: Mesh, medium: Any, around: Any = None):
+    """Return a Mitsuba mesh of the material `null` around a medium, the boundary of a bounded medium.
+
+    Parameters
+    ----------
+    name, mesh
+        Of the shape.
+    medium, around
+        What is inside of it, and outside where that is no clear air: dictionaries or media of Mitsuba.
+    """
+    inside = medium | {"id": f"{name}-medium"} if isinstance(medium, dict) else medium
+    outside = {} if around is None else {"exterior": around}
+    return _mesh(name, mesh, {"mesh_bsdf": {"type": "null"}, "interior": inside} | outside)
 
 
-def _mesh(name: str, mesh: Mesh, plugins: dict[str, dict[str, Any]]):
+def _mesh(name: str, mesh: Mesh, plugins: dict[str, Any]):
     properties = mi.Properties()
     for key, plugin in plugins.items():
-        properties[key] = mi.load_dict(plugin)
+        properties[key] = mi.load_dict(plugin) if isinstance(plugin, dict) else plugin
     vertices, faces = mesh
     result = mi.Mesh(name, vertex_count=len(vertices), face_count=len(faces), props=properties)
     parameters = mi.traverse(result)

@@ -5,7 +5,14 @@ A *study* says which scenes, methods and sizes; a *cell* is one combination of t
 
 Read in this order:
 
-- `row.py`: the columns of a row, their types and units: the one place.
+- `row.py`: the columns of a row, their types and units: the one place;
+- `study.py`: a study from its TOML file, and its cells;
+- `keys.py`: what decides the numbers of a row, as a digest;
+- `truth.py`: the truth that the cells of an image share;
+- `work.py`: a cell becomes a row;
+- `rows.py`: finished rows on disk, and their Parquet.
 
-May import: `analytic.errors`.
+May import: `analytic.errors`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `realtime.scene`,
+`reference.quadrature`, `reference.storage`, `validation.configurations`, `validation.estimates`, `validation.metrics`,
+`validation.random_scenes`, `validation.scenes`.
 """

@@ -22,6 +22,10 @@ from analytic.errors import InputError
 #: `reason` why; 'failed': an exception; 'hung': stopped at the time limit; 'aborted': its process died every time.
 STATUSES = ("done", "refused", "failed", "hung", "aborted")
 
+#: How frames are timed: 'none', 'with' the computation of errors, whatever else runs on the host, or 'alone', where
+#: nothing else of the sweep runs there.
+TIMES = ("none", "with", "alone")
+
 #: Who made the truth of a row.
 TRUTHS = ("quadrature", "single-scatter", "volpath")
 
@@ -207,7 +211,14 @@ _COST = (
         },
     ),
     Column("bytes", "int64", "bytes", "of the device's memory at the peak of preparation and frame"),
-    Column("kernels", "int32", "1", "kernels that preparation and first frame launched"),
+    *_columns(
+        "int32",
+        "1",
+        {
+            "kernels": "kernels that preparation and first frame launched",
+            "compiled": "of these, how many LLVM or CUDA compiled anew",
+        },
+    ),
     Column("peak_mib", "float64", "MiB", "largest resident memory of the process until then"),
 )
 

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Cells as tasks: the truth of an image, and the rows of its cells, as workers compute them."""
+
+import io
+import platform
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from functools import lru_cache
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from realtime.scene.read_scene import Scene, read_scene
+from reports import __version__
+from reports.cluster.run import Group, Outcome, Task
+from reports.cluster.worker import is_alone
+from reports.machine.environment import processor
+from reports.plotting.pictures import error_map, exposure, tone_mapped
+from validation.scenes.loading import LoadedScene
+from validation.sweep.keys import Made, cell_key, source_digest
+from validation.sweep.rows import RowStore
+from validation.sweep.study import Cell, Study
+from validation.sweep.truth import CellTruth, cell_truth, load_cell
+from validation.sweep.work import cell_columns, cell_row
+
+_AGAIN = ("failed", "hung", "aborted")  #: what `--again` computes again
+_QUALITY = 60  # of WebP
+_SMALLER = 320  # pixels: wider images are shown smaller in the rows' pictures
+
+
+def truth_of(cell: Cell) -> CellTruth:
+    """Return the truth of a cell's image."""
+    return cell_truth(_opened(cell.image)[0])
+
+
+def row_of(truth: CellTruth, cell: Cell, key: str) -> dict[str, Any]:
+    """Return the row of a cell, from the truth of its image."""
+    from distributed import get_worker
+
+    started = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    _, scene = _opened(cell.image)
+    row = cell_row(cell, scene, truth, properties={}, paint=_picture)
+    return row | {
+        "key": key,
+        "started": started,
+        "timed_alone": is_alone(get_worker()) if row.get("frame_ms") is not None else None,
+        "threads": dr.thread_count(),
+        "variant": mi.variant(),
+        **_machine(),
+    }
+
+
+def cell_groups(
+    study: Study, made: Made, *, store: RowStore, again: bool, scenes: dict[str, str]
+) -> Iterator[tuple[Group, dict[str, Cell]]]:
+    """Yield the tasks of every image that lacks rows, and its cells by the names of their tasks, which are their keys.
+
+    Parameters
+    ----------
+    study
+        Which cells there are.
+    made
+        What computes them.
+    store
+        The rows that are there.
+    again
+        Whether cells that failed, hung or aborted are computed again.
+    scenes
+        Digests of scenes of files, see `validation.sweep.keys.cell_key`.
+    """
+    done: set[str] = set()
+    for cells in study.images():
+        keyed = {cell_key(cell, made, scenes): cell for cell in cells}
+        missing = {
+            key: cell
+            for key, cell in keyed.items()
+            if key not in done and (key not in store or (again and store.status(key) in _AGAIN))
+        }
+        done |= set(missing)
+        if missing:
+            yield _group(study, missing), missing
+
+
+def row_without_numbers(cell: Cell, key: str, outcome: Outcome) -> dict[str, Any]:
+    """Return the row of a cell that came to nothing: the outcome says why."""
+    return cell_columns(cell) | {
+        "key": key,
+        "status": outcome.status,
+        "reason": outcome.reason,
+        "airlight": __version__,
+        "source": source_digest()[:12],
+    }
+
+
+def _group(study: Study, cells: dict[str, Cell]) -> Group:
+    image = next(iter(cells.values())).image
+    words = " ".join((image.scene, *image.medium, f"{image.size[0]}x{image.size[1]}"))
+    alone = study.times == "alone"
+    tasks = tuple(Task(key, row_of, (cell, key), study.limit, alone) for key, cell in cells.items())
+    return Group(tasks, Task(f"truth of {words}", truth_of, (image,), study.limit, alone))
+
+
+@lru_cache(maxsize=1)
+def _opened(image: Cell) -> tuple[LoadedScene, Scene]:
+    """Return the scene of an image, loaded and as methods read it; that of the last cell is there already."""
+    loaded = load_cell(image)
+    return loaded, read_scene(loaded.scene)
+
+
+@lru_cache(maxsize=1)
+def _machine() -> dict[str, Any]:
+    from importlib.metadata import version
+
+    return {
+        "host": platform.node(),
+        "device": processor(),
+        "airlight": __version__,
+        "source": source_digest()[:12],
+        "mitsuba": version("mitsuba"),
+        "drjit": version("drjit"),
+        "python": platform.python_version(),
+    }
+
+
+def _picture(truth: NDArray[np.float64], test: NDArray[np.float64]) -> bytes:
+    """Return truth, image and error side by side as WebP."""
+    factor = exposure(truth)
+    parts = [tone_mapped(truth, factor), tone_mapped(test, factor), error_map(truth, test)]
+    shown = Image.fromarray(np.concatenate(parts, axis=1))
+    if truth.shape[1] > _SMALLER:
+        shown.thumbnail((3 * _SMALLER, 3 * _SMALLER))
+    file = io.BytesIO()
+    shown.save(file, "WEBP", quality=_QUALITY)
+    return file.getvalue()

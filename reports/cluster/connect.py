@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where a command's work runs: processes of this machine, or a Dask scheduler with workers of any machines."""
+
+import logging
+import re
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from reports.machine.environment import MissingError, threads
+
+HELP = "Where to compute: local[:N], tcp://HOST:PORT, or the scheduler file of a Dask cluster."
+
+MEMORY = "2GiB"  #: of a local worker, above which Dask ends it
+_PATIENCE = 10.0  # until a scheduler has answered [s]
+_WORKERS = 30.0  # until a worker has come [s]
+_ADDRESS = re.compile(r"(tcp|tls|ucx|ws|wss)://[^\s/]+")
+
+
+@dataclass(frozen=True)
+class Place:
+    """What `--cluster` names."""
+
+    workers: int = 0  #: of this machine; 0 for a scheduler
+    address: str | None = None  #: of a scheduler
+    file: Path | None = None  #: of a scheduler, which has its address
+
+    @property
+    def words(self) -> str:
+        """What the user typed, in other words."""
+        return self.address or (str(self.file) if self.file else f"local:{self.workers}")
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A connection."""
+
+    client: Any  #: `distributed.Client`
+    place: Place
+
+
+def parse_place(word: str | None) -> Place:
+    """Return the place that a word names; a worker for each processor of this machine for None.
+
+    Raises
+    ------
+    InputError
+        For another word, a number of workers out of range, and a file that is not there.
+    """
+    from analytic.errors import InputError
+
+    word = "local" if word is None else word.strip()
+    kind, _, number = word.partition(":")
+    if kind == "local":
+        if not number and word == "local":
+            return Place(threads())
+        if not (number.isascii() and number.isdigit() and 1 <= int(number) <= 4096):
+            raise InputError(f"--cluster: got {word!r}, wanted local:N with a number of processes from 1 to 4096")
+        return Place(int(number))
+    if _ADDRESS.fullmatch(word):
+        return Place(address=word)
+    path = Path(word)
+    if path.is_file():
+        return Place(file=path)
+    if word.endswith(".json"):
+        raise InputError(f"--cluster: there is no file {word}; wanted what `dask scheduler --scheduler-file` writes")
+    raise InputError(f"--cluster: got {word!r}, wanted local, local:N, tcp://HOST:PORT or a scheduler file (.json)")
+
+
+def check_library() -> None:
+    """Raise MissingError where Dask is not installed."""
+    try:
+        import distributed  # noqa: F401 - asked for here, before any work
+    except ImportError:
+        raise MissingError(
+            "work on several processes or machines needs the packages dask and distributed: install them with "
+            "`pip install 'airlight[sweep]'`"
+        ) from None
+
+
+@contextmanager
+def connected(place: Place) -> Iterator[Cluster]:
+    """Give the connection to a place, with workers that are of our version.
+
+    Raises
+    ------
+    InputError
+        Where there is no scheduler or no worker, and for workers of another version, by name.
+    MissingError
+        Where Dask is not installed.
+    """
+    check_library()
+    _quiet()
+    with ExitStack() as stack:
+        client = stack.enter_context(_local(place.workers) if place.workers else _remote(place))
+        _wait_for_workers(client, place)
+        check_workers(client)
+        yield Cluster(client, place)
+
+
+def reconnected(place: Place, patience: float) -> Any:
+    """Return a new client of a scheduler that went away; None if it does not come back in time, with a worker."""
+    from analytic.errors import InputError
+
+    until = time.monotonic() + patience
+    while not place.workers and time.monotonic() < until:
+        with suppress(InputError):
+            client = _client(place, timeout=min(_PATIENCE, max(1.0, until - time.monotonic())))
+            with suppress(Exception):
+                client.wait_for_workers(1, timeout=max(1.0, until - time.monotonic()))
+                return client
+            _close(client)
+        time.sleep(0.5)
+    return None
+
+
+def check_workers(client: Any) -> dict[str, dict[str, Any]]:
+    """Return the facts of all workers by address.
+
+    Raises
+    ------
+    InputError
+        For those that have another version of airlight, or none.
+    """
+    from analytic.errors import InputError
+    from reports import __version__
+    from reports.cluster.worker import facts
+    from reports.machine.environment import activate
+    from validation.sweep.keys import made_here
+
+    own = made_here(__version__, activate())
+    told: dict[str, Any] = client.run(facts, on_error="return")
+    wrong = []
+    for address, answer in told.items():
+        if isinstance(answer, OSError):  # it went away meanwhile
+            continue
+        if isinstance(answer, BaseException):
+            wrong.append(f"worker {address} cannot do the work ({type(answer).__name__}: {answer})")
+        elif own.differences(answer["made"]):
+            wrong.append(f"worker {address} has {', '.join(own.differences(answer['made']))}")
+    if wrong:
+        raise InputError(f"{'; '.join(wrong)}: install the same airlight there, or stop it")
+    return {address: answer for address, answer in told.items() if isinstance(answer, dict)}
+
+
+@contextmanager
+def _local(workers: int) -> Iterator[Any]:
+    """Give the client of processes of this machine, one thread each; a single one has all threads and is alone."""
+    import dask
+    from distributed import Client, LocalCluster
+
+    from reference.storage.files import temporary_folder
+
+    alone = workers == 1
+    # Dask would pause a worker near its limit, and wait for memory that only the next task gives back.
+    memory = {f"distributed.worker.memory.{name}": False for name in ("target", "spill", "pause")}
+    # Other tasks' deaths count against a task that only waited on the same worker: we count ourselves.
+    counts = {"distributed.scheduler.allowed-failures": 10}
+    # A cluster that is told of a death waits so long and then forgets the worker, though another process stands in.
+    counts["distributed.deploy.lost-worker-timeout"] = 86400
+    with temporary_folder() as folder, dask.config.set(memory | counts), ExitStack() as stack:
+        with _without_interrupts():
+            cluster = stack.enter_context(
+                LocalCluster(
+                    n_workers=workers,
+                    threads_per_worker=threads() if alone else 1,
+                    processes=True,
+                    host="127.0.0.1",
+                    dashboard_address=None,
+                    memory_limit=MEMORY,
+                    local_directory=str(folder),
+                    silence_logs=logging.CRITICAL,
+                    resources={"alone": 1} if alone else None,
+                )
+            )
+            client = stack.enter_context(Client(cluster, set_as_default=False))
+        yield client
+
+
+@contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Let processes that are started within the block ignore Ctrl-C: this one ends them."""
+    import threading
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _remote(place: Place) -> Iterator[Any]:
+    client = _client(place, timeout=_PATIENCE)
+    try:
+        yield client
+    finally:
+        _close(client)
+
+
+def _client(place: Place, *, timeout: float) -> Any:
+    from distributed import Client
+
+    from analytic.errors import InputError
+
+    given = {"address": place.address} if place.address else {"scheduler_file": str(place.file)}
+    try:
+        return Client(**given, timeout=timeout, set_as_default=False)
+    except (OSError, TimeoutError, ValueError, KeyError) as error:
+        words = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(
+            f"--cluster: no scheduler answers at {place.words} ({words}): start `dask scheduler`, or give its address"
+        ) from None
+
+
+def _close(client: Any) -> None:
+    with suppress(Exception):
+        client.close(timeout=2)
+
+
+def _wait_for_workers(client: Any, place: Place) -> None:
+    from analytic.errors import InputError
+
+    try:
+        client.wait_for_workers(1, timeout=_WORKERS)
+    except TimeoutError:
+        raise InputError(
+            f"--cluster: the scheduler at {place.words} has no worker: start `dask worker` with its address, in an "
+            "environment that has airlight"
+        ) from None
+
+
+def _quiet() -> None:
+    """Let Dask's own words go: what concerns the user is said by the command."""
+    for name in ("distributed", "tornado", "asyncio"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight sweep [STUDY.toml]`: many scenes, every method, on one machine or on a Dask cluster."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from reports.commands.options import Json
+
+if TYPE_CHECKING:
+    from reports.cluster.connect import Place
+    from validation.sweep.rows import RowStore
+    from validation.sweep.study import Study
+
+_USUAL = 100  # random scenes of a study without a file
+
+
+def sweep(
+    study: Annotated[
+        Path | None,
+        typer.Argument(metavar="STUDY.toml", help="What to sweep over, see docs/sweeps.md.", show_default=False),
+    ] = None,
+    random: Annotated[
+        int | None,
+        typer.Option(metavar="N", help=f"So many random scenes; without a study {_USUAL}.", show_default=False),
+    ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WHERE",
+            help="local[:N] processes, tcp://HOST:PORT of a Dask scheduler, or its scheduler file; a process for each "
+            "processor by default.",
+            show_default=False,
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="DIR", help="Folder of the rows; sweep-NAME by default."),
+    ] = None,
+    again: Annotated[
+        bool, typer.Option("--again", help="Compute cells again that failed, hung or aborted; the others stay.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Run every method over many scenes and keep a row of errors and costs for each.
+
+    A study names scenes, methods, kernels, parameters, media and sizes; every combination is a cell and becomes one
+    row of DIR/sweep.parquet. Finished rows are kept: a run that was interrupted goes on where it was, and the same
+    study twice computes nothing.
+
+    Exit status 1 if a cell failed, hung or aborted, or was left undone.
+    """
+    from reports.cluster.connect import check_library, parse_place
+    from reports.machine.environment import activate
+    from validation.sweep.rows import RowStore
+    from validation.sweep.study import default_study, read_study
+
+    place = parse_place(cluster)
+    _check_parquet()
+    check_library()
+    count = _USUAL if random is None else random
+    chosen = default_study(count) if study is None else read_study(study, count=random)
+    folder = output or Path(f"sweep-{chosen.name}")
+    variant = activate()
+    with RowStore(folder) as store:
+        summary = _run(chosen, store, place, variant=variant, again=again)
+        summary["parquet"] = str(store.write_parquet()) if len(store) else None
+    _print(summary, json=json)
+    if summary["problems"] or summary["left"]:
+        raise typer.Exit(1)
+
+
+def _check_parquet() -> None:
+    from reports.machine.environment import MissingError
+
+    try:
+        import pyarrow  # noqa: F401 - asked for here, before any work
+    except ImportError:
+        raise MissingError("sweeps need the package pyarrow: install it with `pip install 'airlight[sweep]'`") from None
+
+
+def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, again: bool) -> dict[str, Any]:
+    """Compute what is missing, add it to the store, and return what came of it."""
+    from collections import Counter
+
+    from analytic.errors import InputError
+    from reference.storage.stopping import hint_when_stopped
+    from reports import __version__
+    from reports.cluster.cells import cell_groups, row_without_numbers
+    from reports.cluster.connect import connected
+    from reports.cluster.run import ForeignWorkerError, run_groups
+    from reports.machine.progress import progress_bar
+    from validation.sweep.keys import made_here, scene_identities
+    from validation.sweep.study import Cell
+
+    made, scenes = made_here(__version__, variant), scene_identities(study.scenes)
+    total = study.scene_count * study.cells_by_scene
+    how: dict[str, Any] = {"store": store, "again": again, "scenes": scenes}
+    missing = sum(len(cells) for _, cells in cell_groups(study, made, **how))
+    counts: Counter[str] = Counter()
+    problems: list[dict[str, Any]] = []
+    open_cells: dict[str, Cell] = {}
+
+    def groups():
+        for group, cells in cell_groups(study, made, **how):
+            open_cells.update(cells)
+            yield group
+
+    if missing:
+        hint = lambda: f"{len(store)} rows are kept in {store.folder}; run the same command again to go on"  # noqa: E731
+        with (
+            hint_when_stopped(hint),
+            connected(place) as cluster,
+            progress_bar(f"sweep {study.name}") as progress,
+        ):
+            try:
+                for outcome in run_groups(cluster, groups(), made=made, retries=study.retries):
+                    key = outcome.task.name
+                    cell = open_cells.pop(key, None)
+                    if cell is None:
+                        continue  # the truth of an image: its cells say what came of it
+                    if outcome.status != "lost":
+                        value = outcome.value if outcome.status == "done" else row_without_numbers(cell, key, outcome)
+                        row = store.add(value | {"study": study.name, "attempts": outcome.attempts})
+                        status = row["status"]
+                    else:
+                        status = "lost"
+                    counts[status] += 1
+                    if status not in ("done", "refused"):
+                        problems.append({"scene": cell.scene, "label": cell.chosen.label, "status": status})
+                        problems[-1]["reason"] = outcome.reason
+                    done = sum(counts.values())
+                    progress(done / missing, f"{done} of {missing} cells, {cell.scene}")
+            except ForeignWorkerError as error:
+                raise InputError(str(error)) from None
+    return {
+        "study": study.name,
+        "scenes": study.scene_count,
+        "cells": total,
+        "kept": total - missing,
+        "computed": sum(counts.values()) - counts["lost"],
+        "counts": dict(counts),
+        "left": missing - sum(counts.values()) + counts["lost"],
+        "problems": problems,
+        "output": str(store.folder),
+    }
+
+
+def _print(summary: dict[str, Any], *, json: bool) -> None:
+    from reports.tables.terminal import print_json
+
+    if json:
+        print_json(summary)
+        return
+    print(f"{summary['output']}: {summary['cells']} cells of {summary['scenes']} scenes")
+    print(f"  {summary['kept']} were there, {summary['computed']} computed, {summary['left']} left")
+    for status, number in sorted(summary["counts"].items()):
+        print(f"  {status}: {number}")
+    for problem in summary["problems"]:
+        print(f"  {problem['status']}: {problem['scene']}, {problem['label']}: {problem['reason']}")
+    if summary["parquet"]:
+        print(f"  rows in {summary['parquet']}")

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tasks for tests of clusters: quick ones, and those that do what none should."""
+
+import os
+import re
+import time
+
+from analytic.errors import InputError
+
+
+def square(number, seconds=0.0):
+    time.sleep(seconds)
+    return number * number
+
+
+def add(first, number):
+    return first + number
+
+
+def large(number):
+    return bytes(1_000_000) + bytes([number])
+
+
+def refuse():
+    raise InputError("it is too dark")
+
+
+def fail():
+    raise ValueError("a fault")
+
+
+def abort():
+    os.abort()
+
+
+def sleep_for_ever():
+    while True:
+        time.sleep(1)
+
+
+def hold_the_interpreter():
+    """Run for ever in C, without letting other threads of Python run."""
+    re.match(r"(a+)+$", "a" * 60 + "b")
+
+
+def die_once(folder):
+    """End the process the first time, return the second time."""
+    flag = os.path.join(folder, "died")
+    if not os.path.exists(flag):
+        open(flag, "w").close()
+        os.abort()
+    return "alive"

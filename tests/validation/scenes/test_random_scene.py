@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: `random:SEED` is a scene wherever one is taken, valid, the same on every run, lit, with a finite truth."""
+
+import hashlib
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from realtime.scene.read_scene import read_scene
+from reference.scene.read import read_truth
+from reference.storage.scene_digest import scene_digest
+from reports.interchange.scene import describe_scene
+from reports.tables.scene import description_text
+from validation.estimates.quadrature import truth_image
+from validation.scenes.loading import load_scene
+from validation.scenes.parts import joined, scaled
+from validation.scenes.random_scene import drawn_values, random_name
+from validation.scenes.solids import box, icosphere
+
+SEEDS = range(48)
+
+
+@pytest.mark.claim("random-valid", tolerance="none: both readers take seeds 0 to 47, with all that was drawn")
+def test_both_readers_take_what_was_drawn(variant):
+    for seed in SEEDS:
+        loaded = load_scene(f"random:{seed}", (16, 12))
+        drawn = drawn_values(loaded.name)
+        ours, truth = read_scene(loaded.scene), read_truth(loaded.scene)
+        assert len(ours.lights) + len(ours.area_lights) == len(drawn["lights"])
+        assert len(truth.lights) + len(truth.area) + len(truth.directional) == len(drawn["lights"])
+        bounded = [medium for medium in drawn["media"] if medium["bounds"] != "endless"]
+        assert len(truth.media) == len(bounded)
+        assert ours.features.clear == (len(bounded) == len(drawn["media"]))
+        # What was drawn arrives, to the precision of the scene, single.
+        sigma = {medium.name: medium.sigma_t for medium in truth.media} | {"endless": truth.medium.sigma_t}
+        for medium in drawn["media"]:
+            np.testing.assert_allclose(sigma[medium["name"]], np.resize(medium["sigma_t"], 3), rtol=1e-6)
+        assert len(truth.occluders.shapes()) >= len(drawn["casters"])
+
+
+def test_light_reaches_what_the_camera_sees():
+    shares = [drawn_values(f"random:{seed}")["reach"]["lit"] for seed in range(24)]
+    assert min(shares) > 0.01
+    assert np.median(shares) < 1, "shadows in half of the scenes"
+
+
+@pytest.mark.claim("random-same", tolerance="none: the digests of two loads, and of the record kept here, are equal")
+def test_the_same_seed_is_the_same_scene(variant):
+    digests = [scene_digest(load_scene(name, (8, 6)).scene) for name in ("random:3", "random:3", "random:4")]
+    assert digests[0] == digests[1] != digests[2]
+    # Of records, whose numbers no variant rounds: an old seed keeps its scene.
+    words = hashlib.sha256()
+    for seed in range(8):
+        drawn = drawn_values(f"random:{seed}")
+        words.update(",".join(f"{light['kind']} {light['position'][0]:.6g}" for light in drawn["lights"]).encode())
+        words.update(",".join(f"{each['kind']} {each['radius']:.6g}" for each in drawn["casters"]).encode())
+    assert words.hexdigest()[:16] == KEPT
+
+
+KEPT = "626df2435b5b8389"
+
+
+def test_the_truth_is_finite_and_not_black(variant):
+    for seed in (1, 7, 13):  # point and spot lights, of which the truth takes a second
+        truth = truth_image(load_scene(f"random:{seed}", (16, 12)).scene)
+        assert np.isfinite(truth.airlight).all()
+        assert truth.airlight.mean() > 0
+
+
+def test_a_name_that_is_no_seed_is_refused():
+    for name in ("random:", "random:seven", "random:-1", "random:7:mesh=.", "random:7:meshes=", "random:1:2"):
+        with pytest.raises(InputError, match=r"wanted random:SEED|wanted meshes=FOLDER or ranges=FILE"):
+            load_scene(name)
+    with pytest.raises(InputError, match="wanted a whole number from 0"):
+        load_scene("random:1000000001")
+
+
+def test_meshes_of_a_folder_are_casters(variant, tmp_path):
+    import mitsuba as mi
+
+    folder = tmp_path / "meshes"
+    folder.mkdir()
+    with pytest.raises(InputError, match=r"holds no \.obj or \.ply file"):
+        load_scene(f"random:2:meshes={folder}")
+    vertices, faces = joined([scaled(icosphere(1), 7.3), box((23.1, 1.7, 1.3))])
+    mesh = mi.Mesh("one", len(vertices), len(faces))
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"], parameters["faces"] = vertices.astype(np.float32).ravel(), faces.ravel()
+    parameters.update()
+    mesh.write_ply(str(folder / "one.ply"))
+    kinds = []
+    for seed in range(6):
+        name = random_name(f"random:{seed}", meshes=folder)
+        drawn = drawn_values(name)
+        loaded = load_scene(name, (8, 6))
+        shapes = {shape.id(): shape for shape in loaded.scene.shapes()}
+        for caster in drawn["casters"]:
+            kinds.append(caster["kind"])
+            if caster["kind"] == "mesh":
+                first = seed
+                assert shapes[caster["name"]].face_count() == len(faces)
+                box_ = shapes[caster["name"]].bbox()
+                away = np.linalg.norm(np.array(box_.center()).ravel() - caster["position"])
+                assert away < caster["radius"]
+    assert "mesh" in kinds
+    (folder / "one.ply").write_text("ply, and not quite")
+    with pytest.raises(InputError, match=r"meshes: .*one\.ply"):
+        load_scene(f"random:{first}:meshes={folder}", (8, 6))
+
+
+def test_options_are_refused_beside_other_scenes(tmp_path):
+    with pytest.raises(InputError, match="--meshes: hall is no random scene"):
+        random_name("hall", meshes=tmp_path)
+    assert random_name("hall") == "hall"
+
+
+def test_describe_prints_what_was_drawn(variant):
+    described = describe_scene(load_scene("random:7", (16, 12)))
+    assert described["drawn"]["seed"] == 7
+    words = description_text(described)
+    for part in (*described["drawn"]["lights"], *described["drawn"]["media"]):
+        assert part["name"] in words
+    assert described["file"]["name"] == "random:7.exr"

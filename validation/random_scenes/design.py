@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The design: scene SEED is point SEED of one scrambled Halton sequence, whose beginning covers the ranges evenly.
+
+What a scene has once or may have first (the optical depth, how many lights, the kind of each) is a coordinate of the
+point. What it has many of, such as the places of casters, comes from a stream of random numbers that the seed begins.
+The scrambling (random permutations of digits, Owen 2017) is the same for all seeds; without it neighbouring
+coordinates of such a sequence are correlated.
+"""
+
+import math
+import zlib
+from collections.abc import Mapping
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from analytic.errors import InputError
+
+#: The coordinates of a point. A new one goes to the end: the others keep their scenes.
+COORDINATES = (
+    "media",
+    "optical_depth",
+    "lights",
+    "casters",
+    "light_kind-1",
+    "phase",
+    "extinctions",
+    "camera_in",
+    "camera_inside",
+    "camera_distance",
+    "camera_elevation",
+    "fov",
+    "g",
+    "grounds",
+    "light_distance-1",
+    "light_elevation-1",
+    "light_azimuth-1",
+    "brightness-1",
+    "light_size-1",
+    "cutoff-1",
+    "scale",
+    "bounds_kind",
+    "bounds",
+    "bounded_media",
+    "light_kind-2",
+    "light_kind-3",
+    "light_kind-4",
+    "albedo",
+    "caster_size",
+    "light_distance-2",
+    "brightness-2",
+    "light_kind-5",
+    "light_kind-6",
+    "light_kind-7",
+    "light_kind-8",
+    "caster_kind-1",
+    "caster_kind-2",
+    "cages",
+    "spheres",
+    "beam-1",
+    "light_material-1",
+    "droplets",
+)
+_SCRAMBLING = 2417
+LARGEST_SEED = 10**9
+
+
+class Draws:
+    """Numbers of a scene: coordinates of its point first, then of its stream."""
+
+    def __init__(self, seed: int, attempt: int = 0, part: str = "") -> None:
+        self._seed, self._attempt = seed, attempt
+        entropy = [seed, attempt, zlib.crc32(part.encode())]
+        self._bits = np.random.PCG64(np.random.SeedSequence(entropy))
+        self._point = point(seed) if not part else {}
+
+    def of(self, part: str) -> "Draws":
+        """Return the stream of a part of the scene: what one part draws does not move the others."""
+        return Draws(self._seed, self._attempt, part)
+
+    def share(self, name: str = "") -> float:
+        """Return a number within (0, 1), the coordinate of that name if the point has one."""
+        if name in self._point:
+            return self._point[name]
+        # The highest 53 bits: the stream of raw numbers is what NumPy promises never to change.
+        return ((int(self._bits.random_raw()) >> 11) + 0.5) * 2.0**-53
+
+    def between(self, low: float, high: float, name: str = "") -> float:
+        """Return a number within a range, evenly."""
+        return low + (high - low) * self.share(name)
+
+    def logarithmic(self, low: float, high: float, name: str = "") -> float:
+        """Return a number within a range of positive numbers, evenly in the logarithm."""
+        return float(low * math.exp(math.log(high / low) * self.share(name)))
+
+    def count(self, low: float, high: float, name: str = "") -> int:
+        """Return a whole number from `low` to `high`, evenly in the logarithm."""
+        return min(math.floor(self.logarithmic(low + 0.5, high + 1.5, name) - 0.5), int(high))
+
+    def few(self, low: float, high: float, name: str = "") -> int:
+        """Return a whole number from `low` to `high`, of which small ones come more often than by `count`."""
+        span = math.log((high + 1.5) / (low + 0.5))
+        return min(math.floor((low + 0.5) * math.exp(span * self.share(name) ** 2) - 0.5), int(high))
+
+    def pick(self, weights: Mapping[str, float], name: str = "") -> str:
+        """Return one of several words by their weights."""
+        left = self.share(name) * sum(weights.values())
+        for word, weight in weights.items():
+            left -= weight
+            if left < 0:
+                return word
+        return [word for word, weight in weights.items() if weight > 0][-1]
+
+    def vector(self) -> NDArray[np.float64]:
+        """Return a unit vector, evenly over the sphere, (3,)."""
+        z, angle = self.between(-1, 1), self.between(0, 2 * math.pi)
+        across = math.sqrt(1 - z * z)
+        return np.array([across * math.cos(angle), across * math.sin(angle), z])
+
+    def in_ball(self) -> NDArray[np.float64]:
+        """Return a point within the unit ball, evenly, (3,)."""
+        return self.vector() * self.share() ** (1 / 3)
+
+
+@lru_cache(maxsize=64)
+def point(seed: int) -> Mapping[str, float]:
+    """Return the coordinates of a seed by name, each within (0, 1).
+
+    Raises
+    ------
+    InputError
+        For a seed that no scene has.
+    """
+    if not 0 <= seed <= LARGEST_SEED:
+        raise InputError(f"random scene: got the seed {seed}, wanted a whole number from 0 to {LARGEST_SEED}")
+    sequence = qmc.Halton(len(COORDINATES), scramble=True, rng=np.random.default_rng(_SCRAMBLING))
+    sequence.fast_forward(seed)
+    values = sequence.random(1)[0]
+    return dict(zip(COORDINATES, (float(min(max(value, 1e-9), 1 - 1e-9)) for value in values), strict=True))

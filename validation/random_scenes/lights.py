@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lights: kinds, places, sizes, and how bright they are.
+
+A light that nothing would be seen of, behind ten optical depths of fog, is drawn again or moved towards what the camera
+sees: a tenth of the scenes would be black else.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validation.random_scenes.brightness import Ways, unit_airlight
+from validation.random_scenes.design import Draws
+from validation.random_scenes.drawn import AREA_KINDS
+from validation.random_scenes.media import PlacedMedium, optical_depths
+from validation.random_scenes.ranges import Ranges
+
+Array = NDArray[np.float64]
+
+_FAR = 1e3  # where directional lights come from, in radii of the stage
+_DEEPEST = 7.0  # optical depth from a light to the camera by the nearest way
+_TRIES = 9
+_LEAST_CONE = 0.37  # radius of a spot's cone at its target, in radii of the stage
+_CLEAR = 0.19  # around the camera nothing of a light is nearer, in radii of the stage
+
+
+@dataclass(frozen=True)
+class PlacedLight:
+    """A light in radii of the stage."""
+
+    kind: str
+    position: Array
+    target: Array
+    colour: Array  #: intensity, irradiance, or radiance, for a stage of radius 1
+    brightness: float
+    size: tuple[float, ...]
+    cutoff: float
+    beam: float
+    black: bool
+
+    @property
+    def ball(self) -> float:
+        """The radius of the ball around what shines."""
+        return math.hypot(*self.size) if self.kind == "rectangle" else max(self.size, default=0.0)
+
+
+def draw_lights(
+    draws: Draws, ranges: Ranges, media: list[PlacedMedium], camera: Array, seen: Ways
+) -> list[PlacedLight]:
+    """Return the lights of a scene.
+
+    Parameters
+    ----------
+    draws, ranges
+        Of the scene.
+    media, camera
+        What was drawn before.
+    seen
+        Rays of the camera, for the brightness.
+    """
+    endless = any(medium.bounds == "endless" for medium in media)
+    kinds = {kind: 0.0 if endless and kind == "directional" else weight for kind, weight in ranges.light_kinds.items()}
+    kinds = kinds if any(kinds.values()) else {"point": 1.0}
+    return [
+        _light(draws, ranges, draws.pick(kinds, f"light_kind-{number}"), number, media, camera, seen)
+        for number in range(1, draws.few(*ranges.lights, "lights") + 1)
+    ]
+
+
+def _light(
+    draws: Draws,
+    ranges: Ranges,
+    kind: str,
+    number: int,
+    media: list[PlacedMedium],
+    camera: Array,
+    seen: Ways,
+) -> PlacedLight:
+    stream = draws.of(f"light-{number}")
+    size = _size(draws, stream, ranges, kind, number)
+    ball = math.hypot(*size) if kind == "rectangle" else max(size, default=0.0)
+    # Where the camera sees light best: the middle of the stage, or nearer in thick fog.
+    ahead = _ahead(media, camera, seen)
+    for attempt in range(_TRIES):
+        first = draws if attempt == 0 else stream
+        elevation = math.asin(
+            math.sin(math.radians(-17.0))
+            + (1 + math.sin(math.radians(17.0))) * first.share(f"light_elevation-{number}") * 0.99
+        )
+        azimuth = first.between(0, 2 * math.pi, f"light_azimuth-{number}")
+        across = math.cos(elevation)
+        direction = np.array([across * math.cos(azimuth), across * math.sin(azimuth), math.sin(elevation)])
+        if kind == "directional":
+            # Light from below the floor would reach nothing.
+            direction[2] = 0.17 + abs(direction[2])
+            position = direction / np.linalg.norm(direction) * _FAR
+        else:
+            distance = first.logarithmic(*ranges.light_distance, f"light_distance-{number}")
+            position = _nearer(media, camera, ahead, (distance + ball) * direction)
+        target = (ahead if attempt % 2 == 0 else np.zeros(3)) + 0.29 * stream.in_ball()
+        unit = unit_airlight(media, seen, position, directional=kind == "directional")
+        if np.linalg.norm(position - camera) > ball + _CLEAR and unit > 0 and math.log(unit) > -_DEEPEST - 9:
+            break
+    colour = np.array([stream.between(0.53, 1.0) for _ in range(3)])
+    brightness = draws.logarithmic(*ranges.brightness, f"brightness-{number}") / (1 + 0.5 * (number - 1))
+    strength = brightness / max(unit, 1e-7)
+    cutoff = beam = 0.0
+    if kind == "spot":
+        # A narrow cone that begins near by would light next to nothing.
+        least = math.degrees(math.atan(_LEAST_CONE / float(np.linalg.norm(target - position))))
+        cutoff = max(draws.logarithmic(*ranges.cutoff, f"cutoff-{number}"), min(least, ranges.cutoff[1]))
+        share = draws.share(f"beam-{number}")
+        beam = cutoff * (1.0 if share > 0.6 else 0.07 + 1.4 * share)
+    if kind in AREA_KINDS:
+        strength /= _projected_area(kind, size)
+    black = draws.pick(ranges.light_materials, f"light_material-{number}") == "black"
+    return PlacedLight(kind, position, target, strength * colour, brightness, size, cutoff, beam, black)
+
+
+def _size(draws: Draws, stream: Draws, ranges: Ranges, kind: str, number: int) -> tuple[float, ...]:
+    if kind not in AREA_KINDS:
+        return ()
+    size = draws.logarithmic(*ranges.light_size, f"light_size-{number}")
+    return (size, size * stream.between(0.23, 0.97)) if kind == "rectangle" else (size,)
+
+
+def _projected_area(kind: str, size: tuple[float, ...]) -> float:
+    """Return radiance to intensity along the normal [m^2]."""
+    return 4 * size[0] * size[1] if kind == "rectangle" else math.pi * size[0] ** 2
+
+
+def _ahead(media: list[PlacedMedium], camera: Array, seen: Ways) -> Array:
+    """Return a point on the axis of the camera, the middle of the stage or where the optical depth is about 2."""
+    axis = seen.directions[0]
+    far = float(np.linalg.norm(camera))
+    for share in (1.0, 0.83, 0.67, 0.51, 0.37, 0.23, 0.13):
+        point = camera + share * far * axis
+        if optical_depths(media, camera, point).mean() < 2:
+            return point
+    return camera + max(0.07 * far, 1.7 * _CLEAR) * axis
+
+
+def _nearer(media: list[PlacedMedium], camera: Array, ahead: Array, position: Array) -> Array:
+    """Return a position from which enough light arrives, moved towards a point ahead where needed."""
+    for share in (1.0, 0.71, 0.5, 0.35, 0.25, 0.17, 0.11):
+        moved = ahead + share * (position - ahead)
+        way = optical_depths(media, moved, ahead).mean() + optical_depths(media, ahead, camera).mean()
+        if way < _DEEPEST:
+            return moved
+    return moved

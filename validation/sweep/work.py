@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A cell becomes a row: the method's image against the truth, by all metrics, and what it cost.
+
+A method that refuses a scene gives a row too, with its reason. Nothing here knows where it runs.
+"""
+
+import json
+import resource
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError as TruthError
+from realtime.errors import InputError
+from realtime.frame.renderer import (
+    Frame,
+    FrameRenderer,
+    evaluated,
+    run_cast_and_shade,
+    run_cull,
+    run_method,
+    run_stages,
+    unchecked_frame,
+)
+from realtime.methods.registry import METHODS
+from realtime.scene.read_scene import Scene
+from validation.configurations.methods import Configuration, prepared, rendered_lights
+from validation.metrics.colour import colour_difference
+from validation.metrics.errors import FLOOR, error_metrics
+from validation.metrics.flip import flip_hdr
+from validation.metrics.other_tools import published_errors
+from validation.sweep.row import PROPERTY
+from validation.sweep.study import Cell, map_side, seed_of
+from validation.sweep.truth import CellTruth
+
+Array = NDArray[np.float64]
+#: Makes a picture of truth and image, both (height, width, 3) [W/(m^2 sr)]; None where there is none.
+Paint = Callable[[Array, Array], bytes | None]
+
+#: The error of methods that claim rounding alone, relative to the pixel, or to a thousandth of the mean in the dark.
+ROUNDING = 1e-3
+
+_SPENT = 100.0  # on frames that are timed, and as much on the airlight alone [ms]
+_MOST = 9  # frames that are timed
+_SLOW = 500.0  # a slower frame is timed once, without a warm-up of its own [ms]
+_OWN_UNITS = ("rae_tev", "rse_tev", "mrse_pbrt", "relmse", "relmse_trim", "mape", "smape", "mrse_jeri")
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """An image and what it cost."""
+
+    frame: Frame
+    numbers: Mapping[str, Any]  #: columns of the cost
+
+
+def cell_columns(cell: Cell) -> dict[str, Any]:
+    """Return the columns that say which cell a row is of, without its key."""
+    chosen = cell.chosen
+    return {
+        "scene": cell.scene,
+        "seed": seed_of(cell.scene),
+        "medium": " ".join(cell.medium) or None,
+        "method": chosen.method,
+        "kernel": chosen.kernel,
+        "parameters": json.dumps(dict(chosen.parameters)),
+        "label": chosen.label,
+        "map": map_side(chosen),
+        "width": cell.size[0],
+        "height": cell.size[1],
+        "command": _command(cell),
+    }
+
+
+def cell_row(
+    cell: Cell, scene: Scene, truth: CellTruth, *, properties: Mapping[str, float], paint: Paint | None = None
+) -> dict[str, Any]:
+    """Return the columns of a cell: errors, costs, or why there are none; without its key and where it ran.
+
+    Parameters
+    ----------
+    cell
+        The cell.
+    scene
+        Of the cell, as methods read it.
+    truth
+        Of the cell's image.
+    properties
+        Of the scene.
+    paint
+        Makes the picture of the row.
+
+    Notes
+    -----
+    Exceptions other than a refusal are the caller's: they are faults.
+    """
+    begin = time.perf_counter()
+    row = cell_columns(cell) | {PROPERTY + name: float(value) for name, value in properties.items()}
+    row |= _truth_columns(truth)
+    try:
+        rendered = _render(scene, cell.chosen, timed=cell.times != "none")
+    except (InputError, TruthError) as error:
+        return row | {"status": "refused", "reason": str(error)}
+    row |= {"status": "done", **rendered.numbers, **error_columns(truth, rendered.frame, scene, cell)}
+    if paint is not None:
+        row["picture"] = paint(truth.airlight, np.asarray(rendered.frame.airlight, dtype=np.float64))
+    row["rays"] = scene.camera.width * scene.camera.height
+    row["lights"] = rendered_lights(scene, cell.chosen)
+    row["peak_mib"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    row["work_ms"] = 1e3 * (time.perf_counter() - begin)
+    return row
+
+
+def stated_bound(chosen: Configuration, scene: Scene) -> float | None:
+    """Return the relative error that a method states for itself in a scene [1]; None where it states none.
+
+    Only what claims to be exact but for rounding states one: the kernel `exact` along whole rays where nothing casts a
+    shadow, and shadow planes in exact order. Points in the place of lights with extent are an approximation.
+    """
+    given = dict(chosen.parameters)
+    plain = chosen.kernel == "exact" and not scene.area_lights
+    exact = {"order": "exact", "media": "exact", "evaluation": "pixel", "tolerance": 0.0}
+    defaults = METHODS[chosen.method].defaults if chosen.method in METHODS else {}
+    as_stated = all((defaults | given).get(name, value) == value for name, value in exact.items())
+    whole_rays = chosen.method in ("unshadowed", "light-volumes") and not scene.features.shadows
+    return ROUNDING if plain and as_stated and (chosen.method == "shadow-planes" or whole_rays) else None
+
+
+def error_columns(truth: CellTruth, frame: Frame, scene: Scene, cell: Cell) -> dict[str, Any]:
+    """Return the errors of a frame against the truth by all metrics."""
+    test = np.asarray(frame.airlight, dtype=np.float64)
+    metrics = asdict(error_metrics(truth.airlight, test))
+    published = asdict(published_errors(truth.airlight, test))
+    normalised = asdict(published_errors(truth.airlight, test, unit=None))
+    colour = asdict(colour_difference(truth.airlight, test))
+    others = ("mse", "mae", "psnr", "relative", "relative_max", "dark_max", "dark", *_OWN_UNITS)
+    finite = np.isfinite(test).all(axis=2)
+    row = {
+        **metrics,
+        "masked": 0,
+        "mean": float(test[finite].mean()) if finite.any() else None,
+        **{name: published[name] for name in others},
+        **{f"normalised.{name}": normalised[name] for name in _OWN_UNITS},
+        **{f"colour.{name}": colour[name] for name in colour if name.startswith(("ciede2000_", "itp_"))},
+        "bound": stated_bound(cell.chosen, scene),
+    }
+    if row["bound"] is not None:
+        floor = FLOOR * truth.airlight.mean()
+        allowed = row["bound"] * np.maximum(truth.airlight, floor) + truth.bound
+        row["outside_bound"] = int((np.abs(test - truth.airlight) > allowed).any(axis=2).sum())
+    if scene.features.surfaces:
+        surface = error_metrics(truth.surface, np.asarray(frame.surface, dtype=np.float64))
+        row |= {f"surface_{name}": getattr(surface, name) for name in ("relative_rmse", "p99", "max", "nonfinite")}
+    if cell.flip:
+        row["flip"] = flip_hdr(truth.airlight, test).value
+    return row
+
+
+def _truth_columns(truth: CellTruth) -> dict[str, Any]:
+    mean = float(truth.airlight.mean())
+    known = mean > 0
+    return {
+        "truth": truth.estimator,
+        "truth_mean": mean,
+        "truth_error": float(truth.bound.mean()) / mean if known else None,
+        "truth_worst": float((truth.bound / np.maximum(truth.airlight, FLOOR * mean)).max()) if known else None,
+        "truth_s": truth.seconds,
+        "crossings": truth.crossings,
+    }
+
+
+def _render(scene: Scene, chosen: Configuration, *, timed: bool) -> Rendered:
+    """Render a frame, and time it if asked for.
+
+    Raises
+    ------
+    InputError
+        If the method refuses the scene or its parameters.
+    """
+    dr.sync_thread()
+    dr.detail.malloc_clear_statistics()
+    before = dr.detail.launch_stats()
+    begin = time.perf_counter()
+    renderer = prepared(scene, chosen)
+    state = renderer.prepare(scene)
+    dr.eval(state)
+    frame = unchecked_frame(renderer, run_stages(renderer, state))
+    first = time.perf_counter() - begin
+    after = dr.detail.launch_stats()
+    backend = dr.JitBackend.CUDA if (mi.variant() or "").startswith("cuda") else dr.JitBackend.LLVM
+    numbers: dict[str, Any] = {
+        "first_ms": 1e3 * first,
+        "kernels": after[0] - before[0],
+        "compiled": after[2] - before[2],
+        "bytes": int(dr.detail.malloc_watermark(backend)),
+    }
+    return Rendered(frame, numbers | (_times(renderer, scene, state) if timed else {}))
+
+
+def _times(renderer: FrameRenderer, scene: Scene, state: Any) -> dict[str, Any]:
+    """Time preparation, frames, and the airlight of a frame; the first run has compiled and recorded all kernels."""
+    prepare = _timed(lambda: dr.eval(renderer.prepare(scene)))
+    frames = _repeated(lambda: run_stages(renderer, state))
+    low, median, high = (float(value) for value in np.percentile(frames, [25, 50, 75]))
+    cast, by_light = run_cast_and_shade(renderer)
+    dr.eval(cast, by_light)
+    airlight = _repeated(
+        lambda: evaluated(
+            cast, by_light, run_method(renderer, state, cast, by_light, run_cull(renderer, state, cast.distance))
+        )
+    )
+    return {
+        "prepare_ms": prepare,
+        "frame_ms": median,
+        "frame_ms_low": low,
+        "frame_ms_high": high,
+        "airlight_ms": float(np.median(airlight)),
+        "frames": len(frames),
+    }
+
+
+def _repeated(work: Callable[[], Any]) -> list[float]:
+    """Return the times of some runs after one of warm-up [ms]; a slow one is not repeated often."""
+    times = [_timed(work)]
+    if times[0] < _SLOW:
+        times = []  # the warm-up replayed for the first time
+    while not times or (sum(times) < _SPENT and len(times) < _MOST):
+        times.append(_timed(work))
+    return times
+
+
+def _timed(work: Callable[[], Any]) -> float:
+    begin = time.perf_counter()
+    work()
+    dr.sync_thread()
+    return 1e3 * (time.perf_counter() - begin)
+
+
+def _command(cell: Cell) -> str:
+    """Return the command that shows the image of a cell again."""
+    chosen = cell.chosen
+    words = ["airlight", "view", cell.scene, "--method", chosen.method]
+    words += ["--kernel", chosen.kernel] if chosen.kernel else []
+    words += [f"--set {name}={value}" for name, value in chosen.parameters]
+    words += [f"--change {change}" for change in cell.medium]
+    return " ".join([*words, "--size", f"{cell.size[0]}x{cell.size[1]}"])
