@@ -2,7 +2,8 @@
 """The Parquet of a sweep, read by columns: without Mitsuba, and without a scene."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -55,11 +56,13 @@ class Sweep:
         import pyarrow.compute as pc
         import pyarrow.parquet as pq
 
-        if not keys or "picture" not in pq.read_schema(self.path).names:
-            return {}
-        wanted = pc.field("key").isin(list(keys)) & pc.field("picture").is_valid()
-        found = pq.read_table(self.path, columns=["key", "picture"], filters=wanted)
-        return dict(zip(found["key"].to_pylist(), found["picture"].to_pylist()))
+        with _reading(self.path):
+            if not keys or "picture" not in pq.read_schema(self.path).names:
+                return {}
+            wanted = pc.field("key").isin(list(keys)) & pc.field("picture").is_valid()
+            columns = ["key", "picture"]
+            found = pq.read_table(self.path, columns=columns, filters=wanted, page_checksum_verification=True)
+            return dict(zip(found["key"].to_pylist(), found["picture"].to_pylist()))
 
 
 def read_sweep(path: Path | str) -> Sweep:
@@ -79,7 +82,7 @@ def read_sweep(path: Path | str) -> Sweep:
     import pyarrow.parquet as pq
 
     file = _file_of(Path(path))
-    try:
+    with _reading(file):
         schema = pq.read_schema(file)
         names = [name for name in schema.names if name != "picture"]
         missing = [name for name in _NEEDED if name not in names]
@@ -96,10 +99,8 @@ def read_sweep(path: Path | str) -> Sweep:
                     f"{file} has {schema.field(name).type} in the column {name!r}, wanted {kinds[name]}; "
                     "run the sweep again with this version of airlight"
                 )
-        table = pq.read_table(file, columns=[name for name in names if name in kinds or name.startswith(PROPERTY)])
-    except (pa.ArrowException, OSError) as error:
-        words = " ".join(str(error).split())
-        raise InputError(f"{file} cannot be read as Parquet: {words[:160]}; run the sweep again") from error
+        wanted = [name for name in names if name in kinds or name.startswith(PROPERTY)]
+        table = pq.read_table(file, columns=wanted, page_checksum_verification=True)
     if not table.num_rows:
         raise InputError(f"{file} has no rows: no cell of the sweep has ended; run it to its end, or for longer")
     columns = {name: _array(table[name]) for name in table.column_names}
@@ -114,6 +115,18 @@ def read_sweep(path: Path | str) -> Sweep:
     columns = {name: values[kept] for name, values in columns.items()}
     properties = tuple(sorted(name.removeprefix(PROPERTY) for name in columns if name.startswith(PROPERTY)))
     return Sweep(file, columns, properties)
+
+
+@contextmanager
+def _reading(file: Path) -> Iterator[None]:
+    """Say in a line what is wrong with a file that Arrow cannot read."""
+    import pyarrow as pa
+
+    try:
+        yield
+    except (pa.ArrowException, OSError) as error:
+        words = " ".join(str(error).split())
+        raise InputError(f"{file} cannot be read as Parquet: {words[:160]}; run the sweep again") from error
 
 
 def natural(text: str) -> tuple[str | int, ...]:

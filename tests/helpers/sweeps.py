@@ -113,5 +113,5 @@ def write_rows(path, several):
     import pyarrow.parquet as pq
 
     schema = arrow_schema(property_names(several))
-    pq.write_table(pa.Table.from_pylist(list(several), schema=schema), path)
+    pq.write_table(pa.Table.from_pylist(list(several), schema=schema), path, write_page_checksum=True)
     return path
