@@ -2,9 +2,11 @@
 """Rows of a sweep made by a seeded generator, so that what must come out is known."""
 
 import hashlib
+import io
 import json
 
 import numpy as np
+from PIL import Image
 
 from validation.sweep.row import arrow_schema, checked_row, property_names
 
@@ -115,3 +117,24 @@ def write_rows(path, several):
     schema = arrow_schema(property_names(several))
     pq.write_table(pa.Table.from_pylist(list(several), schema=schema), path, write_page_checksum=True)
     return path
+
+
+def picture(number):
+    """A small picture, as a row may have one."""
+    pixels = np.random.default_rng(number).integers(0, 255, (12, 48, 3), dtype=np.uint8)
+    stored = io.BytesIO()
+    Image.fromarray(pixels).save(stored, "webp")
+    return stored.getvalue()
+
+
+def faulty_rows():
+    """Rows with pictures of the worst, and one of each fault."""
+    several = rows(40)
+    for name in {each["label"] for each in several}:
+        own = [each for each in several if each["label"] == name and each["status"] == "done"]
+        for number, each in enumerate(sorted(own, key=lambda each: -each["relative_rmse"])[:12]):
+            each["picture"] = picture(number)
+    several[7] |= {"nonfinite": 12, "picture": picture(12)}
+    several[13] |= {"outside_bound": 2, "bound": 1e-5}
+    several.append(row("random:99", parameters={"steps": 16}, status="hung", reason="longer than 60 s"))
+    return several

@@ -1,13 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The page, the figures and the digest of a sweep, from its Parquet alone."""
 
-import io
 import json
 import re
 
-import numpy as np
 import pytest
-from PIL import Image
 
 from analytic.errors import InputError
 from reports.page.chart import svg_text
@@ -18,27 +15,7 @@ from reports.sweep.read import FILE, read_sweep
 from reports.sweep.summary import headlines, summary_of, to_json
 from reports.sweep.write import write_sweep
 from tests.helpers.page import Page, table_of, widths
-from tests.helpers.sweeps import METHODS, row, rows, write_rows
-
-
-def picture(number):
-    pixels = np.random.default_rng(number).integers(0, 255, (12, 48, 3), dtype=np.uint8)
-    stored = io.BytesIO()
-    Image.fromarray(pixels).save(stored, "webp")
-    return stored.getvalue()
-
-
-def faulty_rows():
-    """Rows with pictures of the worst, and one of each fault."""
-    several = rows(40)
-    for label in {each["label"] for each in several}:
-        own = [each for each in several if each["label"] == label and each["status"] == "done"]
-        for number, each in enumerate(sorted(own, key=lambda each: -each["relative_rmse"])[:12]):
-            each["picture"] = picture(number)
-    several[7] |= {"nonfinite": 12, "picture": picture(12)}
-    several[13] |= {"outside_bound": 2, "bound": 1e-5}
-    several.append(row("random:99", parameters={"steps": 16}, status="hung", reason="longer than 60 s"))
-    return several
+from tests.helpers.sweeps import METHODS, faulty_rows, row, write_rows
 
 
 def said_of(folder, several):
