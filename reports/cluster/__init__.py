@@ -9,5 +9,5 @@ Read in this order:
 - `cells.py`: the cells of a sweep as tasks.
 
 May import: `analytic.errors`, `realtime.errors`, `realtime.scene`, `reference.storage`, `reports.machine`,
-`reports.plotting`, `validation.scenes`, `validation.sweep`.
+`reports.plotting`, `validation.properties`, `validation.scenes`, `validation.sweep`.
 """

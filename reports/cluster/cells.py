@@ -20,6 +20,7 @@ from reports.cluster.run import Group, Outcome, Task
 from reports.cluster.worker import is_alone
 from reports.machine.environment import processor
 from reports.plotting.pictures import error_map, exposure, tone_mapped
+from validation.properties.properties import scene_properties
 from validation.scenes.loading import LoadedScene
 from validation.sweep.keys import Made, cell_key, source_digest
 from validation.sweep.rows import RowStore
@@ -43,7 +44,7 @@ def row_of(truth: CellTruth, cell: Cell, key: str) -> dict[str, Any]:
 
     started = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     _, scene = _opened(cell.image)
-    row = cell_row(cell, scene, truth, properties={}, paint=_picture)
+    row = cell_row(cell, scene, truth, properties=_properties(cell.image), paint=_picture)
     return row | {
         "key": key,
         "started": started,
@@ -109,6 +110,11 @@ def _opened(image: Cell) -> tuple[LoadedScene, Scene]:
     """Return the scene of an image, loaded and as methods read it; that of the last cell is there already."""
     loaded = load_cell(image)
     return loaded, read_scene(loaded.scene)
+
+
+@lru_cache(maxsize=1)
+def _properties(image: Cell) -> dict[str, float]:
+    return scene_properties(_opened(image)[1])
 
 
 @lru_cache(maxsize=1)

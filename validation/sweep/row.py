@@ -183,6 +183,7 @@ _TRUTH = (
     ),
     Column("truth_worst", "float64", "1", "that of the worst pixel, relative to it as in `max`"),
     Column("truth_s", "float64", "s", "that the truth took when it was computed, shared by all cells of the scene"),
+    Column("truth_cpu_s", "float64", "s", "processor time of that, of all threads"),
 )
 
 _COST = (
@@ -197,6 +198,7 @@ _COST = (
             "frame_ms_high": "third quartile of a frame",
             "airlight_ms": "median of the airlight of a frame alone",
             "work_ms": "that the cell took from its beginning to its row",
+            "cpu_ms": "processor time of that, of all threads",
         },
     ),
     Column("frames", "int32", "1", "frames that were timed"),

@@ -39,6 +39,7 @@ class CellTruth:
     surface: Array  #: (height, width, 3) [W/(m^2 sr)]
     crossings: int | None  #: of all camera rays with edges between light and shadow
     seconds: float  #: that it took when it was computed
+    processor_seconds: float  #: of all threads, in that time
 
 
 def load_cell(cell: Cell) -> LoadedScene:
@@ -60,16 +61,17 @@ def cell_truth(loaded: LoadedScene) -> CellTruth:
     InputError
         As of `validation.estimates.quadrature.truth_image`.
     """
-    key = "sweep-truth-time/" + cache_key(loaded.scene, "quadrature", {"plan": repr(AREA_PLAN)})
-    begin = time.perf_counter()
+    key = "sweep-truth-cost/" + cache_key(loaded.scene, "quadrature", {"plan": repr(AREA_PLAN)})
+    begin, spent = time.perf_counter(), time.process_time()
     image = truth_image(loaded.scene, plan=AREA_PLAN)
-    took = time.perf_counter() - begin
+    took = {"seconds": time.perf_counter() - begin, "processor": time.process_time() - spent}
     kept = load_arrays(key)
     if kept is None:
-        store_arrays(key, {"seconds": took})
+        store_arrays(key, took)
     else:
-        took = float(kept["seconds"])
-    return CellTruth("quadrature", image.airlight, _bound(image), image.surface, image.transitions, took)
+        took = {name: float(value) for name, value in kept.items()}
+    costs = took["seconds"], took["processor"]
+    return CellTruth("quadrature", image.airlight, _bound(image), image.surface, image.transitions, *costs)
 
 
 def _bound(image: TruthImage) -> Array:

@@ -100,7 +100,7 @@ def cell_row(
     -----
     Exceptions other than a refusal are the caller's: they are faults.
     """
-    begin = time.perf_counter()
+    begin, spent = time.perf_counter(), time.process_time()
     row = cell_columns(cell) | {PROPERTY + name: float(value) for name, value in properties.items()}
     row |= _truth_columns(truth)
     try:
@@ -114,6 +114,7 @@ def cell_row(
     row["lights"] = rendered_lights(scene, cell.chosen)
     row["peak_mib"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     row["work_ms"] = 1e3 * (time.perf_counter() - begin)
+    row["cpu_ms"] = 1e3 * (time.process_time() - spent)
     return row
 
 
@@ -171,6 +172,7 @@ def _truth_columns(truth: CellTruth) -> dict[str, Any]:
         "truth_error": float(truth.bound.mean()) / mean if known else None,
         "truth_worst": float((truth.bound / np.maximum(truth.airlight, FLOOR * mean)).max()) if known else None,
         "truth_s": truth.seconds,
+        "truth_cpu_s": truth.processor_seconds,
         "crossings": truth.crossings,
     }
 

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: the properties of a scene are what it holds, finite for every scene, and none depends on a unit of length."""
+
+import math
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from realtime.scene.read_scene import read_scene
+from validation.properties.properties import scene_properties
+from validation.scenes.loading import load_scene
+from validation.scenes.parts import area_lamp, camera, fog, grid, mitsuba_mesh, placed, point_light, scaled
+from validation.scenes.registry import FOG_SCENES
+from validation.scenes.solids import box
+
+
+def _scene(scale=1.0, *, sigma_t=0.37, lamp=(0.3, 0.1, 5.0), extra=None):
+    """Return a box of 0.4 m under a lamp, over a floor at z = -1, seen from 4 m away."""
+    cube = placed(scaled(box((0.4, 0.4, 0.4)), scale), (0.0, 0.0, 0.0))
+    floor = grid((-9.1 * scale, -9.3 * scale, -scale), (18.7 * scale, 0, 0), (0, 18.3 * scale, 0), (1, 1))
+    return read_scene(
+        mi.load_dict(
+            {
+                "type": "scene",
+                "fog": fog(sigma_t / scale, (0.9, 0.8, 0.7), {"type": "hg", "g": 0.6}),
+                "sensor": camera((0.0, -4.0 * scale, 0.01 * scale), (0, 0, 0), fov=40.0, size=(64, 48)),
+                "lamp": point_light([scale * value for value in lamp], (1.0, 1.0, 1.0)),
+                "cube": mitsuba_mesh("cube", cube, (0.5, 0.5, 0.5)),
+                "floor": mitsuba_mesh("floor", floor, (0.5, 0.5, 0.5)),
+            }
+            | (extra or {})
+        )
+    )
+
+
+def test_they_are_what_the_scene_holds(variant):
+    properties = scene_properties(_scene())
+    assert (properties["lights"], properties["points"], properties["areas"]) == (1, 1, 0)
+    assert properties["triangles"] == 14
+    assert properties["components"] == 2
+    assert properties["closed"] == 0.5
+    # Top and one side of the box face the lamp: six edges; the floor has its four borders.
+    assert properties["silhouettes"] == 10
+    assert properties["mean_cosine"] == pytest.approx(0.6, abs=2e-3)
+    assert properties["forward"] == pytest.approx((1 - 0.6**2) / 0.4**3, rel=1e-3)
+    # About half of the rays meet the floor, and the box.
+    assert 0.4 < properties["surface_share"] < 0.65
+    assert properties["lights_seen"] == 0
+    assert 0.8 < properties["lit_share"] < 1
+    assert properties["shadow_edges"] > 0
+    assert properties["pixels"] == 64 * 48
+
+
+def test_optical_depth_grows_with_extinction(variant):
+    thin, thick = (scene_properties(_scene(sigma_t=sigma)) for sigma in (0.1, 1.0))
+    assert thick["optical_depth"] == pytest.approx(10 * thin["optical_depth"], rel=1e-4)
+    assert thick["optical_depth_light"] == pytest.approx(10 * thin["optical_depth_light"], rel=1e-4)
+    assert {name for name in thin if thin[name] != thick[name]} == {
+        "optical_depth",
+        "optical_depth_light",
+        "optical_depth_most",
+    }
+
+
+def test_none_depends_on_the_unit_of_length(variant):
+    metres, inches = scene_properties(_scene()), scene_properties(_scene(39.37))
+    assert metres.keys() == inches.keys()
+    for name, value in metres.items():
+        assert inches[name] == pytest.approx(value, rel=2e-3, abs=2e-3), name
+
+
+def test_a_light_in_view_is_seen(variant):
+    properties = scene_properties(_scene(lamp=(0.0, 3.0, 0.3)))
+    assert properties["lights_seen"] == 1
+    assert properties["light_ray"] < 0.03
+    assert 0.1 < properties["light_nearest"] < 1
+
+
+def test_extent_and_bounds_are_read(variant):
+    lamp = area_lamp("sphere", (0.0, 0.3, 3.0), (0, 0, 0), 0.5, (1.0, 1.0, 1.0))
+    properties = scene_properties(_scene(extra={"wide": lamp}))
+    assert properties["areas"] == 1
+    # Half a metre from about 4.2 m: the middle of the view is near the camera.
+    assert 0.05 < properties["light_size"] < 0.2
+    windows = scene_properties(read_scene(load_scene("windows", (32, 24)).scene))
+    assert (windows["endless"], windows["bounded"], windows["facets"], windows["inside"]) == (0, 1, 6, 0)
+    assert (windows["directionals"], windows["extinctions"]) == (1, 3)
+
+
+def test_a_ball_without_triangles_is_counted(variant):
+    ball = {"type": "sphere", "center": [0.9, 0.1, 0.2], "radius": 0.2}
+    properties = scene_properties(_scene(extra={"ball": ball}))
+    assert properties["plain_shapes"] == 1
+    assert properties["silhouettes"] == 0
+
+
+@pytest.mark.claim("properties-finite", tolerance="none: every property of fourteen built-in and eight random scenes")
+def test_every_scene_has_the_same_properties_all_finite(variant):
+    names = None
+    for scene in (*FOG_SCENES, *(f"random:{seed}" for seed in range(8))):
+        properties = scene_properties(read_scene(load_scene(scene, (16, 12)).scene))
+        assert names in (None, list(properties))
+        names = list(properties)
+        assert all(math.isfinite(value) for value in properties.values()), scene
+        assert np.all(np.array(list(properties.values())) >= -1), scene
