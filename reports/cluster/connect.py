@@ -4,6 +4,7 @@
 import logging
 import re
 import signal
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -164,6 +165,7 @@ def _local(workers: int) -> Iterator[Any]:
     counts["distributed.deploy.lost-worker-timeout"] = 86400
     with temporary_folder() as folder, dask.config.set(memory | counts), ExitStack() as stack:
         with _without_interrupts():
+            _start_quiet_tracker()
             cluster = stack.enter_context(
                 LocalCluster(
                     n_workers=workers,
@@ -179,6 +181,17 @@ def _local(workers: int) -> Iterator[Any]:
             )
             client = stack.enter_context(Client(cluster, set_as_default=False))
         yield client
+
+
+def _start_quiet_tracker() -> None:
+    """Start the process that frees semaphores of a process that was ended, without its words on that."""
+    from multiprocessing import resource_tracker
+
+    sys.warnoptions.append("ignore::UserWarning:multiprocessing.resource_tracker")
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        sys.warnoptions.pop()
 
 
 @contextmanager

@@ -124,13 +124,11 @@ def stated_bound(chosen: Configuration, scene: Scene) -> float | None:
     Only what claims to be exact but for rounding states one: the kernel `exact` along whole rays where nothing casts a
     shadow, and shadow planes in exact order. Points in the place of lights with extent are an approximation.
     """
-    given = dict(chosen.parameters)
-    plain = chosen.kernel == "exact" and not scene.area_lights
-    exact = {"order": "exact", "media": "exact", "evaluation": "pixel", "tolerance": 0.0}
     defaults = METHODS[chosen.method].defaults if chosen.method in METHODS else {}
-    as_stated = all((defaults | given).get(name, value) == value for name, value in exact.items())
+    usual = all(defaults.get(name, value) == value for name, value in chosen.parameters if name != "map")
+    plain = usual and chosen.kernel == "exact" and not scene.area_lights
     whole_rays = chosen.method in ("unshadowed", "light-volumes") and not scene.features.shadows
-    return ROUNDING if plain and as_stated and (chosen.method == "shadow-planes" or whole_rays) else None
+    return ROUNDING if plain and (chosen.method == "shadow-planes" or whole_rays) else None
 
 
 def error_columns(truth: CellTruth, frame: Frame, scene: Scene, cell: Cell) -> dict[str, Any]:
@@ -154,7 +152,7 @@ def error_columns(truth: CellTruth, frame: Frame, scene: Scene, cell: Cell) -> d
     if row["bound"] is not None:
         floor = FLOOR * truth.airlight.mean()
         allowed = row["bound"] * np.maximum(truth.airlight, floor) + truth.bound
-        row["outside_bound"] = int((np.abs(test - truth.airlight) > allowed).any(axis=2).sum())
+        row["outside_bound"] = int((~(np.abs(test - truth.airlight) <= allowed)).any(axis=2).sum())
     if scene.features.surfaces:
         surface = error_metrics(truth.surface, np.asarray(frame.surface, dtype=np.float64))
         row |= {f"surface_{name}": getattr(surface, name) for name in ("relative_rmse", "p99", "max", "nonfinite")}

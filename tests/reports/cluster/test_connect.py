@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: any Dask scheduler will do, a worker of another version is refused by name, a scheduler may come back."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+
+import pytest
+
+from analytic.errors import InputError
+from reports.cluster.connect import Cluster, Place, connected, parse_place
+
+pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
+
+from reports.cluster import connect
+from reports.cluster.run import Group, Task, run_groups
+from tests.helpers import cluster_tasks as tasks
+from tests.helpers.imports import ROOT
+
+
+def test_places_by_their_words(tmp_path):
+    file = tmp_path / "scheduler.json"
+    file.write_text("{}")
+    assert parse_place("local:3") == Place(3)
+    assert parse_place(None).workers == parse_place("local").workers >= 1
+    assert parse_place("tcp://10.1.2.3:8786") == Place(address="tcp://10.1.2.3:8786")
+    assert parse_place(str(file)) == Place(file=file)
+
+
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        ("local:0", "local:N with a number of processes"),
+        ("local:", "local:N"),
+        ("local:two", "local:N"),
+        ("10.1.2.3:8786", "wanted local, local:N, tcp://HOST:PORT or a scheduler file"),
+        ("none.json", "there is no file none.json"),
+    ],
+)
+def test_other_words_are_refused(word, message):
+    with pytest.raises(InputError, match=message):
+        parse_place(word)
+
+
+def test_where_no_scheduler_answers(monkeypatch):
+    monkeypatch.setattr(connect, "_PATIENCE", 1.0)
+    message = r"no scheduler answers at tcp://127\.0\.0\.1:9 .*start `dask scheduler`"
+    with pytest.raises(InputError, match=message), connected(Place(address="tcp://127.0.0.1:9")):
+        pass
+
+
+def _dask(*words, root=ROOT):
+    return subprocess.Popen(
+        [sys.executable, "-m", "dask", *words],
+        env=os.environ | {"PYTHONPATH": str(root)},
+        cwd=root,  # which stands first among the places of modules
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+
+
+def _kill(process):
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def _free_port():
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return listener.getsockname()[1]
+
+
+def _scheduler(port):
+    return _dask("scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard")
+
+
+def _worker(address, root=ROOT):
+    return _dask("worker", address, "--nthreads", "1", "--no-dashboard", root=root)
+
+
+@contextmanager
+def _ended(*processes):
+    running = list(processes)
+    try:
+        yield running
+    finally:
+        for process in running:
+            _kill(process)
+
+
+@pytest.mark.slow
+@pytest.mark.claim("sweeps-lose-nothing", tolerance="none: every task has one outcome, with its value")
+def test_a_scheduler_that_comes_back_is_sent_what_was_open(tmp_path):
+    port = _free_port()
+    address = f"tcp://127.0.0.1:{port}"
+    connect._quiet()
+    with _ended(_scheduler(port), _worker(address)) as running:
+        client = connect._client(Place(address=address), timeout=60)
+
+        def restart():
+            for process in running:
+                _kill(process)
+            time.sleep(0.5)
+            running[:] = [_scheduler(port), _worker(address)]
+
+        timer = threading.Timer(2.0, restart)
+        ended = {}
+        groups = [
+            Group(tuple(Task(f"{g}-{n}", tasks.add, (n,)) for n in range(4)), Task(f"t{g}", tasks.square, (g, 0.1)))
+            for g in range(40)
+        ]
+        try:
+            client.wait_for_workers(1, timeout=60)
+            timer.start()
+            for outcome in run_groups(Cluster(client, Place(address=address)), groups, patience=90):
+                assert outcome.task.name not in ended
+                ended[outcome.task.name] = (outcome.status, outcome.value)
+        finally:
+            timer.join()
+            client.close(timeout=2)
+    assert ended == {f"{g}-{n}": ("done", g * g + n) for g in range(40) for n in range(4)}
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_stays_away_ends_the_run():
+    port = _free_port()
+    address = f"tcp://127.0.0.1:{port}"
+    connect._quiet()
+    with _ended(_scheduler(port), _worker(address)) as running:
+        client = connect._client(Place(address=address), timeout=60)
+        client.wait_for_workers(1, timeout=60)
+        outcomes = []
+        groups = (Group((Task(f"s{n}", tasks.square, (n, 0.2)),)) for n in range(1000))
+        for outcome in run_groups(Cluster(client, Place(address=address)), groups, patience=3):
+            outcomes.append(outcome)
+            if len(outcomes) == 3:
+                for process in running:
+                    _kill(process)
+        client.close(timeout=2)
+    assert {each.status for each in outcomes[:3]} == {"done"}
+    assert {each.status for each in outcomes} == {"done", "lost"}
+    assert "went away and did not come back" in outcomes[-1].reason
+    assert len(outcomes) < 100
+
+
+@pytest.mark.slow
+@pytest.mark.claim("workers-of-one-version", tolerance="none")
+def test_a_worker_of_another_version_is_refused_by_name(tmp_path, variant):
+    """The other version is a copy of the package with one more line in it."""
+    import shutil
+
+    other = tmp_path / "other"
+    for name in ("analytic", "realtime", "reference", "validation", "reports"):
+        shutil.copytree(ROOT / name, other / name, ignore=shutil.ignore_patterns("__pycache__"))
+    changed = other / "analytic" / "geometry.py"
+    changed.write_text(changed.read_text() + "\n# another version\n")
+    port = _free_port()
+    address = f"tcp://127.0.0.1:{port}"
+    message = r"worker tcp://127.* has source code \w{12}, not \w{12}: install the same"
+    with (
+        _ended(_scheduler(port), _worker(address, other)),
+        pytest.raises(InputError, match=message),
+        connected(Place(address=address)),
+    ):
+        pass

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: a cell becomes a row of finite numbers that are those of the metrics, or says why there are none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from realtime.scene.read_scene import read_scene
+from validation.configurations.methods import configuration, prepared
+from validation.metrics.errors import error_metrics
+from validation.scenes.loading import load_scene
+from validation.sweep import work
+from validation.sweep.row import checked_row
+from validation.sweep.study import Cell
+from validation.sweep.truth import cell_truth, load_cell
+
+SIZE = (24, 18)
+
+
+def row_of(scene, chosen, **options):
+    cell = Cell(scene, SIZE, options.pop("medium", ()), chosen, **options)
+    loaded = load_cell(cell)
+    row = work.cell_row(cell, read_scene(loaded.scene), cell_truth(loaded), properties={"depth": 2.0})
+    return checked_row(row | {"key": "k"})
+
+
+@pytest.mark.usefixtures("variant")
+def test_a_row_has_the_errors_and_what_they_cost():
+    chosen = configuration("shadow-planes")
+    row = row_of("sphere-spot", chosen)
+    loaded = load_scene("sphere-spot", SIZE)
+    frame = work.unchecked_frame  # the same image as `render_frame` makes
+    scene = read_scene(loaded.scene)
+    renderer = prepared(scene, chosen)
+    image = frame(renderer, work.run_stages(renderer, renderer.prepare(scene)))
+    errors = error_metrics(cell_truth(loaded).airlight, image.airlight)
+    assert row["status"] == "done"
+    assert (row["p99"], row["relative_rmse"], row["bias"]) == (errors.p99, errors.relative_rmse, errors.bias)
+    assert (row["bound"], row["outside_bound"], row["nonfinite"]) == (work.ROUNDING, 0, 0)
+    assert row["truth"] == "quadrature"
+    assert 0 < row["truth_error"] < 1e-6
+    assert row["frame_ms"] > 0 < row["prepare_ms"]
+    assert row["frames"] >= 1
+    assert row["crossings"] > 0
+    assert (row["rays"], row["lights"], row["property.depth"]) == (24 * 18, 1, 2.0)
+    assert row["colour.ciede2000_max"] < 0.1
+    assert row["command"] == "airlight view sphere-spot --method shadow-planes --kernel exact --size 24x18"
+
+
+@pytest.mark.usefixtures("variant")
+def test_times_are_left_out_where_nobody_asks():
+    row = row_of("open-fog", configuration("unshadowed"), times="none", medium=("medium.sigma_t=0.3",))
+    assert (row["status"], row["frame_ms"], row["medium"]) == ("done", None, "medium.sigma_t=0.3")
+    assert row["outside_bound"] == 0  # nothing casts a shadow there, so the kernel's claim holds for whole rays
+    assert row_of("windows", configuration("unshadowed"), times="none")["bound"] is None
+
+
+@pytest.mark.usefixtures("variant")
+def test_a_refusal_is_a_row():
+    row = row_of("windows", configuration("shadow-planes", None, {"media": "paper"}))
+    assert row["status"] == "refused"
+    assert "lights with a place" in row["reason"]
+    assert row["p99"] is None
+    assert row["truth_mean"] > 0
+
+
+@pytest.mark.usefixtures("variant")
+def test_what_is_not_finite_is_counted_and_kept_out_of_the_errors(monkeypatch):
+    made = work.unchecked_frame
+
+    def broken(*given):
+        frame = made(*given)
+        airlight = np.array(frame.airlight)
+        airlight[3, 4, 1] = np.nan
+        airlight[5, 6] = -1.0
+        return replace(frame, airlight=airlight)
+
+    monkeypatch.setattr(work, "unchecked_frame", broken)
+    row = row_of("open-fog", configuration("unshadowed"), times="none")
+    assert (row["status"], row["nonfinite"], row["negative"]) == ("done", 1, 1)
+    assert row["outside_bound"] == 2
+    assert row["max"] > 0.5
