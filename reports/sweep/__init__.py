@@ -6,6 +6,7 @@ Read in this order:
 - `read.py`: the Parquet by columns
 - `samples.py`: one sample a scene for each configuration
 - `claims.py`: shares of scenes within an error, with intervals
+- `properties.py`: properties of scenes in words
 - `correlations.py`: which property of a scene goes with error
 - `worst.py`: the worst scenes of each configuration
 - `faults.py`: refusals, and what is wrong whatever the error

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from reports.sweep.properties import property_words
 from reports.sweep.read import Numbers, Sweep
 from reports.sweep.samples import Sample
 from validation.statistics.intervals import LEVEL, rank_correlation
@@ -101,11 +102,6 @@ def _of(sweep: Sweep, sample: Sample, name: str) -> Numbers:
     return sweep.property(name)[list(sample.rows)]
 
 
-def property_words(name: str) -> str:
-    """Return the name of a property as a sentence has it."""
-    return name.replace("_", " ")
-
-
 def sentences(strongest_of: Mapping[str, Sequence[Correlation]]) -> list[str]:
     """Return in plain words what goes with the error of each configuration, and last of which nothing does.
 
@@ -127,7 +123,7 @@ def sentence(name: str, chosen: Sequence[Correlation]) -> str:
     for verb, several in (("grows", [c for c in chosen if c.r > 0]), ("falls", [c for c in chosen if c.r < 0])):
         if several:
             named = [f"{property_words(c.property)} ({c.r:+.2f}, {c.low:+.2f} to {c.high:+.2f})" for c in several]
-            parts.append(f"{verb} with {_listed(named)}")
+            parts.append(f"{verb} with the {_listed(named)}")
     return f"{name}: the error {', and it '.join(parts)}."
 
 

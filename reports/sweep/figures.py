@@ -14,7 +14,8 @@ from reports.page.chart import short
 from reports.plotting.colour_maps import signed_colours
 from reports.plotting.style import report_styles
 from reports.sweep.claims import TARGETS
-from reports.sweep.correlations import Correlation, property_words, sure
+from reports.sweep.correlations import Correlation, sure
+from reports.sweep.properties import property_words
 from reports.sweep.read import Numbers
 from reports.sweep.samples import Sample
 from reports.sweep.summary import Summary

@@ -9,12 +9,13 @@ import numpy as np
 
 from analytic.errors import InputError
 from reports import __version__
-from reports.page.filters import percent
+from reports.page.filters import percent, unbroken
 from reports.page.render import page_environment, template_text
 from reports.page.tables import drawn, facts
 from reports.sweep import tables
-from reports.sweep.correlations import LEAST, NAMED, SAME, property_words
-from reports.sweep.summary import Summary, check_words, goes_with_words, headlines
+from reports.sweep.correlations import LEAST, NAMED, SAME
+from reports.sweep.properties import property_words
+from reports.sweep.summary import Summary, goes_with_words, headlines, sound_words
 
 PAGE_LIMIT = 20_000_000  #: bytes of a page
 
@@ -43,12 +44,14 @@ def render_sweep(said: Summary, charts: Mapping[str, str], *, limit: int = PAGE_
     environment = page_environment()
     environment.filters["error"] = error_words
     environment.globals |= {f"{name}_table": drawn(getattr(tables, f"{name}_table")) for name in _TABLES}
-    environment.globals |= {"facts_table": drawn(facts), "property_words": property_words, "check_words": check_words}
+    environment.globals |= {"facts_table": drawn(facts), "property_words": property_words}
     template = environment.get_template("sweep.html.j2")
     content = {
         "said": said,
+        "scenes": f"{said.scenes} {'random ' * said.drawn}scene{'s' * (said.scenes != 1)}",
         "headlines": headlines(said),
         "charts": {name: Markup(chart) for name, chart in charts.items()},
+        "sound": sound_words(said),
         "goes_with": goes_with_words(said),
         "source": said.sweep.path.name,
         "folder": said.sweep.path.parent,
@@ -86,7 +89,7 @@ def error_words(value: float | None) -> str:
     """Return an error in per cent, or that it is none that a number could say."""
     if value is None:
         return "without a number"
-    return f"{100 * value:.0f} %" if 1 <= value < 1000 else percent(value, 2)
+    return unbroken(f"{100 * value:.0f} %" if 1 <= value < 1000 else percent(value, 2))
 
 
 def _pictures(said: Summary) -> dict[str, str]:

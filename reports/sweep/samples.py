@@ -133,13 +133,12 @@ def short_names(methods: Sequence[str], labels: Sequence[str], most: int = 34) -
     for method, words, label in zip(methods, inside, labels):
         others = [each for other, each in zip(methods, inside) if other == method]
         own = [word for word in words if any(word not in each for each in others)]
-        if len(others) == 1 or (not own and not _suffix(label)):
-            name = method if len(others) == 1 else f"{method} (default)"
-        else:
-            shown = [*own]
-            while shown and len(_joined(method, shown, cut=len(shown) < len(own))) > most:
-                shown.pop()
-            name = (_joined(method, shown, cut=len(shown) < len(own)) if own else method) + _suffix(label)
+        shown = own or words  # what differs from others in nothing of its own is named in full
+        kept = list(shown)
+        while kept and len(_joined(method, kept, cut=len(kept) < len(shown))) > most:
+            kept.pop()
+        inside_words = _joined(method, kept, cut=len(kept) < len(shown)) if shown else method
+        name = method if len(others) == 1 else inside_words + _suffix(label)
         names.append(name)
     counts = Counter(names)
     seen: Counter[str] = Counter()

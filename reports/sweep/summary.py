@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from reports.sweep.claims import TARGETS, Claim, best_claim, claims, percent, written
-from reports.sweep.correlations import Correlation, correlations, property_words, sentences, strongest
+from reports.sweep.correlations import Correlation, correlations, sentences, strongest
 from reports.sweep.faults import Check, Fault, Reason, checks, faults, reasons
+from reports.sweep.properties import property_words
 from reports.sweep.read import Numbers, Sweep
 from reports.sweep.samples import FAULTS, Sample, drawn_at_random, fastest_counts, samples
 from reports.sweep.worst import Worst, worst
@@ -162,12 +163,14 @@ def headlines(said: Summary) -> list[dict[str, Any]]:
         name, count = leading.most_common(1)[0]
         add(
             "Goes with error",
-            f"{property_words(name)} goes with the error of {count} of {len(said.samples)} configurations more than "
-            "any other property does.",
+            f"the {property_words(name)} goes with the error of {count} of {len(said.samples)} configurations more "
+            "than any other property does.",
         )
     for check in said.checks:
-        if check.rows:
-            add(check.check.capitalize(), check_words(check), check.faulty_rows == 0)
+        if check.faulty_rows:
+            add(check.check.capitalize(), check_words(check), False)
+    if not any(check.faulty_rows for check in said.checks):
+        add("Sound", sound_words(said), True)
     for name in ("airlight", "source"):
         if len(said.versions[name]) > 1:
             add("Versions", f"the rows come of several versions: {name} {', '.join(said.versions[name])}.", False)
@@ -186,15 +189,21 @@ def goes_with_words(said: Summary) -> list[str]:
 
 
 def check_words(check: Check) -> str:
-    """Return in a sentence how many images have a fault, or in how many scenes it may have been missed."""
-    if check.faulty_rows:
-        return (
-            f"{check.faulty_rows} of {check.rows} images have {check.meaning}, in {check.faulty_scenes} of "
-            f"{check.scenes} scenes."
-        )
-    most = 100 * binomial_interval(0, check.scenes)[1]
+    """Return in a sentence how many images have a fault."""
     return (
-        f"no image of {check.rows} has {check.meaning}; of all scenes alike at most {most:.2g} % may, "
+        f"{check.faulty_rows} of {check.rows} images have {check.meaning}, in {check.faulty_scenes} of "
+        f"{check.scenes} scenes."
+    )
+
+
+def sound_words(said: Summary) -> str:
+    """Return in a sentence that no image has a fault, and in how many scenes it may have been missed."""
+    checked = {check.check: check for check in said.checks}
+    most = 100 * binomial_interval(0, checked["not finite"].scenes)[1]
+    bound = checked["outside of the bound"].rows
+    return (
+        f"no image of {checked['not finite'].rows} has a pixel that is not finite or negative, or outside of the "
+        f"bound that {bound} of them state; of scenes alike at most {most:.2g} % may have one, "
         f"at {100 * LEVEL:.0f} % confidence."
     )
 
@@ -228,7 +237,7 @@ def to_json(said: Summary) -> dict[str, Any]:
         "worst": {label: [asdict(each) for each in several] for label, several in said.worst.items()},
         "refusals": [asdict(each) for each in said.reasons if each.status == "refused"],
         "not_done": [asdict(each) for each in said.reasons if each.status != "refused"],
-        "checks": [asdict(each) | {"text": check_words(each)} for each in said.checks],
+        "checks": [asdict(each) for each in said.checks],
         "faults": [asdict(each) for each in said.faults],
         "truths": [asdict(each) for each in said.truths],
         "properties": [asdict(each) for each in said.properties],

@@ -4,13 +4,17 @@
 import numpy as np
 import pytest
 
+from realtime.scene.read_scene import read_scene
 from reports.sweep.claims import best_claim, claim, percent, written
 from reports.sweep.correlations import correlations, sentence, sentences, strongest, sure
 from reports.sweep.faults import checks, faults, reasons, without_numbers
+from reports.sweep.properties import WORDS, property_words
 from reports.sweep.read import FILE, read_sweep
 from reports.sweep.samples import samples
 from reports.sweep.worst import worst
 from tests.helpers.sweeps import row, rows, write_rows
+from validation.properties.properties import scene_properties
+from validation.scenes.loading import load_scene
 from validation.statistics.intervals import binomial_interval
 
 
@@ -101,7 +105,7 @@ def test_planted_property_is_found_and_no_other(sweep_of):
     (depth,) = strongest(found, sweep, march)
     assert 0.9 < depth.low < depth.r < depth.high
     words = sentence(march.name, [depth])
-    assert words.startswith("ray-march (steps=16): the error grows with optical depth (+0.9")
+    assert words.startswith("ray-march (steps=16): the error grows with the optical depth (+0.9")
     assert sentences({"a": [depth], "b": [], "c": []})[-1] == "No property goes for sure with the error of b and c."
 
 
@@ -129,8 +133,8 @@ def test_of_properties_that_say_the_same_the_strongest_is_named(sweep_of):
     chosen = strongest(found, sweep, sample)
     assert {each.property for each in chosen} == {"silhouettes", "nearest_light"}
     words = sentence(sample.name, chosen)
-    assert "grows with silhouettes (+" in words
-    assert ", and it falls with nearest light (-" in words
+    assert "grows with the silhouette edges (+" in words
+    assert ", and it falls with the nearest light (-" in words
 
 
 def test_intervals_hold_together(sweep_of):
@@ -205,3 +209,9 @@ def test_planted_faults_are_found_and_counted(sweep_of):
     assert counted["outside of the bound"].faulty_scenes == 1
     assert counted["surface not finite"].rows == 0
     assert counted["negative"].rows == sum(each["status"] == "done" for each in several)
+
+
+def test_every_property_has_words(variant):
+    properties = scene_properties(read_scene(load_scene("open-fog").scene))
+    assert set(properties) == set(WORDS)
+    assert property_words("something_new") == "something new"

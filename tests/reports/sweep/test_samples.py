@@ -187,8 +187,11 @@ def test_names_say_in_what_configurations_of_a_method_differ():
         "ray-march (steps=100, shadow=map)",
         "min-max",
         "planes (exact)",
-        "planes (default)",
+        "planes",
     ]
+    # What has no words of its own is named by those that it has.
+    shared = ["ray-march (steps=100)", "ray-march (steps=100, shadow=map)"]
+    assert short_names(["ray-march"] * 2, shared) == ["ray-march (steps=100)", "ray-march (shadow=map)"]
 
 
 def test_long_names_are_cut_between_words_and_stay_apart():
