@@ -25,14 +25,18 @@ _NEEDED = (
     *("relative_rmse", "rmse", "truth_error"),
 )
 
+_CELL = ("scene", "medium", "label", "width", "height")  #: what makes a cell one: the label has method and parameters
+_ORDER = ("scene", "method", "label", "medium")
+
 
 @dataclass(frozen=True)
 class Sweep:
-    """Rows by columns, one of each key, sorted: the order in which they were finished is chance."""
+    """Rows by columns, one of each cell, sorted: the order in which they were finished is chance."""
 
     path: Path
     columns: Mapping[str, NDArray[Any]] = field(repr=False)  #: texts as objects, None for null; numbers with NaN
     properties: tuple[str, ...]  #: names of the scenes' properties, without what begins their columns
+    superseded: int = 0  #: rows of cells that were computed again: by newer source code, or to be timed
 
     def __len__(self) -> int:
         return len(self.columns["key"])
@@ -107,14 +111,12 @@ def read_sweep(path: Path | str) -> Sweep:
     unknown = sorted(set(columns["status"]) - set(STATUSES))
     if unknown:
         raise InputError(f"{file} has the status {unknown[0]!r}, wanted one of {', '.join(STATUSES)}; run it again")
-    _, first = np.unique(columns["key"].astype(str), return_index=True)
-    order = [
-        tuple(natural(columns[name][row] or "") for name in ("scene", "method", "label", "medium")) for row in first
-    ]
-    kept = first[sorted(range(len(first)), key=order.__getitem__)]
+    kept = _current(columns)
+    order = {row: tuple(natural(columns[name][row] or "") for name in _ORDER) for row in kept}
+    kept.sort(key=order.__getitem__)
     columns = {name: values[kept] for name, values in columns.items()}
     properties = tuple(sorted(name.removeprefix(PROPERTY) for name in columns if name.startswith(PROPERTY)))
-    return Sweep(file, columns, properties)
+    return Sweep(file, columns, properties, superseded=table.num_rows - len(kept))
 
 
 @contextmanager
@@ -132,6 +134,33 @@ def _reading(file: Path) -> Iterator[None]:
 def natural(text: str) -> tuple[str | int, ...]:
     """Return what sorts text as a reader does: random:9 before random:10."""
     return tuple(int(part) if place % 2 else part for place, part in enumerate(re.split(r"(\d+)", text)))
+
+
+def _current(columns: Mapping[str, NDArray[Any]]) -> list[int]:
+    """Return the rows that count: of each cell one.
+
+    The folder of a sweep keeps what earlier source code computed, faults that are mended among it, and a cell may have
+    been computed once for its error and once with the machine to itself for its time. The row of the source code that
+    computed the cell last counts; of several such rows one that was timed alone, and else the last.
+    """
+    rows = range(len(columns["key"]))
+
+    def column(name: str) -> list[Any]:
+        values = columns.get(name)
+        return [None] * len(rows) if values is None else values.tolist()
+
+    started = [each or "" for each in column("started")]
+    source, alone = column("source"), [each == 1 for each in column("timed_alone")]
+    cells: dict[tuple[Any, ...], list[int]] = {}
+    for row, cell in enumerate(zip(*(column(name) for name in _CELL))):
+        # NaN, where a number is not known, is not equal to itself.
+        cells.setdefault(tuple(None if each != each else each for each in cell), []).append(row)
+    kept = []
+    for several in cells.values():
+        last = max(several, key=lambda row: (started[row], columns["key"][row]))
+        same = [row for row in several if source[row] == source[last]]
+        kept.append(max(same, key=lambda row: (alone[row], started[row], columns["key"][row])))
+    return kept
 
 
 def _file_of(path: Path) -> Path:

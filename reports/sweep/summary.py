@@ -215,6 +215,7 @@ def to_json(said: Summary) -> dict[str, Any]:
         "source": str(said.sweep.path),
         "studies": list(said.studies),
         "rows": len(said.sweep),
+        "superseded": said.sweep.superseded,
         "statuses": dict(said.statuses),
         "scenes": said.scenes,
         "drawn_at_random": said.drawn,

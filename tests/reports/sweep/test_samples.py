@@ -46,6 +46,25 @@ def test_same_key_counts_once(sweep_of):
     assert len(sweep_of([row(), row(), row("random:1")])) == 2
 
 
+def test_cells_that_were_computed_again_count_once(sweep_of):
+    """A fault that is mended is gone; a cell that was computed for its error and again for its time has both."""
+    old, new = (
+        {"source": "old", "started": "2026-11-23T08:00:00Z"},
+        {"source": "new", "started": "2026-11-23T09:00:00Z"},
+    )
+    later = new | {"started": "2026-11-23T10:00:00Z"}
+    several = [
+        row(key="a", nonfinite=7, timed_alone=True, **old),
+        row(key="b", timed_alone=False, frame_ms=5.0, **later),
+        row(key="c", timed_alone=True, frame_ms=3.0, **new),
+        row("random:1", key="d", **old),
+        row("random:1", key="e", medium="m", **new),
+    ]
+    sweep = sweep_of(several)
+    assert sorted(sweep.texts("key")) == ["c", "d", "e"]
+    assert sweep.superseded == 2
+
+
 def test_pictures_are_read_by_key(sweep_of):
     with_picture = row("random:3", picture=b"RIFF")
     sweep = sweep_of([row(), with_picture])
