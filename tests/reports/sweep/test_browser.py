@@ -29,6 +29,7 @@ def path(tmp_path_factory):
     return page
 
 
+@pytest.mark.claim("sweep-page-stands-alone")
 @pytest.mark.parametrize(("scheme", "width"), [("light", 1300), ("dark", 390)])
 def test_axe_finds_nothing_and_nothing_is_loaded(browser, path, scheme, width):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe checks the page; see the dev extra")

@@ -23,6 +23,7 @@ def sweep_of(tmp_path):
     return lambda several: read_sweep(write_rows(tmp_path / FILE, several))
 
 
+@pytest.mark.claim("sweep-intervals")
 def test_share_of_the_scenes_and_its_interval(sweep_of):
     several = [row(f"random:{n}", relative_rmse=2e-3 if n < 8 else 5e-4) for n in range(1000)]
     (sample,) = samples(sweep_of(several))
@@ -41,6 +42,7 @@ def test_best_claim_is_the_one_that_promises_most(sweep_of):
     assert best_claim([], 1e-3) is None
 
 
+@pytest.mark.claim("sweep-scenes-are-the-sample")
 def test_cells_of_a_scene_do_not_narrow_the_interval(sweep_of):
     one = claim(samples(sweep_of([row(f"random:{n}") for n in range(20)]))[0], 0.1)
     media = [row(f"random:{n}", medium=medium) for n in range(20) for medium in (None, "a", "b", "c")]
@@ -48,6 +50,7 @@ def test_cells_of_a_scene_do_not_narrow_the_interval(sweep_of):
     assert (one.tries, one.low) == (four.tries, four.low) == (20, binomial_interval(20, 20)[0])
 
 
+@pytest.mark.claim("sweep-tries")
 def test_what_is_no_number_misses_and_a_refusal_is_no_try(sweep_of):
     several = [
         row("random:0", relative_rmse=1e-5),
@@ -61,6 +64,7 @@ def test_what_is_no_number_misses_and_a_refusal_is_no_try(sweep_of):
     assert made.text.endswith("; 1 more refused.")
 
 
+@pytest.mark.claim("sweep-tries")
 def test_what_the_truth_cannot_tell_widens_the_interval_on_one_side(sweep_of):
     several = [row(f"random:{n}", relative_rmse=1e-4) for n in range(10)]
     several += [
@@ -93,6 +97,7 @@ def test_errors_of_claims_are_written_as_powers_of_ten():
     assert [written(target) for target in (0.1, 0.01, 0.001, 1e-5, 0.02)] == ["1e-1", "1e-2", "1e-3", "1e-5", "0.02"]
 
 
+@pytest.mark.claim("sweep-properties")
 def test_planted_property_is_found_and_no_other(sweep_of):
     sweep = sweep_of(rows(200))
     made = samples(sweep)
@@ -109,6 +114,7 @@ def test_planted_property_is_found_and_no_other(sweep_of):
     assert sentences({"a": [depth], "b": [], "c": []})[-1] == "No property goes for sure with the error of b and c."
 
 
+@pytest.mark.claim("sweep-properties")
 def test_of_properties_that_say_the_same_the_strongest_is_named(sweep_of):
     rng = np.random.default_rng(2)
     several = []
@@ -137,6 +143,7 @@ def test_of_properties_that_say_the_same_the_strongest_is_named(sweep_of):
     assert ", and it falls with the nearest light (-" in words
 
 
+@pytest.mark.claim("sweep-properties")
 def test_intervals_hold_together(sweep_of):
     """Of 100 properties of noise none is sure in most sweeps; each by itself at 95 % would give five."""
     rng = np.random.default_rng(4)
@@ -174,6 +181,7 @@ def test_worst_scenes_come_first_and_those_without_numbers_before_them(sweep_of)
     assert found[2].key == several[13]["key"]
 
 
+@pytest.mark.claim("sweep-faults")
 def test_refusals_are_counted_by_reason(sweep_of):
     several = rows(60)
     refused = [each for each in several if each["status"] == "refused"]
@@ -191,6 +199,7 @@ def test_numbers_are_taken_out_of_reasons_and_names_are_not():
     assert without_numbers("RGB8 in light-volumes2 takes x2", "hall") == "RGB8 in light-volumes2 takes x2"
 
 
+@pytest.mark.claim("sweep-faults")
 def test_planted_faults_are_found_and_counted(sweep_of):
     several = rows(20)
     several[7] |= {"nonfinite": 12}

@@ -47,6 +47,7 @@ def test_page_says_what_was_planted(page):
     assert "airlight compare random:1 --method ray-march" in text
 
 
+@pytest.mark.claim("sweep-page-stands-alone")
 def test_page_needs_nothing_but_itself(page):
     for tag, attributes in page.tags:
         for name in ("src", "href", "xlink:href", "data", "poster", "srcset", "action"):
@@ -93,6 +94,7 @@ def test_columns_of_zeros_are_left_out(tmp_path):
     assert set(widths(table_of(Page(made), "In what share of the scenes"))) == {6}
 
 
+@pytest.mark.claim("sweep-page-stands-alone")
 def test_page_keeps_its_limit_by_leaving_out_pictures_of_the_least_bad(said, charts):
     whole = render_sweep(said, charts)
     without = len(whole.encode()) - sum(map(len, re.findall(r'src="(data:image/webp[^"]+)"', whole)))
@@ -155,6 +157,7 @@ def test_names_and_reasons_are_words_and_never_html(tmp_path):
     assert page.text.count("alert('1')") > 10
 
 
+@pytest.mark.claim("sweep-from-parquet")
 def test_same_rows_give_the_same_page_in_any_order(tmp_path):
     def made(several):
         said = said_of(tmp_path, several)
@@ -176,6 +179,7 @@ def test_every_configuration_is_named_in_the_figures(charts, said):
             assert f">{sample.name}" in charts[name], (name, sample.name)
 
 
+@pytest.mark.claim("sweep-from-parquet")
 def test_all_is_written_from_the_parquet(tmp_path, said):
     source = tmp_path / "in"
     source.mkdir()

@@ -33,6 +33,7 @@ def test_parquet_is_read_as_it_was_written(tmp_path):
     assert set(sweep.numbers("timed_alone")[sweep.texts("status") == "done"]) == {1.0}
 
 
+@pytest.mark.claim("sweep-from-parquet")
 def test_order_in_which_rows_were_finished_does_not_matter(tmp_path):
     several = rows(12)
     first = read_sweep(write_rows(tmp_path / "a.parquet", several))
@@ -46,6 +47,7 @@ def test_same_key_counts_once(sweep_of):
     assert len(sweep_of([row(), row(), row("random:1")])) == 2
 
 
+@pytest.mark.claim("sweep-last-rows")
 def test_cells_that_were_computed_again_count_once(sweep_of):
     """A fault that is mended is gone; a cell that was computed for its error and again for its time has both."""
     old, new = (
@@ -106,6 +108,7 @@ def test_column_of_another_type_and_unknown_status_are_refused(tmp_path):
         read_sweep(tmp_path)
 
 
+@pytest.mark.claim("sweep-scenes-are-the-sample")
 def test_media_of_a_scene_are_one_sample_and_the_worst_stands_for_it(sweep_of):
     sweep = sweep_of(
         [
@@ -137,6 +140,7 @@ def test_fault_stands_for_a_scene_and_a_refusal_only_where_nothing_was_measured(
     np.testing.assert_array_equal(sample.errors, [np.nan, 0.5, np.nan])
 
 
+@pytest.mark.claim("sweep-scenes-are-the-sample")
 def test_named_scenes_are_no_sample_where_scenes_were_drawn(sweep_of):
     (drawn,) = samples(sweep_of([row(), row("hall"), row("random:7")]))
     assert drawn.scenes == ("random:0", "random:7")
@@ -162,11 +166,13 @@ def test_black_truth_and_image_without_a_number(sweep_of):
     assert list(sample.errors) == [0.0, np.inf, np.inf]
 
 
+@pytest.mark.claim("sweep-times-alone")
 def test_times_count_only_where_the_machine_had_nothing_else_to_do(sweep_of):
     (sample,) = samples(sweep_of([row(frame_ms=2.0), row("random:1", frame_ms=1.0, timed_alone=False)]))
     np.testing.assert_array_equal(sample.times, [2.0, np.nan])
 
 
+@pytest.mark.claim("sweep-times-alone")
 def test_times_of_several_hosts_are_not_compared(sweep_of):
     several = [row(f"random:{n}", host="there" if n > 1 else "here", threads=8 if n == 4 else 2) for n in range(5)]
     (sample,) = samples(sweep_of(several))
@@ -174,6 +180,7 @@ def test_times_of_several_hosts_are_not_compared(sweep_of):
     assert list(np.isfinite(sample.times)) == [True, True, False, False, False]
 
 
+@pytest.mark.claim("sweep-times-alone")
 def test_fastest_is_counted_where_all_were_timed_alone(sweep_of):
     def pair(scene, first, second, **changes):
         a = {"frame_ms": first[0], "relative_rmse": first[1]}

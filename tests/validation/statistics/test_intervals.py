@@ -23,6 +23,7 @@ def test_ends_of_a_share_leave_a_fortieth_on_either_side(successes, trials):
         assert high == 1
 
 
+@pytest.mark.claim("sweep-intervals")
 def test_share_holds_its_probability_at_least_as_often_as_it_says():
     """The law's own sum over all counts, no simulation; Wilson's interval falls below 0.95 at many of these."""
     for probability in (0.003, 0.08, 0.5, 0.992):
@@ -47,6 +48,7 @@ def test_quantile_of_a_hundred_by_hand():
     assert low == 97.0
 
 
+@pytest.mark.claim("sweep-intervals", tolerance="0.014 of the level: four standard errors of 4000 samples")
 def test_quantile_holds_the_true_one_at_least_as_often_as_it_says():
     rng = np.random.default_rng(11)
     held = 0
@@ -57,6 +59,7 @@ def test_quantile_holds_the_true_one_at_least_as_often_as_it_says():
     assert held / 4000 > 0.95 - 0.014
 
 
+@pytest.mark.claim("sweep-intervals", tolerance="5e-8: the digits of the example")
 def test_rank_correlation_is_that_of_the_authors_own_program():
     """The example of ci.spear in statpsych, the program of D. G. Bonett."""
     y = [21, 4, 9, 12, 35, 18, 10, 22, 24, 1, 6, 8, 13, 16, 19]
@@ -64,6 +67,10 @@ def test_rank_correlation_is_that_of_the_authors_own_program():
     assert rank_correlation(x, y) == pytest.approx((0.8699639, 0.5840951, 0.9638297), abs=5e-8)
 
 
+@pytest.mark.claim(
+    "sweep-intervals",
+    tolerance="0.035 of the level: four standard errors of 2000 samples, and 0.015 of the approximation",
+)
 def test_rank_correlation_holds_the_true_one_about_as_often_as_it_says():
     """Of two normal variables with the correlation c the true one is (6/pi) asin(c/2)."""
     rng = np.random.default_rng(5)
