@@ -84,9 +84,11 @@ def claims(made: Sequence[Sample], targets: Sequence[float] = TARGETS) -> list[C
     return [claim(sample, target) for sample in made for target in targets]
 
 
-def best_claim(made: Sequence[Claim], target: float) -> Claim | None:
-    """Return the claim on an error that promises most, by the lower end of its interval; None where none was tried."""
-    return max((each for each in made if each.target == target and each.tries), key=lambda each: each.low, default=None)
+def best_claims(made: Sequence[Claim], target: float) -> list[Claim]:
+    """Return the claims on an error that promise most, by the lower ends of their intervals, with equals."""
+    tried = [each for each in made if each.target == target and each.within]
+    most = max((each.low for each in tried), default=0.0)
+    return [each for each in tried if each.low == most]
 
 
 def scenes_words(count: int) -> str:

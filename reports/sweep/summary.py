@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from reports.sweep.claims import TARGETS, Claim, best_claim, claims, percent, written
+from reports.sweep.claims import TARGETS, Claim, best_claims, claims, percent, written
 from reports.sweep.correlations import Correlation, correlations, sentences, strongest
 from reports.sweep.faults import Check, Fault, Reason, checks, faults, reasons
 from reports.sweep.properties import property_words
@@ -146,9 +146,10 @@ def headlines(said: Summary) -> list[dict[str, Any]]:
         made.append({"kind": kind, "text": text, "good": good})
 
     for target in TARGETS:
-        best = best_claim(said.claims, target)
-        if best is not None and best.within:
-            add(f"Most often within {written(target)}", f"{best.name}, {best.share_words}.")
+        best = best_claims(said.claims, target)
+        if best:
+            others = f" and {len(best) - 1} more" if best[1:] else ""
+            add(f"Most often within {written(target)}", f"{best[0].name}{others}, {best[0].share_words}.")
     for each in said.fastest:
         if each.scenes and sum(each.counts):
             place = int(np.argmax(each.counts))
@@ -200,11 +201,11 @@ def sound_words(said: Summary) -> str:
     """Return in a sentence that no image has a fault, and in how many scenes it may have been missed."""
     checked = {check.check: check for check in said.checks}
     most = 100 * binomial_interval(0, checked["not finite"].scenes)[1]
-    bound = checked["outside of the bound"].rows
+    stated = checked["outside of the bound"].rows
+    bound = f", or outside of the bound that {stated} of them state" if stated else ""
     return (
-        f"no image of {checked['not finite'].rows} has a pixel that is not finite or negative, or outside of the "
-        f"bound that {bound} of them state; of scenes alike at most {most:.2g} % may have one, "
-        f"at {100 * LEVEL:.0f} % confidence."
+        f"no image of {checked['not finite'].rows} has a pixel that is not finite or negative{bound}; of scenes alike "
+        f"at most {most:.2g} % may have one, at {100 * LEVEL:.0f} % confidence."
     )
 
 
