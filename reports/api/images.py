@@ -65,7 +65,8 @@ def render(
         See `load_scene`.
     method
         A name (`airlight.METHODS`), one's own as 'module:function' or 'path/to/file.py:function', or such a function
-        itself, ``method(view, *, kernel=None, **parameters)``, from the top of a module or a notebook.
+        itself, ``method(view, *, kernel=None, **parameters)``, from the top of a module or a notebook; or 'auto', what
+        the advice names for ``error=1e-3``, its one parameter.
     kernel
         A name (`airlight.KERNELS`), such a name with '-N', 'module:function', or such a function itself; 'exact' by
         default, for a method that calls a kernel.
@@ -97,14 +98,17 @@ def render(
     from realtime.scene.read_scene import read_scene
     from reports.api.results import Rendering, sealed
     from reports.machine.environment import activate
+    from validation.advise.auto import AUTO, auto_configuration
     from validation.configurations.methods import configuration, prepared
     from validation.configurations.timing import time_frame
     from validation.estimates.images import layered_frame
 
     activate()  # a user's module may need a variant when it is imported
-    chosen = configuration(method, kernel_name(kernel), parameters)
+    # A method that is not known is refused before the scene is loaded.
+    known = None if method == AUTO else configuration(method, kernel_name(kernel), parameters)
     loaded = opened(scene, size)
     read = read_scene(loaded.scene, precision)
+    chosen = known or auto_configuration(read, kernel_name(kernel), parameters)[0]
     renderer = prepared(read, chosen)
     layered = prepared(read, chosen, extra_layers=True) if renderer.method.layers else renderer
     image = layered_frame(loaded.name, chosen, render_frame(layered))

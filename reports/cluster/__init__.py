@@ -6,8 +6,10 @@ Read in this order:
 - `worker.py`: what runs in a worker: one task at a time, within its time;
 - `connect.py`: processes of this machine, or a scheduler with workers of our version;
 - `run.py`: every task ends in one outcome, whatever happens to workers and scheduler;
-- `cells.py`: the cells of a sweep as tasks.
+- `cells.py`: the cells of a sweep as tasks;
+- `references.py`: truths and batches for the cache of this machine.
 
-May import: `analytic.errors`, `realtime.errors`, `realtime.scene`, `reference.storage`, `reports.machine`,
-`reports.plotting`, `validation.properties`, `validation.scenes`, `validation.sweep`.
+May import: `analytic.errors`, `realtime.errors`, `realtime.scene`, `reference.monte_carlo`, `reference.quadrature`,
+`reference.storage`, `reports.machine`, `reports.plotting`, `validation.estimates`, `validation.properties`,
+`validation.scenes`, `validation.sweep`.
 """

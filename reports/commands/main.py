@@ -16,6 +16,7 @@ from typing import Annotated, Any
 import typer
 
 from reports import __version__
+from reports.commands.advise import advise
 from reports.commands.baselines import baselines
 from reports.commands.bench import bench
 from reports.commands.cache import cache
@@ -62,7 +63,7 @@ DONE, FAILED, WRONG_INPUT, MISSING, INTERRUPTED = 0, 1, 2, 3, 130
 #: The panels of --help, by what one wants to do, and their commands in its order.
 _PANELS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start": (doctor, list_, render, view, cache),
-    "Measure": (report, diff, bench, sweep, maps, stability),
+    "Measure": (report, diff, bench, advise, sweep, maps, stability),
     "Images": (reference, compare, fit, merge, describe, integrate, slab, clouds, gallery),
     "Papers": (published, figures, fidelity),
     "Develop": (run_tests, docs, baselines, mutations, certify),

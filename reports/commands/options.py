@@ -62,6 +62,16 @@ Size = Annotated[
     str | None,
     typer.Option(metavar="WxH", help="Width and height in pixels; the scene's own by default.", show_default=False),
 ]
+#: Of `sweep`, `reference` and `report`.
+ClusterPlace = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        metavar="WHERE",
+        help="Let workers compute: local[:N] processes, tcp://HOST:PORT of a Dask scheduler, or its scheduler file.",
+        show_default=False,
+    ),
+]
 Force = Annotated[
     bool, typer.Option("--force", help="Start also what will take more than an hour, or more memory than there is.")
 ]

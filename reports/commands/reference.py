@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from reports.commands.options import Changes, Force, Meshes, Ranges, Scene, Size, drawn_from
+from reports.commands.options import Changes, ClusterPlace, Force, Meshes, Ranges, Scene, Size, drawn_from
 
 if TYPE_CHECKING:
+    from reference.storage.exr import Image
+    from reports.cluster.connect import Cluster, Place
     from reports.machine.progress import Progress
     from validation.estimates.budget import Budget
     from validation.estimates.images import MonteCarloReference
@@ -100,13 +102,14 @@ def reference(
     size: Size = None,
     meshes: Meshes = None,
     ranges: Ranges = None,
+    cluster: ClusterPlace = None,
     force: Force = False,
     json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
 ) -> None:
     """Compute the ground truth of a scene, with its error.
 
     It is written as layered EXR. Finished batches are kept: a Monte Carlo run continues from them, after an
-    interruption or with more samples.
+    interruption or with more samples. --cluster spreads batches over workers; the file is the same, byte for byte.
 
     Exit status 1 if the target error was not reached.
     """
@@ -119,12 +122,13 @@ def reference(
     from reports.machine.printing import print_notes
     from reports.machine.progress import progress_bar
     from validation.estimates.budget import Budget
-    from validation.estimates.images import cloud_orders, quadrature_reference
+    from validation.estimates.images import cloud_orders
     from validation.frames.expected_work import check_work, sampled_work, truth_work
     from validation.scenes.changes import parse_changes
     from validation.scenes.loading import load_scene, parse_size
 
     sampled = estimator is not Estimator.quadrature
+    place = None if cluster is None else _place(cluster, time_budget)
     _check_options(estimator, {"--spp": spp, "--target-error": target_error, "--time-budget": time_budget}, pixel)
     if orders is not None and estimator not in (Estimator.volpath, Estimator.cloud_paths):
         raise InputError(f"--orders: {estimator} knows single scattering alone; add --estimator cloud-paths or volpath")
@@ -146,13 +150,15 @@ def reference(
     else:
         work = sampled_work(tuple(pixels), usual or 64, clouds=chosen is not None)
     check_work(f"reference {loaded.name}, {pixels[0]} x {pixels[1]}, {estimator}", [work], force=force)
-    estimate = None
+    from reports.cluster.connect import connected as connected_to
+
     with progress_bar(f"{loaded.name}: {estimator}") as progress:
-        if budget is None:
-            image = quadrature_reference(loaded, pixel=pixel.value, progress=progress)
+        how: dict[str, Any] = {"budget": budget, "orders": chosen, "pixel": pixel, "seed": seed, "progress": progress}
+        if place is None:
+            image, estimate = _compute(loaded, estimator, **how)
         else:
-            estimate = _sample(loaded, estimator, budget, orders=chosen, seed=seed, progress=progress)
-            image = estimate.image
+            with connected_to(place) as connection:
+                image, estimate = _compute(loaded, estimator, cluster=connection, changes=changes, **how)
     write_exr(output, stamped(image))
     summary: dict[str, Any] = {"scene": loaded.name, "output": str(output), "estimator": str(estimator)}
     summary |= {"means": {name: layer.mean(axis=(0, 1)).tolist() for name, layer in image.layers.items()}}
@@ -175,26 +181,56 @@ def _check_options(estimator: Estimator, budgets: dict[str, Any], pixel: Pixel) 
         raise InputError(f"{estimator} traces pixel centres; leave out --pixel area, or take --estimator quadrature")
 
 
-def _sample(
+def _place(cluster: str, time_budget: float | None) -> "Place":
+    """Return where `--cluster` lets batches be traced."""
+    from analytic.errors import InputError
+    from reports.cluster.connect import parse_place
+
+    if time_budget is not None:
+        raise InputError("--time-budget: how many batches workers trace in a time is chance; give --spp with --cluster")
+    return parse_place(cluster)
+
+
+def _compute(
     loaded: "LoadedScene",
     estimator: Estimator,
-    budget: "Budget",
     *,
+    budget: "Budget | None",
     orders: tuple[str, ...] | None,
+    pixel: Pixel,
     seed: int,
     progress: "Progress",
-) -> "MonteCarloReference":
+    cluster: "Cluster | None" = None,
+    changes: Any = None,
+) -> "tuple[Image, MonteCarloReference | None]":
+    """Return the reference, and how it was sampled; with a cluster its workers do what is not in the cache."""
     from reports.machine.progress import Interrupted
-    from validation.estimates.images import monte_carlo_reference
+    from validation.estimates.budget import batch_plan
+    from validation.estimates.images import monte_carlo_reference, quadrature_reference
 
+    elsewhere = None
+    if cluster is not None:
+        from reports.cluster.references import Picture, bring_truths, tracing
+
+        width, height = (int(side) for side in loaded.scene.sensors()[0].film().size())
+        picture = Picture.of(str(loaded.path.resolve() if loaded.path else loaded.name), (width, height), changes)
+        if budget is None:
+            bring_truths(cluster, [picture], pixel=pixel.value)
+        else:
+            batches, samples = batch_plan(budget, width * height)
+            known = None if budget.samples is None else batches
+            elsewhere = tracing(cluster, picture, estimator.value, samples=samples, batches=known, orders=orders)
+    if budget is None:
+        return quadrature_reference(loaded, pixel=pixel.value, progress=progress), None
     try:
-        return monte_carlo_reference(
-            loaded, estimator.value, budget=budget, seed=seed, orders=orders, progress=progress
+        estimate = monte_carlo_reference(
+            loaded, estimator.value, budget=budget, seed=seed, orders=orders, progress=progress, elsewhere=elsewhere
         )
     except KeyboardInterrupt as stop:
         if not stop.args:
             raise
         raise Interrupted(str(stop)) from None
+    return estimate.image, estimate
 
 
 def _sampling(sampled: "MonteCarloReference") -> dict[str, Any]:

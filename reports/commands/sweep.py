@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from reports.commands.options import Json
+from reports.commands.options import ClusterPlace, Json
 
 if TYPE_CHECKING:
     from reports.cluster.connect import Place
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from validation.sweep.study import Study
 
 _USUAL = 100  # random scenes of a study without a file
+_EVERY = 300.0  # between two times that the Parquet is written while rows come [s]
 
 
 def sweep(
@@ -25,15 +26,7 @@ def sweep(
         int | None,
         typer.Option(metavar="N", help=f"So many random scenes; without a study {_USUAL}.", show_default=False),
     ] = None,
-    cluster: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WHERE",
-            help="local[:N] processes, tcp://HOST:PORT of a Dask scheduler, or its scheduler file; a process for each "
-            "processor by default.",
-            show_default=False,
-        ),
-    ] = None,
+    cluster: ClusterPlace = None,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", metavar="DIR", help="Folder of the rows; sweep-NAME by default."),
@@ -56,8 +49,9 @@ def sweep(
     """Run every method over many scenes and keep a row of errors and costs for each.
 
     A study names scenes, methods, kernels, parameters, media and sizes; every combination is a cell and becomes one
-    row of DIR/sweep.parquet. Finished rows are kept: a run that was interrupted goes on where it was, and the same
-    study twice computes nothing.
+    row of DIR/sweep.parquet. A process for each processor computes them unless --cluster says otherwise.
+
+    Finished rows are kept: a run that was interrupted goes on where it was, and the same study twice computes nothing.
 
     --from DIR writes what the rows say: DIR/sweep.html, figures, claims with their confidence as JSON, and a digest in
     Markdown; with -o into another folder.
@@ -129,6 +123,7 @@ def _check_parquet() -> None:
 
 def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, again: bool) -> dict[str, Any]:
     """Compute what is missing, add it to the store, and return what came of it."""
+    import time
     from collections import Counter
 
     from analytic.errors import InputError
@@ -146,6 +141,7 @@ def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, aga
     how: dict[str, Any] = {"store": store, "again": again, "scenes": scenes}
     missing = sum(len(cells) for _, cells in cell_groups(study, made, **how))
     counts: Counter[str] = Counter()
+    written = time.monotonic()
     problems: list[dict[str, Any]] = []
     open_cells: dict[str, Cell] = {}
 
@@ -177,6 +173,9 @@ def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, aga
                     if status not in ("done", "refused"):
                         problems.append({"scene": cell.scene, "label": cell.chosen.label, "status": status})
                         problems[-1]["reason"] = outcome.reason
+                    if time.monotonic() - written > _EVERY:
+                        store.write_parquet()
+                        written = time.monotonic()
                     done = sum(counts.values())
                     progress(done / missing, f"{done} of {missing} cells, {cell.scene}")
             except ForeignWorkerError as error:

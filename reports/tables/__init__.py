@@ -21,11 +21,12 @@ Read in this order:
 - `slab.py`: a slab by order of scattering
 - `diagnosis.py`: planted faults and the answers
 - `fit.py`: parameters that explain an image
+- `advise.py`: what methods would cost and err by in a scene
 - `clouds.py`: tables of canonical transport and their errors
 - `checks.py`: baselines that moved, mutations, light left out
 - `lists.py`: scenes, methods, kernels
 - `scene.py`: the description of a scene for another renderer
 
-May import: `analytic.errors`, `realtime.kernels`, `realtime.methods`, `validation.frames`, `validation.metrics`,
-`validation.scenes`.
+May import: `analytic.errors`, `realtime.kernels`, `realtime.methods`, `validation.advise`, `validation.frames`,
+`validation.metrics`, `validation.scenes`.
 """

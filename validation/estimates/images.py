@@ -23,7 +23,7 @@ from reference.storage.exr import Image
 from reference.storage.scene_digest import scene_digest
 from validation.configurations.methods import Configuration
 from validation.estimates.budget import LEAST_BATCHES, Budget, RelativeErrors, batch_plan, near_light, relative_errors
-from validation.estimates.monte_carlo import monte_carlo_batches
+from validation.estimates.monte_carlo import Elsewhere, monte_carlo_batches
 from validation.estimates.quadrature import truth_image
 from validation.scenes.loading import LoadedScene
 from validation.slab.request import order_range, parse_orders
@@ -97,6 +97,7 @@ def monte_carlo_reference(
     seed: int = 0,
     orders: tuple[str, ...] | None = None,
     progress: Progress | None = None,
+    elsewhere: Elsewhere | None = None,
 ) -> MonteCarloReference:
     """Return the mean of an estimator's batches with its standard errors.
 
@@ -116,6 +117,8 @@ def monte_carlo_reference(
         Of a scene of clouds: the sets of orders with a layer of their own, see `cloud_orders`.
     progress
         Called with (share done, what) after every batch.
+    elsewhere
+        Traces batches in other processes, see `validation.estimates.monte_carlo.monte_carlo_batches`.
     """
     seen = None
     if orders is None:
@@ -140,6 +143,7 @@ def monte_carlo_reference(
         enough=None if budget.error is None else watch.enough,
         go_on=None if budget.seconds is None else watch.go_on,
         progress=watch.tell,
+        elsewhere=elsewhere,
     )
     errors = relative_errors(run.batches, near)
     reached = None if budget.error is None else getattr(errors, budget.target) <= budget.error

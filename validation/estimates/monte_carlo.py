@@ -54,6 +54,14 @@ class Run:
     damaged: int  #: files of the cache that were damaged; their batches have been traced again
 
 
+@dataclass(frozen=True)
+class Elsewhere:
+    """Batches that are traced in other processes."""
+
+    bring: Callable[[list[int]], Iterator[Batches]]  #: from seeds to their batches; what is missing is traced here
+    at_once: int  #: how many seeds are asked for at once
+
+
 def monte_carlo_batches(
     scene,
     estimator: str,
@@ -67,6 +75,7 @@ def monte_carlo_batches(
     enough: Callable[[Batches], bool] | None = None,
     go_on: Callable[[int], bool] | None = None,
     progress: Progress | None = None,
+    elsewhere: Elsewhere | None = None,
 ) -> Run:
     """Return batches, radiances [W/(m^2 sr)], of a Mitsuba scene at its own size.
 
@@ -96,6 +105,8 @@ def monte_carlo_batches(
         Asked with the number of finished batches before each one that is traced, from the third on.
     progress
         Called with (done, total, estimator) after every batch that was traced.
+    elsewhere
+        Traces batches in other processes; what these do not bring is traced here.
 
     Raises
     ------
@@ -124,11 +135,7 @@ def monte_carlo_batches(
     folder = cache_key(scene, estimator, settings)
     make_room()
     sweep(cache_folder() / folder)
-    layers: tuple[str, ...] = LAYERS
-    if orders is None:
-        trace = _tracer(scene, estimator, samples, max_depth, counts)
-    else:
-        layers, trace = _cloud_tracer(scene, estimator, samples, orders)
+    layers, trace = batch_tracer(scene, estimator, samples=samples, max_depth=max_depth, counts=counts, orders=orders)
     tally: Counter[str] = Counter()
 
     def kept_or_traced(seed: int) -> Batches | None:
@@ -145,8 +152,16 @@ def monte_carlo_batches(
 
     try:
         with hint_when_stopped(lambda: _go_on(tally)):
-            done = None
+            done, asked = None, first_seed
             for seeds in _blocks(first_seed, batches):
+                if elsewhere is not None and seeds[-1] >= asked:
+                    asked = seeds[0] + max(elsewhere.at_once, len(seeds))
+                    wanted = range(seeds[0], min(first_seed + batches, asked))
+                    for batch in elsewhere.bring([seed for seed in wanted if not _has(folder, seed)]):
+                        _store(folder, batch)
+                        tally["brought"] += 1
+                        if progress is not None:
+                            progress(seeds[0] - first_seed + tally["brought"], batches, estimator)
                 block, whole = _block(folder, seeds, samples, layers, tally=tally, batch_of=kept_or_traced)
                 if block is not None:
                     done = block if done is None else merged(done, block)
@@ -160,7 +175,28 @@ def monte_carlo_batches(
         reason = os.strerror(error.errno or errno.ENOSPC)
         hint = "make room, or name another folder by AIRLIGHT_CACHE_DIR, and run again to go on"
         raise OSError(error.errno, f"{reason}; {_kept(tally)}; {hint}", str(cache_folder())) from error
-    return Run(_all(done), tally["cached"], tally["damaged"])
+    return Run(_all(done), max(0, tally["cached"] - tally["brought"]), tally["damaged"])
+
+
+def batch_tracer(
+    scene,
+    estimator: str,
+    *,
+    samples: int,
+    max_depth: int = 2,
+    counts: NDArray[np.integer] | None = None,
+    orders: tuple[str, ...] | None = None,
+) -> tuple[tuple[str, ...], Trace]:
+    """Return the layers of a batch, and the function that traces one from its seed; see `monte_carlo_batches`."""
+    if orders is None:
+        return LAYERS, _tracer(scene, estimator, samples, max_depth, counts)
+    return _cloud_tracer(scene, estimator, samples, orders)
+
+
+def _has(folder: str, seed: int) -> bool:
+    """Return whether the batch of a seed is kept, alone or in its block."""
+    start = seed // BLOCK * BLOCK
+    return any(is_kept(_name(folder, seeds)) for seeds in (range(seed, seed + 1), range(start, start + BLOCK)))
 
 
 def _all(done: Batches | None) -> Batches:

@@ -10,12 +10,14 @@ from reference.quadrature.light_points import PointPlan
 from reference.quadrature.ray_values import TruthImage
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_truth
-from reference.storage.cache import drop_arrays, load_arrays, store_arrays
+from reference.storage.cache import drop_arrays, is_kept, load_arrays, store_arrays
 from reference.storage.cache_size import make_room
 from reference.storage.scene_digest import cache_key
 from validation.estimates.light_on_ray import check_camera, check_rays, check_values
 
 Progress = Callable[[int, int, str], None]
+
+_USUAL: dict[str, Any] = {"samples": 256, "shadow_scale": 1.0, "pixel": "centre", "plan": None}
 
 
 def truth_image(
@@ -41,14 +43,8 @@ def truth_image(
     InputError
         For a scene that cannot be read, and for radiance that is not finite, see `validation.estimates.light_on_ray`.
     """
-    # The key names only what differs from the usual, so that images that were kept before are found.
-    settings: dict[str, Any] = {"samples": samples, "shadow_scale": shadow_scale}
-    settings |= {} if pixel == "centre" else {"pixel": pixel}
-    # Points stand for lights with extent alone: without them every plan gives the same image.
-    settings |= {"plan": repr(plan)} if plan is not None and _has_extent(scene) else {}
-    # What a renderer's own shadow rays see also depends on where they start.
-    named = settings if shadow_scale == 1 else settings | {"shadow_start": True}
-    key = cache_key(scene, "quadrature", named)
+    settings: dict[str, Any] = {"samples": samples, "shadow_scale": shadow_scale, "pixel": pixel, "plan": plan}
+    key = _key(scene, settings)
     stored = load_arrays(key)
     if stored is not None and _needed(False) <= set(stored) <= _needed(True):
         return TruthImage(**{field.name: _as_kept(field, stored[field.name]) for field in _fields(set(stored))})
@@ -60,13 +56,39 @@ def truth_image(
     parts = _Parts(key)
     # Only lights with extent take so long that a run is worth going on with.
     keep = parts if truth.area and pixel == "centre" else None
-    how: dict[str, Any] = {"samples": samples, "shadow_scale": shadow_scale, "pixel": pixel, "plan": plan}
-    image = quadrature_image(truth, **how, keep=keep, progress=progress)
+    image = quadrature_image(truth, **settings, keep=keep, progress=progress)
     check_values(truth, image)
-    values = {field.name: getattr(image, field.name) for field in fields(TruthImage)}
-    store_arrays(key, {name: value for name, value in values.items() if value is not None})
+    _store(key, image)
     parts.drop()
     return image
+
+
+def keep_truth(scene, image: TruthImage, *, pixel: str = "centre") -> None:
+    """Keep a truth that another process computed by `truth_image`, so that this one finds it."""
+    make_room()
+    _store(_key(scene, _USUAL | {"pixel": pixel}), image)
+
+
+def has_truth(scene, *, pixel: str = "centre") -> bool:
+    """Return whether the truth of a scene is kept."""
+    return is_kept(_key(scene, _USUAL | {"pixel": pixel}))
+
+
+def _key(scene, settings: Mapping[str, Any]) -> str:
+    """Return the name of a truth; it holds only what differs from the usual, so that older images are found."""
+    plan, pixel = settings["plan"], settings["pixel"]
+    named = {name: settings[name] for name in ("samples", "shadow_scale")}
+    named |= {} if pixel == "centre" else {"pixel": pixel}
+    # Points stand for lights with extent alone: without them every plan gives the same image.
+    named |= {"plan": repr(plan)} if plan is not None and _has_extent(scene) else {}
+    # What a renderer's own shadow rays see also depends on where they start.
+    named |= {} if settings["shadow_scale"] == 1 else {"shadow_start": True}
+    return cache_key(scene, "quadrature", named)
+
+
+def _store(key: str, image: TruthImage) -> None:
+    values = {field.name: getattr(image, field.name) for field in fields(TruthImage)}
+    store_arrays(key, {name: value for name, value in values.items() if value is not None})
 
 
 class _Parts:

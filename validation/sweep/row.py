@@ -196,6 +196,7 @@ _COST = (
             "frame_ms": "median of a frame: camera rays, lit surface, airlight",
             "frame_ms_low": "first quartile of a frame",
             "frame_ms_high": "third quartile of a frame",
+            "frame_cpu_ms": "least processor time of a frame, of all threads: what a busy machine changes least",
             "airlight_ms": "median of the airlight of a frame alone",
             "work_ms": "that the cell took from its beginning to its row",
             "cpu_ms": "processor time of that, of all threads",

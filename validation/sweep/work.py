@@ -206,11 +206,11 @@ def _render(scene: Scene, chosen: Configuration, *, timed: bool) -> Rendered:
 def _times(renderer: FrameRenderer, scene: Scene, state: Any) -> dict[str, Any]:
     """Time preparation, frames, and the airlight of a frame; the first run has compiled and recorded all kernels."""
     prepare = _timed(lambda: dr.eval(renderer.prepare(scene)))
-    frames = _repeated(lambda: run_stages(renderer, state))
+    frames, processor = _repeated(lambda: run_stages(renderer, state))
     low, median, high = (float(value) for value in np.percentile(frames, [25, 50, 75]))
     cast, by_light = run_cast_and_shade(renderer)
     dr.eval(cast, by_light)
-    airlight = _repeated(
+    airlight, _ = _repeated(
         lambda: evaluated(
             cast, by_light, run_method(renderer, state, cast, by_light, run_cull(renderer, state, cast.distance))
         )
@@ -220,19 +220,25 @@ def _times(renderer: FrameRenderer, scene: Scene, state: Any) -> dict[str, Any]:
         "frame_ms": median,
         "frame_ms_low": low,
         "frame_ms_high": high,
+        "frame_cpu_ms": min(processor),
         "airlight_ms": float(np.median(airlight)),
         "frames": len(frames),
     }
 
 
-def _repeated(work: Callable[[], Any]) -> list[float]:
-    """Return the times of some runs after one of warm-up [ms]; a slow one is not repeated often."""
-    times = [_timed(work)]
-    if times[0] < _SLOW:
-        times = []  # the warm-up replayed for the first time
-    while not times or (sum(times) < _SPENT and len(times) < _MOST):
-        times.append(_timed(work))
-    return times
+def _repeated(work: Callable[[], Any]) -> tuple[list[float], list[float]]:
+    """Return wall and processor times of some runs after one of warm-up [ms]; a slow one is not repeated often."""
+    runs = [_timed_both(work)]
+    if runs[0][0] < _SLOW:
+        runs = []  # the warm-up replayed for the first time
+    while not runs or (sum(wall for wall, _ in runs) < _SPENT and len(runs) < _MOST):
+        runs.append(_timed_both(work))
+    return [wall for wall, _ in runs], [processor for _, processor in runs]
+
+
+def _timed_both(work: Callable[[], Any]) -> tuple[float, float]:
+    spent = time.process_time()
+    return _timed(work), 1e3 * (time.process_time() - spent)
 
 
 def _timed(work: Callable[[], Any]) -> float:

@@ -61,10 +61,12 @@ def test_cells_that_were_computed_again_count_once(sweep_of):
         row(key="c", timed_alone=True, frame_ms=3.0, **new),
         row("random:1", key="d", **old),
         row("random:1", key="e", medium="m", **new),
+        row("random:2", key="f", timed_alone=True, **old),
+        row("random:2", key="g", timed_alone=False, **new),  # newer source goes before a time
     ]
     sweep = sweep_of(several)
-    assert sorted(sweep.texts("key")) == ["c", "d", "e"]
-    assert sweep.superseded == 2
+    assert sorted(sweep.texts("key")) == ["c", "d", "e", "g"]
+    assert sweep.superseded == 3
 
 
 def test_pictures_are_read_by_key(sweep_of):

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Truths and batches of references from a cluster: the cache of this machine gets them, and the rest is as without.
+
+So the bytes of a file do not depend on where its numbers were computed. What workers did not bring, whatever became of
+them, is computed here.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+from analytic.errors import InputError
+from reference.monte_carlo.batches import Batches
+from reference.quadrature.ray_values import TruthImage
+from reports import __version__
+from reports.cluster.connect import Cluster
+from reports.cluster.run import Group, Task, run_groups
+from reports.machine.environment import activate
+from validation.estimates.monte_carlo import Elsewhere, Trace, batch_tracer
+from validation.estimates.quadrature import has_truth, keep_truth, truth_image
+from validation.scenes.loading import load_scene
+from validation.sweep.keys import Made, made_here
+
+_LIMIT = 6 * 3600.0  # of a truth or a batch [s]
+_WAVE = 8  # batches that are asked for at once by worker, where their number is not known before
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A scene as workers load it."""
+
+    scene: str  #: name or path
+    size: tuple[int, int] | None  #: [pixels]
+    changes: tuple[tuple[str, tuple[float, ...]], ...] = ()  #: of the scene, as of `--change`
+
+    @classmethod
+    def of(cls, scene: str, size: tuple[int, int] | None, changes: Mapping[str, Sequence[float]]) -> "Picture":
+        """Return the picture that `load_scene` would load."""
+        return cls(scene, size, tuple((name, tuple(values)) for name, values in changes.items()))
+
+    def load(self):
+        """Return the `mi.Scene`."""
+        return load_scene(self.scene, self.size, dict(self.changes)).scene
+
+
+def bring_truths(
+    cluster: Cluster,
+    pictures: Sequence[Picture],
+    *,
+    pixel: str = "centre",
+    told: Callable[[int, int], None] = lambda done, total: None,
+) -> None:
+    """Let workers compute the quadrature truths of scenes that are not in the cache, and keep them here.
+
+    Parameters
+    ----------
+    cluster
+        From `reports.cluster.connect.connected`.
+    pictures
+        The scenes.
+    pixel
+        See `validation.estimates.quadrature.truth_image`.
+    told
+        Called with (done, all) after each.
+    """
+    lacking = [picture for picture in pictures if not has_truth(picture.load(), pixel=pixel)]
+    named = {f"truth {number}": picture for number, picture in enumerate(lacking)}
+    groups = [Group((Task(name, _truth, (picture, pixel), _LIMIT),)) for name, picture in named.items()]
+    for number, outcome in enumerate(run_groups(cluster, groups, made=_made()), 1):
+        if outcome.status == "refused":
+            raise InputError(outcome.reason or "")
+        if outcome.status == "done":
+            keep_truth(named[outcome.task.name].load(), outcome.value, pixel=pixel)
+        told(number, len(named))
+
+
+def tracing(
+    cluster: Cluster,
+    picture: Picture,
+    estimator: str,
+    *,
+    samples: int,
+    batches: int | None,
+    orders: tuple[str, ...] | None,
+) -> Elsewhere:
+    """Return what lets workers trace the batches of an estimator.
+
+    Parameters
+    ----------
+    cluster, picture
+        Where, and of what.
+    estimator, samples, orders
+        See `validation.estimates.monte_carlo.monte_carlo_batches`.
+    batches
+        How many there will be; None where an error decides.
+    """
+
+    def bring(seeds: list[int]) -> Iterator[Batches]:
+        # One task in a group: what is sent at once then depends on the workers alone.
+        groups = (
+            Group((Task(f"batch {seed}", _batch, (picture, estimator, samples, orders, seed), _LIMIT),))
+            for seed in seeds
+        )
+        for outcome in run_groups(cluster, groups, made=_made()):
+            if outcome.status == "refused":
+                raise InputError(outcome.reason or "")
+            if outcome.status == "done":
+                yield outcome.value
+
+    workers = len(cluster.client.scheduler_info(n_workers=-1)["workers"])
+    return Elsewhere(bring, batches or _WAVE * max(1, workers))
+
+
+def _truth(picture: Picture, pixel: str) -> TruthImage:
+    return truth_image(picture.load(), pixel=pixel)
+
+
+def _batch(picture: Picture, estimator: str, samples: int, orders: tuple[str, ...] | None, seed: int) -> Batches:
+    return _tracer(picture, estimator, samples, orders)(seed)
+
+
+@lru_cache(maxsize=1)
+def _tracer(picture: Picture, estimator: str, samples: int, orders: tuple[str, ...] | None) -> Trace:
+    return batch_tracer(picture.load(), estimator, samples=samples, orders=orders)[1]
+
+
+def _made() -> Made:
+    return made_here(__version__, activate())

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: one command sweeps a study, a killed run goes on, and the same study twice computes nothing."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
+
+from tests.helpers.imports import ROOT
+from validation.sweep.rows import ROWS, RowStore
+
+STUDY = """
+scenes = ["open-fog", "random:3"]
+sizes = ["16x12"]
+methods = ["unshadowed", "ray-march", "light-volumes"]
+[parameters.ray-march]
+steps = [4, 9]
+[parameters.light-volumes]
+map = 32
+"""
+COMMAND = [sys.executable, str(ROOT / "airlight.py"), "sweep"]
+
+
+def _run(*words, **options):
+    return subprocess.run([*COMMAND, *map(str, words)], capture_output=True, text=True, timeout=900, **options)
+
+
+def _rows(folder):
+    import pyarrow.parquet as pq
+
+    return pq.read_table(folder / "sweep.parquet").to_pylist()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["none.toml"], "there is no file none.toml"),
+        (["--random", "0"], "--random: got 0, wanted a whole number from 1"),
+        (["--cluster", "tcp:"], "--cluster: got 'tcp:', wanted local, local:N, tcp://HOST:PORT"),
+        (["--cluster", "local:x"], "wanted local:N"),
+    ],
+)
+def test_mistakes_end_in_one_line(words, message, tmp_path):
+    ran = _run(*words, "-o", tmp_path / "out")
+    assert (ran.returncode, ran.stdout) == (2, "")
+    assert message in ran.stderr
+    assert len(ran.stderr.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.claim("sweeps-go-on", tolerance="none: a row for every cell, none twice, none computed again")
+def test_a_killed_sweep_goes_on_and_a_second_computes_nothing(tmp_path):
+    study, folder = tmp_path / "study.toml", tmp_path / "rows"
+    study.write_text(STUDY)
+    begun = subprocess.Popen([*COMMAND, study, "-o", folder, "--cluster", "local:1"], stderr=subprocess.DEVNULL)
+    until = time.monotonic() + 600
+    while time.monotonic() < until and not ((folder / ROWS).exists() and (folder / ROWS).stat().st_size):
+        time.sleep(0.05)
+    begun.send_signal(signal.SIGKILL)
+    begun.wait()
+    with RowStore(folder) as store:
+        kept = {row["key"]: row["started"] for row in store.rows()}
+    assert 1 <= len(kept) <= 8
+    ran = _run(study, "-o", folder, "--cluster", "local:2", "--json")
+    assert ran.returncode == 0, ran.stderr
+    summary = json.loads(ran.stdout)
+    assert (summary["cells"], summary["kept"], summary["computed"], summary["left"]) == (8, len(kept), 8 - len(kept), 0)
+    rows = _rows(folder)
+    assert len({row["key"] for row in rows}) == len(rows) == 8
+    assert {row["status"] for row in rows} == {"done"}
+    assert {key: value for key, value in ((row["key"], row["started"]) for row in rows) if key in kept} == kept
+    assert {row["seed"] for row in rows} == {None, 3}
+    assert {row["property.lights"] is None for row in rows} == {False}
+    assert all(row["picture"][:4] == b"RIFF" for row in rows)
+    again = json.loads(_run(study, "-o", folder, "--json").stdout)
+    assert (again["kept"], again["computed"]) == (8, 0)
+    assert _rows(folder) == rows
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for a process alone")
+def test_an_interrupted_sweep_says_what_is_kept(tmp_path):
+    study, folder = tmp_path / "study.toml", tmp_path / "rows"
+    study.write_text(STUDY)
+    words = [*COMMAND, study, "-o", folder, "--cluster", "local:1"]
+    begun = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + 600
+    while time.monotonic() < until and not ((folder / ROWS).exists() and (folder / ROWS).stat().st_size):
+        time.sleep(0.05)
+    begun.send_signal(signal.SIGINT)
+    _, said = begun.communicate(timeout=60)
+    assert begun.returncode == 130
+    assert f"rows are kept in {folder}; run the same command again to go on" in said
+    assert len(said.splitlines()) <= 2  # with a line of progress
+
+
+@pytest.mark.slow
+@pytest.mark.claim("references-from-clusters", tolerance="none: byte for byte")
+@pytest.mark.parametrize(
+    "words",
+    [["--estimator", "single-scatter", "--spp", "1280"], ["--estimator", "quadrature"]],
+    ids=lambda words: words[1],
+)
+def test_a_reference_from_a_cluster_has_the_same_bytes(tmp_path, words):
+    files = []
+    for where in ([], ["--cluster", "local:2"]):
+        file = tmp_path / f"{len(files)}.exr"
+        command = [sys.executable, str(ROOT / "airlight.py"), "reference", "sphere-spot", "--size", "16x12", *words]
+        environment = os.environ | {"AIRLIGHT_CACHE_DIR": str(tmp_path / f"cache-{len(files)}")}
+        ran = subprocess.run(
+            [*command, *where, "-o", str(file), "--json"], capture_output=True, text=True, timeout=900, env=environment
+        )
+        assert ran.returncode == 0, ran.stderr
+        files.append(file.read_bytes())
+    assert files[0] == files[1]
+    if words[1] == "single-scatter":
+        assert json.loads(ran.stdout)["cached"] == 0
