@@ -2,7 +2,8 @@
 """Claims: in what share of the scenes a configuration keeps an error, with the interval of that share.
 
 A scene counts as within an error if its image was made, all its pixels are finite, and the relative RMSE is at most
-the error. A refusal is no try: refused scenes are counted apart. A cell that failed, hung or died is a try that missed.
+the error. A refusal is no try: refused scenes are counted apart, and so are scenes that have no truth. A cell that
+failed, hung or died is a try that missed.
 
 Where truth and error differ by less than the truth's own error nothing is decided. Such a scene is within at the upper
 end of the interval and not at the lower one: the interval holds the share whatever the exact truth would have said.
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reports.sweep.samples import FAULTS, Sample
+from reports.sweep.samples import FAULTS, UNTOLD, Sample
 from validation.statistics.intervals import LEVEL, binomial_interval
 
 TARGETS = (0.1, 0.01, 0.001)  #: relative RMSE of claims, as shares
@@ -30,6 +31,7 @@ class Claim:
     within: int  #: of these, within the error for sure
     undecided: int  #: of these, with an error nearer to the target than the truth is exact
     refused: int  #: scenes beside these
+    untold: int  #: further scenes that have no truth
     low: float
     high: float
     level: float = LEVEL
@@ -46,7 +48,8 @@ class Claim:
         words += f"{percent(self.low, self.tries)} to {percent(self.high, self.tries)} %"
         if self.undecided:
             words += f"; the truth is not exact enough to tell in {scenes_words(self.undecided)}"
-        return words + (f"; {self.refused} more refused" if self.refused else "")
+        words += f"; {self.refused} more refused" if self.refused else ""
+        return words + (f"; no truth of {self.untold} more" if self.untold else "")
 
     @property
     def text(self) -> str:
@@ -73,9 +76,18 @@ def claim(sample: Sample, target: float, level: float = LEVEL) -> Claim:
     possibly = finite & (sample.errors - sample.truth_errors <= target)
     tries = int(measured.sum()) + sample.count(*FAULTS)
     within, at_most = int(surely.sum()), int(possibly.sum())
-    low, high = binomial_interval(within, tries, level)[0], binomial_interval(at_most, tries, level)[1]
     return Claim(
-        sample.label, sample.name, target, tries, within, at_most - within, sample.count("refused"), low, high, level
+        label=sample.label,
+        name=sample.name,
+        target=target,
+        tries=tries,
+        within=within,
+        undecided=at_most - within,
+        refused=sample.count("refused"),
+        untold=sample.count(UNTOLD),
+        low=binomial_interval(within, tries, level)[0],
+        high=binomial_interval(at_most, tries, level)[1],
+        level=level,
     )
 
 

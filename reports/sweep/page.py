@@ -13,6 +13,7 @@ from reports.page.filters import percent, unbroken
 from reports.page.render import page_environment, template_text
 from reports.page.tables import drawn, facts
 from reports.sweep import tables
+from reports.sweep.claims import TARGETS
 from reports.sweep.correlations import LEAST, NAMED, SAME
 from reports.sweep.properties import property_words
 from reports.sweep.summary import Summary, goes_with_words, headlines, sound_words
@@ -57,7 +58,7 @@ def render_sweep(said: Summary, charts: Mapping[str, str], *, limit: int = PAGE_
         "folder": said.sweep.path.parent,
         "timed": sum(int(np.isfinite(sample.times).sum()) for sample in said.samples),
         "undecided": sum(each.undecided for each in said.claims),
-        "decided": sum(each.tries for each in said.claims),
+        "decided": len(TARGETS) * sum(sample.count("done") for sample in said.samples),
         "same": SAME,
         "named": NAMED,
         "least": LEAST,

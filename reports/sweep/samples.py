@@ -14,9 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reports.sweep.read import Numbers, Sweep, natural
+from reports.sweep.read import Numbers, Sweep, Texts, natural
+from validation.sweep.row import NO_TRUTH
 
 FAULTS = ("failed", "hung", "aborted")  #: what became of a cell that neither ended nor was refused
+UNTOLD = "no truth"  #: of a scene whose truth was not done, so that no method was asked
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,7 @@ class Sample:
     method: str
     scenes: tuple[str, ...]
     rows: tuple[int, ...]  #: of the sweep: where each scene's cell with the largest error stands
-    statuses: tuple[str, ...]  #: what became of each scene
+    statuses: tuple[str, ...]  #: what became of each scene: that of its row, or `UNTOLD`
     errors: Numbers  #: relative RMSE [1]: infinite where the image has no finite pixel, NaN where nothing was measured
     truth_errors: Numbers  #: the truth's own, over its mean [1]; 0 where it says nothing
     nonfinite: Numbers  #: pixels with NaN or infinity, in all cells of a scene
@@ -51,7 +53,7 @@ def drawn_at_random(sweep: Sweep) -> bool:
 
 def samples(sweep: Sweep) -> list[Sample]:
     """Return the sample of every configuration, sorted by method and label."""
-    labels, scenes, statuses = (sweep.texts(name) for name in ("label", "scene", "status"))
+    labels, scenes, statuses = sweep.texts("label"), sweep.texts("scene"), _statuses(sweep)
     methods, errors = sweep.texts("method"), errors_of(sweep)
     truth_errors = np.nan_to_num(sweep.numbers("truth_error"), nan=0.0)
     nonfinite = np.nan_to_num(sweep.numbers("nonfinite"), nan=0.0)
@@ -170,8 +172,15 @@ def _size(sweep: Sweep, row: int) -> str:
     return f" at {width:.0f} x {height:.0f}" if np.isfinite(width) and np.isfinite(height) else ""
 
 
+def _statuses(sweep: Sweep) -> Texts:
+    """Return what became of every row, and of those whose scene has no truth `UNTOLD`."""
+    reasons = zip(sweep.texts("status"), sweep.texts("reason"))
+    untold = [status in FAULTS and (reason or "").startswith(NO_TRUTH) for status, reason in reasons]
+    return np.where(untold, UNTOLD, sweep.texts("status"))
+
+
 def _badness(status: str, error: float) -> tuple[int, float]:
-    """Order the cells of a scene: a fault stands for it before any error, a refusal only where nothing was measured."""
+    """Order the cells of a scene: a fault stands for it before any error, the rest only where nothing was measured."""
     return (2 if status in FAULTS else 1 if status == "done" else 0), 0.0 if np.isnan(error) else error
 
 

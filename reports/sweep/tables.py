@@ -5,7 +5,7 @@ import numpy as np
 
 from reports.sweep.claims import TARGETS, written
 from reports.sweep.properties import property_words
-from reports.sweep.samples import FAULTS
+from reports.sweep.samples import FAULTS, UNTOLD
 from reports.sweep.summary import Summary, quantiles
 from reports.tables.table import Column, Measured, Name, Table, numbers, table, words
 
@@ -21,7 +21,7 @@ def errors_table(said: Summary) -> Table:
             for target in reversed(TARGETS)
         ),
         *numbers(median="median error", most="95 % of scenes below", how=_SHARE),
-        *numbers(scenes="scenes", refused="refused"),
+        *numbers(scenes="scenes", refused="refused", untold="no truth"),
         Column("lost", "not done", alarm=True),
     )
     rows = []
@@ -31,6 +31,7 @@ def errors_table(said: Summary) -> Table:
             "name": sample.name,
             "scenes": len(sample.scenes),
             "refused": sample.count("refused"),
+            "untold": sample.count(UNTOLD),
             "lost": sample.count(*FAULTS),
             "median": values[0]["value"] if values else None,
             "most": values[1]["value"] if values else None,
@@ -40,12 +41,13 @@ def errors_table(said: Summary) -> Table:
                 row[f"within_{claim.target:g}"] = Measured(claim.share, claim.low, claim.high)
         rows.append(row)
     explanation = (
-        "Error: relative RMSE of the airlight. Each share has its interval at 95 % confidence. Refused scenes are in "
-        "no share; scenes that failed, hung or have pixels that are not finite count as not within."
+        "Error: relative RMSE of the airlight. Each share has its interval at 95 % confidence. Scenes that are "
+        "refused or have no truth are in no share; those that failed, hung or have pixels that are not finite are not "
+        "within."
     )
     made = table("In what share of the scenes each method is within an error", columns, rows, explanation=explanation)
     # A column of zeros, or of the same count in every row, says nothing.
-    empty = {key for key in ("refused", "lost") if not any(row[key] for row in rows)}
+    empty = {key for key in ("refused", "untold", "lost") if not any(row[key] for row in rows)}
     empty |= {"scenes"} if len({row["scenes"] for row in rows}) == 1 else set()
     return made.only(*(column.key for column in columns if column.key not in empty))
 
