@@ -95,15 +95,11 @@ def cell_groups(
     scenes
         Digests of scenes of files, see `validation.sweep.keys.cell_key`.
     """
-    done: set[str] = set()
     for cells in study.images():
         keyed = {cell_key(cell, made, scenes): cell for cell in cells}
         missing = {
-            key: cell
-            for key, cell in keyed.items()
-            if key not in done and (key not in store or (again and store.status(key) in _AGAIN))
+            key: cell for key, cell in keyed.items() if key not in store or (again and store.status(key) in _AGAIN)
         }
-        done |= set(missing)
         if missing:
             yield _group(study, missing), missing
 
