@@ -17,6 +17,7 @@ Read in this order:
 - `api/`: the functions of `import airlight` and their results;
 - `bench/`: what `airlight bench` prints;
 - `view/`: the live view in the browser;
+- `sweep/`: what a sweep says, from its Parquet;
 - `commands/`: the commands, one module each;
 - `docs/`: builds the documentation.
 

@@ -23,6 +23,7 @@ from reports.plotting.pictures import error_map, exposure, tone_mapped
 from validation.properties.properties import scene_properties
 from validation.scenes.loading import LoadedScene
 from validation.sweep.keys import Made, cell_key, source_digest
+from validation.sweep.row import NO_TRUTH
 from validation.sweep.rows import RowStore
 from validation.sweep.study import Cell, Study
 from validation.sweep.truth import CellTruth, cell_truth, load_cell
@@ -118,7 +119,7 @@ def _group(study: Study, cells: dict[str, Cell]) -> Group:
     image = next(iter(cells.values())).image
     words = " ".join((image.scene, *image.medium, f"{image.size[0]}x{image.size[1]}"))
     tasks = tuple(Task(key, row_of, (cell, key), study.limit) for key, cell in cells.items())
-    return Group(tasks, Task(f"truth of {words}", truth_of, (image,), study.limit))
+    return Group(tasks, Task(f"{NO_TRUTH}{words}", truth_of, (image,), study.limit))
 
 
 @lru_cache(maxsize=1)

@@ -37,6 +37,16 @@ def sweep(
     again: Annotated[
         bool, typer.Option("--again", help="Compute cells again that failed, hung or aborted; the others stay.")
     ] = False,
+    redraw: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            metavar="DIR",
+            help="Say what this sweep says: a page, figures and claims from its Parquet, without computing.",
+            show_default=False,
+        ),
+    ] = None,
+    markdown: Annotated[bool, typer.Option("--markdown", help="With --from: print the digest in Markdown.")] = False,
     json: Json = False,
 ) -> None:
     """Run every method over many scenes and keep a row of errors and costs for each.
@@ -46,13 +56,23 @@ def sweep(
 
     Finished rows are kept: a run that was interrupted goes on where it was, and the same study twice computes nothing.
 
+    --from DIR writes what the rows say: DIR/sweep.html, figures, claims with their confidence as JSON, and a digest in
+    Markdown; with -o into another folder.
+
     Exit status 1 if a cell failed, hung or aborted, or was left undone.
     """
+    from analytic.errors import InputError
     from reports.cluster.connect import check_library, parse_place
     from reports.machine.environment import activate
     from validation.sweep.rows import RowStore
     from validation.sweep.study import default_study, read_study
 
+    if redraw is not None:
+        given = {"a study": study, "--random": random, "--cluster": cluster, "--again": again or None}
+        _say(redraw, output, [option for option, value in given.items() if value is not None], markdown, json)
+        return
+    if markdown:
+        raise InputError("--markdown: prints the digest of a sweep that is there; name its folder by --from DIR")
     place = parse_place(cluster)
     _check_parquet()
     check_library()
@@ -66,6 +86,33 @@ def sweep(
     _print(summary, json=json)
     if summary["problems"] or summary["left"]:
         raise typer.Exit(1)
+
+
+def _say(source: Path, target: Path | None, others: list[str], markdown: bool, json: bool) -> None:
+    """Write what a sweep says, and print its claims."""
+    from analytic.errors import InputError
+    from reports.tables.drawing import sentence_in_text
+    from reports.tables.terminal import print_json, print_table
+
+    if others:
+        raise InputError(f"sweep: got --from together with {others[0]}; --from computes nothing, leave that out")
+    if json and markdown:
+        raise InputError("sweep: got both --json and --markdown; give one of them")
+    _check_parquet()
+    from reports.sweep.digest import digest
+    from reports.sweep.summary import headlines, to_json
+    from reports.sweep.tables import errors_table
+    from reports.sweep.write import write_sweep
+
+    said, page = write_sweep(source, target)
+    if json:
+        print_json(to_json(said))
+    elif markdown:
+        print(digest(said), end="")
+    else:
+        print("\n".join(f"- {each['kind']}: {sentence_in_text(each['text'])}" for each in headlines(said)))
+        print_table(errors_table(said))
+        print(f"{page}: {said.scenes} scenes, {len(said.samples)} configurations, {len(said.sweep)} cells")
 
 
 def _check_parquet() -> None:
@@ -188,3 +235,4 @@ def _print(summary: dict[str, Any], *, json: bool) -> None:
         print(f"  {problem['status']}: {problem['scene']}, {problem['label']}: {problem['reason']}")
     if summary["parquet"]:
         print(f"  rows in {summary['parquet']}")
+        print(f"  what they say: airlight sweep --from {summary['output']}")

@@ -29,7 +29,7 @@ def speed_error_chart(scenes: list[dict[str, Any]]) -> str:
     for panel in list(panels.flat)[len(scenes) :]:
         panel.set_visible(False)
     _legend(figure, panels.flat[0], styles, columns=3)
-    return _svg(figure)
+    return svg_text(figure)
 
 
 def scene_chart(scenes: list[dict[str, Any]], place: int) -> str:
@@ -53,15 +53,15 @@ def scene_chart(scenes: list[dict[str, Any]], place: int) -> str:
     # The first variant of a method stands for all: the strip of the errors beside the chart names every one.
     methods = {entry["method"]: styles[entry["label"]] for entry in reversed(scene["methods"]) if _has_point(entry)}
     _legend(figure, panel, dict(reversed(methods.items())), columns=4)
-    return _with_titles(_svg(figure, "airlight, one scene"), scene)
+    return _with_titles(svg_text(figure, "airlight, one scene"), scene)
 
 
 def _legend(figure, panel, styles: dict[str, dict[str, Any]], *, columns: int) -> None:
-    handles = [panel.plot([], [], **_points(style), label=_short(label))[0] for label, style in styles.items()]
+    handles = [panel.plot([], [], **_points(style), label=short(label))[0] for label, style in styles.items()]
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize=8, frameon=False)
 
 
-def _short(label: str, most: int = 56) -> str:
+def short(label: str, most: int = 56) -> str:
     """Return a label that leaves room for others."""
     return label if len(label) <= most else label[: most - 1].rstrip(" ,") + "\N{HORIZONTAL ELLIPSIS}"
 
@@ -107,7 +107,16 @@ def _points(style: dict[str, Any]) -> dict[str, Any]:
     return style | {"linestyle": "none", "markersize": 7}
 
 
-def _svg(figure, salt: str = "airlight") -> str:
+def svg_text(figure, salt: str = "airlight") -> str:
+    """Return a figure of matplotlib as inline SVG, the same bytes for the same figure.
+
+    Parameters
+    ----------
+    figure
+        Of matplotlib.
+    salt
+        Of the names in it, another for each chart of a page.
+    """
     import matplotlib
 
     # A fixed salt, another for each chart of a page, and no date: the same data give the same bytes.
@@ -115,5 +124,5 @@ def _svg(figure, salt: str = "airlight") -> str:
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None}, transparent=True)
     text = buffer.getvalue()
-    # The names that matplotlib counts would be there twice on a page of two charts.
-    return re.sub(r' id="[\w.]+_\d+"', "", text[text.index("<svg") :])
+    # The names that matplotlib counts would be there twice on a page of two charts, and so would those of equal images.
+    return re.sub(r' id="([\w.]+_\d+|image[0-9a-f]+)"', "", text[text.index("<svg") :])

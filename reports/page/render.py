@@ -9,7 +9,7 @@ import base64
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from analytic.errors import InputError
 from reports.page.chart import scene_chart, speed_error_chart
@@ -20,9 +20,13 @@ from reports.page.tables import TABLES, trust_words
 from reports.plotting.colour_maps import signed_colours, unsigned_colours
 from reports.tables.methods import fastest_within
 
+if TYPE_CHECKING:
+    import jinja2
+    from markupsafe import Markup
+
 PAGE_LIMIT = 30_000_000  #: bytes of a page
 WORDS_LIMIT = 2_500_000  #: bytes of these for everything but images
-SCRIPTS = ("codec.js", "scene.js", "draw.js", "viewer.js", "page.js")
+SCRIPTS = ("codec.js", "scene.js", "draw.js", "viewer.js", "page.js", "every.js")
 TEMPLATES = Path(__file__).parent / "templates"
 
 
@@ -43,18 +47,8 @@ def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) 
     InputError
         If a file is missing or cannot be used, or if the page cannot be made small enough.
     """
-    import jinja2
     from markupsafe import Markup
 
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= FILTERS
-    environment.globals |= TABLES
     # A scene without any image has no viewer.
     with_images = [scene for scene in data["scenes"] if any(entry["files"] for entry in scene["methods"])]
     images = page_images(with_images, Path(folder), limit - WORDS_LIMIT)
@@ -67,19 +61,19 @@ def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) 
         else None
         for place, scene in enumerate(data["scenes"])
     ]
+    environment = page_environment()
+    environment.globals |= TABLES
     page = environment.get_template("report.html.j2").render(
         report=data,
         viewers=viewers,
         lead=lead,
         trust=trust_words(data["scenes"]),
         chart=Markup(speed_error_chart(data["scenes"])) if data["scenes"] else "",
-        css=Markup((TEMPLATES / "report.css").read_text(encoding="utf-8")),
-        scripts=[Markup((TEMPLATES / name).read_text(encoding="utf-8")) for name in SCRIPTS],
+        css=template_text("report.css"),
+        scripts=[template_text(name) for name in SCRIPTS],
         images=Markup(_script_json({"scenes": [scene_images.index for scene_images in images], "maps": _maps()})),
         pixels=[Markup(scene_images.data) for scene_images in images],
         key_table=KEYS,
-        kinds=KINDS,
-        marks=MARKS,
         kept=kept_words(data),
         precision_words=precision_words([scene_images.index for scene_images in images]),
     )
@@ -89,6 +83,29 @@ def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) 
             "report fewer scenes or methods at once"
         )
     return page
+
+
+def page_environment() -> "jinja2.Environment":
+    """Return what renders the templates: those of every page, filters, and how claims are marked."""
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= FILTERS
+    environment.globals |= {"kinds": KINDS, "marks": MARKS}
+    return environment
+
+
+def template_text(name: str) -> "Markup":
+    """Return a style sheet or a script of the templates, to be put into a page as it is."""
+    from markupsafe import Markup
+
+    return Markup((TEMPLATES / name).read_text(encoding="utf-8"))
 
 
 def _viewer(scene: Mapping[str, Any], number: int, images: SceneImages, chart: str) -> dict[str, Any]:

@@ -95,7 +95,7 @@ def trust_words(scenes: Sequence[Data]) -> dict[str, str]:
     return {"mark": MARKS[True if agree == len(verdicts) else None][0], "words": words}
 
 
-def _drawn(function: Callable[..., Table | Iterable[Table]]) -> Callable[..., Any]:
+def drawn(function: Callable[..., Table | Iterable[Table]]) -> Callable[..., Any]:
     """Return a function that draws what another returns."""
 
     def draw(*arguments: Any) -> Any:
@@ -109,17 +109,17 @@ def _drawn(function: Callable[..., Table | Iterable[Table]]) -> Callable[..., An
 
 #: What the templates call, by name.
 TABLES: dict[str, Callable[..., Any]] = {
-    "fastest_table": _drawn(fastest_table),
-    "methods_table": _drawn(methods),
-    "agreement_table": _drawn(agreement),
-    "trust_table": _drawn(trust_table),
-    "stability_table": _drawn(summary_table),
-    "left_out_table": _drawn(left_out_table),
-    "mutation_table": _drawn(mutations),
-    "seconds_table": _drawn(seconds),
-    "facts_table": _drawn(facts),
-    "biri_tables": _drawn(biri_tables),
+    "fastest_table": drawn(fastest_table),
+    "methods_table": drawn(methods),
+    "agreement_table": drawn(agreement),
+    "trust_table": drawn(trust_table),
+    "stability_table": drawn(summary_table),
+    "left_out_table": drawn(left_out_table),
+    "mutation_table": drawn(mutations),
+    "seconds_table": drawn(seconds),
+    "facts_table": drawn(facts),
+    "biri_tables": drawn(biri_tables),
     "biri_notes": biri_notes,
-    "billeter_tables": _drawn(billeter_tables),
-    "fidelity_tables": _drawn(fidelity_tables),
+    "billeter_tables": drawn(billeter_tables),
+    "fidelity_tables": drawn(fidelity_tables),
 }

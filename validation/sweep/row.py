@@ -29,6 +29,9 @@ TIMES = ("none", "with", "alone")
 #: Who made the truth of a row.
 TRUTHS = ("quadrature", "single-scatter", "volpath")
 
+#: Begins the reason of a row whose scene has no truth: the method was not asked.
+NO_TRUTH = "truth of "
+
 PROPERTY = "property."  #: begins the names of the columns of properties
 
 #: Types of columns, and the Python types that their values may have.

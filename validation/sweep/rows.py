@@ -113,7 +113,10 @@ class RowStore:
         shown = worst_rows(self.rows())
         schema = arrow_schema(property_names(self.rows()))
         target = self.folder / PARQUET
-        with atomic_path(target) as temporary, pq.ParquetWriter(temporary, schema, compression="zstd") as writer:
+        with (
+            atomic_path(target) as temporary,
+            pq.ParquetWriter(temporary, schema, compression="zstd", write_page_checksum=True) as writer,
+        ):
             batch: list[dict[str, Any]] = []
             for row in self.rows():
                 batch.append(row if row["key"] in shown else row | {"picture": None})

@@ -1,4 +1,4 @@
-// The page: one viewer a scene, what they share, keys, help, theme.
+// The page: one viewer a scene, what they share, keys, help.
 "use strict";
 
 (function () {
@@ -168,23 +168,12 @@
 
   for (const button of document.querySelectorAll("[data-opens=help]")) button.addEventListener("click", () => help.showModal());
   document.getElementById("keys-on").addEventListener("change", ({target}) => { keys = target.checked; });
-  const theme = document.getElementById("theme");
-  theme.addEventListener("change", () => { document.documentElement.dataset.theme = theme.value; });
 
-  // Wide tables scroll within themselves; the keyboard must reach them then.
-  function reachable() {
-    for (const box of document.querySelectorAll(".scroll"))
-      if (box.scrollWidth > box.clientWidth) box.tabIndex = 0; else box.removeAttribute("tabindex");
-  }
-  addEventListener("resize", reachable);
-
-  document.querySelector("header .settings").hidden = false;
   for (const viewer of viewers) {
     viewer.showControls();
     viewer.element.addEventListener("pointerenter", () => { active = viewer; });
     viewer.element.addEventListener("focusin", () => { active = viewer; });
     near.observe(viewer.element);
   }
-  reachable();
   addEventListener("load", () => (window.requestIdleCallback ?? setTimeout)(drawRest));
 })();

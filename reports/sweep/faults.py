@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What was refused and why, and what is wrong with rows whatever their error: of all rows, drawn scenes and named ones.
+
+Reasons are counted after their numbers were taken out: "light 3 of 8" and "light 1 of 2" are one reason.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from reports.sweep.read import Sweep
+from reports.sweep.samples import FAULTS
+
+#: What may be wrong with an image: its name, the column that counts the pixels, and in words.
+CHECKS = (
+    ("not finite", "nonfinite", "pixels of the airlight that are NaN or infinite"),
+    ("surface not finite", "surface_nonfinite", "pixels of the lit surfaces that are NaN or infinite"),
+    ("negative", "negative", "pixels with a negative value"),
+    ("outside of the bound", "outside_bound", "pixels whose error is larger than the bound that the method states"),
+)
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why cells have no numbers."""
+
+    status: str
+    reason: str  #: numbers replaced by N, an example's scene by SCENE
+    labels: tuple[str, ...]  #: of the configurations, the most frequent first
+    scenes: int
+    cells: int
+    example: str  #: the command of one of them
+
+
+@dataclass(frozen=True)
+class Fault:
+    """An image that is wrong whatever its error."""
+
+    check: str  #: of `CHECKS`
+    label: str
+    scene: str
+    pixels: int
+    of: int  #: pixels compared
+    command: str
+
+
+@dataclass(frozen=True)
+class Check:
+    """How many rows were checked for a fault, and how many have it."""
+
+    check: str
+    meaning: str
+    rows: int  #: that say
+    scenes: int  #: of these rows
+    faulty_rows: int
+    faulty_scenes: int
+
+
+def reasons(sweep: Sweep, statuses: Sequence[str] = ("refused", *FAULTS)) -> list[Reason]:
+    """Return why cells have no numbers, each reason once, the most frequent first."""
+    groups: dict[tuple[str, str], list[int]] = {}
+    texts, status, scenes = sweep.texts("reason"), sweep.texts("status"), sweep.texts("scene")
+    for row in np.flatnonzero(np.isin(status.astype(str), statuses)).tolist():
+        groups.setdefault((status[row], without_numbers(texts[row] or "no reason given", scenes[row])), []).append(row)
+    labels, commands = sweep.texts("label"), sweep.texts("command")
+    made = [
+        Reason(
+            status=status,
+            reason=reason,
+            labels=tuple(label for label, _ in Counter(labels[rows]).most_common()),
+            scenes=len(set(scenes[rows])),
+            cells=len(rows),
+            example=commands[rows[0]] or "",
+        )
+        for (status, reason), rows in groups.items()
+    ]
+    return sorted(made, key=lambda each: (statuses.index(each.status), -each.cells, each.reason))
+
+
+def without_numbers(reason: str, scene: str) -> str:
+    """Return a reason in which numbers are N and the scene is SCENE: the same for every scene."""
+    text = re.sub(r"\s+", " ", reason.replace(scene, "SCENE")).strip()
+    # Not in names: RGB8, light-volumes2.
+    return re.sub(r"(?<![\w.-])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w-])", "N", text)
+
+
+def checks(sweep: Sweep) -> list[Check]:
+    """Return how many images were checked for each fault, and how many have it."""
+    made = []
+    for name, column, meaning in CHECKS:
+        pixels, scenes = sweep.numbers(column), sweep.texts("scene")
+        says, bad = np.isfinite(pixels), np.nan_to_num(pixels) > 0
+        made.append(
+            Check(name, meaning, int(says.sum()), len(set(scenes[says])), int(bad.sum()), len(set(scenes[bad])))
+        )
+    return made
+
+
+def faults(sweep: Sweep) -> list[Fault]:
+    """Return every image that is wrong, those with the most pixels first within a check."""
+    labels, scenes, commands, of = (*map(sweep.texts, ("label", "scene", "command")), sweep.numbers("pixels"))
+    made = []
+    for name, column, _ in CHECKS:
+        pixels = np.nan_to_num(sweep.numbers(column))
+        for row in sorted(np.flatnonzero(pixels > 0), key=lambda row: (-pixels[row], row)):
+            whole = 0 if np.isnan(of[row]) else int(of[row])
+            made.append(Fault(name, labels[row], scenes[row], int(pixels[row]), whole, commands[row] or ""))
+    return made

@@ -1,0 +1,351 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The figures of a sweep: for the page as SVG, for papers as PDF.
+
+A sweep has a thousand scenes and a dozen configurations or more. No panel tells a dozen colours apart, so that every
+configuration has a line or a panel of its own, with all others in grey behind it.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reports.page.chart import short
+from reports.plotting.colour_maps import signed_colours
+from reports.plotting.style import report_styles
+from reports.sweep.claims import TARGETS
+from reports.sweep.correlations import Correlation, sure
+from reports.sweep.properties import property_words
+from reports.sweep.read import Numbers
+from reports.sweep.samples import Sample
+from reports.sweep.summary import Summary
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH = 10.2  #: of a figure [inches]; the page scales it
+_COLUMNS = 4  #: of small panels
+_GREY = "#b9bcc2"
+_EXACT = 1e-8  #: errors below are drawn here: float32 cannot tell them from none
+_DOTS = 160  #: dots per inch of what is drawn as pixels, thousands of points that would be megabytes as shapes
+
+ERROR = "relative RMSE of the airlight [1]"
+TIME = "time of a frame [ms]"
+
+
+def distribution(said: Summary) -> "Figure | None":
+    """Return how the errors of each configuration are spread over the scenes: a line each, the best above.
+
+    None if nothing was measured.
+    """
+    shown = [sample for sample in said.samples if _errors(sample).size]
+    if not shown:
+        return None
+    shown.sort(key=lambda sample: float(np.median(_errors(sample))))
+    figure = _figure(0.26 * len(shown) + 1.0)
+    panel = figure.subplots()
+    styles = _styles(said)
+    for place, sample in enumerate(shown):
+        errors, colour = _errors(sample), styles[sample.label]["color"]
+        low, first, middle, third, high = np.quantile(errors, (0.05, 0.25, 0.5, 0.75, 0.95), method="nearest")
+        outside = errors[(errors < low) | (errors > high)]
+        panel.plot(outside, np.full(len(outside), place), "|", color=colour, markersize=5, alpha=0.5, rasterized=True)
+        panel.plot((low, high), (place, place), color=colour, linewidth=1.2)
+        panel.plot((first, third), (place, place), color=colour, linewidth=7, alpha=0.55, solid_capstyle="butt")
+        panel.plot(middle, place, "|", color="black", markersize=9, markeredgewidth=1.6)
+    for target in TARGETS:
+        panel.axvline(target, color="#666a72", linewidth=0.8, linestyle=":", zorder=0)
+    panel.set_yticks(range(len(shown)), [_with_count(sample) for sample in shown], parse_math=False)
+    panel.set(xscale="log", xlabel=ERROR, ylim=(len(shown) - 0.4, -0.6))
+    panel.grid(True, axis="x", which="major", linewidth=0.4, alpha=0.5)
+    panel.spines[["top", "right", "left"]].set_visible(False)
+    panel.tick_params(axis="y", length=0)
+    return figure
+
+
+def shares(said: Summary) -> "Figure | None":
+    """Return in what share of the scenes each configuration is within an error, over the error: a panel a method.
+
+    None if nothing was measured.
+    """
+    shown = [sample for sample in said.samples if _errors(sample).size]
+    methods = list(dict.fromkeys(sample.method for sample in shown))
+    if not methods:
+        return None
+    most = max(sum(sample.method == method for sample in shown) for method in methods)
+    figure, panels = _panels(len(methods), 1.9 + 0.13 * most)
+    styles = _styles(said)
+    low = min(float(_errors(sample).min()) for sample in shown)
+    high = max(float(_errors(sample).max()) for sample in shown)
+    for panel, method in zip(panels, methods):
+        own = [sample for sample in shown if sample.method == method]
+        for sample in shown:
+            if sample not in own:
+                panel.plot(*_steps(sample, low, high), color=_GREY, linewidth=0.6, zorder=0, rasterized=True)
+        for sample, line in zip(own, ("-", "--", ":", "-.", (0, (6, 1, 1, 1, 1, 1)), (0, (1, 3))) * 4):
+            panel.plot(
+                *_steps(sample, low, high), color=styles[sample.label]["color"], linestyle=line, label=_own(sample)
+            )
+        panel.set(xscale="log", ylim=(0, 1.02))
+        panel.set_title(_cut(method), fontsize=9, parse_math=False)
+        panel.set_yticks((0, 0.5, 1), ("0", "50 %", "100 %"))
+        panel.grid(True, which="major", linewidth=0.4, alpha=0.5)
+        if len(own) > 1:
+            # Below: within the panel it would lie on the lines.
+            panel.legend(
+                fontsize=7,
+                frameon=False,
+                labelspacing=0.2,
+                handlelength=2.6,
+                loc="upper center",
+                bbox_to_anchor=(0.5, -0.16),
+            )
+    figure.supxlabel(ERROR, fontsize=9)
+    figure.supylabel("share of the scenes within the error", fontsize=9)
+    return figure
+
+
+def medians(said: Summary) -> "Figure | None":
+    """Return speed against error, each configuration as its median and its quartiles over the scenes.
+
+    None if nothing was timed with the machine to itself.
+    """
+    shown = [sample for sample in said.samples if _points(sample)[0].size]
+    if not shown:
+        return None
+    figure = _figure(4.0 + 0.16 * -(-len(shown) // 3))
+    panel = figure.subplots()
+    styles = _styles(said)
+    for sample in shown:
+        times, errors = _points(sample)
+        (x0, x, x1), (y0, y, y1) = (np.quantile(each, (0.25, 0.5, 0.75), method="nearest") for each in (times, errors))
+        style = styles[sample.label] | {"linestyle": "none", "markersize": 8}
+        panel.errorbar(x, y, xerr=[[x - x0], [x1 - x]], yerr=[[y - y0], [y1 - y]], elinewidth=0.8, **style)
+    panel.set(xscale="log", yscale="log", xlabel=TIME, ylabel=ERROR)
+    _plain_times(panel)
+    panel.grid(True, which="major", linewidth=0.4, alpha=0.5)
+    handles = [panel.plot([], [], label=_cut(s.name), **(styles[s.label] | {"linestyle": "none"}))[0] for s in shown]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+    return figure
+
+
+def clouds(said: Summary) -> "Figure | None":
+    """Return speed against error with every scene as a point: a panel a configuration, all others in grey behind it.
+
+    None if nothing was timed with the machine to itself.
+    """
+    shown = [sample for sample in said.samples if _points(sample)[0].size]
+    if not shown:
+        return None
+    figure, panels = _panels(len(shown), 1.9)
+    styles = _styles(said)
+    every = [np.concatenate(each) for each in zip(*(_points(sample) for sample in shown))]
+    for panel, sample in zip(panels, shown):
+        times, errors = _points(sample)
+        panel.plot(*every, ".", color=_GREY, markersize=1.2, alpha=0.35, markeredgewidth=0, rasterized=True, zorder=0)
+        colour = styles[sample.label]["color"]
+        panel.plot(times, errors, ".", color=colour, markersize=2.6, alpha=0.6, markeredgewidth=0, rasterized=True)
+        panel.plot(np.median(times), np.median(errors), "+", color="black", markersize=9, markeredgewidth=1.4)
+        panel.set(xscale="log", yscale="log")
+        panel.set_title(_cut(sample.name), fontsize=8, parse_math=False)
+        panel.grid(True, which="major", linewidth=0.4, alpha=0.5)
+    figure.supxlabel(TIME, fontsize=9)
+    figure.supylabel(ERROR, fontsize=9)
+    return figure
+
+
+def matrix(said: Summary) -> "Figure | None":
+    """Return the rank correlation of every property with the error of every configuration; None if there is none."""
+    from matplotlib.colors import ListedColormap
+
+    if not said.correlations:
+        return None
+    found = {(each.label, each.property): each for each in said.correlations}
+    labels = [sample for sample in said.samples if any(label == sample.label for label, _ in found)]
+    names = sorted({name for _, name in found}, key=lambda name: (-_weight(found, labels, name), name))
+    values = np.full((len(names), len(labels)), np.nan)
+    for (label, name), each in found.items():
+        values[names.index(name), [sample.label for sample in labels].index(label)] = each.r
+    figure = _figure(0.27 * len(names) + 1.9)
+    panel = figure.subplots()
+    colours = ListedColormap(signed_colours() / 255.0)
+    # The darkest ends of the map would swallow the numbers: +1 is at 60 % of an arm.
+    panel.imshow(values, cmap=colours, vmin=-1 / 0.6, vmax=1 / 0.6, aspect="auto")
+    for (label, name), each in found.items():
+        column = [sample.label for sample in labels].index(label)
+        certain = sure(each)
+        words = f"{each.r:+.2f}" if certain else "\N{MIDDLE DOT}"
+        dark = certain and abs(each.r) > 0.75
+        panel.text(
+            column, names.index(name), words, ha="center", va="center", fontsize=7, color="white" if dark else "black"
+        )
+    panel.set_xticks(
+        range(len(labels)), [_cut(s.name) for s in labels], rotation=35, ha="left", fontsize=8, parse_math=False
+    )
+    panel.set_yticks(range(len(names)), [property_words(name) for name in names], fontsize=8, parse_math=False)
+    panel.xaxis.tick_top()
+    panel.tick_params(length=0)
+    panel.spines[:].set_visible(False)
+    return figure
+
+
+def trends(said: Summary) -> "Figure | None":
+    """Return the error of each configuration over the property that goes with it most; None if none does for sure."""
+    shown = [(sample, said.strongest[sample.label][0]) for sample in said.samples if said.strongest[sample.label]]
+    if not shown:
+        return None
+    figure, panels = _panels(len(shown), 2.2)
+    styles = _styles(said)
+    for panel, (sample, strongest) in zip(panels, shown):
+        x, y = _pairs(said, sample, strongest.property)
+        panel.plot(
+            x,
+            y,
+            ".",
+            color=styles[sample.label]["color"],
+            markersize=2.6,
+            alpha=0.5,
+            markeredgewidth=0,
+            rasterized=True,
+        )
+        panel.plot(*_running(x, y), color="black", linewidth=1.4)
+        positive = bool((x > 0).all()) and x.max() > 30 * x.min()
+        panel.set(xscale="log" if positive else "linear", yscale="log")
+        panel.set_xlabel(property_words(strongest.property), fontsize=8, parse_math=False)
+        panel.set_title(f"{_cut(sample.name)}\n{strongest.r:+.2f}", fontsize=8, parse_math=False)
+        panel.grid(True, which="major", linewidth=0.4, alpha=0.5)
+    figure.supylabel(ERROR, fontsize=9)
+    return figure
+
+
+#: Every figure by its name: what draws it, and what its files and its place on the page are called.
+FIGURES: Mapping[str, Callable[[Summary], "Figure | None"]] = {
+    "sweep-errors": distribution,
+    "sweep-shares": shares,
+    "sweep-medians": medians,
+    "sweep-speed": clouds,
+    "sweep-correlations": matrix,
+    "sweep-trends": trends,
+}
+
+
+def drawn(said: Summary, names: Sequence[str] = tuple(FIGURES)) -> Iterator[tuple[str, "Figure"]]:
+    """Yield the figures that the sweep has data for, by name.
+
+    Parameters
+    ----------
+    said
+        What the sweep says.
+    names
+        Of `FIGURES`.
+    """
+    for name in names:
+        figure = FIGURES[name](said)
+        if figure is not None:
+            yield name, figure
+
+
+def pdf_bytes(figure: "Figure") -> bytes:
+    """Return a figure as PDF, the same bytes for the same figure."""
+    import io
+
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="pdf", dpi=2 * _DOTS, metadata={"CreationDate": None})
+    return buffer.getvalue()
+
+
+def _figure(height: float) -> "Figure":
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(WIDTH, height), layout="constrained", dpi=_DOTS)
+
+
+def _panels(count: int, height: float) -> tuple["Figure", "list[Axes]"]:
+    """Return small panels with the same axes, and nothing in the places that are left over."""
+    columns = min(_COLUMNS, count)
+    rows = -(-count // columns)
+    figure = _figure(height * rows + 0.4)
+    grid = figure.subplots(rows, columns, squeeze=False)
+    for panel in list(grid.flat)[count:]:
+        panel.set_visible(False)
+    panels = list(grid.flat)[:count]
+    for panel in panels:
+        panel.tick_params(labelsize=7)
+    return figure, panels
+
+
+def _styles(said: Summary) -> dict[str, dict[str, Any]]:
+    """Return the styles of the configurations: those of the report, one colour and marker a method."""
+    return report_styles([{"methods": [{"method": sample.method, "label": sample.label} for sample in said.samples]}])
+
+
+def _errors(sample: Sample) -> Numbers:
+    """Return the finite errors of a configuration, none below what float32 tells from none."""
+    return np.maximum(sample.errors[np.isfinite(sample.errors)], _EXACT)
+
+
+def _points(sample: Sample) -> tuple[Numbers, Numbers]:
+    """Return times and errors of the scenes that have both."""
+    both = np.isfinite(sample.times) & np.isfinite(sample.errors)
+    return sample.times[both], np.maximum(sample.errors[both], _EXACT)
+
+
+def _pairs(said: Summary, sample: Sample, name: str) -> tuple[Numbers, Numbers]:
+    """Return a property and the error of the scenes that have both."""
+    x = said.sweep.property(name)[list(sample.rows)]
+    both = np.isfinite(x) & np.isfinite(sample.errors)
+    return x[both], np.maximum(sample.errors[both], _EXACT)
+
+
+def _running(x: Numbers, y: Numbers) -> tuple[list[float], list[float]]:
+    """Return the median of y over groups of equally many neighbours in x; equal values of x are in one group."""
+    order = np.argsort(x, kind="stable")
+    groups = np.array_split(order, min(12, max(1, len(x) // 8)))
+    places: dict[float, list[float]] = {}
+    for group in groups:
+        places.setdefault(float(np.median(x[group])), []).extend(y[group].tolist())
+    return list(places), [float(np.median(values)) for values in places.values()]
+
+
+def _steps(sample: Sample, low: float, high: float) -> tuple[Numbers, Numbers]:
+    """Return the share of the measured scenes within an error; what has no finite error is never within."""
+    errors = np.sort(_errors(sample))
+    total = len(errors) + np.isinf(sample.errors).sum()
+    # More steps than the panel has dots make the file larger and the line no truer.
+    shown = np.unique(np.linspace(1, len(errors), min(len(errors), 240)).round().astype(int))
+    x = np.concatenate([[low], np.repeat(errors[shown - 1], 2), [high]])
+    y = np.repeat(np.concatenate([[0], shown]), 2) / total
+    return x, y
+
+
+def _with_count(sample: Sample) -> str:
+    """Return the name of a configuration, and how many of its scenes have no place in the figure."""
+    away = {"refused": sample.count("refused"), "infinite": int(np.isinf(sample.errors).sum())}
+    words = ", ".join(f"{count} {what}" for what, count in away.items() if count)
+    return f"{_cut(sample.name)}{f' [{words}]' if words else ''}"
+
+
+def _own(sample: Sample) -> str:
+    """Return what tells a configuration from the others of its method."""
+    return _cut(sample.name.removeprefix(sample.method).strip(" ()") or sample.name)
+
+
+def _cut(name: str) -> str:
+    """Return a name that leaves room for a panel: that of a method of the user's own may be a path."""
+    return short(name, 38)
+
+
+def _weight(found: Mapping[tuple[str, str], Correlation], labels: Sequence[Sample], name: str) -> float:
+    """Return the sum of squares of the correlations of a property: what goes with most errors stands above."""
+    own = (found.get((sample.label, name)) for sample in labels)
+    return sum(each.r**2 for each in own if each is not None)
+
+
+def _plain_times(panel: "Axes") -> None:
+    """Name 1, 2 and 5 of each decade of the times, in plain numbers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    panel.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    panel.xaxis.set_major_formatter(FuncFormatter(lambda value, position: f"{value:g}"))
+    panel.xaxis.set_minor_formatter(NullFormatter())

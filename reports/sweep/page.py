@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The page of a sweep: one HTML file that needs no network, made from the Parquet alone."""
+
+import base64
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from analytic.errors import InputError
+from reports import __version__
+from reports.page.filters import percent, unbroken
+from reports.page.render import page_environment, template_text
+from reports.page.tables import drawn, facts
+from reports.sweep import tables
+from reports.sweep.claims import TARGETS
+from reports.sweep.correlations import LEAST, NAMED, SAME
+from reports.sweep.properties import property_words
+from reports.sweep.summary import Summary, goes_with_words, headlines, sound_words
+
+PAGE_LIMIT = 20_000_000  #: bytes of a page
+
+_TABLES = ("errors", "speed", "refusals", "checks", "faults", "truths", "properties", "hosts")
+
+
+def render_sweep(said: Summary, charts: Mapping[str, str], *, limit: int = PAGE_LIMIT) -> str:
+    """Return the HTML page of a sweep.
+
+    Parameters
+    ----------
+    said
+        What the sweep says.
+    charts
+        Its figures as SVG, by name; see `reports.sweep.figures`.
+    limit
+        Of the page [bytes]; pictures are left out to keep it, those of the least bad scenes first.
+
+    Raises
+    ------
+    InputError
+        If the page without any picture is larger.
+    """
+    from markupsafe import Markup
+
+    environment = page_environment()
+    environment.filters["error"] = error_words
+    environment.globals |= {f"{name}_table": drawn(getattr(tables, f"{name}_table")) for name in _TABLES}
+    environment.globals |= {"facts_table": drawn(facts), "property_words": property_words}
+    template = environment.get_template("sweep.html.j2")
+    content = {
+        "said": said,
+        "scenes": f"{said.scenes} {'random ' * said.drawn}scene{'s' * (said.scenes != 1)}",
+        "headlines": headlines(said),
+        "charts": {name: Markup(chart) for name, chart in charts.items()},
+        "sound": sound_words(said),
+        "goes_with": goes_with_words(said),
+        "source": said.sweep.path.name,
+        "folder": said.sweep.path.parent,
+        "timed": sum(int(np.isfinite(sample.times).sum()) for sample in said.samples),
+        "undecided": sum(each.undecided for each in said.claims),
+        "decided": len(TARGETS) * sum(sample.count("done") for sample in said.samples),
+        "same": SAME,
+        "named": NAMED,
+        "least": LEAST,
+        "version": __version__,
+        "css": Markup(template_text("report.css") + template_text("sweep.css")),
+        "scripts": [template_text("every.js")],
+    }
+
+    def page(pictures: Mapping[str, str], omitted: int) -> str:
+        return template.render(content | {"pictures": pictures, "omitted": omitted})
+
+    every = _pictures(said)
+    words = len(page({}, len(every)).encode())
+    if words > limit:
+        raise InputError(
+            f"sweep: the page takes {words / 1e6:.1f} MB, wanted at most {limit / 1e6:g} MB; "
+            "ask for fewer methods or parameters at once"
+        )
+    room, shown = limit - words - 1000, {}
+    for key, address in every.items():
+        room -= len(address) + 400  # with the words around it
+        if room < 0:
+            break
+        shown[key] = address
+    return page(shown, len(every) - len(shown))
+
+
+def error_words(value: float | None) -> str:
+    """Return an error in per cent, or that it is none that a number could say."""
+    if value is None:
+        return "without a number"
+    return unbroken(f"{100 * value:.0f} %" if 1 <= value < 1000 else percent(value, 2))
+
+
+def _pictures(said: Summary) -> dict[str, str]:
+    """Return the pictures of the worst scenes as addresses that hold them, the worst of every configuration first."""
+    ranks = max((len(several) for several in said.worst.values()), default=0)
+    keys = [several[rank].key for rank in range(ranks) for several in said.worst.values() if rank < len(several)]
+    kept: dict[str, Any] = said.sweep.pictures(keys)
+    return {key: f"data:image/webp;base64,{base64.b64encode(kept[key]).decode()}" for key in keys if key in kept}

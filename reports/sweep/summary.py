@@ -1,0 +1,323 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""All that a sweep says, worked out once: for the page, the digest and `--json`."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from reports.sweep.claims import TARGETS, Claim, best_claims, claims, percent, written
+from reports.sweep.correlations import Correlation, correlations, sentences, strongest
+from reports.sweep.faults import Check, Fault, Reason, checks, faults, reasons
+from reports.sweep.properties import property_words
+from reports.sweep.read import Numbers, Sweep
+from reports.sweep.samples import FAULTS, Sample, drawn_at_random, fastest_counts, samples
+from reports.sweep.worst import Worst, worst
+from validation.statistics.intervals import LEVEL, binomial_interval, quantile_interval
+
+SCHEMA = "airlight-sweep/1"
+
+#: What made the rows, by column.
+_VERSIONS = ("airlight", "source", "mitsuba", "drjit", "python", "variant")
+
+
+@dataclass(frozen=True)
+class Fastest:
+    """In how many scenes each configuration is the fastest within an error."""
+
+    target: float
+    counts: tuple[int, ...]  #: by configuration
+    none: int  #: scenes in which no configuration is within the error
+    scenes: int  #: in which whatever was measured was timed with the machine to itself
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What one estimator says of its own error."""
+
+    estimator: str
+    scenes: int
+    median: float  #: over its scenes, relative to the mean of the truth
+    largest: float
+
+
+@dataclass(frozen=True)
+class Host:
+    """Where rows were computed."""
+
+    host: str
+    device: str
+    threads: int | None
+    rows: int
+    timed_alone: int
+
+
+@dataclass(frozen=True)
+class Property:
+    """What the scenes hold of a property."""
+
+    property: str
+    least: float
+    median: float
+    largest: float
+    scenes: int
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a sweep says."""
+
+    sweep: Sweep
+    drawn: bool  #: whether claims are about scenes that were drawn at random
+    samples: tuple[Sample, ...]
+    claims: tuple[Claim, ...]
+    correlations: tuple[Correlation, ...]
+    strongest: Mapping[str, tuple[Correlation, ...]]  #: by label
+    worst: Mapping[str, tuple[Worst, ...]]  #: by label
+    fastest: tuple[Fastest, ...]
+    reasons: tuple[Reason, ...]
+    checks: tuple[Check, ...]
+    faults: tuple[Fault, ...]
+    truths: tuple[Truth, ...]
+    hosts: tuple[Host, ...]
+    properties: tuple[Property, ...]
+    versions: Mapping[str, tuple[str, ...]]
+    statuses: Mapping[str, int]  #: rows that ended so
+    scenes: int  #: that claims are about
+    named_scenes: int  #: others
+    studies: tuple[str, ...]
+    started: tuple[str, str] | None  #: when the first and the last cell began
+
+    @property
+    def timed_alone(self) -> int:
+        """Rows whose times were taken with the machine to themselves."""
+        return sum(host.timed_alone for host in self.hosts)
+
+
+def summary_of(sweep: Sweep) -> Summary:
+    """Return what a sweep says."""
+    made = tuple(samples(sweep))
+    found = tuple(correlations(sweep, made))
+    goes_with = {sample.label: tuple(strongest(found, sweep, sample)) for sample in made}
+    random = np.isfinite(sweep.numbers("seed"))
+    names = sweep.texts("scene")
+    drawn = drawn_at_random(sweep)
+    return Summary(
+        sweep=sweep,
+        drawn=drawn,
+        samples=made,
+        claims=tuple(claims(made)),
+        correlations=found,
+        strongest=goes_with,
+        worst={
+            sample.label: tuple(worst(sweep, sample, [each.property for each in goes_with[sample.label]]))
+            for sample in made
+        },
+        fastest=tuple(_fastest(made, target) for target in TARGETS),
+        reasons=tuple(reasons(sweep)),
+        checks=tuple(checks(sweep)),
+        faults=tuple(faults(sweep)),
+        truths=tuple(_truths(sweep)),
+        hosts=tuple(_hosts(sweep)),
+        properties=tuple(_properties(sweep)),
+        versions={name: tuple(sorted(set(sweep.texts(name)) - {None})) for name in _VERSIONS},
+        statuses=dict(Counter(sweep.texts("status").tolist()).most_common()),
+        scenes=len(set(names[random] if drawn else names)),
+        named_scenes=len(set(names[~random])) if drawn else 0,
+        studies=tuple(sorted(set(sweep.texts("study")) - {None})),
+        started=_span(sweep),
+    )
+
+
+def finite_median(values: Numbers) -> float | None:
+    """Return the median of the values that are not NaN, None where none is or it is infinite."""
+    known = values[~np.isnan(values)]
+    median = float(np.median(known)) if len(known) else np.inf
+    return median if np.isfinite(median) else None
+
+
+def headlines(said: Summary) -> list[dict[str, Any]]:
+    """Return what a reader should know first, as claims with `kind`, `text` and `good`, as report.json has them."""
+    made: list[dict[str, Any]] = []
+
+    def add(kind: str, text: str, good: bool | None = None) -> None:
+        made.append({"kind": kind, "text": text, "good": good})
+
+    for target in TARGETS:
+        best = best_claims(said.claims, target)
+        if best:
+            others = f" and {len(best) - 1} more" if best[1:] else ""
+            add(f"Most often within {written(target)}", f"{best[0].name}{others}, {best[0].share_words}.")
+    for each in said.fastest:
+        if each.scenes and sum(each.counts):
+            place = int(np.argmax(each.counts))
+            none = f"; in {each.none} none is within it" if each.none else ""
+            share = percent(each.counts[place] / each.scenes, each.scenes)
+            add(
+                f"Fastest within {written(each.target)}",
+                f"{said.samples[place].name}, in {share} % of {each.scenes} scenes{none}.",
+            )
+    leading = Counter(chosen[0].property for chosen in said.strongest.values() if chosen)
+    if leading:
+        name, count = leading.most_common(1)[0]
+        add(
+            "Goes with error",
+            f"the {property_words(name)} goes with the error of {count} of {len(said.samples)} configurations more "
+            "than any other property does.",
+        )
+    for check in said.checks:
+        if check.faulty_rows:
+            add(check.check.capitalize(), check_words(check), False)
+    if not any(check.faulty_rows for check in said.checks):
+        add("Sound", sound_words(said), True)
+    for name in ("airlight", "source"):
+        if len(said.versions[name]) > 1:
+            add("Versions", f"the rows come of several versions: {name} {', '.join(said.versions[name])}.", False)
+    lost = sum(said.statuses.get(status, 0) for status in FAULTS)
+    words = ", ".join(f"{said.statuses[status]} {status}" for status in FAULTS if said.statuses.get(status))
+    total = f"{len(said.sweep)} cells"
+    add(
+        "Not done", f"of {total}: {words}." if lost else f"none of {total} failed, hung or ended its process.", not lost
+    )
+    return made
+
+
+def goes_with_words(said: Summary) -> list[str]:
+    """Return in sentences which properties go with the error of each configuration."""
+    return sentences({sample.name: said.strongest[sample.label] for sample in said.samples})
+
+
+def check_words(check: Check) -> str:
+    """Return in a sentence how many images have a fault."""
+    return (
+        f"{check.faulty_rows} of {check.rows} images have {check.meaning}, in {check.faulty_scenes} of "
+        f"{check.scenes} scenes."
+    )
+
+
+def sound_words(said: Summary) -> str:
+    """Return in a sentence that no image has a fault, and in how many scenes it may have been missed."""
+    checked = {check.check: check for check in said.checks}
+    most = 100 * binomial_interval(0, checked["not finite"].scenes)[1]
+    stated = checked["outside of the bound"].rows
+    bound = f", or outside of the bound that {stated} of them state" if stated else ""
+    return (
+        f"no image of {checked['not finite'].rows} has a pixel that is not finite or negative{bound}; of scenes alike "
+        f"at most {most:.2g} % may have one, at {100 * LEVEL:.0f} % confidence."
+    )
+
+
+def to_json(said: Summary) -> dict[str, Any]:
+    """Return everything as plain data, for `--json`; nothing in it is infinite or NaN."""
+    return {
+        "schema": SCHEMA,
+        "source": str(said.sweep.path),
+        "studies": list(said.studies),
+        "rows": len(said.sweep),
+        "superseded": said.sweep.superseded,
+        "statuses": dict(said.statuses),
+        "scenes": said.scenes,
+        "drawn_at_random": said.drawn,
+        "named_scenes": said.named_scenes,
+        "timed_alone": said.timed_alone,
+        "level": LEVEL,
+        "headlines": headlines(said),
+        "claims": [asdict(each) | {"share": each.share, "text": each.text} for each in said.claims],
+        "configurations": [_configuration(sample) for sample in said.samples],
+        "fastest": [
+            asdict(each)
+            | {"counts": {sample.label: count for sample, count in zip(said.samples, each.counts) if count}}
+            for each in said.fastest
+        ],
+        "correlations": [asdict(each) for each in said.correlations],
+        "goes_with": {
+            sample.label: [each.property for each in said.strongest[sample.label]] for sample in said.samples
+        },
+        "goes_with_words": goes_with_words(said),
+        "worst": {label: [asdict(each) for each in several] for label, several in said.worst.items()},
+        "refusals": [asdict(each) for each in said.reasons if each.status == "refused"],
+        "not_done": [asdict(each) for each in said.reasons if each.status != "refused"],
+        "checks": [asdict(each) for each in said.checks],
+        "faults": [asdict(each) for each in said.faults],
+        "truths": [asdict(each) for each in said.truths],
+        "properties": [asdict(each) for each in said.properties],
+        "hosts": [asdict(each) for each in said.hosts],
+        "versions": {name: list(values) for name, values in said.versions.items()},
+        "started": None if said.started is None else list(said.started),
+    }
+
+
+def quantiles(errors: Numbers, probabilities: Sequence[float] = (0.5, 0.95)) -> list[dict[str, float | None]]:
+    """Return quantiles of the errors of a configuration with their intervals; None for infinite ones."""
+    known = errors[~np.isnan(errors)]
+    if not len(known):
+        return []
+    made = []
+    for probability in probabilities:
+        ends = quantile_interval(known, probability)
+        value, low, high = (end if end is not None and np.isfinite(end) else None for end in ends)
+        made.append({"probability": probability, "value": value, "low": low, "high": high})
+    return made
+
+
+def _configuration(sample: Sample) -> dict[str, Any]:
+    return {
+        "label": sample.label,
+        "name": sample.name,
+        "method": sample.method,
+        "scenes": len(sample.scenes),
+        "statuses": dict(Counter(sample.statuses)),
+        "relative_rmse": quantiles(sample.errors),
+        "frame_ms": finite_median(sample.times),
+        "timed_alone": int(np.isfinite(sample.times).sum()),
+    }
+
+
+def _fastest(made: Sequence[Sample], target: float) -> Fastest:
+    counts, none, scenes = fastest_counts(made, target)
+    return Fastest(target, tuple(counts), none, scenes)
+
+
+def _truths(sweep: Sweep) -> list[Truth]:
+    estimators, scenes, errors = sweep.texts("truth"), sweep.texts("scene"), sweep.numbers("truth_error")
+    made = []
+    for estimator in sorted(set(estimators) - {None}):
+        own = (estimators == estimator) & np.isfinite(errors)
+        if own.any():
+            values = errors[own]
+            made.append(Truth(estimator, len(set(scenes[own])), float(np.median(values)), float(values.max())))
+    return made
+
+
+def _hosts(sweep: Sweep) -> list[Host]:
+    places = Counter(zip(sweep.texts("host"), sweep.texts("device"), sweep.numbers("threads").tolist()))
+    alone = sweep.numbers("timed_alone") == 1
+    timed = Counter(zip(*(sweep.texts(name)[alone] for name in ("host", "device")), sweep.numbers("threads")[alone]))
+    return [
+        Host(host or "", device or "", None if np.isnan(threads) else int(threads), rows, timed[host, device, threads])
+        for (host, device, threads), rows in places.most_common()
+        if host is not None
+    ]
+
+
+def _properties(sweep: Sweep) -> list[Property]:
+    _, first = np.unique(sweep.texts("scene").astype(str), return_index=True)
+    made = []
+    for name in sweep.properties:
+        values = sweep.property(name)[first]
+        values = values[np.isfinite(values)]
+        if len(values):
+            made.append(Property(name, float(values.min()), float(np.median(values)), float(values.max()), len(values)))
+    return made
+
+
+def _span(sweep: Sweep) -> tuple[str, str] | None:
+    known = sorted(set(sweep.texts("started")) - {None})
+    return (_time_words(known[0]), _time_words(known[-1])) if known else None
+
+
+def _time_words(started: str) -> str:
+    """Return a time of a row as readers write it: 2026-11-23 08:30 UTC."""
+    return f"{started[:10]} {started[11:16]} UTC"

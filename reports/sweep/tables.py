@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The tables of a sweep, for its page, its digest and the terminal."""
+
+import numpy as np
+
+from reports.sweep.claims import TARGETS, written
+from reports.sweep.properties import property_words
+from reports.sweep.samples import FAULTS, UNTOLD
+from reports.sweep.summary import Summary, quantiles
+from reports.tables.table import Column, Measured, Name, Table, numbers, table, words
+
+_SHARE = {"digits": 2, "share": True}
+
+
+def errors_table(said: Summary) -> Table:
+    """Return how wrong each configuration is, and in what share of the scenes it keeps an error."""
+    columns = (
+        *words(name="method"),
+        *(
+            Column(f"within_{target:g}", f"within {written(target)}", percent=True, spread="95 %", places=1)
+            for target in reversed(TARGETS)
+        ),
+        *numbers(median="median error", most="95 % of scenes below", how=_SHARE),
+        *numbers(scenes="scenes", refused="refused", untold="no truth"),
+        Column("lost", "not done", alarm=True),
+    )
+    rows = []
+    for sample in said.samples:
+        values = quantiles(sample.errors)
+        row = {
+            "name": sample.name,
+            "scenes": len(sample.scenes),
+            "refused": sample.count("refused"),
+            "untold": sample.count(UNTOLD),
+            "lost": sample.count(*FAULTS),
+            "median": values[0]["value"] if values else None,
+            "most": values[1]["value"] if values else None,
+        }
+        for claim in said.claims:
+            if claim.label == sample.label and claim.share is not None:
+                row[f"within_{claim.target:g}"] = Measured(claim.share, claim.low, claim.high)
+        rows.append(row)
+    explanation = (
+        "Error: relative RMSE of the airlight. Each share has its interval at 95 % confidence. Scenes that are "
+        "refused or have no truth are in no share; those that failed, hung or have pixels that are not finite are not "
+        "within."
+    )
+    made = table("In what share of the scenes each method is within an error", columns, rows, explanation=explanation)
+    # A column of zeros, or of the same count in every row, says nothing.
+    empty = {key for key in ("refused", "untold", "lost") if not any(row[key] for row in rows)}
+    empty |= {"scenes"} if len({row["scenes"] for row in rows}) == 1 else set()
+    return made.only(*(column.key for column in columns if column.key not in empty))
+
+
+def speed_table(said: Summary) -> Table:
+    """Return what each configuration costs, and in how many scenes it is the fastest within an error."""
+    columns = (
+        *words(name="method"),
+        *numbers(timed="scenes timed"),
+        Column("frame", "frame", "ms", spread="quartiles over scenes"),
+        *(
+            Column(f"fastest_{each.target:g}", f"fastest within {written(each.target)}", percent=True)
+            for each in said.fastest
+        ),
+    )
+    rows = []
+    for place, sample in enumerate(said.samples):
+        known = sample.times[np.isfinite(sample.times)]
+        row = {"name": sample.name, "timed": len(known)}
+        if len(known):
+            first, middle, third = np.quantile(known, (0.25, 0.5, 0.75)).tolist()
+            row["frame"] = Measured(middle, first, third)
+        row |= {f"fastest_{e.target:g}": e.counts[place] / e.scenes if e.scenes else None for e in said.fastest}
+        rows.append(row)
+    none = ", ".join(f"{each.none} within {written(each.target)}" for each in said.fastest)
+    explanation = (
+        f"Of {said.fastest[0].scenes} scenes in which every image was timed with the machine to itself; scenes in "
+        f"which no method is within the error: {none}."
+    )
+    return table("Times, and the fastest method within an error", columns, rows, explanation=explanation)
+
+
+def refusals_table(said: Summary) -> Table:
+    """Return why cells have no numbers, each reason once."""
+    columns = (
+        *numbers(cells="cells", scenes="scenes"),
+        *words(reason="reason", how={"long": True}),
+        *words(status="outcome", methods="methods", how={"minor": True}),
+    )
+    name_of = {sample.label: sample.name for sample in said.samples}
+    rows = []
+    for each in said.reasons:
+        names = list(dict.fromkeys(name_of.get(label, label) for label in each.labels))
+        shown = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if names[3:] else "")
+        rows.append(
+            {
+                "reason": each.reason,
+                "status": each.status,
+                "cells": each.cells,
+                "scenes": each.scenes,
+                "methods": shown,
+            }
+        )
+    return table(
+        "Refused and not done, by reason",
+        columns,
+        rows,
+        explanation="In reasons N stands for a number, SCENE for a scene.",
+    ).only("status", "reason", "methods", "scenes", "cells")
+
+
+def checks_table(said: Summary) -> Table:
+    """Return how many images were checked for each fault and how many have it."""
+    columns = (
+        *words(check="what would be wrong"),
+        *numbers(rows="images checked", scenes="scenes"),
+        *numbers(faulty_rows="images at fault", faulty_scenes="scenes at fault", how={"alarm": True}),
+        *words(meaning="which means", how={"long": True, "minor": True}),
+    )
+    shown = [each for each in said.checks if each.rows]
+    return table("Images that were checked", columns, [vars(each) for each in shown])
+
+
+def faults_table(said: Summary, most: int = 30) -> Table:
+    """Return the images that are wrong, the worst of each kind first."""
+    columns = (
+        *words(check="what", scene="scene", label="method"),
+        *numbers(pixels="pixels", of="of"),
+        *words(command="shown by", how={"long": True, "minor": True}),
+    )
+    rows = [vars(each) | {"command": Name(each.command)} for each in said.faults[:most]]
+    left = len(said.faults) - most
+    explanation = f"{left} more are in --json." if left > 0 else ""
+    return table("Images at fault", columns, rows, explanation=explanation)
+
+
+def truths_table(said: Summary) -> Table:
+    """Return what the truths say of their own errors."""
+    columns = (
+        *words(estimator="truth"),
+        *numbers(scenes="scenes"),
+        *numbers(median="own error, median", largest="own error, largest", how=_SHARE),
+    )
+    explanation = "Relative to the mean of the true airlight: the quadrature's bound, or Monte Carlo's standard error."
+    return table("Errors of the truth itself", columns, [vars(each) for each in said.truths], explanation=explanation)
+
+
+def properties_table(said: Summary) -> Table:
+    """Return what the scenes hold."""
+    columns = (*words(property="property"), *numbers("least", "median", "largest"), *numbers(scenes="scenes"))
+    rows = [vars(each) | {"property": property_words(each.property)} for each in said.properties]
+    return table("What the scenes hold", columns, rows)
+
+
+def hosts_table(said: Summary) -> Table:
+    """Return where rows were computed."""
+    columns = (
+        *words(host="host", device="device"),
+        *numbers(threads="threads", rows="cells", timed_alone="timed alone"),
+    )
+    return table("Where it ran", columns, [vars(each) for each in said.hosts])

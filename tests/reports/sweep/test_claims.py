@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a sweep claims: shares of scenes with their intervals, what goes with error, what was refused, what is wrong."""
+
+import numpy as np
+import pytest
+
+from realtime.scene.read_scene import read_scene
+from reports.sweep.claims import best_claims, claim, percent, written
+from reports.sweep.correlations import correlations, sentence, sentences, strongest, sure
+from reports.sweep.faults import checks, faults, reasons, without_numbers
+from reports.sweep.properties import WORDS, property_words
+from reports.sweep.read import FILE, read_sweep
+from reports.sweep.samples import samples
+from reports.sweep.worst import worst
+from tests.helpers.sweeps import row, rows, write_rows
+from validation.properties.properties import scene_properties
+from validation.scenes.loading import load_scene
+from validation.statistics.intervals import binomial_interval
+
+
+@pytest.fixture
+def sweep_of(tmp_path):
+    return lambda several: read_sweep(write_rows(tmp_path / FILE, several))
+
+
+@pytest.mark.claim("sweep-intervals")
+def test_share_of_the_scenes_and_its_interval(sweep_of):
+    several = [row(f"random:{n}", relative_rmse=2e-3 if n < 8 else 5e-4) for n in range(1000)]
+    (sample,) = samples(sweep_of(several))
+    made = claim(sample, 1e-3)
+    assert (made.tries, made.within, made.undecided, made.share) == (1000, 992, 0, 0.992)
+    assert (made.low, made.high) == binomial_interval(992, 1000)
+    assert made.text == "ray-march: within 1e-3 in 99.2 % of 1000 scenes, 98.4 to 99.7 %."
+
+
+def test_best_claim_is_the_one_that_promises_most(sweep_of):
+    """A method that was right in all of three scenes does not stand above one that was right in 99 of a hundred."""
+    several = [row(f"random:{n}", relative_rmse=1e-4 if n else 1.0) for n in range(100)]
+    several += [row(f"random:{n}", method="min-max", relative_rmse=1e-4) for n in range(3)]
+    made = [claim(sample, 1e-3) for sample in samples(sweep_of(several))]
+    (best,) = best_claims(made, 1e-3)
+    assert (best.name, best.within) == ("ray-march", 99)
+    assert best_claims([best, best], 1e-3) == [best, best]  # equals are not told apart by their names
+    assert best_claims([], 1e-3) == best_claims(made, 1e-5) == []
+
+
+@pytest.mark.claim("sweep-scenes-are-the-sample")
+def test_cells_of_a_scene_do_not_narrow_the_interval(sweep_of):
+    one = claim(samples(sweep_of([row(f"random:{n}") for n in range(20)]))[0], 0.1)
+    media = [row(f"random:{n}", medium=medium) for n in range(20) for medium in (None, "a", "b", "c")]
+    four = claim(samples(sweep_of(media))[0], 0.1)
+    assert (one.tries, one.low) == (four.tries, four.low) == (20, binomial_interval(20, 20)[0])
+
+
+@pytest.mark.claim("sweep-tries")
+def test_what_is_no_number_misses_and_a_refusal_is_no_try(sweep_of):
+    several = [
+        row("random:0", relative_rmse=1e-5),
+        row("random:1", relative_rmse=1e-5, nonfinite=1),
+        row("random:2", status="failed", reason="x"),
+        row("random:3", status="refused", reason="x"),
+        row("random:4", relative_rmse=None, rmse=None, nonfinite=19200),
+    ]
+    made = claim(samples(sweep_of(several))[0], 1e-3)
+    assert (made.tries, made.within, made.refused) == (4, 1, 1)
+    assert made.text.endswith("; 1 more refused.")
+
+
+@pytest.mark.claim("sweep-tries")
+def test_scene_without_a_truth_is_no_try(sweep_of):
+    several = [
+        row("random:0", relative_rmse=1e-5),
+        row("random:1", status="hung", reason="truth of random:1 160x120: stopped after 600 s"),
+        row("random:2", status="hung", reason="stopped after 600 s"),
+        row("random:3", status="hung", reason="truth of random:3 160x120: stopped after 600 s"),
+        row("random:3", medium="m", relative_rmse=1e-5),
+    ]
+    made = claim(samples(sweep_of(several))[0], 1e-3)
+    assert (made.tries, made.within, made.untold) == (3, 2, 1)
+    assert made.text.endswith("; no truth of 1 more.")
+
+
+@pytest.mark.claim("sweep-tries")
+def test_what_the_truth_cannot_tell_widens_the_interval_on_one_side(sweep_of):
+    several = [row(f"random:{n}", relative_rmse=1e-4) for n in range(10)]
+    several += [
+        row("random:10", relative_rmse=9e-4, truth_error=2e-4),
+        row("random:11", relative_rmse=1.1e-3, truth_error=2e-4),
+        row("random:12", relative_rmse=5e-3, truth_error=2e-4),
+    ]
+    made = claim(samples(sweep_of(several))[0], 1e-3)
+    assert (made.tries, made.within, made.undecided) == (13, 10, 2)
+    assert made.low == binomial_interval(10, 13)[0]
+    assert made.high == binomial_interval(12, 13)[1]
+    assert made.text.endswith("the truth is not exact enough to tell in 2 scenes.")
+
+
+def test_of_no_scene_nothing_is_claimed(sweep_of):
+    made = claim(samples(sweep_of([row(status="refused", reason="x")]))[0], 1e-3)
+    assert (made.share, made.low, made.high) == (None, 0.0, 1.0)
+    assert made.text == "ray-march: no scene was tried."
+
+
+@pytest.mark.parametrize(
+    ("share", "trials", "text"),
+    [(0.992, 1000, "99.2"), (0.9999, 1000, "99.9"), (1.0, 1000, "100.0"), (0.0001, 100, "1"), (0.5, 1, "50")],
+)
+def test_a_share_is_not_rounded_to_all_or_none(share, trials, text):
+    assert percent(share, trials) == text
+
+
+def test_errors_of_claims_are_written_as_powers_of_ten():
+    assert [written(target) for target in (0.1, 0.01, 0.001, 1e-5, 0.02)] == ["1e-1", "1e-2", "1e-3", "1e-5", "0.02"]
+
+
+@pytest.mark.claim("sweep-properties")
+def test_planted_property_is_found_and_no_other(sweep_of):
+    sweep = sweep_of(rows(200))
+    made = samples(sweep)
+    found = correlations(sweep, made)
+    assert len(found) == 5 * 5
+    for sample in made:
+        chosen = strongest(found, sweep, sample)
+        assert [each.property for each in chosen] == (["optical_depth"] if sample.method == "ray-march" else [])
+    march = next(sample for sample in made if sample.method == "ray-march")
+    (depth,) = strongest(found, sweep, march)
+    assert 0.9 < depth.low < depth.r < depth.high
+    words = sentence(march.name, [depth])
+    assert words.startswith("ray-march (steps=16): the error grows with the optical depth (+0.9")
+    assert sentences({"a": [depth], "b": [], "c": []})[-1] == "No property goes for sure with the error of b and c."
+
+
+@pytest.mark.claim("sweep-properties")
+def test_of_properties_that_say_the_same_the_strongest_is_named(sweep_of):
+    rng = np.random.default_rng(2)
+    several = []
+    for number in range(80):
+        lights, near = float(rng.integers(1, 9)), rng.uniform(0.1, 5)
+        silhouettes = 100 * lights * np.exp(0.2 * rng.normal())
+        error = 1e-3 * silhouettes / near
+        several.append(
+            row(
+                f"random:{number}",
+                relative_rmse=error,
+                property_lights=lights,
+                property_silhouettes=silhouettes,
+                property_nearest_light=near,
+                property_constant=2.0,
+            )
+        )
+    sweep = sweep_of(several)
+    (sample,) = samples(sweep)
+    found = correlations(sweep, [sample])
+    assert {each.property for each in found} == {"lights", "silhouettes", "nearest_light"}
+    chosen = strongest(found, sweep, sample)
+    assert {each.property for each in chosen} == {"silhouettes", "nearest_light"}
+    words = sentence(sample.name, chosen)
+    assert "grows with the silhouette edges (+" in words
+    assert ", and it falls with the nearest light (-" in words
+
+
+@pytest.mark.claim("sweep-properties")
+def test_intervals_hold_together(sweep_of):
+    """Of 100 properties of noise none is sure in most sweeps; each by itself at 95 % would give five."""
+    rng = np.random.default_rng(4)
+    noise = [
+        {f"property_p{k}": value for k, value in enumerate(rng.normal(size=100))} | {"relative_rmse": rng.lognormal()}
+        for _ in range(60)
+    ]
+    sweep = sweep_of([row(f"random:{n}", **values) for n, values in enumerate(noise)])
+    found = correlations(sweep, samples(sweep))
+    assert len(found) == 100
+    assert not any(sure(each) for each in found)
+    assert any(abs(each.r) > 0.2 for each in found)
+
+
+def test_too_few_scenes_have_no_correlation(sweep_of):
+    sweep = sweep_of([row(f"random:{n}", relative_rmse=0.1 * n, property_depth=float(n)) for n in range(1, 9)])
+    assert correlations(sweep, samples(sweep)) == []
+
+
+def test_worst_scenes_come_first_and_those_without_numbers_before_them(sweep_of):
+    several = [row(f"random:{n}", relative_rmse=0.01 * n, property_depth=float(n)) for n in range(1, 15)]
+    several += [
+        row("random:20", relative_rmse=1e-4, nonfinite=3),
+        row("random:21", relative_rmse=None, rmse=None, nonfinite=19200),
+        row("random:22", status="refused", reason="x"),
+    ]
+    sweep = sweep_of(several)
+    found = worst(sweep, samples(sweep)[0], ["depth"])
+    assert [each.scene for each in found[:4]] == ["random:21", "random:20", "random:14", "random:13"]
+    assert len(found) == 10
+    assert found[0].relative_rmse is None
+    assert found[1].nonfinite == 3
+    assert found[2].properties == {"depth": 14.0}
+    assert found[2].command == "airlight compare random:14 --method ray-march"
+    assert found[2].key == several[13]["key"]
+
+
+@pytest.mark.claim("sweep-faults")
+def test_refusals_are_counted_by_reason(sweep_of):
+    several = rows(60)
+    refused = [each for each in several if each["status"] == "refused"]
+    several.append(row("hall", status="hung", reason="longer than 60 s"))
+    (refusal, hung) = reasons(sweep_of(several))
+    assert refusal.reason == "SCENE has N lights, wanted at most N"
+    assert (refusal.cells, refusal.scenes) == (len(refused), len(refused))
+    assert refusal.labels == ("light-volumes (exact)",)
+    assert refusal.example == refused[0]["command"]
+    assert (hung.status, hung.reason, hung.cells) == ("hung", "longer than N s", 1)
+
+
+def test_numbers_are_taken_out_of_reasons_and_names_are_not():
+    assert without_numbers("random:17: light 3 of 8\n at -1.5e-3 m", "random:17") == "SCENE: light N of N at N m"
+    assert without_numbers("RGB8 in light-volumes2 takes x2", "hall") == "RGB8 in light-volumes2 takes x2"
+
+
+@pytest.mark.claim("sweep-faults")
+def test_planted_faults_are_found_and_counted(sweep_of):
+    several = rows(20)
+    several[7] |= {"nonfinite": 12}
+    several[8] |= {"negative": 5}
+    several[13] |= {"outside_bound": 2, "bound": 1e-5}
+    several[3] |= {"outside_bound": 0, "bound": 1e-5}
+    sweep = sweep_of(several)
+    found = faults(sweep)
+    assert [(each.check, each.scene, each.pixels, each.of) for each in found] == [
+        ("not finite", several[7]["scene"], 12, 19200),
+        ("negative", several[8]["scene"], 5, 19200),
+        ("outside of the bound", several[13]["scene"], 2, 19200),
+    ]
+    counted = {each.check: each for each in checks(sweep)}
+    assert counted["outside of the bound"].rows == 2
+    assert counted["outside of the bound"].faulty_scenes == 1
+    assert counted["surface not finite"].rows == 0
+    assert counted["negative"].rows == sum(each["status"] == "done" for each in several)
+
+
+def test_every_property_has_words(variant):
+    properties = scene_properties(read_scene(load_scene("open-fog").scene))
+    assert set(properties) == set(WORDS)
+    assert property_words("something_new") == "something new"

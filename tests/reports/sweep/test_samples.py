@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Scenes are the sample, not cells; what is read of a Parquet is what was written."""
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from analytic.errors import InputError
+from reports.sweep.read import FILE, read_sweep
+from reports.sweep.samples import fastest_counts, samples, short_names
+from tests.helpers.sweeps import row, rows, write_rows
+
+
+@pytest.fixture
+def sweep_of(tmp_path):
+    return lambda several: read_sweep(write_rows(tmp_path / FILE, several))
+
+
+def test_parquet_is_read_as_it_was_written(tmp_path):
+    several = rows(4)
+    sweep = read_sweep(write_rows(tmp_path / FILE, several).parent)
+    assert len(sweep) == len(several) == 20
+    by_key = {each["key"]: each for each in several}
+    for place, key in enumerate(sweep.texts("key")):
+        wanted = by_key.pop(key)
+        assert sweep.texts("scene")[place] == wanted["scene"]
+        assert sweep.property("lights")[place] == wanted["property.lights"]
+        errors = [wanted["relative_rmse"] or np.nan]
+        np.testing.assert_array_equal(sweep.numbers("relative_rmse")[place : place + 1], errors)
+    assert not by_key
+    assert sweep.properties == ("light_distance", "lights", "optical_depth", "silhouettes", "triangles")
+    assert set(sweep.numbers("timed_alone")[sweep.texts("status") == "done"]) == {1.0}
+
+
+@pytest.mark.claim("sweep-from-parquet")
+def test_order_in_which_rows_were_finished_does_not_matter(tmp_path):
+    several = rows(12)
+    first = read_sweep(write_rows(tmp_path / "a.parquet", several))
+    second = read_sweep(write_rows(tmp_path / "b.parquet", several[::-1]))
+    assert list(first.texts("key")) == list(second.texts("key"))
+    assert list(dict.fromkeys(first.texts("scene"))) == [f"random:{n}" for n in range(12)]  # 9 before 10
+    assert [each.label for each in samples(first)] == [each.label for each in samples(second)]
+
+
+def test_same_key_counts_once(sweep_of):
+    assert len(sweep_of([row(), row(), row("random:1")])) == 2
+
+
+@pytest.mark.claim("sweep-last-rows")
+def test_cells_that_were_computed_again_count_once(sweep_of):
+    """A fault that is mended is gone; a cell that was computed for its error and again for its time has both."""
+    old, new = (
+        {"source": "old", "started": "2026-11-23T08:00:00Z"},
+        {"source": "new", "started": "2026-11-23T09:00:00Z"},
+    )
+    later = new | {"started": "2026-11-23T10:00:00Z"}
+    several = [
+        row(key="a", nonfinite=7, timed_alone=True, **old),
+        row(key="b", timed_alone=False, frame_ms=5.0, **later),
+        row(key="c", timed_alone=True, frame_ms=3.0, **new),
+        row("random:1", key="d", **old),
+        row("random:1", key="e", medium="m", **new),
+        row("random:2", key="f", timed_alone=True, **old),
+        row("random:2", key="g", timed_alone=False, **new),  # newer source goes before a time
+    ]
+    sweep = sweep_of(several)
+    assert sorted(sweep.texts("key")) == ["c", "d", "e", "g"]
+    assert sweep.superseded == 3
+
+
+def test_pictures_are_read_by_key(sweep_of):
+    with_picture = row("random:3", picture=b"RIFF")
+    sweep = sweep_of([row(), with_picture])
+    assert sweep.pictures([with_picture["key"], row()["key"]]) == {with_picture["key"]: b"RIFF"}
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda path: None, "is not there; wanted the folder of a sweep"),
+        (lambda path: path.write_bytes(b"PAR1 and no more"), "cannot be read as Parquet"),
+        (lambda path: path.write_bytes(b""), "cannot be read as Parquet"),
+        (lambda path: pq.write_table(pa.table({"a": [1]}), path), "has no column 'key'"),
+        (lambda path: write_rows(path, []), "has no rows"),
+        (
+            lambda path: pq.write_table(
+                pq.read_table(write_rows(path, [row()])).drop(["truth_error"]), path.with_name(FILE)
+            ),
+            "has no column 'truth_error'",
+        ),
+    ],
+)
+def test_what_is_no_sweep_is_refused_in_a_line(tmp_path, make, words):
+    make(tmp_path / FILE)
+    with pytest.raises(InputError, match=words) as caught:
+        read_sweep(tmp_path)
+    assert "\n" not in str(caught.value)
+
+
+def test_column_of_another_type_and_unknown_status_are_refused(tmp_path):
+    table = pq.read_table(write_rows(tmp_path / FILE, [row()]))
+    place = table.column_names.index("relative_rmse")
+    pq.write_table(table.set_column(place, "relative_rmse", pa.array(["0.1"])), tmp_path / FILE)
+    with pytest.raises(InputError, match="has string in the column 'relative_rmse', wanted float64"):
+        read_sweep(tmp_path)
+    place = table.column_names.index("status")
+    pq.write_table(table.set_column(place, "status", pa.array(["lost"])), tmp_path / FILE)
+    with pytest.raises(InputError, match="has the status 'lost'"):
+        read_sweep(tmp_path)
+
+
+@pytest.mark.claim("sweep-scenes-are-the-sample")
+def test_media_of_a_scene_are_one_sample_and_the_worst_stands_for_it(sweep_of):
+    sweep = sweep_of(
+        [
+            row(relative_rmse=0.01),
+            row(relative_rmse=0.3, medium="medium.sigma_t=1"),
+            row(relative_rmse=0.02, medium="medium.sigma_t=2", nonfinite=4),
+            row("random:1", relative_rmse=0.1),
+        ]
+    )
+    (sample,) = samples(sweep)
+    assert sample.scenes == ("random:0", "random:1")
+    assert list(sample.errors) == [0.3, 0.1]
+    assert list(sample.nonfinite) == [4, 0]  # also where it is not the worst cell that has them
+
+
+def test_fault_stands_for_a_scene_and_a_refusal_only_where_nothing_was_measured(sweep_of):
+    sweep = sweep_of(
+        [
+            row(),
+            row(medium="m", status="hung", reason="x"),
+            row("random:1", status="refused", reason="x"),
+            row("random:1", medium="m", relative_rmse=0.5),
+            row("random:2", status="refused", reason="x"),
+        ]
+    )
+    (sample,) = samples(sweep)
+    assert sample.statuses == ("hung", "done", "refused")
+    assert list(sample.measured) == [False, True, False]
+    np.testing.assert_array_equal(sample.errors, [np.nan, 0.5, np.nan])
+
+
+@pytest.mark.claim("sweep-scenes-are-the-sample")
+def test_named_scenes_are_no_sample_where_scenes_were_drawn(sweep_of):
+    (drawn,) = samples(sweep_of([row(), row("hall"), row("random:7")]))
+    assert drawn.scenes == ("random:0", "random:7")
+    (named,) = samples(sweep_of([row("hall"), row("clutter")]))
+    assert named.scenes == ("clutter", "hall")
+
+
+def test_sizes_of_an_image_are_configurations(sweep_of):
+    made = samples(sweep_of([row(), row(width=320, height=240), row("random:1", method="min-max")]))
+    wanted = ["min-max", "ray-march at 160 x 120", "ray-march at 320 x 240"]
+    assert [sample.label for sample in made] == [sample.name for sample in made] == wanted
+
+
+def test_black_truth_and_image_without_a_number(sweep_of):
+    sweep = sweep_of(
+        [
+            row("random:0", relative_rmse=None, rmse=0.0),  # black, as the truth
+            row("random:1", relative_rmse=None, rmse=1e-9),  # light where the truth is black
+            row("random:2", relative_rmse=None, rmse=None, nonfinite=19200),
+        ]
+    )
+    (sample,) = samples(sweep)
+    assert list(sample.errors) == [0.0, np.inf, np.inf]
+
+
+@pytest.mark.claim("sweep-times-alone")
+def test_times_count_only_where_the_machine_had_nothing_else_to_do(sweep_of):
+    (sample,) = samples(sweep_of([row(frame_ms=2.0), row("random:1", frame_ms=1.0, timed_alone=False)]))
+    np.testing.assert_array_equal(sample.times, [2.0, np.nan])
+
+
+@pytest.mark.claim("sweep-times-alone")
+def test_times_of_several_hosts_are_not_compared(sweep_of):
+    several = [row(f"random:{n}", host="there" if n > 1 else "here", threads=8 if n == 4 else 2) for n in range(5)]
+    (sample,) = samples(sweep_of(several))
+    # Two rows each of both hosts with two threads: the first of them in the sweep, and never a mixture.
+    assert list(np.isfinite(sample.times)) == [True, True, False, False, False]
+
+
+@pytest.mark.claim("sweep-times-alone")
+def test_fastest_is_counted_where_all_were_timed_alone(sweep_of):
+    def pair(scene, first, second, **changes):
+        a = {"frame_ms": first[0], "relative_rmse": first[1]}
+        b = {"frame_ms": second[0], "relative_rmse": second[1]}
+        return [row(scene, **a), row(scene, method="min-max", **(b | changes))]
+
+    sweep = sweep_of(
+        [
+            *pair("random:0", (1.0, 0.005), (2.0, 0.001)),
+            *pair("random:1", (1.0, 0.5), (2.0, 0.001)),
+            *pair("random:2", (1.0, 0.5), (2.0, 0.2)),
+            *pair("random:3", (1.0, 0.5), (2.0, 0.001), nonfinite=1),
+            *pair("random:4", (1.0, 0.001), (2.0, 0.001), timed_alone=False),
+        ]
+    )
+    assert fastest_counts(samples(sweep), 0.01) == ([1, 1], 2, 4)
+
+
+def test_names_say_in_what_configurations_of_a_method_differ():
+    labels = [
+        "ray-march (steps=16)",
+        "ray-march (steps=100, shadow=map)",
+        "min-max (exact)",
+        "planes (exact)",
+        "planes",
+    ]
+    methods = ["ray-march", "ray-march", "min-max", "planes", "planes"]
+    assert short_names(methods, labels) == [
+        "ray-march (steps=16)",
+        "ray-march (steps=100, shadow=map)",
+        "min-max",
+        "planes (exact)",
+        "planes",
+    ]
+    # What has no words of its own is named by those that it has.
+    shared = ["ray-march (steps=100)", "ray-march (steps=100, shadow=map)"]
+    assert short_names(["ray-march"] * 2, shared) == ["ray-march (steps=100)", "ray-march (shadow=map)"]
+
+
+def test_long_names_are_cut_between_words_and_stay_apart():
+    long = [f"soft-shafts (points=16, pattern=sobol, interleave=True, scale=2, steps={steps})" for steps in (1, 2)]
+    names = short_names(["soft-shafts"] * 3, [*long, "soft-shafts (points=5)"])
+    assert names[0] == "soft-shafts (points=16, ..) #1"
+    assert len(set(names)) == 3
+    assert all(len(name) <= 40 for name in names)

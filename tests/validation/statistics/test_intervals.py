@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Intervals of shares, quantiles and rank correlations hold what they estimate as often as they say."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from validation.statistics.intervals import binomial_interval, quantile_interval, rank_correlation
+
+
+@pytest.mark.parametrize(("successes", "trials"), [(0, 12), (12, 12), (3, 40), (992, 1000), (0, 0)])
+def test_ends_of_a_share_leave_a_fortieth_on_either_side(successes, trials):
+    """By the definition: at the lower end so many or more have the tail's chance, at the upper so many or fewer."""
+    low, high = binomial_interval(successes, trials)
+    assert low <= successes / max(trials, 1) <= high
+    if successes > 0:
+        assert stats.binom.sf(successes - 1, trials, low) == pytest.approx(0.025, rel=1e-8)
+    else:
+        assert low == 0
+    if successes < trials:
+        assert stats.binom.cdf(successes, trials, high) == pytest.approx(0.025, rel=1e-8)
+    else:
+        assert high == 1
+
+
+@pytest.mark.claim("sweep-intervals")
+def test_share_holds_its_probability_at_least_as_often_as_it_says():
+    """The law's own sum over all counts, no simulation; Wilson's interval falls below 0.95 at many of these."""
+    for probability in (0.003, 0.08, 0.5, 0.992):
+        chances = stats.binom.pmf(np.arange(201), 200, probability)
+        ends = [binomial_interval(count, 200) for count in range(201)]
+        held = sum(chance for chance, (low, high) in zip(chances, ends) if low <= probability <= high)
+        assert held >= 0.95
+
+
+def test_more_successes_than_trials_are_a_mistake():
+    with pytest.raises(ValueError, match="got 5 successes, wanted 0 to 4"):
+        binomial_interval(5, 4)
+
+
+def test_quantile_of_a_hundred_by_hand():
+    values = np.arange(1, 101)[::-1]
+    # Binomial(100, 1/2): P(X <= 39) = 0.0176 < 0.025 <= P(X <= 40) = 0.0284; the same from above.
+    assert quantile_interval(values, 0.5) == (50.0, 40.0, 61.0)
+    # Of a hundred the largest is not above the 99 % quantile often enough: the upper end is not known.
+    estimate, low, high = quantile_interval(values, 0.99)
+    assert (estimate, high) == (99.0, None)
+    assert low == 97.0
+
+
+@pytest.mark.claim("sweep-intervals", tolerance="0.014 of the level: four standard errors of 4000 samples")
+def test_quantile_holds_the_true_one_at_least_as_often_as_it_says():
+    rng = np.random.default_rng(11)
+    held = 0
+    for _ in range(4000):
+        _, low, high = quantile_interval(rng.exponential(size=60), 0.8)
+        held += (low or 0) <= -np.log(0.2) <= (np.inf if high is None else high)
+    # Order statistics cannot hit the level exactly: they exceed it. Four standard errors of a share of 4000: 0.014.
+    assert held / 4000 > 0.95 - 0.014
+
+
+@pytest.mark.claim("sweep-intervals", tolerance="5e-8: the digits of the example")
+def test_rank_correlation_is_that_of_the_authors_own_program():
+    """The example of ci.spear in statpsych, the program of D. G. Bonett."""
+    y = [21, 4, 9, 12, 35, 18, 10, 22, 24, 1, 6, 8, 13, 16, 19]
+    x = [67, 28, 30, 28, 52, 40, 25, 37, 44, 10, 14, 20, 28, 40, 51]
+    assert rank_correlation(x, y) == pytest.approx((0.8699639, 0.5840951, 0.9638297), abs=5e-8)
+
+
+@pytest.mark.claim(
+    "sweep-intervals",
+    tolerance="0.035 of the level: four standard errors of 2000 samples, and 0.015 of the approximation",
+)
+def test_rank_correlation_holds_the_true_one_about_as_often_as_it_says():
+    """Of two normal variables with the correlation c the true one is (6/pi) asin(c/2)."""
+    rng = np.random.default_rng(5)
+    for c in (0.0, 0.5, 0.8):
+        truth, held = 6 / np.pi * np.arcsin(c / 2), 0
+        for _ in range(2000):
+            x = rng.normal(size=80)
+            _, low, high = rank_correlation(x, c * x + np.sqrt(1 - c * c) * rng.normal(size=80))
+            held += low <= truth <= high
+        # An approximation: within 0.015 of the level, and four standard errors of a share of 2000, 0.0195.
+        assert held / 2000 == pytest.approx(0.95, abs=0.035)
+
+
+def test_of_what_does_not_vary_nothing_is_known():
+    assert rank_correlation(np.ones(20), np.arange(20)) == (0.0, -1.0, 1.0)
+    assert rank_correlation(np.arange(9), np.arange(9)) == (0.0, -1.0, 1.0)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_one_order_for_both_is_not_certain(sign):
+    r, low, high = rank_correlation(np.arange(12), sign * np.arange(12.0) ** 3)
+    assert r == pytest.approx(sign, abs=1e-12)
+    far, near = (low, high) if sign > 0 else (high, low)
+    assert near == sign
+    assert 0.9 < sign * far < 0.999
