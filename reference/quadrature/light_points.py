@@ -41,6 +41,7 @@ class PointPlan:
     most: int = 1024  #: points, or scan lines, that no ray exceeds, a power of two
     seed: int = 0  #: of the scramblings
     shared: bool = False  #: whether all surface points have the same scan lines: their errors are then alike
+    surfaces: bool = True  #: whether surfaces get the light; if not, theirs is that of other lights alone
 
 
 def square_points(plan: PointPlan, number: int, replicate: int, kind: str) -> Array:

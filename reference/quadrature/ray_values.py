@@ -192,7 +192,9 @@ def ray_values(
         tell = partial(_tell, progress, total)
         how_kept: dict[str, Any] = {"plan": plan, "shadow_scale": shadow_scale} | ({"keep": keep} if keep else {})
         scattered = area_airlight(truth, hits.distance, airlight, how=how, tell=partial(tell, done), **how_kept)
-        lit = area_surface(truth, hits, surface, tell=partial(tell, done + _STEPS), **how_kept)
+        lit = np.zeros_like(scattered.replicates)
+        if plan.surfaces:
+            lit = area_surface(truth, hits, surface, tell=partial(tell, done + _STEPS), **how_kept)
         tell(total, 0.0)
         replicates = np.concatenate([scattered.replicates, lit], axis=1)
         mean = replicates.mean(axis=2)

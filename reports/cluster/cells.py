@@ -26,7 +26,7 @@ from validation.sweep.keys import Made, cell_key, source_digest
 from validation.sweep.rows import RowStore
 from validation.sweep.study import Cell, Study
 from validation.sweep.truth import CellTruth, cell_truth, load_cell
-from validation.sweep.work import cell_columns, cell_row
+from validation.sweep.work import cell_columns, cell_row, cell_times
 
 _AGAIN = ("failed", "hung", "aborted")  #: what `--again` computes again
 _QUALITY = 60  # of WebP
@@ -55,6 +55,27 @@ def row_of(truth: CellTruth, cell: Cell, key: str) -> dict[str, Any]:
     }
 
 
+def times_of(cell: Cell) -> dict[str, Any]:
+    """Return the columns of a cell's times, of a worker that is alone on its host."""
+    from distributed import get_worker
+
+    times = cell_times(cell, _opened(cell.image)[1])
+    return times | {"timed_alone": is_alone(get_worker()), "threads": dr.thread_count(), **_machine()}
+
+
+def timing_groups(
+    study: Study, made: Made, *, store: RowStore, scenes: dict[str, str]
+) -> Iterator[tuple[Group, dict[str, Cell]]]:
+    """Yield what `cell_groups` does, of those rows of a study with times 'alone' that were done and have none."""
+    for cells in study.images():
+        keyed = {cell_key(cell, made, scenes): cell for cell in cells}
+        wanted = {key: cell for key, cell in keyed.items() if store.status(key) == "done"}
+        missing = {key: cell for key, cell in wanted.items() if store.row(key)["frame_ms"] is None}
+        tasks = tuple(Task(key, times_of, (cell,), study.limit, alone=True) for key, cell in missing.items())
+        if tasks:
+            yield Group(tasks), missing
+
+
 def cell_groups(
     study: Study, made: Made, *, store: RowStore, again: bool, scenes: dict[str, str]
 ) -> Iterator[tuple[Group, dict[str, Cell]]]:
@@ -73,15 +94,11 @@ def cell_groups(
     scenes
         Digests of scenes of files, see `validation.sweep.keys.cell_key`.
     """
-    done: set[str] = set()
     for cells in study.images():
         keyed = {cell_key(cell, made, scenes): cell for cell in cells}
         missing = {
-            key: cell
-            for key, cell in keyed.items()
-            if key not in done and (key not in store or (again and store.status(key) in _AGAIN))
+            key: cell for key, cell in keyed.items() if key not in store or (again and store.status(key) in _AGAIN)
         }
-        done |= set(missing)
         if missing:
             yield _group(study, missing), missing
 
@@ -100,9 +117,8 @@ def row_without_numbers(cell: Cell, key: str, outcome: Outcome) -> dict[str, Any
 def _group(study: Study, cells: dict[str, Cell]) -> Group:
     image = next(iter(cells.values())).image
     words = " ".join((image.scene, *image.medium, f"{image.size[0]}x{image.size[1]}"))
-    alone = study.times == "alone"
-    tasks = tuple(Task(key, row_of, (cell, key), study.limit, alone) for key, cell in cells.items())
-    return Group(tasks, Task(f"truth of {words}", truth_of, (image,), study.limit, alone))
+    tasks = tuple(Task(key, row_of, (cell, key), study.limit) for key, cell in cells.items())
+    return Group(tasks, Task(f"truth of {words}", truth_of, (image,), study.limit))
 
 
 @lru_cache(maxsize=1)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight sweep [STUDY.toml]`: many scenes, every method, on one machine or on a Dask cluster."""
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +12,7 @@ from reports.commands.options import ClusterPlace, Json
 
 if TYPE_CHECKING:
     from reports.cluster.connect import Place
+    from validation.sweep.keys import Made
     from validation.sweep.rows import RowStore
     from validation.sweep.study import Study
 
@@ -76,74 +79,99 @@ def _check_parquet() -> None:
 
 def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, again: bool) -> dict[str, Any]:
     """Compute what is missing, add it to the store, and return what came of it."""
+    from dataclasses import replace
+
+    from reports import __version__
+    from reports.cluster.cells import cell_groups, row_without_numbers, timing_groups
+    from validation.sweep.keys import made_here, scene_identities
+
+    made, scenes = made_here(__version__, variant), scene_identities(study.scenes)
+    how: dict[str, Any] = {"store": store, "scenes": scenes}
+
+    def with_errors(cell, key, outcome):
+        value = outcome.value if outcome.status == "done" else row_without_numbers(cell, key, outcome)
+        return value | {"study": study.name, "attempts": outcome.attempts}
+
+    def with_times(cell, key, outcome):
+        return store.row(key) | (outcome.value if outcome.status == "done" else {})
+
+    parts = [_part(study, store, place, made, partial(cell_groups, again=again, **how), with_errors)]
+    if study.times == "alone":
+        where = replace(place, workers=1) if place.workers else place
+        parts.append(_part(study, store, where, made, partial(timing_groups, **how), with_times))
+    total = study.scene_count * study.cells_by_scene
+    counts = parts[0]["counts"]
+    return {
+        "study": study.name,
+        "scenes": study.scene_count,
+        "cells": total,
+        "kept": total - parts[0]["missing"],
+        "computed": sum(counts.values()) - counts["lost"],
+        "timed_alone": parts[1]["counts"]["done"] if len(parts) > 1 else 0,
+        "counts": dict(counts),
+        "left": sum(part["left"] for part in parts),
+        "problems": [problem for part in parts for problem in part["problems"]],
+        "output": str(store.folder),
+    }
+
+
+def _part(
+    study: "Study",
+    store: "RowStore",
+    place: "Place",
+    made: "Made",
+    groups_of: Callable[..., Any],
+    row_from: Callable[..., dict[str, Any]],
+) -> dict[str, Any]:
+    """Run the groups of a study, and add a row for each outcome."""
     import time
     from collections import Counter
 
     from analytic.errors import InputError
     from reference.storage.stopping import hint_when_stopped
-    from reports import __version__
-    from reports.cluster.cells import cell_groups, row_without_numbers
     from reports.cluster.connect import connected
     from reports.cluster.run import ForeignWorkerError, run_groups
     from reports.machine.progress import progress_bar
-    from validation.sweep.keys import made_here, scene_identities
     from validation.sweep.study import Cell
 
-    made, scenes = made_here(__version__, variant), scene_identities(study.scenes)
-    total = study.scene_count * study.cells_by_scene
-    how: dict[str, Any] = {"store": store, "again": again, "scenes": scenes}
-    missing = sum(len(cells) for _, cells in cell_groups(study, made, **how))
+    missing = sum(len(cells) for _, cells in groups_of(study, made))
     counts: Counter[str] = Counter()
-    written = time.monotonic()
     problems: list[dict[str, Any]] = []
     open_cells: dict[str, Cell] = {}
+    written = time.monotonic()
 
     def groups():
-        for group, cells in cell_groups(study, made, **how):
+        for group, cells in groups_of(study, made):
             open_cells.update(cells)
             yield group
 
-    if missing:
-        hint = lambda: f"{len(store)} rows are kept in {store.folder}; run the same command again to go on"  # noqa: E731
-        with (
-            hint_when_stopped(hint),
-            connected(place) as cluster,
-            progress_bar(f"sweep {study.name}") as progress,
-        ):
-            try:
-                for outcome in run_groups(cluster, groups(), made=made, retries=study.retries):
-                    key = outcome.task.name
-                    cell = open_cells.pop(key, None)
-                    if cell is None:
-                        continue  # the truth of an image: its cells say what came of it
-                    if outcome.status != "lost":
-                        value = outcome.value if outcome.status == "done" else row_without_numbers(cell, key, outcome)
-                        row = store.add(value | {"study": study.name, "attempts": outcome.attempts})
-                        status = row["status"]
-                    else:
-                        status = "lost"
-                    counts[status] += 1
-                    if status not in ("done", "refused"):
-                        problems.append({"scene": cell.scene, "label": cell.chosen.label, "status": status})
-                        problems[-1]["reason"] = outcome.reason
-                    if time.monotonic() - written > _EVERY:
-                        store.write_parquet()
-                        written = time.monotonic()
-                    done = sum(counts.values())
-                    progress(done / missing, f"{done} of {missing} cells, {cell.scene}")
-            except ForeignWorkerError as error:
-                raise InputError(str(error)) from None
-    return {
-        "study": study.name,
-        "scenes": study.scene_count,
-        "cells": total,
-        "kept": total - missing,
-        "computed": sum(counts.values()) - counts["lost"],
-        "counts": dict(counts),
-        "left": missing - sum(counts.values()) + counts["lost"],
-        "problems": problems,
-        "output": str(store.folder),
-    }
+    def hint() -> str:
+        return f"{len(store)} rows are kept in {store.folder}; run the same command again to go on"
+
+    if not missing:
+        return {"counts": counts, "problems": problems, "left": 0, "missing": 0}
+    with hint_when_stopped(hint), connected(place) as cluster, progress_bar(f"sweep {study.name}") as progress:
+        try:
+            for outcome in run_groups(cluster, groups(), made=made, retries=study.retries):
+                key = outcome.task.name
+                cell = open_cells.pop(key, None)
+                if cell is None:
+                    continue  # the truth of an image: its cells say what came of it
+                if outcome.status != "lost":
+                    store.add(row_from(cell, key, outcome))
+                counts[outcome.status if outcome.status != "done" else store.status(key) or "done"] += 1
+                if outcome.status not in ("done", "refused"):
+                    what = {"scene": cell.scene, "label": cell.chosen.label, "status": outcome.status}
+                    problems.append(what | {"reason": outcome.reason})
+                if time.monotonic() - written > _EVERY:
+                    store.write_parquet()
+                    written = time.monotonic()
+                done = sum(counts.values())
+                progress(done / missing, f"{done} of {missing} cells, {cell.scene}")
+        except ForeignWorkerError as error:
+            raise InputError(str(error)) from None
+    left = missing - sum(counts.values()) + counts["lost"]
+    return {"counts": counts, "problems": problems, "left": left, "missing": missing}
 
 
 def _print(summary: dict[str, Any], *, json: bool) -> None:

@@ -163,7 +163,7 @@ _ERRORS = (
         "float64",
         "1",
         {
-            "surface_relative_rmse": "relative_rmse of the lit surfaces; null where there are none",
+            "surface_relative_rmse": "relative_rmse of the lit surfaces; null without any, and for lights with extent",
             "surface_p99": "p99 of the lit surfaces",
             "surface_max": "max of the lit surfaces",
         },

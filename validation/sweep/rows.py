@@ -69,6 +69,13 @@ class RowStore:
         """Return the status of a row; None where there is none."""
         return self._statuses.get(key)
 
+    def row(self, key: str) -> dict[str, Any]:
+        """Return the row of a key that is there."""
+        offset, length = self._places[key]
+        row = _row(os.pread(self._file, length, offset))
+        assert row is not None, "it was read, or written, before"
+        return row
+
     def add(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Add a row, or replace the one of the same key, and return it as it is kept.
 
@@ -95,10 +102,8 @@ class RowStore:
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield every row once, in the order in which they were finished."""
-        for offset, length in sorted(self._places.values()):
-            row = _row(os.pread(self._file, length, offset))
-            assert row is not None, "it was read, or written, before"
-            yield row
+        for key in sorted(self._places, key=self._places.__getitem__):
+            yield self.row(key)
 
     def write_parquet(self) -> Path:
         """Write `sweep.parquet` from all rows, whole or not at all, and return its path."""

@@ -30,6 +30,7 @@ import itertools
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -96,8 +97,8 @@ class Study:
 
     @property
     def scene_count(self) -> int:
-        """How many scenes it has."""
-        return len(self.scenes) + self.random.count
+        """How many scenes it has; a random one that is named too counts once."""
+        return len(self.scenes) + self.random.count - sum(self._drawn(name) for name in self.scenes)
 
     @property
     def cells_by_scene(self) -> int:
@@ -105,11 +106,22 @@ class Study:
         return len(self.sizes) * len(self.media) * len(self.configurations)
 
     def scene_names(self) -> Iterator[str]:
-        """Yield the scenes, random ones last."""
-        yield from self.scenes
-        seeds = range(self.random.first, self.random.first + self.random.count)
-        options = random_name(PREFIX, self.random.meshes, self.random.ranges).removeprefix(PREFIX)
-        yield from (f"{PREFIX}{seed}{options}" for seed in seeds)
+        """Yield the scenes, each once, random ones last."""
+        yield from (name for name in self.scenes if not self._drawn(name))
+        yield from (f"{PREFIX}{seed}{self._options}" for seed in self._seeds)
+
+    @property
+    def _seeds(self) -> range:
+        return range(self.random.first, self.random.first + self.random.count)
+
+    @cached_property
+    def _options(self) -> str:
+        """What follows the seed in the names of its random scenes."""
+        return random_name(PREFIX, self.random.meshes, self.random.ranges).removeprefix(PREFIX)
+
+    def _drawn(self, name: str) -> bool:
+        seed = seed_of(name)
+        return seed in self._seeds and name == f"{PREFIX}{seed}{self._options}"
 
     def images(self) -> Iterator[tuple[Cell, ...]]:
         """Yield the cells of one image after the other: they share a truth."""

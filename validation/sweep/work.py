@@ -104,7 +104,7 @@ def cell_row(
     row = cell_columns(cell) | {PROPERTY + name: float(value) for name, value in properties.items()}
     row |= _truth_columns(truth)
     try:
-        rendered = _render(scene, cell.chosen, timed=cell.times != "none")
+        rendered = _render(scene, cell.chosen, timed=cell.times == "with")
     except (InputError, TruthError) as error:
         return row | {"status": "refused", "reason": str(error)}
     row |= {"status": "done", **rendered.numbers, **error_columns(truth, rendered.frame, scene, cell)}
@@ -116,6 +116,17 @@ def cell_row(
     row["work_ms"] = 1e3 * (time.perf_counter() - begin)
     row["cpu_ms"] = 1e3 * (time.process_time() - spent)
     return row
+
+
+def cell_times(cell: Cell, scene: Scene) -> dict[str, Any]:
+    """Return the columns of the costs of a cell that can be rendered, its times among them.
+
+    Raises
+    ------
+    realtime.errors.InputError
+        If the method refuses the scene.
+    """
+    return dict(_render(scene, cell.chosen, timed=True).numbers)
 
 
 def stated_bound(chosen: Configuration, scene: Scene) -> float | None:
@@ -153,7 +164,7 @@ def error_columns(truth: CellTruth, frame: Frame, scene: Scene, cell: Cell) -> d
         floor = FLOOR * truth.airlight.mean()
         allowed = row["bound"] * np.maximum(truth.airlight, floor) + truth.bound
         row["outside_bound"] = int((~(np.abs(test - truth.airlight) <= allowed)).any(axis=2).sum())
-    if scene.features.surfaces:
+    if scene.features.surfaces and truth.surface is not None:
         surface = error_metrics(truth.surface, np.asarray(frame.surface, dtype=np.float64))
         row |= {f"surface_{name}": getattr(surface, name) for name in ("relative_rmse", "p99", "max", "nonfinite")}
     if cell.flip:

@@ -54,6 +54,7 @@ def test_values_refusals_and_faults(cluster):
     assert "ten" not in ended
 
 
+@pytest.mark.claim("sweeps-end-what-hangs", tolerance="none")
 def test_a_task_that_ends_its_process_is_given_up_and_no_other(cluster):
     others = [Task(f"s{n}", tasks.square, (n, 0.05)) for n in range(12)]
     ended = outcomes(cluster, alone(Task("bad", tasks.abort), *others), retries=1)
@@ -75,6 +76,7 @@ def test_a_truth_that_ends_its_process_takes_its_cells_with_it(cluster):
     assert ended["s"].value == 9
 
 
+@pytest.mark.claim("sweeps-end-what-hangs", tolerance="none")
 @pytest.mark.parametrize("hang", [tasks.sleep_for_ever, tasks.hold_the_interpreter], ids=lambda task: task.__name__)
 def test_what_hangs_is_stopped_and_its_process_too(cluster, hang):
     ended = outcomes(
@@ -88,6 +90,7 @@ def test_what_hangs_is_stopped_and_its_process_too(cluster, hang):
 
 
 @pytest.mark.slow
+@pytest.mark.claim("sweeps-lose-nothing", tolerance="none: every task has one outcome, with its value")
 def test_twenty_kills_during_two_hundred_tasks(cluster):
     """Claim: no task is lost or counted twice when workers are killed at any moment."""
     killed = []

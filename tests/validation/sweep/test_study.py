@@ -55,6 +55,13 @@ def test_a_file_with_its_own_scenes_and_fewer_random_ones(tmp_path):
     assert list(study.scene_names()) == [str(tmp_path / "hall.xml"), "random:7", "random:3", "random:4"]
 
 
+def test_a_random_scene_that_is_named_too_is_there_once():
+    study = parse_study({"scenes": ["random:4", "windows", "random:9"], "random": {"count": 3, "first": 3}})
+    assert list(study.scene_names()) == ["windows", "random:9", "random:3", "random:4", "random:5"]
+    assert study.scene_count == 5
+
+
+@pytest.mark.claim("sweep-studies", tolerance="none")
 @pytest.mark.parametrize(
     ("data", "message"),
     [
