@@ -55,10 +55,11 @@ def advise(
     ] = "frame_ms",
     json: Json = False,
 ) -> None:
-    """Predict what methods would cost and err by in a scene, and name the one to take.
+    """Name the method to take in a scene, for an error.
 
-    The prediction is fitted to the rows of a sweep, and says in how many of the scenes that it had not seen its choice
-    held the error. `--method auto` of render takes the choice. See docs/advise.md.
+    What every method would cost and err by is predicted from what the scene holds. The prediction is fitted to the
+    rows of a sweep, and says in how many of the scenes that it had not seen its choice held the error. `--method auto`
+    of render and view takes the choice. See docs/advise.md.
 
     Exit status 1 if no method is predicted to hold the error.
     """

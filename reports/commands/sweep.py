@@ -49,7 +49,7 @@ def sweep(
     markdown: Annotated[bool, typer.Option("--markdown", help="With --from: print the digest in Markdown.")] = False,
     json: Json = False,
 ) -> None:
-    """Run every method over many scenes and keep a row of errors and costs for each.
+    """Run every method over many scenes: a row of numbers each.
 
     A study names scenes, methods, kernels, parameters, media and sizes; every combination is a cell and becomes one
     row of DIR/sweep.parquet. A process for each processor computes them unless --cluster says otherwise.
