@@ -48,7 +48,7 @@ from realtime.clouds.hypertexture.light_depths import (
     depths_memory,
     leg_by_depths,
     leg_through,
-    light_depths,
+    sun_depths,
 )
 from realtime.clouds.hypertexture.lit_surface import dense_surface, lit_dense_surface
 from realtime.clouds.hypertexture.scattered import light_once, opacity_as_printed, with_densities
@@ -230,10 +230,7 @@ def prepare_collectors(scene: Scene, parameters: CollectorParameters) -> Callabl
     def marched(scene: Scene) -> CloudState:
         filled = scene.medium.clouds
         assert filled is not None
-        depths = tuple(
-            tuple(light_depths(surfaces, filled, light, cloud=cloud, stride=stride) for cloud in range(clouds))
-            for light in scene.lights
-        )
+        depths = sun_depths(surfaces, filled, scene.lights, stride=stride)
         settings = {"threshold": parameters.threshold, "stride": stride}
         maps = tuple(
             filtered_map(

@@ -23,7 +23,7 @@ import numpy as np
 
 from realtime.clouds.bounds.crossings import sum_over_stretches
 from realtime.clouds.bounds.surfaces import CloudSurfaces, cloud_surfaces
-from realtime.clouds.hypertexture.light_depths import LightDepths, leg_by_depths, leg_through, light_depths
+from realtime.clouds.hypertexture.light_depths import LightDepths, leg_by_depths, leg_through, sun_depths
 from realtime.clouds.hypertexture.scattered import light_once, opacity_as_printed, with_densities
 from realtime.clouds.order_layers import OPACITY, ORDER_LAYERS, order_layer
 from realtime.clouds.single_scattering.behind import light_on_surfaces, sky_behind
@@ -126,16 +126,7 @@ def prepare_cloud_octaves(scene: Scene, parameters: CloudOctavesParameters) -> C
         return lambda now: state
 
     def with_depths(now: Scene) -> OctaveState:
-        of_clouds = range(len(scene.boundaries))
-        return replace(
-            state,
-            depths=tuple(
-                tuple(
-                    light_depths(state.surfaces, clouds, light, cloud=cloud, stride=state.stride) for cloud in of_clouds
-                )
-                for light in now.lights
-            ),
-        )
+        return replace(state, depths=sun_depths(state.surfaces, clouds, now.lights, stride=state.stride))
 
     return with_depths
 

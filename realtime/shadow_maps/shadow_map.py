@@ -119,6 +119,26 @@ def tiled_corners(faces: int, side: int):
     return face, 4 * (row - face * across) + within // 4, 4 * (square - row * across) + within % 4
 
 
+def texel_rays(light: Light, size: int) -> tuple[Any, Any, Any]:
+    """Return the rays of a directional light through the middles of the texels of its map, in squares of 4 x 4.
+
+    Parameters
+    ----------
+    light
+        A directional light with an extent.
+    size
+        Texels on a side, a multiple of 4.
+
+    Returns
+    -------
+    tuple
+        Where the rays start [m] and their unit direction, in float64, and the numbers of their texels, row by row.
+    """
+    _, row, column = tiled_corners(1, size)
+    u, v = (dr.fma(mi.Float64(texel), 2.0 / size, 1.0 / size - 1) for texel in (column, row))
+    return *map_ray(light, mi.UInt32(0), u, v), row * size + column
+
+
 def cast_map_rays(scene, light: Light, place, active=True):
     """Return the distances to the first surface along rays of a light's map, infinite where there is none [m].
 

@@ -88,10 +88,6 @@ class DeviceTables:
 
     def __call__(self, set_number: int, t, d, mu, cos_phi, sin_phi, mu_l):
         """Return T [1/sr], c_x, c_y, sigma [mean free paths]; see above."""
-        Float = type(t)
-        lowest = math.log(coordinates.THINNEST + coordinates.THICKNESS_SHIFT)
-        highest = math.log(coordinates.THICKEST + coordinates.THICKNESS_SHIFT)
-        low_sun = coordinates.lowest_sun_coordinate()
         d = dr.clip(d, 0, t)
         mu = dr.clip(mu, -1, 1)
         behind = dr.select(mu < 0, d, t - d) / dr.maximum(dr.abs(mu), 1e-6)
@@ -100,13 +96,7 @@ class DeviceTables:
         dimmed = dr.clip(mu_l / coordinates.LOWEST_SUN, 0, 1)
         thinner = dr.minimum(t / coordinates.THINNEST, 1)
 
-        upper = dr.log(1 + d_inside / coordinates.DEPTH_SCALE)
-        lower = dr.log(1 + (t_inside - d_inside) / coordinates.DEPTH_SCALE)
-        place = (
-            (dr.log(t_inside + coordinates.THICKNESS_SHIFT) - lowest) / (highest - lowest),
-            upper / (upper + lower),
-            (dr.sqrt(dr.asin(sun) * (2 / math.pi)) - low_sun) / (1 - low_sun),
-        )
+        place = place_shares(t_inside, d_inside, sun)
         from_place = around(place, self.of_coefficients)
         azimuth = dr.safe_acos(cos_phi) * dr.inv_pi
         from_direction = around((direction_share(mu), azimuth), (_DIRECTIONS, _AZIMUTHS))
@@ -130,7 +120,7 @@ class DeviceTables:
         b, log_spread = between(mi.Vector2f, self.means[set_number], around(place, self.of_means), 1, 0)
         f, x, y, z = (summed(low, high) for low, high in pairwise(ends))
         cosine = dr.fma(dr.safe_sqrt((1 - mu * mu) * (1 - sun * sun)), cos_phi, -mu * sun)
-        scattered = _scattered(self.angular[set_number], cosine, Float)
+        scattered = scattered_at(self.angular[set_number], mi.UInt32(0), cosine)
         # Series take the place of differences where the way is short.
         left, is_short = dr.exp(-behind), behind < coordinates.SHORT
         passed = dr.select(is_short, behind * (1 - behind * (0.5 - behind * (1 / 6))), 1 - left)
@@ -161,6 +151,18 @@ def _inside(t, d):
     thin = thinnest * d / dr.maximum(t, 1e-30)
     inside = dr.select(t > thickest, thick, dr.select(t < thinnest, thin, d))
     return dr.clip(t, thinnest, thickest), inside
+
+
+def place_shares(t, d, sun) -> tuple[Any, Any, Any]:
+    """Return the coordinates of thickness, depth and the cosine of the sun's zenith angle, from 0 to 1."""
+    low, high = (math.log(end + coordinates.THICKNESS_SHIFT) for end in (coordinates.THINNEST, coordinates.THICKEST))
+    upper, lower = (dr.log(1 + length / coordinates.DEPTH_SCALE) for length in (d, t - d))
+    low_sun = coordinates.lowest_sun_coordinate()
+    return (
+        (dr.log(t + coordinates.THICKNESS_SHIFT) - low) / (high - low),
+        upper / dr.maximum(upper + lower, 1e-30),
+        (dr.sqrt(dr.asin(sun) * (2 * dr.inv_pi)) - low_sun) / (1 - low_sun),
+    )
 
 
 def direction_share(mu):
@@ -209,9 +211,10 @@ def _fine_shapes(shapes: Array, ranks: tuple[int, ...]) -> Array:
     return np.concatenate([below, above[1:]])
 
 
-def _scattered(table, cosine, Float):
-    """Return P_s, linear in the angle."""
-    position = dr.safe_acos(cosine) * ((ENTRIES - 1) / math.pi)
+def scattered_at(table, first, cosine):
+    """Return P_s, linear in the angle; `first` is the index of its first entry in the table."""
+    Float = type(cosine)
+    position = dr.safe_acos(cosine) * ((ENTRIES - 1) * dr.inv_pi)
     cell = dr.minimum(mi.UInt32(position), ENTRIES - 2)
-    low, high = dr.gather(Float, table, cell), dr.gather(Float, table, cell + 1)
+    low, high = (dr.gather(Float, table, first + cell + offset) for offset in (0, 1))
     return dr.lerp(low, high, position - Float(cell))

@@ -16,20 +16,26 @@ import drjit as dr
 import mitsuba as mi
 
 #: Networks that sort so many numbers by comparisons of pairs.
-_NETWORKS = {2: ((0, 1),), 3: ((0, 2), (0, 1), (1, 2))}
+_NETWORKS = {
+    2: ((0, 1),),
+    3: ((0, 2), (0, 1), (1, 2)),
+    5: ((0, 3), (1, 4), (0, 2), (1, 3), (0, 1), (2, 4), (1, 2), (3, 4), (2, 3)),
+}
 
 
-def around(places: tuple[Any, ...], sides: tuple[int, ...]) -> list[tuple[Any, Any]]:
+def around(places: tuple[Any, ...], sides: tuple[int, ...], first: Any = 0) -> list[tuple[Any, Any]]:
     """Return indices and weights of the entries around places.
 
     Parameters
     ----------
     places
-        Coordinates from 0 to 1.
+        Coordinates from 0 to 1; two, three or five.
     sides
         Entries along each, the last of which lie side by side.
+    first
+        Index of the first entry.
     """
-    base: Any = mi.UInt32(0)
+    base: Any = mi.UInt32(first)
     pairs: list[tuple[Any, Any]] = []
     for axis, (place, side) in enumerate(zip(places, sides, strict=True)):
         position = dr.clip(place, 0, 1) * (side - 1)

@@ -9,14 +9,9 @@ fifth, with one packet an entry,
 
 where P_s and 1 - exp(-L) are the steep factors that the tables leave out, too, and Q_0(t, d, mu_L) is Q of one level
 direction: deep in thick slabs it falls by many powers of e, so that it has a grid of its own, of three dimensions and
-finer. Between entries it is linear on the
-simplex that holds the place: with the shares f of the place in its cell sorted so that f_1 >= f_2 >= .. >= f_5 and the
-strides s_i in that order,
-
-    v = v_0 (1 - f_1) + v_1 (f_1 - f_2) + .. + v_5 f_5,     v_i the entry at base + s_1 + .. + s_i,
-
-which reads 6 entries where products of five pairs of weights would read 32. The entries are looked up in the tables
-when a scene is prepared. All sets have one code: the number of the set is an offset.
+finer. Between entries it is linear on simplices (`realtime.clouds.canonical.simplex`): 6 entries, where products of
+five pairs of weights would read 32. The entries are looked up in the tables when a scene is prepared. All sets have one
+code: the number of the set is an offset.
 """
 
 import math
@@ -28,6 +23,8 @@ import mitsuba as mi
 
 from realtime.clouds.canonical import coordinates
 from realtime.clouds.canonical.angular import ENTRIES
+from realtime.clouds.canonical.look_up import place_shares, scattered_at
+from realtime.clouds.canonical.simplex import around
 from realtime.numerics.array_types import four_numbers
 
 #: Entries along thickness, depth, sun, direction and azimuth.
@@ -63,24 +60,15 @@ class TransportGrid:
         sigma = dr.exp(log_sigma)
         cosine = dr.fma(dr.safe_sqrt((1 - mu * mu) * (1 - sun * sun)), cos_phi, -mu * sun)
         dimmed = dr.clip(mu_l / coordinates.LOWEST_SUN, 0, 1) * dr.minimum(t / coordinates.THINNEST, 1)
-        T = self._scattered(number, cosine) * _passed(t, d, mu) * dr.exp(source) * dimmed
+        T = scattered_at(self.angular, number * ENTRIES, cosine) * _passed(t, d, mu) * dr.exp(source) * dimmed
         return T, x * sigma, dr.mulsign(y, sin_phi) * sigma, sigma
 
     def _source(self, look_up: Any, number: int, t, d, mu, cos_phi, sin_phi, mu_l) -> tuple[Any, Any, Any, Any]:
         """Return log Q, c_x, c_y and sigma of a set by the tables."""
         T, *collector = look_up(number, t, d, mu, cos_phi, sin_phi, mu_l)
         cosine = dr.fma(dr.safe_sqrt((1 - mu * mu) * (1 - mu_l * mu_l)), cos_phi, -mu * mu_l)
-        steep = self._scattered(mi.UInt32(number), cosine) * _passed(t, d, mu)
+        steep = scattered_at(self.angular, mi.UInt32(number * ENTRIES), cosine) * _passed(t, d, mu)
         return dr.maximum(dr.log(dr.maximum(T / steep, 1e-30)), _DARK), *collector
-
-    def _scattered(self, number, cosine):
-        """Return P_s, linear in the angle."""
-        Float = type(cosine)
-        position = dr.safe_acos(cosine) * ((ENTRIES - 1) * dr.inv_pi)
-        cell = dr.minimum(mi.UInt32(position), ENTRIES - 2)
-        first = number * ENTRIES + cell
-        low, high = (dr.gather(Float, self.angular, place) for place in (first, first + 1))
-        return dr.lerp(low, high, position - Float(cell))
 
 
 def transport_grid(look_up: Any, angular: Any, sets: int) -> TransportGrid:
@@ -133,16 +121,9 @@ def _strides(sides: tuple[int, ...]) -> list[int]:
 
 def _between(kind: Any, table: Any, number, places, sides: tuple[int, ...]) -> Any:
     """Return what a table of a set has at a place, linear on the simplex of entries that holds it."""
-    base, corners = number * math.prod(sides), []
-    for place, side, stride in zip(places, sides, _strides(sides), strict=True):
-        position = dr.clip(place, 0, 1) * (side - 1)
-        cell = dr.minimum(mi.UInt32(position), side - 2)
-        base += cell * stride
-        corners.append((position - type(position)(cell), mi.UInt32(stride)))
-    before, total = type(position)(1), kind(0)
-    for share, stride in [*_sorted(corners), (type(position)(0), mi.UInt32(0))]:
-        total = dr.fma(dr.gather(kind, table, base), before - share, total)
-        before, base = share, base + stride
+    total = kind(0)
+    for index, weight in around(tuple(places), sides, number * math.prod(sides)):
+        total = dr.fma(dr.gather(kind, table, index), weight, total)
     return total
 
 
@@ -154,15 +135,7 @@ def _passed(t, d, mu):
 
 def _shares(t, d, sun, mu):
     """Return the coordinates of thickness, depth, sun and direction, from 0 to 1."""
-    low, high = (math.log(end + coordinates.THICKNESS_SHIFT) for end in (coordinates.THINNEST, coordinates.THICKEST))
-    upper, lower = (dr.log(1 + length / coordinates.DEPTH_SCALE) for length in (d, t - d))
-    low_sun = coordinates.lowest_sun_coordinate()
-    return (
-        (dr.log(t + coordinates.THICKNESS_SHIFT) - low) / (high - low),
-        upper / dr.maximum(upper + lower, 1e-30),
-        (dr.sqrt(dr.asin(sun) * (2 * dr.inv_pi)) - low_sun) / (1 - low_sun),
-        dr.fma(dr.asin(dr.clip(mu, -1, 1)), dr.inv_pi, 0.5),
-    )
+    return *place_shares(t, d, sun), dr.fma(dr.asin(dr.clip(mu, -1, 1)), dr.inv_pi, 0.5)
 
 
 def _places(t_share, d_share, sun_share, mu_share):
@@ -180,21 +153,3 @@ def _places(t_share, d_share, sun_share, mu_share):
     sun = dr.sin(0.5 * dr.pi * dr.square(dr.fma(sun_share, 1 - low_sun, low_sun)))
     mu = dr.sin(dr.pi * (mu_share - 0.5))
     return t, d, sun, dr.select(dr.abs(mu) < _ASIDE, _ASIDE, mu)
-
-
-#: Networks that sort so many numbers by comparisons of pairs.
-_NETWORKS = {
-    3: ((0, 2), (0, 1), (1, 2)),
-    5: ((0, 3), (1, 4), (0, 2), (1, 3), (0, 1), (2, 4), (1, 2), (3, 4), (2, 3)),
-}
-
-
-def _sorted(corners: list[tuple[Any, Any]]) -> list[tuple[Any, Any]]:
-    """Return three or five pairs by their first number, the largest first."""
-    pairs = list(corners)
-    for first, second in _NETWORKS[len(pairs)]:
-        (a, p), (b, q) = pairs[first], pairs[second]
-        less = a < b
-        pairs[first] = dr.select(less, b, a), dr.select(less, q, p)
-        pairs[second] = dr.select(less, a, b), dr.select(less, p, q)
-    return pairs

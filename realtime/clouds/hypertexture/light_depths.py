@@ -13,7 +13,7 @@ map alone takes the way from the first surface for cloud of one density, without
 sigma_t l, so that other extinctions need no new map.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,8 +26,8 @@ from realtime.clouds.single_scattering.march import exact_leg
 from realtime.numerics.array_types import Metres, bytes_of
 from realtime.scene.lights import Light
 from realtime.scene.medium import Clouds
-from realtime.shadow_maps.projection import Projection, light_projection, map_ray
-from realtime.shadow_maps.shadow_map import tiled_corners
+from realtime.shadow_maps.projection import Projection, light_projection
+from realtime.shadow_maps.shadow_map import texel_rays
 
 SIZE, LAYERS = 256, 64  #: texels on a side, layers of each
 
@@ -95,11 +95,9 @@ def light_depths(
         Texels on a side; layers of each.
     """
     Float = type(light.position.x)
-    _, row, column = tiled_corners(1, size)
-    u, v = (dr.fma(mi.Float64(texel), 2.0 / size, 1.0 / size - 1) for texel in (column, row))
-    start, axis = map_ray(light, mi.UInt32(0), u, v)
+    start, axis, texel = texel_rays(light, size)
     Vector = type(light.position)
-    origin, direction, texel = Vector(start), Vector(axis) + dr.zeros(Vector, size * size), row * size + column
+    origin, direction = Vector(start), Vector(axis) + dr.zeros(Vector, size * size)
     top = Float(light.extent.depth)
     dr.eval(origin, direction, texel)
     nothing = dr.full(Float, dr.inf, size * size), dr.zeros(Float, size * size)
@@ -149,6 +147,17 @@ def light_depths(
     dr.eval(lengths, arrays)
     front, back = arrays
     return LightDepths(size, layers, lengths, front, back, light.position, light_projection(light))
+
+
+def sun_depths(
+    surfaces: CloudSurfaces, clouds: Clouds, lights: Sequence[Light], *, stride: Any
+) -> tuple[tuple[LightDepths, ...], ...]:
+    """Return the maps of all suns, by light and cloud; arguments as of `light_depths`."""
+    count = dr.width(clouds.phase)
+    return tuple(
+        tuple(light_depths(surfaces, clouds, light, cloud=cloud, stride=stride) for cloud in range(count))
+        for light in lights
+    )
 
 
 def leg_by_depths(clouds: Clouds, by_cloud: tuple[LightDepths, ...]) -> Callable[[Any, Any], tuple[Any, ...]]:

@@ -29,8 +29,7 @@ from realtime.clouds.hypertexture.march import march, middle_density, voxel
 from realtime.clouds.light_maps.surfaces import LitSurfaces
 from realtime.scene.lights import Light
 from realtime.scene.medium import Clouds
-from realtime.shadow_maps.projection import map_ray
-from realtime.shadow_maps.shadow_map import check_size, tiled_corners
+from realtime.shadow_maps.shadow_map import check_size, texel_rays
 
 
 @dataclass(frozen=True)
@@ -123,9 +122,7 @@ def lit_dense_surface(
     """
     check_size(size)
     Float, Vector = type(light.position.x), type(light.position)
-    _, row, column = tiled_corners(1, size)
-    u, v = (dr.fma(mi.Float64(texel), 2.0 / size, 1.0 / size - 1) for texel in (column, row))
-    start, axis = map_ray(light, mi.UInt32(0), u, v)
+    start, axis, texel = texel_rays(light, size)
     origin, direction = Vector(start), Vector(axis) + dr.zeros(Vector, size * size)
     met = dense_surface(
         surfaces, clouds, origin, direction, Float(dr.inf), threshold=threshold, stride=stride, only=cloud
@@ -145,7 +142,7 @@ def lit_dense_surface(
     front = dr.select(there, Float(light.extent.depth) - distance, 0)
     body = clouds.density.mean_above(cloud, threshold)
     back = dr.select(there, front - met.behind / body, 0)
-    lit = LitSurfaces(size, row * size + column, there, front, back, dr.select(there, normal, 0))
+    lit = LitSurfaces(size, texel, there, front, back, dr.select(there, normal, 0))
     dr.eval(lit)
     return lit
 

@@ -95,7 +95,7 @@ def marched_depths(
 
     def step(depths, x, cloud, inside):
         length = stride * voxel(clouds, cloud, inside)
-        return length * dr.exp(dr.minimum(_least(depths), OPAQUE) / SPREAD) if seen else length
+        return length * dr.exp(dr.minimum(least(depths), OPAQUE) / SPREAD) if seen else length
 
     def add(depths, begin, finish, cloud, inside):
         rho = middle_density(clouds, origin, direction, begin, finish, cloud, inside)
@@ -103,14 +103,15 @@ def marched_depths(
         depths = tuple(
             dr.fma(dr.gather(Float, own, cloud, inside), length, depth) for own, depth in zip(clouds.sigma_t, depths)
         )
-        return depths, _least(depths) < OPAQUE if seen else inside
+        return depths, least(depths) < OPAQUE if seen else inside
 
     nothing = tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
     return march(surfaces, origin, direction, end, nothing, step=step, add=add, active=active)
 
 
-def _least(depths: tuple[Any, ...]) -> Any:
-    least = depths[0]
+def least(depths: tuple[Any, ...]) -> Any:
+    """Return the smallest of depths by channel [1]."""
+    smallest = depths[0]
     for depth in depths[1:]:
-        least = dr.minimum(least, depth)
-    return least
+        smallest = dr.minimum(smallest, depth)
+    return smallest

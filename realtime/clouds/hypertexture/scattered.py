@@ -23,13 +23,11 @@ import mitsuba as mi
 
 from realtime.clouds.bounds.crossings import optical_depths
 from realtime.clouds.bounds.surfaces import CloudSurfaces
-from realtime.clouds.hypertexture.march import OPAQUE, march, marched_depths, middle_density, voxel
-from realtime.clouds.single_scattering.march import Beam, CloudRays, scattered
-from realtime.clouds.single_scattering.opacity import printed_opacity
+from realtime.clouds.hypertexture.march import OPAQUE, least, march, marched_depths, middle_density, voxel
+from realtime.clouds.single_scattering.march import Beam, CloudRays, chosen_value, scattered, step_light
+from realtime.clouds.single_scattering.opacity import add_printed, nothing_printed, printed_opacity
 from realtime.clouds.single_scattering.spacing import SPREAD
 from realtime.scene.medium import Clouds
-
-_SERIES = 0.02  # below it (1 - exp(-d))/d is summed up: d^4/120 is left, 1e-9
 
 
 def with_densities(rays: CloudRays, stride: Any) -> CloudRays:
@@ -115,16 +113,20 @@ def marched_light(
             new_sums.append(
                 tuple(
                     sum_
-                    + dr.select(inside, _light(own, (depths, after), (leg, next_leg), scale, printed, Color), 0)
-                    * (albedo * (0.5 * (shown + next_shown) * _chosen(values, phase)))
-                    for sum_, scale, values in zip(was, beam.scales, beam.phases, strict=True)
+                    + dr.select(inside, term, 0) * (albedo * (0.5 * (shown + next_shown) * chosen_value(values, phase)))
+                    for sum_, term, values in zip(
+                        was,
+                        step_light(beam, own, (depths, after), (leg, next_leg), printed=printed),
+                        beam.phases,
+                        strict=True,
+                    )
                 )
             )
         legs = tuple(
             tuple(dr.select(inside, new, old) for new, old in zip(*pair)) for pair in zip(next_legs, legs, strict=True)
         )
         lit = tuple(dr.select(inside, new, old) for new, old in zip(next_lit, lit, strict=True))
-        return (dr.select(inside, end, last), after, legs, lit, tuple(new_sums)), _shown(after)
+        return (dr.select(inside, end, last), after, legs, lit, tuple(new_sums)), least(after) < OPAQUE
 
     total = (
         dr.full(Float, -1, lanes),
@@ -145,50 +147,13 @@ def marched_printed_opacity(surfaces: CloudSurfaces, clouds: Clouds, origin, dir
     Float, Color, lanes = type(direction.x), type(clouds.albedo), dr.width(direction)
 
     def add(total, begin, finish, cloud, inside):
-        first, sums = total
-        first = dr.select(inside & ~dr.isfinite(first), begin, first)
         rho = middle_density(clouds, origin, direction, begin, finish, cloud, inside)
-        near, far = (dr.select(inside, place - first, 0) for place in (begin, finish))
         kappas = [dr.gather(Float, sigma_t, cloud, inside) * rho for sigma_t in clouds.sigma_t]
-        terms = [
-            dr.select(inside & (kappa > 0), (dr.exp(-kappa * far) - dr.exp(-kappa * near)) / kappa, 0)
-            for kappa in kappas
-        ]
-        return (first, tuple(own + term for own, term in zip(sums, terms))), inside
+        return add_printed(total, begin, finish, kappas, inside), inside
 
     def step(total, x, cloud, inside):
         return stride * voxel(clouds, cloud, inside)
 
-    nothing = dr.full(Float, dr.inf, lanes), tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
+    nothing = nothing_printed(clouds, Float, lanes)
     _, sums = march(surfaces, origin, direction, end, nothing, step=step, add=add)
     return Color(*(sums * (3 // len(sums))))
-
-
-def _light(own, depths, legs, scale, printed: bool, Color) -> Any:
-    """Return the integral over a step of its `own` depths, from `depths` and `legs` at its ends, a colour."""
-    parts = []
-    for part, eye, next_eye, leg, next_leg in zip(own, *depths, *legs, strict=True):
-        first, last = eye + scale * leg, next_eye + scale * next_leg
-        if printed:
-            parts.append(dr.exp(-last) - dr.exp(-first))
-            continue
-        change = dr.abs(part + scale * (next_leg - leg))
-        series = dr.fma(change, dr.fma(change, dr.fma(change, -1 / 24, 1 / 6), -0.5), 1)
-        share = dr.select(change < _SERIES, series, (1 - dr.exp(-change)) / dr.maximum(change, _SERIES))
-        parts.append(part * dr.exp(-dr.minimum(first, last)) * share)
-    return Color(*(parts * (3 // len(parts))))
-
-
-def _shown(depths: tuple[Any, ...]) -> Any:
-    shown = depths[0] < OPAQUE
-    for depth in depths[1:]:
-        shown |= depth < OPAQUE
-    return shown
-
-
-def _chosen(values: tuple[Any, ...], number) -> Any:
-    """Return the value of a number."""
-    chosen = values[0]
-    for place, value in enumerate(values[1:], 1):
-        chosen = dr.select(number == place, value, chosen)
-    return chosen

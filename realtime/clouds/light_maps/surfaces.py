@@ -14,8 +14,7 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.scene.lights import Light
-from realtime.shadow_maps.projection import map_ray
-from realtime.shadow_maps.shadow_map import check_size, tiled_corners
+from realtime.shadow_maps.shadow_map import check_size, texel_rays
 
 
 @dataclass(frozen=True)
@@ -49,9 +48,7 @@ def cast_surfaces(cloud, light: Light, size: int) -> LitSurfaces:
     """
     check_size(size)
     Float, Vector = type(light.position.x), type(light.position)
-    _, row, column = tiled_corners(1, size)
-    u, v = (dr.fma(mi.Float64(texel), 2.0 / size, 1.0 / size - 1) for texel in (column, row))
-    start, axis = map_ray(light, mi.UInt32(0), u, v)
+    start, axis, texel = texel_rays(light, size)
     depth = mi.Float64(light.extent.depth)
     first = mi.Ray3f(mi.Point3f(start), mi.Vector3f(axis))
     last = mi.Ray3f(mi.Point3f(start + axis * depth), mi.Vector3f(-axis))
@@ -62,4 +59,4 @@ def cast_surfaces(cloud, light: Light, size: int) -> LitSurfaces:
     front, back = dr.select(there, Float(depth) - Float(hit.t), 0), dr.select(there, Float(behind.t), 0)
     along = dr.dot(hit.n, mi.Vector3f(axis))
     normal = Vector(dr.select(there, dr.select(along > 0, -hit.n, hit.n), 0))
-    return LitSurfaces(size, row * size + column, there, front, back, normal)
+    return LitSurfaces(size, texel, there, front, back, normal)

@@ -134,13 +134,14 @@ def scattered(
             new_legs, new_shares = legs_at(rays.origin + rays.direction * target, going)
             albedo = dr.gather(Color, clouds.albedo, cloud, going)
             phase = dr.gather(mi.UInt32, clouds.phase, cloud, going) if several else None
+            own_depths = [sigma * length for sigma in sigma_t]
             sums = tuple(
                 tuple(
                     total + dr.select(steps_on, term * factor, 0)
                     for total, term, factor in zip(
                         own,
-                        _terms(beam, sigma_t, length, (depths, after), (was, now), printed=printed),
-                        [albedo * lit * (_chosen(values, phase) if several else 1) for values in beam.phases],
+                        step_light(beam, own_depths, (depths, after), (was, now), printed=printed),
+                        [albedo * lit * (chosen_value(values, phase) if several else 1) for values in beam.phases],
                         strict=True,
                     )
                 )
@@ -192,18 +193,29 @@ def scattered(
     )
 
 
-def _terms(beam: Beam, sigma_t, length, depths, legs, *, printed: bool) -> list[Any]:
-    """Return the integrals over a step by octave, colours; `depths` to the eye and `legs` are those at its two ends."""
+def step_light(beam: Beam, own, depths, legs, *, printed: bool) -> list[Any]:
+    """Return the integrals of exp(-tau - a l) dtau over a step by octave, colours [1].
+
+    Parameters
+    ----------
+    beam
+        The light.
+    own
+        The depth of the step, by channel [1].
+    depths, legs
+        tau and l at its two ends, by channel [1].
+    printed
+        Whether to return what the paper prints.
+    """
     Color = type(beam.irradiance)
-    return [
-        Color(
-            *(
-                _step(sigma * length, (before, then), (scale * leg, scale * next_leg), printed=printed)
-                for sigma, before, then, leg, next_leg in zip(sigma_t, *depths, *legs, strict=True)
-            )
-        )
-        for scale in beam.scales
-    ]
+    by_octave = []
+    for scale in beam.scales:
+        parts = [
+            _step(part, (before, then), (scale * leg, scale * next_leg), printed=printed)
+            for part, before, then, leg, next_leg in zip(own, *depths, *legs, strict=True)
+        ]
+        by_octave.append(Color(*(parts * (3 // len(parts)))))
+    return by_octave
 
 
 def _step(depth, eye, leg, *, printed: bool):
@@ -217,8 +229,8 @@ def _step(depth, eye, leg, *, printed: bool):
     return depth * dr.exp(-dr.minimum(first, last)) * share
 
 
-def _chosen(values: tuple[Any, ...], number):
-    """Return the value of a number."""
+def chosen_value(values: tuple[Any, ...], number) -> Any:
+    """Return the value of a number, which may differ between lanes."""
     chosen = values[0]
     for place, value in enumerate(values[1:], 1):
         chosen = dr.select(number == place, value, chosen)

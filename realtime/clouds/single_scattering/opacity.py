@@ -51,17 +51,25 @@ def printed_opacity(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, 
     Float, Color = type(direction.x), type(clouds.albedo)
 
     def add(total, begin, end, cloud, inside):
-        first, sums = total
-        first = dr.select(inside & ~dr.isfinite(first), begin, first)
-        near, far = (dr.select(inside, place - first, 0) for place in (begin, end))
         kappas = [dr.gather(Float, sigma_t, cloud, inside) for sigma_t in clouds.sigma_t]
-        terms = [
-            dr.select(inside & (kappa > 0), (dr.exp(-kappa * far) - dr.exp(-kappa * near)) / kappa, 0)
-            for kappa in kappas
-        ]
-        return first, tuple(own + term for own, term in zip(sums, terms))
+        return add_printed(total, begin, end, kappas, inside)
 
-    lanes = dr.width(direction)
-    nothing = dr.full(Float, dr.inf, lanes), tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
+    nothing = nothing_printed(clouds, Float, dr.width(direction))
     _, sums = sum_over_stretches(surfaces, origin, direction, end, nothing, add)
     return Color(*sums)
+
+
+def nothing_printed(clouds: Clouds, Float, lanes: int) -> tuple[Any, tuple[Any, ...]]:
+    """Return the sum of no stretch: where the first cloud begins, infinite, and 0 by channel."""
+    return dr.full(Float, dr.inf, lanes), tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
+
+
+def add_printed(total, begin, end, kappas, inside) -> tuple[Any, tuple[Any, ...]]:
+    """Return `total` and what is printed for a stretch [m] of the extinctions `kappas` [1/m], where it is `inside`."""
+    first, sums = total
+    first = dr.select(inside & ~dr.isfinite(first), begin, first)
+    near, far = (dr.select(inside, place - first, 0) for place in (begin, end))
+    terms = [
+        dr.select(inside & (kappa > 0), (dr.exp(-kappa * far) - dr.exp(-kappa * near)) / kappa, 0) for kappa in kappas
+    ]
+    return first, tuple(own + term for own, term in zip(sums, terms))
