@@ -154,7 +154,7 @@ class CollectorParameters(Parameters):
     stride: float = parameter(
         1.0, "longest step through a grid of densities where a ray enters", above=0, most=100, unit="voxels"
     )
-    map: int = map_size(512, "texels on a side of the maps of a sun")
+    map: int = map_size(256, "texels on a side of the maps of a sun")
     tolerance: float = tolerance()
 
 
