@@ -31,8 +31,7 @@ def compute(folder: Path | str, *, quick: bool = False, progress: Progress | Non
     """
     from reference.storage.exr import Image, write_exr
     from reports.plotting.pictures import exposure
-    from validation.papers.bouthors_clouds import GAP, LOBES, RESULTS, SAMPLES, SIZE, pair_of
-    from validation.scenes.loading import load_scene
+    from validation.papers.bouthors_clouds import GAP, LOBES, RESULTS, SAMPLES, SIZE, pair_of, shown
 
     target = ensure_folder(folder)
     size, samples = ((24, 18), 16) if quick else (SIZE, SAMPLES)
@@ -40,7 +39,7 @@ def compute(folder: Path | str, *, quick: bool = False, progress: Progress | Non
     rows: list[tuple[str, str, str, float]] = []
     for number, (name, figure) in enumerate(scenes.items()):
         part = part_of(progress, number / len(scenes), (number + 1) / len(scenes), before=f"{name}, ")
-        pair = pair_of(load_scene(name, size), samples, part)
+        pair = pair_of(shown(name, size), samples, part)
         factor = exposure(pair.image)
         for way, image in (("collectors", pair.image), ("light paths", pair.truth)):
             file = f"{NAME}-{name}-{way.replace(' ', '-')}.exr"

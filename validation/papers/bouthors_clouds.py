@@ -33,21 +33,26 @@ from reference.scene.clouds import CloudScene, read_clouds
 from validation.configurations.timing import first_frame
 from validation.estimates.budget import Budget
 from validation.estimates.images import cloud_orders, monte_carlo_reference
-from validation.scenes.cloud_parts import without_peak
+from validation.scenes.cloud_parts import cloud, droplets, sun, without_peak
 from validation.scenes.cumulus import cumulus_mesh
 from validation.scenes.loading import LoadedScene, load_scene, resize
 from validation.scenes.parts import medium_boundary
 from validation.scenes.registry import SCENES
+from validation.scenes.ring import ring_mesh
 from validation.scenes.stratocumulus import stratocumulus_mesh
+from validation.scenes.two_lobes import two_lobes_mesh
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
 SIZE, SAMPLES = (80, 60), 512
+_FEWER = 4  #: times as few in Fig. 11, of which means over pixels are compared
 #: Fig. 12, with the meshes that the medium without its peak is filled into.
 RESULTS = {"stratocumulus": stratocumulus_mesh, "cumulus": cumulus_mesh}
 GAP, LOBES = "ring", "two-lobes"
+_MESHES = {**RESULTS, GAP: ring_mesh, LOBES: two_lobes_mesh}
 _METHOD = "cloud-collectors"
+_HIGH = (0.013, 0.029, -1.0)  #: way of the sun's light over the ring
 _MOST = 16  #: crossings of a ray towards the sun
 _ASIDE, _WIDTH = 250.0, 60.0  #: where searches start beside a point, and how wide [m]
 _APART = 1.0  #: distance of their ends from which on there are two [sigma]
@@ -91,11 +96,24 @@ def clouds_study(
     data: dict[str, Any] = {"results": {}, "by_order": {}}
     for number, name in enumerate(RESULTS):
         begin, end = 0.35 * number, 0.35 * (number + 1)
-        data["results"][name] = _apart(pair_of(load_scene(name, size), samples, _part(tell, begin, end, name)))
+        data["results"][name] = _apart(pair_of(shown(name, size), samples, _part(tell, begin, end, name)))
         data["by_order"][name] = _by_order(name, size, samples, _part(tell, begin + 0.15, end, name))
-    data["gap"] = _gap(load_scene(GAP, size), samples, _part(tell, 0.7, 0.85, GAP))
-    data["lobes"] = _lobes(load_scene(LOBES, size), samples, _part(tell, 0.85, 1.0, LOBES))
+    fewer = max(2, samples // _FEWER)
+    data["gap"] = _gap(shown(GAP, size), fewer, _part(tell, 0.7, 0.85, GAP))
+    data["lobes"] = _lobes(shown(LOBES, size), fewer, _part(tell, 0.85, 1.0, LOBES))
     return data
+
+
+def shown(name: str, size: tuple[int, int]) -> LoadedScene:
+    """Return a scene of these figures.
+
+    Those of Fig. 11 are filled with droplets, whose tables are there already; over the ring the sun stands so high that
+    the upper part shades the lower.
+    """
+    if name in RESULTS:
+        return load_scene(name, size)
+    parts = {"sun": sun(_HIGH, (3.17, 3.05, 2.83))} if name == GAP else {}
+    return _filled(name, size, cloud(droplets()), **parts)
 
 
 def pair_of(loaded: LoadedScene, samples: int, progress: Progress | None = None, **parameters: Any) -> _Pair:
@@ -179,11 +197,15 @@ def _by_order(name: str, size: tuple[int, int], samples: int, progress: Progress
 
 def _in_the_sun(name: str, size: tuple[int, int], peak: float | None) -> LoadedScene:
     """Return a scene without its sky, and with a share of the peak its medium without that."""
+    return _filled(name, size, None if peak is None else without_peak(peak), sky=None)
+
+
+def _filled(name: str, size: tuple[int, int], medium: dict[str, Any] | None, **parts: Any) -> LoadedScene:
+    """Return a scene with another medium in its cloud, if one is given, and other parts; None leaves one out."""
     record = SCENES[name]
-    description = record.build()
-    description.pop("sky", None)
-    if peak is not None:
-        description["cloud"] = medium_boundary("cloud", RESULTS[name](), without_peak(peak))
+    description = {key: part for key, part in (record.build() | parts).items() if part is not None}
+    if medium is not None:
+        description["cloud"] = medium_boundary("cloud", _MESHES[name](), medium)
     loaded = LoadedScene(name, mi.load_dict(description), record.purpose, record.published)
     resize(loaded.scene, size)
     return loaded

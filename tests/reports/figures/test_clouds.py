@@ -2,12 +2,12 @@
 """Claim: the figures of clouds are drawn from what the studies gave, twice to the same bytes."""
 
 import numpy as np
-import pytest
 
 import validation.papers.bouthors_clouds as bouthors_clouds
 import validation.papers.bouthors_transport as bouthors_transport
 from reports.figures import cloud_images, cloud_transport
 from reports.figures.files import plot, read_data
+from validation.scenes.loading import LoadedScene
 
 
 def drawn_twice(module, folder):
@@ -42,10 +42,7 @@ def test_clouds_stand_above_the_truth_in_the_same_exposure(monkeypatch, tmp_path
         return bouthors_clouds._Pair(np.full((18, 24, 3), 0.5), np.full((18, 24, 3), 0.25), None, {}, {})
 
     monkeypatch.setattr(bouthors_clouds, "pair_of", pair)
-    pytest.importorskip("mitsuba")
-    from validation.scenes import loading
-
-    monkeypatch.setattr(loading, "load_scene", lambda name, size: loading.LoadedScene(name, None, "", ""))
+    monkeypatch.setattr(bouthors_clouds, "shown", lambda name, size: LoadedScene(name, None, "", ""))
     cloud_images.compute(tmp_path, quick=True)
     rows = read_data(tmp_path, "cloud-images")
     assert [row["way"] for row in rows] == ["collectors"] * 4 + ["light paths"] * 4
