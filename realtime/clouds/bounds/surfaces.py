@@ -36,7 +36,9 @@ def cloud_surfaces(scene: Scene) -> CloudSurfaces:
     cloud[numbers] = np.arange(len(shapes))
     facets = mi.Float(np.concatenate(rows).ravel())
     spheres = not all(shape.is_mesh() for shape in shapes)
-    surfaces = CloudSurfaces(boundary_scene(shapes), mi.UInt32(first), mi.UInt32(cloud), facets, spheres, len(shapes) > 1)
+    surfaces = CloudSurfaces(
+        boundary_scene(shapes), mi.UInt32(first), mi.UInt32(cloud), facets, spheres, len(shapes) > 1
+    )
     dr.make_opaque(surfaces.first, surfaces.cloud, surfaces.facets)
     return surfaces
 
