@@ -14,6 +14,7 @@ Read in this order:
 - `kernels/`: errors, cost, convergence and stability of airlight kernels;
 - `oracles/`: slow programs that compute the airlight of a light volume in float64;
 - `frames/`: errors and cost of whole frames, scene by scene, and the comparison with `baselines/`;
+- `scaling/`: what a method costs as its work grows;
 - `papers/`: the results of papers measured again;
 - `fidelity/`: a verdict for every claim of these papers;
 - `slab/`: a slab by order of scattering, on both sides;

@@ -9,6 +9,9 @@ frame serves the next one too: `realtime.frame.incremental`.
 Where there are lights with extent, a renderer has groups of lights (`LightGroups`): those without extent together, then
 each light point by itself. The stages for light points are recorded once and replayed for every one; their radiance is
 added up. What the stages of a single group take and return is a tuple by group then: states, surfaces and lists.
+
+A large image of a method that computes each ray by itself is rendered in parts, one after the other (`parts`): what a
+frame needs beside the image that it shows is then that of a part.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -39,6 +42,8 @@ from realtime.tiles.adaptive_sampling import Corners, tile_corners
 from realtime.tiles.layout import TILE
 
 _ROOM = 2**30  # of states of groups of lights, such as shadow maps [bytes]
+_LARGE = 2**21  # pixels; a larger image is rendered in parts where it can be
+_PART = 2**20  # pixels of a part at most
 _MOST_KEPT = 32  # groups of lights of which states, surfaces and lists are kept; those of others are made when needed
 
 
@@ -70,6 +75,7 @@ class FrameRenderer:
     shade_casts_rays: bool  #: whether shading asks Mitsuba for shapes or shadows
     casts_rays: bool  #: whether the method casts rays of its own
     carries: bool  #: whether the method hands arrays on to the next frame
+    by_rays: bool  #: whether each ray is computed by itself, so that any part of the image can be rendered alone
     extra_layers: bool  #: whether `render` returns `Layers.extra` too
     groups: LightGroups | None = None  #: where the scene has lights with extent
 
@@ -290,6 +296,7 @@ def _stages(
         shade_casts_rays=shade_casts_rays,
         casts_rays=casts_rays,
         carries=carries,
+        by_rays=by_rays and not has_passes and not carries and corners is None,
         extra_layers=extra_layers,
     )
 
@@ -300,24 +307,59 @@ def _has_passes(method: Method, parameters: Any) -> bool:
 
 def render_frame(renderer: FrameRenderer) -> Frame:
     """Render one frame and bring it to the host in the order of the image."""
-    cast, by_light = run_cast_and_shade(renderer)
-    layers = run_method(renderer, renderer.prepare(renderer.scene), cast, by_light)
-    return image_frame(renderer, evaluated(cast, by_light, layers), layers[2])
+    state, frame = renderer.prepare(renderer.scene), None
+    for part in parts(renderer):
+        cast, by_light = run_cast_and_shade(part)
+        layers = run_method(part, state, cast, by_light)
+        stages, extra = evaluated(cast, by_light, layers), layers[2]
+        del cast, by_light, layers
+        if dr.width(renderer.pixel) > _LARGE:
+            dr.flush_malloc_cache()  # what was freed: the host's images need room now
+        frame = _with_part(frame, part, stages, extra)
+    assert frame is not None
+    check_radiance(renderer.scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
+    return frame
+
+
+def parts(renderer: FrameRenderer) -> tuple[FrameRenderer, ...]:
+    """Return renderers of the parts of a large image, of about one size each; the renderer itself where that is all."""
+    count = dr.width(renderer.pixel)
+    if not renderer.by_rays or count <= _LARGE:
+        return (renderer,)
+    block = TILE * TILE
+    length = -(-count // (-(-count // _PART) * block)) * block
+    lanes = [dr.arange(mi.UInt32, begin, min(begin + length, count)) for begin in range(0, count, length)]
+    pixels = [dr.gather(mi.UInt32, renderer.pixel, lane) for lane in lanes]
+    dr.eval(pixels)
+    return tuple(_of_pixels(renderer, pixel) for pixel in pixels)
+
+
+def _of_pixels(renderer: FrameRenderer, pixel: PerRay) -> FrameRenderer:
+    """Return a renderer of some pixels."""
+    groups = renderer.groups
+    if groups is not None:
+        whole, of_point = (each and replace(each, pixel=pixel) for each in (groups.whole, groups.of_point))
+        groups = replace(groups, whole=whole, of_point=of_point)
+    return replace(renderer, pixel=pixel, groups=groups)
 
 
 def image_frame(renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None = None) -> Frame:
     """Bring `stages`, what `run_stages` returned, to the host in the order of the image, and `extra` layers."""
-    distance, surface, airlight = stages
-    height, width = renderer.scene.camera.height, renderer.scene.camera.width
-    shown = {name: _colour(renderer, values) for name, values in (extra or {}).items()}
-    frame = Frame(
-        _image(renderer, airlight, (height, width, 3)),
-        _image(renderer, surface, (height, width, 3)),
-        _image(renderer, distance, (height, width)),
-        {name: _image(renderer, values, (height, width, 3)) for name, values in shown.items()},
-    )
+    frame = _with_part(None, renderer, stages, extra)
     check_radiance(renderer.scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
     return frame
+
+
+def _with_part(frame: Frame | None, renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None) -> Frame:
+    """Return a frame with the pixels of a renderer written into it; a new one where there is none yet."""
+    distance, surface, airlight = stages
+    shown = {name: _colour(renderer, values) for name, values in (extra or {}).items()}
+    return Frame(
+        _image(renderer, airlight, frame and frame.airlight),
+        _image(renderer, surface, frame and frame.surface),
+        _image(renderer, distance, frame and frame.distance),
+        {name: _image(renderer, values, frame and frame.extra[name]) for name, values in shown.items()},
+    )
 
 
 def run_stages(renderer: FrameRenderer, state):
@@ -550,10 +592,14 @@ def _colour(renderer: FrameRenderer, values):
     return values if isinstance(values, Color) else Color(values)
 
 
-def _image(renderer: FrameRenderer, values, shape):
-    lanes = np.array(values)
-    lanes = lanes.T if lanes.ndim == 2 else lanes
-    lanes = np.broadcast_to(lanes, (dr.width(renderer.pixel), *lanes.shape[1:]))  # a constant has one entry
-    image = np.empty_like(lanes)
-    image[np.array(renderer.pixel)] = lanes
-    return image.reshape(shape)
+def _image(renderer: FrameRenderer, values, image=None):
+    """Write values by lane to their pixels of an image (height, width[, 3]), a new one by default, and return it."""
+    camera, pixel = renderer.scene.camera, np.array(renderer.pixel)
+    channels = [np.array(channel) for channel in values] if dr.depth_v(values) > 1 else [np.array(values)]
+    if image is None:
+        image = np.empty((camera.height, camera.width, len(channels)), dtype=channels[0].dtype)
+        image = image if dr.depth_v(values) > 1 else image[..., 0]
+    by_pixel = image.reshape(-1, len(channels))
+    for number, channel in enumerate(channels):
+        by_pixel[pixel, number] = channel
+    return image

@@ -8,9 +8,11 @@ Read in this order:
 - `kernels.py`: kernels alone, and what their derivatives cost
 - `estimators.py`: Monte Carlo estimators at equal error
 - `octaves.py`: the constants of cloud-octaves that fit best
+- `scaling.py`: what methods cost as their work grows
 - `diagnosis.py`: planted faults and what a diagnosis answers
 
 May import: `analytic`, `realtime.errors`, `realtime.kernels`, `realtime.scene`, `reference.storage`, `reports.data`,
 `reports.figures`, `reports.machine`, `reports.tables`, `validation.configurations`, `validation.diagnosis`,
-`validation.estimates`, `validation.frames`, `validation.kernels`, `validation.metrics`, `validation.scenes`.
+`validation.estimates`, `validation.frames`, `validation.kernels`, `validation.metrics`,
+`validation.scaling`, `validation.scenes`.
 """

@@ -44,6 +44,6 @@ May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`,
 `reports.interchange`, `reports.machine`, `reports.papers`, `reports.plotting`, `reports.report`, `reports.tables`,
 `reports.view`, `validation.canonical`, `validation.certified`, `validation.comparison`, `validation.configurations`,
 `validation.diagnosis`, `validation.estimates`, `validation.fidelity`, `validation.fit`, `validation.frames`,
-`validation.kernels`, `validation.metrics`, `validation.mutations`, `validation.papers`, `validation.scenes`,
-`validation.slab`.
+`validation.kernels`, `validation.metrics`, `validation.mutations`, `validation.papers`, `validation.scaling`,
+`validation.scenes`, `validation.slab`.
 """

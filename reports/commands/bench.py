@@ -13,6 +13,7 @@ from reports.bench.estimators import print_estimators
 from reports.bench.kernels import print_gradients, print_kernels
 from reports.bench.methods import print_methods, steps
 from reports.bench.octaves import print_octave_fits
+from reports.bench.scaling import print_scaling
 from reports.commands import completion
 from reports.commands.options import (
     USUAL_LIMIT,
@@ -73,6 +74,14 @@ def bench(
         bool,
         typer.Option("--stages", help="Time the stages of cloud-collectors, and count searches without end."),
     ] = False,
+    scaling: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KINDS",
+            help="Time methods as their work grows: some of size,triangles,lights,media,map.",
+            show_default=False,
+        ),
+    ] = None,
     against: Annotated[
         Path | None,
         typer.Option(
@@ -119,6 +128,9 @@ def bench(
     --stages prints what light maps, order 1 and frames of cloud-collectors take, stratocumulus by default, and in how
     many pixels a search is far from its end; parameters come by --set.
 
+    --scaling prints times, memory and exponents by pixels, triangles, lights, bounded media or texels of the map, of
+    colonnade and one configuration of each method with shadows by default. Exit status 1 if a time jumps.
+
     --decompose prints by which causes each image is wrong: parts that add up to its error, differences of renders in
     which one cause after the other is gone.
     """
@@ -163,14 +175,22 @@ def bench(
     from reports.machine.printing import print_notes
     from validation.configurations.methods import rendered_lights
     from validation.frames.expected_work import check_work, frame_work, truth_work
+    from validation.scaling.study import METHODS
     from validation.scenes.loading import load_scene, parse_size
     from validation.scenes.registry import FOG_SCENES
 
     chosen = named_configurations(
-        named("--method", method, "--methods", methods), named_kernels, settings or [], limit=method_limit
+        named("--method", method, "--methods", methods),
+        named_kernels,
+        settings or [],
+        usual=None if scaling is None else METHODS,
+        limit=method_limit,
     )
     apart = partial(in_own_process, limit=method_limit)
     pixels = parse_size(size) if size else None
+    if scaling is not None:
+        print_scaling(scenes, scaling, size=pixels, chosen=chosen, json=json, markdown=markdown)
+        return
     activate()
     names = scenes or list(FOG_SCENES)
     works = []

@@ -27,6 +27,7 @@ FIGURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "cloud-transport": ("cloud_transport", ("quick", "progress")),
     "cloud-images": ("cloud_images", ("quick", "progress")),
     "map-size": ("map_size", ("quick", "progress")),
+    "scaling": ("scaling", ("quick", "progress")),
     "stages": ("stages", ("quick", "progress", "published")),
     "published": ("published", ("quick", "progress", "published")),
     "paper-images": ("paper_images", ("quick",)),

@@ -23,6 +23,7 @@ Read in this order:
 - `polynomials.py`: Biri's polynomials
 - `published.py`: frames a second beside the papers
 - `slab_orders.py`: a slab by order of scattering
+- `scaling.py`: time of a frame over its work
 - `stages.py`: shares of the stages of a frame
 - `strip.py`: images with insets and errors
 - `z_distribution.py`: standardised errors of the estimators
@@ -30,5 +31,5 @@ Read in this order:
 May import: `analytic`, `realtime.kernels`, `realtime.scene`, `reference.storage`, `reports.data`, `reports.machine`,
 `reports.papers`, `reports.plotting`, `reports.tables`, `validation.configurations`, `validation.estimates`,
 `validation.frames`, `validation.fidelity`, `validation.kernels`, `validation.papers`, `validation.scenes`,
-`validation.slab`.
+`validation.scaling`, `validation.slab`.
 """

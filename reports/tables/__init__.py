@@ -18,6 +18,7 @@ Read in this order:
 - `cloud_stages.py`: the stages of collectors for clouds, and their searches
 - `octave_fit.py`: the constants of octaves that fit best
 - `map_size.py`: error and flicker against the size of the shadow map
+- `scaling.py`: what methods cost as their work grows, and exponents
 - `slab.py`: a slab by order of scattering
 - `diagnosis.py`: planted faults and the answers
 - `fit.py`: parameters that explain an image

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from realtime.frame.incremental import FrameCache, next_frame
 from realtime.frame.renderer import (
     FrameRenderer,
+    parts,
     run_cast_and_shade,
     run_cull,
     run_method,
@@ -189,8 +190,10 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | N
         Time to spend on each of the first three, and half of it on each of the others.
     slow
         If the airlight takes longer than this, whole frames are run stage by stage and the seven are added up from
-        them: up to five frames in place of some forty; `SLOW` by default [s].
+        them: up to five frames in place of some forty; `SLOW` by default [s]. So are images that are rendered in parts.
     """
+    if len(parts(renderer)) > 1:
+        return _slow_frame(renderer, turns=3)
     scene = renderer.scene
     cache = first_frame(renderer)
     state, cast = cache.state, cache.cast
@@ -234,7 +237,7 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | N
 
 def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
     """Time the stages of some frames."""
-    scene = renderer.scene
+    scene, in_parts = renderer.scene, parts(renderer)
     objects = _objects(scene)
     steps = []
     for _ in range(turns):
@@ -248,17 +251,22 @@ def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
         done()
         state = renderer.prepare(there)
         done()
-        cast, by_light = run_cast_and_shade(renderer)
-        dr.eval(cast, by_light)
-        done()
-        dr.eval(run_shade(renderer, cast))
-        done()
-        lists = run_cull(renderer, state, cast.distance)
-        done()
-        dr.eval(run_method(renderer, state, cast, by_light, lists))
-        done()
-        steps.append(1e3 * np.diff(times))
-    move, prepare, surface, shade, in_tiles, rest = np.array(steps).T
+        of_parts = np.zeros(4)
+        for part in in_parts:
+            cast, by_light = run_cast_and_shade(part)
+            dr.eval(cast, by_light)
+            done()
+            dr.eval(run_shade(part, cast))
+            done()
+            # Of many groups of lights in a large image, the lists would take most of the memory.
+            apart = part.groups is None or len(in_parts) == 1
+            lists = run_cull(part, state, cast.distance) if apart else None
+            done()
+            dr.eval(run_method(part, state, cast, by_light, lists))
+            done()
+            of_parts += np.diff(times[-5:])
+        steps.append([*np.diff(times[:3]), *of_parts])
+    move, prepare, surface, shade, in_tiles, rest = 1e3 * np.array(steps).T
     needed = renderer.method.prepared_from
 
     def timing(milliseconds: NDArray[np.float64]) -> Timing:

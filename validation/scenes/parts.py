@@ -111,18 +111,24 @@ def joined(meshes: Sequence[Mesh]) -> Mesh:
 def mitsuba_mesh(name: str, mesh: Mesh, reflectance: Sequence[float]):
     """Return a Mitsuba mesh with flat shading and a two-sided diffuse material of RGB `reflectance` [1], 0 to 1."""
     diffuse = {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(reflectance)}}
-    return _mesh(name, mesh, {"mesh_bsdf": {"type": "twosided", "bsdf": diffuse}})
+    return mesh_with_material(name, mesh, mi.load_dict({"type": "twosided", "bsdf": diffuse}))
+
+
+def mesh_with_material(name: str, mesh: Mesh, material):
+    """Return a Mitsuba mesh with flat shading and a Mitsuba `material`."""
+    return _mesh(name, mesh, {"mesh_bsdf": material})
 
 
 def medium_boundary(name: str, mesh: Mesh, medium: dict[str, Any]):
     """Return a Mitsuba mesh of the material `null` around a medium, the boundary of a bounded medium."""
-    return _mesh(name, mesh, {"mesh_bsdf": {"type": "null"}, "interior": medium | {"id": f"{name}-medium"}})
+    described = {"mesh_bsdf": {"type": "null"}, "interior": medium | {"id": f"{name}-medium"}}
+    return _mesh(name, mesh, {key: mi.load_dict(plugin) for key, plugin in described.items()})
 
 
-def _mesh(name: str, mesh: Mesh, plugins: dict[str, dict[str, Any]]):
+def _mesh(name: str, mesh: Mesh, plugins: dict[str, Any]):
     properties = mi.Properties()
     for key, plugin in plugins.items():
-        properties[key] = mi.load_dict(plugin)
+        properties[key] = plugin
     vertices, faces = mesh
     result = mi.Mesh(name, vertex_count=len(vertices), face_count=len(faces), props=properties)
     parameters = mi.traverse(result)

@@ -110,3 +110,16 @@ def test_kernels_are_named_by_an_option(variant, capfd, monkeypatch):
     for words in ([], ["--kernel", "exact"], ["--kernel", "exact,table", "--kernel", "taylor-8"]):
         assert cli.run(["bench", "--kernels", *words, "--json"]) == 0
     assert asked == [None, ["exact"], ["exact", "table", "taylor-8"]]
+
+
+def test_scaling_prints_steps_and_exponents(variant, capfd):
+    arguments = ["bench", "sphere-spot", "--scaling", "size", "--size", "16x12", "--method", "unshadowed"]
+    assert cli.run([*arguments, "--kernel", "taylor", "--json"]) in (0, 1)  # a busy machine may show a jump
+    (record,) = json.loads(capfd.readouterr().out)["scaling"]
+    assert [cost["work"] for cost in record["costs"]] == [8 * 6, 16 * 12, 32 * 24, 64 * 48]
+    assert set(record["growth"]) == {"frame", "light_moved", "objects_moved"}
+    assert all(cost["frame"]["median_ms"] > 0 for cost in record["costs"])
+    assert cli.run(["bench", "open-fog", "--scaling", "size,speed"]) == 2
+    assert "--scaling: got 'speed', wanted some of size,triangles,lights,media,map" in capfd.readouterr().err
+    assert cli.run(["bench", "open-fog", "--scaling", "media"]) == 2
+    assert "0 bounded media" in capfd.readouterr().err

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a method costs as its work grows, and the exponents of its times."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from reports.tables.table import Column, Row, Table, measured, numbers, table, words
+
+Record = Mapping[str, Any]  #: a result of `airlight bench --scaling --json`
+
+WORK = {
+    "size": "pixels",
+    "triangles": "triangles",
+    "lights": "lights",
+    "media": "bounded media",
+    "map": "texels on a side of the map",
+}
+TIMES = {"frame": "frame", "light_moved": "light moved", "objects_moved": "objects moved"}
+
+_MS = {"unit": "ms"}
+_EXPONENTS = (
+    (key, heading) for own, name in TIMES.items() for key, heading in ((own, name), (f"{own}_steepest", "steepest"))
+)
+_GROWTH = (
+    *words(kind="work", label="method"),
+    *(Column(key, heading) for key, heading in _EXPONENTS),
+    *words(cliff="cliff"),
+)
+
+
+def scaling_tables(records: Iterable[Record]) -> list[Table]:
+    """Return a table of costs for each kind of work in a scene, and one of all exponents."""
+    records = list(records)
+    kinds = dict.fromkeys((record["scene"], record["kind"]) for record in records)
+    tables = [
+        _costs(scene, kind, [record for record in records if (record["scene"], record["kind"]) == (scene, kind)])
+        for scene, kind in kinds
+    ]
+    scenes = dict.fromkeys(record["scene"] for record in records)
+    return tables + [_exponents(scene, [record for record in records if record["scene"] == scene]) for scene in scenes]
+
+
+def cliffs(records: Iterable[Record]) -> list[str]:
+    """Return a sentence for every time that jumps."""
+    return [
+        f"{record['scene']}, {record['label']}: {TIMES[name]} grows with the power {own['steepest']:.2g} of the "
+        f"{WORK[record['kind']]} up to {own['at']:g}"
+        for record in records
+        for name, own in record["growth"].items()
+        if own["cliff"]
+    ]
+
+
+def _costs(scene: str, kind: str, records: list[Record]) -> Table:
+    columns = (
+        *words(label="method"),
+        *numbers(work=WORK[kind], how={"whole": True}),
+        *numbers(**TIMES, rays="rays alone", how=_MS),
+        *numbers(memory="memory [MiB]"),
+    )
+    rows = []
+    for record in records:
+        rows += [
+            Row(
+                {"label": record["label"], "work": cost["work"], "memory": cost["memory"]}
+                | {name: measured(cost[name]) for name in (*TIMES, "rays")}
+            )
+            for cost in record["costs"]
+        ]
+        if record["refused"]:
+            rows.append(Row({"label": record["label"]}, f"refused: {record['refused']}"))
+    size = "" if kind == "size" else ", {} x {}".format(*records[0]["size"])
+    explanation = (
+        "Medians; rays alone: the camera rays without shading, the floor of a frame that casts them. Memory: what one "
+        "frame takes at its peak, prepared anew, with its image on the host."
+    )
+    return table(f"{scene} by {WORK[kind]}{size}", columns, rows, explanation=explanation)
+
+
+def _exponents(scene: str, records: list[Record]) -> Table:
+    rows = []
+    for record in records:
+        if len(record["costs"]) < 2:
+            continue
+        values: dict[str, Any] = {"kind": WORK[record["kind"]], "label": record["label"]}
+        for name, own in record["growth"].items():
+            values |= {name: own["exponent"], f"{name}_steepest": own["steepest"]}
+        jumps = [TIMES[name] for name, own in record["growth"].items() if own["cliff"]]
+        rows.append(Row(values | {"cliff": ", ".join(jumps) or "no"}))
+    explanation = (
+        "Exponents e of time ~ work^e, fitted to all steps; steepest: between two steps that follow one another. "
+        "A cliff: steeper than the work asks for by 0.6, in a time above 5 ms."
+    )
+    return table(f"{scene}: how times grow", _GROWTH, rows, explanation=explanation)

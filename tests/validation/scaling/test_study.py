@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Exponents are those of the times, a jump is called a cliff, and each kind of work has its steps."""
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+
+
+def costs(works, times):
+    from validation.configurations.timing import Timing
+    from validation.scaling.study import Cost
+
+    made = [Timing(time, 0.9 * time, 1.1 * time, 7) for time in times]
+    return [Cost(work, time, time, time, time, None) for work, time in zip(works, made)]
+
+
+@pytest.mark.parametrize("exponent", [0.0, 0.37, 1.0, 1.7])
+def test_a_power_is_found_and_is_no_cliff(exponent):
+    from validation.scaling.study import growth
+
+    works = [1000 * 4**level for level in range(5)]
+    found = growth("map", "light_moved", costs(works, [7.3 * work**exponent for work in works]))
+    assert found.exponent == pytest.approx(exponent, abs=1e-12)
+    assert found.steepest == pytest.approx(exponent, abs=1e-12)
+    assert not found.cliff
+
+
+def test_a_jump_is_a_cliff():
+    """The times of shadow planes before their wedges: 17 times the time for 4 times the triangles."""
+    from validation.scaling.study import growth
+
+    works = [20480, 81920, 327680, 1310720, 5242880]
+    found = growth("triangles", "frame", costs(works, [57, 81, 128, 2148, 5645]))
+    assert found.cliff
+    assert found.at == 1310720
+    assert found.steepest == pytest.approx(np.log(2148 / 128) / np.log(4))
+    # The same after them, and light volumes: none.
+    assert not growth("triangles", "frame", costs(works, [57, 81, 128, 259, 512])).cliff
+    assert not growth("triangles", "frame", costs(works, [32, 34, 38, 39, 45])).cliff
+    # Short times are those of launches: a jump of them says nothing.
+    assert not growth("triangles", "frame", costs(works, [0.1, 0.1, 0.1, 3.9, 4.1])).cliff
+
+
+def test_one_step_has_no_exponent():
+    from validation.scaling.study import growth
+
+    found = growth("media", "frame", costs([1], [7.0]))
+    assert np.isnan(found.exponent)
+    assert np.isnan(found.steepest)
+    assert not found.cliff
+
+
+@pytest.mark.parametrize(
+    ("kind", "scene", "works"),
+    [
+        ("size", "open-fog", [12 * 9, 24 * 18, 48 * 36, 96 * 72]),
+        ("lights", "two-pens", [1, 2, 4, 8]),
+        ("media", "three-media", [1, 2, 3]),
+        ("map", "open-fog", [128, 256, 512, 1024, 2048]),
+    ],
+)
+def test_steps_have_the_work_that_they_say(kind, scene, works, variant):
+    from validation.scaling.ladders import ladder
+
+    steps = ladder(kind, scene, (24, 18))
+    assert [step.work for step in steps] == works
+    for step in steps:
+        made = step.scene()
+        held = {
+            "size": made.camera.width * made.camera.height,
+            "lights": len(made.lights),
+            "media": len(made.medium.bounded_media),
+            "map": step.parameters.get("map"),
+        }
+        assert held[kind] == step.work
+        kinds = made.features
+        assert kinds.point_lights + kinds.spot_lights + kinds.directional_lights == len(made.lights)
+
+
+def test_copies_of_lights_share_the_intensity(variant):
+    from realtime.scene.read_scene import read_scene
+    from validation.scaling.ladders import with_copies
+    from validation.scenes.loading import load_scene
+
+    scene = read_scene(load_scene("windows", (24, 18)).scene)
+    total = sum(np.array(light.intensity).ravel() for light in scene.lights)
+    copied = with_copies(scene, 5)
+    np.testing.assert_allclose(sum(np.array(light.intensity).ravel() for light in copied.lights), total, rtol=1e-6)
+    axes = {tuple(np.array(light.axis).ravel()) for light in copied.lights}
+    assert len(axes) == 5 * len(scene.lights)
+
+
+@pytest.mark.parametrize(
+    ("kind", "scene", "why"),
+    [
+        ("speed", "open-fog", "wanted some of size, triangles"),
+        ("triangles", "open-fog", "has 0 triangles"),
+        ("lights", "fence", "lights with extent only"),
+        ("media", "open-fog", "0 bounded media"),
+    ],
+)
+def test_what_a_scene_does_not_have_is_refused(kind, scene, why, variant):
+    from validation.scaling.ladders import ladder
+
+    with pytest.raises(InputError, match=why):
+        ladder(kind, scene, (24, 18))
+
+
+def test_a_study_measures_every_step_and_says_who_refuses(variant):
+    from validation.configurations.methods import configuration
+    from validation.scaling.ladders import ladder
+    from validation.scaling.study import study_scaling
+
+    steps = ladder("map", "sphere-spot", (24, 18))[:2]
+    told = []
+    found = study_scaling(
+        "map",
+        steps,
+        [configuration("light-volumes"), configuration("unshadowed")],
+        seconds=0.01,
+        progress=lambda *done: told.append(done),
+    )
+    measured, refused = found
+    assert [cost.work for cost in measured.costs] == [128, 256]
+    assert all(cost.frame.median_ms > 0 and cost.rays.median_ms > 0 for cost in measured.costs)
+    assert measured.refused is None
+    assert refused.costs == ()
+    assert "map" in refused.refused
+    assert told[-1][:2] == (4, 4)

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Subdivided meshes are closed where they were; their bumps have more silhouettes as triangles shrink."""
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+
+
+def ball():
+    from validation.scenes.solids import icosphere
+
+    return icosphere(1)
+
+
+def open_edges(faces):
+    """Return how many edges have no neighbour."""
+    sides = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    return int(np.sum(np.unique(sides, axis=0, return_counts=True)[1] != 2))
+
+
+def test_a_divided_mesh_is_the_same_surface():
+    from validation.scaling.subdivision import divided
+
+    vertices, faces = ball()
+    finer, cut = divided((vertices, faces))
+    assert len(cut) == 4 * len(faces)
+    assert open_edges(cut) == 0
+
+    def area(points, triangles):
+        a, b, c = (points[triangles[:, k]] for k in range(3))
+        return np.cross(b - a, c - a).sum(axis=0), np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
+
+    # Midpoints of straight sides: rounding alone.
+    np.testing.assert_allclose(area(finer, cut)[1], area(vertices, faces)[1], rtol=1e-12)
+    np.testing.assert_allclose(area(finer, cut)[0], 0, atol=1e-12)
+
+
+def test_the_map_of_space_is_one_to_one():
+    """Its derivative less the identity is below 1 everywhere, so that no mesh crosses itself or another."""
+    from validation.scaling.subdivision import bumpy
+
+    points = np.random.default_rng(71).uniform(-2.0, 3.0, (4000, 3))
+    size, step = 5.3, 1e-5
+    corner = np.array([-2.0, -2.0, -2.0])
+    columns = [
+        (bumpy(points + step * axis, corner, size) - bumpy(points - step * axis, corner, size)) / (2 * step)
+        for axis in np.eye(3)
+    ]
+    derivative = np.stack(columns, axis=-1) - np.eye(3)
+    largest = np.linalg.norm(derivative, ord=2, axis=(1, 2)).max()
+    assert 0.3 < largest <= 0.6 + 1e-6
+
+
+def test_a_scene_keeps_what_has_no_triangles_to_cut(variant):
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+    from tests.helpers.scenes import tiny_scene
+    from validation.scaling.subdivision import subdivided, triangles_of
+
+    box = mi.ScalarTransform4f().translate([0.13, 0.17, 0.71]).scale(0.37)
+    scene = mi.load_dict(tiny_scene(block={"type": "cube", "to_world": box}))
+    count = triangles_of(scene)
+    assert count == 12 + sum(shape.face_count() for shape in scene.shapes() if shape.id() == "floor")
+    finer = subdivided(scene, 2)
+    assert triangles_of(finer) == 16 * count
+    assert {shape.id() for shape in finer.shapes()} == {shape.id() for shape in scene.shapes()}
+    before, after = read_scene(scene), read_scene(finer)
+    assert after.features == before.features
+    assert (after.camera.width, after.camera.height) == (before.camera.width, before.camera.height)
+    with pytest.raises(InputError, match="no opaque meshes"):
+        subdivided(mi.load_dict(tiny_scene(floor=None)), 1)
+
+
+def test_finer_meshes_have_more_silhouettes():
+    """About twice as many with four times the triangles: what the exponent 1/2 of shadow planes is of."""
+    from validation.scaling.subdivision import bumpy, divided
+
+    light, counts = np.array([0.9, 0.7, 4.9]), []
+    vertices, faces = ball()
+    for _ in range(5):
+        vertices, faces = divided((vertices, faces))
+        unit = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
+        moved = bumpy(unit, np.full(3, -1.0), 2 * 3**0.5)
+        a, b, c = (moved[faces[:, k]] for k in range(3))
+        normals = np.cross(b - a, c - a)
+        lit = np.einsum("ij,ij->i", normals, light - a) > 0
+        sides = np.sort(np.stack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]], axis=1), axis=2).reshape(-1, 2)
+        _, number = np.unique(sides, axis=0, return_inverse=True)
+        count = np.bincount(number.ravel(), weights=np.repeat(lit, 3))
+        counts.append(int(np.sum(count == 1)))
+    assert 1.5 < counts[-1] / counts[-2] < 2.6

@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a method costs as its work grows: pixels, triangles, lights, bounded media, texels of its map.
+
+Read in this order:
+
+- `ladders.py`: a scene with less and more of one kind of work;
+- `subdivision.py`: its meshes with four times the triangles, and bumps that these resolve;
+- `memory.py`: the peak of the memory while a frame is made;
+- `study.py`: the times of every step, the exponent that fits them, and where they jump.
+
+May import: `analytic.errors`, `realtime.errors`, `realtime.frame`, `realtime.scene`, `validation.configurations`,
+`validation.frames`, `validation.scenes`.
+"""

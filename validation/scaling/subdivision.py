@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""The meshes of a scene with four times the triangles at each level, and with bumps that these resolve.
+
+A flat triangle cut into four has no new silhouette. So all vertices move by one smooth map of space,
+
+    u(p) = p + sum_i a_i sin(k_i . p + i),     |a_i| |k_i| = 0.15,     i = 1 .. 4,
+
+with wavelengths from a quarter to a thirtieth of the scene's size. The norms of its derivative less the identity add
+up to 0.6 < 1: it is one to one, so that closed meshes stay closed, and what was disjoint is disjoint. Its bumps turn
+smooth outlines into silhouettes of which more and more edges are found as triangles shrink below the wavelengths, about
+the root of their number. Equal places move equally, so that seams of doubled vertices stay closed.
+
+Bounds of media and lights with extent stay as they are: they must be convex, or of their shape.
+"""
+
+from collections.abc import Iterable
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from realtime.scene.mesh_adjacency import mesh_triangles
+from validation.scenes.parts import Mesh, mesh_with_material
+
+_WAVES = ((3.1, 2.3, -1.1), (-5.3, 6.7, 3.7), (11.3, -7.9, 9.1), (-17.3, 15.1, 13.9))  # along the size of the scene
+_STEEPNESS = 0.15
+
+
+def triangles_of(scene) -> int:
+    """Return how many triangles the meshes of a Mitsuba scene have that `subdivided` cuts."""
+    return sum(int(shape.face_count()) for shape in scene.shapes() if _is_cut(shape))
+
+
+def subdivided(scene, levels: int) -> Any:
+    """Return a Mitsuba scene whose opaque meshes have 4^levels times the triangles, and bumps.
+
+    Parameters
+    ----------
+    scene
+        The Mitsuba scene.
+    levels
+        How often each triangle is cut into four.
+
+    Raises
+    ------
+    InputError
+        If nothing in it is an opaque mesh.
+    """
+    if not triangles_of(scene):
+        raise InputError("triangles: the scene has no opaque meshes, which alone can have more triangles; use another")
+    box = scene.bbox()
+    low, high = (np.array(corner, dtype=np.float64) for corner in (box.min, box.max))
+    shapes = [_cut(shape, levels, low, float(np.linalg.norm(high - low))) for shape in scene.shapes()]
+    return with_shapes(scene, shapes)
+
+
+def with_shapes(scene, shapes: Iterable[Any]) -> Any:
+    """Return a Mitsuba scene of other shapes, with the camera and the lights without extent of one."""
+    parts: dict[str, Any] = {"type": "scene", "sensor": scene.sensors()[0]}
+    others = (emitter for emitter in scene.emitters() if emitter.class_name() != "AreaLight")
+    parts |= {f"emitter-{number}": emitter for number, emitter in enumerate(others)}
+    return mi.load_dict(parts | {shape.id().replace(".", "-"): shape for shape in shapes})
+
+
+def _cut(shape, levels: int, corner: NDArray[np.float64], size: float) -> Any:
+    if not _is_cut(shape):
+        return shape
+    mesh = mesh_triangles(shape)
+    for _ in range(levels):
+        mesh = divided(mesh)
+    vertices, faces = mesh
+    cut = mesh_with_material(shape.id(), (bumpy(vertices, corner, size), faces), shape.bsdf())
+    cut.set_id(shape.id())
+    return cut
+
+
+def divided(mesh: Mesh) -> Mesh:
+    """Return a mesh with each triangle cut into four at the middles of its sides."""
+    vertices, faces = mesh
+    corners = np.asarray(faces, dtype=np.int64)
+    sides = np.sort(np.stack([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]], axis=1), axis=2)
+    unique, number = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True)
+    a, b, c = corners.T
+    ab, bc, ca = (len(vertices) + number.reshape(-1, 3)).T
+    cut = np.stack([(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]).transpose(2, 0, 1).reshape(-1, 3)
+    return np.concatenate([vertices, vertices[unique].mean(axis=1)]), cut
+
+
+def bumpy(points: NDArray[np.float64], corner: NDArray[np.float64], size: float) -> NDArray[np.float64]:
+    """Return points (n, 3) after the map of space above, for a scene of a `size` from a `corner` on [m]."""
+    moved = points.copy()
+    for number, wave in enumerate(np.asarray(_WAVES) * (2 * np.pi / size), 1):
+        across = np.cross(wave, (0.31, 0.53, 0.79))
+        height = _STEEPNESS / np.linalg.norm(wave)
+        moved += height * across / np.linalg.norm(across) * np.sin((points - corner) @ wave + number)[:, None]
+    return moved
+
+
+def _is_cut(shape) -> bool:
+    return shape.is_mesh() and not shape.is_emitter() and shape.bsdf().class_name() != "Null"
