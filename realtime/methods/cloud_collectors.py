@@ -35,7 +35,7 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.clouds.bounds.surfaces import CloudSurfaces, cloud_surfaces
-from realtime.clouds.canonical.fit import fit_on_device, fit_tables
+from realtime.clouds.canonical.fit import fit_on_device, fitted_functions
 from realtime.clouds.canonical.look_up import on_device
 from realtime.clouds.canonical.scene_phase import share_of_peak, slab_phase
 from realtime.clouds.canonical.sets import SETS
@@ -154,7 +154,7 @@ class CollectorParameters(Parameters):
     stride: float = parameter(
         1.0, "longest step through a grid of densities where a ray enters", above=0, most=100, unit="voxels"
     )
-    map: int = map_size(512, "texels on a side of the maps of a sun")
+    map: int = map_size(256, "texels on a side of the maps of a sun")
     tolerance: float = tolerance()
 
 
@@ -267,14 +267,16 @@ def _fillings(scene: Scene, parameters: CollectorParameters) -> tuple[tuple[Fill
         share = {"matched": share_of_peak(known, types), "half": _HALF, "full": 0.0}[parameters.peak]
         filled = (phases == phase) & (albedos == albedo)
         left[filled] = 1 - albedo * share
-        tables = canonical_tables(
-            slab_phase(known, types, modified=parameters.peak != "full"), albedo * (1 - share) / (1 - albedo * share)
+        medium = (
+            slab_phase(known, types, modified=parameters.peak != "full"),
+            albedo * (1 - share) / (1 - albedo * share),
         )
+        tables = canonical_tables(*medium)
         transport: Any = on_device(tables, types)
         if parameters.transport == "grid":
             transport = transport_grid(transport, tables.angular, len(SETS))
         elif parameters.transport == "fit":
-            transport = fit_on_device(fit_tables(transport, types), types)
+            transport = fit_on_device(fitted_functions(*medium, tables, transport, types), types)
         fillings.append(Filling(transport, tuple(mi.UInt32(row.astype(np.uint32)) for row in filled)))
     by_channel = tuple(types.scalar(row) for row in left)
     dr.make_opaque([filling.clouds for filling in fillings], by_channel)

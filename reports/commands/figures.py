@@ -24,6 +24,8 @@ FIGURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "decomposition": ("decomposition", ("quick", "progress")),
     "froxels": ("froxels", ("quick", "progress")),
     "slab-orders": ("slab_orders", ("quick", "progress")),
+    "cloud-transport": ("cloud_transport", ("quick", "progress")),
+    "cloud-images": ("cloud_images", ("quick", "progress")),
     "map-size": ("map_size", ("quick", "progress")),
     "scaling": ("scaling", ("quick", "progress")),
     "stages": ("stages", ("quick", "progress", "published")),

@@ -61,7 +61,8 @@ def published(
     volumes` and its peers: frames a second, static against adaptive tessellation, the passes, and which of the
     paper's conclusions hold here. ali: Fig. 5.8 with `soft-shafts` and what goes with it, by errors in the
     penumbrae and times. bouthors: what a slab decides, Fig. 3, the printed extinction and
-    densities, and the frames a second of section 9. The others at
+    densities, light by direction beside the fitted functions, Fig. 8, clouds beside light paths, Figs 11 and 12, by
+    order of scattering too, and the frames a second of section 9. The others at
     the published sizes, after the light moved, everything rebuilt or camera rays kept, beside the published figures,
     with the error of the airlight.
     """
@@ -142,13 +143,17 @@ def _ali(*, scale: float, progress: Callable) -> dict[str, Any]:
 
 
 def _bouthors(progress: Callable) -> dict[str, Any]:
-    """Measure what a slab decides of Bouthors 2008, and the frames a second of its clouds."""
+    """Measure what a slab decides of Bouthors 2008, its light by direction, clouds beside the truth, and frames."""
     from reports.machine.progress import part_of
     from validation.papers.bouthors import slab_study
+    from validation.papers.bouthors_clouds import clouds_study
     from validation.papers.bouthors_frames import frames_study
+    from validation.papers.bouthors_transport import transport_study
 
-    slab = slab_study(progress=part_of(progress, 0.0, 0.5))
-    return {"bouthors": slab | frames_study(progress=part_of(progress, 0.5, 1.0))}
+    slab = slab_study(progress=part_of(progress, 0.0, 0.1))
+    transport = transport_study(progress=part_of(progress, 0.1, 0.25))
+    images = clouds_study(progress=part_of(progress, 0.25, 0.9))
+    return {"bouthors": slab | transport | images | frames_study(progress=part_of(progress, 0.9, 1.0))}
 
 
 def _wanted_scenes(scenes: Sequence[str], papers: Sequence[str]) -> list[str]:

@@ -4,9 +4,11 @@
 Read in this order:
 
 - `files.py`: the files of a figure
-- `picture_grid.py`: six pictures from EXR files
+- `picture_grid.py`: pictures from EXR files
 - `report.py`: what figures read of a report
 - `published_rows.py`: rows of papers, from a report or measured
+- `cloud_images.py`: clouds beside light paths
+- `cloud_transport.py`: light of a slab by direction
 - `convergence.py`: orders of kernels and estimators
 - `decomposition.py`: errors by cause
 - `frame_speed.py`: time of frames against error

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Six pictures with titles, in two rows, from the EXR files of a figure."""
+"""Pictures with titles, in two rows, from the EXR files of a figure."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -24,8 +24,8 @@ def stored_image(path: Path):
     return np.asarray(layer(read_exr(path), LAYER, path), dtype=np.float64)
 
 
-def picture_grid(pictures: Iterable[tuple[str, Any]], column: str) -> "Figure":
-    """Return a figure of up to six pictures.
+def picture_grid(pictures: Iterable[tuple[str, Any]], column: str, *, across: int = 3) -> "Figure":
+    """Return a figure of pictures in two rows.
 
     Parameters
     ----------
@@ -33,10 +33,12 @@ def picture_grid(pictures: Iterable[tuple[str, Any]], column: str) -> "Figure":
         Titles and pictures, (height, width, 3) in 8 bits, or (height, width) for shades of grey.
     column
         Of `reports.plotting.style.WIDTHS`.
+    across
+        Pictures in a row.
     """
     wide = WIDTHS[column]
-    figure = new_figure(wide, 0.62 * wide)
-    for panel, (title, picture) in zip(figure.subplots(2, 3, squeeze=False).ravel(), pictures):
+    figure = new_figure(wide, 1.86 * wide / across)
+    for panel, (title, picture) in zip(figure.subplots(2, across, squeeze=False).ravel(), pictures):
         show_picture(panel, picture)
         panel.set_title(title, fontsize=6 if column == "double" else 4.5)
     return figure

@@ -42,5 +42,5 @@ def use_formula(monkeypatch) -> None:
     monkeypatch.setattr(method, "canonical_tables", lambda phase, albedo: SimpleNamespace(angular=None))
     monkeypatch.setattr(method, "on_device", on_device)
     monkeypatch.setattr(method, "transport_grid", lambda look_up, angular, sets: look_up)
-    monkeypatch.setattr(method, "fit_tables", lambda look_up, types: look_up)
+    monkeypatch.setattr(method, "fitted_functions", lambda phase, albedo, tables, look_up, types: look_up)
     monkeypatch.setattr(method, "fit_on_device", lambda look_up, types: look_up)

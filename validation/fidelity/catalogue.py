@@ -21,7 +21,9 @@ from validation.fidelity.row import Evidence, Row, judge
 from validation.fidelity.scattering import ambient_fog, thin_media
 from validation.fidelity.tessellation import tessellation
 from validation.papers.bouthors import slab_study
+from validation.papers.bouthors_clouds import clouds_study
 from validation.papers.bouthors_frames import frames_study
+from validation.papers.bouthors_transport import transport_study
 
 #: Names of papers on the command line, and in words.
 PAPERS: Mapping[str, str] = {
@@ -54,6 +56,8 @@ EXPERIMENTS: Mapping[str, Experiment] = {
     "printed": Experiment(printed, 0.1, images=False),
     "droplets": Experiment(droplets, 3.0, images=False),
     "cloud slab": Experiment(slab_study, 40.0, images=False, report=False),
+    "cloud transport": Experiment(transport_study, 90.0, report=False),
+    "cloud images": Experiment(clouds_study, 600.0, report=False),
     "cloud frames": Experiment(frames_study, 60.0, report=False),
     "ordering": Experiment(ordering, 1.5, images=False),
     "polynomials": Experiment(polynomials, 2.0, images=False),

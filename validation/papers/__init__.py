@@ -10,9 +10,12 @@ Read in this order:
 - `billeter_conclusions.py`: which of their conclusions hold here;
 - `ali.py`: the figures of Ali 2016 that captions describe;
 - `bouthors.py`: what a slab decides of Bouthors, Neyret, Max, Bruneton, Crassin 2008;
+- `bouthors_transport.py`: their Fig. 8, light by direction;
+- `bouthors_clouds.py`: their Figs 11 and 12, and the error by order of scattering;
 - `bouthors_frames.py`: their section 9, frames a second.
 
-May import: `analytic`, `realtime.clouds`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `realtime.scene`,
-`realtime.shadow_maps`, `realtime.tiles`, `reference.quadrature`, `reference.scene`, `validation.configurations`,
-`validation.estimates`, `validation.frames`, `validation.metrics`, `validation.oracles`, `validation.scenes`.
+May import: `analytic`, `realtime.clouds`, `realtime.errors`, `realtime.frame`, `realtime.methods`,
+`realtime.numerics`, `realtime.scene`, `realtime.shadow_maps`, `realtime.tiles`, `reference.monte_carlo`,
+`reference.quadrature`, `reference.scene`, `validation.configurations`, `validation.estimates`, `validation.frames`,
+`validation.metrics`, `validation.oracles`, `validation.scenes`, `validation.slab`.
 """

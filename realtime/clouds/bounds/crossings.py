@@ -61,11 +61,13 @@ def next_crossing(surfaces: CloudSurfaces, origin, direction, x, active=True) ->
     valid = hit.is_valid() & active
     t = dr.select(valid, hit.t, 0)
     normal = outward_normal(surfaces, hit, start + mi.Vector3f(direction) * t, valid)
-    shape = dr.reinterpret_array(mi.UInt32, hit.shape)
+    cloud = mi.UInt32(0)
+    if surfaces.several:
+        cloud = dr.gather(mi.UInt32, surfaces.cloud, dr.reinterpret_array(mi.UInt32, hit.shape), valid)
     return Crossing(
         dr.select(valid, begin + Float(t), dr.inf),
         valid & (dr.dot(normal, mi.Vector3f(direction)) > 0),
-        dr.gather(mi.UInt32, surfaces.cloud, shape, valid),
+        cloud,
         normal,
     )
 

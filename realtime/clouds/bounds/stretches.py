@@ -25,7 +25,7 @@ class Stretches:
 
     begins: tuple[Metres, ...]
     ends: tuple[Metres, ...]
-    clouds: tuple[PerRay, ...]  #: numbers
+    clouds: tuple[PerRay, ...]  #: numbers; empty where there is one cloud, of the number 0
     count: PerRay  #: how many are kept
     beyond: Metres  #: where the first begins that is not; infinite where all are [m]
 
@@ -37,7 +37,7 @@ class Stretches:
     def chosen(self, number: PerRay) -> tuple[Metres, Metres, PerRay]:
         """Return begin, end and cloud of a stretch by lane."""
         parts = []
-        for values in (self.begins, self.ends, self.clouds):
+        for values in (self.begins, self.ends, self.clouds or (mi.UInt32(0),)):
             value = values[0]
             for place, other in enumerate(values[1:], 1):
                 value = dr.select(number == place, other, value)
@@ -70,7 +70,7 @@ def first_stretches(
     lanes = max(dr.width(direction), dr.width(origin))
     first = next_crossing(surfaces, origin, direction, dr.zeros(Float, lanes), Float(0) < end)
     nothing = tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
-    stretches, depths = _none(Float, lanes), nothing
+    stretches, depths = _none(surfaces, Float, lanes), nothing
     inside = first.leaves
     stop = dr.select(inside, dr.minimum(first.distance, end), 0)
     stretches = _with(stretches, dr.zeros(Float, lanes), stop, first.cloud, inside)
@@ -106,19 +106,19 @@ def next_stretches(surfaces: CloudSurfaces, origin, direction, end, last: Stretc
         more = (crossing.distance < end) & ~dr.isfinite(stretches.beyond)
         return crossing.distance, stretches.fields, going & more
 
-    none = _none(Float, dr.width(last.beyond))
+    none = _none(surfaces, Float, dr.width(last.beyond))
     _, fields, _ = dr.while_loop(
         state=(+last.beyond, none.fields, dr.isfinite(last.beyond)), cond=lambda *state: state[-1], body=step
     )
     return Stretches(*fields)
 
 
-def _none(Float, lanes: int) -> Stretches:
-    places, numbers = (tuple(dr.zeros(kind, lanes) for _ in range(KEPT)) for kind in (Float, mi.UInt32))
+def _none(surfaces: CloudSurfaces, Float, lanes: int) -> Stretches:
+    begins, ends, numbers = (tuple(dr.zeros(kind, lanes) for _ in range(KEPT)) for kind in (Float, Float, mi.UInt32))
     return Stretches(
-        places,
-        tuple(dr.zeros(Float, lanes) for _ in range(KEPT)),
-        numbers,
+        begins,
+        ends,
+        numbers if surfaces.several else (),
         dr.zeros(mi.UInt32, lanes),
         dr.full(Float, dr.inf, lanes),
     )
@@ -135,7 +135,7 @@ def _with(stretches: Stretches, begin, end, cloud, inside) -> Stretches:
     return Stretches(
         put(stretches.begins, begin),
         put(stretches.ends, end),
-        put(stretches.clouds, cloud),
+        put(stretches.clouds, cloud) if stretches.clouds else (),
         dr.select(inside & (stretches.count < KEPT), stretches.count + 1, stretches.count),
         dr.select(left_over, begin, stretches.beyond),
     )

@@ -22,6 +22,8 @@ class CloudSurfaces:
     first: Any  #: by number of the shape in Mitsuba's registry, its first row of `facets`
     cloud: Any  #: by that number, the number of the cloud in `Medium.clouds`
     facets: Any  #: four numbers each: the outward unit normal of a triangle and 0, or the centre of a sphere [m] and 1
+    spheres: bool  #: whether there are any
+    several: bool  #: whether there is more than one cloud
 
 
 def cloud_surfaces(scene: Scene) -> CloudSurfaces:
@@ -33,15 +35,22 @@ def cloud_surfaces(scene: Scene) -> CloudSurfaces:
     first[numbers] = np.cumsum([0] + [len(own) for own in rows[:-1]])
     cloud[numbers] = np.arange(len(shapes))
     facets = mi.Float(np.concatenate(rows).ravel())
-    surfaces = CloudSurfaces(boundary_scene(shapes), mi.UInt32(first), mi.UInt32(cloud), facets)
+    spheres = not all(shape.is_mesh() for shape in shapes)
+    surfaces = CloudSurfaces(
+        boundary_scene(shapes), mi.UInt32(first), mi.UInt32(cloud), facets, spheres, len(shapes) > 1
+    )
     dr.make_opaque(surfaces.first, surfaces.cloud, surfaces.facets)
     return surfaces
 
 
 def outward_normal(surfaces: CloudSurfaces, hit, point, active):
     """Return the outward unit normals where `hit`, a preliminary intersection, meets a boundary at a `point` [m]."""
-    shape = dr.reinterpret_array(mi.UInt32, hit.shape)
-    row = dr.gather(mi.UInt32, surfaces.first, shape, active)
+    row = mi.UInt32(0)
+    if surfaces.several:
+        row = dr.gather(mi.UInt32, surfaces.first, dr.reinterpret_array(mi.UInt32, hit.shape), active)
+    if not surfaces.spheres:
+        x, y, z, _ = dr.gather(four_numbers(mi.Float), surfaces.facets, row + hit.prim_index, active)
+        return mi.Vector3f(x, y, z)
     ball = dr.gather(four_numbers(mi.Float), surfaces.facets, row, active).w > 0
     x, y, z, _ = dr.gather(four_numbers(mi.Float), surfaces.facets, row + dr.select(ball, 0, hit.prim_index), active)
     normal = mi.Vector3f(x, y, z)

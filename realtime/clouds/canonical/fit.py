@@ -15,8 +15,9 @@ As printed, the logarithms depend on the unit of length, change sign at d + D = 
 B + D = 1: D is kept above 1.01 and B + D above 1.05, in mean free paths.
 """
 
+import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import drjit as dr
@@ -26,12 +27,18 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from realtime.clouds.canonical import coordinates
+from realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
 from realtime.clouds.canonical.look_up import LookUp, direction_share
 from realtime.clouds.canonical.sets import SETS
+from realtime.clouds.canonical.tables import CanonicalTables, logged, tables_digest
+from realtime.clouds.slab_orders.phases import SlabPhase
 from realtime.numerics.array_types import ArrayTypes
 
 Array = NDArray[Any]
 Progress = Callable[[float, str], None]
+
+#: Raise this when a fit to the same tables gives other numbers.
+VERSION = 1
 
 _THICKNESSES, _DEPTHS, _SUNS, _DIRECTIONS, _AZIMUTHS = 10, 10, 5, 13, 3
 _ANGLES = 61  #: of P
@@ -84,6 +91,42 @@ class _Samples:
     c_y: Array
     sigma: Array
     share: Array  #: of the light of all sets
+
+
+def fitted_functions(
+    phase: SlabPhase,
+    albedo: float,
+    tables: CanonicalTables,
+    look_up: LookUp,
+    types: ArrayTypes,
+    *,
+    progress: Progress | None = None,
+) -> tuple[FittedSet, ...]:
+    """Return the functions fitted to the tables of a medium, from the disk where they are kept there.
+
+    Parameters
+    ----------
+    phase, albedo
+        Of the medium.
+    tables
+        From `realtime.clouds.canonical.tables.canonical_tables`.
+    look_up
+        Of these.
+    types
+        Of its numbers.
+    progress
+        Called with (share done, what) while functions are fitted; without it the log says how far they are.
+    """
+    made = VERSION, tables_digest(tables.grid), types.scalar.__name__
+    digest = hashlib.blake2b(repr(made).encode(), digest_size=8).hexdigest()
+    medium = medium_numbers(phase, albedo)
+    names = [field.name for field in fields(FittedSet)]
+    arrays = load_kept(digest, medium)
+    if arrays is None:
+        fitted = fit_tables(look_up, types, progress=progress or logged("functions fitted to tables of clouds"))
+        keep(digest, medium, {name: np.stack([getattr(each, name) for each in fitted]) for name in names})
+        return fitted
+    return tuple(FittedSet(*(arrays[name][number] for name in names)) for number in range(len(SETS)))
 
 
 def fit_tables(look_up: LookUp, types: ArrayTypes, *, progress: Progress | None = None) -> tuple[FittedSet, ...]:

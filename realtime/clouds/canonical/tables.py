@@ -124,7 +124,7 @@ def canonical_tables(
     digest, medium = tables_digest(grid), medium_numbers(phase, albedo)
     arrays = load_kept(digest, medium)
     if arrays is None:
-        tables = make_tables(phase, albedo, grid, progress=progress or _logged())
+        tables = make_tables(phase, albedo, grid, progress=progress or logged("tables of clouds"))
         named = {f"coefficients_{number}": each for number, each in enumerate(tables.coefficients)}
         named |= {f"shapes_{number}": each for number, each in enumerate(tables.shapes)}
         fixed = {"means": tables.means, "angular": tables.angular, "seconds": np.float64(tables.seconds)}
@@ -136,7 +136,7 @@ def canonical_tables(
     return CanonicalTables(grid, arrays["means"], products, shapes, arrays["angular"], float(arrays["seconds"]))
 
 
-def _logged() -> Progress:
+def logged(made: str) -> Progress:
     """Return what writes a line into the log now and then: a frame waits for minutes, which looks like a hanging one.
 
     It is a warning, so that it reaches the error stream where nobody has set up a log.
@@ -149,7 +149,7 @@ def _logged() -> Progress:
         if now - last > _PATIENCE and 0 < share < 1:
             last = now
             left = (now - began) * (1 - share) / share
-            _LOG.warning("tables of clouds, made once: %.0f %%, about %.0f s left, %s", 100 * share, left, what)
+            _LOG.warning("%s, made once: %.0f %%, about %.0f s left, %s", made, 100 * share, left, what)
 
     return tell
 

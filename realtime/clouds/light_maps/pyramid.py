@@ -120,11 +120,11 @@ def slope_normals(surfaces: LitSurfaces, projection: Projection) -> Any:
     size, Float = surfaces.size, type(surfaces.front)
     across, up, axis = projection.basis
     row, column = surfaces.place // size, surfaces.place % size
-    # Neighbours are found row by row.
+    # Neighbours are found row by row. What else is read later is kept now: rays would be cast again for it.
     fronts, there = dr.empty(Float, size * size), dr.empty(type(surfaces.there), size * size)
     dr.scatter(fronts, surfaces.front, surfaces.place)
     dr.scatter(there, surfaces.there, surfaces.place)
-    dr.eval(fronts, there)
+    dr.eval(fronts, there, surfaces.front, surfaces.back, surfaces.there, surfaces.place)
 
     def slope(place, stride: int, width):
         def side(inside, neighbour):

@@ -5,10 +5,11 @@ import drjit as dr
 import numpy as np
 import pytest
 
+import realtime.clouds.canonical.fit as fit_module
 import realtime.clouds.canonical.tables as tables_module
 import validation.canonical.errors as errors_module
 from realtime.clouds.canonical import coordinates
-from realtime.clouds.canonical.fit import fit_on_device, fit_tables
+from realtime.clouds.canonical.fit import FittedSet, fit_on_device, fit_tables, fitted_functions
 from realtime.clouds.canonical.look_up import on_device
 from realtime.clouds.canonical.sets import SETS, set_name
 from realtime.clouds.canonical.tables import RANKS, Grid, canonical_tables
@@ -187,6 +188,28 @@ def test_a_frame_that_waits_says_so(coarse, tmp_path, monkeypatch, caplog):
     monkeypatch.setattr(tables_module, "_PATIENCE", 0.0)
     canonical_tables(HenyeyGreensteinPhase(0.0), 0.5, grid=SMALL)
     assert "tables of clouds, made once: 40 %, about" in caplog.text
+
+
+def test_functions_are_fitted_once_for_a_medium(variant, tmp_path, monkeypatch):
+    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path))
+    fits = []
+
+    def fit(look_up, types, *, progress):
+        fits.append(look_up)
+        shapes = ((3,), (2, 3, 4), (2, 3, 2), (3, 9), (3, 3), (5,))
+        return tuple(FittedSet(*(np.full(shape, number + 0.1) for shape in shapes)) for number in range(len(SETS)))
+
+    monkeypatch.setattr(fit_module, "fit_tables", fit)
+    empty = tuple(np.zeros(1) for _ in SETS)
+    tables = tables_module.CanonicalTables(SMALL, np.zeros(1), empty, empty, np.zeros(1), 1.0)
+    first, again, other = (
+        fitted_functions(HenyeyGreensteinPhase(g), 0.9, tables, g, array_types()) for g in (0.5, 0.5, 0.4)
+    )
+    assert fits == [0.5, 0.4]
+    assert len(first) == len(again) == len(other) == len(SETS)
+    for one, kept in zip(first, again):
+        for name in ("p", "of_directions", "of_suns", "collector", "n", "spread"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(kept, name))
 
 
 def test_what_is_stopped_leaves_no_file(coarse, tmp_path, monkeypatch):
