@@ -4,17 +4,13 @@
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
 from analytic.errors import InputError
-from reference.monte_carlo.batches import LAYERS
-from reference.monte_carlo.volpath.integrator import volpath_batch
-from reference.scene.read import TruthScene, read_truth
+from reference.scene.read import read_truth
 from reference.storage.exr import Image, read_exr
 from validation.comparison.engine_compare import scene_of_size
 from validation.comparison.engine_layers import judged_layer
@@ -24,8 +20,8 @@ from validation.diagnosis.encoding import ENCODING
 from validation.diagnosis.hypothesis import Hypothesis
 from validation.diagnosis.lights import LIGHTS
 from validation.diagnosis.medium import MEDIUM
-from validation.diagnosis.prediction import Predictor
-from validation.diagnosis.search import Explanation, explain
+from validation.diagnosis.prediction import Predictor, SceneLight
+from validation.diagnosis.search import EVALUATIONS, Explanation, explain
 from validation.diagnosis.verdict import (
     LEAST_EFFECT,
     LEAST_EVIDENCE,
@@ -34,6 +30,7 @@ from validation.diagnosis.verdict import (
     evidence,
     gains,
     is_explained,
+    leaves_nothing,
     scale_of,
 )
 from validation.fit.fit import said_pixel, three_channels
@@ -48,15 +45,13 @@ HYPOTHESES: tuple[Hypothesis, ...] = (*LIGHTS, *MEDIUM, *CAMERA, *ENCODING)
 RIGHT, UNEXPLAINED = "right", "unexplained"
 
 _REFINED = 5
-_PAIRS = 80  # a pair takes as long as a hypothesis
-_PARTNERS = 5  # of the best explanations that pairs are made of
+_GAINED = 0.98  # share of the error that a search leaves which gained something
+_PAIRS = 2500  # evaluations for pairs
+_OTHER_PATHS = 4  # evaluations for which one with other paths counts
 _BETTER = 0.7  # what a pair must leave of the error of one alone
 _MUCH = 0.2  # what an explanation must leave of the error to be named although more is wrong
 _ALIKE = 5.0  # evidence by which explanations may differ and still be as good as one another
 _SHOWN = 8
-_BATCH = 4  # batches of 16 paths a pixel for the light of multiple scattering
-_SAMPLES = 16
-_SMOOTH = 40  # of the width of an image: the width of the filter for that light
 
 
 @dataclass(frozen=True)
@@ -127,6 +122,7 @@ def diagnose_image(
     layer: str | None = None,
     holds: str | None = None,
     pixel: str | None = None,
+    light: SceneLight | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Say what is wrong with an image of a scene.
@@ -141,6 +137,8 @@ def diagnose_image(
         Which layer, and what it holds: 'airlight', 'surface' or 'total'.
     pixel
         'centre' or 'area'; by default what the image says of itself, or what fits better.
+    light
+        Of this scene, as other images of it have found it.
     progress
         Called with (share done, what).
 
@@ -152,19 +150,18 @@ def diagnose_image(
     if pixel is not None and pixel not in PIXELS:
         raise InputError(f"--pixel {pixel}; wanted 'centre' or 'area'")
     judged = judged_layer(image, path, name=layer, holds=holds)
-    truth = read_truth(loaded.scene)
+    light = light or SceneLight(read_truth(loaded.scene))
     values = three_channels(judged)
     used = np.asarray(np.isfinite(values).all(axis=1))
     if not used.any() or not np.any(values[used] > 0):
         raise InputError(f"{path}: the layer '{judged.name}' has no finite value above 0; there is nothing to diagnose")
     said = pixel or said_pixel(image)
-    task = Task(truth, values, judged.holds, used, area=False)
-    multiple = cache(lambda: _multiple_light(truth))
+    task = Task(light.truth, values, judged.holds, used, area=False)
     kinds = [said] if said else list(PIXELS)
     results = []
     for number, kind in enumerate(kinds):
         shape = judged.size[1], judged.size[0]
-        predictor = Predictor(replace(task, area=kind == "area"), shape, multiple=multiple)
+        predictor = Predictor(replace(task, area=kind == "area"), shape, light)
         tell = None if progress is None else _stage(progress, number, len(kinds))
         results.append((kind, _ranked(predictor, kind, tell)))
     kind, (right, chosen, rows, explained) = min(results, key=lambda result: result[1][1].error)
@@ -192,19 +189,18 @@ def _ranked(
     pairs_of_pixels = predictor.pairs(right.guess)
     there = [hypothesis for hypothesis in HYPOTHESES if hypothesis.applies(predictor)]
     cheap = [hypothesis for hypothesis in there if not hypothesis.costly]
-    singles = _explained(predictor, cheap, progress, (0.0, 0.5))
+    singles = _explained(predictor, right, cheap, progress, (0.0, 0.5))
     chosen = _best(right, singles, pixel)
     if not is_explained(chosen, pairs_of_pixels) or chosen.error > LEFT:
-        costly = [hypothesis for hypothesis in there if hypothesis.costly]
+        costly = sorted((each for each in there if each.costly), key=lambda hypothesis: hypothesis.costly)
         for number, hypothesis in enumerate(costly):
             share = 0.5 + 0.25 * number / len(costly)
-            singles += _explained(predictor, [hypothesis], progress, (share, share))
+            singles += _explained(predictor, right, [hypothesis], progress, (share, share))
             chosen = _best(right, singles, pixel)
             if chosen.error <= LEFT and gains(chosen, right):
                 break  # nothing is left that another one could explain
-    pairs: list[Explanation] = []
     if not is_explained(chosen, pairs_of_pixels):
-        pairs = _pairs(predictor, right, singles, there, pixel, progress)
+        pairs = _pairs(predictor, right, chosen, singles, pixel, progress)
         best = _best(right, [chosen, *pairs] if chosen.hypotheses else pairs, pixel)
         if best.error < _BETTER * chosen.error:
             chosen = best
@@ -228,19 +224,24 @@ def _ranked(
 
 
 def _explained(
-    predictor: Predictor, hypotheses: Sequence[Hypothesis], progress: Progress | None, span: tuple[float, float]
+    predictor: Predictor,
+    right: Explanation,
+    hypotheses: Sequence[Hypothesis],
+    progress: Progress | None,
+    span: tuple[float, float],
 ) -> list[Explanation]:
     explanations = []
     for number, hypothesis in enumerate(hypotheses):
         if progress is not None:
             progress(span[0] + (span[1] - span[0]) * number / len(hypotheses), hypothesis.name)
         explanations.append(explain(predictor, (hypothesis,), fine=False))
-    return _refined(predictor, explanations)
+    return _refined(predictor, right, explanations)
 
 
-def _refined(predictor: Predictor, explanations: list[Explanation]) -> list[Explanation]:
-    """Return explanations, those that leave least with all digits."""
-    ordered = sorted(explanations, key=lambda each: each.error)
+def _refined(predictor: Predictor, right: Explanation, explanations: list[Explanation]) -> list[Explanation]:
+    """Return explanations, those that leave least with all digits: where a search gained nothing, none are wanted."""
+    better = [each for each in explanations if each.error < _GAINED * right.error]
+    ordered = sorted(better, key=lambda each: each.error)
     best = [each for each in ordered[:_REFINED] if each.parameters]
     finer = {id(each): explain(predictor, each.hypotheses, each.values) for each in best}
     return [finer.get(id(each), each) for each in explanations]
@@ -262,38 +263,53 @@ def _best(right: Explanation, explanations: Sequence[Explanation], pixel: str) -
 def _pairs(
     predictor: Predictor,
     right: Explanation,
+    chosen: Explanation,
     singles: Sequence[Explanation],
-    there: Sequence[Hypothesis],
     pixel: str,
     progress: Progress | None,
 ) -> list[Explanation]:
-    """Return explanations by two hypotheses of different kinds."""
-    scale = min(scale_of(each, pixel) for each in singles)
-    ordered = sorted(singles, key=lambda each: -evidence(each, right, scale))
-    partners = [each.hypotheses[0] for each in ordered[:_PARTNERS]]
-    partners += [hypothesis for hypothesis in there if hypothesis.name == "factor" and hypothesis not in partners]
-    wanted = []
-    for partner in partners:
-        for other in there:
-            costly = partner.costly or other.costly
-            pair = _in_order(partner, other)
-            if partner.kind != other.kind and not costly and pair not in wanted:
-                wanted.append(pair)
-    wanted = wanted[:_PAIRS]  # those of the best partners come first
-    explanations = []
+    """Return explanations by two hypotheses of different kinds: those of the best names first, until one leaves
+    nothing that could be seen.
+    """
+    wanted = _wanted_pairs(right, singles, pixel)
+    explanations: list[Explanation] = []
     for number, pair in enumerate(wanted):
         if progress is not None:
             progress(0.75 + 0.25 * number / len(wanted), " and ".join(each.name for each in pair))
         explanations.append(explain(predictor, pair, fine=False))
-    return _refined(predictor, explanations)
+        if explanations[-1].error < _MUCH * chosen.error:
+            explanations[-1] = explain(predictor, pair, explanations[-1].values)
+            if leaves_nothing(explanations[-1], pixel):
+                break
+    return _refined(predictor, right, explanations)
+
+
+def _wanted_pairs(
+    right: Explanation, singles: Sequence[Explanation], pixel: str
+) -> list[tuple[Hypothesis, Hypothesis]]:
+    """Return pairs of hypotheses of different kinds, by the ranks of both names, as many as can be evaluated."""
+    scale = min(scale_of(each, pixel) for each in singles)
+    ordered = sorted(singles, key=lambda each: -evidence(each, right, scale))
+    cheap = [each.hypotheses[0] for each in ordered if not each.hypotheses[0].costly]
+    # Whatever else is wrong, an image may be too bright or too dark.
+    names = list(dict.fromkeys(["factor", *(hypothesis.name for hypothesis in cheap)]))
+    pairs = [_in_order(a, b) for number, a in enumerate(cheap) for b in cheap[:number] if a.kind != b.kind]
+    pairs.sort(key=lambda pair: names.index(pair[0].name) + names.index(pair[1].name))
+    costs = np.cumsum([_cost(first) + _cost(second) for first, second in pairs])
+    return pairs[: int(np.searchsorted(costs, _PAIRS))]
+
+
+def _cost(hypothesis: Hypothesis) -> int:
+    """Return how many evaluations a hypothesis adds to a pair; those with other paths count as several."""
+    return 1 + sum(EVALUATIONS * (_OTHER_PATHS if number.step else 1) for number in hypothesis.parameters)
 
 
 _ORDER = ("medium", "light", "camera", "brightness", "values")
 
 
-def _in_order(*hypotheses: Hypothesis) -> tuple[Hypothesis, ...]:
+def _in_order(first: Hypothesis, second: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
     """Return hypotheses in the order in which faults happen: the scene, its image, what is done to values."""
-    return tuple(sorted(hypotheses, key=lambda each: _ORDER.index(each.kind)))
+    return (first, second) if _ORDER.index(first.kind) <= _ORDER.index(second.kind) else (second, first)
 
 
 def _rows(explanation: Explanation, weight: float) -> list[Ranked]:
@@ -310,17 +326,3 @@ def _rows(explanation: Explanation, weight: float) -> list[Ranked]:
         )
         for hypothesis, values in zip(explanation.hypotheses, explanation.values, strict=True)
     ]
-
-
-def _multiple_light(truth: TruthScene) -> Array | None:
-    """Return the light of higher orders by layer, (2, pixels, 3), by Mitsuba's path tracer."""
-    if truth.width * truth.height > 1 << 17:
-        return None  # minutes for one hypothesis
-    parts = []
-    for seed in range(_BATCH):
-        whole, single = (volpath_batch(truth, seed, _SAMPLES, max_depth=depth).mean for depth in (64, 2))
-        parts.append((whole - single)[[LAYERS.index(layer) for layer in ("airlight", "surface")]])
-    image = np.mean(parts, axis=0).reshape(2, truth.height, truth.width, 3)
-    # Light of higher orders is smooth but for edges, and noisy.
-    width = truth.width / _SMOOTH
-    return np.asarray(gaussian_filter(image, (0, width, width, 0)).reshape(2, -1, 3))

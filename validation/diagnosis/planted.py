@@ -19,14 +19,16 @@ from reference.quadrature.image import quadrature_image
 from reference.quadrature.light_airlight import light_airlight
 from reference.quadrature.ray_values import TruthImage
 from reference.quadrature.surface import lit_surface, surface_hits
+from reference.scene.area_light import is_area
 from reference.scene.camera import film_directions, pixel_centres
-from reference.scene.read import TruthScene, read_truth
+from reference.scene.directional_light import is_directional
+from reference.scene.read import TruthLight, TruthScene, read_truth
 from reference.storage.exr import Image
 from validation.comparison.engine_layers import truth_layer
 from validation.comparison.whole_image import to_srgb
 from validation.diagnosis.diagnose import diagnose_image
 from validation.diagnosis.encoding import agx, blender_filmic, filmic
-from validation.diagnosis.prediction import Scenery, changed_scene
+from validation.diagnosis.prediction import SceneLight, Scenery, changed_scene
 from validation.fog_model.build import scattering_paths
 from validation.fog_model.fog import scene_fog
 from validation.fog_model.radiance import as_array, fog_total, on_device
@@ -62,9 +64,34 @@ def _total(image: TruthImage) -> Array:
 def _of_scene(change: Callable[[TruthScene], TruthScene | None]) -> Callable[[TruthScene], Array | None]:
     def image(truth: TruthScene) -> Array | None:
         changed = change(truth)
-        return None if changed is None else _total(_quadrature(changed))
+        return None if changed is None else _total(_quadrature(_with_emitters(changed)))
 
     return image
+
+
+def _with_emitters(truth: TruthScene) -> TruthScene:
+    """Return a scene whose point and spot lights are Mitsuba's too: the light on surfaces is theirs."""
+    whole = truth.scene
+    near = iter(truth.lights)
+    emitters = [
+        emitter if is_directional(emitter) else mi.load_dict(_emitter(next(near)))
+        for emitter in whole.emitters()
+        if not is_area(emitter)
+    ]
+    parts = [*whole.sensors(), *whole.shapes(), *emitters]
+    return replace(truth, scene=mi.load_dict({"type": "scene"} | {f"part{n}": part for n, part in enumerate(parts)}))
+
+
+def _emitter(light: TruthLight) -> dict[str, Any]:
+    intensity = {"type": "rgb", "value": [float(value) for value in light.intensity]}
+    if light.axis is None:
+        return {"type": "point", "position": [float(value) for value in light.position], "intensity": intensity}
+    across = np.cross(light.axis, np.eye(3)[int(np.argmin(np.abs(light.axis)))])
+    across /= np.linalg.norm(across)
+    matrix = np.eye(4)
+    matrix[:3] = np.stack([across, np.cross(light.axis, across), light.axis, light.position], axis=1)
+    angles = {"cutoff_angle": float(np.rad2deg(light.cutoff)), "beam_width": float(np.rad2deg(light.beam))}
+    return {"type": "spot", "to_world": mi.ScalarTransform4f(matrix), "intensity": intensity, **angles}
 
 
 def _of_image(change: Callable[[Array], Array | None]) -> Callable[[TruthScene], Array | None]:
@@ -296,6 +323,7 @@ def planted_answers(
     for number, name in enumerate(scenes):
         loaded = load_scene(name, size)
         truth = read_truth(loaded.scene)
+        light = SceneLight(truth)
         for turn, planted in enumerate((*PLANTED, *PAIRS)):
             if progress is not None:
                 share = (number + turn / len((*PLANTED, *PAIRS))) / len(scenes)
@@ -303,7 +331,7 @@ def planted_answers(
             image = planted.image(truth)
             if image is None:
                 continue
-            diagnosis = diagnose_image(Image({_HOLDS: image}), loaded, layer=_HOLDS, pixel="centre")
+            diagnosis = diagnose_image(Image({_HOLDS: image}), loaded, layer=_HOLDS, pixel="centre", light=light)
             answer = " and ".join(diagnosis.ranked[0].together) or diagnosis.first
             rows.append(
                 {

@@ -19,6 +19,7 @@ from validation.diagnosis.prediction import Guess, Predictor
 
 Array = NDArray[np.float64]
 
+EVALUATIONS = 15  #: for each number of a search that need not be fine
 _LEAST_SCALE = 1e-6
 _TURNS = 5
 _COARSE = 0.02
@@ -70,23 +71,28 @@ def explain(
         Whether the values are looked for to all digits, or to some per cent, which a hypothesis that is wrong needs.
     """
     parameters = [parameter for hypothesis in hypotheses for parameter in hypothesis.parameters]
+    known: dict[tuple[float, ...], Array] = {}
+
+    def errors(numbers: Sequence[float]) -> Array:
+        values = tuple(numbers)
+        if values not in known:
+            known[values] = predictor.errors(_guess(predictor, hypotheses, values))
+        return known[values]
+
     starts = [tuple(value for part in near for value in part)] if near else _starts(predictor, hypotheses)
-    scale = min(_scale(predictor, _guess(predictor, hypotheses, start)) for start in starts)
-    inner = _inward(
-        parameters, min(starts, key=lambda start: _loss(predictor, _guess(predictor, hypotheses, start), scale))
-    )
+    scale = min(_scale(errors(start)) for start in starts)
+    inner = _inward(parameters, min(starts, key=lambda start: _loss(errors(start), scale)))
     for _ in range((2 if fine else 1) if parameters else 0):
-        scale = _scale(predictor, _guess(predictor, hypotheses, _outward(parameters, inner)))
-        inner = _improved(predictor, hypotheses, parameters, inner, scale, fine=fine)
+        scale = _scale(errors(_outward(parameters, inner)))
+        inner = _improved(errors, parameters, inner, scale, fine=fine)
     values = _outward(parameters, inner)
+    left = errors(values)
     guess = _guess(predictor, hypotheses, values)
-    errors = predictor.errors(guess)
-    return Explanation(tuple(hypotheses), _parted(hypotheses, values), guess, errors, float(np.abs(errors).mean()))
+    return Explanation(tuple(hypotheses), _parted(hypotheses, values), guess, left, float(np.abs(left).mean()))
 
 
 def _improved(
-    predictor: Predictor,
-    hypotheses: Sequence[Hypothesis],
+    errors_of: Callable[[Sequence[float]], Array],
     parameters: Sequence[Parameter],
     inner: Array,
     scale: float,
@@ -94,10 +100,10 @@ def _improved(
     fine: bool,
 ) -> Array:
     def errors(place: Array) -> Array:
-        return predictor.errors(_guess(predictor, hypotheses, _outward(parameters, place)))
+        return errors_of(_outward(parameters, place))
 
     def loss(place: Array) -> float:
-        return float(np.mean(np.log1p((errors(place) / scale) ** 2)))
+        return _loss(errors(place), scale)
 
     low, high = _inward(parameters, [p.low for p in parameters]), _inward(parameters, [p.high for p in parameters])
     if any(parameter.step for parameter in parameters):
@@ -111,7 +117,7 @@ def _improved(
         )
         return np.array([solved.x]) if solved.fun <= loss(inner) else inner
     simplex = np.concatenate([inner[None], inner + _SIMPLEX * np.eye(len(inner))])
-    most = (60 if fine else 15) * len(inner)
+    most = (60 if fine else EVALUATIONS) * len(inner)
     options = {"initial_simplex": np.clip(simplex, low, high), "maxfev": most, "xatol": 1e-5, "fatol": 1e-9}
     inner = np.clip(inner, low, high)
     solved = minimize(loss, inner, method="Nelder-Mead", bounds=list(zip(low, high, strict=True)), options=options)
@@ -209,9 +215,9 @@ def _outward(parameters: Sequence[Parameter], inner: Sequence[float] | Array) ->
     )
 
 
-def _loss(predictor: Predictor, guess: Guess, scale: float) -> float:
-    return float(np.mean(np.log1p((predictor.errors(guess) / scale) ** 2)))
+def _loss(errors: Array, scale: float) -> float:
+    return float(np.mean(np.log1p((errors / scale) ** 2)))
 
 
-def _scale(predictor: Predictor, guess: Guess) -> float:
-    return max(1.4826 * float(np.median(np.abs(predictor.errors(guess)))), _LEAST_SCALE)
+def _scale(errors: Array) -> float:
+    return max(1.4826 * float(np.median(np.abs(errors))), _LEAST_SCALE)

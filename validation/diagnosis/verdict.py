@@ -57,16 +57,21 @@ def is_explained(explanation: Explanation, pairs: tuple[Index, Index]) -> bool:
     return usual <= LEFT or correlation(explanation.errors, pairs) <= _NOISE
 
 
+def leaves_nothing(explanation: Explanation, pixel: str) -> bool:
+    """Return whether an explanation leaves no more than the fog model itself does."""
+    return scale_of(explanation, pixel) <= _KNOWN[pixel] and explanation.error <= LEFT
+
+
 def gains(explanation: Explanation, right: Explanation) -> bool:
     """Return whether an explanation leaves a tenth of the errors of the unchanged scene, or less."""
     return bool(explanation.hypotheses) and explanation.error <= right.error / _GAIN
 
 
 def correlation(errors: Array, pairs: tuple[Index, Index]) -> float:
-    """Return the correlation of the errors of neighbours, clipped at three scales."""
+    """Return the correlation of the errors of neighbours, clipped at three scales, or what is no fault in a pixel."""
     means = errors.mean(axis=1)
-    scale = 1.4826 * float(np.median(np.abs(means)))
-    clipped = np.clip(means, -3 * scale, 3 * scale)
+    most = max(3 * 1.4826 * float(np.median(np.abs(means))), LEFT)
+    clipped = np.clip(means, -most, most)
     power = float(np.mean(clipped**2))
     here, there = pairs
     return float(np.mean(clipped[here] * clipped[there])) / power if power > 0 and len(here) else 0.0
