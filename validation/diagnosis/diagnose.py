@@ -4,6 +4,7 @@
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,12 +26,13 @@ from validation.diagnosis.search import EVALUATIONS, Explanation, explain
 from validation.diagnosis.verdict import (
     LEAST_EFFECT,
     LEAST_EVIDENCE,
-    LEFT,
     effect,
     evidence,
     gains,
     is_explained,
+    is_noise,
     leaves_nothing,
+    no_fault,
     scale_of,
 )
 from validation.fit.fit import said_pixel, three_channels
@@ -52,6 +54,7 @@ _BETTER = 0.7  # what a pair must leave of the error of one alone
 _MUCH = 0.2  # what an explanation must leave of the error to be named although more is wrong
 _ALIKE = 5.0  # evidence by which explanations may differ and still be as good as one another
 _SHOWN = 8
+_SHARES = (0.0, 0.3), (0.3, 0.6), (0.8, 1.0), (0.6, 0.8)  # of the time: hypotheses by what they cost, and pairs
 
 
 @dataclass(frozen=True)
@@ -186,24 +189,34 @@ def _ranked(
 ) -> tuple[Explanation, Explanation, list[Ranked], bool]:
     """Return the unchanged scene, the explanation that is chosen, all in order, and whether nothing is left."""
     right = explain(predictor, ())
-    pairs_of_pixels = predictor.pairs(right.guess)
+    neighbours, little = predictor.pairs(right.guess), no_fault(predictor.task.truth)
+    explained = partial(is_explained, pairs=neighbours, little=little)
     there = [hypothesis for hypothesis in HYPOTHESES if hypothesis.applies(predictor)]
-    cheap = [hypothesis for hypothesis in there if not hypothesis.costly]
-    singles = _explained(predictor, right, cheap, progress, (0.0, 0.5))
+
+    def tried(costly: int) -> list[Explanation]:
+        own = [hypothesis for hypothesis in there if hypothesis.costly == costly]
+        tell = None if progress is None else partial(_within, progress, _SHARES[costly])
+        return _explained(predictor, right, own, tell)
+
+    def settled(explanation: Explanation) -> bool:
+        """Return whether nothing is left that another hypothesis could explain."""
+        if len(explanation.hypotheses) > 1:
+            return leaves_nothing(explanation, pixel)
+        return (explained(explanation) and explanation.error <= little) or is_noise(explanation, neighbours)
+
+    singles = tried(0)
     chosen = _best(right, singles, pixel)
-    if not is_explained(chosen, pairs_of_pixels) or chosen.error > LEFT:
-        costly = sorted((each for each in there if each.costly), key=lambda hypothesis: hypothesis.costly)
-        for number, hypothesis in enumerate(costly):
-            share = 0.5 + 0.25 * number / len(costly)
-            singles += _explained(predictor, right, [hypothesis], progress, (share, share))
+    pairs: list[Explanation] = []
+    if not settled(chosen):
+        singles += tried(1)
+        chosen = _best(right, singles, pixel)
+        if not explained(chosen):
+            tell = None if progress is None else partial(_within, progress, _SHARES[-1])
+            pairs = _pairs(predictor, right, chosen, singles, pixel, tell)
+        if not settled(_with_pairs(right, chosen, pairs, pixel)):
+            singles += tried(2)
             chosen = _best(right, singles, pixel)
-            if chosen.error <= LEFT and gains(chosen, right):
-                break  # nothing is left that another one could explain
-    if not is_explained(chosen, pairs_of_pixels):
-        pairs = _pairs(predictor, right, chosen, singles, pixel, progress)
-        best = _best(right, [chosen, *pairs] if chosen.hypotheses else pairs, pixel)
-        if best.error < _BETTER * chosen.error:
-            chosen = best
+        chosen = _with_pairs(right, chosen, pairs, pixel)
     scale = scale_of(chosen, pixel)
     rows: list[Ranked] = []
     if len(chosen.hypotheses) > 1:
@@ -220,20 +233,26 @@ def _ranked(
     elif len(chosen.hypotheses) == 1:
         # Between explanations that leave the same, the one with fewer numbers comes first.
         rows.sort(key=lambda row: row.name != chosen.hypotheses[0].name)
-    return right, chosen, rows, is_explained(chosen, pairs_of_pixels) or gains(chosen, right)
+    return right, chosen, rows, explained(chosen) or gains(chosen, right)
+
+
+def _within(progress: Progress, span: tuple[float, float], share: float, what: str) -> None:
+    progress(span[0] + (span[1] - span[0]) * share, what)
+
+
+def _with_pairs(right: Explanation, chosen: Explanation, pairs: Sequence[Explanation], pixel: str) -> Explanation:
+    """Return the best pair if it leaves far less than the best explanation alone, else that one."""
+    best = _best(right, [chosen, *pairs] if chosen.hypotheses else pairs, pixel)
+    return best if best.error < _BETTER * chosen.error else chosen
 
 
 def _explained(
-    predictor: Predictor,
-    right: Explanation,
-    hypotheses: Sequence[Hypothesis],
-    progress: Progress | None,
-    span: tuple[float, float],
+    predictor: Predictor, right: Explanation, hypotheses: Sequence[Hypothesis], progress: Progress | None
 ) -> list[Explanation]:
     explanations = []
     for number, hypothesis in enumerate(hypotheses):
         if progress is not None:
-            progress(span[0] + (span[1] - span[0]) * number / len(hypotheses), hypothesis.name)
+            progress(number / len(hypotheses), hypothesis.name)
         explanations.append(explain(predictor, (hypothesis,), fine=False))
     return _refined(predictor, right, explanations)
 
@@ -275,7 +294,7 @@ def _pairs(
     explanations: list[Explanation] = []
     for number, pair in enumerate(wanted):
         if progress is not None:
-            progress(0.75 + 0.25 * number / len(wanted), " and ".join(each.name for each in pair))
+            progress(number / len(wanted), " and ".join(each.name for each in pair))
         explanations.append(explain(predictor, pair, fine=False))
         if explanations[-1].error < _MUCH * chosen.error:
             explanations[-1] = explain(predictor, pair, explanations[-1].values)

@@ -7,7 +7,8 @@ scene, less k log(n)/2 (Schwarz 1978, Ann. Statist. 6, 461): a hypothesis with a
 of a pixel share their noise, so that three values count as one.
 
 Errors of neighbours that go together are no noise. An explanation leaves nothing to explain if they do not (a
-correlation of 0.25 at most), if it leaves 0.4 %, which no engine need beat, or a tenth of what there was.
+correlation of 0.25 at most), if it leaves 0.4 %, which no engine need beat (1 % with lights that have extent: the fog
+model has sixteen points of them), or a tenth of what there was.
 """
 
 import math
@@ -15,6 +16,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.scene.read import TruthScene
 from validation.diagnosis.search import Explanation
 
 Array = NDArray[np.float64]
@@ -22,11 +24,16 @@ Index = NDArray[np.int64]
 
 LEAST_EVIDENCE = 20.0  #: e^20 to one: what nobody doubts
 LEAST_EFFECT = 0.002  #: mean relative change of the image: less is no fault
-LEFT = 0.004  #: mean relative error that is no fault
+_LEFT, _LEFT_OF_AREA = 0.004, 0.01  # mean relative error that is no fault
 _GAIN = 10.0  # what an explanation that leaves nothing makes of the error
-_NOISE = 0.25  # correlation of neighbours
+_NOISE, _NOISE_ALONE = 0.25, 0.1  # correlation of neighbours
 _WORST = 0.02  # share of the pixels that may be as wrong as they like: those at lamps
 _KNOWN = {"centre": 3e-4, "area": 3e-3}  # relative error of the fog model itself, in most pixels
+
+
+def no_fault(truth: TruthScene) -> float:
+    """Return the mean relative error that is no fault in a scene [1]."""
+    return _LEFT_OF_AREA if truth.area else _LEFT
 
 
 def scale_of(explanation: Explanation, pixel: str) -> float:
@@ -50,16 +57,21 @@ def effect(explanation: Explanation, right: Explanation) -> float:
     return float(np.mean(np.abs(explanation.errors - right.errors)))
 
 
-def is_explained(explanation: Explanation, pairs: tuple[Index, Index]) -> bool:
-    """Return whether what an explanation leaves is noise, or little; `pairs` are those of `Predictor.pairs`."""
+def is_explained(explanation: Explanation, pairs: tuple[Index, Index], little: float) -> bool:
+    """Return whether what an explanation leaves is noise, or little, see `no_fault`; `pairs`: of `Predictor.pairs`."""
     errors = np.sort(np.abs(explanation.errors).mean(axis=1))
     usual = float(errors[: max(1, int((1 - _WORST) * len(errors)))].mean())
-    return usual <= LEFT or correlation(explanation.errors, pairs) <= _NOISE
+    return usual <= little or correlation(explanation.errors, pairs) <= _NOISE
+
+
+def is_noise(explanation: Explanation, pairs: tuple[Index, Index]) -> bool:
+    """Return whether what an explanation leaves is noise, and no fault a third as large could hide in it."""
+    return correlation(explanation.errors, pairs) <= _NOISE_ALONE
 
 
 def leaves_nothing(explanation: Explanation, pixel: str) -> bool:
     """Return whether an explanation leaves no more than the fog model itself does."""
-    return scale_of(explanation, pixel) <= _KNOWN[pixel] and explanation.error <= LEFT
+    return scale_of(explanation, pixel) <= _KNOWN[pixel] and explanation.error <= _LEFT
 
 
 def gains(explanation: Explanation, right: Explanation) -> bool:
@@ -70,7 +82,7 @@ def gains(explanation: Explanation, right: Explanation) -> bool:
 def correlation(errors: Array, pairs: tuple[Index, Index]) -> float:
     """Return the correlation of the errors of neighbours, clipped at three scales, or what is no fault in a pixel."""
     means = errors.mean(axis=1)
-    most = max(3 * 1.4826 * float(np.median(np.abs(means))), LEFT)
+    most = max(3 * 1.4826 * float(np.median(np.abs(means))), _LEFT)
     clipped = np.clip(means, -most, most)
     power = float(np.mean(clipped**2))
     here, there = pairs

@@ -133,6 +133,9 @@ def test_nodes_integrate_what_they_should():
     wanted = np.arctan(np.sinh(start + width)) - np.arctan(np.sinh(start))
     assert integral == pytest.approx(wanted, rel=1e-7)
     assert (np.diff(owner) >= 0).all()
+    owner, place, weight = panel_nodes(start, width, orders=(4, 2))
+    assert np.bincount(owner, weight / np.cosh(place)) == pytest.approx(wanted, rel=1e-3)
+    assert len(owner) == 4 * 3 + 2 + 4
 
 
 def test_an_image_has_only_the_pixels_that_are_asked_for(variant):
