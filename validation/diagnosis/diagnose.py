@@ -22,7 +22,7 @@ from validation.diagnosis.hypothesis import Hypothesis
 from validation.diagnosis.lights import LIGHTS
 from validation.diagnosis.medium import MEDIUM
 from validation.diagnosis.prediction import Predictor, SceneLight
-from validation.diagnosis.search import EVALUATIONS, Explanation, explain
+from validation.diagnosis.search import EVALUATIONS, Explanation, begin, explain
 from validation.diagnosis.verdict import (
     LEAST_EFFECT,
     LEAST_EVIDENCE,
@@ -48,8 +48,9 @@ RIGHT, UNEXPLAINED = "right", "unexplained"
 
 _REFINED = 5
 _GAINED = 0.98  # share of the error that a search leaves which gained something
-_PAIRS = 2500  # evaluations for pairs
-_OTHER_PATHS = 4  # evaluations for which one with other paths counts
+_FAR = 10.0  # errors over the least one that no more digits bring down to it
+_PAIRS = 1500  # evaluations for pairs, after those where they begin
+_OTHER_PATHS = 20  # evaluations for which one with other paths counts
 _BETTER = 0.7  # what a pair must leave of the error of one alone
 _MUCH = 0.2  # what an explanation must leave of the error to be named although more is wrong
 _ALIKE = 5.0  # evidence by which explanations may differ and still be as good as one another
@@ -258,9 +259,12 @@ def _explained(
 
 
 def _refined(predictor: Predictor, right: Explanation, explanations: list[Explanation]) -> list[Explanation]:
-    """Return explanations, those that leave least with all digits: where a search gained nothing, none are wanted."""
-    better = [each for each in explanations if each.error < _GAINED * right.error]
-    ordered = sorted(better, key=lambda each: each.error)
+    """Return explanations, those that leave least with all digits.
+
+    Where a search gained nothing, or left far more than another, none are wanted.
+    """
+    most = min(_GAINED * right.error, _FAR * max(LEAST_EFFECT, min((each.error for each in explanations), default=0.0)))
+    ordered = sorted((each for each in explanations if each.error < most), key=lambda each: each.error)
     best = [each for each in ordered[:_REFINED] if each.parameters]
     finer = {id(each): explain(predictor, each.hypotheses, each.values) for each in best}
     return [finer.get(id(each), each) for each in explanations]
@@ -287,15 +291,26 @@ def _pairs(
     pixel: str,
     progress: Progress | None,
 ) -> list[Explanation]:
-    """Return explanations by two hypotheses of different kinds: those of the best names first, until one leaves
-    nothing that could be seen.
+    """Return explanations by two hypotheses of different kinds.
+
+    All begin where their hypotheses do; those that leave least there are followed until one leaves nothing that could
+    be seen, or enough have been.
     """
-    wanted = _wanted_pairs(right, singles, pixel)
-    explanations: list[Explanation] = []
-    for number, pair in enumerate(wanted):
+    cheap = [each.hypotheses[0] for each in singles if not each.hypotheses[0].costly]
+    both = [_in_order(a, b) for number, a in enumerate(cheap) for b in cheap[:number] if _differ(a, b)]
+    begun = []
+    for number, pair in enumerate(both):
         if progress is not None:
-            progress(number / len(wanted), " and ".join(each.name for each in pair))
-        explanations.append(explain(predictor, pair, fine=False))
+            progress(0.5 * number / len(both), " and ".join(each.name for each in pair))
+        begun.append((*begin(predictor, pair), pair))
+    begun.sort(key=lambda each: each[0])
+    costs = np.cumsum([_cost(first) + _cost(second) for _, _, (first, second) in begun])
+    wanted = begun[: int(np.searchsorted(costs, _PAIRS))]
+    explanations: list[Explanation] = []
+    for number, (_, near, pair) in enumerate(wanted):
+        if progress is not None:
+            progress(0.5 + 0.5 * number / len(wanted), " and ".join(each.name for each in pair))
+        explanations.append(explain(predictor, pair, near, fine=False))
         if explanations[-1].error < _MUCH * chosen.error:
             explanations[-1] = explain(predictor, pair, explanations[-1].values)
             if leaves_nothing(explanations[-1], pixel):
@@ -303,19 +318,11 @@ def _pairs(
     return _refined(predictor, right, explanations)
 
 
-def _wanted_pairs(
-    right: Explanation, singles: Sequence[Explanation], pixel: str
-) -> list[tuple[Hypothesis, Hypothesis]]:
-    """Return pairs of hypotheses of different kinds, by the ranks of both names, as many as can be evaluated."""
-    scale = min(scale_of(each, pixel) for each in singles)
-    ordered = sorted(singles, key=lambda each: -evidence(each, right, scale))
-    cheap = [each.hypotheses[0] for each in ordered if not each.hypotheses[0].costly]
-    # Whatever else is wrong, an image may be too bright or too dark.
-    names = list(dict.fromkeys(["factor", *(hypothesis.name for hypothesis in cheap)]))
-    pairs = [_in_order(a, b) for number, a in enumerate(cheap) for b in cheap[:number] if a.kind != b.kind]
-    pairs.sort(key=lambda pair: names.index(pair[0].name) + names.index(pair[1].name))
-    costs = np.cumsum([_cost(first) + _cost(second) for first, second in pairs])
-    return pairs[: int(np.searchsorted(costs, _PAIRS))]
+def _differ(first: Hypothesis, second: Hypothesis) -> bool:
+    """Return whether two hypotheses are of different kinds, and do not both look for paths of their own."""
+    moves = [any(parameter.step for parameter in each.parameters) for each in (first, second)]
+    lights = [each.kind == "light" for each in (first, second)]
+    return first.kind != second.kind and not (any(moves) and any(lights))
 
 
 def _cost(hypothesis: Hypothesis) -> int:

@@ -150,10 +150,13 @@ def _negative_g(phase: PhaseFunction) -> PhaseFunction | None:
     return PhaseFunction("hg", g=-phase.g) if phase.name == "hg" and phase.g else None
 
 
-def _other_g(phase: PhaseFunction) -> PhaseFunction | None:
-    if phase.name == "hg":
-        return PhaseFunction("hg", g=0.31 if phase.g > 0.4 else phase.g + 0.37)
-    return PhaseFunction("hg", g=0.43) if phase.is_constant else None
+def _other_g(truth: TruthScene) -> TruthScene | None:
+    """Return a scene with one g typed for all lobes, or a lobe where all that scatters is isotropic."""
+    lobes = [medium.phase.g for medium in (truth.medium, *truth.media) if medium.phase.name == "hg"]
+    if lobes:
+        other = PhaseFunction("hg", g=0.31 if lobes[0] > 0.4 else lobes[0] + 0.37)
+        return _phase(lambda phase: other if phase.name == "hg" else None)(truth)
+    return _phase(lambda phase: PhaseFunction("hg", g=0.43) if phase.is_constant else None)(truth)
 
 
 def _scenery(wanted: Callable[[TruthScene], bool], **given: Any) -> Callable[[TruthScene], TruthScene | None]:
@@ -264,7 +267,7 @@ PLANTED = (
     Planted("albedo", "the albedo left out", _of_scene(_optics(lambda s, a: (s, np.ones_like(a))))),
     Planted("sigma-s", "extinction for scattering", _of_scene(_optics(lambda s, a: (s / np.maximum(a, 1e-9), a)))),
     Planted("g-sign", "g with the other sign", _of_scene(_phase(_negative_g))),
-    Planted("g", "another g", _of_scene(_phase(_other_g))),
+    Planted("g", "another g", _of_scene(_other_g)),
     Planted("light-leg", "the way from the light not attenuated", _light_leg),
     Planted("camera-leg", "the way to the camera not attenuated", _of_model(lambda truth: True, {"camera_leg": 0.0})),
     Planted("near-plane", "no medium up to 0.7 m", _near_plane),

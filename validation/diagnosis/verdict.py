@@ -27,6 +27,7 @@ LEAST_EFFECT = 0.002  #: mean relative change of the image: less is no fault
 _LEFT, _LEFT_OF_AREA = 0.004, 0.01  # mean relative error that is no fault
 _GAIN = 10.0  # what an explanation that leaves nothing makes of the error
 _NOISE, _NOISE_ALONE = 0.25, 0.1  # correlation of neighbours
+_EVEN = 2.5  # mean over median of errors that are noise; 1.2 of a normal distribution
 _WORST = 0.02  # share of the pixels that may be as wrong as they like: those at lamps
 _KNOWN = {"centre": 3e-4, "area": 3e-3}  # relative error of the fog model itself, in most pixels
 
@@ -65,8 +66,14 @@ def is_explained(explanation: Explanation, pairs: tuple[Index, Index], little: f
 
 
 def is_noise(explanation: Explanation, pairs: tuple[Index, Index]) -> bool:
-    """Return whether what an explanation leaves is noise, and no fault a third as large could hide in it."""
-    return correlation(explanation.errors, pairs) <= _NOISE_ALONE
+    """Return whether what an explanation leaves is noise, all over the image: no fault of some size hides in it.
+
+    Neighbours do not share it, and no part of the image has most of it, as shadows have that are off.
+    """
+    errors = np.sort(np.abs(explanation.errors).mean(axis=1))
+    usual = float(errors[: max(1, int((1 - _WORST) * len(errors)))].mean())
+    even = usual <= _EVEN * float(np.median(errors))
+    return even and correlation(explanation.errors, pairs) <= _NOISE_ALONE
 
 
 def leaves_nothing(explanation: Explanation, pixel: str) -> bool:
@@ -81,9 +88,8 @@ def gains(explanation: Explanation, right: Explanation) -> bool:
 
 def correlation(errors: Array, pairs: tuple[Index, Index]) -> float:
     """Return the correlation of the errors of neighbours, clipped at three scales, or what is no fault in a pixel."""
-    means = errors.mean(axis=1)
-    most = max(3 * 1.4826 * float(np.median(np.abs(means))), _LEFT)
-    clipped = np.clip(means, -most, most)
+    most = max(3 * 1.4826 * float(np.median(np.abs(errors))), _LEFT)
+    clipped = np.clip(errors, -most, most)
     power = float(np.mean(clipped**2))
     here, there = pairs
     return float(np.mean(clipped[here] * clipped[there])) / power if power > 0 and len(here) else 0.0
