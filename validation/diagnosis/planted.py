@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from analytic.phase import PhaseFunction
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.light_airlight import light_airlight
+from reference.quadrature.light_points import PointPlan
 from reference.quadrature.ray_values import TruthImage
 from reference.quadrature.surface import lit_surface, surface_hits
 from reference.scene.area_light import is_area
@@ -38,6 +39,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
 _SAMPLES = 16  # of visibility, where it is not exact: images of planted faults are small
+_POINTS = 128  # of lights with extent: 0.03 % off in the mean
 _HOLDS = "total"
 _FOOT = 0.3048  # [m]
 
@@ -70,7 +72,7 @@ class Planted:
 
 
 def _quadrature(truth: TruthScene, **how: Any) -> TruthImage:
-    return quadrature_image(truth, samples=_SAMPLES, **how)
+    return quadrature_image(truth, samples=_SAMPLES, plan=PointPlan(most=_POINTS), **how)
 
 
 def _total(image: TruthImage) -> Array:

@@ -17,6 +17,7 @@ from reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from reference.scene.directional_light import DirectionalLight, is_directional
 from reference.scene.read import TruthLight, TruthScene
 from reference.scene.shapes import read_shapes
+from reference.visibility.before_light import before_light
 from reference.visibility.exact_distance import exact_distance
 from validation.fog_model.directional_paths import directional_nodes
 from validation.fog_model.paths import LightPaths, Nodes, ScatteringPaths, SurfacePoints
@@ -99,7 +100,8 @@ def scattering_paths(
     lights = []
     for number, given in enumerate(sources):
         source = _spots_whole_within(given, blend) if blend else given
-        nodes = [_nodes(open_rays, light, hits.distance, how, begin) for light in source.lights] if airlight else []
+        before, known = (open_rays, how) if source.area is None else _without(open_rays, source.area, how)
+        nodes = [_nodes(before, light, hits.distance, known, begin) for light in source.lights] if airlight else []
         lit = [surface_points(rays, light, hits, shadows=shadows) for light in source.lights] if surface else []
         if blend:
             edges = [partial(_blended, light=light) for light in source.lights]
@@ -131,6 +133,14 @@ def scattering_paths(
     )
 
 
+def _without(truth: TruthScene, light: TruthAreaLight, how: dict[str, Any]) -> tuple[TruthScene, dict[str, Any]]:
+    """Return a scene without the shape of a light, whose own points it does not shadow, and how to ask it."""
+    if how["shapes"] is None:
+        return truth, how
+    truth, shapes = before_light(truth, light)
+    return truth, {"shapes": shapes} | ({"checks": 0} if shapes.others is None else {})
+
+
 def _positions(centres: Array, rays_per_side: int) -> Array:
     """Return places on the film, those of a pixel one after another."""
     if not rays_per_side:
@@ -149,6 +159,7 @@ class Source:
     intensity: Array  #: what multiplies the paths from it, (3,)
     lights: Sequence[TruthLight | DirectionalLight]  #: that stand for it
     centre: Array | None = None  #: of a sphere, (3,) [m]
+    area: TruthAreaLight | None = None  #: that has this extent in the scene
 
 
 def light_sources(truth: TruthScene, points: int = _POINTS, seed: int = 0, radius: float = 0.0) -> list[Source]:
@@ -173,6 +184,7 @@ def light_sources(truth: TruthScene, points: int = _POINTS, seed: int = 0, radiu
             light.radiance * light.area / points,
             light_points(light, square_points(plan, number, 0, light.kind)),
             light.centre if light.kind == "sphere" else None,
+            light,
         )
         for number, light in enumerate(truth.area)
     ]
