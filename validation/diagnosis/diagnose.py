@@ -34,6 +34,7 @@ from validation.diagnosis.verdict import (
     leaves_nothing,
     no_fault,
     scale_of,
+    usual_error,
 )
 from validation.fit.fit import said_pixel, three_channels
 from validation.fit.image_model import Task
@@ -203,7 +204,7 @@ def _ranked(
         """Return whether nothing is left that another hypothesis could explain."""
         if len(explanation.hypotheses) > 1:
             return leaves_nothing(explanation, pixel)
-        return (explained(explanation) and explanation.error <= little) or is_noise(explanation, neighbours)
+        return usual_error(explanation) <= little or is_noise(explanation, neighbours)
 
     singles = tried(0)
     chosen = _best(right, singles, pixel)

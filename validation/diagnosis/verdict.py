@@ -27,8 +27,8 @@ LEAST_EFFECT = 0.002  #: mean relative change of the image: less is no fault
 _LEFT, _LEFT_OF_AREA = 0.004, 0.01  # mean relative error that is no fault
 _GAIN = 10.0  # what an explanation that leaves nothing makes of the error
 _NOISE, _NOISE_ALONE = 0.25, 0.1  # correlation of neighbours
-_EVEN = 2.5  # mean over median of errors that are noise; 1.2 of a normal distribution
-_WORST = 0.02  # share of the pixels that may be as wrong as they like: those at lamps
+_EVEN = 2.0  # mean over median of errors that are noise; 1.2 of a normal distribution
+_WORST = 0.02  # share of the pixels that may be as wrong as they like
 _KNOWN = {"centre": 3e-4, "area": 3e-3}  # relative error of the fog model itself, in most pixels
 
 
@@ -58,11 +58,15 @@ def effect(explanation: Explanation, right: Explanation) -> float:
     return float(np.mean(np.abs(explanation.errors - right.errors)))
 
 
+def usual_error(explanation: Explanation) -> float:
+    """Return the mean error of nearly all pixels: those at lamps may be as wrong as they like."""
+    errors = np.sort(np.abs(explanation.errors).mean(axis=1))
+    return float(errors[: max(1, int((1 - _WORST) * len(errors)))].mean())
+
+
 def is_explained(explanation: Explanation, pairs: tuple[Index, Index], little: float) -> bool:
     """Return whether what an explanation leaves is noise, or little, see `no_fault`; `pairs`: of `Predictor.pairs`."""
-    errors = np.sort(np.abs(explanation.errors).mean(axis=1))
-    usual = float(errors[: max(1, int((1 - _WORST) * len(errors)))].mean())
-    return usual <= little or correlation(explanation.errors, pairs) <= _NOISE
+    return usual_error(explanation) <= little or correlation(explanation.errors, pairs) <= _NOISE
 
 
 def is_noise(explanation: Explanation, pairs: tuple[Index, Index]) -> bool:
@@ -70,9 +74,7 @@ def is_noise(explanation: Explanation, pairs: tuple[Index, Index]) -> bool:
 
     Neighbours do not share it, and no part of the image has most of it, as shadows have that are off.
     """
-    errors = np.sort(np.abs(explanation.errors).mean(axis=1))
-    usual = float(errors[: max(1, int((1 - _WORST) * len(errors)))].mean())
-    even = usual <= _EVEN * float(np.median(errors))
+    even = usual_error(explanation) <= _EVEN * float(np.median(np.abs(explanation.errors).mean(axis=1)))
     return even and correlation(explanation.errors, pairs) <= _NOISE_ALONE
 
 
