@@ -11,13 +11,15 @@ from analytic.errors import InputError
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_truth
 from reference.storage.exr import Image, write_exr
+from tests.helpers.aside import write_scenes
 from validation.comparison.whole_image import to_srgb
 from validation.diagnosis.diagnose import HYPOTHESES, diagnose_file, diagnose_image
 from validation.diagnosis.diagnosis_text import diagnosis_lines
 from validation.diagnosis.encoding import gamma, srgb_in_8_bits
 from validation.diagnosis.planted import PAIRS, PLANTED
-from validation.diagnosis.prediction import SceneLight, Scenery, changed_scene
-from validation.diagnosis.verdict import correlation
+from validation.diagnosis.prediction import Guess, SceneLight, Scenery, changed_scene
+from validation.diagnosis.search import Explanation
+from validation.diagnosis.verdict import correlation, is_noise
 from validation.fit.image_model import Task
 from validation.fog_model.build import scattering_paths
 from validation.fog_model.fog import scene_fog
@@ -137,6 +139,32 @@ def test_errors_of_few_pixels_are_no_noise():
     pairs = np.arange(399), np.arange(1, 400)
     assert correlation(errors, pairs) > 0.9
     assert correlation(0.01 * generator.standard_normal((400, 3)), pairs) < 0.25
+
+
+def test_neighbours_are_compared_by_channel():
+    """Red too bright and blue too dark by as much is no noise."""
+    errors = np.tile([0.1, 0.0, -0.1], (400, 1))
+    assert correlation(errors, (np.arange(399), np.arange(1, 400))) == pytest.approx(1.0)
+
+
+def test_noise_is_of_one_size_all_over_the_image(truth):
+    generator = np.random.default_rng(2)
+    errors, pairs = 0.02 * generator.standard_normal((400, 3)), (np.arange(399), np.arange(1, 400))
+    explanation = Explanation((), (), Guess(scene_fog(truth)), errors, float(np.abs(errors).mean()))
+    assert is_noise(explanation, pairs)
+    errors[::7] *= 20  # thin shadows that are off
+    assert not is_noise(explanation, pairs)
+
+
+@pytest.mark.slow
+def test_one_of_several_minima_is_found(variant, tmp_path):
+    """The light of a spot fills a part of this image: another g, -0.43, was nearly right in more of its pixels."""
+    write_scenes(tmp_path)
+    path = str(tmp_path / "spot-in-box.xml")
+    (planted,) = (each for each in PLANTED if each.words == "another g")
+    diagnosis = diagnosed(planted.image(read_truth(load_scene(path, SIZE).scene)), path)
+    assert (diagnosis.first, diagnosis.ranked[0].together) == ("g", ())
+    assert diagnosis.ranked[0].parameter == pytest.approx(0.14, abs=1e-3)
 
 
 @pytest.mark.slow
