@@ -45,6 +45,7 @@ def test_runs_are_joined_and_drawn(tmp_path, rows):
     assert "old" not in page
     assert page.startswith("a\n")
     assert len(read_json(tmp_path / RECORD, "a run")["diagnosis"]) == 6
+    assert "Not run: `" in page  # the other scenes
 
 
 def test_answers_are_counted():
