@@ -48,8 +48,8 @@ HYPOTHESES: tuple[Hypothesis, ...] = (*LIGHTS, *MEDIUM, *CAMERA, *ENCODING)
 RIGHT, UNEXPLAINED = "right", "unexplained"
 
 _REFINED = 5
-_GAINED = 0.98  # share of the error that a search leaves which gained something
-_FAR = 10.0  # errors over the least one that no more digits bring down to it
+_MOVED = 0.02  # share by which the error changes where a search left the unchanged scene
+_FAR, _FAR_OF_PATHS = 10.0, 3.0  # errors over the least one that more digits do not bring down to it
 _PAIRS = 1500  # evaluations for pairs, after those where they begin
 _OTHER_PATHS = 20  # evaluations for which one with other paths counts
 _BETTER = 0.7  # what a pair must leave of the error of one alone
@@ -195,10 +195,12 @@ def _ranked(
     explained = partial(is_explained, pairs=neighbours, little=little)
     there = [hypothesis for hypothesis in HYPOTHESES if hypothesis.applies(predictor)]
 
+    singles: list[Explanation] = []
+
     def tried(costly: int) -> list[Explanation]:
         own = [hypothesis for hypothesis in there if hypothesis.costly == costly]
         tell = None if progress is None else partial(_within, progress, _SHARES[costly])
-        return _explained(predictor, right, own, tell)
+        return _explained(predictor, right, own, min((each.error for each in singles), default=1.0), tell)
 
     def settled(explanation: Explanation) -> bool:
         """Return whether nothing is left that another hypothesis could explain."""
@@ -206,7 +208,7 @@ def _ranked(
             return leaves_nothing(explanation, pixel)
         return usual_error(explanation) <= little or is_noise(explanation, neighbours)
 
-    singles = tried(0)
+    singles += tried(0)
     chosen = _best(right, singles, pixel)
     pairs: list[Explanation] = []
     if not settled(chosen):
@@ -249,26 +251,40 @@ def _with_pairs(right: Explanation, chosen: Explanation, pairs: Sequence[Explana
 
 
 def _explained(
-    predictor: Predictor, right: Explanation, hypotheses: Sequence[Hypothesis], progress: Progress | None
+    predictor: Predictor,
+    right: Explanation,
+    hypotheses: Sequence[Hypothesis],
+    least: float,
+    progress: Progress | None,
 ) -> list[Explanation]:
     explanations = []
     for number, hypothesis in enumerate(hypotheses):
         if progress is not None:
             progress(number / len(hypotheses), hypothesis.name)
         explanations.append(explain(predictor, (hypothesis,), fine=False))
-    return _refined(predictor, right, explanations)
+    return _refined(predictor, right, explanations, least)
 
 
-def _refined(predictor: Predictor, right: Explanation, explanations: list[Explanation]) -> list[Explanation]:
-    """Return explanations, those that leave least with all digits.
+def _refined(
+    predictor: Predictor, right: Explanation, explanations: list[Explanation], least: float = 1.0
+) -> list[Explanation]:
+    """Return explanations, those that leave least with all digits; `least` is what others leave.
 
-    Where a search gained nothing, or left far more than another, none are wanted.
+    Where a search stayed at the unchanged scene, or left far more than another, none are wanted.
     """
-    most = min(_GAINED * right.error, _FAR * max(LEAST_EFFECT, min((each.error for each in explanations), default=0.0)))
-    ordered = sorted((each for each in explanations if each.error < most), key=lambda each: each.error)
+    least = max(LEAST_EFFECT, min([least, *(each.error for each in explanations)]))
+    moved = [each for each in explanations if abs(each.error - right.error) > _MOVED * right.error]
+    better = [each for each in moved if each.error < _far(each) * least]
+    ordered = sorted(better, key=lambda each: each.error)
     best = [each for each in ordered[:_REFINED] if each.parameters]
     finer = {id(each): explain(predictor, each.hypotheses, each.values) for each in best}
     return [finer.get(id(each), each) for each in explanations]
+
+
+def _far(explanation: Explanation) -> float:
+    """Return the error over the least one that more digits do not bring down to it: those of other paths are few."""
+    numbers = (parameter for hypothesis in explanation.hypotheses for parameter in hypothesis.parameters)
+    return _FAR_OF_PATHS if any(number.step for number in numbers) else _FAR
 
 
 def _best(right: Explanation, explanations: Sequence[Explanation], pixel: str) -> Explanation:
