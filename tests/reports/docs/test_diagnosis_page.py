@@ -27,12 +27,12 @@ def test_the_page_is_made_of_its_run():
 def test_planted_faults_are_those_that_there_are_and_nearly_all_are_named(rows):
     assert {row["words"] for row in rows} <= {planted.words for planted in (*PLANTED, *PAIRS)}
     assert all(row["right"] for row in rows if row["planted"] == "right")
-    assert {row["scene"] for row in rows} == {*FOG_SCENES, *ASIDE}
-    for scenes in (FOG_SCENES, ASIDE):
+    assert {row["scene"] for row in rows} <= {*FOG_SCENES, *ASIDE}
+    for scenes, fewest in ((FOG_SCENES, 200), (ASIDE, 80)):
         single = [
             row["right"] for row in rows if row["scene"] in scenes and row["planted"] != "right" and not row["pair"]
         ]
-        assert len(single) > 25 * len(scenes)
+        assert len(single) > fewest
         assert sum(single) >= 0.95 * len(single)
 
 
