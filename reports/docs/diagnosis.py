@@ -41,6 +41,9 @@ def _answers(record: Mapping[str, Any]) -> str:
             names = ", ".join(f"`{name}`" for name in dict.fromkeys(row["scene"] for row in own))
             drawn = markdown(answers_table(own))
             parts += [f"Scenes {title}: {names}. {answers_sentence(own)}", drawn[drawn.index("| ") :].rstrip()]
+    missing = [f"`{name}`" for name in FOG_SCENES if all(row["scene"] != name for row in rows)]
+    if missing:
+        parts.append(f"Not run: {', '.join(missing)}.")
     return "\n\n".join([*parts, ""])
 
 

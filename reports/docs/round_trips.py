@@ -42,7 +42,10 @@ def answers(
     root
         The checkout.
     """
+    from reference.scene.read import read_truth
     from validation.diagnosis.diagnose import diagnose_file
+    from validation.diagnosis.prediction import SceneLight
+    from validation.scenes.loading import load_scene
 
     scene = str(root / SCENES[name]) if SCENES[name].endswith(".xml") else SCENES[name]
     if python is None:
@@ -50,11 +53,12 @@ def answers(
     else:
         faults = _listed(python, root)
         render_faults(python, scene, folder, samples=samples, size=_SIZE, root=root)
+    light = SceneLight(read_truth(load_scene(scene, _SIZE).scene))
     for fault, said in faults.items():
         path = folder / f"{fault}.exr"
         if not path.exists():
             continue  # a scene that cannot have it
-        diagnosis = diagnose_file(path, scene, pixel="area")
+        diagnosis = diagnose_file(path, scene, pixel="area", light=light)
         first = diagnosis.ranked[0]
         off, left = _percent(diagnosis.residual), _percent(diagnosis.left)
         print(f"{name}, {fault}: {diagnosis.first}, {off} off, {left} left", flush=True)

@@ -79,7 +79,7 @@ CAMERA = (
         "the image shows {0:.4g} times the width that it should",
         _zoom,
         (Parameter("factor", 0.2, 5.0, (0.9, 1.1), logarithmic=True, step=0.01),),
-        costly=True,
+        costly=1,
     ),
     Hypothesis(
         "shift",

@@ -4,17 +4,14 @@
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
 from analytic.errors import InputError
-from reference.monte_carlo.batches import LAYERS
-from reference.monte_carlo.volpath.integrator import volpath_batch
-from reference.scene.read import TruthScene, read_truth
+from reference.scene.read import read_truth
 from reference.storage.exr import Image, read_exr
 from validation.comparison.engine_compare import scene_of_size
 from validation.comparison.engine_layers import judged_layer
@@ -24,17 +21,20 @@ from validation.diagnosis.encoding import ENCODING
 from validation.diagnosis.hypothesis import Hypothesis
 from validation.diagnosis.lights import LIGHTS
 from validation.diagnosis.medium import MEDIUM
-from validation.diagnosis.prediction import Predictor
-from validation.diagnosis.search import Explanation, explain
+from validation.diagnosis.prediction import Predictor, SceneLight
+from validation.diagnosis.search import EVALUATIONS, Explanation, begin, explain
 from validation.diagnosis.verdict import (
     LEAST_EFFECT,
     LEAST_EVIDENCE,
-    LEFT,
     effect,
     evidence,
     gains,
     is_explained,
+    is_noise,
+    leaves_nothing,
+    no_fault,
     scale_of,
+    usual_error,
 )
 from validation.fit.fit import said_pixel, three_channels
 from validation.fit.image_model import Task
@@ -48,15 +48,15 @@ HYPOTHESES: tuple[Hypothesis, ...] = (*LIGHTS, *MEDIUM, *CAMERA, *ENCODING)
 RIGHT, UNEXPLAINED = "right", "unexplained"
 
 _REFINED = 5
-_PAIRS = 80  # a pair takes as long as a hypothesis
-_PARTNERS = 5  # of the best explanations that pairs are made of
+_MOVED = 0.02  # share by which the error changes where a search left the unchanged scene
+_FAR, _FAR_OF_PATHS = 10.0, 3.0  # errors over the least one that more digits do not bring down to it
+_PAIRS = 1500  # evaluations for pairs, after those where they begin
+_OTHER_PATHS = 20  # evaluations for which one with other paths counts
 _BETTER = 0.7  # what a pair must leave of the error of one alone
 _MUCH = 0.2  # what an explanation must leave of the error to be named although more is wrong
 _ALIKE = 5.0  # evidence by which explanations may differ and still be as good as one another
 _SHOWN = 8
-_BATCH = 4  # batches of 16 paths a pixel for the light of multiple scattering
-_SAMPLES = 16
-_SMOOTH = 40  # of the width of an image: the width of the filter for that light
+_SHARES = (0.0, 0.3), (0.3, 0.6), (0.8, 1.0), (0.6, 0.8)  # of the time: hypotheses by what they cost, and pairs
 
 
 @dataclass(frozen=True)
@@ -127,6 +127,7 @@ def diagnose_image(
     layer: str | None = None,
     holds: str | None = None,
     pixel: str | None = None,
+    light: SceneLight | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Say what is wrong with an image of a scene.
@@ -141,6 +142,8 @@ def diagnose_image(
         Which layer, and what it holds: 'airlight', 'surface' or 'total'.
     pixel
         'centre' or 'area'; by default what the image says of itself, or what fits better.
+    light
+        Of this scene, as other images of it have found it.
     progress
         Called with (share done, what).
 
@@ -152,19 +155,18 @@ def diagnose_image(
     if pixel is not None and pixel not in PIXELS:
         raise InputError(f"--pixel {pixel}; wanted 'centre' or 'area'")
     judged = judged_layer(image, path, name=layer, holds=holds)
-    truth = read_truth(loaded.scene)
+    light = light or SceneLight(read_truth(loaded.scene))
     values = three_channels(judged)
     used = np.asarray(np.isfinite(values).all(axis=1))
     if not used.any() or not np.any(values[used] > 0):
         raise InputError(f"{path}: the layer '{judged.name}' has no finite value above 0; there is nothing to diagnose")
     said = pixel or said_pixel(image)
-    task = Task(truth, values, judged.holds, used, area=False)
-    multiple = cache(lambda: _multiple_light(truth))
+    task = Task(light.truth, values, judged.holds, used, area=False)
     kinds = [said] if said else list(PIXELS)
     results = []
     for number, kind in enumerate(kinds):
         shape = judged.size[1], judged.size[0]
-        predictor = Predictor(replace(task, area=kind == "area"), shape, multiple=multiple)
+        predictor = Predictor(replace(task, area=kind == "area"), shape, light)
         tell = None if progress is None else _stage(progress, number, len(kinds))
         results.append((kind, _ranked(predictor, kind, tell)))
     kind, (right, chosen, rows, explained) = min(results, key=lambda result: result[1][1].error)
@@ -189,25 +191,36 @@ def _ranked(
 ) -> tuple[Explanation, Explanation, list[Ranked], bool]:
     """Return the unchanged scene, the explanation that is chosen, all in order, and whether nothing is left."""
     right = explain(predictor, ())
-    pairs_of_pixels = predictor.pairs(right.guess)
+    neighbours, little = predictor.pairs(right.guess), no_fault(predictor.task.truth)
+    explained = partial(is_explained, pairs=neighbours, little=little)
     there = [hypothesis for hypothesis in HYPOTHESES if hypothesis.applies(predictor)]
-    cheap = [hypothesis for hypothesis in there if not hypothesis.costly]
-    singles = _explained(predictor, cheap, progress, (0.0, 0.5))
+
+    singles: list[Explanation] = []
+
+    def tried(costly: int) -> list[Explanation]:
+        own = [hypothesis for hypothesis in there if hypothesis.costly == costly]
+        tell = None if progress is None else partial(_within, progress, _SHARES[costly])
+        return _explained(predictor, right, own, min((each.error for each in singles), default=1.0), tell)
+
+    def settled(explanation: Explanation) -> bool:
+        """Return whether nothing is left that another hypothesis could explain."""
+        if len(explanation.hypotheses) > 1:
+            return leaves_nothing(explanation, pixel)
+        return usual_error(explanation) <= little or is_noise(explanation, neighbours)
+
+    singles += tried(0)
     chosen = _best(right, singles, pixel)
-    if not is_explained(chosen, pairs_of_pixels) or chosen.error > LEFT:
-        costly = [hypothesis for hypothesis in there if hypothesis.costly]
-        for number, hypothesis in enumerate(costly):
-            share = 0.5 + 0.25 * number / len(costly)
-            singles += _explained(predictor, [hypothesis], progress, (share, share))
-            chosen = _best(right, singles, pixel)
-            if chosen.error <= LEFT and gains(chosen, right):
-                break  # nothing is left that another one could explain
     pairs: list[Explanation] = []
-    if not is_explained(chosen, pairs_of_pixels):
-        pairs = _pairs(predictor, right, singles, there, pixel, progress)
-        best = _best(right, [chosen, *pairs] if chosen.hypotheses else pairs, pixel)
-        if best.error < _BETTER * chosen.error:
-            chosen = best
+    if not settled(chosen):
+        singles += tried(1)
+        chosen = _best(right, singles, pixel)
+        if not explained(chosen):
+            tell = None if progress is None else partial(_within, progress, _SHARES[-1])
+            pairs = _pairs(predictor, right, chosen, singles, pixel, tell)
+        if not settled(_with_pairs(right, chosen, pairs, pixel)):
+            singles += tried(2)
+            chosen = _best(right, singles, pixel)
+        chosen = _with_pairs(right, chosen, pairs, pixel)
     scale = scale_of(chosen, pixel)
     rows: list[Ranked] = []
     if len(chosen.hypotheses) > 1:
@@ -224,26 +237,54 @@ def _ranked(
     elif len(chosen.hypotheses) == 1:
         # Between explanations that leave the same, the one with fewer numbers comes first.
         rows.sort(key=lambda row: row.name != chosen.hypotheses[0].name)
-    return right, chosen, rows, is_explained(chosen, pairs_of_pixels) or gains(chosen, right)
+    return right, chosen, rows, explained(chosen) or gains(chosen, right)
+
+
+def _within(progress: Progress, span: tuple[float, float], share: float, what: str) -> None:
+    progress(span[0] + (span[1] - span[0]) * share, what)
+
+
+def _with_pairs(right: Explanation, chosen: Explanation, pairs: Sequence[Explanation], pixel: str) -> Explanation:
+    """Return the best pair if it leaves far less than the best explanation alone, else that one."""
+    best = _best(right, [chosen, *pairs] if chosen.hypotheses else pairs, pixel)
+    return best if best.error < _BETTER * chosen.error else chosen
 
 
 def _explained(
-    predictor: Predictor, hypotheses: Sequence[Hypothesis], progress: Progress | None, span: tuple[float, float]
+    predictor: Predictor,
+    right: Explanation,
+    hypotheses: Sequence[Hypothesis],
+    least: float,
+    progress: Progress | None,
 ) -> list[Explanation]:
     explanations = []
     for number, hypothesis in enumerate(hypotheses):
         if progress is not None:
-            progress(span[0] + (span[1] - span[0]) * number / len(hypotheses), hypothesis.name)
+            progress(number / len(hypotheses), hypothesis.name)
         explanations.append(explain(predictor, (hypothesis,), fine=False))
-    return _refined(predictor, explanations)
+    return _refined(predictor, right, explanations, least)
 
 
-def _refined(predictor: Predictor, explanations: list[Explanation]) -> list[Explanation]:
-    """Return explanations, those that leave least with all digits."""
-    ordered = sorted(explanations, key=lambda each: each.error)
+def _refined(
+    predictor: Predictor, right: Explanation, explanations: list[Explanation], least: float = 1.0
+) -> list[Explanation]:
+    """Return explanations, those that leave least with all digits; `least` is what others leave.
+
+    Where a search stayed at the unchanged scene, or left far more than another, none are wanted.
+    """
+    least = max(LEAST_EFFECT, min([least, *(each.error for each in explanations)]))
+    moved = [each for each in explanations if abs(each.error - right.error) > _MOVED * right.error]
+    better = [each for each in moved if each.error < _far(each) * least]
+    ordered = sorted(better, key=lambda each: each.error)
     best = [each for each in ordered[:_REFINED] if each.parameters]
     finer = {id(each): explain(predictor, each.hypotheses, each.values) for each in best}
     return [finer.get(id(each), each) for each in explanations]
+
+
+def _far(explanation: Explanation) -> float:
+    """Return the error over the least one that more digits do not bring down to it: those of other paths are few."""
+    numbers = (parameter for hypothesis in explanation.hypotheses for parameter in hypothesis.parameters)
+    return _FAR_OF_PATHS if any(number.step for number in numbers) else _FAR
 
 
 def _best(right: Explanation, explanations: Sequence[Explanation], pixel: str) -> Explanation:
@@ -262,38 +303,56 @@ def _best(right: Explanation, explanations: Sequence[Explanation], pixel: str) -
 def _pairs(
     predictor: Predictor,
     right: Explanation,
+    chosen: Explanation,
     singles: Sequence[Explanation],
-    there: Sequence[Hypothesis],
     pixel: str,
     progress: Progress | None,
 ) -> list[Explanation]:
-    """Return explanations by two hypotheses of different kinds."""
-    scale = min(scale_of(each, pixel) for each in singles)
-    ordered = sorted(singles, key=lambda each: -evidence(each, right, scale))
-    partners = [each.hypotheses[0] for each in ordered[:_PARTNERS]]
-    partners += [hypothesis for hypothesis in there if hypothesis.name == "factor" and hypothesis not in partners]
-    wanted = []
-    for partner in partners:
-        for other in there:
-            costly = partner.costly or other.costly
-            pair = _in_order(partner, other)
-            if partner.kind != other.kind and not costly and pair not in wanted:
-                wanted.append(pair)
-    wanted = wanted[:_PAIRS]  # those of the best partners come first
-    explanations = []
-    for number, pair in enumerate(wanted):
+    """Return explanations by two hypotheses of different kinds.
+
+    All begin where their hypotheses do; those that leave least there are followed until one leaves nothing that could
+    be seen, or enough have been.
+    """
+    cheap = [each.hypotheses[0] for each in singles if not each.hypotheses[0].costly]
+    both = [_in_order(a, b) for number, a in enumerate(cheap) for b in cheap[:number] if _differ(a, b)]
+    begun = []
+    for number, pair in enumerate(both):
         if progress is not None:
-            progress(0.75 + 0.25 * number / len(wanted), " and ".join(each.name for each in pair))
-        explanations.append(explain(predictor, pair, fine=False))
-    return _refined(predictor, explanations)
+            progress(0.5 * number / len(both), " and ".join(each.name for each in pair))
+        begun.append((*begin(predictor, pair), pair))
+    begun.sort(key=lambda each: each[0])
+    costs = np.cumsum([_cost(first) + _cost(second) for _, _, (first, second) in begun])
+    wanted = begun[: int(np.searchsorted(costs, _PAIRS))]
+    explanations: list[Explanation] = []
+    for number, (_, near, pair) in enumerate(wanted):
+        if progress is not None:
+            progress(0.5 + 0.5 * number / len(wanted), " and ".join(each.name for each in pair))
+        explanations.append(explain(predictor, pair, near, fine=False))
+        if explanations[-1].error < _MUCH * chosen.error:
+            explanations[-1] = explain(predictor, pair, explanations[-1].values)
+            if leaves_nothing(explanations[-1], pixel):
+                break
+    return _refined(predictor, right, explanations)
+
+
+def _differ(first: Hypothesis, second: Hypothesis) -> bool:
+    """Return whether two hypotheses are of different kinds, and do not both look for paths of their own."""
+    moves = [any(parameter.step for parameter in each.parameters) for each in (first, second)]
+    lights = [each.kind == "light" for each in (first, second)]
+    return first.kind != second.kind and not (any(moves) and any(lights))
+
+
+def _cost(hypothesis: Hypothesis) -> int:
+    """Return how many evaluations a hypothesis adds to a pair; those with other paths count as several."""
+    return 1 + sum(EVALUATIONS * (_OTHER_PATHS if number.step else 1) for number in hypothesis.parameters)
 
 
 _ORDER = ("medium", "light", "camera", "brightness", "values")
 
 
-def _in_order(*hypotheses: Hypothesis) -> tuple[Hypothesis, ...]:
+def _in_order(first: Hypothesis, second: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
     """Return hypotheses in the order in which faults happen: the scene, its image, what is done to values."""
-    return tuple(sorted(hypotheses, key=lambda each: _ORDER.index(each.kind)))
+    return (first, second) if _ORDER.index(first.kind) <= _ORDER.index(second.kind) else (second, first)
 
 
 def _rows(explanation: Explanation, weight: float) -> list[Ranked]:
@@ -310,17 +369,3 @@ def _rows(explanation: Explanation, weight: float) -> list[Ranked]:
         )
         for hypothesis, values in zip(explanation.hypotheses, explanation.values, strict=True)
     ]
-
-
-def _multiple_light(truth: TruthScene) -> Array | None:
-    """Return the light of higher orders by layer, (2, pixels, 3), by Mitsuba's path tracer."""
-    if truth.width * truth.height > 1 << 17:
-        return None  # minutes for one hypothesis
-    parts = []
-    for seed in range(_BATCH):
-        whole, single = (volpath_batch(truth, seed, _SAMPLES, max_depth=depth).mean for depth in (64, 2))
-        parts.append((whole - single)[[LAYERS.index(layer) for layer in ("airlight", "surface")]])
-    image = np.mean(parts, axis=0).reshape(2, truth.height, truth.width, 3)
-    # Light of higher orders is smooth but for edges, and noisy.
-    width = truth.width / _SMOOTH
-    return np.asarray(gaussian_filter(image, (0, width, width, 0)).reshape(2, -1, 3))

@@ -42,5 +42,5 @@ class Hypothesis:
     change: Change
     parameters: tuple[Parameter, ...] = field(default=())
     begin: Begin | None = None  #: values to begin with, by what the image shows, in the place of the starts
-    costly: bool = False  #: whether it is tried only where nothing cheap explains the image
+    costly: int = 0  #: 1: tried where nothing of 0 explains the image; 2: where no pair does either
     applies: Callable[[Predictor], bool] = field(default=lambda predictor: True)

@@ -112,7 +112,7 @@ LIGHTS = (
         "the angles of spots are {0:.4g} times what they should be",
         _cone,
         (Parameter("factor", 0.2, 4.0, (0.8, 1.25), logarithmic=True, step=0.02),),
-        costly=True,
+        costly=1,
         applies=_spots,
     ),
     Hypothesis(
@@ -131,7 +131,7 @@ LIGHTS = (
         "spots fall off as Blender's with a blend of {0:.3g}, which its own is 0.15: smoothly by the cosine",
         _blend,
         (Parameter("blend", 0.01, 1.0, (0.15, 0.5, 1.0), step=0.01),),
-        costly=True,
+        costly=1,
         applies=_spots,
     ),
     Hypothesis(
@@ -140,7 +140,7 @@ LIGHTS = (
         "point lights are spheres of the radius {0:.3g} m",
         _radius,
         (Parameter("radius", 0.0, 10.0, (0.05, 0.2, 0.5), step=0.01, unit="m"),),
-        costly=True,
+        costly=2,
         applies=_point_lights,
     ),
     Hypothesis(
@@ -149,7 +149,7 @@ LIGHTS = (
         "the first light is off by ({0:.3g}, {1:.3g}, {2:.3g}) m",
         _position,
         tuple(Parameter(axis, -1e3, 1e3, (0.0,), step=0.003, unit="m") for axis in "xyz"),
-        costly=True,
+        costly=1,
         applies=_near_lights,
     ),
 )

@@ -231,7 +231,7 @@ MEDIUM = (
         "the medium is missing up to {0:.4g} m before the camera: its near plane",
         _exact_near,
         (Parameter("distance", 0.0, np.inf, (0.1, 0.3, 1.0), step=0.02, unit="m"),),
-        costly=True,
+        costly=1,
         applies=_surrounds,
     ),
     Hypothesis(
@@ -240,7 +240,7 @@ MEDIUM = (
         "{0:.3g} times the light of multiple scattering is included",
         _multiple,
         (Parameter("share", 0.0, 3.0, (1.0,)),),
-        costly=True,
+        costly=1,
         applies=_shines,
     ),
     Hypothesis(
@@ -249,7 +249,7 @@ MEDIUM = (
         "{0:.3g} times the light of higher orders is included, between surfaces and of the medium",
         _all_orders,
         (Parameter("share", 0.0, 3.0, (1.0,)),),
-        costly=True,
+        costly=1,
         applies=lambda predictor: predictor.task.holds == "total",
     ),
 )

@@ -3,10 +3,15 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
+from reference.monte_carlo.batches import LAYERS
+from reference.monte_carlo.volpath.integrator import volpath_batch
 from reference.scene.camera import camera_matrix
 from reference.scene.read import TruthScene
 from validation.fit.image_model import ImageModel, Task, image_model
@@ -17,6 +22,9 @@ Index = NDArray[np.int64]
 
 APART = 2  #: pixels between those whose errors are compared: a filter that is wider than a pixel joins neighbours
 _MOST_RAYS = 3000
+_BATCH = 4  # batches of 16 paths a pixel for the light of multiple scattering
+_SAMPLES = 16
+_SMOOTH = 40  # of the width of an image: the width of the filter for that light
 _FLOOR = 0.01  # of the mean of an image: below it values count relative to this
 
 
@@ -50,28 +58,39 @@ class Guess:
 
 
 @dataclass
-class Predictor:
-    """Predicts images; paths are found once for each scenery."""
+class SceneLight:
+    """The light of a scene, which all images of it share: paths by scenery, and what scatters again."""
 
-    task: Task
-    shape: tuple[int, int]
-    most: int = _MOST_RAYS
-    multiple: Callable[[], Array | None] | None = None
-    """Light of higher orders in airlight and surfaces, (2, all pixels, 3), or None."""
-    _models: dict[Scenery, ImageModel] = field(default_factory=dict)
+    truth: TruthScene
+    most: int = 4_000_000  #: nodes whose paths are kept, those used last: some 120 bytes each
+    _models: dict[Any, ImageModel] = field(default_factory=dict)  # the one used last comes last
 
-    @property
-    def fog(self) -> Fog:
-        """The fog as the scene has it."""
-        return self.model(Scenery()).fog
+    @cached_property
+    def higher_orders(self) -> Array | None:
+        """Light of higher orders in airlight and surfaces, (2, pixels, 3), by Mitsuba's path tracer.
 
-    def model(self, scenery: Scenery) -> ImageModel:
-        """Return the model of a scenery."""
-        if scenery not in self._models:
-            truth = changed_scene(self.task.truth, scenery)
-            self._models[scenery] = image_model(
-                replace(self.task, truth=truth),
-                most=self.most,
+        None where an image is so large that this would take minutes.
+        """
+        truth = self.truth
+        if truth.width * truth.height > 1 << 17:
+            return None
+        parts = []
+        for seed in range(_BATCH):
+            whole, single = (volpath_batch(truth, seed, _SAMPLES, max_depth=depth).mean for depth in (64, 2))
+            parts.append((whole - single)[[LAYERS.index(layer) for layer in ("airlight", "surface")]])
+        image = np.mean(parts, axis=0).reshape(2, truth.height, truth.width, 3)
+        # It is smooth but for edges, and noisy.
+        width = truth.width / _SMOOTH
+        return np.asarray(gaussian_filter(image, (0, width, width, 0)).reshape(2, -1, 3))
+
+    def model(self, task: Task, scenery: Scenery) -> ImageModel:
+        """Return the model of an image in a scenery."""
+        key = scenery, task.area, task.holds, task.used.tobytes()
+        known = self._models.pop(key, None)
+        if known is None:
+            known = image_model(
+                replace(task, truth=changed_scene(task.truth, scenery)),
+                most=_MOST_RAYS,
                 apart=APART,
                 shadows=scenery.shadows,
                 offset=scenery.offset,
@@ -80,7 +99,29 @@ class Predictor:
                 blend=scenery.blend,
                 near=scenery.near,
             )
-        return self._models[scenery]
+            room = self.most - known.paths.nodes
+            while self._models and sum(model.paths.nodes for model in self._models.values()) > room:
+                del self._models[next(iter(self._models))]
+        self._models[key] = known
+        return replace(known, task=task)
+
+
+@dataclass
+class Predictor:
+    """Predicts images."""
+
+    task: Task
+    shape: tuple[int, int]
+    light: SceneLight
+
+    @property
+    def fog(self) -> Fog:
+        """The fog as the scene has it."""
+        return self.model(Scenery()).fog
+
+    def model(self, scenery: Scenery) -> ImageModel:
+        """Return the model of a scenery."""
+        return self.light.model(self.task, scenery)
 
     def pairs(self, guess: Guess) -> tuple[Index, Index]:
         """Return which values belong to pixels and which to their neighbours, those of the next columns if it can be.
@@ -105,7 +146,7 @@ class Predictor:
         model = self.model(guess.scenery)
         radiance = model.radiance(guess.fog)
         if any(guess.multiple):
-            more = None if self.multiple is None else self.multiple()
+            more = self.light.higher_orders
             if more is not None:
                 radiance = radiance + sum(share * part[model.pixels] for share, part in zip(guess.multiple, more))
         if guess.vignette:

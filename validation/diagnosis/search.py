@@ -19,9 +19,11 @@ from validation.diagnosis.prediction import Guess, Predictor
 
 Array = NDArray[np.float64]
 
-_LEAST_SCALE = 1e-6
+EVALUATIONS = 15  #: for each number of a search that need not be fine
+_LEAST_SCALE, _LEAST_COARSE = 1e-4, 1e-2  # where most pixels do not know a parameter, those that do are no outliers
 _TURNS = 5
 _COARSE = 0.02
+_BEGUN = 2  # of the best starts
 _LITTLE = 0.9  # share of the loss that a step leaves which gains little
 _SIMPLEX = 0.1  # first step, of a logarithm or in units of the parameter
 
@@ -70,23 +72,43 @@ def explain(
         Whether the values are looked for to all digits, or to some per cent, which a hypothesis that is wrong needs.
     """
     parameters = [parameter for hypothesis in hypotheses for parameter in hypothesis.parameters]
+    known: dict[tuple[float, ...], Array] = {}
+
+    def errors(numbers: Sequence[float]) -> Array:
+        values = tuple(numbers)
+        if values not in known:
+            known[values] = predictor.errors(_guess(predictor, hypotheses, values))
+        return known[values]
+
     starts = [tuple(value for part in near for value in part)] if near else _starts(predictor, hypotheses)
-    scale = min(_scale(predictor, _guess(predictor, hypotheses, start)) for start in starts)
-    inner = _inward(
-        parameters, min(starts, key=lambda start: _loss(predictor, _guess(predictor, hypotheses, start), scale))
-    )
+    least = _LEAST_SCALE if fine else _LEAST_COARSE
+    scale = min(_scale(errors(start), least) for start in starts)
+    starts = sorted(starts, key=lambda start: _loss(errors(start), scale))
+    ends = [_inward(parameters, start) for start in starts[: _BEGUN if _on_a_line(parameters) else 1]]
     for _ in range((2 if fine else 1) if parameters else 0):
-        scale = _scale(predictor, _guess(predictor, hypotheses, _outward(parameters, inner)))
-        inner = _improved(predictor, hypotheses, parameters, inner, scale, fine=fine)
+        scale = _scale(errors(_outward(parameters, ends[0])), least)
+        ends = [_improved(errors, parameters, inner, scale, fine=fine) for inner in ends]
+    inner = min(ends, key=lambda end: _loss(errors(_outward(parameters, end)), scale))
     values = _outward(parameters, inner)
+    left = errors(values)
     guess = _guess(predictor, hypotheses, values)
-    errors = predictor.errors(guess)
-    return Explanation(tuple(hypotheses), _parted(hypotheses, values), guess, errors, float(np.abs(errors).mean()))
+    return Explanation(tuple(hypotheses), _parted(hypotheses, values), guess, left, float(np.abs(left).mean()))
+
+
+def _on_a_line(parameters: Sequence[Parameter]) -> bool:
+    """Return whether a search is quick, and can begin more than once: between starts there may be several minima."""
+    return len(parameters) == 1 and not parameters[0].step
+
+
+def begin(predictor: Predictor, hypotheses: Sequence[Hypothesis]) -> tuple[float, tuple[tuple[float, ...], ...]]:
+    """Return the least mean error at the starts of some hypotheses together, and the values there."""
+    starts = _starts(predictor, hypotheses)
+    left = [float(np.abs(predictor.errors(_guess(predictor, hypotheses, start))).mean()) for start in starts]
+    return min(left), _parted(hypotheses, starts[int(np.argmin(left))])
 
 
 def _improved(
-    predictor: Predictor,
-    hypotheses: Sequence[Hypothesis],
+    errors_of: Callable[[Sequence[float]], Array],
     parameters: Sequence[Parameter],
     inner: Array,
     scale: float,
@@ -94,28 +116,37 @@ def _improved(
     fine: bool,
 ) -> Array:
     def errors(place: Array) -> Array:
-        return predictor.errors(_guess(predictor, hypotheses, _outward(parameters, place)))
+        return errors_of(_outward(parameters, place))
 
     def loss(place: Array) -> float:
-        return float(np.mean(np.log1p((errors(place) / scale) ** 2)))
+        return _loss(errors(place), scale)
 
     low, high = _inward(parameters, [p.low for p in parameters]), _inward(parameters, [p.high for p in parameters])
     if any(parameter.step for parameter in parameters):
         steps = np.array([parameter.step or 1e-4 for parameter in parameters])
         return _by_differences(errors, loss, inner, scale, (steps, low, high), fine=fine)
     if len(parameters) == 1:
-        step = 0.7 if parameters[0].logarithmic else max(0.3 * abs(inner[0]), 0.1)
-        bounds = max(float(low[0]), inner[0] - step), min(float(high[0]), inner[0] + step)
+        bounds = _between(parameters[0], float(inner[0]), float(low[0]), float(high[0]))
         solved = minimize_scalar(
             lambda value: loss(np.array([value])), bounds=bounds, options={"xatol": 1e-7 if fine else _COARSE}
         )
         return np.array([solved.x]) if solved.fun <= loss(inner) else inner
     simplex = np.concatenate([inner[None], inner + _SIMPLEX * np.eye(len(inner))])
-    most = (60 if fine else 15) * len(inner)
+    most = (60 if fine else EVALUATIONS) * len(inner)
     options = {"initial_simplex": np.clip(simplex, low, high), "maxfev": most, "xatol": 1e-5, "fatol": 1e-9}
     inner = np.clip(inner, low, high)
     solved = minimize(loss, inner, method="Nelder-Mead", bounds=list(zip(low, high, strict=True)), options=options)
     return np.asarray(solved.x)
+
+
+def _between(parameter: Parameter, inner: float, low: float, high: float) -> tuple[float, float]:
+    """Return the ends of a search on the line: a start's are the starts beside it, others have some room."""
+    step = 0.7 if parameter.logarithmic else max(0.3 * abs(inner), 0.1)
+    ends = inner - step, inner + step
+    if not parameter.logarithmic and inner in parameter.starts:
+        below, above = ([start for start in parameter.starts if sign * (start - inner) > 0] for sign in (-1, 1))
+        ends = max(below, default=low), min(above, default=high if math.isfinite(high) else ends[1])
+    return max(low, ends[0]), min(high, ends[1])
 
 
 def _by_differences(
@@ -209,9 +240,9 @@ def _outward(parameters: Sequence[Parameter], inner: Sequence[float] | Array) ->
     )
 
 
-def _loss(predictor: Predictor, guess: Guess, scale: float) -> float:
-    return float(np.mean(np.log1p((predictor.errors(guess) / scale) ** 2)))
+def _loss(errors: Array, scale: float) -> float:
+    return float(np.mean(np.log1p((errors / scale) ** 2)))
 
 
-def _scale(predictor: Predictor, guess: Guess) -> float:
-    return max(1.4826 * float(np.median(np.abs(predictor.errors(guess)))), _LEAST_SCALE)
+def _scale(errors: Array, least: float) -> float:
+    return max(1.4826 * float(np.median(np.abs(errors))), least)

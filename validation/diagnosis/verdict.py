@@ -7,7 +7,8 @@ scene, less k log(n)/2 (Schwarz 1978, Ann. Statist. 6, 461): a hypothesis with a
 of a pixel share their noise, so that three values count as one.
 
 Errors of neighbours that go together are no noise. An explanation leaves nothing to explain if they do not (a
-correlation of 0.25 at most), if it leaves 0.4 %, which no engine need beat, or a tenth of what there was.
+correlation of 0.25 at most), if it leaves 0.4 %, which no engine need beat (1 % with lights that have extent: the fog
+model has sixteen points of them), or a tenth of what there was.
 """
 
 import math
@@ -15,6 +16,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.scene.read import TruthScene
 from validation.diagnosis.search import Explanation
 
 Array = NDArray[np.float64]
@@ -22,11 +24,17 @@ Index = NDArray[np.int64]
 
 LEAST_EVIDENCE = 20.0  #: e^20 to one: what nobody doubts
 LEAST_EFFECT = 0.002  #: mean relative change of the image: less is no fault
-LEFT = 0.004  #: mean relative error that is no fault
+_LEFT, _LEFT_OF_AREA = 0.004, 0.01  # mean relative error that is no fault
 _GAIN = 10.0  # what an explanation that leaves nothing makes of the error
-_NOISE = 0.25  # correlation of neighbours
-_WORST = 0.02  # share of the pixels that may be as wrong as they like: those at lamps
+_NOISE, _NOISE_ALONE = 0.25, 0.1  # correlation of neighbours
+_EVEN = 2.0  # mean over median of errors that are noise; 1.2 of a normal distribution
+_WORST = 0.02  # share of the pixels that may be as wrong as they like
 _KNOWN = {"centre": 3e-4, "area": 3e-3}  # relative error of the fog model itself, in most pixels
+
+
+def no_fault(truth: TruthScene) -> float:
+    """Return the mean relative error that is no fault in a scene [1]."""
+    return _LEFT_OF_AREA if truth.area else _LEFT
 
 
 def scale_of(explanation: Explanation, pixel: str) -> float:
@@ -50,11 +58,29 @@ def effect(explanation: Explanation, right: Explanation) -> float:
     return float(np.mean(np.abs(explanation.errors - right.errors)))
 
 
-def is_explained(explanation: Explanation, pairs: tuple[Index, Index]) -> bool:
-    """Return whether what an explanation leaves is noise, or little; `pairs` are those of `Predictor.pairs`."""
+def usual_error(explanation: Explanation) -> float:
+    """Return the mean error of nearly all pixels: those at lamps may be as wrong as they like."""
     errors = np.sort(np.abs(explanation.errors).mean(axis=1))
-    usual = float(errors[: max(1, int((1 - _WORST) * len(errors)))].mean())
-    return usual <= LEFT or correlation(explanation.errors, pairs) <= _NOISE
+    return float(errors[: max(1, int((1 - _WORST) * len(errors)))].mean())
+
+
+def is_explained(explanation: Explanation, pairs: tuple[Index, Index], little: float) -> bool:
+    """Return whether what an explanation leaves is noise, or little, see `no_fault`; `pairs`: of `Predictor.pairs`."""
+    return usual_error(explanation) <= little or correlation(explanation.errors, pairs) <= _NOISE
+
+
+def is_noise(explanation: Explanation, pairs: tuple[Index, Index]) -> bool:
+    """Return whether what an explanation leaves is noise, all over the image: no fault of some size hides in it.
+
+    Neighbours do not share it, and no part of the image has most of it, as shadows have that are off.
+    """
+    even = usual_error(explanation) <= _EVEN * float(np.median(np.abs(explanation.errors).mean(axis=1)))
+    return even and correlation(explanation.errors, pairs) <= _NOISE_ALONE
+
+
+def leaves_nothing(explanation: Explanation, pixel: str) -> bool:
+    """Return whether an explanation leaves no more than the fog model itself does."""
+    return scale_of(explanation, pixel) <= _KNOWN[pixel] and explanation.error <= _LEFT
 
 
 def gains(explanation: Explanation, right: Explanation) -> bool:
@@ -63,10 +89,9 @@ def gains(explanation: Explanation, right: Explanation) -> bool:
 
 
 def correlation(errors: Array, pairs: tuple[Index, Index]) -> float:
-    """Return the correlation of the errors of neighbours, clipped at three scales."""
-    means = errors.mean(axis=1)
-    scale = 1.4826 * float(np.median(np.abs(means)))
-    clipped = np.clip(means, -3 * scale, 3 * scale)
+    """Return the correlation of the errors of neighbours, clipped at three scales, or what is no fault in a pixel."""
+    most = max(3 * 1.4826 * float(np.median(np.abs(errors))), _LEFT)
+    clipped = np.clip(errors, -most, most)
     power = float(np.mean(clipped**2))
     here, there = pairs
     return float(np.mean(clipped[here] * clipped[there])) / power if power > 0 and len(here) else 0.0

@@ -24,7 +24,7 @@ Bools = NDArray[np.bool_]
 _MOST_RAYS = 20_000  # that a fit looks at, each with some nodes for every light: more say nothing new of few numbers
 _SIDE = 3  # rays along a side of a pixel, for means over its area
 _AREA_POINTS = 16  # of lights with extent
-_SPHERE_POINTS = 64  # of a sphere in the place of a point light: its rays pass by close
+_SPHERE_POINTS = 32  # of a sphere in the place of a point light: its rays pass by close
 _HUGE = 1e100  # whose square is a number too
 _SATURATED = 8  # values that stop at the largest one
 

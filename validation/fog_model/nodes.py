@@ -23,7 +23,7 @@ _SHORT, _FEW = 0.6, 4
 
 
 def panel_nodes(
-    start: Array, width: Array, *, most: float = _PANEL, short: float = _SHORT
+    start: Array, width: Array, *, most: float = _PANEL, short: float = _SHORT, orders: tuple[int, int] = (_NODES, _FEW)
 ) -> tuple[Index, Array, Array]:
     """Return nodes on intervals.
 
@@ -32,9 +32,11 @@ def panel_nodes(
     start, width
         Of the intervals, (n,), in any variable.
     most
-        Widest panel of eight nodes.
+        Widest panel.
     short
-        Widest interval that four nodes serve.
+        Widest interval that few nodes serve.
+    orders
+        How many nodes a panel has, and how many are few.
 
     Returns
     -------
@@ -43,7 +45,7 @@ def panel_nodes(
     """
     few = width <= short
     owners, places, weights = [], [], []
-    for chosen, order in ((np.flatnonzero(few), _FEW), (np.flatnonzero(~few), _NODES)):
+    for chosen, order in ((np.flatnonzero(few), orders[1]), (np.flatnonzero(~few), orders[0])):
         panels = np.maximum(np.ceil(width[chosen] / most).astype(np.int64), 1)
         owner = np.repeat(chosen, panels)
         number = np.arange(len(owner)) - np.repeat(np.cumsum(panels) - panels, panels)

@@ -22,6 +22,7 @@ Index = NDArray[np.int64]
 _NOTHING_LEFT = 40.0  # optical depth after which e^-40 = 4e-18 of the light is left
 _THINNEST = 1 / 30  # share of the scene's extinction down to which endless rays are long enough
 _AT_LIGHT = 1e-290  # height [m] below which a ray meets the light
+_OF_ONE, _OF_MANY = (8, 4), (4, 2)  # nodes on a panel and on a short one: of a light, of a point on one with extent
 _NEAR_ZERO = 1e-15  # height over distance below which a light beside a piece may as well be at this height
 
 
@@ -62,7 +63,8 @@ def point_nodes(
     beside = np.where(s0 > 0, s0, np.where(s1 < 0, -s1, 0.0))
     height = np.maximum(rays.height[ray], np.maximum(_NEAR_ZERO * beside, _AT_LIGHT))
     start = np.arcsinh(s0 / height)
-    owner, w, weight = panel_nodes(start, np.arcsinh(s1 / height) - start)
+    orders = _OF_MANY if light.cosine else _OF_ONE
+    owner, w, weight = panel_nodes(start, np.arcsinh(s1 / height) - start, orders=orders)
     ray, foot, height, medium = ray[owner], foot[owner], height[owner], medium[owner]
     sine, r = np.tanh(w), height * np.cosh(w)
     x = foot + height * np.sinh(w)

@@ -64,6 +64,11 @@ class DevicePaths:
     share: float  #: of a pixel that a ray stands for
     lights: tuple[_DeviceLight, ...]
 
+    @property
+    def nodes(self) -> int:
+        """How many nodes and surface points there are."""
+        return sum(dr.width(part.pixel) for light in self.lights for part in (light.nodes, light.surface))
+
 
 def on_device(paths: ScatteringPaths) -> DevicePaths:
     """Return paths as Dr.Jit arrays in float64."""

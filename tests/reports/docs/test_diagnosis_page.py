@@ -7,8 +7,10 @@ from reports.data.json_files import read_json
 from reports.docs.diagnosis import RECORD, ROOT, current_page, redraw
 from reports.tables.diagnosis import answers_sentence, answers_table
 from reports.tables.drawing import text
+from tests.helpers.aside import SCENES as ASIDE
 from tests.helpers.aside import write_scenes
 from validation.diagnosis.planted import PAIRS, PLANTED
+from validation.scenes.registry import FOG_SCENES
 
 
 @pytest.fixture(scope="module")
@@ -25,9 +27,13 @@ def test_the_page_is_made_of_its_run():
 def test_planted_faults_are_those_that_there_are_and_nearly_all_are_named(rows):
     assert {row["words"] for row in rows} <= {planted.words for planted in (*PLANTED, *PAIRS)}
     assert all(row["right"] for row in rows if row["planted"] == "right")
-    single = [row["right"] for row in rows if row["planted"] != "right" and not row["pair"]]
-    assert len(single) > 60
-    assert sum(single) >= 0.95 * len(single)
+    assert {row["scene"] for row in rows} <= {*FOG_SCENES, *ASIDE}
+    for scenes, fewest in ((FOG_SCENES, 200), (ASIDE, 80)):
+        single = [
+            row["right"] for row in rows if row["scene"] in scenes and row["planted"] != "right" and not row["pair"]
+        ]
+        assert len(single) > fewest
+        assert sum(single) >= 0.95 * len(single)
 
 
 def test_runs_are_joined_and_drawn(tmp_path, rows):
@@ -39,6 +45,7 @@ def test_runs_are_joined_and_drawn(tmp_path, rows):
     assert "old" not in page
     assert page.startswith("a\n")
     assert len(read_json(tmp_path / RECORD, "a run")["diagnosis"]) == 6
+    assert "Not run: `" in page  # the other scenes
 
 
 def test_answers_are_counted():
