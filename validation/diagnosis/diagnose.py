@@ -161,7 +161,7 @@ def diagnose_image(
     if not used.any() or not np.any(values[used] > 0):
         raise InputError(f"{path}: the layer '{judged.name}' has no finite value above 0; there is nothing to diagnose")
     said = pixel or said_pixel(image)
-    task = Task(light.truth, values, judged.holds, used, area=False)
+    task = Task(light.truth, values, judged.holds, used, area=False, points=light.points)
     kinds = [said] if said else list(PIXELS)
     results = []
     for number, kind in enumerate(kinds):

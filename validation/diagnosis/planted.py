@@ -216,7 +216,7 @@ def _of_model(wanted: Callable[[TruthScene], bool], laws: Mapping[str, Any], **h
     def image(truth: TruthScene) -> Array | None:
         if not wanted(truth):
             return None
-        paths = on_device(scattering_paths(truth, **how))
+        paths = on_device(scattering_paths(truth, **({"points": _POINTS} | how)))
         return as_array(fog_total(paths, replace(scene_fog(truth), **laws))).reshape(truth.height, truth.width, 3)
 
     return image
@@ -276,7 +276,7 @@ PLANTED = (
     Planted(
         "distance-law", "one over the distance", _of_model(lambda truth: bool(truth.lights), {"distance_power": 1.0})
     ),
-    Planted("light-radius", "lamps of 0.23 m", _of_model(_point_lights, {}, radius=0.23, points=64, seed=7)),
+    Planted("light-radius", "lamps of 0.23 m", _of_model(_point_lights, {}, radius=0.23, seed=7)),
     Planted("no-shadow", "no shadows", _shadowless),
     Planted("spot-angle", "cones twice as wide", _of_scene(_scenery(_spots, cone=2.0))),
     Planted("spot-angle", "cones half as wide", _of_scene(_scenery(_spots, cone=0.5))),

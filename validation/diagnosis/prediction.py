@@ -14,7 +14,7 @@ from reference.monte_carlo.batches import LAYERS
 from reference.monte_carlo.volpath.integrator import volpath_batch
 from reference.scene.camera import camera_matrix
 from reference.scene.read import TruthScene
-from validation.fit.image_model import ImageModel, Task, image_model
+from validation.fit.image_model import ImageModel, Task, image_model, needed_points
 from validation.fog_model.fog import Fog
 
 Array = NDArray[np.float64]
@@ -66,6 +66,11 @@ class SceneLight:
     _models: dict[Any, ImageModel] = field(default_factory=dict)  # the one used last comes last
 
     @cached_property
+    def points(self) -> int:
+        """How many points stand for a light with extent."""
+        return needed_points(self.truth)
+
+    @cached_property
     def higher_orders(self) -> Array | None:
         """Light of higher orders in airlight and surfaces, (2, pixels, 3), by Mitsuba's path tracer.
 
@@ -85,7 +90,7 @@ class SceneLight:
 
     def model(self, task: Task, scenery: Scenery) -> ImageModel:
         """Return the model of an image in a scenery."""
-        key = scenery, task.area, task.holds, task.used.tobytes()
+        key = scenery, task.area, task.holds, task.points, task.used.tobytes()
         known = self._models.pop(key, None)
         if known is None:
             known = image_model(

@@ -18,7 +18,7 @@ from validation.comparison.engine_layers import JudgedLayer, judged_layer
 from validation.comparison.engine_pixels import PIXELS
 from validation.comparison.images import read_mask
 from validation.fit.confounding import Group, confounded_groups
-from validation.fit.image_model import ImageModel, Task, at_places, image_model, usable_pixels
+from validation.fit.image_model import ImageModel, Task, at_places, image_model, needed_points, usable_pixels
 from validation.fit.least_squares import Solution, best_start, robust_fit, weighted_derivatives, weighted_fit
 from validation.fit.unknowns import AXES, CHANNELS, Unknown, read_unknowns
 from validation.fog_model.fog import scene_fog
@@ -208,7 +208,7 @@ def fit_image(
             f"{path}: {int(used.sum())} pixels of the layer '{judged.name}' say something; wanted at least {fewest}, "
             "finite, not cut off at the brightest value, and left by the mask"
         )
-    task = Task(truth, values, judged.holds, used, area=False)
+    task = Task(truth, values, judged.holds, used, area=False, points=needed_points(truth))
     said = pixel or said_pixel(image)
     kinds = [said] if said else list(PIXELS)
     results = []

@@ -7,7 +7,6 @@ from other ranges. What is drawn where too little light reaches what the camera 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -301,7 +300,6 @@ def _cage(bars: int, radius: float) -> Mesh:
     return joined([placed(bar, (0.71 * np.cos(each), 0.71 * np.sin(each), 0.0)) for each in angle])
 
 
-@lru_cache(maxsize=32)
 def _user_mesh(path: Path) -> Mesh:
     """Return a mesh of the user's, moved and scaled to the unit ball."""
     try:
