@@ -282,3 +282,19 @@ def test_a_file_is_fitted_too(variant, tmp_path):
     assert (fit.path, fit.pixel, fit.scene) == (str(path), "centre", "own")
     with pytest.raises(InputError, match="No such file"):
         fit_file(tmp_path / "missing.exr", scene, ["sigma_t"])
+
+
+@pytest.mark.slow
+def test_a_light_has_the_points_that_its_shadows_need(variant):
+    """Each point has shadows of its own: a window before pillars needs more than a lamp above one edge."""
+    from reference.scene.read import read_truth
+    from validation.fit.image_model import needed_points
+    from validation.scenes.loading import load_scene
+
+    needed = {
+        name: needed_points(read_truth(load_scene(name, (16, 12)).scene))
+        for name in ("open-fog", "penumbra-plane", "soft-hall")
+    }
+    assert needed["open-fog"] == 16
+    assert needed["penumbra-plane"] <= 32
+    assert needed["soft-hall"] == 128
