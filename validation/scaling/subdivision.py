@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from realtime.scene.mesh_adjacency import mesh_triangles
-from validation.scenes.parts import Mesh, mesh_with_material
+from validation.scenes.parts import mesh_with_material
+from validation.scenes.solids import divided
 
 _WAVES = ((3.1, 2.3, -1.1), (-5.3, 6.7, 3.7), (11.3, -7.9, 9.1), (-17.3, 15.1, 13.9))  # along the size of the scene
 _STEEPNESS = 0.15
@@ -74,18 +75,6 @@ def _cut(shape, levels: int, corner: NDArray[np.float64], size: float) -> Any:
     cut = mesh_with_material(shape.id(), (bumpy(vertices, corner, size), faces), shape.bsdf())
     cut.set_id(shape.id())
     return cut
-
-
-def divided(mesh: Mesh) -> Mesh:
-    """Return a mesh with each triangle cut into four at the middles of its sides."""
-    vertices, faces = mesh
-    corners = np.asarray(faces, dtype=np.int64)
-    sides = np.sort(np.stack([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]], axis=1), axis=2)
-    unique, number = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True)
-    a, b, c = corners.T
-    ab, bc, ca = (len(vertices) + number.reshape(-1, 3)).T
-    cut = np.stack([(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]).transpose(2, 0, 1).reshape(-1, 3)
-    return np.concatenate([vertices, vertices[unique].mean(axis=1)]), cut
 
 
 def bumpy(points: NDArray[np.float64], corner: NDArray[np.float64], size: float) -> NDArray[np.float64]:

@@ -39,20 +39,22 @@ def icosphere(levels: int) -> Mesh:
     faces = np.array([t if np.linalg.det(vertices[list(t)]) > 0 else (t[0], t[2], t[1]) for t in triples])
     vertices = vertices / np.linalg.norm(vertices[0])
     for _ in range(levels):
-        vertices, faces = _divided(vertices, faces)
+        known = len(vertices)
+        vertices, faces = divided((vertices, faces))
+        vertices[known:] /= np.linalg.norm(vertices[known:], axis=1, keepdims=True)
     return vertices, faces
 
 
-def _divided(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Mesh:
-    """Return each face as four, with the midpoints of its edges moved out to the unit sphere."""
+def divided(mesh: Mesh) -> Mesh:
+    """Return each face as four, cut at the midpoints of its edges, which come after the vertices that were there."""
+    vertices, faces = mesh
     edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     unique, number = np.unique(edges, axis=0, return_inverse=True)
-    middle = vertices[unique].sum(axis=1)
-    middle = middle / np.linalg.norm(middle, axis=1, keepdims=True)
     ab, bc, ca = (number.reshape(-1, 3) + len(vertices)).T
     a, b, c = faces.T
     corners = [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
-    return np.concatenate([vertices, middle]), np.concatenate([np.stack(triple, axis=1) for triple in corners])
+    middles = vertices[unique].mean(axis=1)
+    return np.concatenate([vertices, middles]), np.concatenate([np.stack(triple, axis=1) for triple in corners])
 
 
 def gem(sides: int, rings: int) -> Mesh:

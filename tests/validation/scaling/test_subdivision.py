@@ -20,7 +20,7 @@ def open_edges(faces):
 
 
 def test_a_divided_mesh_is_the_same_surface():
-    from validation.scaling.subdivision import divided
+    from validation.scenes.solids import divided
 
     vertices, faces = ball()
     finer, cut = divided((vertices, faces))
@@ -75,7 +75,8 @@ def test_a_scene_keeps_what_has_no_triangles_to_cut(variant):
 
 def test_finer_meshes_have_more_silhouettes():
     """About twice as many with four times the triangles: what the exponent 1/2 of shadow planes is of."""
-    from validation.scaling.subdivision import bumpy, divided
+    from validation.scaling.subdivision import bumpy
+    from validation.scenes.solids import divided
 
     light, counts = np.array([0.9, 0.7, 4.9]), []
     vertices, faces = ball()
