@@ -8,6 +8,6 @@ Read in this order:
 - `memory.py`: the peak of the memory while a frame is made;
 - `study.py`: the times of every step, the exponent that fits them, and where they jump.
 
-May import: `analytic.errors`, `realtime.errors`, `realtime.frame`, `realtime.scene`, `validation.configurations`,
-`validation.frames`, `validation.scenes`.
+May import: `analytic.errors`, `realtime.area_lights`, `realtime.errors`, `realtime.frame`, `realtime.scene`,
+`validation.configurations`, `validation.frames`, `validation.scenes`.
 """
