@@ -19,6 +19,7 @@ from validation.fog_model.fog import Fog
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 APART = 2  #: pixels between those whose errors are compared: a filter that is wider than a pixel joins neighbours
 _MOST_RAYS = 3000
@@ -175,10 +176,18 @@ class Predictor:
     def errors(self, guess: Guess) -> Array:
         """Return the errors of a guess, relative to the larger of both values, (m, 3), from -1 to 1."""
         predicted, seen = self.predicted(guess), self.seen(guess)
-        floor = _FLOOR * max(float(np.mean(np.abs(seen))), 1e-300)
-        scale = np.maximum(np.maximum(np.abs(seen), np.abs(predicted)), floor)
+        scale = np.maximum(np.maximum(np.abs(seen), np.abs(predicted)), _floor(seen))
         errors = (seen - predicted) / scale
         return np.where(np.isfinite(errors), errors, 1.0)
+
+    def lit(self, guess: Guess) -> Bools:
+        """Return which values of the image are not dark, (m, 3): the others have no noise that could be seen."""
+        seen = self.seen(guess)
+        return np.asarray(np.abs(seen) > _floor(seen))
+
+
+def _floor(seen: Array) -> float:
+    return _FLOOR * max(float(np.mean(np.abs(seen))), 1e-300)
 
 
 def changed_scene(truth: TruthScene, scenery: Scenery) -> TruthScene:

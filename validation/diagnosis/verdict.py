@@ -2,9 +2,10 @@
 """How much speaks for an explanation, and whether it leaves anything to explain.
 
 With e the relative errors of n pixels and s their scale in the best explanation, the log-likelihood of Cauchy's
-distribution is -sum log(1 + (e/s)^2). The evidence of an explanation with k numbers is what it gains over the unchanged
-scene, less k log(n)/2 (Schwarz 1978, Ann. Statist. 6, 461): a hypothesis with a number must beat one without. Channels
-of a pixel share their noise, so that three values count as one.
+distribution is -sum log(1 + (e/s)^2). The scale is that of values that are not dark: where half of an image is black,
+the median of all errors is 0, and noise would be taken for what a fault does. The evidence of an explanation with k
+numbers is what it gains over the unchanged scene, less k log(n)/2 (Schwarz 1978, Ann. Statist. 6, 461): a hypothesis
+with a number must beat one without. Channels of a pixel share their noise, so that three values count as one.
 
 Errors of neighbours that go together are no noise. An explanation leaves nothing to explain if they do not (a
 correlation of 0.25 at most), if it leaves 0.4 %, which no engine need beat (1 % with lights that have extent: the fog
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.scene.read import TruthScene
-from validation.diagnosis.search import Explanation
+from validation.diagnosis.search import Explanation, usual_size
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -39,7 +40,7 @@ def no_fault(truth: TruthScene) -> float:
 
 def scale_of(explanation: Explanation, pixel: str) -> float:
     """Return the scale of the errors that an explanation leaves [1]."""
-    return max(1.4826 * float(np.median(np.abs(explanation.errors))), _KNOWN[pixel])
+    return max(usual_size(explanation.errors[explanation.lit]), _KNOWN[pixel])
 
 
 def evidence(explanation: Explanation, right: Explanation, scale: float) -> float:
@@ -60,8 +61,11 @@ def effect(explanation: Explanation, right: Explanation) -> float:
 
 def usual_error(explanation: Explanation) -> float:
     """Return the mean error of nearly all pixels: those at lamps may be as wrong as they like."""
-    errors = np.sort(np.abs(explanation.errors).mean(axis=1))
-    return float(errors[: max(1, int((1 - _WORST) * len(errors)))].mean())
+    return _usual(np.abs(explanation.errors).mean(axis=1))
+
+
+def _usual(sizes: Array) -> float:
+    return float(np.sort(sizes)[: max(1, int((1 - _WORST) * len(sizes)))].mean())
 
 
 def is_explained(explanation: Explanation, pairs: tuple[Index, Index], little: float) -> bool:
@@ -74,7 +78,8 @@ def is_noise(explanation: Explanation, pairs: tuple[Index, Index]) -> bool:
 
     Neighbours do not share it, and no part of the image has most of it, as shadows have that are off.
     """
-    even = usual_error(explanation) <= _EVEN * float(np.median(np.abs(explanation.errors).mean(axis=1)))
+    sizes = np.abs(explanation.errors).mean(axis=1)[explanation.lit.any(axis=1)]
+    even = not len(sizes) or _usual(sizes) <= _EVEN * float(np.median(sizes))
     return even and correlation(explanation.errors, pairs) <= _NOISE_ALONE
 
 

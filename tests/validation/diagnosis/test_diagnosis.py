@@ -150,7 +150,8 @@ def test_neighbours_are_compared_by_channel():
 def test_noise_is_of_one_size_all_over_the_image(truth):
     generator = np.random.default_rng(2)
     errors, pairs = 0.02 * generator.standard_normal((400, 3)), (np.arange(399), np.arange(1, 400))
-    explanation = Explanation((), (), Guess(scene_fog(truth)), errors, float(np.abs(errors).mean()))
+    lit = np.ones(errors.shape, bool)
+    explanation = Explanation((), (), Guess(scene_fog(truth)), errors, lit, float(np.abs(errors).mean()))
     assert is_noise(explanation, pairs)
     errors[::7] *= 20  # thin shadows that are off
     assert not is_noise(explanation, pairs)
