@@ -191,7 +191,7 @@ def _ranked(
 ) -> tuple[Explanation, Explanation, list[Ranked], bool]:
     """Return the unchanged scene, the explanation that is chosen, all in order, and whether nothing is left."""
     right = explain(predictor, ())
-    neighbours, little = predictor.pairs(right.guess), no_fault(predictor.task.truth)
+    neighbours, little = predictor.pairs, no_fault(predictor.task.truth)
     explained = partial(is_explained, pairs=neighbours, little=little)
     there = [hypothesis for hypothesis in HYPOTHESES if hypothesis.applies(predictor)]
 

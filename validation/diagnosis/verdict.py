@@ -69,7 +69,7 @@ def _usual(sizes: Array) -> float:
 
 
 def is_explained(explanation: Explanation, pairs: tuple[Index, Index], little: float) -> bool:
-    """Return whether what an explanation leaves is noise, or little, see `no_fault`; `pairs`: of `Predictor.pairs`."""
+    """Return whether what an explanation leaves is noise, or little, see `no_fault`; `pairs`: of `Predictor`."""
     return usual_error(explanation) <= little or correlation(explanation.errors, pairs) <= _NOISE
 
 

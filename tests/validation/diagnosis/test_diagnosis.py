@@ -131,6 +131,19 @@ def test_paths_are_kept_up_to_some_nodes(truth):
     assert light.model(task, Scenery()).paths is not first
 
 
+def test_images_are_kept_up_to_some_values(truth):
+    task = Task(truth, np.ones((SIZE[0] * SIZE[1], 3)), "total", np.ones(SIZE[0] * SIZE[1], bool), False)
+    light, fog = SceneLight(truth), scene_fog(truth)
+    first = light.radiance(task, Scenery(), fog)
+    assert light.radiance(task, Scenery(), replace(fog, exposure=(2.0, 2.0, 2.0))) == pytest.approx(2 * first)
+    light.radiance(task, Scenery(), replace(fog, camera_leg=0.0))
+    assert len(light._images) == 2  # a brighter image is one that is known
+    light.most_values = 2 * first.size
+    light.radiance(task, Scenery(shadows=False), fog)
+    assert next(iter(light._images))[1].camera_leg == 0.0
+    assert light.radiance(task, Scenery(), fog) == pytest.approx(first, rel=1e-12)
+
+
 def test_errors_of_few_pixels_are_no_noise():
     """Most pixels were right to rounding, and the signs of that decided what was noise."""
     generator = np.random.default_rng(1)
