@@ -20,7 +20,15 @@ from validation.comparison.engine_layers import JudgedLayer, judged_layer
 from validation.comparison.engine_pixels import PIXELS
 from validation.comparison.images import read_mask
 from validation.fit.confounding import Group, confounded_groups
-from validation.fit.image_model import ImageModel, Task, at_places, image_model, needed_points, usable_pixels
+from validation.fit.image_model import (
+    ImageModel,
+    Task,
+    at_places,
+    image_model,
+    needed_points,
+    pixels_of_rays,
+    usable_pixels,
+)
 from validation.fit.intervals import SIGMAS, interval_ends
 from validation.fit.least_squares import Solution, best_start, robust_fit, weighted_derivatives, weighted_fit
 from validation.fit.unknowns import AXES, CHANNELS, Unknown, read_unknowns
@@ -33,9 +41,11 @@ Progress = Callable[[float, str], None]
 
 _MOVES = 12  # rounds in which lit intervals are found anew
 _STILL = 1e-6  # of the distance of a light from the camera: it does not move any more
+_STILL_IN_NOISE = 0.02  # of a standard error: the interval would not show it
 _KNOWN = 1e-6  # a standard error that is always there: scenes are read, and images written, in float32
 _EXACT = 1e-5  # mean relative residual at which pixels are centres beyond doubt
 _FEW_RAYS = 3000  # on which starts are compared
+_FEWER = 4
 _FEWEST = 16  # pixels
 
 
@@ -265,7 +275,9 @@ def _solved(
     if any(unknown.moves and unknown.start != unknown.scene for unknown in unknowns):
         task, unknowns = _moved(task, unknowns, [unknown.start for unknown in unknowns])
     model = image_model(task, progress=None if progress is None else lambda share, what: progress(0.5 * share, what))
-    start = best_start(image_model(task, most=_FEW_RAYS), unknowns)
+    # Paths cost more than what is done with them: starts have some of their own where these are far fewer.
+    few = len(model.pixels) > _FEWER * pixels_of_rays(task, _FEW_RAYS)
+    start = best_start(image_model(task, most=_FEW_RAYS) if few else model, unknowns)
     groups = confounded_groups(weighted_derivatives(model, unknowns, start))
     held = {number for group in groups for number in group.held}
     free = [number for number in range(len(unknowns)) if number not in held]
@@ -279,11 +291,11 @@ def _solved(
         known = [unknowns[number] for number in free]
         inner = robust_fit(fixed, known, inner) if turn == 0 else inner
         solution = weighted_fit(fixed, known, inner)
-        step = float(np.max(np.abs(solution.inner - inner), initial=0.0))
-        inner = solution.inner
+        step, inner = np.abs(solution.inner - inner), solution.inner
         if progress is not None:
             progress(0.5 + 0.5 * (turn + 1) / _MOVES, "fit")
-        if turn + 1 == turns or (turn and step < _STILL * _size(task)):
+        still = np.maximum(_STILL * _size(task), _STILL_IN_NOISE * np.sqrt(np.maximum(np.diag(solution.covariance), 0)))
+        if turn + 1 == turns or (turn and np.all(step < still)):
             break
         outward = [unknown.start for unknown in unknowns]
         for number, value in zip(free, inner, strict=True):
