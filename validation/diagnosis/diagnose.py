@@ -47,12 +47,12 @@ Progress = Callable[[float, str], None]
 HYPOTHESES: tuple[Hypothesis, ...] = (*LIGHTS, *MEDIUM, *CAMERA, *ENCODING)
 RIGHT, UNEXPLAINED = "right", "unexplained"
 
-_REFINED = 5
+_REFINED = 5  # hypotheses whose numbers are found to all digits: those that leave least after a coarse search
 _MOVED = 0.02  # share by which the error changes where a search left the unchanged scene
 _FAR, _FAR_OF_PATHS = 10.0, 3.0  # errors over the least one that more digits do not bring down to it
 _PAIRS = 1500  # evaluations for pairs, after those where they begin
 _OTHER_PATHS = 20  # evaluations for which one with other paths counts
-_BETTER = 0.7  # what a pair must leave of the error of one alone
+_BETTER = 0.7  # what a pair must leave of the error of one alone: with more numbers anything fits a little better
 _MUCH = 0.2  # what an explanation must leave of the error to be named although more is wrong
 _ALIKE = 5.0  # evidence by which explanations may differ and still be as good as one another
 _SHOWN = 8

@@ -22,9 +22,9 @@ Bools = NDArray[np.bool_]
 
 EVALUATIONS = 15  #: for each number of a search that need not be fine
 _LEAST_SCALE, _LEAST_COARSE = 1e-4, 1e-2  # where most pixels do not know a parameter, those that do are no outliers
-_TURNS = 5
-_COARSE = 0.02
-_BEGUN = 2  # of the best starts
+_TURNS = 5  # steps of Gauss and Newton at most: each costs new paths for every number
+_COARSE = 0.02  # on a line, of a logarithm or in units of the parameter: enough to tell hypotheses apart
+_BEGUN = 2  # of the best starts: the best one may lead to a lesser minimum
 _LITTLE = 0.9  # share of the loss that a step leaves which gains little
 _SIMPLEX = 0.1  # first step, of a logarithm or in units of the parameter
 

@@ -8,8 +8,8 @@ numbers is what it gains over the unchanged scene, less k log(n)/2 (Schwarz 1978
 with a number must beat one without. Channels of a pixel share their noise, so that three values count as one.
 
 Errors of neighbours that go together are no noise. An explanation leaves nothing to explain if they do not (a
-correlation of 0.25 at most), if it leaves 0.4 %, which no engine need beat (1 % with lights that have extent: the fog
-model has sixteen points of them), or a tenth of what there was.
+correlation of 0.25 at most), if it leaves 0.4 %, which no engine need beat (1 % with lights that have extent, which are
+points in the fog model), or a tenth of what there was.
 """
 
 import math
@@ -27,7 +27,9 @@ LEAST_EVIDENCE = 20.0  #: e^20 to one: what nobody doubts
 LEAST_EFFECT = 0.002  #: mean relative change of the image: less is no fault
 _LEFT, _LEFT_OF_AREA = 0.004, 0.01  # mean relative error that is no fault
 _GAIN = 10.0  # what an explanation that leaves nothing makes of the error
-_NOISE, _NOISE_ALONE = 0.25, 0.1  # correlation of neighbours
+# Correlation of neighbours; that of noise is 0 +- 1/sqrt(pairs), 0.04 in an image of 32 x 24 pixels. Of noise alone no
+# fault may hide in it; where a hypothesis was found, a filter of pixels may have joined neighbours.
+_NOISE, _NOISE_ALONE = 0.25, 0.1
 _EVEN = 2.0  # mean over median of errors that are noise; 1.2 of a normal distribution
 _WORST = 0.02  # share of the pixels that may be as wrong as they like
 _KNOWN = {"centre": 3e-4, "area": 3e-3}  # relative error of the fog model itself, in most pixels
