@@ -9,6 +9,7 @@ Read in this order:
 - `study.py`: a study from its TOML file, and its cells;
 - `keys.py`: what decides the numbers of a row, as a digest;
 - `truth.py`: the truth that the cells of an image share;
+- `bounds.py`: the errors that methods state for themselves;
 - `work.py`: a cell becomes a row;
 - `rows.py`: finished rows on disk, and their Parquet.
 
