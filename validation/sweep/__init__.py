@@ -15,5 +15,5 @@ Read in this order:
 
 May import: `analytic.errors`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `realtime.scene`,
 `reference.quadrature`, `reference.scene`, `reference.storage`, `validation.configurations`, `validation.estimates`,
-`validation.metrics`, `validation.random_scenes`, `validation.scenes`.
+`validation.metrics`, `validation.random_scenes`, `validation.scaling`, `validation.scenes`.
 """

@@ -5,7 +5,6 @@ A method that refuses a scene gives a row too, with its reason. Nothing here kno
 """
 
 import json
-import resource
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -30,10 +29,12 @@ from realtime.frame.renderer import (
 )
 from realtime.scene.read_scene import Scene
 from validation.configurations.methods import Configuration, prepared, rendered_lights
+from validation.configurations.timing import run_times
 from validation.metrics.colour import colour_difference
 from validation.metrics.errors import FLOOR, error_metrics
 from validation.metrics.flip import flip_hdr
 from validation.metrics.other_tools import published_errors
+from validation.scaling.memory import largest_memory
 from validation.sweep.bounds import stated_bound, worth_of_ends
 from validation.sweep.row import PROPERTY
 from validation.sweep.study import Cell, map_side, seed_of
@@ -120,7 +121,7 @@ def cell_row(
         row["picture"] = paint(known, shown)
     row["rays"] = scene.camera.width * scene.camera.height
     row["lights"] = rendered_lights(scene, cell.chosen)
-    row["peak_mib"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    row["peak_mib"] = largest_memory()
     row["work_ms"] = 1e3 * (time.perf_counter() - begin)
     row["cpu_ms"] = 1e3 * (time.process_time() - spent)
     return row
@@ -218,7 +219,7 @@ def _render(scene: Scene, chosen: Configuration, *, timed: bool) -> Rendered:
 
 def _times(renderer: FrameRenderer, scene: Scene, state: Any) -> dict[str, Any]:
     """Time preparation, frames, and the airlight of a frame; the first run has compiled and recorded all kernels."""
-    prepare = _timed(lambda: dr.eval(renderer.prepare(scene)))
+    prepare, _ = run_times(lambda: dr.eval(renderer.prepare(scene)))
     frames, processor = _repeated(lambda: run_stages(renderer, state))
     low, median, high = (float(value) for value in np.percentile(frames, [25, 50, 75]))
     airlight = median  # camera rays and surfaces take little of a frame that is slow, and it takes too long to ask
@@ -244,24 +245,12 @@ def _times(renderer: FrameRenderer, scene: Scene, state: Any) -> dict[str, Any]:
 
 def _repeated(work: Callable[[], Any]) -> tuple[list[float], list[float]]:
     """Return wall and processor times of some runs after one of warm-up [ms]; a slow one is not repeated often."""
-    runs = [_timed_both(work)]
+    runs = [run_times(work)]
     if runs[0][0] < _SLOW:
         runs = []  # the warm-up replayed for the first time
     while not runs or (sum(wall for wall, _ in runs) < _SPENT and len(runs) < _MOST):
-        runs.append(_timed_both(work))
+        runs.append(run_times(work))
     return [wall for wall, _ in runs], [processor for _, processor in runs]
-
-
-def _timed_both(work: Callable[[], Any]) -> tuple[float, float]:
-    spent = time.process_time()
-    return _timed(work), 1e3 * (time.process_time() - spent)
-
-
-def _timed(work: Callable[[], Any]) -> float:
-    begin = time.perf_counter()
-    work()
-    dr.sync_thread()
-    return 1e3 * (time.perf_counter() - begin)
 
 
 def _command(cell: Cell) -> str:

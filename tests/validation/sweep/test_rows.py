@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: a finished row is never lost and never there twice, whatever ends the process or the disk."""
 
-
 import pytest
 
 from analytic.errors import InputError
