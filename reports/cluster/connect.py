@@ -174,7 +174,9 @@ def _local(workers: int) -> Iterator[Any]:
                     threads_per_worker=threads() if alone else 1,
                     processes=True,
                     host="127.0.0.1",
-                    dashboard_address=None,
+                    # Any port: without an address Dask takes 8787, and warns where another run has it.
+                    dashboard_address="127.0.0.1:0",
+                    scheduler_kwargs={"dashboard": False},
                     memory_limit=MEMORY,
                     local_directory=str(folder),
                     silence_logs=logging.CRITICAL,

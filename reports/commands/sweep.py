@@ -227,6 +227,8 @@ def _print(summary: dict[str, Any], *, json: bool) -> None:
         return
     print(f"{summary['output']}: {summary['cells']} cells of {summary['scenes']} scenes")
     print(f"  {summary['kept']} were there, {summary['computed']} computed, {summary['left']} left")
+    if summary["timed_alone"]:
+        print(f"  {summary['timed_alone']} timed alone")
     for status, number in sorted(summary["counts"].items()):
         print(f"  {status}: {number}")
     for problem in summary["problems"]:
