@@ -239,6 +239,29 @@ def light_leg(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
     return insides
 
 
+def grazed_at(seen: Seen, ray: MediaRay) -> tuple[Any, Any]:
+    """Return where the points of rays lie whose legs graze a sphere, two distances or infinity [m].
+
+    Before and behind them a leg has a part in the sphere that rises like a root. With w from the light to the middle
+    of the sphere, c = |w|^2 - radius^2 and v = v_0 + x d from the light to the point, |v x w| = radius |v| there, so
+
+        (q^2 - c) x^2 + 2 (p q - c v_0 . d) x + p^2 - c |v_0|^2 = 0,     p = v_0 . w,  q = d . w,
+
+    whose discriminant is c (radius^2 |n|^2 - (w . n)^2), n = v_0 x d: nothing cancels. One of them may belong to legs
+    away from the sphere, where a cut does no harm.
+    """
+    w, start, direction = seen.toward, ray.start, ray.direction
+    radius, away = seen.bounded_medium.radius, dr.norm(w)
+    c = (away - radius) * (away + radius)
+    p, q = dr.dot(start, w), dr.dot(direction, w)
+    across = dr.cross(start, direction)
+    square = c * (dr.square(radius) * dr.squared_norm(across) - dr.square(dr.dot(w, across)))
+    half = dr.fma(p, q, -c * dr.dot(start, direction))
+    t = -(half + dr.mulsign(dr.sqrt(dr.maximum(square, 0)), half))
+    ends = t / dr.fma(q, q, -c), (p * p - c * dr.squared_norm(start)) / t
+    return tuple(dr.select((square > 0) & dr.isfinite(x), x, dr.inf) for x in ends)
+
+
 def other_media_near(ray: MediaRay, number: int, x0, x1):
     """Return whether legs from the light to points of [x0, x1] [m] in the medium `number` may meet another one."""
     xs = [x0, x1]
