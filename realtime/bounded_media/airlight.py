@@ -45,6 +45,7 @@ References
 Biri, Arques, Michelin 2006, sections 4.2 and 5.2.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -56,7 +57,7 @@ from realtime.bounded_media.panels import MediumSegment, medium_integral
 from realtime.bounded_media.ray_segments import MediaRay, Piece, grazed_at, light_leg, other_media_near, sum_over_pieces
 from realtime.bounded_media.views import light_views
 from realtime.errors import InputError
-from realtime.numerics.array_types import is_single
+from realtime.numerics.array_types import is_single, one_of
 from realtime.numerics.fast_exp import exp_bounded
 from realtime.numerics.gauss_legendre import unit_nodes
 from realtime.rays.ray_light import distance_to_light, falloff, ray_geometry, smooth_subsegments
@@ -65,6 +66,7 @@ from realtime.scene.medium import Medium, least_extinction
 
 FORMS = ("exact", "paper", "printed")
 _NODES, _NODES_PAPER = 24, 6
+_AT_ONCE = 8  # nodes that a kernel's code has side by side
 _OPTICAL_REACH = 18.0  # e^-18 = 1.5e-8 of the light is left
 
 
@@ -261,18 +263,45 @@ def _integral(ray: MediaRay, piece: Piece, x0, x1, *, like_roots: bool = False):
     nodes = unit_nodes(_node_count(ray, piece, single=is_single(Float)))
     if like_roots:  # in the t of t^2 (3 - 2 t) it is smooth
         nodes = tuple((t * t * (3 - 2 * t), 6 * t * (1 - t) * weight) for t, weight in nodes)
-    xs, rs = [], []
-    for fraction, _ in nodes:
-        sine, cosine = dr.sincos(width * fraction)
-        s = h * dr.fma(s0, cosine, h * sine) / dr.fma(h, cosine, -s0 * sine)
-        xs.append(ray.geometry.foot + s)
-        rs.append(dr.sqrt(dr.fma(s, s, h * h)))
-    kept = _attenuation(ray, piece, xs, rs) if ray.form == "exact" else _paper_attenuation(ray, piece, xs)
-    total = sum(
-        weight * _scattered(ray, piece, value, x, r)
-        for (_, weight), value, x, r in zip(nodes, kept, xs, rs, strict=True)
+
+    def part(nodes):
+        """Add up the terms of some nodes: the planes of media are read once for all of them."""
+        xs, rs = [], []
+        for fraction, _ in nodes:
+            sine, cosine = dr.sincos(width * fraction)
+            s = h * dr.fma(s0, cosine, h * sine) / dr.fma(h, cosine, -s0 * sine)
+            xs.append(ray.geometry.foot + s)
+            rs.append(dr.sqrt(dr.fma(s, s, h * h)))
+        kept = _attenuation(ray, piece, xs, rs) if ray.form == "exact" else _paper_attenuation(ray, piece, xs)
+        return sum(
+            weight * _scattered(ray, piece, value, x, r)
+            for (_, weight), value, x, r in zip(nodes, kept, xs, rs, strict=True)
+        )
+
+    return _sum_in_parts(nodes, part, dr.zeros(type(ray.medium.albedo), dr.width(h, s0, s1))) * (width / h)
+
+
+def _sum_in_parts(nodes: Sequence[tuple[float, float]], part: Callable[[Sequence[tuple[Any, Any]]], Any], zero):
+    """Return the sum of `part` over parts of the nodes, by a loop whose code has one part.
+
+    The integral is recorded for every piece, light and walk: with all nodes written out kernels took a minute to
+    compile in scenes with several lights and media, and ran no faster.
+    """
+    turns, left = divmod(len(nodes), _AT_ONCE)
+    if turns < 2 or left:
+        return part(nodes)
+    Float = type(zero.x)
+
+    def body(turn, total):
+        columns = [nodes[first::_AT_ONCE] for first in range(_AT_ONCE)]
+        numbers = [[tuple(map(Float, values)) for values in zip(*column, strict=True)] for column in columns]
+        chosen = [tuple(one_of(turn, values) for values in pair) for pair in numbers]
+        return turn + 1, total + part(chosen)
+
+    _, total = dr.while_loop(
+        state=(mi.UInt32(0), zero), cond=lambda turn, total: turn < turns, body=body, labels=("turn", "total")
     )
-    return total * (width / h)
+    return total
 
 
 def _node_count(ray: MediaRay, piece: Piece, *, single: bool) -> int:

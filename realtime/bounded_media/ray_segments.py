@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
+import mitsuba as mi
 
 from realtime.bounded_media.convex_clip import Seen, inverse_crossings, near_line, share_inside
 from realtime.bounded_media.directional_legs import parallel_legs, seen_along
 from realtime.bounded_media.facet_walk import EntryPlanes, clear_of, line_crossings
 from realtime.bounded_media.views import MediumView, medium_view
+from realtime.numerics.array_types import one_of
 from realtime.rays.ray_light import RayGeometry, distance_to_light
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
@@ -61,16 +63,32 @@ def sum_over_pieces(pieces: tuple[Piece, ...], segments, integral, zero):
         The colour of no segment, of the rays' width.
     """
     Color = type(zero)
+
+    def added(total, piece, ends):
+        x0, x1 = ends
+        begin, end = dr.maximum(x0, piece.begin), dr.minimum(x1, piece.end)
+        return total + dr.if_stmt(
+            args=(begin, end),
+            cond=end > begin,
+            true_fn=lambda begin, end: integral(piece, begin, end),
+            false_fn=lambda begin, end: Color(0),
+        )
+
     total = zero
     for piece in pieces:
-        for x0, x1 in segments:
-            begin, end = dr.maximum(x0, piece.begin), dr.minimum(x1, piece.end)
-            total += dr.if_stmt(
-                args=(begin, end),
-                cond=end > begin,
-                true_fn=lambda begin, end, piece=piece: integral(piece, begin, end),
-                false_fn=lambda begin, end: Color(0),
-            )
+        if len(segments) == 1:
+            total = added(total, piece, segments[0])
+            continue
+        # A loop: the integral is long, and its code need not be there for each segment.
+        _, total = dr.while_loop(
+            state=(mi.UInt32(0), total),
+            cond=lambda number, total: number < len(segments),
+            body=lambda number, total, piece=piece: (
+                number + 1,
+                added(total, piece, [one_of(number, ends) for ends in zip(*segments, strict=True)]),
+            ),
+            labels=("number", "total"),
+        )
     return total
 
 

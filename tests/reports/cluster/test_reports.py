@@ -56,7 +56,7 @@ def test_a_report_from_a_cluster_says_the_same(tmp_path, monkeypatch, variant):
 @pytest.mark.slow
 @pytest.mark.claim("reports-from-clusters", tolerance="none: the same numbers")
 def test_mutations_on_workers_are_those_seen_here(own_cache, variant):
-    some = [mutation for mutation in MUTATIONS if not mutation.wide][::30]
+    some = [mutation for mutation in MUTATIONS if not mutation.wide][::45]
     looked = []
     with connected(Place(2)) as cluster:
 
@@ -64,6 +64,6 @@ def test_mutations_on_workers_are_those_seen_here(own_cache, variant):
             looked.append(mutations_seen(cluster, *asked))
             return looked[-1]
 
-        together = study_mutations(some, size=(12, 9), margin=0.3, elsewhere=elsewhere)
+        together = study_mutations(some, size=(8, 6), margin=0.3, elsewhere=elsewhere)
     assert len(looked[0]) == 6  # no stage was left for this process
-    assert together == study_mutations(some, size=(12, 9), margin=0.3)
+    assert together == study_mutations(some, size=(8, 6), margin=0.3)

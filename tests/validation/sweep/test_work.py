@@ -88,11 +88,11 @@ def test_what_is_not_finite_is_counted_and_kept_out_of_the_errors(monkeypatch):
 
 
 @pytest.mark.usefixtures("variant")
-def test_under_a_light_with_extent_an_eighth_of_the_pixels_has_a_truth(own_cache):
-    loaded = load_cell(Cell("penumbra-plane", (32, 24), (), configuration("unshadowed")))
+def test_under_a_light_with_extent_a_sixteenth_of_the_pixels_has_a_truth(own_cache):
+    loaded = load_cell(Cell("penumbra-plane", (40, 32), (), configuration("unshadowed")))
     truth = cell_truth(loaded)
     assert truth.mask is not None
-    assert int(truth.mask.sum()) == 32 * 24 // 8
+    assert int(truth.mask.sum()) == 40 * 32 // 16
     assert truth.surface is None
     whole = truth_image(loaded.scene)
     assert whole.airlight_se is not None
