@@ -36,6 +36,7 @@ ROUNDING = 1e-3
 END = 8 * 2.0**-24  #: uncertainty of the end of a lit interval, relative to its distance from the camera
 
 _SAMPLES = 256  # of a ray, about each light: what is scattered is smooth between them
+_RAYS = 1024  # at once: so many take some 100 MB
 _BETWEEN = 1.1  # times the largest of these no place scatters
 
 
@@ -82,9 +83,14 @@ def worth_of_ends(scene: Any, pixels: NDArray[np.int64]) -> Array:
     not.
     """
     whole = read_truth(scene)
-    truth = replace(whole, direction=whole.direction[pixels])
+    parts = np.array_split(pixels, range(_RAYS, len(pixels), _RAYS))
+    return np.concatenate([_worth_of_ends(replace(whole, direction=whole.direction[part])) for part in parts])
+
+
+def _worth_of_ends(truth: TruthScene) -> Array:
+    """Return what the uncertain ends of the lit intervals of all rays of `truth` are worth, (rays, 3)."""
     distance = surface_hits(truth).distance
-    worth = np.zeros((len(pixels), 3))
+    worth = np.zeros((len(distance), 3))
     for light in (*truth.lights, *truth.directional):
         x = _places(truth, light, distance)
         ray, column = np.nonzero(np.isfinite(x))
