@@ -202,7 +202,7 @@ def test_a_worker_of_another_version_that_joins_a_run_is_sent_away_and_its_work_
             for group in groups:
                 left -= bool(refused)
                 if not left:
-                    return
+                    break
                 yield group
 
         for outcome in run_groups(cluster, until_it_came(), made=made, refused=refused.append):
