@@ -34,6 +34,7 @@ from realtime.frame.surface_stages import no_surface, surface_stages
 from realtime.kernels.preparation import prepare_kernel, with_tables
 from realtime.methods.interface.layers import History
 from realtime.methods.interface.method import Method, Preparation, method_parameters
+from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import Metres, PerRay
 from realtime.numerics.recorded import Frozen
 from realtime.scene.camera import tiled_pixels
@@ -212,7 +213,7 @@ def _stages(
     tolerance = chosen.tolerance if method.by_rays else 0.0
     features, camera = scene.features, scene.camera
     provides_visibility = method.provides_visibility(chosen)
-    pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
+    pixel = aligned_array(mi.UInt32, tiled_pixels(camera.width, camera.height))
     corners = tile_corners(pixel, camera, tolerance, by_rays=by_rays, lights=len(scene.lights))
     stages = surface_stages(
         scene,
@@ -297,7 +298,7 @@ def _stages(
         passes = passes and Frozen(passes)
     lane = None
     if passes is not None:
-        lane = mi.UInt32(np.argsort(np.array(pixel)).astype(np.uint32))
+        lane = aligned_array(mi.UInt32, np.argsort(np.array(pixel)).astype(np.uint32))
     dr.eval(pixel, lane)
     return FrameRenderer(
         scene,

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import pytest
 
@@ -34,6 +34,16 @@ def test_places_by_their_words(tmp_path):
     assert parse_place(None).workers == parse_place("local").workers >= 1
     assert parse_place("tcp://10.1.2.3:8786") == Place(address="tcp://10.1.2.3:8786")
     assert parse_place(str(file)) == Place(file=file)
+
+
+def test_a_cluster_of_this_machine_shares_no_port_with_another():
+    """Two sweeps, or somebody's own Dask on its usual port: a warning would be an error here."""
+    with socket.socket() as taken:
+        with suppress(OSError):  # somebody else has taken it, which will do as well
+            taken.bind(("0.0.0.0", 8787))
+            taken.listen()
+        with connected(Place(1)) as cluster:
+            assert cluster.client.scheduler_info()["workers"]
 
 
 @pytest.mark.parametrize(
