@@ -15,10 +15,11 @@ from reference.monte_carlo.volpath.integrator import volpath_batch
 from reference.scene.camera import camera_matrix
 from reference.scene.read import TruthScene
 from validation.fit.image_model import ImageModel, Task, image_model, needed_points
-from validation.fog_model.fog import Fog
+from validation.fog_model.fog import Fog, scene_fog
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 APART = 2  #: pixels between those whose errors are compared: a filter that is wider than a pixel joins neighbours
 _MOST_RAYS = 3000
@@ -63,7 +64,9 @@ class SceneLight:
 
     truth: TruthScene
     most: int = 4_000_000  #: nodes whose paths are kept, those used last: some 120 bytes each
+    most_values: int = 8_000_000  #: of images that are kept, those used last: hypotheses share fogs, and images starts
     _models: dict[Any, ImageModel] = field(default_factory=dict)  # the one used last comes last
+    _images: dict[Any, Array] = field(default_factory=dict)  # likewise
 
     @cached_property
     def points(self) -> int:
@@ -90,7 +93,7 @@ class SceneLight:
 
     def model(self, task: Task, scenery: Scenery) -> ImageModel:
         """Return the model of an image in a scenery."""
-        key = scenery, task.area, task.holds, task.points, task.used.tobytes()
+        key = scenery, *_sight(task)
         known = self._models.pop(key, None)
         if known is None:
             known = image_model(
@@ -110,6 +113,23 @@ class SceneLight:
         self._models[key] = known
         return replace(known, task=task)
 
+    def radiance(self, task: Task, scenery: Scenery, fog: Fog) -> Array:
+        """Return what a fog makes of the pixels of an image in a scenery, (m, 3) [W/(m^2 sr)]."""
+        grey = replace(fog, exposure=(1.0, 1.0, 1.0))
+        key = scenery, grey, *_sight(task)
+        known = self._images.pop(key, None)
+        if known is None:
+            known = self.model(task, scenery).radiance(grey)
+            while (len(self._images) + 1) * known.size > self.most_values and self._images:
+                del self._images[next(iter(self._images))]
+        self._images[key] = known
+        return known * np.array(fog.exposure)
+
+
+def _sight(task: Task) -> tuple[Any, ...]:
+    """Return what of a task its pixels depend on, and their paths."""
+    return task.area, task.holds, task.points, task.used.tobytes()
+
 
 @dataclass
 class Predictor:
@@ -122,21 +142,17 @@ class Predictor:
     @property
     def fog(self) -> Fog:
         """The fog as the scene has it."""
-        return self.model(Scenery()).fog
+        return scene_fog(self.task.truth)
 
-    def model(self, scenery: Scenery) -> ImageModel:
-        """Return the model of a scenery."""
-        return self.light.model(self.task, scenery)
+    @cached_property
+    def pixels(self) -> Index:
+        """Which pixels take part, in any scenery, (m,)."""
+        return self.light.model(self.task, Scenery()).pixels
 
-    def pairs(self, guess: Guess) -> tuple[Index, Index]:
-        """Return which values belong to pixels and which to their neighbours, those of the next columns if it can be.
-
-        Returns
-        -------
-        tuple of numpy.ndarray
-            Two arrays of numbers of rows of `errors`.
-        """
-        pixels, width = self.model(guess.scenery).pixels, self.shape[1]
+    @cached_property
+    def pairs(self) -> tuple[Index, Index]:
+        """Which rows of `errors` are pixels, and which their neighbours, those of the next columns if it can be."""
+        pixels, width = self.pixels, self.shape[1]
         for apart in (1, APART) if len(pixels) == self.task.used.sum() else (APART,):
             partner = np.searchsorted(pixels, pixels + apart)
             row = np.flatnonzero(partner < len(pixels))
@@ -148,37 +164,44 @@ class Predictor:
 
     def predicted(self, guess: Guess) -> Array:
         """Return the values of the pixels, (m, 3)."""
-        model = self.model(guess.scenery)
-        radiance = model.radiance(guess.fog)
+        radiance = self.light.radiance(self.task, guess.scenery, guess.fog)
         if any(guess.multiple):
             more = self.light.higher_orders
             if more is not None:
-                radiance = radiance + sum(share * part[model.pixels] for share, part in zip(guess.multiple, more))
+                radiance = radiance + sum(share * part[self.pixels] for share, part in zip(guess.multiple, more))
         if guess.vignette:
-            radiance = radiance * self._cosines(model.pixels)[:, None] ** guess.vignette
+            radiance = radiance * self._cosines()[:, None] ** guess.vignette
         for change in guess.values:
             radiance = change(radiance)
         return radiance
 
-    def _cosines(self, pixels: Index) -> Array:
-        """Return the cosines of pixels to the axis of the camera, (m,)."""
+    def _cosines(self) -> Array:
+        """Return the cosines of the pixels to the axis of the camera, (m,)."""
         truth = self.task.truth
-        return np.asarray(truth.direction[pixels] @ camera_matrix(truth.scene.sensors()[0])[:3, 2])
+        return np.asarray(truth.direction[self.pixels] @ camera_matrix(truth.scene.sensors()[0])[:3, 2])
 
     def seen(self, guess: Guess) -> Array:
         """Return the values of the image in these pixels, (m, 3), with the fault of the grid taken back."""
         values = self.task.values
         if guess.undo is not None:
             values = np.ascontiguousarray(guess.undo(values.reshape(*self.shape, 3))).reshape(-1, 3)
-        return values[self.model(guess.scenery).pixels]
+        return values[self.pixels]
 
     def errors(self, guess: Guess) -> Array:
         """Return the errors of a guess, relative to the larger of both values, (m, 3), from -1 to 1."""
         predicted, seen = self.predicted(guess), self.seen(guess)
-        floor = _FLOOR * max(float(np.mean(np.abs(seen))), 1e-300)
-        scale = np.maximum(np.maximum(np.abs(seen), np.abs(predicted)), floor)
+        scale = np.maximum(np.maximum(np.abs(seen), np.abs(predicted)), _floor(seen))
         errors = (seen - predicted) / scale
         return np.where(np.isfinite(errors), errors, 1.0)
+
+    def lit(self, guess: Guess) -> Bools:
+        """Return which values of the image are not dark, (m, 3): the others have no noise that could be seen."""
+        seen = self.seen(guess)
+        return np.asarray(np.abs(seen) > _floor(seen))
+
+
+def _floor(seen: Array) -> float:
+    return _FLOOR * max(float(np.mean(np.abs(seen))), 1e-300)
 
 
 def changed_scene(truth: TruthScene, scenery: Scenery) -> TruthScene:

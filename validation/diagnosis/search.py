@@ -18,12 +18,13 @@ from validation.diagnosis.hypothesis import Hypothesis, Parameter
 from validation.diagnosis.prediction import Guess, Predictor
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 EVALUATIONS = 15  #: for each number of a search that need not be fine
 _LEAST_SCALE, _LEAST_COARSE = 1e-4, 1e-2  # where most pixels do not know a parameter, those that do are no outliers
-_TURNS = 5
-_COARSE = 0.02
-_BEGUN = 2  # of the best starts
+_TURNS = 5  # steps of Gauss and Newton at most: each costs new paths for every number
+_COARSE = 0.02  # on a line, of a logarithm or in units of the parameter: enough to tell hypotheses apart
+_BEGUN = 2  # of the best starts: the best one may lead to a lesser minimum
 _LITTLE = 0.9  # share of the loss that a step leaves which gains little
 _SIMPLEX = 0.1  # first step, of a logarithm or in units of the parameter
 
@@ -36,6 +37,7 @@ class Explanation:
     values: tuple[tuple[float, ...], ...]
     guess: Guess
     errors: Array  #: relative, (pixels, 3)
+    lit: Bools  #: which values of the image are not dark, (pixels, 3): their errors say what the noise is
     error: float  #: mean of their sizes
 
     @property
@@ -80,19 +82,24 @@ def explain(
             known[values] = predictor.errors(_guess(predictor, hypotheses, values))
         return known[values]
 
+    def scale_at(numbers: Sequence[float]) -> float:
+        values = tuple(numbers)
+        left = errors(values)[predictor.lit(_guess(predictor, hypotheses, values))]
+        return max(usual_size(left), _LEAST_SCALE if fine else _LEAST_COARSE)
+
     starts = [tuple(value for part in near for value in part)] if near else _starts(predictor, hypotheses)
-    least = _LEAST_SCALE if fine else _LEAST_COARSE
-    scale = min(_scale(errors(start), least) for start in starts)
+    scale = min(scale_at(start) for start in starts)
     starts = sorted(starts, key=lambda start: _loss(errors(start), scale))
     ends = [_inward(parameters, start) for start in starts[: _BEGUN if _on_a_line(parameters) else 1]]
     for _ in range((2 if fine else 1) if parameters else 0):
-        scale = _scale(errors(_outward(parameters, ends[0])), least)
+        scale = scale_at(_outward(parameters, ends[0]))
         ends = [_improved(errors, parameters, inner, scale, fine=fine) for inner in ends]
     inner = min(ends, key=lambda end: _loss(errors(_outward(parameters, end)), scale))
     values = _outward(parameters, inner)
     left = errors(values)
     guess = _guess(predictor, hypotheses, values)
-    return Explanation(tuple(hypotheses), _parted(hypotheses, values), guess, left, float(np.abs(left).mean()))
+    error = float(np.abs(left).mean())
+    return Explanation(tuple(hypotheses), _parted(hypotheses, values), guess, left, predictor.lit(guess), error)
 
 
 def _on_a_line(parameters: Sequence[Parameter]) -> bool:
@@ -244,5 +251,6 @@ def _loss(errors: Array, scale: float) -> float:
     return float(np.mean(np.log1p((errors / scale) ** 2)))
 
 
-def _scale(errors: Array, least: float) -> float:
-    return max(1.4826 * float(np.median(np.abs(errors))), least)
+def usual_size(errors: Array) -> float:
+    """Return the standard deviation of normal errors with this median size."""
+    return 1.4826 * float(np.median(np.abs(errors))) if errors.size else 0.0

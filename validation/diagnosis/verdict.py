@@ -2,13 +2,14 @@
 """How much speaks for an explanation, and whether it leaves anything to explain.
 
 With e the relative errors of n pixels and s their scale in the best explanation, the log-likelihood of Cauchy's
-distribution is -sum log(1 + (e/s)^2). The evidence of an explanation with k numbers is what it gains over the unchanged
-scene, less k log(n)/2 (Schwarz 1978, Ann. Statist. 6, 461): a hypothesis with a number must beat one without. Channels
-of a pixel share their noise, so that three values count as one.
+distribution is -sum log(1 + (e/s)^2). The scale is that of values that are not dark: where half of an image is black,
+the median of all errors is 0, and noise would be taken for what a fault does. The evidence of an explanation with k
+numbers is what it gains over the unchanged scene, less k log(n)/2 (Schwarz 1978, Ann. Statist. 6, 461): a hypothesis
+with a number must beat one without. Channels of a pixel share their noise, so that three values count as one.
 
 Errors of neighbours that go together are no noise. An explanation leaves nothing to explain if they do not (a
-correlation of 0.25 at most), if it leaves 0.4 %, which no engine need beat (1 % with lights that have extent: the fog
-model has sixteen points of them), or a tenth of what there was.
+correlation of 0.25 at most), if it leaves 0.4 %, which no engine need beat (1 % with lights that have extent, which are
+points in the fog model), or a tenth of what there was.
 """
 
 import math
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.scene.read import TruthScene
-from validation.diagnosis.search import Explanation
+from validation.diagnosis.search import Explanation, usual_size
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -26,7 +27,9 @@ LEAST_EVIDENCE = 20.0  #: e^20 to one: what nobody doubts
 LEAST_EFFECT = 0.002  #: mean relative change of the image: less is no fault
 _LEFT, _LEFT_OF_AREA = 0.004, 0.01  # mean relative error that is no fault
 _GAIN = 10.0  # what an explanation that leaves nothing makes of the error
-_NOISE, _NOISE_ALONE = 0.25, 0.1  # correlation of neighbours
+# Correlation of neighbours; that of noise is 0 +- 1/sqrt(pairs), 0.04 in an image of 32 x 24 pixels. Of noise alone no
+# fault may hide in it; where a hypothesis was found, a filter of pixels may have joined neighbours.
+_NOISE, _NOISE_ALONE = 0.25, 0.1
 _EVEN = 2.0  # mean over median of errors that are noise; 1.2 of a normal distribution
 _WORST = 0.02  # share of the pixels that may be as wrong as they like
 _KNOWN = {"centre": 3e-4, "area": 3e-3}  # relative error of the fog model itself, in most pixels
@@ -39,7 +42,7 @@ def no_fault(truth: TruthScene) -> float:
 
 def scale_of(explanation: Explanation, pixel: str) -> float:
     """Return the scale of the errors that an explanation leaves [1]."""
-    return max(1.4826 * float(np.median(np.abs(explanation.errors))), _KNOWN[pixel])
+    return max(usual_size(explanation.errors[explanation.lit]), _KNOWN[pixel])
 
 
 def evidence(explanation: Explanation, right: Explanation, scale: float) -> float:
@@ -60,12 +63,15 @@ def effect(explanation: Explanation, right: Explanation) -> float:
 
 def usual_error(explanation: Explanation) -> float:
     """Return the mean error of nearly all pixels: those at lamps may be as wrong as they like."""
-    errors = np.sort(np.abs(explanation.errors).mean(axis=1))
-    return float(errors[: max(1, int((1 - _WORST) * len(errors)))].mean())
+    return _usual(np.abs(explanation.errors).mean(axis=1))
+
+
+def _usual(sizes: Array) -> float:
+    return float(np.sort(sizes)[: max(1, int((1 - _WORST) * len(sizes)))].mean())
 
 
 def is_explained(explanation: Explanation, pairs: tuple[Index, Index], little: float) -> bool:
-    """Return whether what an explanation leaves is noise, or little, see `no_fault`; `pairs`: of `Predictor.pairs`."""
+    """Return whether what an explanation leaves is noise, or little, see `no_fault`; `pairs`: of `Predictor`."""
     return usual_error(explanation) <= little or correlation(explanation.errors, pairs) <= _NOISE
 
 
@@ -74,7 +80,8 @@ def is_noise(explanation: Explanation, pairs: tuple[Index, Index]) -> bool:
 
     Neighbours do not share it, and no part of the image has most of it, as shadows have that are off.
     """
-    even = usual_error(explanation) <= _EVEN * float(np.median(np.abs(explanation.errors).mean(axis=1)))
+    sizes = np.abs(explanation.errors).mean(axis=1)[explanation.lit.any(axis=1)]
+    even = not len(sizes) or _usual(sizes) <= _EVEN * float(np.median(sizes))
     return even and correlation(explanation.errors, pairs) <= _NOISE_ALONE
 
 

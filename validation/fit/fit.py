@@ -3,10 +3,12 @@
 
 import math
 import os
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,7 +20,16 @@ from validation.comparison.engine_layers import JudgedLayer, judged_layer
 from validation.comparison.engine_pixels import PIXELS
 from validation.comparison.images import read_mask
 from validation.fit.confounding import Group, confounded_groups
-from validation.fit.image_model import ImageModel, Task, at_places, image_model, needed_points, usable_pixels
+from validation.fit.image_model import (
+    ImageModel,
+    Task,
+    at_places,
+    image_model,
+    needed_points,
+    pixels_of_rays,
+    usable_pixels,
+)
+from validation.fit.intervals import SIGMAS, interval_ends
 from validation.fit.least_squares import Solution, best_start, robust_fit, weighted_derivatives, weighted_fit
 from validation.fit.unknowns import AXES, CHANNELS, Unknown, read_unknowns
 from validation.fog_model.fog import scene_fog
@@ -28,12 +39,13 @@ from validation.scenes.loading import LoadedScene
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
-_SIGMAS = 1.959964  # standard errors in half of a 95 % interval
 _MOVES = 12  # rounds in which lit intervals are found anew
 _STILL = 1e-6  # of the distance of a light from the camera: it does not move any more
+_STILL_IN_NOISE = 0.02  # of a standard error: the interval would not show it
 _KNOWN = 1e-6  # a standard error that is always there: scenes are read, and images written, in float32
 _EXACT = 1e-5  # mean relative residual at which pixels are centres beyond doubt
 _FEW_RAYS = 3000  # on which starts are compared
+_FEWER = 4
 _FEWEST = 16  # pixels
 
 
@@ -56,7 +68,7 @@ class Product:
     name: str  #: such as 'albedo * intensity'
     value: float
     low: float
-    high: float
+    high: float | None  #: None where the image sets no end
 
 
 @dataclass(frozen=True)
@@ -85,6 +97,7 @@ class Fit:
     left_out: int  #: of these, how many disagree with what explains the others
     noise: float  #: median of the relative residual, as a standard deviation
     confounded: tuple[Confounded, ...]
+    seconds: float  #: that the fit took, with the paths of light
 
     def to_json(self) -> dict[str, Any]:
         """Return every number by name. A parameter of three channels has lists of three."""
@@ -105,6 +118,7 @@ class Fit:
             "pixels": self.pixels,
             "left_out": self.left_out,
             "confounded": [asdict(each) for each in self.confounded],
+            "seconds": plain(self.seconds),
         }
 
 
@@ -190,11 +204,12 @@ def fit_image(
     Notes
     -----
     Valid for single scattering: homogeneous media, point and spot lights, directional ones where media have bounds;
-    lights with extent are sixteen points here, which leaves some 0.5 % in a pixel. The intervals count pixels as
+    lights with extent are 16 to 128 points here, which leaves some 0.5 % in a pixel. The intervals count pixels as
     independent of one another.
     """
     if pixel is not None and pixel not in PIXELS:
         raise InputError(f"--pixel {pixel}; wanted 'centre' or 'area'")
+    started = time.perf_counter()
     judged = judged_layer(image, path, name=layer, holds=holds)
     truth = read_truth(loaded.scene)
     unknowns = read_unknowns(parameters, truth, scene_fog(truth), starts or {})
@@ -218,7 +233,8 @@ def fit_image(
         if _wrong(results[-1][3]) < _EXACT:
             break
     kind, model, groups, solution, unknowns = min(results, key=lambda result: _wrong(result[3]))
-    return _fit((loaded.name, path, judged.holds, kind), model, groups, solution, unknowns)
+    fit = _fit((loaded.name, path, judged.holds, kind), model, groups, solution, unknowns)
+    return replace(fit, seconds=time.perf_counter() - started)
 
 
 def said_pixel(image: Image) -> str | None:
@@ -259,7 +275,9 @@ def _solved(
     if any(unknown.moves and unknown.start != unknown.scene for unknown in unknowns):
         task, unknowns = _moved(task, unknowns, [unknown.start for unknown in unknowns])
     model = image_model(task, progress=None if progress is None else lambda share, what: progress(0.5 * share, what))
-    start = best_start(image_model(task, most=_FEW_RAYS), unknowns)
+    # Paths cost more than what is done with them: starts have some of their own where these are far fewer.
+    few = len(model.pixels) > _FEWER * pixels_of_rays(task, _FEW_RAYS)
+    start = best_start(image_model(task, most=_FEW_RAYS) if few else model, unknowns)
     groups = confounded_groups(weighted_derivatives(model, unknowns, start))
     held = {number for group in groups for number in group.held}
     free = [number for number in range(len(unknowns)) if number not in held]
@@ -267,16 +285,17 @@ def _solved(
     if not free:
         return model, groups, _nothing(model), unknowns
     inner = start[free]
-    for turn in range(_MOVES if any(unknowns[number].moves for number in free) else 1):
+    turns = _MOVES if any(unknowns[number].moves for number in free) else 1
+    for turn in range(turns):
         fixed = _holding(model, unknowns, given)
         known = [unknowns[number] for number in free]
         inner = robust_fit(fixed, known, inner) if turn == 0 else inner
         solution = weighted_fit(fixed, known, inner)
-        step = float(np.max(np.abs(solution.inner - inner), initial=0.0))
-        inner = solution.inner
+        step, inner = np.abs(solution.inner - inner), solution.inner
         if progress is not None:
             progress(0.5 + 0.5 * (turn + 1) / _MOVES, "fit")
-        if not any(unknown.moves for unknown in known) or (turn and step < _STILL * _size(task)):
+        still = np.maximum(_STILL * _size(task), _STILL_IN_NOISE * np.sqrt(np.maximum(np.diag(solution.covariance), 0)))
+        if turn + 1 == turns or (turn and np.all(step < still)):
             break
         outward = [unknown.start for unknown in unknowns]
         for number, value in zip(free, inner, strict=True):
@@ -312,7 +331,9 @@ def _holding(model: ImageModel, unknowns: Sequence[Unknown], given: Mapping[int,
 def _nothing(model: ImageModel) -> Solution:
     radiance = model.radiance(model.fog)
     kept = np.ones(len(model.pixels), dtype=bool)
-    return Solution(np.empty(0), np.empty((0, 0)), model.image - radiance, radiance, kept, np.ones_like(radiance))
+    return Solution(
+        np.empty(0), np.empty((0, 0)), model.image - radiance, radiance, kept, np.ones_like(radiance), np.empty(0)
+    )
 
 
 def _left(solution: Solution) -> Array:
@@ -337,7 +358,9 @@ def _fit(
     held = {number for group in groups for number in group.held}
     doubtful = {number for group in groups for number in group.members}
     free = [number for number in range(len(unknowns)) if number not in held]
-    error = dict(zip(free, np.sqrt(np.maximum(np.diag(solution.covariance), 0.0) + _KNOWN**2), strict=True))
+    known = [unknowns[number] for number in free]
+    reach = interval_ends(model, known, solution) - solution.inner[:, None]
+    lengths = dict(zip(free, np.copysign(np.hypot(reach, SIGMAS * _KNOWN), [-1, 1]), strict=True))
     inner = {number: unknowns[number].scale.inward(unknowns[number].start) for number in held}
     inner |= dict(zip(free, (float(value) for value in solution.inner), strict=True))
     rows = []
@@ -345,8 +368,8 @@ def _fit(
         outward = unknown.scale.outward
         ends: tuple[float | None, float | None] = (None, None)
         if number not in doubtful:
-            reach = _SIGMAS * error[number]
-            ends = _finite(outward(inner[number] - reach)), _finite(outward(inner[number] + reach))
+            low, high = inner[number] + lengths[number]
+            ends = _finite(outward(float(low))), _finite(outward(float(high)))
         rows.append(Fitted(unknown.name, float(outward(inner[number])), *ends, unknown.unit, unknown.scene))
     kept = solution.kept
     image, residual = model.image[kept], solution.residual[kept]
@@ -361,7 +384,8 @@ def _fit(
         len(kept),
         int((~kept).sum()),
         1.4826 * float(np.median(_left(solution))) if _left(solution).size else math.nan,
-        tuple(_confounded(group, unknowns, inner, error, what[2]) for group in groups),
+        tuple(_confounded(group, unknowns, inner, lengths, what[2]) for group in groups),
+        math.nan,
     )
 
 
@@ -390,7 +414,7 @@ def _whole(unknown: Unknown) -> str:
 
 
 def _confounded(
-    group: Group, unknowns: Sequence[Unknown], inner: Mapping[int, float], error: Mapping[int, float], holds: str
+    group: Group, unknowns: Sequence[Unknown], inner: Mapping[int, float], lengths: Mapping[int, Array], holds: str
 ) -> Confounded:
     names = {number: unknowns[number].name for number in group.members}
     products = []
@@ -398,8 +422,8 @@ def _confounded(
         if all(unknowns[number].scale.relative for number in (kept, *powers)):
             words = [names[kept], *(_power(names[number], power) for number, power in powers.items())]
             middle = inner[kept] + sum(power * inner[number] for number, power in powers.items())
-            ends = (math.exp(middle + sign * _SIGMAS * error[kept]) for sign in (-1, 1))
-            products.append(Product(" * ".join(words), math.exp(middle), *ends))
+            low, high = (float(dr.exp(middle + float(length))) for length in lengths[kept])
+            products.append(Product(" * ".join(words), math.exp(middle), low, _finite(high)))
     held = tuple(names[number] for number in group.held)
     return Confounded(tuple(names.values()), held, tuple(products), _way_out(group, unknowns, holds))
 

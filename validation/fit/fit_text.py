@@ -19,6 +19,13 @@ def fit_lines(fit: Fit) -> list[str]:
     ]
     if fit.explained < _BAD:
         lines.append("That is no explanation: something that was not looked for is different.")
+    held = {name for group in fit.confounded for name in group.parameters}
+    lines += [
+        f"{each.name} has no upper end: this image allows any value above {each.low:.6g}."
+        for each in fit.parameters
+        if each.high is None and each.low is not None and each.name not in held
+    ]
+    lines.append(f"The fit took {fit.seconds:.2g} s.")
     return lines + [line for group in fit.confounded for line in _group_lines(group)]
 
 
@@ -26,7 +33,7 @@ def _group_lines(group: Confounded) -> list[str]:
     names = ", ".join(group.parameters)
     alone = len(group.parameters) == 1
     lines = [f"This image says nothing of {names}." if alone else f"This image does not tell apart: {names}."]
-    lines += [
-        f"Known is {each.name} = {each.value:.6g} ({each.low:.6g} to {each.high:.6g})." for each in group.products
-    ]
+    for each in group.products:
+        ends = f"{each.low:.6g} or more" if each.high is None else f"{each.low:.6g} to {each.high:.6g}"
+        lines.append(f"Known is {each.name} = {each.value:.6g} ({ends}).")
     return [*lines, f"Way out: {group.way_out}."]

@@ -30,6 +30,7 @@ Index = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 _MOST_RAYS = 20_000  # that a fit looks at, each with some nodes for every light: more say nothing new of few numbers
+_FEWEST = 64  # pixels, whatever rays they need
 _SIDE = 3  # rays along a side of a pixel, for means over its area
 _AREA_POINTS, _MOST_POINTS = 16, 128  # of lights with extent: at first, and at most
 _SETTLED = 0.005  # mean relative change of an image with twice the points, below which there are enough
@@ -118,8 +119,7 @@ def image_model(
     how
         More for `validation.fog_model.build.scattering_paths`.
     """
-    rays = (_SIDE**2 if task.area else 1) * (task.points if task.truth.area else 1)
-    pixels = _some(np.flatnonzero(task.used), max(64, most // rays), seed)
+    pixels = _some(np.flatnonzero(task.used), pixels_of_rays(task, most), seed)
     if apart and len(pixels) < np.count_nonzero(task.used):
         pixels = _with_partners(pixels[::2], task, apart)
     paths = scattering_paths(
@@ -134,6 +134,11 @@ def image_model(
         **how,
     )
     return ImageModel(task, pixels, on_device(paths), scene_fog(task.truth))
+
+
+def pixels_of_rays(task: Task, most: int) -> int:
+    """Return how many pixels so many rays allow, or the fewest that a fit looks at."""
+    return max(_FEWEST, most // ((_SIDE**2 if task.area else 1) * (task.points if task.truth.area else 1)))
 
 
 def needed_points(truth: TruthScene) -> int:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Levenberg and Marquardt's method on the pixels of an image, robust to those that disagree, with intervals.
+"""Levenberg and Marquardt's method on the pixels of an image, robust to those that disagree, with a covariance.
 
 1. Starts are tried over three decades of extinction and the whole range of g, each with the factor on the image that
    fits best, by a loss of relative errors that no single pixel decides (Cauchy's).
@@ -7,7 +7,7 @@
 3. What is left says how noisy the image is (`validation.fit.noise`): least squares with the weights 1/sigma^2, without
    outliers, until neither changes.
 
-The intervals come from the sandwich
+The covariance is the sandwich
 
     C = B^-1 M B^-1,    B = sum w J J^T,    M = sum_pixels s s^T,    s = sum_channels w J e,
 
@@ -53,6 +53,7 @@ class Solution:
     radiance: Array  #: of the model, (pixels, 3) [W/(m^2 sr)]
     kept: Bools  #: which pixels took part in the end, (pixels,)
     weights: Array  #: 1/sigma, (pixels, 3)
+    stretch: Array  #: variances over those of independent values of these weights, (parameters,)
 
 
 def best_start(model: ImageModel, unknowns: Sequence[Unknown]) -> Array:
@@ -143,9 +144,9 @@ def weighted_fit(model: ImageModel, unknowns: Sequence[Unknown], start: Array) -
             weights, kept = 1 / _relative(model.image), np.ones_like(kept)
             break
         solved = least_squares(
-            _weighted(model, unknowns, weights, kept),
+            weighted_residual(model, unknowns, weights, kept),
             inner,
-            _weighted_slopes(model, unknowns, weights, kept),
+            weighted_slopes(model, unknowns, weights, kept),
             method="lm" if 3 * int(kept.sum()) >= len(inner) else "trf",
             x_scale="jac",
             max_nfev=40,
@@ -156,8 +157,8 @@ def weighted_fit(model: ImageModel, unknowns: Sequence[Unknown], start: Array) -
             break
     radiance = model.values(unknowns, inner)
     residual = model.image - radiance
-    covariance = _sandwich(model.derivatives(unknowns, inner), residual, weights, kept)
-    return Solution(inner, covariance, residual, radiance, kept, weights)
+    covariance, stretch = _sandwich(model.derivatives(unknowns, inner), residual, weights, kept)
+    return Solution(inner, covariance, residual, radiance, kept, weights, stretch)
 
 
 def weighted_derivatives(model: ImageModel, unknowns: Sequence[Unknown], inner: Array) -> Array:
@@ -166,17 +167,22 @@ def weighted_derivatives(model: ImageModel, unknowns: Sequence[Unknown], inner: 
     return (model.derivatives(unknowns, inner) / scale[:, :, None]).reshape(-1, len(inner))
 
 
-def _weighted(model: ImageModel, unknowns: Sequence[Unknown], weights: Array, kept: Bools) -> Callable[[Array], Array]:
+def weighted_residual(
+    model: ImageModel, unknowns: Sequence[Unknown], weights: Array, kept: Bools
+) -> Callable[[Array], Array]:
+    """Return the function whose squares are summed, of the parameters, (values,)."""
     return lambda inner: ((model.image - model.values(unknowns, inner)) * weights)[kept].ravel()
 
 
-def _weighted_slopes(
+def weighted_slopes(
     model: ImageModel, unknowns: Sequence[Unknown], weights: Array, kept: Bools
 ) -> Callable[[Array], Array]:
+    """Return the derivatives of `weighted_residual`, (values, parameters)."""
     return lambda inner: -(model.derivatives(unknowns, inner) * weights[:, :, None])[kept].reshape(-1, len(inner))
 
 
-def _sandwich(derivatives: Array, residual: Array, weights: Array, kept: Bools) -> Array:
+def _sandwich(derivatives: Array, residual: Array, weights: Array, kept: Bools) -> tuple[Array, Array]:
+    """Return the covariance, and its variances over those of independent values of these weights."""
     slopes, count = (derivatives * weights[:, :, None])[kept], derivatives.shape[2]
     flat = slopes.reshape(-1, count)
     scores = np.einsum("pck,pc->pk", slopes, (residual * weights)[kept])
@@ -185,7 +191,9 @@ def _sandwich(derivatives: Array, residual: Array, weights: Array, kept: Bools) 
     bread = np.linalg.pinv((flat / size).T @ (flat / size), rcond=1e-14)
     freedom = len(scores) / max(len(scores) - count, 1)
     meat = (scores / size).T @ (scores / size) * freedom
-    return np.asarray(bread @ meat @ bread / np.outer(size, size))
+    covariance = bread @ meat @ bread
+    stretch = np.diag(covariance) / np.maximum(np.diag(bread), 1e-300)
+    return covariance / np.outer(size, size), stretch
 
 
 def _relative(image: Array) -> Array:

@@ -131,6 +131,19 @@ def test_paths_are_kept_up_to_some_nodes(truth):
     assert light.model(task, Scenery()).paths is not first
 
 
+def test_images_are_kept_up_to_some_values(truth):
+    task = Task(truth, np.ones((SIZE[0] * SIZE[1], 3)), "total", np.ones(SIZE[0] * SIZE[1], bool), False)
+    light, fog = SceneLight(truth), scene_fog(truth)
+    first = light.radiance(task, Scenery(), fog)
+    assert light.radiance(task, Scenery(), replace(fog, exposure=(2.0, 2.0, 2.0))) == pytest.approx(2 * first)
+    light.radiance(task, Scenery(), replace(fog, camera_leg=0.0))
+    assert len(light._images) == 2  # a brighter image is one that is known
+    light.most_values = 2 * first.size
+    light.radiance(task, Scenery(shadows=False), fog)
+    assert next(iter(light._images))[1].camera_leg == 0.0
+    assert light.radiance(task, Scenery(), fog) == pytest.approx(first, rel=1e-12)
+
+
 def test_errors_of_few_pixels_are_no_noise():
     """Most pixels were right to rounding, and the signs of that decided what was noise."""
     generator = np.random.default_rng(1)
@@ -150,7 +163,8 @@ def test_neighbours_are_compared_by_channel():
 def test_noise_is_of_one_size_all_over_the_image(truth):
     generator = np.random.default_rng(2)
     errors, pairs = 0.02 * generator.standard_normal((400, 3)), (np.arange(399), np.arange(1, 400))
-    explanation = Explanation((), (), Guess(scene_fog(truth)), errors, float(np.abs(errors).mean()))
+    lit = np.ones(errors.shape, bool)
+    explanation = Explanation((), (), Guess(scene_fog(truth)), errors, lit, float(np.abs(errors).mean()))
     assert is_noise(explanation, pairs)
     errors[::7] *= 20  # thin shadows that are off
     assert not is_noise(explanation, pairs)

@@ -17,6 +17,7 @@ from validation.estimates.quadrature import truth_image
 from validation.fit.confounding import confounded_groups
 from validation.fit.fit import fit_file, fit_image, said_pixel
 from validation.fit.image_model import Task, image_model, usable_pixels
+from validation.fit.intervals import interval_ends
 from validation.fit.least_squares import best_start, robust_fit, weighted_fit
 from validation.fit.noise import noise_of, outliers
 from validation.fit.unknowns import read_unknowns
@@ -201,10 +202,34 @@ def test_intervals_cover_the_truth_as_often_as_they_say(variant, tmp_path, noise
         }[noise]()
         seen = replace(model, task=replace(model.task, values=noisy))
         solution = weighted_fit(seen, unknowns, robust_fit(seen, unknowns, best_start(seen, unknowns)))
-        covered += np.abs(solution.inner - wanted) < 1.96 * np.sqrt(np.diag(solution.covariance))
+        low, high = interval_ends(seen, unknowns, solution).T
+        covered += (low < wanted) & (wanted < high)
     # Of 200 trials 190 should cover; the binomial distribution with 0.95 gives fewer than 177 once in 16 000, of which
     # nine are looked at.
     assert (covered >= 177).all(), covered / trials
+
+
+def test_ends_are_those_of_the_profile_where_an_image_is_not_linear(variant, tmp_path):
+    """With 20 % of noise the extinction is known to a factor of two: the ellipse of the covariance is wrong there."""
+    truth = read_truth(load_scene(scene_file(tmp_path), (32, 24)).scene)
+    fog, count = scene_fog(truth), 32 * 24
+    unknowns = read_unknowns(["sigma_t", "intensity"], truth, fog, {})
+    model = image_model(Task(truth, np.zeros((count, 3)), "airlight", np.ones(count, bool), False))
+    noise = np.random.default_rng(5).gamma(25.0, 0.04, (count, 1))
+    seen = replace(model, task=replace(model.task, values=model.radiance(fog) * noise))
+    solution = weighted_fit(seen, unknowns, [unknown.scale.inward(unknown.scene) for unknown in unknowns])
+    ends = interval_ends(seen, unknowns, solution)
+    reach = 1.959964 * np.sqrt(np.diag(solution.covariance))
+    assert np.abs((ends - solution.inner[:, None]) / reach[:, None] - [-1, 1]).max() > 0.05
+    squares = np.sum((solution.residual * solution.weights)[solution.kept] ** 2)
+    for sigma_t in ends[0]:
+        # Of the intensity the image is a multiple: the best one is known.
+        radiance = seen.values(unknowns, [sigma_t, 0.0]) * solution.weights
+        image = seen.image * solution.weights
+        best = np.sum(image[solution.kept] * radiance[solution.kept]) / np.sum(radiance[solution.kept] ** 2)
+        left = np.sum((image - best * radiance)[solution.kept] ** 2)
+        errors = np.sqrt((left - squares) / solution.stretch[0])
+        assert errors == pytest.approx(1.959964, rel=0.03)
 
 
 def test_noise_is_found_by_its_two_parts():
