@@ -20,7 +20,8 @@ between the ends of the segment: with s = x - foot and the angle u from the near
     s = h (s_0 cos u + h sin u)/(h cos u - s_0 sin u),     u_1 = atan2(h (s_1 - s_0), h^2 + s_0 s_1),
 
 so that a segment far from the light or a ray close to it loses nothing. The parts l_k have kinks where the leg passes
-an edge of the medium, and there the rule is of second order.
+an edge of the medium, and there the rule is of second order. Where legs graze a sphere, l_k rises like a root: between
+media, segments are cut there, and the rule is used in the u of u^2 (3 - 2 u), in which roots at both ends are smooth.
 
 The published approximation (section 4.2) puts a constant R for r in the exponent, and takes the distance x_n at which
 the ray enters from x. As printed it is
@@ -44,17 +45,19 @@ References
 Biri, Arques, Michelin 2006, sections 4.2 and 5.2.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
+import mitsuba as mi
 
 from realtime.bounded_media.directional_airlight import ParallelRay
 from realtime.bounded_media.panels import MediumSegment, medium_integral
-from realtime.bounded_media.ray_segments import MediaRay, Piece, light_leg, other_media_near, sum_over_pieces
+from realtime.bounded_media.ray_segments import MediaRay, Piece, grazed_at, light_leg, other_media_near, sum_over_pieces
 from realtime.bounded_media.views import light_views
 from realtime.errors import InputError
-from realtime.numerics.array_types import is_single
+from realtime.numerics.array_types import is_single, one_of
 from realtime.numerics.fast_exp import exp_bounded
 from realtime.numerics.gauss_legendre import unit_nodes
 from realtime.rays.ray_light import distance_to_light, falloff, ray_geometry, smooth_subsegments
@@ -63,6 +66,7 @@ from realtime.scene.medium import Medium, least_extinction
 
 FORMS = ("exact", "paper", "printed")
 _NODES, _NODES_PAPER = 24, 6
+_AT_ONCE = 8  # nodes that a kernel's code has side by side
 _OPTICAL_REACH = 18.0  # e^-18 = 1.5e-8 of the light is left
 
 
@@ -197,8 +201,10 @@ def check_form(medium: Medium, form: str) -> None:
 
 def _piece_integral(ray: MediaRay, piece: Piece, x0, x1):
     """Integrate one segment in one piece."""
-    if piece.number is None or ray.form != "exact":
+    if ray.form != "exact":
         return _integral(ray, piece, x0, x1)
+    if piece.number is None:
+        return _integral_past_spheres(ray, piece, x0, x1)
     number = piece.number
     segment = MediumSegment(
         medium=piece.medium,
@@ -222,8 +228,30 @@ def _piece_integral(ray: MediaRay, piece: Piece, x0, x1):
     )
 
 
-def _integral(ray: MediaRay, piece: Piece, x0, x1):
-    """Integrate one segment in one piece."""
+def _integral_past_spheres(ray: MediaRay, piece: Piece, x0, x1):
+    """Integrate one segment between media, cut where legs graze spheres."""
+    cuts = [x for seen in ray.seen if seen.bounded_medium.planes is None for x in grazed_at(seen, ray)]
+    if not cuts:
+        return _integral(ray, piece, x0, x1)
+
+    def part(turn, begin, total):
+        end = x1
+        for x in cuts:
+            end = dr.minimum(end, dr.select(x > begin, x, dr.inf))
+        return turn + 1, end, total + _integral(ray, piece, begin, end, like_roots=True)
+
+    width = dr.width(ray.geometry.height, x0, x1)
+    *_, total = dr.while_loop(
+        state=(dr.zeros(mi.UInt32, width), x0 + 0, dr.zeros(type(ray.medium.albedo), width)),
+        cond=lambda turn, begin, total: (begin < x1) & (turn <= len(cuts)),
+        body=part,
+        labels=("turn", "begin", "total"),
+    )
+    return total
+
+
+def _integral(ray: MediaRay, piece: Piece, x0, x1, *, like_roots: bool = False):
+    """Integrate one segment in one piece; its integrand may rise and fall `like_roots` at the ends."""
     if ray.polynomial is not None:
         return published_integral(ray, piece, x0, x1)
     Float = type(ray.geometry.height)
@@ -233,18 +261,47 @@ def _integral(ray: MediaRay, piece: Piece, x0, x1):
     s0, s1 = x0 - ray.geometry.foot, x1 - ray.geometry.foot
     width = dr.select(dr.isfinite(x1), dr.atan2(h * (s1 - s0), dr.fma(h, h, s0 * s1)), dr.atan2(h, s0))
     nodes = unit_nodes(_node_count(ray, piece, single=is_single(Float)))
-    xs, rs = [], []
-    for fraction, _ in nodes:
-        sine, cosine = dr.sincos(width * fraction)
-        s = h * dr.fma(s0, cosine, h * sine) / dr.fma(h, cosine, -s0 * sine)
-        xs.append(ray.geometry.foot + s)
-        rs.append(dr.sqrt(dr.fma(s, s, h * h)))
-    kept = _attenuation(ray, piece, xs, rs) if ray.form == "exact" else _paper_attenuation(ray, piece, xs)
-    total = sum(
-        weight * _scattered(ray, piece, value, x, r)
-        for (_, weight), value, x, r in zip(nodes, kept, xs, rs, strict=True)
+    if like_roots:  # in the t of t^2 (3 - 2 t) it is smooth
+        nodes = tuple((t * t * (3 - 2 * t), 6 * t * (1 - t) * weight) for t, weight in nodes)
+
+    def part(nodes):
+        """Add up the terms of some nodes: the planes of media are read once for all of them."""
+        xs, rs = [], []
+        for fraction, _ in nodes:
+            sine, cosine = dr.sincos(width * fraction)
+            s = h * dr.fma(s0, cosine, h * sine) / dr.fma(h, cosine, -s0 * sine)
+            xs.append(ray.geometry.foot + s)
+            rs.append(dr.sqrt(dr.fma(s, s, h * h)))
+        kept = _attenuation(ray, piece, xs, rs) if ray.form == "exact" else _paper_attenuation(ray, piece, xs)
+        return sum(
+            weight * _scattered(ray, piece, value, x, r)
+            for (_, weight), value, x, r in zip(nodes, kept, xs, rs, strict=True)
+        )
+
+    return _sum_in_parts(nodes, part, dr.zeros(type(ray.medium.albedo), dr.width(h, s0, s1))) * (width / h)
+
+
+def _sum_in_parts(nodes: Sequence[tuple[float, float]], part: Callable[[Sequence[tuple[Any, Any]]], Any], zero):
+    """Return the sum of `part` over parts of the nodes, by a loop whose code has one part.
+
+    The integral is recorded for every piece, light and walk: with all nodes written out kernels took a minute to
+    compile in scenes with several lights and media, and ran no faster.
+    """
+    turns, left = divmod(len(nodes), _AT_ONCE)
+    if turns < 2 or left:
+        return part(nodes)
+    Float = type(zero.x)
+
+    def body(turn, total):
+        columns = [nodes[first::_AT_ONCE] for first in range(_AT_ONCE)]
+        numbers = [[tuple(map(Float, values)) for values in zip(*column, strict=True)] for column in columns]
+        chosen = [tuple(one_of(turn, values) for values in pair) for pair in numbers]
+        return turn + 1, total + part(chosen)
+
+    _, total = dr.while_loop(
+        state=(mi.UInt32(0), zero), cond=lambda turn, total: turn < turns, body=body, labels=("turn", "total")
     )
-    return total * (width / h)
+    return total
 
 
 def _node_count(ray: MediaRay, piece: Piece, *, single: bool) -> int:

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
+import mitsuba as mi
 
 from realtime.bounded_media.convex_clip import Seen, inverse_crossings, near_line, share_inside
 from realtime.bounded_media.directional_legs import parallel_legs, seen_along
 from realtime.bounded_media.facet_walk import EntryPlanes, clear_of, line_crossings
 from realtime.bounded_media.views import MediumView, medium_view
+from realtime.numerics.array_types import one_of
 from realtime.rays.ray_light import RayGeometry, distance_to_light
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
@@ -61,16 +63,32 @@ def sum_over_pieces(pieces: tuple[Piece, ...], segments, integral, zero):
         The colour of no segment, of the rays' width.
     """
     Color = type(zero)
+
+    def added(total, piece, ends):
+        x0, x1 = ends
+        begin, end = dr.maximum(x0, piece.begin), dr.minimum(x1, piece.end)
+        return total + dr.if_stmt(
+            args=(begin, end),
+            cond=end > begin,
+            true_fn=lambda begin, end: integral(piece, begin, end),
+            false_fn=lambda begin, end: Color(0),
+        )
+
     total = zero
     for piece in pieces:
-        for x0, x1 in segments:
-            begin, end = dr.maximum(x0, piece.begin), dr.minimum(x1, piece.end)
-            total += dr.if_stmt(
-                args=(begin, end),
-                cond=end > begin,
-                true_fn=lambda begin, end, piece=piece: integral(piece, begin, end),
-                false_fn=lambda begin, end: Color(0),
-            )
+        if len(segments) == 1:
+            total = added(total, piece, segments[0])
+            continue
+        # A loop: the integral is long, and its code need not be there for each segment.
+        _, total = dr.while_loop(
+            state=(mi.UInt32(0), total),
+            cond=lambda number, total: number < len(segments),
+            body=lambda number, total, piece=piece: (
+                number + 1,
+                added(total, piece, [one_of(number, ends) for ends in zip(*segments, strict=True)]),
+            ),
+            labels=("number", "total"),
+        )
     return total
 
 
@@ -219,6 +237,29 @@ def light_leg(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
         shares = [share_inside(inverse_in, inverse_out) for inverse_in, inverse_out in zip(enter, ends)]
         insides.append([dr.select(near, share * r, 0) for share, r in zip(shares, rs)])
     return insides
+
+
+def grazed_at(seen: Seen, ray: MediaRay) -> tuple[Any, Any]:
+    """Return where the points of rays lie whose legs graze a sphere, two distances or infinity [m].
+
+    Before and behind them a leg has a part in the sphere that rises like a root. With w from the light to the middle
+    of the sphere, c = |w|^2 - radius^2 and v = v_0 + x d from the light to the point, |v x w| = radius |v| there, so
+
+        (q^2 - c) x^2 + 2 (p q - c v_0 . d) x + p^2 - c |v_0|^2 = 0,     p = v_0 . w,  q = d . w,
+
+    whose discriminant is c (radius^2 |n|^2 - (w . n)^2), n = v_0 x d: nothing cancels. One of them may belong to legs
+    away from the sphere, where a cut does no harm.
+    """
+    w, start, direction = seen.toward, ray.start, ray.direction
+    radius, away = seen.bounded_medium.radius, dr.norm(w)
+    c = (away - radius) * (away + radius)
+    p, q = dr.dot(start, w), dr.dot(direction, w)
+    across = dr.cross(start, direction)
+    square = c * (dr.square(radius) * dr.squared_norm(across) - dr.square(dr.dot(w, across)))
+    half = dr.fma(p, q, -c * dr.dot(start, direction))
+    t = -(half + dr.mulsign(dr.sqrt(dr.maximum(square, 0)), half))
+    ends = t / dr.fma(q, q, -c), (p * p - c * dr.squared_norm(start)) / t
+    return tuple(dr.select((square > 0) & dr.isfinite(x), x, dr.inf) for x in ends)
 
 
 def other_media_near(ray: MediaRay, number: int, x0, x1):

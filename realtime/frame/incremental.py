@@ -147,7 +147,7 @@ def _next_of_groups(renderer: FrameRenderer, made: _Made, *, cast_again: bool):
         state, lists, cast, by_light = _before_method(group, made.of_group(number), cast, cast_again=cast_again)
         first = kept[0][0] if kept else state
         kept.append((state, lists) if number < kept_groups(first) else (None, None))
-        if renderer.groups.of_point is None:
+        if renderer.groups.at_once:
             *layers, history, carried = run_method(group, state, cast, by_light, lists, history, carried)
             stages = evaluated(cast, by_light, layers)
             continue

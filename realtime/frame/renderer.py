@@ -6,9 +6,11 @@ them afterwards, so a frame costs its kernels and little else. A method whose ar
 frame cannot be frozen. All that moves (camera, lights, medium, shadow maps) is passed in as opaque arrays. What of a
 frame serves the next one too: `realtime.frame.incremental`.
 
-Where there are lights with extent, a renderer has groups of lights (`LightGroups`): those without extent together, then
-each light point by itself. The stages for light points are recorded once and replayed for every one; their radiance is
-added up. What the stages of a single group take and return is a tuple by group then: states, surfaces and lists.
+Where there are lights with extent, or many, a renderer has groups of lights (`LightGroups`): those without extent
+together where they are few, or each by itself, then each light point by itself. Stages for one light are recorded once
+and replayed for all of its structure; their radiance is added up. So the code of a kernel, and the time to compile it,
+do not grow with the lights: with five lights and two media in one kernel it had half a million operations, and took a
+minute. What the stages of a single group take and return is a tuple by group then: states, surfaces and lists.
 
 A large image of a method that computes each ray by itself is rendered in parts, one after the other (`parts`): what a
 frame needs beside the image that it shows is then that of a part.
@@ -32,6 +34,7 @@ from realtime.frame.surface_stages import no_surface, surface_stages
 from realtime.kernels.preparation import prepare_kernel, with_tables
 from realtime.methods.interface.layers import History
 from realtime.methods.interface.method import Method, Preparation, method_parameters
+from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import Metres, PerRay
 from realtime.numerics.recorded import Frozen
 from realtime.scene.camera import tiled_pixels
@@ -44,16 +47,18 @@ from realtime.tiles.layout import TILE
 _ROOM = 2**30  # of states of groups of lights, such as shadow maps [bytes]
 _LARGE = 2**21  # pixels; a larger image is rendered in parts where it can be
 _PART = 2**20  # pixels of a part at most
+_FEW = 4  # lights without extent whose code one kernel may hold; in bounded media it is long, and only one may
 _MOST_KEPT = 32  # groups of lights of which states, surfaces and lists are kept; those of others are made when needed
 
 
 @dataclass(frozen=True)
 class LightGroups:
-    """The stages of a frame by groups of lights, for a scene with lights with extent."""
+    """The stages of a frame by groups of lights, for a scene with lights with extent, or with many."""
 
     light_points: LightPoints
-    whole: "FrameRenderer | None"  #: of the lights without extent, or of all at once; None where there are none
-    of_point: "FrameRenderer | None"  #: of one light point; None where a method takes all lights at once
+    ordinary: tuple["FrameRenderer", ...]  #: of the lights without extent: one of all of them, or one of each
+    of_point: "FrameRenderer | None"  #: of one light point; None where there is none by itself
+    at_once: bool = False  #: whether there is one group, of all lights and light points
 
 
 @dataclass(frozen=True)
@@ -77,7 +82,7 @@ class FrameRenderer:
     carries: bool  #: whether the method hands arrays on to the next frame
     by_rays: bool  #: whether each ray is computed by itself, so that any part of the image can be rendered alone
     extra_layers: bool  #: whether `render` returns `Layers.extra` too
-    groups: LightGroups | None = None  #: where the scene has lights with extent
+    groups: LightGroups | None = None  #: where the scene has lights with extent, or many
 
     # A frozen function reads all shapes of a scene that it is given anew at every call.
 
@@ -123,6 +128,7 @@ def frame_renderer(
         An airlight kernel function; needed where `method.uses_kernel` says so.
     extra_layers
         Whether frames have the further layers that the method names; in a scene with lights with extent they have not.
+        In others all lights are in one group then.
     parameters
         Values of the method's parameters, and of `realtime.area_lights.points.LightPoints`; the others have their
         defaults.
@@ -137,16 +143,30 @@ def frame_renderer(
     if method.uses_kernel(chosen) and kernel is None:
         raise InputError(f"method {method.name}: got no kernel, wanted one of realtime.kernels.registry.KERNELS")
     _check_clouds(scene, method)
-    if not scene.area_lights:
+    at_once = _has_passes(method, chosen) or method.lights_at_once(chosen) or method.carries(chosen)
+    by_light = len(scene.lights) > (1 if scene.features.bounded else _FEW) and not (at_once or extra_layers)
+    if not (scene.area_lights or by_light):
         return _stages(scene, method, kernel, chosen, extra_layers=extra_layers)
     lit = with_light_points(scene, light_points.points, light_points.pattern)
-    if _has_passes(method, chosen) or method.lights_at_once(chosen) or method.carries(chosen):
-        groups = LightGroups(light_points, _stages(lit, method, kernel, chosen), None)
+    if at_once:
+        groups = LightGroups(light_points, (_stages(lit, method, kernel, chosen),), None, at_once=True)
     else:
-        point = replace(lit, lights=lit.lights[len(scene.lights) :][:1])
-        whole = _stages(scene, method, kernel, chosen) if scene.lights else None
-        groups = LightGroups(light_points, whole, _stages(point, method, kernel, chosen, adds_up=True))
-    known = groups.whole or groups.of_point
+        of_one: dict[Any, FrameRenderer] = {}
+
+        def stages_of(light: Light) -> FrameRenderer:
+            """Return the stages for one light: lights of one structure share them."""
+            structure = tuple(value is None for value in vars(light).values())
+            if structure not in of_one:
+                alone = replace(lit, lights=(light,))
+                of_one[structure] = _stages(alone, method, kernel, chosen, adds_up=True)
+            return of_one[structure]
+
+        if by_light:
+            ordinary = tuple(stages_of(light) for light in scene.lights)
+        else:
+            ordinary = (_stages(scene, method, kernel, chosen),) if scene.lights else ()
+        groups = LightGroups(light_points, ordinary, stages_of(lit.lights[-1]) if scene.area_lights else None)
+    known = groups.ordinary[0] if groups.ordinary else groups.of_point
     assert known is not None
     return replace(known, scene=scene, prepare=GroupPreparation(groups), groups=groups)
 
@@ -193,7 +213,7 @@ def _stages(
     tolerance = chosen.tolerance if method.by_rays else 0.0
     features, camera = scene.features, scene.camera
     provides_visibility = method.provides_visibility(chosen)
-    pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
+    pixel = aligned_array(mi.UInt32, tiled_pixels(camera.width, camera.height))
     corners = tile_corners(pixel, camera, tolerance, by_rays=by_rays, lights=len(scene.lights))
     stages = surface_stages(
         scene,
@@ -278,7 +298,7 @@ def _stages(
         passes = passes and Frozen(passes)
     lane = None
     if passes is not None:
-        lane = mi.UInt32(np.argsort(np.array(pixel)).astype(np.uint32))
+        lane = aligned_array(mi.UInt32, np.argsort(np.array(pixel)).astype(np.uint32))
     dr.eval(pixel, lane)
     return FrameRenderer(
         scene,
@@ -338,8 +358,9 @@ def _of_pixels(renderer: FrameRenderer, pixel: PerRay) -> FrameRenderer:
     """Return a renderer of some pixels."""
     groups = renderer.groups
     if groups is not None:
-        whole, of_point = (each and replace(each, pixel=pixel) for each in (groups.whole, groups.of_point))
-        groups = replace(groups, whole=whole, of_point=of_point)
+        ordinary = tuple(replace(each, pixel=pixel) for each in groups.ordinary)
+        of_point = groups.of_point and replace(groups.of_point, pixel=pixel)
+        groups = replace(groups, ordinary=ordinary, of_point=of_point)
     return replace(renderer, pixel=pixel, groups=groups)
 
 
@@ -422,12 +443,17 @@ def light_groups(renderer: FrameRenderer) -> tuple[FrameRenderer, ...]:
 
 def _groups_in(groups: LightGroups, scene: Scene) -> tuple[FrameRenderer, ...]:
     lit = with_light_points(scene, groups.light_points.points, groups.light_points.pattern)
+    if groups.at_once:
+        return (replace(groups.ordinary[0], scene=lit),)
+    shown = [scene]  # lights without extent, by group
+    if len(groups.ordinary) > 1:
+        shown = [replace(scene, lights=(light,)) for light in scene.lights]
+    ordinary = tuple(replace(each, scene=part) for each, part in zip(groups.ordinary, shown))
     if groups.of_point is None:
-        assert groups.whole is not None
-        return (replace(groups.whole, scene=lit),)
-    whole = (replace(groups.whole, scene=scene),) if groups.whole is not None else ()
+        return ordinary
+    of_point = groups.of_point
     points = (replace(lit, lights=(point,)) for point in lit.lights[len(scene.lights) :])
-    return whole + tuple(replace(groups.of_point, scene=point) for point in points)
+    return ordinary + tuple(replace(of_point, scene=point) for point in points)
 
 
 def run_cast_and_shade(renderer: FrameRenderer) -> tuple[Cast, Any]:
@@ -506,7 +532,7 @@ def run_method(
     """
     if renderer.groups is not None:
         groups = light_groups(renderer)
-        if len(groups) == 1 and renderer.groups.of_point is None:
+        if renderer.groups.at_once:
             only = None if lists is None else lists[0]
             own = state[0] if state else groups[0].prepare(groups[0].scene)
             airlight, surface, *left = run_method(groups[0], own, cast, by_light[0], only, history, carried)

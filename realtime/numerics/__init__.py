@@ -5,6 +5,7 @@ Read in this order:
 
 - `array_types.py`: the Dr.Jit types of one precision, so that one source runs in float32 and float64;
 - `aligned.py`: arrays from NumPy, aligned as Dr.Jit's own;
+- `host_numbers.py`: the way back, for a few numbers of a scene;
 - `error_free.py`: sums and products that keep their rounding errors;
 - `diamond_angle.py`: an azimuth without trigonometry;
 - `fast_exp.py`: exponentials for bounded arguments;

@@ -89,3 +89,11 @@ def smallest(Float) -> float:
 def largest(Float) -> float:
     """Return the largest number of a type."""
     return (2 - 2.0**-23) * 2.0**127 if is_single(Float) else (2 - 2.0**-52) * 2.0**1023
+
+
+def one_of(number, values):
+    """Return of some values, arrays of one type, the one of this number, counted from 0; by lane."""
+    chosen, *others = values
+    for other, value in enumerate(others, 1):
+        chosen = dr.select(number == other, value, chosen)
+    return chosen

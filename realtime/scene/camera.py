@@ -24,6 +24,7 @@ import drjit as dr
 import numpy as np
 
 from realtime.numerics.error_free import two_product, two_sum
+from realtime.numerics.host_numbers import host_numbers
 
 
 @dataclass(frozen=True)
@@ -55,9 +56,9 @@ class HostCamera:
 
 def read_camera(camera: Camera) -> HostCamera:
     """Bring a camera to the host, which waits for the device."""
-    pairs = (camera.forward, camera.forward_low), (camera.left, camera.left_low), (camera.up, camera.up_low)
-    vectors = (sum(np.array(part, dtype=np.float64).ravel() for part in pair) for pair in pairs)
-    return HostCamera(camera.width, camera.height, np.array(camera.origin, dtype=np.float64).ravel(), *vectors)
+    high, low = (camera.forward, camera.left, camera.up), (camera.forward_low, camera.left_low, camera.up_low)
+    origin, *axes = host_numbers(camera.origin, *high, *low)
+    return HostCamera(camera.width, camera.height, origin, *(axes[i] + axes[i + 3] for i in range(3)))
 
 
 def shifted_camera(camera: Camera, right: float, down: float) -> Camera:

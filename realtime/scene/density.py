@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.errors import InputError
+from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import ArrayTypes, PerRay, four_numbers
 from realtime.scene.closed_mesh import ClosedMesh
 
@@ -220,10 +221,10 @@ def density_on_device(grids: list[DensityGrid | None], types: ArrayTypes) -> Den
         voxels.append(np.inf if grid is None else grid.voxel)
     first = np.cumsum([0] + [len(table) for table in tables[:-1]])
     density = Density(
-        types.scalar(np.concatenate(tables).ravel()),
-        mi.UInt32(first),
-        tuple(mi.UInt32(column) for column in np.array(counts).T),
-        tuple(types.scalar(column) for column in np.array(rows).T),
+        aligned_array(types.scalar, np.concatenate(tables).ravel()),
+        aligned_array(mi.UInt32, first.astype(np.uint32)),
+        tuple(aligned_array(mi.UInt32, column) for column in np.array(counts, dtype=np.uint32).T),
+        tuple(aligned_array(types.scalar, column) for column in np.array(rows).T),
         types.scalar(voxels),
     )
     dr.make_opaque(density.table, density.first, density.counts, density.rows, density.voxel)

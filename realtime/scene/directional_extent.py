@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import ArrayTypes
 from realtime.scene.closed_mesh import ClosedMesh
 from realtime.scene.lights import DirectionalExtent, with_low
@@ -90,9 +91,9 @@ def directional_fields(axis: Array, spheres: Array, back: float, types: ArrayTyp
     vectors = {"position": middle + corner + behind * axis, "across": across, "up": up}
     made = {name: _vector(vector.astype(np.float32), types) for name, vector in vectors.items()}
     position = made.pop("position")
-    media = types.vector(*(types.scalar(column) for column in spheres[:, :3].T))
+    media = types.vector(*(aligned_array(types.scalar, column) for column in spheres[:, :3].T))
     numbers = {"depth": types.scalar(float(np.float32(back + behind))), "back": types.scalar(back)}
-    extent = DirectionalExtent(**made, **numbers, media=media, radii=types.scalar(spheres[:, 3]))
+    extent = DirectionalExtent(**made, **numbers, media=media, radii=aligned_array(types.scalar, spheres[:, 3]))
     fields = {"position": position, "axis": _vector(high, types), "axis_low": _vector(low, types), "extent": extent}
     dr.make_opaque(*fields.values())
     return fields

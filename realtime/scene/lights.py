@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.numerics.array_types import ArrayTypes, is_single
+from realtime.numerics.host_numbers import host_numbers
 
 Array = NDArray[np.float64]
 
@@ -169,17 +170,14 @@ def sources_of(lights: tuple[Light, ...]) -> list[list[int]]:
 def host_position(light: Light) -> Array:
     """Return the homogeneous position of a light on the host: l [m for w = 1] and w, (4,), in float64."""
     if light.w:
-        return np.append(_on_host(light.position), 1.0)
-    return np.append(-(_on_host(light.axis) + _on_host(light.axis_low)), 0.0)
+        return np.append(host_numbers(light.position)[0], 1.0)
+    axis, low = host_numbers(light.axis, light.axis_low)
+    return np.append(-(axis + low), 0.0)
 
 
 def place_and_weight(position: Array) -> tuple[Array, int]:
     """Return l and w of a homogeneous position (4,), or of a place (3,), whose w is 1."""
     return position[:3], int(position[3]) if len(position) == 4 else 1
-
-
-def _on_host(vector) -> Array:
-    return np.array(vector, dtype=np.float64).ravel()
 
 
 def spot_fields(axis, cutoff: float, beam: float, types: ArrayTypes) -> dict[str, Any]:

@@ -15,6 +15,7 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.errors import InputError
+from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import ArrayTypes
 from realtime.scene.closed_mesh import ClosedMesh, check_bodies, encloses
 from realtime.scene.convex_bounds import Bounds, holds, mean_distance, overlap, plane_neighbours, read_bounds
@@ -167,7 +168,7 @@ def _clouds(media: list[Medium], boundaries, types: ArrayTypes) -> Clouds:
         for channel in range(len(media[0].sigma_t))
     )
     albedos = np.stack([np.array(medium.albedo, dtype=np.float64).ravel() for medium in media], axis=1)
-    albedo = types.color(*(types.scalar(column) for column in albedos))
+    albedo = types.color(*(aligned_array(types.scalar, column) for column in albedos))
     number = mi.UInt32([distinct.index(key) for key in keys])
     dr.make_opaque(sigma_t, albedo, number)
     return Clouds(sigma_t, albedo, tuple(media[keys.index(key)].phase for key in distinct), number)
@@ -219,9 +220,9 @@ def make_bounded_medium(medium: Medium, bounds: Bounds, types: ArrayTypes) -> Bo
     bounded_medium = BoundedMedium(medium, None, len(bounds.offsets), centre, radius, distance)
     if bounds.is_sphere:
         return bounded_medium
-    planes = tuple(types.scalar(column) for column in (*bounds.normals.T, bounds.offsets))
+    planes = tuple(aligned_array(types.scalar, column) for column in (*bounds.normals.T, bounds.offsets))
     table = plane_neighbours(bounds)
-    neighbours = mi.UInt32(table.ravel())
+    neighbours = aligned_array(mi.UInt32, table.ravel().astype(np.uint32))
     dr.eval(neighbours, *planes)
     return replace(bounded_medium, planes=planes, neighbours=neighbours, sides=table.shape[1])
 
@@ -289,5 +290,5 @@ def _read_phase(phase, types: ArrayTypes) -> Phase:
         values = np.array(parameters["values"], dtype=np.float64)
         # The mean over the sphere is half the integral over the cosine: the trapezoidal rule is exact on linear pieces.
         mean = (values.sum() - 0.5 * (values[0] + values[-1])) / (len(values) - 1)
-        return tabulated(types.scalar(values / mean))
+        return tabulated(aligned_array(types.scalar, values / mean))
     return named_phase(name)

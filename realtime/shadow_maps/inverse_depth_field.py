@@ -95,10 +95,14 @@ def inverse_depth_field(shadow_map: ShadowMap) -> InverseDepthField:
 
 def node_bounds(heights: InverseDepthField, face, level, i, j, active=True):
     """Return the least and largest height over the node in column `i` and row `j` of a level of a face [1/m]."""
-    before = 0x55555555 & ((mi.UInt32(1) << (2 * level)) - 1)
-    node = face * heights.nodes + before + (j << level) + i
+    node = face * heights.nodes + _before(level) + (j << level) + i
     pair = dr.gather(two_numbers(type(heights.bounds)), heights.bounds, node, active)
     return pair.x, pair.y
+
+
+def _before(level):
+    """Return `level_start` of a level that only the device knows."""
+    return 0x55555555 & ((mi.UInt32(1) << (2 * level)) - 1)
 
 
 def texel_heights(heights: InverseDepthField, face, i, j, active=True):
@@ -166,16 +170,16 @@ def _of_texels(rows, smaller):
 
 def _write_level(heights: InverseDepthField, bounds, level: int) -> None:
     """Write the bounds of the nodes of a level, from those of the next one."""
-    side = 1 << level
-    index = dr.arange(mi.UInt32, heights.faces * side * side)
-    row = index // side
-    face, i = row // side, index - row * side
-    j = row - face * side
+    step = dr.opaque(mi.UInt32, level)  # one kernel for all levels: to compile it takes longer than all its runs
+    index = dr.arange(mi.UInt32, heights.faces << (2 * level))
+    row = index >> step
+    face = row >> step
+    i, j = index - (row << step), row - (face << step)
     full = InverseDepthField(heights.size, heights.projection, heights.texels, bounds)
-    four = [node_bounds(full, face, level + 1, 2 * i + k % 2, 2 * j + k // 2) for k in range(4)]
+    four = [node_bounds(full, face, step + 1, 2 * i + k % 2, 2 * j + k // 2) for k in range(4)]
     low, high = four[0]
     for lower, higher in four[1:]:
         low, high = dr.minimum(low, lower), dr.maximum(high, higher)
-    node = face * heights.nodes + level_start(level) + j * side + i
+    node = face * heights.nodes + _before(step) + (j << step) + i
     dr.eval(low, high)  # Dr.Jit would copy an array that one kernel both reads and writes
     dr.scatter(bounds, two_numbers(type(bounds))(low, high), node)

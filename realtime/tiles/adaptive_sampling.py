@@ -37,6 +37,7 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.errors import InputError
+from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import Metres, PerRay, PerTile, four_numbers
 from realtime.parameters import parameter
 from realtime.scene.camera import Camera
@@ -116,12 +117,12 @@ def tile_corners(pixel, camera: Camera, tolerance: float, *, by_rays: bool, ligh
     right, below = np.minimum(i + 1, across - 1), np.minimum(j + 1, down - 1)
     middle_i, middle_j = np.clip(i, 1, across - 2), np.clip(j, 1, down - 2)
     corners = Corners(
-        mi.UInt32(number[j, right]),
-        mi.UInt32(number[below, i]),
-        mi.UInt32(number[below, right]),
-        tuple(mi.UInt32(number[j, middle_i + step]) for step in (-1, 0, 1)),
-        tuple(mi.UInt32(number[middle_j + step, i]) for step in (-1, 0, 1)),
-        mi.Bool((i < across - 1) & (j < down - 1)),
+        aligned_array(mi.UInt32, number[j, right]),
+        aligned_array(mi.UInt32, number[below, i]),
+        aligned_array(mi.UInt32, number[below, right]),
+        tuple(aligned_array(mi.UInt32, number[j, middle_i + step]) for step in (-1, 0, 1)),
+        tuple(aligned_array(mi.UInt32, number[middle_j + step, i]) for step in (-1, 0, 1)),
+        aligned_array(mi.Bool, (i < across - 1) & (j < down - 1)),
     )
     dr.eval(corners)
     return corners

@@ -10,6 +10,6 @@ Read in this order:
 - `references.py`: truths and batches for the cache of this machine.
 
 May import: `analytic.errors`, `realtime.errors`, `realtime.scene`, `reference.monte_carlo`, `reference.quadrature`,
-`reference.storage`, `reports.machine`, `reports.plotting`, `validation.estimates`, `validation.properties`,
-`validation.scenes`, `validation.sweep`.
+`reference.storage`, `reports.machine`, `reports.plotting`, `validation.estimates`, `validation.mutations`,
+`validation.properties`, `validation.scenes`, `validation.sweep`.
 """

@@ -44,8 +44,8 @@ def row_of(truth: CellTruth, cell: Cell, key: str) -> dict[str, Any]:
     from distributed import get_worker
 
     started = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-    _, scene = _opened(cell.image)
-    row = cell_row(cell, scene, truth, properties=_properties(cell.image), paint=_picture)
+    loaded, scene = _opened(cell.image)
+    row = cell_row(cell, scene, truth, whole=loaded.scene, properties=_properties(cell.image), paint=_picture)
     return row | {
         "key": key,
         "started": started,

@@ -174,7 +174,8 @@ def _local(workers: int) -> Iterator[Any]:
                     threads_per_worker=threads() if alone else 1,
                     processes=True,
                     host="127.0.0.1",
-                    dashboard_address=None,
+                    dashboard_address="127.0.0.1:0",  # None is port 8787 on all interfaces, which may be taken
+                    scheduler_kwargs={"dashboard": False},
                     memory_limit=MEMORY,
                     local_directory=str(folder),
                     silence_logs=logging.CRITICAL,

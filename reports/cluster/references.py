@@ -8,6 +8,10 @@ them, is computed here.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.monte_carlo.batches import Batches
@@ -16,8 +20,10 @@ from reports import __version__
 from reports.cluster.connect import Cluster
 from reports.cluster.run import Group, Task, run_groups
 from reports.machine.environment import activate
-from validation.estimates.monte_carlo import Elsewhere, Trace, batch_tracer
+from validation.estimates.monte_carlo import Elsewhere, Spread, Trace, batch_tracer
 from validation.estimates.quadrature import has_truth, keep_truth, truth_image
+from validation.mutations.record import Mutation
+from validation.mutations.study import Seen, seen_on_stage
 from validation.scenes.loading import load_scene
 from validation.sweep.keys import Made, made_here
 
@@ -80,8 +86,9 @@ def tracing(
     estimator: str,
     *,
     samples: int,
-    batches: int | None,
-    orders: tuple[str, ...] | None,
+    batches: int | None = None,
+    orders: tuple[str, ...] | None = None,
+    counts: NDArray[np.integer] | None = None,
 ) -> Elsewhere:
     """Return what lets workers trace the batches of an estimator.
 
@@ -89,18 +96,17 @@ def tracing(
     ----------
     cluster, picture
         Where, and of what.
-    estimator, samples, orders
+    estimator, samples, orders, counts
         See `validation.estimates.monte_carlo.monte_carlo_batches`.
     batches
         How many there will be; None where an error decides.
     """
+    by_pixel = None if counts is None else (counts.shape, counts.astype(np.int64).tobytes())
+    kind = _Kind(picture, estimator, samples, orders, by_pixel)
 
     def bring(seeds: list[int]) -> Iterator[Batches]:
         # One task in a group: what is sent at once then depends on the workers alone.
-        groups = (
-            Group((Task(f"batch {seed}", _batch, (picture, estimator, samples, orders, seed), _LIMIT),))
-            for seed in seeds
-        )
+        groups = (Group((Task(f"batch {seed}", _batch, (kind, seed), _LIMIT),)) for seed in seeds)
         for outcome in run_groups(cluster, groups, made=_made()):
             if outcome.status == "refused":
                 raise InputError(outcome.reason or "")
@@ -111,17 +117,47 @@ def tracing(
     return Elsewhere(bring, batches or _WAVE * max(1, workers))
 
 
+def spread(cluster: Cluster, picture: Picture) -> Spread:
+    """Return what lets workers trace the batches that check a truth."""
+    return lambda estimator, samples, counts: tracing(cluster, picture, estimator, samples=samples, counts=counts)
+
+
+def mutations_seen(
+    cluster: Cluster, names: tuple[str, ...], mutations: tuple[Mutation, ...], size: tuple[int, int], margin: float
+) -> dict[str, Seen]:
+    """Let each worker try all mutations on a stage; arguments as of `validation.mutations.study.Elsewhere`."""
+    groups = [Group((Task(name, seen_on_stage, (name, mutations, size, margin), _LIMIT),)) for name in names]
+    ended = run_groups(cluster, groups, made=_made())
+    return {outcome.task.name: outcome.value for outcome in ended if outcome.status == "done"}
+
+
 def _truth(picture: Picture, pixel: str) -> TruthImage:
     return truth_image(picture.load(), pixel=pixel)
 
 
-def _batch(picture: Picture, estimator: str, samples: int, orders: tuple[str, ...] | None, seed: int) -> Batches:
-    return _tracer(picture, estimator, samples, orders)(seed)
+@dataclass(frozen=True)
+class _Kind:
+    """What the batches of a picture have in common, but for their seeds."""
+
+    picture: Picture
+    estimator: str
+    samples: int
+    orders: tuple[str, ...] | None
+    counts: tuple[tuple[int, ...], bytes] | None  #: shape and content, int64
+
+
+def _batch(kind: _Kind, seed: int) -> Batches:
+    return _tracer(kind)(seed)
 
 
 @lru_cache(maxsize=1)
-def _tracer(picture: Picture, estimator: str, samples: int, orders: tuple[str, ...] | None) -> Trace:
-    return batch_tracer(picture.load(), estimator, samples=samples, orders=orders)[1]
+def _tracer(kind: _Kind) -> Trace:
+    counts = None
+    if kind.counts is not None:
+        shape, content = kind.counts
+        counts = np.frombuffer(content, dtype=np.int64).reshape(shape)
+    given: dict[str, Any] = {"samples": kind.samples, "orders": kind.orders, "counts": counts}
+    return batch_tracer(kind.picture.load(), kind.estimator, **given)[1]
 
 
 def _made() -> Made:

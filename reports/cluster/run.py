@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from reports.cluster.connect import Cluster, reconnected
-from reports.cluster.worker import ALONE, TOLD, Answer, Order, do
+from reports.cluster.worker import ALONE, FOREIGN, TOLD, Answer, Order, do
 
 PATIENCE = 120.0  #: how long a scheduler that went away is waited for, and a worker where none is left [s]
 
@@ -84,10 +84,6 @@ class _Flown:
     open: dict[str, _Flight] = field(default_factory=dict)
 
 
-class ForeignWorkerError(Exception):
-    """A worker of another version came while a run was going on."""
-
-
 def run_groups(
     cluster: Cluster,
     groups: Iterable[Group],
@@ -95,6 +91,7 @@ def run_groups(
     made: Any = None,
     retries: int = 3,
     patience: float = PATIENCE,
+    refused: Callable[[str], None] = lambda words: None,
 ) -> Iterator[Outcome]:
     """Yield the outcome of every task of the groups, the first ones' only where they were not done.
 
@@ -110,13 +107,10 @@ def run_groups(
         How often a task is begun again whose process died.
     patience
         How long a scheduler, or a last worker, that went away is waited for [s].
-
-    Raises
-    ------
-    ForeignWorkerError
-        If a worker of another version takes a task, with its name.
+    refused
+        Is told in words of a worker of another version that came meanwhile: it is sent away, and others do its work.
     """
-    run = _Run(cluster, made=made, retries=retries, patience=patience)
+    run = _Run(cluster, made=made, retries=retries, patience=patience, refused=refused)
     try:
         yield from run.outcomes(iter(groups))
     finally:
@@ -126,8 +120,11 @@ def run_groups(
 class _Run:
     """The state of a run; one thread changes it, others put what they hear into a queue."""
 
-    def __init__(self, cluster: Cluster, *, made: Any, retries: int, patience: float) -> None:
+    def __init__(
+        self, cluster: Cluster, *, made: Any, retries: int, patience: float, refused: Callable[[str], None]
+    ) -> None:
         self._cluster, self._made, self._retries, self._patience = cluster, made, retries, patience
+        self._refused = refused
         self._client = cluster.client
         self._own_client = False
         self._identity = uuid.uuid4().hex[:12]
@@ -139,6 +136,7 @@ class _Run:
         self._groups = 0
         self._looked = 0.0
         self._workers: dict[str, Any] = {}  # at the last look
+        self._sent_away: set[str] = set()  # addresses of workers of another version
         self._without: float | None = None  # since when nobody is there who could work
         self._lost = self._gone = False
         self._listen()
@@ -290,10 +288,26 @@ class _Run:
         self._told.discard(name)
         if flight is None:
             return
-        if answer.status == "foreign":
-            raise ForeignWorkerError(f"a worker has {answer.reason}: install the same airlight there, or stop it")
+        if answer.status == FOREIGN:
+            self._refuse(flight, answer)
+            return
         outcome = Outcome(flight.task, answer.status, answer.value, answer.reason, max(1, flight.begun))
         yield from self._close(flight, outcome)
+
+    def _refuse(self, flight: _Flight, answer: Answer) -> None:
+        """Send a worker of another version away, and what it was to do to others."""
+        if answer.value not in self._sent_away:
+            self._sent_away.add(answer.value)
+            self._refused(f"worker {answer.value} has {answer.reason}: install the same airlight there")
+            with suppress(Exception):  # it may be gone
+                self._client.retire_workers([answer.value], close_workers=True)
+        self._send_all(flight.group)
+
+    def _send_all(self, flown: _Flown) -> None:
+        """Send all that is open of a group again, the first task too."""
+        if flown.first is not None:
+            self._flights[flown.first.task.name] = flown.first
+        self._send(flown, True, list(flown.open.values()))
 
     def _erred(self, flight: _Flight) -> Iterator[Outcome]:
         """Send a task again whose workers died, unless it died too often; what else goes wrong is a failure."""
@@ -404,6 +418,4 @@ class _Run:
         self._listen()
         self._look(time.monotonic())
         for flown in list(self._flown.values()):
-            if flown.first is not None:
-                self._flights[flown.first.task.name] = flown.first
-            self._send(flown, True, list(flown.open.values()))
+            self._send_all(flown)

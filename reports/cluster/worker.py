@@ -16,6 +16,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+FOREIGN = "foreign"  #: status of an answer of a worker of another version; its value is the worker's address
 TOLD = "told"  #: status of what is left in the cluster of an answer that was told
 ALONE = "alone"  #: the Dask resource of a worker on whose host nothing else runs
 _GRACE = 2.0  # after its limit a task has so long until its process ends: who waits has given it up by then [s]
@@ -30,7 +31,7 @@ _SENT = 0.004  # until what a worker says is on its way, twice the interval of D
 class Answer:
     """What came of a task."""
 
-    status: str  #: 'done', 'refused', 'failed', or 'foreign' of a worker with another version
+    status: str  #: 'done', 'refused', 'failed', or `FOREIGN`
     value: Any = None  #: what the function returned
     reason: str | None = None  #: why it did not
 
@@ -60,7 +61,8 @@ def do(order: Order, function: Callable[..., Any], arguments: tuple[Any, ...], f
         The answer of the task that this one needs; if that has no value, this one has the same fate.
     """
     if first is not None and first.status != "done":
-        return Answer(first.status, reason=f"{order.needs}: {first.reason}")
+        whose = "" if first.status == FOREIGN else f"{order.needs}: "
+        return Answer(first.status, first.value, f"{whose}{first.reason}")
     from distributed import get_worker
 
     worker = get_worker()
@@ -68,7 +70,7 @@ def do(order: Order, function: Callable[..., Any], arguments: tuple[Any, ...], f
     with worker.__dict__.setdefault("airlight_lock", threading.Lock()):
         problem = _ready(worker, order)
         if problem:
-            return Answer("foreign", reason=problem)
+            return Answer(FOREIGN, worker.address, problem)
         worker.log_event(order.topic, {"start": order.name, "worker": worker.address})
         time.sleep(_SENT)
         with open(os.devnull, "w") as nowhere:

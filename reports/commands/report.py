@@ -11,6 +11,7 @@ import typer
 from reports.commands import completion
 from reports.commands.options import (
     USUAL_LIMIT,
+    ClusterPlace,
     Force,
     Meshes,
     MethodLimit,
@@ -78,6 +79,7 @@ def report(
     ] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Measure again what is kept from earlier runs.")] = False,
     method_limit: MethodLimit = USUAL_LIMIT,
+    cluster: ClusterPlace = None,
     force: Force = False,
     json: Annotated[bool, typer.Option("--json", help="Print report.json.")] = False,
     old_scenes: OldScenes = None,
@@ -108,6 +110,7 @@ def report(
             "--set": settings,
             "--images": images,
             "--fresh": fresh,
+            "--cluster": cluster,
         }
         for option, value in given.items():
             if value not in (None, False, []):
@@ -129,6 +132,7 @@ def report(
             images=images,
             fresh=fresh,
             method_limit=method_limit,
+            cluster=cluster,
             force=force,
         )
         done = _kept_words(data)
@@ -168,10 +172,14 @@ def _measured(
     images: Path | None,
     fresh: bool,
     method_limit: float,
+    cluster: str | None,
     force: bool,
 ) -> dict[str, Any]:
     """Measure and write a report; unusable input is refused before the work begins."""
+    from contextlib import ExitStack
+
     from reference.storage.files import ensure_folder
+    from reports.cluster.connect import check_library, connected, parse_place
     from reports.commands.own_methods import named_configurations
     from reports.machine.environment import activate
     from reports.machine.printing import print_notes
@@ -183,6 +191,9 @@ def _measured(
     from validation.frames.expected_work import check_work, frame_work, truth_work
     from validation.frames.scene_study import EFFORTS
 
+    place = None if cluster is None else parse_place(cluster)
+    if place is not None:
+        check_library()
     names, shown = scenes_of_images(scenes or None, images, EFFORTS[effort_name].scenes)
     usual = QUICK if effort_name == "quick" else None
     chosen = named_configurations(methods, kernels, settings, usual=usual, limit=method_limit)
@@ -196,7 +207,7 @@ def _measured(
     works = [truth_work(size) for size in sizes]
     works += [frame_work(size, steps=100, frames=8 * len(chosen)) for size in sizes]
     check_work("report --images", works, force=force)
-    with progress_bar("report") as progress:
+    with ExitStack() as stack, progress_bar("report") as progress:
         return write_report(
             target,
             scenes=names,
@@ -207,6 +218,7 @@ def _measured(
             fresh=fresh,
             method_limit=method_limit,
             progress=progress,
+            cluster=None if place is None else stack.enter_context(connected(place)),
         )
 
 

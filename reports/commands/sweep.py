@@ -158,6 +158,7 @@ def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, aga
         "counts": dict(counts),
         "left": sum(part["left"] for part in parts),
         "problems": [problem for part in parts for problem in part["problems"]],
+        "refused_workers": [words for part in parts for words in part["refused_workers"]],
         "output": str(store.folder),
     }
 
@@ -174,16 +175,16 @@ def _part(
     import time
     from collections import Counter
 
-    from analytic.errors import InputError
     from reference.storage.stopping import hint_when_stopped
     from reports.cluster.connect import connected
-    from reports.cluster.run import ForeignWorkerError, run_groups
+    from reports.cluster.run import run_groups
     from reports.machine.progress import progress_bar
     from validation.sweep.study import Cell
 
     missing = sum(len(cells) for _, cells in groups_of(study, made))
     counts: Counter[str] = Counter()
     problems: list[dict[str, Any]] = []
+    refused: list[str] = []
     open_cells: dict[str, Cell] = {}
     written = time.monotonic()
 
@@ -196,29 +197,26 @@ def _part(
         return f"{len(store)} rows are kept in {store.folder}; run the same command again to go on"
 
     if not missing:
-        return {"counts": counts, "problems": problems, "left": 0, "missing": 0}
+        return {"counts": counts, "problems": problems, "refused_workers": refused, "left": 0, "missing": 0}
     with hint_when_stopped(hint), connected(place) as cluster, progress_bar(f"sweep {study.name}") as progress:
-        try:
-            for outcome in run_groups(cluster, groups(), made=made, retries=study.retries):
-                key = outcome.task.name
-                cell = open_cells.pop(key, None)
-                if cell is None:
-                    continue  # the truth of an image: its cells say what came of it
-                if outcome.status != "lost":
-                    store.add(row_from(cell, key, outcome))
-                counts[outcome.status if outcome.status != "done" else store.status(key) or "done"] += 1
-                if outcome.status not in ("done", "refused"):
-                    what = {"scene": cell.scene, "label": cell.chosen.label, "status": outcome.status}
-                    problems.append(what | {"reason": outcome.reason})
-                if time.monotonic() - written > _EVERY:
-                    store.write_parquet()
-                    written = time.monotonic()
-                done = sum(counts.values())
-                progress(done / missing, f"{done} of {missing} cells, {cell.scene}")
-        except ForeignWorkerError as error:
-            raise InputError(str(error)) from None
+        for outcome in run_groups(cluster, groups(), made=made, retries=study.retries, refused=refused.append):
+            key = outcome.task.name
+            cell = open_cells.pop(key, None)
+            if cell is None:
+                continue  # the truth of an image: its cells say what came of it
+            if outcome.status != "lost":
+                store.add(row_from(cell, key, outcome))
+            counts[outcome.status if outcome.status != "done" else store.status(key) or "done"] += 1
+            if outcome.status not in ("done", "refused"):
+                what = {"scene": cell.scene, "label": cell.chosen.label, "status": outcome.status}
+                problems.append(what | {"reason": outcome.reason})
+            if time.monotonic() - written > _EVERY:
+                store.write_parquet()
+                written = time.monotonic()
+            done = sum(counts.values())
+            progress(done / missing, f"{done} of {missing} cells, {cell.scene}")
     left = missing - sum(counts.values()) + counts["lost"]
-    return {"counts": counts, "problems": problems, "left": left, "missing": missing}
+    return {"counts": counts, "problems": problems, "refused_workers": refused, "left": left, "missing": missing}
 
 
 def _print(summary: dict[str, Any], *, json: bool) -> None:
@@ -229,10 +227,14 @@ def _print(summary: dict[str, Any], *, json: bool) -> None:
         return
     print(f"{summary['output']}: {summary['cells']} cells of {summary['scenes']} scenes")
     print(f"  {summary['kept']} were there, {summary['computed']} computed, {summary['left']} left")
+    if summary["timed_alone"]:
+        print(f"  {summary['timed_alone']} timed alone")
     for status, number in sorted(summary["counts"].items()):
         print(f"  {status}: {number}")
     for problem in summary["problems"]:
         print(f"  {problem['status']}: {problem['scene']}, {problem['label']}: {problem['reason']}")
+    for words in summary["refused_workers"]:
+        print(f"  refused: {words}")
     if summary["parquet"]:
         print(f"  rows in {summary['parquet']}")
         print(f"  what they say: airlight sweep --from {summary['output']}")

@@ -13,7 +13,8 @@ Read in this order:
 - `measure.py`: all of these, report.json and the page
 
 May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `realtime.scene`, `reference.storage`,
-`reports.data`, `reports.machine`, `reports.page`, `reports.papers`, `reports.plotting`, `validation.comparison`,
-`validation.configurations`, `validation.estimates`, `validation.fidelity`, `validation.frames`, `validation.kernels`,
-`validation.metrics`, `validation.mutations`, `validation.papers`, `validation.scenes`.
+`reports.cluster`, `reports.data`, `reports.machine`, `reports.page`, `reports.papers`, `reports.plotting`,
+`validation.comparison`, `validation.configurations`, `validation.estimates`, `validation.fidelity`,
+`validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`, `validation.papers`,
+`validation.scenes`.
 """

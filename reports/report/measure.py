@@ -22,6 +22,8 @@ from realtime.errors import InputError as MethodError
 from realtime.frame.renderer import render_frame
 from reference.storage.files import ensure_folder
 from reference.storage.stopping import hint_when_stopped
+from reports.cluster.connect import Cluster
+from reports.cluster.references import Picture, bring_truths, spread
 from reports.data.claims import claims, unstudied
 from reports.data.own_faults import own_fault
 from reports.data.reader import SCHEMA, report_text
@@ -41,7 +43,8 @@ from validation.frames.benchmark import Apart, render_by_name
 from validation.frames.result_cache import CachedResult, ResultCache, cached_result, now, sweep_results
 from validation.frames.scene_study import Effort, SceneStudy, open_study
 from validation.metrics.errors import plain
-from validation.scenes.registry import FOG_SCENES
+from validation.scenes.random_scene import is_random
+from validation.scenes.registry import FOG_SCENES, SCENES
 
 
 def write_report(
@@ -55,6 +58,7 @@ def write_report(
     fresh: bool = False,
     method_limit: float | None = None,
     progress: Progress | None = None,
+    cluster: Cluster | None = None,
 ) -> dict[str, Any]:
     """Study scenes and write the report.
 
@@ -79,6 +83,8 @@ def write_report(
         there stands in their rows (`own_faults`). None: they run in this process, and a fault ends the report.
     progress
         Called with (share done, what) now and then.
+    cluster
+        Whose workers compute truths, the batches that check them, and faults of the physics; methods run here.
 
     Returns
     -------
@@ -103,13 +109,16 @@ def write_report(
     start = time.monotonic()
     cache = report_cache(environment, fresh=fresh)
     efforts = {name: effort.of(name).at(sizes.get(Path(name).stem)) for name in scenes}
-    others = [*other_parts(effort, scenes, cache), *fidelity_parts(effort, scenes, cache)]
+    others = [*other_parts(effort, scenes, cache, cluster), *fidelity_parts(effort, scenes, cache)]
     steps = _steps(progress, cache, efforts, configurations, others)
     apart = None if method_limit is None else partial(in_own_process, limit=method_limit)
     ended: dict[Configuration, str] = {}
     seconds = dict.fromkeys(("scenes", "stability", "mutations", "published", "fidelity"), 0.0)
     try:
         with hint_when_stopped(lambda: _kept_words(results, "")), staged(target) as hidden:
+            if cluster is not None:
+                with _timed(seconds, "scenes"):
+                    bring_truths(cluster, [_picture(name, each.image) for name, each in efforts.items()])
             studied = []
             with _timed(seconds, "scenes"):
                 for number, (name, sized_effort) in enumerate(efforts.items()):
@@ -126,6 +135,7 @@ def write_report(
                             results=results,
                             own=OwnMethods(apart, ended),
                             progress=steps[name],
+                            spread=None if cluster is None else spread(cluster, _picture(name, sized_effort.checked)),
                         )
                     )
             by_kind: dict[str, list[CachedResult]] = {}
@@ -190,6 +200,11 @@ def _timed(seconds: dict[str, float], part: str) -> Iterator[None]:
     start = time.monotonic()
     yield
     seconds[part] = round(seconds.get(part, 0.0) + time.monotonic() - start, 2)
+
+
+def _picture(name: str, size: tuple[int, int]) -> Picture:
+    """Return a scene of the command line as workers load it."""
+    return Picture(name if name in SCENES or is_random(name) else str(Path(name).resolve()), size)
 
 
 def _counts(results: Sequence[CachedResult]) -> dict[str, Any]:

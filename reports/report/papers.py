@@ -3,8 +3,10 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
+from reports.cluster.connect import Cluster
 from reports.data.serialize import mutations_data
 from reports.machine.progress import Progress, counted, part_of
 from reports.papers.billeter import billeter_data
@@ -25,7 +27,9 @@ class OtherPart:
     compute: Callable[[Progress], Computed]
 
 
-def other_parts(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[OtherPart]:
+def other_parts(
+    effort: Effort, scenes: Sequence[str], cache: ResultCache, cluster: Cluster | None = None
+) -> list[OtherPart]:
     """Return the parts that an effort asks for; those of papers in the scenes that are studied, table by table."""
     parts = []
     if effort.rays:
@@ -33,7 +37,7 @@ def other_parts(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> li
         parts.append(OtherPart("stability", "stability", entry, lambda progress: _stability(effort.rays, progress)))
     if effort.mutations:
         entry = cache_entry(cache, "mutations", identity={})
-        parts.append(OtherPart("mutations", "faults of the physics", entry, _mutations))
+        parts.append(OtherPart("mutations", "faults of the physics", entry, partial(_mutations, cluster)))
     if "biri" in effort.papers:
         parts += _biri(effort, scenes, cache)
     if "billeter" in effort.papers:
@@ -62,10 +66,12 @@ def _stability(rays: int, progress: Progress) -> Computed:
     return {"kernels": plain(stability(count=rays, progress=counted(progress)))}, {}
 
 
-def _mutations(progress: Progress) -> Computed:
+def _mutations(cluster: Cluster | None, progress: Progress) -> Computed:
+    from reports.cluster.references import mutations_seen
     from validation.mutations.study import study_mutations
 
-    return mutations_data(study_mutations(progress=progress)), {}
+    elsewhere = None if cluster is None else partial(mutations_seen, cluster)
+    return mutations_data(study_mutations(progress=progress, elsewhere=elsewhere)), {}
 
 
 def _biri(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[OtherPart]:

@@ -23,6 +23,7 @@ from validation.comparison.engine_images import EngineImage, ImageMeasurement, i
 from validation.comparison.engine_layers import truth_layer
 from validation.configurations.methods import Configuration
 from validation.estimates.images import layered_frame, layered_truth
+from validation.estimates.monte_carlo import Spread
 from validation.frames.benchmark import Apart, Measurement, configurations_for
 from validation.frames.result_cache import (
     CachedResult,
@@ -77,6 +78,7 @@ def scene_report(
     results: list[CachedResult],
     own: OwnMethods,
     progress: Progress,
+    spread: Spread | None = None,
 ) -> dict[str, Any]:
     """Return what the report says of a scene, and write its files.
 
@@ -98,6 +100,8 @@ def scene_report(
         How methods of the user's own are run.
     progress
         Called with (share done, what).
+    spread
+        Lets other processes trace the batches that check the truth.
     """
     chosen = configurations_for(study.scene.features, configurations)
     entries = SceneEntries(cache, study.loaded.name, study.loaded.path, study.effort)
@@ -108,7 +112,9 @@ def scene_report(
     truth = parts.result("truth", lambda: _truth(study), stem=_REFERENCE)
     factor = truth.data["exposure"]
     steps["agreement"](0.0, "checks of the truth")
-    checks = parts.result("agreement", lambda: (plain(check_truth(study, progress=steps["agreement"])), {}))
+    checks = parts.result(
+        "agreement", lambda: (plain(check_truth(study, progress=steps["agreement"], spread=spread)), {})
+    )
     steps["multiple"](0.0, "multiple scattering")
     multiple = parts.result("multiple", lambda: (plain(study_multiple(study)), {}))
     stems = file_stems([*(configuration.label for configuration in chosen), *(image.label for image in images)])

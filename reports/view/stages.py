@@ -29,8 +29,10 @@ def timed_stages(renderer: FrameRenderer) -> tuple[FrameRenderer, dict[str, floa
 
 def _timed(renderer: FrameRenderer, times: dict[str, float]) -> FrameRenderer:
     if renderer.groups is not None:
-        whole, of_point = (part and _timed(part, times) for part in (renderer.groups.whole, renderer.groups.of_point))
-        renderer = replace(renderer, groups=replace(renderer.groups, whole=whole, of_point=of_point))
+        groups = renderer.groups
+        ordinary = tuple(_timed(part, times) for part in groups.ordinary)
+        of_point = groups.of_point and _timed(groups.of_point, times)
+        renderer = replace(renderer, groups=replace(groups, ordinary=ordinary, of_point=of_point))
     stages: dict[str, Any] = {name: getattr(renderer, name) for name in WORDS}
     clocked: dict[str, Any] = {name: _clocked(name, stage, times) for name, stage in stages.items() if stage}
     return replace(renderer, **clocked)

@@ -29,7 +29,7 @@ from reference.quadrature.light_points import REPLICATES
 from reference.quadrature.ray_values import TruthImage
 from reference.scene.read import TruthScene, read_truth
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
-from validation.estimates.monte_carlo import monte_carlo_batches
+from validation.estimates.monte_carlo import Spread, monte_carlo_batches
 from validation.estimates.quadrature import truth_image
 from validation.statistics.comparison import Estimate, Statistics, compare_statistics
 
@@ -72,6 +72,7 @@ def agreement(
     samples: int = _SAMPLES,
     seconds: float | None = None,
     progress: Progress | None = None,
+    spread: Spread | None = None,
 ) -> dict[str, Agreement]:
     """Compare an estimator with the quadrature image of a Mitsuba scene at its own size.
 
@@ -93,6 +94,8 @@ def agreement(
         Trace no further batch after so long, the pilot not counted; without a limit by default.
     progress
         Called with (done, total, what) after every batch.
+    spread
+        Lets other processes trace batches.
 
     Returns
     -------
@@ -142,6 +145,7 @@ def agreement(
         enough=enough,
         go_on=go_on,
         progress=tell,
+        elsewhere=None if spread is None else spread(estimator, samples, counts),
     ).batches
     results = {layer: compared(traced, layer) for layer in layers}
     return {
@@ -170,6 +174,7 @@ def agreements(
     samples: Mapping[str, int] | None = None,
     seconds: float | None = None,
     progress: Callable[[float, str], None] | None = None,
+    spread: Spread | None = None,
 ) -> dict[str, Agreement]:
     """Compare several estimators with the quadrature image.
 
@@ -185,6 +190,8 @@ def agreements(
         How many batches at most, and how long [s], for each estimator; see `agreement`.
     progress
         Called with (share done, what).
+    spread
+        Lets other processes trace batches.
 
     Returns
     -------
@@ -207,6 +214,7 @@ def agreements(
             samples=(samples or {}).get(estimator, _SAMPLES),
             seconds=seconds,
             progress=told,
+            spread=spread,
         )
         by_name |= {f"{estimator} {layer}": result for layer, result in by_layer.items()}
     return by_name

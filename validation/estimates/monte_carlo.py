@@ -62,6 +62,10 @@ class Elsewhere:
     at_once: int  #: how many seeds are asked for at once
 
 
+#: Estimator, samples a batch, and their counts by pixel or None -> who traces such batches.
+Spread = Callable[[str, int, NDArray[np.integer] | None], Elsewhere]
+
+
 def monte_carlo_batches(
     scene,
     estimator: str,

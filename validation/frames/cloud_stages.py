@@ -26,7 +26,7 @@ from realtime.frame.renderer import FrameRenderer, bytes_in, frame_renderer, ima
 from realtime.methods.cloud_collectors import CollectorParameters, missed_collectors, scattered_once
 from realtime.methods.registry import METHODS
 from realtime.scene.read_scene import Scene
-from validation.configurations.timing import Timing, first_frame
+from validation.configurations.timing import Timing, first_frame, run_times
 from validation.scenes.animation import animate
 from validation.scenes.record import Animation
 
@@ -192,11 +192,9 @@ def _timed(name: str, goal: float | None, first: float | None, work: Callable[[]
     processor: list[float] = []
     stop = np.inf
     while len(clock) < 7 or time.perf_counter() < stop:
-        begin, spent = time.perf_counter(), time.process_time()
-        work()
-        dr.sync_thread()
-        clock.append(1e3 * (time.perf_counter() - begin))
-        processor.append(1e3 * (time.process_time() - spent))
+        wall, spent = run_times(work)
+        clock.append(wall)
+        processor.append(spent)
         if len(clock) == 2:
             stop = time.perf_counter() + seconds
     low, median, high = (float(value) for value in np.percentile(clock[2:], [25, 50, 75]))

@@ -9,7 +9,7 @@ control.
 """
 
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +35,8 @@ from validation.statistics.comparison import Statistics
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
+CONTROL = ""  #: in the place of a mutation's name: what is seen without one
+
 #: Share of the mutations that the standard run must catch: 18 of 20.
 LEAST_CAUGHT = 0.9
 
@@ -57,6 +59,11 @@ class Sighting:
     rejected: int  #: pixels rejected at Sidak's level, for the record: the verdict is that of the bias
     expected_rejections: float
     agrees: bool
+
+
+Seen = dict[str, tuple[Sighting, ...]]  #: by the name of a mutation what was seen of it on a stage
+#: Names of stages, mutations, size and margin -> by stage what is seen there, as of `seen_on_stage`.
+Elsewhere = Callable[[tuple[str, ...], tuple[Mutation, ...], tuple[int, int], float], Mapping[str, Seen]]
 
 
 @dataclass(frozen=True)
@@ -99,6 +106,7 @@ def study_mutations(
     size: tuple[int, int] = (48, 36),
     margin: float = 0.01,
     progress: Progress | None = None,
+    elsewhere: Elsewhere | None = None,
 ) -> MutationStudy:
     """Put every mutation through the standard run.
 
@@ -113,20 +121,28 @@ def study_mutations(
         intervals are narrow enough.
     progress
         Called with (share done, what) now and then.
+    elsewhere
+        Looks at stages in other processes; what these do not bring is done here.
     """
     tell = progress or (lambda share, what: None)
     names = (*SCENES, *PROBES, *(WIDE_PROBES if any(mutation.wide for mutation in mutations) else ()))
-    stages = []
+    by_stage = dict(elsewhere(names, tuple(mutations), size, margin)) if elsewhere else {}
     for number, name in enumerate(names):
-        tell(0.7 * number / len(names), f"unchanged images, {name}")
-        stages.append(stage_of(name, loaded_stage(name, size), margin=margin))
-    control = seen(None, stages)
-    results = []
-    for number, mutation in enumerate(mutations):
-        tell(0.7 + 0.3 * number / len(mutations), mutation.name)
-        tried = [stage for stage in stages if (stage.plan is not None) == mutation.wide]
-        results.append(judged(mutation, seen(mutation, tried)))
-    return MutationStudy(control, tuple(results))
+        tell(number / len(names), f"images and faults, {name}")
+        if name not in by_stage:
+            by_stage[name] = seen_on_stage(name, mutations, size, margin)
+
+    def on_all(name: str) -> tuple[Sighting, ...]:
+        return tuple(sighting for stage in names for sighting in by_stage[stage].get(name, ()))
+
+    return MutationStudy(on_all(CONTROL), tuple(judged(mutation, on_all(mutation.name)) for mutation in mutations))
+
+
+def seen_on_stage(name: str, mutations: Sequence[Mutation], size: tuple[int, int], margin: float) -> Seen:
+    """Return what is seen of the mutations on one stage, by their names, and of the unchanged copy as `CONTROL`."""
+    stage = stage_of(name, loaded_stage(name, size), margin=margin)
+    tried = [mutation for mutation in mutations if (stage.plan is not None) == mutation.wide]
+    return {CONTROL: seen(None, [stage])} | {mutation.name: seen(mutation, [stage]) for mutation in tried}
 
 
 def seen(mutation: Mutation | None, stages: Sequence[Stage]) -> tuple[Sighting, ...]:

@@ -9,10 +9,11 @@ Read in this order:
 - `study.py`: a study from its TOML file, and its cells;
 - `keys.py`: what decides the numbers of a row, as a digest;
 - `truth.py`: the truth that the cells of an image share;
+- `bounds.py`: the errors that methods state for themselves;
 - `work.py`: a cell becomes a row;
 - `rows.py`: finished rows on disk, and their Parquet.
 
 May import: `analytic.errors`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `realtime.scene`,
 `reference.quadrature`, `reference.scene`, `reference.storage`, `validation.configurations`, `validation.estimates`,
-`validation.metrics`, `validation.random_scenes`, `validation.scenes`.
+`validation.metrics`, `validation.random_scenes`, `validation.scaling`, `validation.scenes`.
 """

@@ -36,7 +36,7 @@ _SOURCES = (
     "validation/random_scenes",
     "validation/scenes",
 )
-_FILES = ("validation/sweep/truth.py", "validation/sweep/work.py")
+_FILES = tuple(f"validation/sweep/{name}.py" for name in ("bounds", "truth", "work"))
 _PACKAGES = ("mitsuba", "drjit", "numpy", "scipy")
 _FILENAME = re.compile(rb"""value\s*=\s*["']([^"']+)["']""")
 

@@ -109,7 +109,7 @@ _ERRORS = (
             "masked": "left out: seven of eight where a light has an extent, whose truth is dear",
             "nonfinite": "with NaN or infinity in the method's image; left out of every average",
             "negative": "with a negative value in the method's image",
-            "outside_bound": "whose error exceeds the truth's bound and `bound`; null where the method states none",
+            "outside_bound": "whose error exceeds the truth's bound, `bound` and rounded ends; null without `bound`",
         },
     ),
     Column("bound", "float64", "1", "error that the method states for itself here, relative to the pixel as in `max`"),

@@ -36,7 +36,7 @@ class RowStore:
     def __init__(self, folder: Path) -> None:
         self.folder = ensure_folder(folder)
         self.path = self.folder / ROWS
-        self._file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
+        self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666)
         try:
             _lock(self._file, self.folder)
             self._places: dict[str, tuple[int, int]] = {}  # key -> offset and length of its last line
@@ -72,7 +72,8 @@ class RowStore:
     def row(self, key: str) -> dict[str, Any]:
         """Return the row of a key that is there."""
         offset, length = self._places[key]
-        row = _row(os.pread(self._file, length, offset))
+        os.lseek(self._file, offset, os.SEEK_SET)
+        row = _row(os.read(self._file, length))
         assert row is not None, "it was read, or written, before"
         return row
 
@@ -89,9 +90,10 @@ class RowStore:
         row = checked_row(values)
         line = _line(row)
         try:
+            os.lseek(self._file, self._end, os.SEEK_SET)
             written = 0
             while written < len(line):
-                written += os.pwrite(self._file, line[written:], self._end + written)
+                written += os.write(self._file, line[written:])
         except OSError as error:
             os.ftruncate(self._file, self._end)
             raise OSError(error.errno, f"{error.strerror}; {len(self)} rows are kept", str(self.path)) from error

@@ -3,7 +3,7 @@
 
 It is the quadrature at pixel centres. A light with extent needs many points, each as dear as a point light: here it has
 fewer than in `airlight reference`, and their standard error is part of the truth's bound. Of an image that such a light
-lights, an eighth of the pixels has a truth, chosen by chance once for all: quantiles of errors need no more.
+lights, a sixteenth of the pixels has a truth, chosen by chance once for all: quantiles of errors need no more.
 """
 
 import time
@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 #: point takes as long as a point light does, and surfaces take as long again: these are left out.
 AREA_PLAN = PointPlan(error=2e-2, first=2, most=4, surfaces=False)
 
-SHARE = 8  #: one pixel in so many has a truth where lights have an extent
+SHARE = 16  #: one pixel in so many has a truth where lights have an extent
 
 _LEAST = 64  # pixels that have one
 _SEED = 20261123  # of their choice

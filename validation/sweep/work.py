@@ -5,7 +5,6 @@ A method that refuses a scene gives a row too, with its reason. Nothing here kno
 """
 
 import json
-import resource
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -28,13 +27,15 @@ from realtime.frame.renderer import (
     run_stages,
     unchecked_frame,
 )
-from realtime.methods.registry import METHODS
 from realtime.scene.read_scene import Scene
 from validation.configurations.methods import Configuration, prepared, rendered_lights
+from validation.configurations.timing import run_times
 from validation.metrics.colour import colour_difference
 from validation.metrics.errors import FLOOR, error_metrics
 from validation.metrics.flip import flip_hdr
 from validation.metrics.other_tools import published_errors
+from validation.scaling.memory import largest_memory
+from validation.sweep.bounds import stated_bound, worth_of_ends
 from validation.sweep.row import PROPERTY
 from validation.sweep.study import Cell, map_side, seed_of
 from validation.sweep.truth import CellTruth
@@ -42,9 +43,6 @@ from validation.sweep.truth import CellTruth
 Array = NDArray[np.float64]
 #: Makes a picture of truth and image, both (height, width, 3) [W/(m^2 sr)]; None where there is none.
 Paint = Callable[[Array, Array], bytes | None]
-
-#: The error of methods that claim rounding alone, relative to the pixel, or to a thousandth of the mean in the dark.
-ROUNDING = 1e-3
 
 _SPENT = 100.0  # on frames that are timed, and as much on the airlight alone [ms]
 _MOST = 9  # frames that are timed
@@ -79,7 +77,13 @@ def cell_columns(cell: Cell) -> dict[str, Any]:
 
 
 def cell_row(
-    cell: Cell, scene: Scene, truth: CellTruth, *, properties: Mapping[str, float], paint: Paint | None = None
+    cell: Cell,
+    scene: Scene,
+    truth: CellTruth,
+    *,
+    whole: Any,
+    properties: Mapping[str, float],
+    paint: Paint | None = None,
 ) -> dict[str, Any]:
     """Return the columns of a cell: errors, costs, or why there are none; without its key and where it ran.
 
@@ -91,6 +95,8 @@ def cell_row(
         Of the cell, as methods read it.
     truth
         Of the cell's image.
+    whole
+        The `mi.Scene` that both were read of.
     properties
         Of the scene.
     paint
@@ -107,7 +113,7 @@ def cell_row(
         rendered = _render(scene, cell.chosen, timed=cell.times == "with")
     except (InputError, TruthError) as error:
         return row | {"status": "refused", "reason": str(error)}
-    row |= {"status": "done", **rendered.numbers, **error_columns(truth, rendered.frame, scene, cell)}
+    row |= {"status": "done", **rendered.numbers, **error_columns(truth, rendered.frame, scene, cell, whole=whole)}
     if paint is not None:
         shown = np.asarray(rendered.frame.airlight, dtype=np.float64)
         # Pixels without a truth are shown as if they were right.
@@ -115,7 +121,7 @@ def cell_row(
         row["picture"] = paint(known, shown)
     row["rays"] = scene.camera.width * scene.camera.height
     row["lights"] = rendered_lights(scene, cell.chosen)
-    row["peak_mib"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    row["peak_mib"] = largest_memory()
     row["work_ms"] = 1e3 * (time.perf_counter() - begin)
     row["cpu_ms"] = 1e3 * (time.process_time() - spent)
     return row
@@ -132,20 +138,7 @@ def cell_times(cell: Cell, scene: Scene) -> dict[str, Any]:
     return dict(_render(scene, cell.chosen, timed=True).numbers)
 
 
-def stated_bound(chosen: Configuration, scene: Scene) -> float | None:
-    """Return the relative error that a method states for itself in a scene [1]; None where it states none.
-
-    Only what claims to be exact but for rounding states one: the kernel `exact` along whole rays where nothing casts a
-    shadow, and shadow planes in exact order. Points in the place of lights with extent are an approximation.
-    """
-    defaults = METHODS[chosen.method].defaults if chosen.method in METHODS else {}
-    usual = all(defaults.get(name, value) == value for name, value in chosen.parameters if name != "map")
-    plain = usual and chosen.kernel == "exact" and not scene.area_lights
-    whole_rays = chosen.method in ("unshadowed", "light-volumes") and not scene.features.shadows
-    return ROUNDING if plain and (chosen.method == "shadow-planes" or whole_rays) else None
-
-
-def error_columns(truth: CellTruth, frame: Frame, scene: Scene, cell: Cell) -> dict[str, Any]:
+def error_columns(truth: CellTruth, frame: Frame, scene: Scene, cell: Cell, *, whole: Any) -> dict[str, Any]:
     """Return the errors of a frame against the truth by all metrics."""
     test = np.asarray(frame.airlight, dtype=np.float64)
     mask = truth.mask
@@ -167,7 +160,11 @@ def error_columns(truth: CellTruth, frame: Frame, scene: Scene, cell: Cell) -> d
     if row["bound"] is not None:
         floor = FLOOR * truth.airlight.mean()  # of all pixels: who states a bound has a truth in each
         allowed = row["bound"] * np.maximum(truth.airlight, floor) + truth.bound
-        row["outside_bound"] = int((~(np.abs(test - truth.airlight) <= allowed)).any(axis=2).sum())
+        excess = np.abs(test - truth.airlight).reshape(-1, 3) - allowed.reshape(-1, 3)
+        outside = np.flatnonzero(~(excess <= 0).all(axis=1))
+        if len(outside):  # few: what the ends of intervals are worth takes a while
+            outside = outside[~(excess[outside] <= worth_of_ends(whole, outside)).all(axis=1)]
+        row["outside_bound"] = len(outside)
     if scene.features.surfaces and truth.surface is not None:
         surface = error_metrics(truth.surface, np.asarray(frame.surface, dtype=np.float64))
         row |= {f"surface_{name}": getattr(surface, name) for name in ("relative_rmse", "p99", "max", "nonfinite")}
@@ -222,7 +219,7 @@ def _render(scene: Scene, chosen: Configuration, *, timed: bool) -> Rendered:
 
 def _times(renderer: FrameRenderer, scene: Scene, state: Any) -> dict[str, Any]:
     """Time preparation, frames, and the airlight of a frame; the first run has compiled and recorded all kernels."""
-    prepare = _timed(lambda: dr.eval(renderer.prepare(scene)))
+    prepare, _ = run_times(lambda: dr.eval(renderer.prepare(scene)))
     frames, processor = _repeated(lambda: run_stages(renderer, state))
     low, median, high = (float(value) for value in np.percentile(frames, [25, 50, 75]))
     airlight = median  # camera rays and surfaces take little of a frame that is slow, and it takes too long to ask
@@ -248,24 +245,12 @@ def _times(renderer: FrameRenderer, scene: Scene, state: Any) -> dict[str, Any]:
 
 def _repeated(work: Callable[[], Any]) -> tuple[list[float], list[float]]:
     """Return wall and processor times of some runs after one of warm-up [ms]; a slow one is not repeated often."""
-    runs = [_timed_both(work)]
+    runs = [run_times(work)]
     if runs[0][0] < _SLOW:
         runs = []  # the warm-up replayed for the first time
     while not runs or (sum(wall for wall, _ in runs) < _SPENT and len(runs) < _MOST):
-        runs.append(_timed_both(work))
+        runs.append(run_times(work))
     return [wall for wall, _ in runs], [processor for _, processor in runs]
-
-
-def _timed_both(work: Callable[[], Any]) -> tuple[float, float]:
-    spent = time.process_time()
-    return _timed(work), 1e3 * (time.process_time() - spent)
-
-
-def _timed(work: Callable[[], Any]) -> float:
-    begin = time.perf_counter()
-    work()
-    dr.sync_thread()
-    return 1e3 * (time.perf_counter() - begin)
 
 
 def _command(cell: Cell) -> str:

@@ -8,6 +8,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import four_numbers
 from realtime.scene.closed_mesh import boundary_scene, shape_number
 from realtime.scene.mesh_adjacency import mesh_triangles
@@ -34,11 +35,10 @@ def cloud_surfaces(scene: Scene) -> CloudSurfaces:
     first, cloud = np.zeros(max(numbers) + 1, dtype=np.uint32), np.zeros(max(numbers) + 1, dtype=np.uint32)
     first[numbers] = np.cumsum([0] + [len(own) for own in rows[:-1]])
     cloud[numbers] = np.arange(len(shapes))
-    facets = mi.Float(np.concatenate(rows).ravel())
+    facets = aligned_array(mi.Float, np.concatenate(rows).ravel())
     spheres = not all(shape.is_mesh() for shape in shapes)
-    surfaces = CloudSurfaces(
-        boundary_scene(shapes), mi.UInt32(first), mi.UInt32(cloud), facets, spheres, len(shapes) > 1
-    )
+    firsts, clouds = (aligned_array(mi.UInt32, values) for values in (first, cloud))
+    surfaces = CloudSurfaces(boundary_scene(shapes), firsts, clouds, facets, spheres, len(shapes) > 1)
     dr.make_opaque(surfaces.first, surfaces.cloud, surfaces.facets)
     return surfaces
 

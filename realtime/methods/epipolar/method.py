@@ -18,6 +18,7 @@ lists of tiles, which bound the sixteen rays of a tile alone, miss what concerns
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import drjit as dr
 import mitsuba as mi
@@ -62,6 +63,7 @@ _MOST = 65536  # slices, and samples of a slice
 
 _LEAST_COSINE = 0.05  # of a light point, in the yardstick
 _NEXT = 6.0  #: pixels from the image of a light point within which nothing is interpolated
+_DEEP = 5.0  #: optical depth beyond which nothing is interpolated where a light point lights no more before
 
 
 @dataclass(frozen=True)
@@ -232,7 +234,10 @@ def _sampled_shares(view: View, number: int, kernel, samples: Samples, heights: 
         seen = replace(view, direction=direction, direction_low=None, distance=depth, layout=Layout.SOME)
         airlight = _ray_airlight(seen, number, kernel)
         share = _lit_integral(airlight, heights, slice_number) / _yardstick(airlight)
-        dr.scatter(shares, dr.select(dr.isfinite(share), share, no_value(share)), sample)
+        known = dr.isfinite(share)
+        if airlight.light.facing is not None:
+            known &= ~_begins_deep(airlight)
+        dr.scatter(shares, dr.select(known, share, no_value(share)), sample)
         return lane
 
     lane = spread(dr.width(marked))
@@ -277,6 +282,19 @@ def _yardstick(airlight: RayAirlight):
     return dr.select(x1 > x0, transmittance(medium, x + r) * weight, 0)
 
 
+def _begins_deep(airlight: RayAirlight):
+    """Return whether a light point, which lights what lies before its plane, lights rays from deep in the medium on.
+
+    Next to rays along its plane the yardstick falls to nothing from sample to sample, and its one node is wrong by
+    orders of magnitude: a share that is multiplied with the yardstick of another ray would outshine the image. In
+    bounded media the yardstick is the integral.
+    """
+    x0, x1 = airlight.segment
+    if airlight.media:
+        return x1 < x0
+    return (reduce(dr.maximum, airlight.view.medium.sigma_t) * x0 > _DEEP) & (x1 > x0)
+
+
 def _interpolated(airlight: RayAirlight, samples: Samples, shares, heights: SliceHeights, point):
     """Return the integral of every pixel: the share of the samples around it, or its own where they do not fit."""
     share, fits = between_samples(samples, shares, point, airlight.view.distance)
@@ -284,5 +302,6 @@ def _interpolated(airlight: RayAirlight, samples: Samples, shares, heights: Slic
         # Next to a light that lies on a surface, samples end before it, or beyond.
         pixel = dr.norm(airlight.view.camera.left)
         fits &= airlight.geometry.height > _NEXT * pixel * dr.abs(airlight.geometry.foot)
+        fits &= ~_begins_deep(airlight)
     own = _lit_integral(airlight, heights, _nearest(samples.slices, point), ~fits)
     return dr.select(fits, share * _yardstick(airlight), own)

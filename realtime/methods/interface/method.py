@@ -80,8 +80,8 @@ class Method:
     #: order in which `airlight bench --decompose` takes them away, one on top of the other.
     error_causes: Callable[[Any, tuple[int, int]], tuple[ErrorCause, ...]] = no_causes
     #: Parameters -> whether it is given all lights of a frame at once, the points of lights with extent among them. If
-    #: not, and if it has no passes over the image, it is given one light point after another, and what it returns is
-    #: added up: it is recorded once for all of them.
+    #: not, and if it has no passes over the image, it is given one light point after another, and where there are many
+    #: lights one after another: what it returns is added up, and it is recorded once for all of one structure.
     lights_at_once: Callable[[Any], bool] = never
     #: Parameters -> whether its visibility has one entry for all points of a light with extent, and one for each other
     #: light: then surfaces are shaded by source too.

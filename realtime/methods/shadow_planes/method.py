@@ -27,7 +27,6 @@ from functools import partial
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
 
 from realtime.bounded_media.airlight import FORMS, LitRay, PlacedRay, ambient_radiance
 from realtime.errors import InputError
@@ -45,6 +44,7 @@ from realtime.methods.shadow_planes.tile_lists import Lists, tile_lists
 from realtime.methods.shadow_planes.view_culling import components_in_view
 from realtime.methods.shadow_planes.wedges import Wedges
 from realtime.numerics.array_types import ArrayTypes, types_of
+from realtime.numerics.host_numbers import host_numbers
 from realtime.parameters import Parameters, parameter
 from realtime.scene.camera import HostCamera, read_camera
 from realtime.scene.light_points import source_shape
@@ -193,7 +193,8 @@ def plane_finder(
     position = host_position(light)
     ring = None
     if cone and light.cone is not None:
-        ring = cone_ring(np.array(light.axis, dtype=np.float64).ravel(), float(light.cos_cutoff[0]), cone)
+        axis, cosine = host_numbers(light.axis, light.cos_cutoff)
+        ring = cone_ring(axis, float(cosine[0]), cone)
     seen = None if ring is not None else read_spot(light)
 
     def find() -> PlaneIndex:

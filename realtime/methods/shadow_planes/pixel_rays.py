@@ -44,6 +44,7 @@ from numpy.typing import NDArray
 
 from realtime.numerics.array_types import ArrayTypes, is_single
 from realtime.numerics.diamond_angle import TURN, host_diamond_angle
+from realtime.numerics.host_numbers import host_numbers
 from realtime.rays.ray_light import RayGeometry, before_plane
 from realtime.rays.spot_cone import AxisGeometry, axis_distance, cone_roots
 from realtime.scene.camera import Camera, HostCamera
@@ -109,15 +110,15 @@ class HostSpot:
 def read_spot(light: Light) -> HostSpot | None:
     """Read the fields of a spot or a light point to the host; None for other lights."""
     if light.facing is not None:
-        return HostSpot(_both(light.facing.normal, light.facing.normal_low))
+        normal, low = host_numbers(light.facing.normal, light.facing.normal_low)
+        return HostSpot(normal + low)
     if light.cone is None:
         return None
-    sines = [
-        np.sqrt(float(np.sum(_one(cone.square_sin)) + np.sum(_one(cone.square_sin_low)))) if cone else None
-        for cone in (light.cone, light.beam)
-    ]
-    assert sines[0] is not None
-    return HostSpot(_both(light.axis, light.axis_low), sines[0], sines[1])
+    cones = [cone for cone in (light.cone, light.beam) if cone]
+    squares = [part for cone in cones for part in (cone.square_sin, cone.square_sin_low)]
+    high, low, *parts = host_numbers(light.axis, light.axis_low, *squares)
+    sines = [float(np.sqrt(parts[i][0] + parts[i + 1][0])) for i in range(0, len(parts), 2)]
+    return HostSpot(high + low, *sines)
 
 
 def aim_at(camera: HostCamera, axes: Array, spot: HostSpot | None, types: ArrayTypes) -> Aim:
@@ -287,11 +288,3 @@ def _split(values: Array, types: ArrayTypes) -> tuple[Affine, Affine]:
     high = np.round(values / unit) * unit
     few, rest = (Affine(*(types.scalar(float(component)) for component in part)) for part in (high, values - high))
     return few, rest
-
-
-def _one(value) -> Array:
-    return np.array(value, dtype=np.float64).ravel()
-
-
-def _both(high, low) -> Array:
-    return _one(high) + _one(low)

@@ -12,6 +12,7 @@ import numpy as np
 
 from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import types_of
+from realtime.numerics.host_numbers import host_numbers
 from realtime.scene.lights import Light
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps, LightFrame, cast_hemisphere_maps
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
@@ -36,18 +37,24 @@ def source_state(
         maps = cast_shadow_map(scene, lights[0], size) if with_maps else None
         return SourceState(None, dr.opaque(Float, 0, 1), True, maps)
     facing = [light.facing for light in lights if light.facing is not None]
-    positions, normals = _rows(light.position for light in lights), _rows(own.normal for own in facing)
+    numbers = host_numbers(
+        *(light.position for light in lights), *(own.normal for own in facing), *(own.lift for own in facing)
+    )
+    positions, normals, lift = (np.stack(numbers[i * len(lights) : (i + 1) * len(lights)]) for i in range(3))
     helper = np.where(np.abs(normals[:, :1]) < 0.5, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     across = np.cross(helper, normals)
     across /= np.linalg.norm(across, axis=1, keepdims=True)
-    lift = np.array([own.lift[0] for own in facing])
     Vector = types_of(Float).vector
 
     def lanes(rows: Any) -> Any:
         return Vector(*(aligned_array(Float, column) for column in rows.T))
 
     frames = LightFrame(
-        lanes(positions), lanes(across), lanes(np.cross(normals, across)), lanes(normals), aligned_array(Float, lift)
+        lanes(positions),
+        lanes(across),
+        lanes(np.cross(normals, across)),
+        lanes(normals),
+        aligned_array(Float, lift[:, 0]),
     )
     # Of a square of the side L the mean square distance from the middle is L^2 / 6.
     spread = np.mean(np.sum((positions - positions.mean(axis=0)) ** 2, axis=1))
@@ -62,8 +69,3 @@ def frame_at(frames: LightFrame | None, number: Any) -> LightFrame:
     """Return light points of a table by their numbers."""
     assert frames is not None
     return dr.gather(LightFrame, frames, number)
-
-
-def _rows(vectors: Any) -> Any:
-    # Number by number: NumPy would have a kernel make an array of each vector.
-    return np.array([[component[0] for component in vector] for vector in vectors])

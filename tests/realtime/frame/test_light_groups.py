@@ -154,6 +154,72 @@ def test_ordinary_lights_and_several_lamps_add_up(variant):
     np.testing.assert_allclose(together.surface, sum(frame.surface for frame in each), rtol=1e-5, atol=1e-6)
 
 
+def _many_lights(points, *, media=None):
+    """Return a scene with a hard and a soft spot and so many point lights, in fog or in bounded media."""
+    import mitsuba as mi
+
+    spot = {"type": "spot", "to_world": mi.ScalarTransform4f().look_at([1.3, -0.7, 2.1], [0.1, 0.2, 0.3], [0, 0, 1])}
+    bright = {"intensity": {"type": "rgb", "value": [9.1, 7.3, 5.9]}, "cutoff_angle": 37.0}
+    lamps = {"hard": spot | bright | {"beam_width": 37.0}, "soft": spot | bright | {"beam_width": 11.0}}
+    for number in range(points):
+        place = [1.7 * np.cos(2.1 * number), 1.9 * np.sin(2.1 * number), 1.3 + 0.17 * number]
+        colour = {"type": "rgb", "value": [3.1, 2.3 + 0.1 * number, 1.7]}
+        lamps[f"point{number}"] = {"type": "point", "position": place, "intensity": colour}
+    if media is None:
+        return read_scene(mi.load_dict(lit_by(changes={"size": SIZE}) | lamps | {"lamp": tiny_scene()["lamp"]}))
+    turned = mi.ScalarTransform4f().translate([0.63, 0.47, 1.63]).rotate([1, 2, 3], 37).scale(0.07)
+    solid = {"type": "cube", "to_world": turned}
+    return read_scene(mi.load_dict(shaded(size=(16, 12), pearl=fog_sphere(), solid=solid, **lamps)))
+
+
+@pytest.mark.parametrize(
+    ("name", "media"),
+    [
+        ("unshadowed", None),
+        ("ray-march", None),
+        ("shadow-planes", None),
+        ("shadow-planes adaptive", None),
+        ("light-volumes", None),
+        ("unshadowed", "bounded"),
+        ("shadow-planes", "bounded"),
+    ],
+)
+def test_many_lights_one_by_one_are_all_at_once(variant, name, media):
+    """Each light has code of its own in one kernel, or kernels of their own: the sum is the same to rounding."""
+    word = name.split()[0]
+    parameters = {"tolerance": 0.005} if "adaptive" in name else {"steps": 20} if word == "ray-march" else {}
+    scene = _many_lights(0 if media else 2, media=media)
+    kernel = KERNELS["exact"].function
+    together = replace(METHODS[word], lights_at_once=lambda parameters: True)
+    apart = frame_renderer(scene, METHODS[word], kernel=kernel, **parameters)
+    assert len(light_groups(apart)) == len(scene.lights) > (1 if media else 4)
+    one = frame_renderer(scene, together, kernel=kernel, **parameters)
+    assert len(light_groups(one)) == 1
+    wanted, frame = render_frame(one), render_frame(apart)
+    # Adaptive sampling asks whether the sum of the lights bends, or whether each does.
+    rtol = 0.01 if "adaptive" in name else 1e-5
+    np.testing.assert_allclose(frame.airlight, wanted.airlight, rtol=rtol, atol=rtol * wanted.airlight.mean())
+    np.testing.assert_allclose(frame.surface, wanted.surface, rtol=1e-5, atol=1e-6)
+    still = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
+    stages, cache = next_frame(apart, scene, None, **still)
+    np.testing.assert_array_equal(image_frame(apart, stages).airlight, frame.airlight)
+    stages, _ = next_frame(apart, scene, cache, **still)
+    np.testing.assert_array_equal(image_frame(apart, stages).airlight, frame.airlight)
+
+
+def test_lights_of_one_structure_share_a_recording(variant):
+    """The code of kernels does not grow with the lights: what was recorded for five serves nine."""
+    recorded = []
+    for points in (3, 7):
+        renderer = renderer_of(_many_lights(points), "shadow-planes")
+        render_frame(renderer)
+        groups = light_groups(renderer)
+        assert len(groups) == points + 3
+        kinds = {id(group.render): group.render.n_recordings for group in groups}
+        recorded.append(sorted(kinds.values()))
+    assert recorded == [[1, 1, 1], [1, 1, 1]]  # point lights, hard spots, soft spots
+
+
 def _mixed(**changes):
     """Return two bounded media of other phase functions, with the sun, a box before it, and two lamps."""
     import mitsuba as mi

@@ -2,18 +2,22 @@
 """Claim: any Dask scheduler will do, a worker of another version is refused by name, a scheduler may come back."""
 
 import os
+import re
+import shutil
 import signal
 import socket
 import subprocess
 import sys
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import pytest
 
 from analytic.errors import InputError
+from reports import __version__
 from reports.cluster.connect import Cluster, Place, connected, parse_place
+from validation.sweep.keys import made_here
 
 pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
 
@@ -30,6 +34,16 @@ def test_places_by_their_words(tmp_path):
     assert parse_place(None).workers == parse_place("local").workers >= 1
     assert parse_place("tcp://10.1.2.3:8786") == Place(address="tcp://10.1.2.3:8786")
     assert parse_place(str(file)) == Place(file=file)
+
+
+def test_a_cluster_of_this_machine_shares_no_port_with_another():
+    """Two sweeps, or somebody's own Dask on its usual port: a warning would be an error here."""
+    with socket.socket() as taken:
+        with suppress(OSError):  # somebody else has taken it, which will do as well
+            taken.bind(("0.0.0.0", 8787))
+            taken.listen()
+        with connected(Place(1)) as cluster:
+            assert cluster.client.scheduler_info()["workers"]
 
 
 @pytest.mark.parametrize(
@@ -152,23 +166,61 @@ def test_a_scheduler_that_stays_away_ends_the_run():
     assert len(outcomes) < 100
 
 
+def other_version(tmp_path):
+    """Return a copy of the package with one more line in it."""
+    other = tmp_path / "other"
+    for name in ("analytic", "realtime", "reference", "validation", "reports", "tests"):
+        shutil.copytree(ROOT / name, other / name, ignore=shutil.ignore_patterns("__pycache__", "data"))
+    changed = other / "analytic" / "geometry.py"
+    changed.write_text(changed.read_text() + "\n# another version\n")
+    return other
+
+
 @pytest.mark.slow
 @pytest.mark.claim("workers-of-one-version", tolerance="none")
 def test_a_worker_of_another_version_is_refused_by_name(tmp_path, variant):
-    """The other version is a copy of the package with one more line in it."""
-    import shutil
-
-    other = tmp_path / "other"
-    for name in ("analytic", "realtime", "reference", "validation", "reports"):
-        shutil.copytree(ROOT / name, other / name, ignore=shutil.ignore_patterns("__pycache__"))
-    changed = other / "analytic" / "geometry.py"
-    changed.write_text(changed.read_text() + "\n# another version\n")
     port = _free_port()
     address = f"tcp://127.0.0.1:{port}"
     message = r"worker tcp://127.* has source code \w{12}, not \w{12}: install the same"
     with (
-        _ended(_scheduler(port), _worker(address, other)),
+        _ended(_scheduler(port), _worker(address, other_version(tmp_path))),
         pytest.raises(InputError, match=message),
         connected(Place(address=address)),
     ):
         pass
+
+
+@pytest.mark.slow
+@pytest.mark.claim("workers-of-one-version", tolerance="none")
+def test_a_worker_of_another_version_that_joins_a_run_is_sent_away_and_its_work_done(tmp_path, variant):
+    port = _free_port()
+    address = f"tcp://127.0.0.1:{port}"
+    other = other_version(tmp_path)
+    made = made_here(__version__, variant)
+    groups = [
+        Group(tuple(Task(f"{g}-{n}", tasks.add, (n,)) for n in range(4)), Task(f"t{g}", tasks.square, (g, 0.3)))
+        for g in range(400)
+    ]
+    refused, ended = [], {}
+    with _ended(_scheduler(port), _worker(address)) as running, connected(Place(address=address)) as cluster:
+        running.append(_worker(address, other))
+        # Enough groups for the other worker to come, and a few more.
+        left = 10
+
+        def until_it_came():
+            nonlocal left
+            for group in groups:
+                left -= bool(refused)
+                if not left:
+                    break
+                yield group
+
+        for outcome in run_groups(cluster, until_it_came(), made=made, refused=refused.append):
+            assert outcome.task.name not in ended
+            ended[outcome.task.name] = (outcome.status, outcome.value)
+    assert len(refused) == 1
+    assert re.fullmatch(
+        r"worker tcp://127.* has source code \w{12}, not \w{12}: install the same airlight there", *refused
+    )
+    assert len(ended) > 40
+    assert ended == {f"{g}-{n}": ("done", g * g + n) for g in range(len(ended) // 4) for n in range(4)}

@@ -85,6 +85,25 @@ def test_a_killed_sweep_goes_on_and_a_second_computes_nothing(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.claim("sweep-timed-alone", tolerance="none")
+def test_times_of_a_process_alone_are_added_to_the_errors_of_all(tmp_path):
+    study, folder = tmp_path / "study.toml", tmp_path / "rows"
+    study.write_text('times = "alone"\n' + STUDY.replace(', "light-volumes"', "").split("[parameters.light")[0])
+    summary = json.loads(_run(study, "-o", folder, "--cluster", "local:2", "--json").stdout)
+    assert (summary["cells"], summary["computed"], summary["timed_alone"], summary["problems"]) == (6, 6, 6, [])
+    rows = _rows(folder)
+    assert len({row["key"] for row in rows}) == len(rows) == 6
+    assert {(row["status"], row["timed_alone"]) for row in rows} == {("done", True)}
+    assert all(row["frame_ms"] > 0 and row["p99"] is not None for row in rows)
+    with RowStore(folder) as store:  # a run that ended between the errors and the times
+        row = store.row(rows[0]["key"])
+        store.add(row | {"frame_ms": None, "timed_alone": None})
+    again = json.loads(_run(study, "-o", folder, "--cluster", "local:2", "--json").stdout)
+    assert (again["kept"], again["computed"], again["timed_alone"]) == (6, 0, 1)
+    assert {row["timed_alone"] for row in _rows(folder)} == {True}
+
+
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for a process alone")
 def test_an_interrupted_sweep_says_what_is_kept(tmp_path):
     study, folder = tmp_path / "study.toml", tmp_path / "rows"

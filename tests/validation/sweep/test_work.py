@@ -12,6 +12,7 @@ from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import error_metrics
 from validation.scenes.loading import load_scene
 from validation.sweep import work
+from validation.sweep.bounds import ROUNDING
 from validation.sweep.row import checked_row
 from validation.sweep.study import Cell
 from validation.sweep.truth import cell_truth, load_cell
@@ -22,7 +23,9 @@ SIZE = (24, 18)
 def row_of(scene, chosen, **options):
     cell = Cell(scene, SIZE, options.pop("medium", ()), chosen, **options)
     loaded = load_cell(cell)
-    row = work.cell_row(cell, read_scene(loaded.scene), cell_truth(loaded), properties={"depth": 2.0})
+    row = work.cell_row(
+        cell, read_scene(loaded.scene), cell_truth(loaded), whole=loaded.scene, properties={"depth": 2.0}
+    )
     return checked_row(row | {"key": "k"})
 
 
@@ -38,7 +41,7 @@ def test_a_row_has_the_errors_and_what_they_cost():
     errors = error_metrics(cell_truth(loaded).airlight, image.airlight)
     assert row["status"] == "done"
     assert (row["p99"], row["relative_rmse"], row["bias"]) == (errors.p99, errors.relative_rmse, errors.bias)
-    assert (row["bound"], row["outside_bound"], row["nonfinite"]) == (work.ROUNDING, 0, 0)
+    assert (row["bound"], row["outside_bound"], row["nonfinite"]) == (ROUNDING, 0, 0)
     assert row["truth"] == "quadrature"
     assert 0 < row["truth_error"] < 1e-6
     assert row["frame_ms"] > 0 < row["prepare_ms"]
@@ -85,11 +88,11 @@ def test_what_is_not_finite_is_counted_and_kept_out_of_the_errors(monkeypatch):
 
 
 @pytest.mark.usefixtures("variant")
-def test_under_a_light_with_extent_an_eighth_of_the_pixels_has_a_truth(own_cache):
-    loaded = load_cell(Cell("penumbra-plane", (32, 24), (), configuration("unshadowed")))
+def test_under_a_light_with_extent_a_sixteenth_of_the_pixels_has_a_truth(own_cache):
+    loaded = load_cell(Cell("penumbra-plane", (40, 32), (), configuration("unshadowed")))
     truth = cell_truth(loaded)
     assert truth.mask is not None
-    assert int(truth.mask.sum()) == 32 * 24 // 8
+    assert int(truth.mask.sum()) == 40 * 32 // 16
     assert truth.surface is None
     whole = truth_image(loaded.scene)
     assert whole.airlight_se is not None

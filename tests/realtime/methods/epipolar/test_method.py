@@ -267,3 +267,27 @@ def test_memory_is_counted_before_it_is_taken(variant, monkeypatch):
     with pytest.raises(InputError, match=r"map: 8192 texels .*" + message):
         render(scene, "ray-march", shadow="map", map=8192)
     assert np.all(np.isfinite(render(scene, "min-max", map=64)))
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_light_point_that_lights_rays_from_deep_fog_on(variant, threads):
+    # random:5: rays along the plane of a light point had shares of 1e13, by one thread, which keeps denormal numbers.
+    import drjit as dr
+
+    from realtime.frame.renderer import render_frame
+    from realtime.scene.read_scene import read_scene
+    from validation.configurations.methods import configuration, prepared
+    from validation.scenes.loading import load_scene
+
+    before = dr.thread_count()
+    dr.set_thread_count(threads)
+    try:
+        scene = read_scene(load_scene("random:5", (80, 60)).scene)
+        slices, pixels = (
+            np.asarray(render_frame(prepared(scene, configuration("min-max", None, settings))).airlight)
+            for settings in ({}, {"sampling": "pixels"})
+        )
+    finally:
+        dr.set_thread_count(before)
+    assert np.abs(slices - pixels).max() < 0.5 * pixels.mean()
+    assert (np.abs(slices - pixels) < 0.3 * pixels).all()

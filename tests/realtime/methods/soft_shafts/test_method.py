@@ -163,3 +163,22 @@ def test_wrong_parameters_are_refused_in_one_line(variant, parameters, words):
     with pytest.raises(InputError, match=re.escape(words)) as caught:
         renderer(lamp_scene(size=(16, 12)), **parameters)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.claim("soft-shafts-steps", tolerance="half of the light; 2 % of it")
+def test_equal_steps_miss_the_peak_next_to_a_light_and_equal_angles_do_not(variant):
+    from realtime.frame.renderer import render_frame
+    from realtime.scene.read_scene import read_scene
+    from validation.configurations.methods import configuration, prepared
+    from validation.estimates.quadrature import truth_image
+    from validation.scenes.loading import load_scene
+
+    loaded = load_scene("random:1", (80, 60)).scene
+    truth, scene = truth_image(loaded).airlight.mean(), read_scene(loaded)
+
+    def missing(**settings):
+        renderer = prepared(scene, configuration("soft-shafts", None, settings))
+        return 1 - float(np.mean(np.asarray(render_frame(renderer).airlight))) / truth
+
+    assert missing() > 0.5
+    assert abs(missing(spacing="equiangular")) < 0.02

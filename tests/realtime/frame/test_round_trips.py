@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a GPU needs of a frame: nothing that only a processor has, and no wait for the host but those of a table.
+
+No GPU is asked: the code is read, and frames are rendered while every wait is counted.
+"""
+
+import ast
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from realtime.methods.registry import METHODS
+from tests.helpers.area_lamps import lit_by
+from tests.helpers.clouds import cloud_scene
+from tests.helpers.round_trips import ROOT, round_trips
+from tests.helpers.scenes import spot
+from tests.helpers.sunlit import plank, shaded
+from tests.helpers.transport_formula import use_formula
+
+POINTS = 4  # of a light with extent
+LAMP = {"type": "point", "position": [0.9, 0.7, 1.9], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
+
+MOVES = {"look": "", "camera": "camera_moved", "light": "light_moved", "objects": "geometry_moved"}
+
+READ = "realtime/numerics/host_numbers.py: _in_one_transfer"
+SIDES = "realtime/methods/light_volumes/jump_search.py: _jumping_sides"
+
+#: By method the moves after which a frame waits for the host, where, and how often in each of the scenes below. There
+#: is no other wait. docs/gpu.md says why these are there.
+WAITS: dict[str, tuple[tuple[str, ...], str, dict[str, int]]] = {
+    "shadow-planes": (
+        ("camera", "light", "objects"),
+        READ,
+        {"lamp": 2, "spot": 3, "sun": 2, "area": 3 * POINTS, "box": 2},
+    ),
+    "light-volumes": (
+        ("light", "objects"),
+        SIDES,
+        {"lamp": 2, "spot": 2, "sun": 2, "area": 2 * POINTS, "box": 2},
+    ),
+    "froxel-fog": (("light", "objects"), READ, {"area": 1}),
+    "soft-shafts": (("light", "objects"), READ, {"area": 1}),
+}
+
+#: Names that only one kind of device has, or that wait for it, by the file that may use them and what for.
+SPOKEN: dict[str, dict[str, str]] = {
+    "realtime/numerics/fast_exp.py": {"llvm": "polynomials in place of a slow exponential; others take Dr.Jit's"},
+    "realtime/numerics/host_numbers.py": {"cuda": "one transfer where single reads wait"},
+    "realtime/memory.py": {"cuda": "how much memory the device has"},
+    "realtime/frame/renderer.py": {"flush_malloc_cache": "between the parts of a large image that goes to the host"},
+    "realtime/methods/light_volumes/jump_search.py": {"compress": "sides where the map jumps, when it is made"},
+    "realtime/methods/light_volumes/published/raster.py": {"compress": "the published mesh, rasterised by the host"},
+    "realtime/methods/light_volumes/published/signed_sum.py": {"compress": "the published mesh"},
+}
+BACKENDS = ("llvm", "cuda")
+DOORS = (
+    *("sync_thread", "sync_device", "sync_all_devices", "flush_malloc_cache", "compress", "numpy", "torch", "jax"),
+    *("set_thread_count", "set_flag", "scoped_set_flag", "kernel_history", "whos", "flush_kernel_cache"),
+)
+
+
+def scenes() -> dict[str, Callable[[], dict[str, Any]]]:
+    """By name small scenes with each kind of light, and with bounded media in clear air."""
+    return {
+        "lamp": lambda: lit_by(changes={"lamp": LAMP}),
+        "spot": lambda: lit_by(changes={"lamp": spot(cutoff=33.0, beam=21.0)}),
+        "area": lit_by,
+        "sun": lambda: shaded(solid=plank()),
+        "box": lambda: shaded(solid=plank(), lamp=LAMP),
+    }
+
+
+def waits_of_frames(scene: dict[str, Any], method: str) -> dict[str, Counter[str]]:
+    """By what moved, the waits of a frame that has been rendered before."""
+    import mitsuba as mi
+
+    from realtime.frame.incremental import next_frame
+    from realtime.frame.renderer import frame_renderer
+    from realtime.kernels.registry import KERNELS
+    from realtime.scene.read_scene import read_scene
+
+    read = read_scene(mi.load_dict(scene))
+    points = {"points": POINTS} if read.area_lights else {}
+    renderer = frame_renderer(read, METHODS[method], kernel=KERNELS["exact"].function, **points)
+    cache, waits = None, {}
+    for counting in (False, True):
+        for name, moved in MOVES.items():
+            moves = {word: word == moved for word in MOVES.values() if word}
+            if not counting:
+                _, cache = next_frame(renderer, read, cache, **moves)
+                continue
+            with round_trips() as waits[name]:
+                _, cache = next_frame(renderer, read, cache, **moves)
+    return waits
+
+
+@pytest.mark.claim("no-wait-in-a-frame")
+@pytest.mark.parametrize("scene", scenes())
+@pytest.mark.parametrize("method", [name for name, method in METHODS.items() if not method.renders_clouds])
+def test_a_frame_waits_for_the_host_where_the_table_says(variant, method, scene):
+    moves, where, counts = WAITS.get(method, ((), "", {}))
+    expected = {name: {where: counts[scene]} if name in moves and scene in counts else {} for name in MOVES}
+    assert waits_of_frames(scenes()[scene](), method) == expected
+
+
+@pytest.mark.claim("no-wait-in-a-frame")
+@pytest.mark.parametrize("method", [name for name, method in METHODS.items() if method.renders_clouds])
+def test_a_frame_of_clouds_never_waits(variant, monkeypatch, method):
+    use_formula(monkeypatch)
+    assert waits_of_frames(cloud_scene(size=(8, 6)), method) == {name: {} for name in MOVES}
+
+
+def test_every_wait_is_found(variant):
+    """What a method could do with an array that lies on the device."""
+    import drjit as dr
+    import mitsuba as mi
+
+    numbers = dr.arange(mi.Float, 8)
+    colour = mi.Color3f(1.0, 2.0, dr.opaque(mi.Float, 3.0, 8))
+    dr.eval(numbers, colour)
+    reads: tuple[Callable[[], Any], ...] = (
+        lambda: np.array(numbers),
+        lambda: np.asarray(dr.detach(numbers)),
+        lambda: colour.numpy(),
+        lambda: float(numbers[3]),
+        lambda: bool(dr.any(numbers > 3)),
+        lambda: list(numbers),
+        lambda: dr.slice(numbers, 3),
+        lambda: dr.compress(numbers > 3),
+        lambda: dr.sync_thread(),
+    )
+    for read in reads:
+        with round_trips() as waits:
+            read()
+        assert sum(waits.values()) == 1
+    with round_trips() as waits:
+        dr.eval(numbers + 1, dr.sum(numbers))
+        assert mi.Float(3.0)[0] == 3.0  # a literal: Python knows it
+    assert not waits
+    waiting: dict[str, Any] = {"state": (+numbers,), "cond": lambda x: x < 9, "body": lambda x: (x + 1,)}
+    with pytest.raises(RuntimeError, match="synchroniz"), round_trips():
+        dr.while_loop(**waiting, mode="evaluated")
+
+
+def spoken(source: str) -> set[str]:
+    """The names of backends and the `DOORS` that code uses, as attributes or in texts that are no sentences."""
+    tree = ast.parse(source)
+    documented = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    used = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute):
+            used |= {node.attr} & set(DOORS) | {word for word in BACKENDS if word == node.attr.lower()}
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in documented:
+            used |= {word for word in BACKENDS if word in node.value.lower() and " " not in node.value}
+    return used
+
+
+@pytest.mark.claim("no-backend-by-name")
+def test_methods_name_no_backend_and_do_not_wait():
+    used = {path.relative_to(ROOT).as_posix(): spoken(path.read_text()) for path in (ROOT / "realtime").rglob("*.py")}
+    assert {name: words for name, words in used.items() if words} == {
+        name: set(words) for name, words in SPOKEN.items()
+    }
+
+
+def test_names_of_backends_are_found():
+    source = "'''LLVM'''\nx = dr.llvm.Float(1)\nmi.set_variant('llvm_ad_rgb')\ny = x.numpy()\nraise E('use LLVM')\n"
+    assert spoken(source) == {"llvm", "numpy"}

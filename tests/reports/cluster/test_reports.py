@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: a report whose truths, checks and mutations a cluster computed says what it says without one."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
+
+from reports.cluster.connect import Place, connected
+from reports.cluster.references import mutations_seen
+from reports.report.measure import write_report
+from validation.configurations.methods import configuration
+from validation.frames.scene_study import EFFORTS
+from validation.mutations.catalogue import MUTATIONS
+from validation.mutations.study import study_mutations
+
+#: Names of what is measured by the clock.
+TIMES = {"created", "seconds", "parts", "measured", "stages", "times", "environment", "claims"}
+
+
+def without_times(data):
+    """Return a report without what the clock says, also names that end so."""
+    if isinstance(data, dict):
+        kept = {name: entry for name, entry in data.items() if name not in TIMES and not name.endswith(("_ms", "fps"))}
+        return {name: without_times(entry) for name, entry in kept.items()}
+    return [without_times(entry) for entry in data] if isinstance(data, list) else data
+
+
+@pytest.mark.slow
+@pytest.mark.claim("reports-from-clusters", tolerance="none: the same numbers, but for times")
+def test_a_report_from_a_cluster_says_the_same(tmp_path, monkeypatch, variant):
+    sizes = {"image": (32, 24), "timed": (32, 24), "checked": (16, 12)}
+    # No patience, which a busy machine would try; margins that some dozen batches decide.
+    margins = {"single-scatter": 0.02, "volpath": 0.2}
+    small = replace(EFFORTS["quick"], **sizes, margins=margins, patience=None, batches=64, seconds=0.01)
+    chosen = [configuration("shadow-planes"), configuration("ray-march")]
+
+    def report(name, cluster):
+        monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / f"cache-{name}"))
+        folder, scenes = tmp_path / name, ["sphere-spot"]
+        data = write_report(folder, scenes=scenes, effort=small, configurations=chosen, cluster=cluster)
+        images = {path.relative_to(folder): path.read_bytes() for path in folder.rglob("reference.exr")}
+        return without_times(json.loads(json.dumps(data))), images
+
+    alone, images = report("alone", None)
+    with connected(Place(2)) as cluster:
+        together, others = report("together", cluster)
+    assert together["scenes"][0]["agreement"] == alone["scenes"][0]["agreement"]
+    assert together == alone
+    assert len(images) == 1
+    assert others == images
+
+
+@pytest.mark.slow
+@pytest.mark.claim("reports-from-clusters", tolerance="none: the same numbers")
+def test_mutations_on_workers_are_those_seen_here(own_cache, variant):
+    some = [mutation for mutation in MUTATIONS if not mutation.wide][::45]
+    looked = []
+    with connected(Place(2)) as cluster:
+
+        def elsewhere(*asked):
+            looked.append(mutations_seen(cluster, *asked))
+            return looked[-1]
+
+        together = study_mutations(some, size=(8, 6), margin=0.3, elsewhere=elsewhere)
+    assert len(looked[0]) == 6  # no stage was left for this process
+    assert together == study_mutations(some, size=(8, 6), margin=0.3)

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""The errors that a method states for itself: what is further from the truth is a fault.
+
+What claims to be exact but for rounding, the kernel `exact` along whole rays where nothing casts a shadow and shadow
+planes in exact order, states three:
+
+* **Rounding** of the pixel, `ROUNDING` of it.
+* **Ends.** A lit interval ends at a surface, at the bounds of a medium or at a shadow plane, at a distance x that is
+  known to some units of float32. With s(x) the radiance that a metre of the ray scatters in full light, that is worth
+  x s(x) times `END`. It is little, but a ray may be lit along little: where it clips the edge of a medium by 37 um at
+  0.66 m, an error of 2.6 units changes its length, and all of its airlight, by 4e-3.
+* **Kinks.** The rules of the kernel have positive weights, and are exact for the smooth function that a tabulated phase
+  function stands for. It departs from the table by an eighth of the second difference of its values, so rule and
+  integral together err by two eighths of the largest second difference over the value.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.methods.registry import METHODS
+from realtime.scene.phase import Tabulated
+from realtime.scene.read_scene import Scene
+from reference.quadrature.segments import AMBIENT, camera_segments, optical_depth, scattering_range
+from reference.quadrature.surface import surface_hits
+from reference.scene.read import TruthMedium, TruthScene, read_truth
+from validation.configurations.methods import Configuration
+
+Array = NDArray[np.float64]
+
+#: The error of methods that claim rounding alone, relative to the pixel, or to a thousandth of the mean in the dark.
+ROUNDING = 1e-3
+
+END = 8 * 2.0**-24  #: uncertainty of the end of a lit interval, relative to its distance from the camera
+
+_SAMPLES = 256  # of a ray, about each light: what is scattered is smooth between them
+_RAYS = 1024  # at once: so many take some 100 MB
+_BETWEEN = 1.1  # times the largest of these no place scatters
+
+
+def stated_bound(chosen: Configuration, scene: Scene) -> float | None:
+    """Return the relative error that a method states for itself in a scene, ends left aside [1]; None for none.
+
+    Points in the place of lights with extent are an approximation.
+    """
+    defaults = METHODS[chosen.method].defaults if chosen.method in METHODS else {}
+    usual = all(defaults.get(name, value) == value for name, value in chosen.parameters if name != "map")
+    plain = usual and chosen.kernel == "exact" and not scene.area_lights
+    whole_rays = chosen.method in ("unshadowed", "light-volumes") and not scene.features.shadows
+    if not plain or not (chosen.method == "shadow-planes" or whole_rays):
+        return None
+    media = [scene.medium, *(bounded.medium for bounded in scene.medium.bounded_media)]
+    bound = ROUNDING + max(_kinks(medium.phase) for medium in media)
+    return bound if np.isfinite(bound) else None
+
+
+def _kinks(phase: Any) -> float:
+    """Return what the kinks of a phase function are worth, relative to the integral."""
+    if not isinstance(phase, Tabulated):
+        return 0.0
+    values = np.array(phase.values, dtype=np.float64)
+    neighbours = np.lib.stride_tricks.sliding_window_view(values, min(3, len(values)))
+    bends = np.abs(neighbours @ np.array([1, -2, 1])) if len(values) > 2 else np.zeros(1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(np.nan_to_num(0.25 * bends / neighbours.min(axis=1), posinf=np.inf).max())
+
+
+def worth_of_ends(scene: Any, pixels: NDArray[np.int64]) -> Array:
+    """Return what the uncertain ends of lit intervals are worth, (pixels, 3) [W/(m^2 sr)].
+
+    Parameters
+    ----------
+    scene
+        The `mi.Scene`.
+    pixels
+        Numbers of pixels, row by row.
+
+    Notes
+    -----
+    Valid for lights without extent. Wherever a ray may end: the largest x s(x) along it, whether it is lit there or
+    not.
+    """
+    whole = read_truth(scene)
+    parts = np.array_split(pixels, range(_RAYS, len(pixels), _RAYS))
+    return np.concatenate([_worth_of_ends(replace(whole, direction=whole.direction[part])) for part in parts])
+
+
+def _worth_of_ends(truth: TruthScene) -> Array:
+    """Return what the uncertain ends of the lit intervals of all rays of `truth` are worth, (rays, 3)."""
+    distance = surface_hits(truth).distance
+    worth = np.zeros((len(distance), 3))
+    for light in (*truth.lights, *truth.directional):
+        x = _places(truth, light, distance)
+        ray, column = np.nonzero(np.isfinite(x))
+        scattered = x[ray, column, None] * _scattered(truth, light, ray, x[ray, column], distance)
+        largest = np.zeros_like(worth)
+        np.maximum.at(largest, ray, scattered)
+        worth += largest
+    return _BETWEEN * END * worth
+
+
+def _places(truth: TruthScene, light: Any, distance: Array) -> Array:
+    """Return distances along rays, (rays, places) [m]: between the ends of segments, at these, and about the light."""
+    fraction = np.linspace(0, 1, _SAMPLES)[:, None]
+    places = [np.zeros((1, len(distance))), distance[None]]
+    if truth.media:
+        segments = camera_segments(truth, distance)
+        places += [segments.start, segments.end, 0.5 * (segments.start + segments.end)]
+    if hasattr(light, "position"):
+        toward = light.position - truth.origin
+        foot = truth.direction @ toward
+        height = np.linalg.norm(toward - foot[:, None] * truth.direction, axis=1)
+        first, last = np.arctan2(-foot, height), np.arctan2(distance - foot, height)
+        angle = first + fraction * (last - first)
+        places.append(np.where(angle < np.pi / 2 - 1e-6, foot + height * np.tan(angle), np.inf))
+    else:
+        low, high = scattering_range(segments)
+        places.append(low + fraction * (high - low))
+    return np.clip(np.concatenate(places), 0, distance).T
+
+
+def _scattered(truth: TruthScene, light: Any, ray: NDArray[np.int64], x: Array, distance: Array) -> Array:
+    """Return what a metre of rays scatters at distances x in the full light of one light, (n, 3) [W/(m^3 sr)]."""
+    direction = truth.direction[ray]
+    point = truth.origin + x[:, None] * direction
+    if hasattr(light, "position"):
+        leg = point - light.position
+        r = np.linalg.norm(leg, axis=1)
+        leg /= r[:, None]
+        arriving = light.intensity / (r * r)[:, None]
+        from_light = optical_depth(truth, light.position, leg, np.zeros(len(x)), r)
+    else:
+        leg = np.broadcast_to(light.direction, point.shape)
+        arriving = np.broadcast_to(light.irradiance, point.shape)
+        from_light = np.zeros_like(point)  # an upper bound
+    from_camera = optical_depth(truth, truth.origin, direction, np.zeros(len(x)), x)
+    kept = arriving * np.exp(-from_camera - from_light) / (4 * np.pi)
+    total = np.zeros_like(kept)
+    for medium, inside in _media(truth, ray, x, distance):
+        phase = medium.phase(np.clip(np.sum(leg * -direction, axis=1), -1, 1))
+        total += np.where(inside, phase, 0)[:, None] * medium.albedo * medium.sigma_t * kept
+    return total
+
+
+def _media(truth: TruthScene, ray: NDArray[np.int64], x: Array, distance: Array) -> list[tuple[TruthMedium, Any]]:
+    """Return media and which places are in them; a place at a bound is on either side of it."""
+    if not truth.media:
+        return [(truth.medium, np.ones(len(x), dtype=bool))]
+    segments = camera_segments(truth, distance)
+    slack = END * x
+    inside = [
+        (number[ray], (x >= start[ray] - slack) & (x <= end[ray] + slack) & (start[ray] < end[ray]))
+        for start, end, number in zip(segments.start, segments.end, segments.medium)
+    ]
+    numbers = [AMBIENT, *range(len(truth.media))]
+    media = [truth.medium, *truth.media]
+    return [
+        (medium, np.any([which & (of == number) for of, which in inside], axis=0))
+        for number, medium in zip(numbers, media, strict=True)
+    ]
