@@ -5,6 +5,28 @@
 command line treats both alike.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class InputError(ValueError):
     """Input that cannot be used. The message says in one line what was given, what is wanted and what to do."""
+
+
+@contextmanager
+def refusals() -> Iterator[None]:
+    """Raise an `InputError` as it was: Dr.Jit wraps what is raised in the body of a loop or a branch."""
+    try:
+        yield
+    except RuntimeError as error:
+        root = root_of(error)
+        if isinstance(root, InputError):
+            raise root from None
+        raise
+
+
+def root_of(error: BaseException) -> BaseException:
+    """Return what an exception was raised from first."""
+    while error.__cause__ is not None:
+        error = error.__cause__
+    return error

@@ -223,14 +223,15 @@ def _piece_integral(ray: MediaRay, piece: Piece, x0, x1):
     return dr.if_stmt(
         args=(x0, x1),
         cond=other_media_near(ray, number, x0, x1),
-        true_fn=lambda x0, x1: _integral(ray, piece, x0, x1),
+        true_fn=lambda x0, x1: _integral_past_spheres(ray, piece, x0, x1),
         false_fn=lambda x0, x1: medium_integral(segment, x0, x1),
     )
 
 
 def _integral_past_spheres(ray: MediaRay, piece: Piece, x0, x1):
-    """Integrate one segment between media, cut where legs graze spheres."""
-    cuts = [x for seen in ray.seen if seen.bounded_medium.planes is None for x in grazed_at(seen, ray)]
+    """Integrate one segment in one piece, cut where legs graze the spheres of other media."""
+    others = [seen for number, seen in enumerate(ray.seen) if number != piece.number]
+    cuts = [x for seen in others if seen.bounded_medium.planes is None for x in grazed_at(seen, ray)]
     if not cuts:
         return _integral(ray, piece, x0, x1)
 

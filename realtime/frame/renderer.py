@@ -25,7 +25,7 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.area_lights.points import LightPoints
-from realtime.errors import InputError
+from realtime.errors import InputError, refusals
 from realtime.frame.frame_view import frame_view
 from realtime.frame.layers import adaptive_layers, added, composed, image_passes
 from realtime.frame.light_on_ray import check_radiance
@@ -258,7 +258,8 @@ def _stages(
             view = replace(view, extra_layers=True)
 
         def layers_of(view):
-            layers = method.render(view, state, lists, kernel=with_tables(kernel, tables), parameters=chosen)
+            with refusals():
+                layers = method.render(view, state, lists, kernel=with_tables(kernel, tables), parameters=chosen)
             return layers if extra_layers else replace(layers, extra=None)
 
         layers = layers_of(view) if corners is None else adaptive_layers(layers_of, view, corners, tolerance)

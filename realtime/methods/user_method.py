@@ -22,7 +22,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from realtime.errors import InputError
+from realtime.errors import InputError, root_of
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.method import Method, always, never
 from realtime.methods.user_result import checked_layers, checked_radiance
@@ -255,9 +255,7 @@ def _own_errors(what: str, file: str | None = None) -> Iterator[None]:
         raise
     # The user's code may raise anything, and end the program: that is his to mend, never a failure of ours.
     except (Exception, SystemExit) as error:
-        root: BaseException = error
-        while root.__cause__ is not None:  # Dr.Jit wraps what is raised in the body of a loop
-            root = root.__cause__
+        root = root_of(error)  # Dr.Jit wraps what is raised in the body of a loop
         words = " ".join(str(root).split())
         raise InputError(f"{what}: {_place(root, error, file)}{type(root).__name__}: {words}") from error
 

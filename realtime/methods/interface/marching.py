@@ -57,12 +57,17 @@ def marched_integral(
 
 
 def within(media: LitRay, x0, x1) -> tuple[Any, Any]:
-    """Return the part of a segment [m] from the first to the last bounded medium."""
+    """Return the part of a segment [m] from the first to the last bounded medium; 0 and 0 where a ray meets none.
+
+    An endless ray that meets none would begin at infinity, where a map has no place and a step no length.
+    """
     first, last = x1, x0
     for piece in media.pieces:
         first = dr.minimum(first, piece.begin)
         last = dr.maximum(last, dr.select(dr.isfinite(piece.begin), piece.end, x0))
-    return dr.maximum(first, x0), dr.minimum(last, x1)
+    begin, end = dr.maximum(first, x0), dr.minimum(last, x1)
+    meets = end > begin
+    return dr.select(meets, begin, 0), dr.select(meets, end, 0)
 
 
 def _march(
@@ -106,9 +111,7 @@ def _march_parallel(view: View, media: LitRay, segment, *, steps: int, lit):
     """Sum equal steps of every ray under a directional light; see `_march`."""
     x0, x1 = segment
     Float = type(view.distance)
-    # Rays that miss all bounded media take steps of length 0: a map has no place for points at infinity.
-    meets = x1 > x0
-    x0, width = dr.select(meets, x0, 0), dr.select(meets, (x1 - x0) / steps, 0)
+    width = (x1 - x0) / steps
 
     def step(index, total):
         x = dr.fma(Float(index) + 0.5, width, x0)

@@ -120,6 +120,26 @@ def test_taylor_refuses_a_tabulated_phase_function(variant):
         evaluate(taylor, [row], "single")
 
 
+@pytest.mark.claim("refused-phase-functions")
+@pytest.mark.parametrize("method", ["unshadowed", "shadow-planes", "light-volumes"])
+def test_a_refusal_from_the_body_of_a_loop_stays_one(variant, method):
+    """Dr.Jit wraps what is raised there: `random:13` ended `airlight render` with a traceback."""
+    import mitsuba as mi
+
+    from realtime.frame.renderer import frame_renderer, render_frame
+    from realtime.kernels.registry import KERNELS
+    from realtime.methods.registry import METHODS
+    from realtime.scene.read_scene import read_scene
+    from tests.helpers.scenes import tiny_scene
+
+    entries = tiny_scene()
+    fog = entries["fog"] | {"phase": {"type": "tabphase", "values": "1.1, 0.4, 1.7"}}
+    block = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).scale(0.31)}
+    scene = read_scene(mi.load_dict(entries | {"fog": fog, "ball": block}))
+    with pytest.raises(InputError, match="no Taylor series"):
+        render_frame(frame_renderer(scene, METHODS[method], kernel=KERNELS["taylor"].function))
+
+
 @pytest.mark.parametrize("kernel_name", ["quadrature", "taylor"])
 def test_zero_length_segments_give_zero(variant, kernel_name):
     from realtime.kernels.registry import KERNELS

@@ -136,3 +136,18 @@ def test_the_kernel_is_asked_for_transitions_alone(variant):
     assert configuration("ray-march", "taylor", {"sum": "transitions"}).label == "ray-march (taylor, sum=transitions)"
     with pytest.raises(InputError, match="calls no kernel"):
         configuration("ray-march", "taylor")
+
+
+@pytest.mark.parametrize(
+    ("method", "parameters"),
+    [("ray-march", {"spacing": "uniform", "steps": 400}), ("soft-shafts", {"filter": "none", "steps": 400})],
+)
+def test_rays_that_meet_no_medium_and_no_surface_are_black(variant, method, parameters):
+    """Equal steps of an endless ray past all media had the length -inf: `random:19` was not finite in all pixels."""
+    ball = {"type": "sphere", "center": [0.2, 0.1, 0.7], "radius": 0.4}
+    scene = clear_scene(pearl=bounded_medium(ball, 0.9, (0.9, 0.4, 0.3)))
+    image = render(method, scene=scene, precision="single", **parameters)
+    wanted = render("unshadowed", scene=scene)
+    assert (wanted == 0).any()
+    assert (image[wanted == 0] == 0).all()
+    assert relative_rmse(image, wanted) < 1e-2
