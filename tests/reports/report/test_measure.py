@@ -242,7 +242,7 @@ def test_fresh_measures_again_and_finds_the_same_errors(written, variant, tmp_pa
 def test_a_changed_scene_is_measured_again(written, variant, tmp_path, monkeypatch, own_cache):
     """In a cache of its own: what it finds anew replaces what was kept."""
     multiple = written.data["scenes"][0]["multiple"]
-    monkeypatch.setattr("reports.report.scene.check_truth", lambda study, progress: {})
+    monkeypatch.setattr("reports.report.scene.check_truth", lambda study, progress, spread: {})
     monkeypatch.setattr("reports.report.scene.study_multiple", lambda study: multiple)
     path = tmp_path / "mine.xml"
     counts = []
