@@ -57,7 +57,7 @@ from realtime.bounded_media.panels import MediumSegment, medium_integral
 from realtime.bounded_media.ray_segments import MediaRay, Piece, grazed_at, light_leg, other_media_near, sum_over_pieces
 from realtime.bounded_media.views import light_views
 from realtime.errors import InputError
-from realtime.numerics.array_types import is_single, one_of
+from realtime.numerics.array_types import chosen_value, is_single
 from realtime.numerics.fast_exp import exp_bounded
 from realtime.numerics.gauss_legendre import unit_nodes
 from realtime.rays.ray_light import distance_to_light, falloff, ray_geometry, smooth_subsegments
@@ -296,7 +296,7 @@ def _sum_in_parts(nodes: Sequence[tuple[float, float]], part: Callable[[Sequence
     def body(turn, total):
         columns = [nodes[first::_AT_ONCE] for first in range(_AT_ONCE)]
         numbers = [[tuple(map(Float, values)) for values in zip(*column, strict=True)] for column in columns]
-        chosen = [tuple(one_of(turn, values) for values in pair) for pair in numbers]
+        chosen = [tuple(chosen_value(values, turn) for values in pair) for pair in numbers]
         return turn + 1, total + part(chosen)
 
     _, total = dr.while_loop(

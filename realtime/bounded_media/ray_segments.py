@@ -14,7 +14,7 @@ from realtime.bounded_media.convex_clip import Seen, inverse_crossings, near_lin
 from realtime.bounded_media.directional_legs import parallel_legs, seen_along
 from realtime.bounded_media.facet_walk import EntryPlanes, clear_of, line_crossings
 from realtime.bounded_media.views import MediumView, medium_view
-from realtime.numerics.array_types import one_of
+from realtime.numerics.array_types import chosen_value
 from realtime.rays.ray_light import RayGeometry, distance_to_light
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
@@ -85,7 +85,7 @@ def sum_over_pieces(pieces: tuple[Piece, ...], segments, integral, zero):
             cond=lambda number, total: number < len(segments),
             body=lambda number, total, piece=piece: (
                 number + 1,
-                added(total, piece, [one_of(number, ends) for ends in zip(*segments, strict=True)]),
+                added(total, piece, [chosen_value(ends, number) for ends in zip(*segments, strict=True)]),
             ),
             labels=("number", "total"),
         )

@@ -91,9 +91,9 @@ def largest(Float) -> float:
     return (2 - 2.0**-23) * 2.0**127 if is_single(Float) else (2 - 2.0**-52) * 2.0**1023
 
 
-def one_of(number, values):
-    """Return of some values, arrays of one type, the one of this number, counted from 0; by lane."""
+def chosen_value(values, number):
+    """Return the value of a number, counted from 0, which may differ between lanes; `values` are arrays of one type."""
     chosen, *others = values
-    for other, value in enumerate(others, 1):
-        chosen = dr.select(number == other, value, chosen)
+    for place, value in enumerate(others, 1):
+        chosen = dr.select(number == place, value, chosen)
     return chosen

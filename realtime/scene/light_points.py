@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lights with extent as light points: what methods render of them."""
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from realtime.area_lights.points import PlacedPoints, place_points
 from realtime.numerics.aligned import aligned_numbers
 from realtime.numerics.array_types import ArrayTypes, types_of
+from realtime.numerics.host_numbers import host_numbers
 from realtime.scene.lights import Facing, Light, with_low
 from realtime.scene.read_scene import Scene
+
+Array = NDArray[np.float64]
 
 
 def with_light_points(scene: Scene, points: int, pattern: str) -> Scene:
@@ -54,6 +59,28 @@ def light_points(scene: Scene, points: int, pattern: str) -> tuple[Light, ...]:
 def source_shape(scene: Scene, light: Light) -> str | None:
     """Return the name of the shape of a light point, which casts no shadow in it; None for other lights."""
     return None if light.source is None else scene.area_lights[light.source].name
+
+
+@dataclass(frozen=True)
+class HostLightPoints:
+    """Light points on the host, one a row, in float64."""
+
+    position: Array  #: (points, 3) [m]
+    normal: Array  #: unit normals, (points, 3)
+    across: Array  #: unit vectors across them, (points, 3)
+    lift: Array  #: how far before the shape rays start, (points, 1) [m]
+
+
+def read_light_points(points: Sequence[Light]) -> HostLightPoints:
+    """Bring light points to the host together, which waits for the device once."""
+    facing = [point.facing for point in points if point.facing is not None]
+    numbers = host_numbers(
+        *(point.position for point in points), *(own.normal for own in facing), *(own.lift for own in facing)
+    )
+    position, normal, lift = (np.stack(numbers[i * len(points) : (i + 1) * len(points)]) for i in range(3))
+    helper = np.where(np.abs(normal[:, :1]) < 0.5, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    across = np.cross(helper, normal)
+    return HostLightPoints(position, normal, across / np.linalg.norm(across, axis=1, keepdims=True), lift)
 
 
 def _points_of(placed: PlacedPoints, source: int, types: ArrayTypes) -> list[Light]:

@@ -395,7 +395,7 @@ class _Run:
             if not future.done():
                 self._client.cancel([future], force=True)
             future.release()
-        except Exception:
+        except Exception:  # Dask raises many kinds where the scheduler is gone, and what is let go of is not needed
             self._lost = self._lost or self._client.status != "running"
 
     def _settle(self, flown: _Flown) -> None:

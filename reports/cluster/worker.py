@@ -126,7 +126,7 @@ def _answer(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Answer:
         return Answer("done", function(*arguments))
     except (InputError, MethodError) as error:
         return Answer("refused", reason=str(error))
-    except Exception as error:
+    except Exception as error:  # whatever a task raises is its row's, not the end of the run
         place = traceback.extract_tb(error.__traceback__)[-1]
         words = " ".join(str(error).split())
         return Answer("failed", reason=f"{type(error).__name__}: {words} ({place.name}, line {place.lineno})")

@@ -5,7 +5,7 @@ A name may go on: `random:7:meshes=FOLDER` takes .obj and .ply files as casters 
 from other ranges. What is drawn where too little light reaches what the camera sees is drawn again.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from realtime.scene.mesh_adjacency import mesh_triangles
 from validation.random_scenes.draw import draw_scene
 from validation.random_scenes.drawn import AREA_KINDS, DrawnCaster, DrawnLight, DrawnMedium, DrawnScene
 from validation.random_scenes.ranges import Ranges, ranges_from, read_ranges
@@ -306,9 +307,7 @@ def _user_mesh(path: Path) -> Mesh:
         shape = mi.load_dict({"type": path.suffix.lower()[1:], "filename": str(path)})
     except Exception as error:  # Mitsuba raises RuntimeError for all bad input
         raise InputError(f"meshes: Mitsuba cannot read {path}: {' '.join(str(error).split())}") from error
-    parameters: Mapping[str, Any] = mi.traverse(shape)
-    vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
-    faces = np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
+    vertices, faces = mesh_triangles(shape)
     if not len(faces) or not np.isfinite(vertices).all():
         raise InputError(f"meshes: {path} has no triangles or numbers that are not finite; wanted a mesh")
     used = vertices[np.unique(faces)]

@@ -13,7 +13,7 @@ import mitsuba as mi
 
 from realtime.clouds.bounds.crossings import Crossing, next_crossing
 from realtime.clouds.bounds.surfaces import CloudSurfaces
-from realtime.numerics.array_types import Metres, PerRay
+from realtime.numerics.array_types import Metres, PerRay, chosen_value
 from realtime.scene.medium import Clouds
 
 KEPT = 4  #: stretches of a ray; of 480 000 camera rays of `stratocumulus` 0.1 % have more
@@ -36,13 +36,10 @@ class Stretches:
 
     def chosen(self, number: PerRay) -> tuple[Metres, Metres, PerRay]:
         """Return begin, end and cloud of a stretch by lane."""
-        parts = []
-        for values in (self.begins, self.ends, self.clouds or (mi.UInt32(0),)):
-            value = values[0]
-            for place, other in enumerate(values[1:], 1):
-                value = dr.select(number == place, other, value)
-            parts.append(value)
-        return tuple(parts)
+        begin, end, cloud = (
+            chosen_value(values, number) for values in (self.begins, self.ends, self.clouds or (mi.UInt32(0),))
+        )
+        return begin, end, cloud
 
 
 def first_stretches(

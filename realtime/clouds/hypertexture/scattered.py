@@ -24,9 +24,10 @@ import mitsuba as mi
 from realtime.clouds.bounds.crossings import optical_depths
 from realtime.clouds.bounds.surfaces import CloudSurfaces
 from realtime.clouds.hypertexture.march import OPAQUE, least, march, marched_depths, middle_density, voxel
-from realtime.clouds.single_scattering.march import Beam, CloudRays, chosen_value, scattered, step_light
+from realtime.clouds.single_scattering.march import Beam, CloudRays, scattered, step_light
 from realtime.clouds.single_scattering.opacity import add_printed, nothing_printed, printed_opacity
 from realtime.clouds.single_scattering.spacing import SPREAD
+from realtime.numerics.array_types import chosen_value
 from realtime.scene.medium import Clouds
 
 

@@ -29,6 +29,7 @@ from realtime.clouds.bounds.crossings import Crossing, optical_depths
 from realtime.clouds.bounds.stretches import Stretches, first_stretches, next_stretches
 from realtime.clouds.bounds.surfaces import CloudSurfaces
 from realtime.clouds.single_scattering.spacing import node_depth, node_share
+from realtime.numerics.array_types import chosen_value
 from realtime.scene.lights import Light
 from realtime.scene.medium import Clouds
 
@@ -227,11 +228,3 @@ def _step(depth, eye, leg, *, printed: bool):
     series = dr.fma(change, dr.fma(change, dr.fma(change, -1 / 24, 1 / 6), -0.5), 1)
     share = dr.select(change < _SERIES, series, (1 - dr.exp(-change)) / dr.maximum(change, _SERIES))
     return depth * dr.exp(-dr.minimum(first, last)) * share
-
-
-def chosen_value(values: tuple[Any, ...], number) -> Any:
-    """Return the value of a number, which may differ between lanes."""
-    chosen = values[0]
-    for place, value in enumerate(values[1:], 1):
-        chosen = dr.select(number == place, value, chosen)
-    return chosen

@@ -11,7 +11,7 @@ import numpy as np
 
 from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import four_numbers
-from realtime.numerics.host_numbers import host_numbers
+from realtime.scene.light_points import read_light_points
 from realtime.scene.lights import Facing, Light
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps, LightFrame, cast_hemisphere_maps
 
@@ -66,17 +66,11 @@ def tabulated(lights: Sequence[Light]) -> tuple[LightPointTable, ...]:
 
 def _table(source: int, points: list[Light]) -> LightPointTable:
     Float = type(points[0].position.x)
-    facing = [light.facing for light in points if light.facing is not None]
-    read = host_numbers(
-        *(own.normal for own in facing), *(light.position for light in points), *(own.lift for own in facing)
-    )
-    normals, positions, lifts = (np.stack(read[i * len(points) : (i + 1) * len(points)]) for i in range(3))
-    helper = np.where(np.abs(normals[:, :1]) < 0.5, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    across = np.cross(helper, normals)
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    read = read_light_points(points)
 
     def rows(vectors: Any, last: Any) -> Any:
         return aligned_array(Float, np.hstack([vectors, last]).ravel())
 
     nothing = np.zeros((len(points), 1))
-    return LightPointTable(source, len(points), rows(positions, lifts), rows(normals, nothing), rows(across, nothing))
+    places, normals, across = rows(read.position, read.lift), rows(read.normal, nothing), rows(read.across, nothing)
+    return LightPointTable(source, len(points), places, normals, across)

@@ -12,7 +12,7 @@ import numpy as np
 
 from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import types_of
-from realtime.numerics.host_numbers import host_numbers
+from realtime.scene.light_points import read_light_points
 from realtime.scene.lights import Light
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps, LightFrame, cast_hemisphere_maps
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
@@ -36,14 +36,8 @@ def source_state(
     if lights[0].facing is None:
         maps = cast_shadow_map(scene, lights[0], size) if with_maps else None
         return SourceState(None, dr.opaque(Float, 0, 1), True, maps)
-    facing = [light.facing for light in lights if light.facing is not None]
-    numbers = host_numbers(
-        *(light.position for light in lights), *(own.normal for own in facing), *(own.lift for own in facing)
-    )
-    positions, normals, lift = (np.stack(numbers[i * len(lights) : (i + 1) * len(lights)]) for i in range(3))
-    helper = np.where(np.abs(normals[:, :1]) < 0.5, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    across = np.cross(helper, normals)
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    read = read_light_points(lights)
+    positions, normals = read.position, read.normal
     Vector = types_of(Float).vector
 
     def lanes(rows: Any) -> Any:
@@ -51,10 +45,10 @@ def source_state(
 
     frames = LightFrame(
         lanes(positions),
-        lanes(across),
-        lanes(np.cross(normals, across)),
+        lanes(read.across),
+        lanes(np.cross(normals, read.across)),
         lanes(normals),
-        aligned_array(Float, lift[:, 0]),
+        aligned_array(Float, read.lift[:, 0]),
     )
     # Of a square of the side L the mean square distance from the middle is L^2 / 6.
     spread = np.mean(np.sum((positions - positions.mean(axis=0)) ** 2, axis=1))

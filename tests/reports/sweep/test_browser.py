@@ -10,14 +10,8 @@ from reports.sweep.figures import drawn
 from reports.sweep.page import render_sweep
 from reports.sweep.read import FILE, read_sweep
 from reports.sweep.summary import summary_of
-from tests.helpers.browser import chromium, watched
+from tests.helpers.browser import watched
 from tests.helpers.sweeps import faulty_rows, write_rows
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as launched:
-        yield launched
 
 
 @pytest.fixture(scope="module")

@@ -4,15 +4,9 @@
 import pytest
 
 from reports.page.render import render_page
-from tests.helpers.browser import chromium, watched
+from tests.helpers.browser import watched
 from tests.helpers.page import engine_image, report_data, write_files
 from tests.helpers.published import BILLETER, BIRI, MUTATIONS, STABILITY
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as launched:
-        yield launched
 
 
 @pytest.fixture(scope="module")

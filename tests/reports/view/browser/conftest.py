@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.helpers.browser import chromium, watched
+from tests.helpers.browser import watched
 
 ROOT = Path(__file__).resolve().parents[4]
 
@@ -42,12 +42,6 @@ def changed(page, do):
         "+document.documentElement.dataset.told > told",
         arg=[frame, told],
     )
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as launched:
-        yield launched
 
 
 @pytest.fixture(scope="module")
