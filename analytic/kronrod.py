@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The Gauss-Kronrod pair of 10 and 21 nodes, as in QUADPACK's qk21 (Piessens et al. 1983).
+"""Two Gauss-Kronrod pairs: of 10 and 21 nodes, as in QUADPACK's qk21 (Piessens et al. 1983), and of 3 and 7 nodes.
 
-Every second node, from the second on, is one of Gauss's ten, so one evaluation of 21 values gives two integrals: the
-rule of Kronrod is exact for polynomials up to degree 31, the rule of Gauss up to degree 19.
+Every second node of Kronrod, from the second on, is one of Gauss's, so one evaluation gives two integrals. The rules of
+Kronrod with 21 and 7 nodes are exact for polynomials up to degree 31 and 11, those of Gauss up to degree 19 and 5.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import NDArray
 
 _HALF_NODES = (
     0.995657163025808080735527280689003,
@@ -38,11 +41,37 @@ _HALF_GAUSS = (
     0.269266719309996355091226921569469,
     0.295524224714752870173892994651338,
 )
-#: The 21 nodes of Kronrod on [-1, 1], in increasing order.
-NODES = np.concatenate([-np.array(_HALF_NODES), [0.0], _HALF_NODES[::-1]])
-_KRONROD = np.concatenate([_HALF_KRONROD, [0.149445554002916905664936468389821], _HALF_KRONROD[::-1]])
-_GAUSS = np.zeros(21)
-_GAUSS[1:10:2] = _HALF_GAUSS
-_GAUSS[11:20:2] = _HALF_GAUSS[::-1]
-#: Weights of both rules at these nodes, of shape (21, 2).
-KRONROD_AND_GAUSS = np.stack([_KRONROD, _GAUSS], axis=1)
+_HALF_NODES_OF_7 = (
+    0.960491268708020283423507092629080,
+    0.774596669241483377035853079956480,
+    0.434243749346802558002071502844628,
+)
+_HALF_KRONROD_OF_7 = (
+    0.104656226026467265193823857192073,
+    0.268488089868333440728569280666710,
+    0.401397414775962222905051818618432,
+)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A rule of Kronrod and the rule of Gauss whose nodes are among its own."""
+
+    nodes: NDArray[np.float64]  #: of Kronrod, on [-1, 1], in increasing order, (n,)
+    weights: NDArray[np.float64]  #: of Kronrod and of Gauss at these nodes, (n, 2)
+
+
+def _pair(half_nodes: tuple, half_kronrod: tuple, middle: float, half_gauss: tuple, gauss_middle: float) -> Pair:
+    """Return a pair from what lies left of the middle, and the weights there."""
+    half = np.zeros(len(half_nodes))
+    half[1::2] = half_gauss
+    kronrod = np.concatenate([half_kronrod, [middle], half_kronrod[::-1]])
+    gauss = np.concatenate([half, [gauss_middle], half[::-1]])
+    nodes = np.concatenate([-np.array(half_nodes), [0.0], half_nodes[::-1]])
+    return Pair(nodes, np.stack([kronrod, gauss], axis=1))
+
+
+#: 10 and 21 nodes.
+WIDE = _pair(_HALF_NODES, _HALF_KRONROD, 0.149445554002916905664936468389821, _HALF_GAUSS, 0.0)
+#: 3 and 7 nodes.
+NARROW = _pair(_HALF_NODES_OF_7, _HALF_KRONROD_OF_7, 0.450916538658474142345110087045571, (5 / 9,), 8 / 9)

@@ -63,6 +63,7 @@ def sum_panels(
     evaluate: Callable[[Index, Array, Array], Panels],
     owner: Index,
     count: int,
+    rtol: float = RTOL,
 ) -> tuple[Array, Array]:
     """Halve panels until all rays meet the tolerance, or only rounding is left, and add up those of each ray.
 
@@ -76,6 +77,8 @@ def sum_panels(
         The ray of each piece, from 0 on.
     count
         Number of rays.
+    rtol
+        Relative tolerance of the sum of each ray [1].
 
     Returns
     -------
@@ -86,7 +89,7 @@ def sum_panels(
     panels = evaluate(*first)
     for _ in range(_HALVINGS):
         ray = owner[panels.piece]
-        allowed = RTOL * sums_of(ray, panels.value, count)
+        allowed = rtol * sums_of(ray, panels.value, count)
         missed = sums_of(ray, panels.error, count) > allowed
         share = allowed / np.maximum(np.bincount(ray, minlength=count), 1)[:, None]
         halve = np.any(missed[ray] & (panels.error > share[ray]) & (panels.error > panels.noise), axis=1)

@@ -31,7 +31,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.kronrod import KRONROD_AND_GAUSS, NODES
+from analytic.kronrod import WIDE
 from reference.quadrature.adaptive_panels import Panels, first_panels, sum_panels
 from reference.quadrature.pieces import Crossed, Pieces, cut_pieces
 from reference.quadrature.segments import Segments, polygon_corners
@@ -185,8 +185,8 @@ class _Sum:
         for first in range(0, len(piece), _PANELS):
             block = slice(first, first + _PANELS)
             rows, half = piece[block], 0.5 * width[block]
-            depth = self.depth(rows, start[block, None] + half[:, None] * (1 + NODES))
-            integral = np.einsum("mnc,nk->kmc", np.exp(-depth), KRONROD_AND_GAUSS)
+            depth = self.depth(rows, start[block, None] + half[:, None] * (1 + WIDE.nodes))
+            integral = np.einsum("mnc,nk->kmc", np.exp(-depth), WIDE.weights)
             both[:, block] = integral * half[:, None] * self.factor[rows]
             noise[block] = _EPS * (16 + depth[:, 10]) * np.abs(both[0, block])
         return Panels(piece, start, width, both[0], np.abs(both[0] - both[1]), noise)

@@ -62,14 +62,14 @@ def light_airlight(
     how
         What `reference.visibility.lit_intervals.lit_intervals` takes to find the lit intervals.
     tolerance
-        `rtol` of the integrals in one unbounded medium.
+        `rtol` of the integrals; by default, what `sum_intervals` and `sum_media` take.
     """
     reaches = lit_rays(truth, light, distance, how)
     rays, lit, segments = reaches.rays, reaches.lit, reaches.segments
     if segments is None:
         radiance, bound = sum_intervals(truth.medium, light, rays, lit, shadow_scale, **tolerance)
     else:
-        radiance, bound = sum_media(truth, light, rays, lit, segments, shadow_scale=shadow_scale)
+        radiance, bound = sum_media(truth, light, rays, lit, segments, shadow_scale=shadow_scale, **tolerance)
     in_front = (rays.foot > 0) & (rays.foot < distance)
     angle = np.where(in_front, np.arctan2(rays.height, rays.foot), np.pi)
     bound += _worth_of_doubt(light, rays, lit, truth)

@@ -59,6 +59,7 @@ class Pieces:
     first: NDArray[np.bool_]  #: whether it begins where a lit interval does, (n,)
     last: NDArray[np.bool_]  #: whether it ends where a lit interval does, (n,)
     depth: Array  #: optical depth between camera and x0, (n, 3) [1]
+    part: Index  #: number of the part of a lit interval in one medium that the piece was cut from, (n,)
 
     def __getitem__(self, rows) -> "Pieces":
         return Pieces(*(getattr(self, f.name)[rows] for f in fields(self)))
@@ -98,7 +99,7 @@ def _parts(setup: Crossed, ray: Index, x0: Array, x1: Array, foot: Array | None)
         reach = np.maximum(low, foot[ray]) + _UNDERFLOW / sigma_t[sigma_t > 0].min()
         high = np.where(np.isinf(high), reach, high)
     order = np.lexsort((low, ray))
-    return Pieces(ray, number, low, high, first, last, np.zeros((len(ray), 3)))[order]
+    return Pieces(ray, number, low, high, first, last, np.zeros((len(ray), 3)), np.arange(len(ray)))[order]
 
 
 def _cut(setup: Crossed, parts: Pieces, ray: Index, x: Array) -> Pieces:
@@ -130,5 +131,6 @@ def _cut(setup: Crossed, parts: Pieces, ray: Index, x: Array) -> Pieces:
         parts.first[owner] & begin,
         parts.last[owner] & ends,
         depth,
+        owner,
     )
     return pieces[end > start]

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.bounded import kinks
+from reference.quadrature.bounded import smooth_pieces
 from reference.quadrature.light_airlight import lit_rays
-from reference.quadrature.pieces import Setup, cut_pieces
+from reference.quadrature.pieces import Setup
 from reference.quadrature.unbounded import lit_stretches
 from reference.scene.read import TruthLight, TruthScene
 from reference.visibility.spot_cone import falloff
@@ -56,7 +56,7 @@ def point_nodes(
         x1 = np.where(np.isinf(x1), np.maximum(x0, rays.foot[ray]) + _reach(truth), x1)
     else:
         setup = Setup(truth, rays.direction, reach.segments, light, rays, 1.0, reach.lit.edge)
-        pieces = cut_pieces(setup, (ray, x0, x1), kinks(setup, np.unique(ray)), rays.foot)
+        pieces, _ = smooth_pieces(setup, (ray, x0, x1))
         # The truth counts media with bounds from 0 and calls what surrounds them -1.
         ray, x0, x1, medium = pieces.ray, pieces.x0, pieces.x1, pieces.medium + 1
     foot, s0, s1 = rays.foot[ray], x0 - rays.foot[ray], x1 - rays.foot[ray]

@@ -8,6 +8,9 @@ from tests.helpers.volpath import assert_volpath_agrees
 STEPS = 200_000
 HG = {"phase": {"type": "hg", "g": 0.6}}
 TABLE = {"phase": {"type": "tabphase", "values": "0.5, 0.2, 0.4, 1.7"}}
+FINE_TABLE = {
+    "phase": {"type": "tabphase", "values": ", ".join(f"{1 + (7 * i % 11) / (1 + i % 5)}" for i in range(257))}
+}
 
 
 def truth_and_image(scene, **settings):
@@ -91,6 +94,7 @@ def midpoint_airlight(truth, light, pixel, *, shadow_scale=1.0, end=np.inf):
 CASES = {
     "box": lambda: clear_scene(size=(12, 9), brick=brick()),
     "ball": lambda: clear_scene(size=(12, 9), pearl=pearl(**HG)),
+    "a table of 257 values": lambda: clear_scene(size=(12, 9), brick=brick(**FINE_TABLE), pearl=pearl(1.3)),
     "two, lamp beside": lambda: clear_scene(size=(12, 9), brick=brick(**TABLE), pearl=pearl(**HG)),
     "two, one in the light of the other": lambda: clear_scene(
         size=(12, 9),

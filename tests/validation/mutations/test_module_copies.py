@@ -37,9 +37,9 @@ def test_what_does_not_lead_to_the_change_is_shared():
 
 
 def test_imports_inside_functions_are_served_too():
-    source = "def ask():\n    from analytic.kronrod import NODES\n    return NODES\n"
+    source = "def ask():\n    from analytic.kronrod import WIDE\n    return WIDE\n"
     copies = ModuleCopies("analytic.panels", source, ("analytic.panels",))
-    assert copies["analytic.panels"].ask() is sys.modules["analytic.kronrod"].NODES
+    assert copies["analytic.panels"].ask() is sys.modules["analytic.kronrod"].WIDE
     changed = "from analytic.errors import InputError\n"
     copies = ModuleCopies("analytic.errors", "InputError = 'changed'\n", ("analytic.errors",))
     assert imported_modules(changed) == {"analytic.errors"}
