@@ -128,8 +128,9 @@ def distance_to_light(geometry: RayGeometry, x):
 def smooth_subsegments(geometry: RayGeometry, light: Light, x0, x1):
     """Cut [x0, x1] [m] where a soft spot's `falloff` has kinks, at the cone of the beam; one piece for other lights.
 
-    A ray that misses the beam is cut where it is closest to the axis: the closer it passes, the more like a kink.
-    Valid for any segment.
+    A ray that misses the beam is cut where it is closest to the axis: the closer it passes, the more like a kink. Of an
+    endless ray that stays in the beam the last piece, which is empty, lies at its beginning: at infinity kernels would
+    multiply 0 by infinity. Valid for any segment.
     """
     if light.beam is None:
         return [(x0, x1)]
@@ -138,7 +139,8 @@ def smooth_subsegments(geometry: RayGeometry, light: Light, x0, x1):
     closest = dr.clip(geometry.foot + dr.select(crosses, geometry.slide / geometry.slant, 0), x0, x1)
     misses = crosses & (inner0 >= inner1)
     inner0, inner1 = dr.select(misses, closest, inner0), dr.select(misses, closest, inner1)
-    return [(x0, inner0), (inner0, inner1), (inner1, x1)]
+    stays = dr.isinf(inner1)
+    return [(x0, inner0), (inner0, inner1), (dr.select(stays, x0, inner1), dr.select(stays, x0, x1))]
 
 
 def _clip(enter, leave, x0, x1):

@@ -289,3 +289,41 @@ def test_soft_spots_against_the_truth(variant, cutoff, beam):
     value = np.array(airlight_integral(exact, rays, single.scalar(0), single.scalar(9.0), medium=medium, light=light))
     bright = expected > 1e-2 * expected.max()  # of dim rays rounding of their own directions shows
     assert np.max(np.abs(value[bright] / expected[bright] - 1)) < 1e-4
+
+
+SOFT = ("exact", "quadrature", "quadrature-theta", "taylor", "taylor-printed", "equiangular", "uniform", "polynomial")
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+@pytest.mark.parametrize("name", SOFT)
+def test_endless_rays_that_stay_in_the_beam_of_a_soft_spot(variant, name, precision):
+    """The piece behind the beam is empty and at infinity: values were not finite in five of 440 random scenes.
+
+    Expected: the truth, without a weight in the beam, to what each kernel is known for. Uniform steps have no end.
+    """
+    from analytic.panels import airlight_segments
+    from analytic.phase import PhaseFunction
+    from realtime.kernels.registry import KERNELS, airlight_integral
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import ray_geometry
+    from realtime.scene.medium import Medium
+
+    rng = np.random.default_rng(7)
+    count = 200
+    types = array_types(precision)
+    origin = np.stack([*(0.03 * rng.normal(size=(2, count))), -rng.uniform(1.0, 2.0, count)])
+    aim = np.stack([*(0.1 * rng.normal(size=(2, count))), -np.ones(count)])
+    direction = aim / np.linalg.norm(aim, axis=0)
+    light = soft_spot(types, 40, 25)
+    vectors = (types.vector(*(aligned_array(types.scalar, row) for row in v)) for v in (origin, direction))
+    rays = ray_geometry(*vectors, light)
+    assert np.all(np.isinf(np.array(rays.beam_leave)))
+    medium = Medium((types.scalar(0.31),), types.color(1), phase_of("isotropic", 0, types))
+    far = types.scalar(np.inf)
+    value = np.array(airlight_integral(KERNELS[name].function, rays, types.scalar(0), far, medium=medium, light=light))
+    foot, height = -np.sum(origin * direction, axis=0), np.linalg.norm(np.cross(origin.T, direction.T), axis=1)
+    expected, _ = airlight_segments(foot, height, 0.0, np.inf, 0.31, PhaseFunction("isotropic"))
+    assert np.all(np.isfinite(value))
+    known = {"exact": 1e-5, "quadrature": 1e-4, "quadrature-theta": 1e-2, "equiangular": 0.1}
+    if name in known:
+        assert value == pytest.approx(expected, rel=known[name])
