@@ -9,6 +9,7 @@ Read in this order:
 - `estimators.py`: Monte Carlo estimators at equal error
 - `octaves.py`: the constants of cloud-octaves that fit best
 - `scaling.py`: what methods cost as their work grows
+- `interpolation.py`: how many rays an image needs between tiles, and along epipolar lines
 - `diagnosis.py`: planted faults and what a diagnosis answers
 
 May import: `analytic`, `realtime.errors`, `realtime.kernels`, `realtime.scene`, `reference.storage`, `reports.data`,

@@ -10,13 +10,16 @@ import typer
 _SIZE = (800, 600)
 
 
-def print_scaling(names: list[str] | None, kinds: str, *, size, chosen, json: bool, markdown: bool) -> None:
-    """Print times, memory and exponents by the work; exit status 1 if a time jumps."""
+def print_scaling(
+    names: list[str] | None, kinds: str, *, size, chosen, against: Path | None, json: bool, markdown: bool
+) -> None:
+    """Print times, memory and exponents by the work; exit status 1 if a time jumps or grows faster than it did."""
     from analytic.errors import InputError
+    from reports.data.serialize import scaling_data
     from reports.machine.environment import activate, describe_environment
     from reports.machine.printing import print_heading, print_tables
     from reports.machine.progress import counted, part_of, progress_bar
-    from reports.tables.scaling import cliffs, scaling_tables
+    from reports.tables.scaling import cliffs, grown, scaling_tables
     from reports.tables.terminal import print_json
     from validation.scaling.ladders import KINDS, ladder
     from validation.scaling.study import study_scaling
@@ -25,6 +28,7 @@ def print_scaling(names: list[str] | None, kinds: str, *, size, chosen, json: bo
     for kind in wanted:
         if kind not in KINDS:
             raise InputError(f"--scaling: got {kind!r}, wanted some of {','.join(KINDS)}")
+    earlier = _earlier(against, names or ["colonnade"])
     activate()
     pixels = size or _SIZE
     # Scenes that have nothing of a kind are refused before an hour of work, not after.
@@ -33,27 +37,43 @@ def print_scaling(names: list[str] | None, kinds: str, *, size, chosen, json: bo
     with progress_bar("bench --scaling") as progress:
         for number, (name, kind, steps) in enumerate(ladders):
             part = part_of(progress, number / len(ladders), (number + 1) / len(ladders))
-            records += [
-                _record(name, pixels, found) for found in study_scaling(kind, steps, chosen, progress=counted(part))
-            ]
+            found = study_scaling(kind, steps, chosen, progress=counted(part))
+            records += [scaling_data(name, pixels, each) for each in found]
     if json:
         print_json({"environment": describe_environment(), "scaling": records})
     else:
         if markdown:
             print_heading()
         print_tables(scaling_tables(records), as_markdown=markdown)
-    jumps = cliffs(records)
-    for jump in jumps:
-        print(f"airlight: {jump}", file=sys.stderr)
-    if jumps:
+    faults = [*cliffs(records), *grown(earlier, records)]
+    for fault in faults:
+        print(f"airlight: {fault}", file=sys.stderr)
+    if faults:
         raise typer.Exit(1)
 
 
-def _record(name: str, size: tuple[int, int], found) -> dict[str, Any]:
-    from dataclasses import asdict
+def _earlier(against: Path | None, names: list[str]) -> list[dict[str, Any]]:
+    """Return the records of an earlier run: of the file that the user names, or the baselines of built-in scenes.
 
-    from validation.metrics.errors import plain
+    A baseline is what `airlight bench SCENE --scaling size,triangles,lights,map --json` printed once.
+    """
+    from analytic.errors import InputError
+    from reports.data.json_files import read_json
+    from validation.frames.baseline_files import FOLDER
 
-    values = plain(asdict(found))
-    del values["configuration"]
-    return {"scene": Path(name).stem, "size": list(size), "label": found.configuration.label} | values
+    if against is None:
+        kept = [FOLDER / "scaling" / f"{name}.json" for name in names]
+        files = [path for path in kept if path.is_file()]
+    else:
+        files = [against]
+    records = []
+    for path in files:
+        data = read_json(path, "what `bench --scaling --json` printed, or a report.json of `report --full`")
+        found = data.get("scaling") if isinstance(data, dict) else None
+        if not isinstance(found, list) or not found:
+            raise InputError(
+                f"{path}: it holds no `scaling`; wanted what `bench --scaling --json` printed, or a report.json of "
+                "`report --full`"
+            )
+        records += found
+    return records

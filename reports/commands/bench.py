@@ -10,6 +10,7 @@ import typer
 from reports.bench.decompose import print_decomposition
 from reports.bench.diagnosis import print_diagnoses
 from reports.bench.estimators import print_estimators
+from reports.bench.interpolation import print_interpolation
 from reports.bench.kernels import print_gradients, print_kernels
 from reports.bench.methods import print_methods, steps
 from reports.bench.octaves import print_octave_fits
@@ -87,11 +88,18 @@ def bench(
             show_default=False,
         ),
     ] = None,
+    interpolation: Annotated[
+        bool,
+        typer.Option(
+            "--interpolation", help="Count the rays of interpolated images, between tiles and along epipolar lines."
+        ),
+    ] = False,
     against: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="With --fit-octaves: the truth, an EXR with the layer airlight; that of cloud-paths by default.",
+            help="With --scaling: what its --json printed before; the baseline of the scene by default. With "
+            "--fit-octaves: the truth, an EXR with the layer airlight; that of cloud-paths by default.",
             show_default=False,
         ),
     ] = None,
@@ -134,7 +142,11 @@ def bench(
     many pixels a search is far from its end; parameters come by --set.
 
     --scaling prints times, memory and exponents by pixels, triangles, lights, bounded media or texels of the map, of
-    colonnade and one configuration of each method with shadows by default. Exit status 1 if a time jumps.
+    colonnade and one configuration of each method with shadows by default. Exit status 1 if a time jumps, or grows with
+    a higher power of the work than in the baseline.
+
+    --interpolation prints with how many rays an image of colonnade by shadow-planes, or of other scenes and methods, is
+    within 0.1 % where its airlight is interpolated between tiles or along epipolar lines.
 
     --decompose prints by which causes each image is wrong: parts that add up to its error, differences of renders in
     which one cause after the other is gone.
@@ -147,8 +159,8 @@ def bench(
         raise InputError("--output: got a folder without --decompose, which alone writes images; add --decompose")
     scenes = drawn_from(scenes or [], meshes, ranges) or None
     named_kernels = named("--kernel", kernel, "--kernel", None)
-    if against is not None and not octaves:
-        raise InputError("--against: got an image without --fit-octaves, which alone takes one; add --fit-octaves")
+    if against is not None and not octaves and scaling is None:
+        raise InputError("--against: got a file without --scaling or --fit-octaves, which take one; add one of them")
     if octaves:
         print_octave_fits(scenes, size=size, against=against, settings=settings, json=json, markdown=markdown)
         return
@@ -189,13 +201,16 @@ def bench(
         named("--method", method, "--methods", methods),
         named_kernels,
         settings or [],
-        usual=None if scaling is None else METHODS,
+        usual=METHODS[:1] if interpolation else None if scaling is None else METHODS,
         limit=method_limit,
     )
     apart = partial(in_own_process, limit=method_limit)
     pixels = parse_size(size) if size else None
     if scaling is not None:
-        print_scaling(scenes, scaling, size=pixels, chosen=chosen, json=json, markdown=markdown)
+        print_scaling(scenes, scaling, size=pixels, chosen=chosen, against=against, json=json, markdown=markdown)
+        return
+    if interpolation:
+        print_interpolation(scenes, size=pixels, chosen=chosen, json=json, markdown=markdown)
         return
     activate()
     names = scenes or list(FOG_SCENES)

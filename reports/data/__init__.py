@@ -12,5 +12,5 @@ Read in this order:
 - `reader.py`: reads a report back, checks it, draws its page again
 
 May import: `analytic`, `realtime.scene`, `reference.quadrature`, `reference.storage`, `reports.page`, `reports.tables`,
-`validation.comparison`, `validation.frames`, `validation.metrics`.
+`validation.comparison`, `validation.frames`, `validation.metrics`, `validation.scaling`.
 """

@@ -9,6 +9,7 @@ A claim is {"kind", "text", "good"}: `good` is true or false for what is a verdi
     failed         values that are not finite or negative, lit intervals on which shadow rays disagree
     published      values that are negative or not finite in what reproduces a paper, errors included: no failures
     refused        which method refuses which scene
+    growth         whether a time jumps as the work grows
     not-measured   what was left out for its time, HDR-FLIP that could not be computed
 """
 
@@ -18,6 +19,7 @@ from typing import Any
 
 from reports.tables.agreement import verdict, worst_interval
 from reports.tables.peers import published_as
+from reports.tables.scaling import WORK, cliffs
 
 Claim = dict[str, Any]
 Scenes = Sequence[Mapping[str, Any]]
@@ -47,6 +49,16 @@ def unstudied(names: Sequence[str], known: Sequence[str]) -> list[Claim]:
         "A scene that is named is studied, `--full` has all."
     )
     return [_claim("not-measured", text)]
+
+
+def growth_claims(records: Sequence[Mapping[str, Any]]) -> list[Claim]:
+    """Return the claims that follow from how times grow, the records of `scaling`."""
+    if not records:
+        return []
+    jumps = [_claim("growth", f"A time jumps: {jump}.", good=False) for jump in cliffs(records)]
+    scenes = " and ".join(dict.fromkeys(record["scene"] for record in records))
+    kinds = ", ".join(dict.fromkeys(WORK[record["kind"]] for record in records))
+    return jumps or [_claim("growth", f"No time of a frame of {scenes} jumps as the work grows: {kinds}.", good=True)]
 
 
 def confirmed(scenes: Scenes) -> bool:

@@ -4,6 +4,7 @@
 docs/report-schema.md explains every key of the schema "airlight-report/2". NaN becomes null.
 """
 
+from pathlib import Path
 from typing import Any
 
 from realtime.scene.features import describe
@@ -13,6 +14,7 @@ from validation.frames.baseline_files import read_baseline
 from validation.frames.benchmark import Measurement, knows_shadows
 from validation.frames.scene_study import SceneStudy
 from validation.metrics.errors import plain
+from validation.scaling.study import Scaling
 
 
 def scene_facts(study: SceneStudy) -> dict[str, Any]:
@@ -67,6 +69,7 @@ def measurement_data(measured: Measurement) -> dict[str, Any]:
         "left_out": measured.left_out,
         "note": measured.note,
         "times": plain(measured.times),
+        "memory": measured.memory,
         "error": plain(measured.error),
         "surface_error": plain(measured.surface_error),
         "flip": measured.flip.to_json() if measured.flip else None,
@@ -104,3 +107,10 @@ def mutations_data(study: Any) -> dict[str, Any]:
         "passed": study.passed,
         "results": plain(study.results),
     }
+
+
+def scaling_data(name: str, size: tuple[int, int], found: Scaling) -> dict[str, Any]:
+    """Return how a method grows with one kind of work, in a scene with images of a size [pixels]."""
+    shown = {"scene": Path(name).stem, "size": list(size), "label": found.configuration.label, "kind": found.kind}
+    growth = {time: plain(of_time) for time, of_time in found.growth.items()}
+    return shown | {"costs": plain(found.costs), "growth": growth, "refused": found.refused}

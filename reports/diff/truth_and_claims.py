@@ -7,6 +7,8 @@ from reports.data.claims import confirmed
 from reports.diff.finding import Finding, Report
 from reports.tables.agreement import verdict
 from reports.tables.methods import TARGETS, fastest_within
+from reports.tables.scaling import TIMES, WORK, same_records
+from validation.statistics.noise import other_power
 
 
 def compare_truth(old: Report, new: Report, gone: str) -> Iterator[Finding]:
@@ -33,6 +35,7 @@ def compare_claims(old: Report, new: Report) -> Iterator[Finding]:
     yield from _claims(old, new)
     yield from _stability(old, new)
     yield from _mutations(old, new)
+    yield from _growth(old, new)
 
 
 def _claims(old: Report, new: Report) -> Iterator[Finding]:
@@ -66,6 +69,16 @@ def _mutations(old: Report, new: Report) -> Iterator[Finding]:
     before, after = ((entry["count"] - entry["caught"]) for entry in (old["mutations"], new["mutations"]))
     if before != after:
         yield Finding("worse" if after > before else "better", "", "", "faults that nothing catches", before, after)
+
+
+def _growth(old: Report, new: Report) -> Iterator[Finding]:
+    """Compare the powers of the work with which times grow."""
+    for before, after in same_records(old.get("scaling", ()), new.get("scaling", ())):
+        for name, growth in after["growth"].items():
+            if other_power(before["growth"][name], growth):
+                was, is_now = before["growth"][name]["exponent"], growth["exponent"]
+                what = f"the power of the {WORK[after['kind']]} with which {TIMES[name]} grows"
+                yield Finding("worse" if is_now > was else "better", after["scene"], after["label"], what, was, is_now)
 
 
 def compare_winners(before: Mapping[str, Report], after: Mapping[str, Report]) -> Iterator[Finding]:

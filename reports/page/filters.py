@@ -16,6 +16,7 @@ KINDS = {
     "failed": "Failed",
     "published": "Published peer",
     "refused": "Refused",
+    "growth": "As the work grows",
     "not-measured": "Not measured",
 }
 #: By whether a claim is good: a mark, and its words for screen readers.

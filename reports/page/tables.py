@@ -14,6 +14,7 @@ from reports.tables.checks import left_out_table, mutation_table
 from reports.tables.drawing import html
 from reports.tables.methods import fastest_table, method_row, methods_table
 from reports.tables.peers import published_as
+from reports.tables.scaling import scaling_tables
 from reports.tables.stability import summary_table
 from reports.tables.table import Column, Row, Table, table
 
@@ -114,6 +115,7 @@ TABLES: dict[str, Callable[..., Any]] = {
     "agreement_table": drawn(agreement),
     "trust_table": drawn(trust_table),
     "stability_table": drawn(summary_table),
+    "scaling_tables": drawn(scaling_tables),
     "left_out_table": drawn(left_out_table),
     "mutation_table": drawn(mutations),
     "seconds_table": drawn(seconds),

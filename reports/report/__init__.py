@@ -16,5 +16,5 @@ May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.methods`,
 `reports.cluster`, `reports.data`, `reports.machine`, `reports.page`, `reports.papers`, `reports.plotting`,
 `validation.comparison`, `validation.configurations`, `validation.estimates`, `validation.fidelity`,
 `validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`, `validation.papers`,
-`validation.scenes`.
+`validation.scaling`, `validation.scenes`.
 """

@@ -37,7 +37,15 @@ _TYPICAL: Mapping[str, tuple[float, float, float, float]] = {
     "overlap": (480.0, 60.0, 60.0, 30.0),
 }
 _USUAL = (6.0, 25.0, 20.0, 4.0)  #: the same of any other scene
-_OTHERS = {"stability": 20.0, "mutations": 500.0, "biri": 8.0, "zero_cost": 60.0, "billeter": 300.0, "fidelity": 8.0}
+_OTHERS = {
+    "stability": 20.0,
+    "mutations": 500.0,
+    "biri": 8.0,
+    "zero_cost": 60.0,
+    "billeter": 300.0,
+    "fidelity": 8.0,
+    "scaling": 80.0,
+}
 PAGE_SECONDS = 1.0  #: to pack the images of a scene and draw its part of the page
 _PIXELS = 320 * 240  #: of the images of these runs
 _LEAST = 0.01  #: to read a kept result [s]

@@ -24,7 +24,7 @@ from reference.storage.files import ensure_folder
 from reference.storage.stopping import hint_when_stopped
 from reports.cluster.connect import Cluster
 from reports.cluster.references import Picture, bring_truths, spread
-from reports.data.claims import claims, unstudied
+from reports.data.claims import claims, growth_claims, unstudied
 from reports.data.own_faults import own_fault
 from reports.data.reader import SCHEMA, report_text
 from reports.machine.environment import describe_environment
@@ -113,7 +113,7 @@ def write_report(
     steps = _steps(progress, cache, efforts, configurations, others)
     apart = None if method_limit is None else partial(in_own_process, limit=method_limit)
     ended: dict[Configuration, str] = {}
-    seconds = dict.fromkeys(("scenes", "stability", "mutations", "published", "fidelity"), 0.0)
+    seconds = dict.fromkeys(("scenes", "stability", "mutations", "scaling", "published", "fidelity"), 0.0)
     try:
         with hint_when_stopped(lambda: _kept_words(results, "")), staged(target) as hidden:
             if cluster is not None:
@@ -145,6 +145,7 @@ def write_report(
                     results.append(cached_result(part.entry, partial(part.compute, step)))
                 by_kind.setdefault(part.kind, []).append(results[-1])
             stability, mutations = by_kind.get("stability"), by_kind.get("mutations")
+            scaling = [record for result in by_kind.get("scaling", ()) for record in result.data["scaling"]]
             data = {
                 "schema": SCHEMA,
                 "created": now(),
@@ -155,10 +156,12 @@ def write_report(
                 "settings": plain(asdict(effort)),
                 "environment": environment,
                 "claims": claims(studied)
+                + growth_claims(scaling)
                 + (unstudied(scenes, list(FOG_SCENES)) if tuple(scenes) == effort.scenes else []),
                 "scenes": studied,
                 "stability": stability[-1].data["kernels"] if stability else [],
                 "mutations": mutations[-1].data if mutations else None,
+                "scaling": scaling,
                 "published": published_data(by_kind),
                 "fidelity": fidelity_rows(by_kind),
             }

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The parts of a report that belong to no scene: tables of papers, stability of the kernels, faults of the physics."""
+"""The parts of a report that belong to no scene of it.
+
+These are tables of papers, the stability of the kernels, faults of the physics, and how times grow with the work.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,7 +10,7 @@ from functools import partial
 from typing import Any
 
 from reports.cluster.connect import Cluster
-from reports.data.serialize import mutations_data
+from reports.data.serialize import mutations_data, scaling_data
 from reports.machine.progress import Progress, counted, part_of
 from reports.papers.billeter import billeter_data
 from reports.papers.biri import biri_data
@@ -16,12 +19,15 @@ from validation.frames.result_cache import CachedResult, CacheEntry, Computed, R
 from validation.frames.scene_study import Effort
 from validation.metrics.errors import plain
 
+_GROWING = "colonnade"  # of which times are measured as its work grows
+_GROWING_SIZE = (400, 300)  # of its images [pixels]
+
 
 @dataclass(frozen=True)
 class OtherPart:
     """A part of a report that belongs to no scene."""
 
-    kind: str  #: 'stability', 'mutations', 'biri', 'zero_cost', 'billeter' or 'fidelity'
+    kind: str  #: 'stability', 'mutations', 'scaling', 'biri', 'zero_cost', 'billeter' or 'fidelity'
     title: str  #: shown as the progress
     entry: CacheEntry
     compute: Callable[[Progress], Computed]
@@ -38,6 +44,8 @@ def other_parts(
     if effort.mutations:
         entry = cache_entry(cache, "mutations", identity={})
         parts.append(OtherPart("mutations", "faults of the physics", entry, partial(_mutations, cluster)))
+    if _GROWING in scenes:
+        parts += [_scaling(kind, effort.seconds, cache) for kind in effort.scaling]
     if "biri" in effort.papers:
         parts += _biri(effort, scenes, cache)
     if "billeter" in effort.papers:
@@ -64,6 +72,21 @@ def _stability(rays: int, progress: Progress) -> Computed:
     from validation.kernels.stability import stability
 
     return {"kernels": plain(stability(count=rays, progress=counted(progress)))}, {}
+
+
+def _scaling(kind: str, seconds: float, cache: ResultCache) -> OtherPart:
+    """Return how times grow with one kind of work."""
+
+    def compute(progress: Progress) -> Computed:
+        from validation.scaling.ladders import ladder
+        from validation.scaling.study import METHODS, study_scaling
+
+        steps = ladder(kind, _GROWING, _GROWING_SIZE)
+        found = study_scaling(kind, steps, METHODS, seconds=seconds, progress=counted(progress))
+        return {"scaling": [scaling_data(_GROWING, _GROWING_SIZE, each) for each in found]}, {}
+
+    identity = {"scene": _GROWING, "size": _GROWING_SIZE, "kind": kind, "seconds": seconds}
+    return OtherPart("scaling", "how times grow", cache_entry(cache, "scaling", identity=identity), compute)
 
 
 def _mutations(cluster: Cluster | None, progress: Progress) -> Computed:

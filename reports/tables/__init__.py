@@ -19,6 +19,7 @@ Read in this order:
 - `octave_fit.py`: the constants of octaves that fit best
 - `map_size.py`: error and flicker against the size of the shadow map
 - `scaling.py`: what methods cost as their work grows, and exponents
+- `interpolation.py`: how many rays interpolated images need
 - `slab.py`: a slab by order of scattering
 - `diagnosis.py`: planted faults and the answers
 - `fit.py`: parameters that explain an image
@@ -29,5 +30,5 @@ Read in this order:
 - `scene.py`: the description of a scene for another renderer
 
 May import: `analytic.errors`, `realtime.kernels`, `realtime.methods`, `validation.advise`, `validation.frames`,
-`validation.metrics`, `validation.scenes`.
+`validation.metrics`, `validation.scenes`, `validation.statistics`.
 """

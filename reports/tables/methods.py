@@ -33,6 +33,7 @@ _MEANINGS = {
     "surface": "camera rays and the lit surface",
     "light_moved": "a frame after the light moved, with shadow maps or planes anew",
     "objects_moved": "a frame after objects moved too",
+    "memory": "what a frame takes at its peak, prepared anew, with its image on the host, beyond what was there before",
     "relative_rmse": "root of the mean squared error over the mean of the truth: errors of bright pixels weigh most",
     "relative_bias": "mean error over the mean of the truth: below 0 the image as a whole is too dark",
     "p50": _RELATIVE.format("half"),
@@ -57,6 +58,7 @@ COLUMNS = {
             colours_changed="colours changed",
             how=_MS | _MINOR,
         ),
+        *numbers(memory="memory [MiB]", how=_RATE | _MINOR),
         *numbers("p99", "max", relative_rmse="rel. RMSE", relative_bias="rel. bias", p50="median error", how=_SHARE),
         *numbers(flip="HDR-FLIP"),
         *numbers(nonfinite="not finite", how={"alarm": True}),
@@ -65,7 +67,7 @@ COLUMNS = {
 TARGETS = (0.01, 0.001)  #: relative RMSE for which the fastest method is named
 #: Columns of what `bench` prints.
 BENCH = (
-    *("label", "frame", "frame_rate", "airlight", "airlight_rate", "light_moved"),
+    *("label", "frame", "frame_rate", "airlight", "airlight_rate", "light_moved", "memory"),
     *("relative_rmse", "relative_bias", "p99", "max"),
 )
 
@@ -109,6 +111,7 @@ def method_row(entry: Entry, *, shadows: bool = False) -> Row:
     values |= {name: measured(times.get(name)) for name in TIMES}
     values |= {f"{name}_rate": per_second(measured(times.get(name))) for name in ("frame", "airlight")}
     values |= {name: error.get(name) for name in ERRORS}
+    values["memory"] = entry.get("memory")
     values["flip"] = (entry.get("flip") or {}).get("value")
     return Row(values, remarks=tuple(remarks))
 

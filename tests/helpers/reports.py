@@ -9,6 +9,7 @@ noisy as a machine.
 import copy
 import functools
 import json
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,30 @@ def checked(data: dict[str, Any]) -> dict[str, Any]:
 def timing(median: float) -> dict[str, Any]:
     """Return a timing with its quartiles [ms]."""
     return {"median_ms": median, "low_ms": 0.9 * median, "high_ms": 1.2 * median, "repetitions": 7}
+
+
+def growth_record(
+    *,
+    cliff: bool = False,
+    refused: str | None = None,
+    works: Sequence[float] = (100.0, 400.0),
+    exponent: float = 0.47,
+    size: tuple[int, int] = (80, 60),
+) -> dict[str, Any]:
+    """Return how shadow planes grow with the triangles of `hall`; with `cliff`, a frame jumps."""
+    growth = {"exponent": exponent, "standard_error": 0.01, "steepest": 1.93, "at": works[-1] if works else None}
+    times = ("frame", "light_moved", "objects_moved")
+    return {
+        "scene": "hall",
+        "size": list(size),
+        "label": "shadow-planes (exact)",
+        "kind": "triangles",
+        "costs": [
+            {"work": work, "memory": 71.5} | {name: timing(0.31 * work) for name in (*times, "rays")} for work in works
+        ],
+        "growth": {name: growth | {"cliff": cliff and name == "frame"} for name in times},
+        "refused": refused,
+    }
 
 
 def errors(relative_rmse: float | None, **changes: Any) -> dict[str, Any]:

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Methods and kernels as a user names them, and the timing of their frames.
+"""Methods and kernels as a user names them, the timing of their frames, and their memory.
 
 Read in this order:
 
 - `kernel_names.py`: from a name such as 'quadrature-32' or 'module:function' to a kernel;
 - `methods.py`: a configuration is a method with a kernel and parameters; the standard ones of commands and reports;
-- `timing.py`: medians of frames and of their stages.
+- `timing.py`: medians of frames and of their stages;
+- `memory.py`: the peak of the memory while a frame is made.
 
 May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.methods`,
 `realtime.numerics`, `realtime.parameters`, `realtime.scene`, `validation.scenes`.

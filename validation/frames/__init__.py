@@ -14,6 +14,7 @@ Read in this order:
 - `octave_fit.py`: the constants of octaves that fit a scene of clouds best;
 - `froxel_study.py`: which grid froxel fog needs, and the ghosts of its history;
 - `map_size.py`: error against the size of the shadow map, and the flicker of a light that moves;
+- `interpolation_study.py`: how many rays an image needs between tiles, and along epipolar lines;
 - `plane_stability.py`: hard cases for sums over shadow planes;
 - `zero_cost.py`: checks that what a scene does not need costs nothing.
 

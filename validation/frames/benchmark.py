@@ -15,6 +15,7 @@ from realtime.numerics.recorded import Frozen
 from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import Scene, read_scene
 from reference.quadrature.ray_values import TruthImage
+from validation.configurations.memory import peak_memory
 from validation.configurations.methods import STANDARD, Configuration, prepared
 from validation.configurations.timing import FrameTimes, time_frame
 from validation.estimates.quadrature import truth_image
@@ -40,6 +41,7 @@ class Rendering:
     refused: str | None = None  #: why there is no frame
     left_out: bool = False  #: whether only the time speaks against this configuration, which could render the scene
     note: str | None = None  #: how its times differ from those of other configurations
+    memory: float | None = None  #: at the peak of the timed frame, beyond what was there before [MiB]; None: not known
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,7 @@ class Measurement:
     left_out: bool = False  #: whether only the time speaks against this configuration, which could render the scene
     note: str | None = None  #: how its times differ from those of other configurations
     knows_shadows: bool | None = None  #: whether it renders volumetric shadows; None: the method's record says it
+    memory: float | None = None  #: at the peak of the timed frame, beyond what was there before [MiB]; None: not known
 
 
 def configurations_for(
@@ -130,6 +133,7 @@ def measure(
         flip_hdr(truth.airlight + truth.surface, frame.airlight + frame.surface) if with_flip else None,
         note=rendered.note,
         knows_shadows=rendered.knows_shadows,
+        memory=rendered.memory,
     )
 
 
@@ -181,8 +185,10 @@ def render_and_time(
         notes.append(f"timed at {scene.camera.width} x {scene.camera.height}: larger frames take minutes")
     if chosen.own and not isinstance(renderer.render, Frozen):
         notes.append("not frozen: its Python runs again for every frame")
-    times = time_frame(renderer if timed is None else prepared(timed, chosen), seconds=seconds, slow=slow)
-    return Rendering(frame, times, shadows, note="; ".join(notes) or None)
+    shown = renderer if timed is None else prepared(timed, chosen)
+    times = time_frame(shown, seconds=seconds, slow=slow)
+    memory = peak_memory(lambda: render_frame(shown))
+    return Rendering(frame, times, shadows, note="; ".join(notes) or None, memory=memory)
 
 
 def render_and_time_by_name(

@@ -52,6 +52,7 @@ class Effort:
     papers: tuple[str, ...] = ()  #: papers whose tables are measured again: 'biri', 'billeter'
     paper_kernels: tuple[str, ...] = ("exact",)  #: kernels of these tables
     fidelity: bool = False  #: whether to measure the claims of papers that need images
+    scaling: tuple[str, ...] = ()  #: kinds of work by whose growth a scene is timed, see `validation.scaling.ladders`
 
     def at(self, size: tuple[int, int] | None) -> "Effort":
         """Return the effort with images and timed frames of another size [pixels]; itself for None."""
@@ -124,6 +125,7 @@ EFFORTS: dict[str, Effort] = {
             papers=("biri", "billeter"),
             paper_kernels=("exact", "taylor"),
             fidelity=True,
+            scaling=("size", "triangles", "lights", "map"),
         ),
     )
 }

@@ -5,7 +5,6 @@ Read in this order:
 
 - `ladders.py`: a scene with less and more of one kind of work;
 - `subdivision.py`: its meshes with four times the triangles, and bumps that these resolve;
-- `memory.py`: the peak of the memory while a frame is made;
 - `study.py`: the times of every step, the exponent that fits them, and where they jump.
 
 May import: `analytic.errors`, `realtime.area_lights`, `realtime.errors`, `realtime.frame`, `realtime.scene`,

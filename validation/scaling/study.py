@@ -23,11 +23,11 @@ from itertools import pairwise
 from analytic.errors import InputError as TruthError
 from realtime.errors import InputError
 from realtime.frame.renderer import render_frame
+from validation.configurations.memory import peak_memory
 from validation.configurations.methods import Configuration, configuration, prepared
 from validation.configurations.timing import Timing, camera_rays, time_frame, time_repeated
 from validation.frames.map_size import Slope, fitted_slope
 from validation.scaling.ladders import Step
-from validation.scaling.memory import peak_memory
 
 Progress = Callable[[int, int, str], None]
 

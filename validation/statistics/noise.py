@@ -41,6 +41,10 @@ longer than a repetition; so the quartiles say how noisy the moment was, not how
    burst is not: every stage that contains it must have grown by half as many milliseconds, and the quartiles must not
    overlap. Two bursts do meet now and then: with a single witness the square of the ratio is needed, without one the
    cube, and the square where there are too few repetitions for quartiles. The surface alone is no concern of a method.
+
+**Powers** of the work with which times grow, fitted to a few steps. Another power is one that differs by more than
+three standard errors of both fits, and by more than `POWER_TOLERANCE`: over the eight times the work of the shortest
+ladder, that is a time at one end that is wrong by half.
 """
 
 import math
@@ -52,6 +56,7 @@ import numpy as np
 ROUNDING = 2.0**-24  #: half of the distance from 1 to the next float32
 ERROR_TOLERANCE = 0.02  #: relative band of an error
 TIME_TOLERANCE = 0.25  #: relative band of a time
+POWER_TOLERANCE = 0.2  #: of a power of the work with which a time grows
 FLOORS = {
     "relative_rmse": 24 * ROUNDING,
     "relative_bias": 24 * ROUNDING,
@@ -180,3 +185,18 @@ def _median(times: Times, stage: str) -> float:
 
 def _scaled(timing: Timing, factor: float) -> dict[str, Any]:
     return {name: value if name == "repetitions" else factor * value for name, value in timing.items()}
+
+
+def other_power(old: Mapping[str, Any], new: Mapping[str, Any]) -> float:
+    """Return by how much a time grows with another power of the work than before, 0 where noise may explain it.
+
+    Parameters
+    ----------
+    old, new
+        `exponent` and `standard_error` of fits [1], None where there were too few steps for them.
+    """
+    before, after = old["exponent"], new["exponent"]
+    if before is None or after is None:
+        return 0.0
+    scatter = math.hypot(old["standard_error"] or 0.0, new["standard_error"] or 0.0)
+    return after - before if abs(after - before) > max(POWER_TOLERANCE, 3 * scatter) else 0.0

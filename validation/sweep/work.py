@@ -28,13 +28,13 @@ from realtime.frame.renderer import (
     unchecked_frame,
 )
 from realtime.scene.read_scene import Scene
+from validation.configurations.memory import largest_memory
 from validation.configurations.methods import Configuration, prepared, rendered_lights
 from validation.configurations.timing import run_times
 from validation.metrics.colour import colour_difference
 from validation.metrics.errors import FLOOR, error_metrics
 from validation.metrics.flip import flip_hdr
 from validation.metrics.other_tools import published_errors
-from validation.scaling.memory import largest_memory
 from validation.sweep.bounds import stated_bound, worth_of_ends
 from validation.sweep.row import PROPERTY
 from validation.sweep.study import Cell, map_side, seed_of

@@ -112,6 +112,25 @@ def test_kernels_are_named_by_an_option(variant, capfd, monkeypatch):
     assert asked == [None, ["exact"], ["exact", "table", "taylor-8"]]
 
 
+def test_scaling_is_compared_with_an_earlier_run(variant, capfd, tmp_path):
+    """The earlier run's times did not grow at all: pixels cost more than that, however busy the machine."""
+    flat = {"exponent": -1.0, "standard_error": 0.0, "steepest": 0.0, "at": 1.0, "cliff": False}
+    arguments = ["bench", "sphere-spot", "--scaling", "size", "--size", "48x36", "--method", "ray-march", "--json"]
+    assert cli.run(arguments) in (0, 1)
+    data = json.loads(capfd.readouterr().out)
+    for record in data["scaling"]:
+        record["growth"] = dict.fromkeys(record["growth"], flat)
+    earlier = tmp_path / "earlier.json"
+    earlier.write_text(json.dumps(data))
+    assert cli.run([*arguments, "--against", str(earlier)]) == 1
+    assert "of the pixels, and did with -1" in capfd.readouterr().err
+    earlier.write_text("{}")
+    assert cli.run([*arguments, "--against", str(earlier)]) == 2
+    assert "it holds no `scaling`" in capfd.readouterr().err
+    assert cli.run(["bench", "open-fog", "--against", str(earlier)]) == 2
+    assert "--against: got a file without --scaling or --fit-octaves" in capfd.readouterr().err
+
+
 def test_scaling_prints_steps_and_exponents(variant, capfd):
     arguments = ["bench", "sphere-spot", "--scaling", "size", "--size", "16x12", "--method", "unshadowed"]
     assert cli.run([*arguments, "--kernel", "taylor", "--json"]) in (0, 1)  # a busy machine may show a jump

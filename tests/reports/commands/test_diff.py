@@ -7,7 +7,7 @@ import pytest
 from reports.commands.main import run
 from reports.data.reader import read_report
 from reports.diff.compare import compare_reports
-from tests.helpers.reports import agreement, checked, errors, method, report, slow_down
+from tests.helpers.reports import agreement, checked, errors, growth_record, method, report, slow_down
 
 
 def words(difference, verdict="worse"):
@@ -355,3 +355,16 @@ def test_a_row_that_is_gone_and_a_published_figure_that_changed_are_worse():
 
 def test_reports_with_verdicts_keep_to_the_schema():
     checked(claimed("differs", 2.0, published=3))
+
+
+def test_another_power_of_the_work_is_found():
+    old, new = report(), report()
+    assert not compare_reports(old, new | {"scaling": [growth_record()]}).findings  # earlier reports have none
+    old["scaling"], new["scaling"] = [growth_record()], [growth_record(exponent=0.71)]
+    found = compare_reports(checked(old), checked(new))
+    assert words(found) == [
+        f"hall shadow-planes (exact) the power of the triangles with which {time} grows"
+        for time in ("frame", "light moved", "objects moved")
+    ]
+    assert [(finding.old, finding.new) for finding in found.worse] == [(0.47, 0.71)] * 3
+    assert len(words(compare_reports(new, old), "better")) == 3

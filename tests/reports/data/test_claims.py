@@ -3,9 +3,9 @@ import copy
 
 import pytest
 
-from reports.data.claims import claims, confirmed, unstudied
+from reports.data.claims import claims, confirmed, growth_claims, unstudied
 from reports.tables.agreement import verdict
-from tests.helpers.reports import agreement, checked, engine, entry, errors, flip, report_of, scene
+from tests.helpers.reports import agreement, checked, engine, entry, errors, flip, growth_record, report_of, scene
 from tests.helpers.reports import refused as refused_entry
 
 
@@ -206,3 +206,13 @@ def test_scenes_that_the_effort_leaves_out_are_named():
     (claim,) = unstudied(["fog"], ["fog", "hall", "tangle"])
     assert (claim["kind"], claim["good"]) == ("not-measured", None)
     assert claim["text"].startswith("Scenes not studied, for the time that they take: hall, tangle.")
+
+
+def test_a_time_that_jumps_is_a_claim():
+    assert growth_claims([]) == []
+    (good,) = growth_claims([growth_record()])
+    assert (good["kind"], good["good"]) == ("growth", True)
+    assert good["text"] == "No time of a frame of hall jumps as the work grows: triangles."
+    (bad,) = growth_claims([growth_record(), growth_record(cliff=True)])
+    assert bad["good"] is False
+    assert bad["text"].startswith("A time jumps: hall, shadow-planes (exact): frame grows with the power 1.9")

@@ -22,7 +22,7 @@ from tests.helpers.page import (
     write_files,
 )
 from tests.helpers.published import MUTATIONS, STABILITY
-from tests.helpers.reports import refused, timing
+from tests.helpers.reports import growth_record, refused, timing
 
 
 @pytest.fixture
@@ -381,3 +381,12 @@ def test_mutations_have_a_table_where_they_were_tried(data, folder):
     assert "0 of 1 faults of the physics" in text
     assert "no-falloff" in text
     assert "too small" in text
+
+
+def test_page_shows_how_times_grow(data, folder):
+    assert "As the work grows" not in render(data, folder).text
+    data["scaling"] = [growth_record()]
+    page = render(data, folder)
+    assert ("a", {"href": "#scaling"}) in page.tags
+    assert "hall by triangles, 80 \N{MULTIPLICATION SIGN} 60" in page.text
+    assert "0.47" in page.text

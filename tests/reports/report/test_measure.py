@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import json
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +14,7 @@ from reports.page.filters import number, percent
 from reports.report.measure import write_report
 from reports.report.scene import file_stems
 from reports.tables.methods import fastest_table
+from tests.helpers.reports import checked
 from validation.configurations.methods import STANDARD, Configuration
 from validation.frames.scene_study import EFFORTS, Effort
 
@@ -339,3 +341,17 @@ def test_built_in_scene_with_all_standard_configurations(variant, tmp_path):
     # 16 nodes without any shadow are the integral itself; float32 and the light in view leave 1e-5.
     assert best["unshadowed (quadrature)"] < 1e-4
     assert not any(entry["error"]["nonfinite"] for scene in data["scenes"] for entry in scene["methods"])
+
+
+def test_a_report_times_growing_work(variant, tmp_path, monkeypatch):
+    from reports.report import papers
+
+    monkeypatch.setattr(papers, "_GROWING", "open-fog")
+    monkeypatch.setattr(papers, "_GROWING_SIZE", (16, 12))
+    data = write_report(tmp_path, scenes=["open-fog"], effort=replace(TINY, scaling=("size",)))
+    assert len(data["scaling"]) == 4  # methods
+    assert [cost["work"] for cost in data["scaling"][0]["costs"]] == [48, 192, 768, 3072]
+    assert "growth" in {claim["kind"] for claim in data["claims"]}
+    assert data["parts"]["scaling"] > 0
+    assert "As the work grows" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    checked(data)

@@ -2,26 +2,8 @@
 """Tables of scaling hold every step and exponent, and a jump becomes a sentence."""
 
 from reports.tables.drawing import markdown
-from reports.tables.scaling import cliffs, scaling_tables
-
-
-def record(*, cliff, refused=None, works=(100.0, 400.0)):
-    def timing(time):
-        return {"median_ms": time, "low_ms": time, "high_ms": time, "repetitions": 5}
-
-    growth = {"exponent": 0.47, "standard_error": 0.01, "steepest": 1.93, "at": works[-1] if works else None}
-    times = ("frame", "light_moved", "objects_moved")
-    return {
-        "scene": "hall",
-        "size": [80, 60],
-        "label": "shadow-planes (exact)",
-        "kind": "triangles",
-        "costs": [
-            {"work": work, "memory": 71.5} | {name: timing(0.31 * work) for name in (*times, "rays")} for work in works
-        ],
-        "growth": {name: growth | {"cliff": cliff and name == "frame"} for name in times},
-        "refused": refused,
-    }
+from reports.tables.scaling import cliffs, grown, scaling_tables
+from tests.helpers.reports import growth_record as record
 
 
 def test_a_table_for_each_kind_and_one_of_exponents():
@@ -44,3 +26,15 @@ def test_who_refuses_is_named_and_has_no_exponent():
 def test_a_jump_is_a_sentence():
     (sentence,) = cliffs([record(cliff=True), record(cliff=False)])
     assert sentence == "hall, shadow-planes (exact): frame grows with the power 1.9 of the triangles up to 400"
+
+
+def test_a_higher_power_than_before_is_a_sentence():
+    old = [record(cliff=False)]
+    assert grown(old, [record(cliff=False, exponent=0.66)]) == []
+    sentences = grown(old, [record(cliff=False, exponent=0.69)])
+    assert len(sentences) == 3  # one for each time
+    assert sentences[0] == (
+        "hall, shadow-planes (exact): frame grows with the power 0.69 of the triangles, and did with 0.47"
+    )
+    assert grown(old, [record(cliff=False, exponent=0.1)]) == []  # that is better
+    assert grown(old, [record(cliff=False, exponent=0.9, size=(160, 120))]) == []  # another image

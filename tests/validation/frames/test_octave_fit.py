@@ -89,7 +89,7 @@ def test_options_that_do_not_go_together(tmp_path, capsys):
     image = tmp_path / "image.exr"
     write_exr(image, Image({"airlight": np.ones((4, 4, 3), dtype=np.float32)}, None, {}))
     for words, message in (
-        (["bench", "--against", str(image)], "add --fit-octaves"),
+        (["bench", "--against", str(image)], "--scaling or --fit-octaves"),
         (["bench", "cumulus", "cloud-slab", "--fit-octaves", "--against", str(image)], "one image for 2 scenes"),
         (["bench", "cumulus", "--fit-octaves", "--against", str(image), "--set", "extinct=1"], "extinction"),
         (["bench", "sphere-spot", "--fit-octaves", "--against", str(image)], "has no clouds"),

@@ -10,6 +10,7 @@ from validation.statistics.noise import (
     drift,
     error_band,
     least_ratio,
+    other_power,
     slower_stages,
     spread,
 )
@@ -115,3 +116,19 @@ def test_quiet_and_busy_machines_are_told_apart():
     )
     assert spread(quiet) < 1.05
     assert spread(busy) > 1.2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "differs"),
+    [
+        ((0.5, 0.01), (0.69, 0.01), 0.0),  # a fifth
+        ((0.5, 0.01), (0.72, 0.01), 0.22),
+        ((0.72, 0.01), (0.5, 0.01), -0.22),
+        ((0.5, 0.06), (0.72, 0.08), 0.0),  # three standard errors are 0.3
+        ((0.5, None), (0.72, None), 0.22),  # two steps lie on a line
+        ((None, None), (0.72, 0.01), 0.0),  # one step has no power
+    ],
+)
+def test_another_power_is_beyond_tolerance_and_scatter(old, new, differs):
+    fits = [{"exponent": exponent, "standard_error": error} for exponent, error in (old, new)]
+    assert other_power(*fits) == pytest.approx(differs)

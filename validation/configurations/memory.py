@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The peak of the memory of this process while something is done."""
 
+import ctypes
 import gc
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,8 @@ def peak_memory(work: Callable[[], Any]) -> float | None:
     dr.sync_thread()
     gc.collect()
     dr.flush_malloc_cache()
+    with suppress(OSError, AttributeError):  # what the allocator keeps free would hide what small frames take
+        ctypes.CDLL(None).malloc_trim(0)
     try:
         Path("/proc/self/clear_refs").write_text(_FORGET)
         before = _status("VmRSS")

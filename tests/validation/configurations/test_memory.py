@@ -9,7 +9,7 @@ import pytest
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux lets a process forget an earlier peak")
 def test_the_peak_is_that_of_what_was_held_together(variant):
-    from validation.scaling.memory import peak_memory
+    from validation.configurations.memory import peak_memory
 
     def work(mebibytes):
         held = np.ones(mebibytes * 2**17)
@@ -24,7 +24,7 @@ def test_the_peak_is_that_of_what_was_held_together(variant):
 def test_a_system_that_does_not_say_gives_none(variant, monkeypatch):
     from pathlib import Path
 
-    from validation.scaling.memory import peak_memory
+    from validation.configurations.memory import peak_memory
 
     def refuse(self, text):
         raise FileNotFoundError(self)
