@@ -25,7 +25,7 @@ A table of a phase function cuts a segment at each of its entries. Of these narr
 more, and Gauss's three nodes are right to rho^(-6) = 2e-11: Kronrod's seven do for a third of the work.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,7 +40,7 @@ Index = NDArray[np.int64]
 Weight = Callable[[Array, Index], Array]
 
 _PANEL = 2.4  # width of the first panels: rho = 2.97, so that Gauss's ten nodes are right to about 1e-9 to 1e-11
-NARROW_PANEL = 0.1  #: width in w up to which a panel has Kronrod's 7 nodes, and not 21
+_NARROW = 0.1  # width in w up to which a panel has Kronrod's 7 nodes, and not 21
 _NEGLIGIBLE = 44.0  # e-folds after which the rest of a segment is below 1e-19 of it
 _CHUNK = 8192  # panels evaluated at once: 1.4 MB an array
 _HALVINGS = 40
@@ -249,23 +249,27 @@ def _evaluate(segments: _Segments, integrand: _Integrand, owner: Index, start: A
     """Integrate panels by both rules, a block at a time so that the arrays stay in the cache."""
     both = np.empty((len(owner), 2))
     noise = np.empty(len(owner))
-    for pair, rows in panels_by_rule(width):
-        for block in np.split(rows, range(_CHUNK, len(rows), _CHUNK)):
-            panels = owner[block], start[block], width[block]
-            both[block], noise[block] = _evaluate_block(segments, integrand, pair, *panels)
+    for pair, block in blocks_by_rule(width, _CHUNK):
+        panels = owner[block], start[block], width[block]
+        both[block], noise[block] = _evaluate_block(segments, integrand, pair, *panels)
     return _Panels(owner, start, width, both[:, 0], np.abs(both[:, 0] - both[:, 1]), noise * np.abs(both[:, 0]))
 
 
-def panels_by_rule(width: Array) -> list[tuple[Pair, Index]]:
-    """Return the pairs of rules and the numbers of the panels that each is to integrate.
+def blocks_by_rule(width: Array, most: int) -> Iterator[tuple[Pair, Index]]:
+    """Yield pairs of rules with the numbers of panels that each is to integrate at once.
 
     Parameters
     ----------
     width
         Of the panels, in w, (panels,) [1].
+    most
+        How many panels at once.
     """
-    narrow = width <= NARROW_PANEL
-    return [(pair, np.flatnonzero(chosen)) for pair, chosen in ((NARROW, narrow), (WIDE, ~narrow)) if chosen.any()]
+    narrow = width <= _NARROW
+    for pair, chosen in ((NARROW, narrow), (WIDE, ~narrow)):
+        panels = np.flatnonzero(chosen)
+        for first in range(0, len(panels), most):
+            yield pair, panels[first : first + most]
 
 
 def _evaluate_block(

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.kronrod import Pair
-from analytic.panels import panels_by_rule
+from analytic.panels import blocks_by_rule
 from reference.quadrature.adaptive_panels import RTOL, Panels, first_panels, sum_panels
 from reference.quadrature.pieces import Pieces, Setup, cut_pieces
 from reference.quadrature.segments import Segments, leg_kinks
@@ -180,9 +180,8 @@ class _Sum:
     def evaluate(self, piece: Index, start: Array, width: Array) -> Panels:
         """Integrate panels by both rules, a block at a time so that the arrays stay in the cache."""
         both, noise = np.empty((2, len(piece), 3)), np.empty((len(piece), 3))
-        for pair, chosen in panels_by_rule(width):
-            for block in np.split(chosen, range(_PANELS, len(chosen), _PANELS)):
-                both[:, block], noise[block] = self.evaluate_block(pair, piece[block], start[block], width[block])
+        for pair, block in blocks_by_rule(width, _PANELS):
+            both[:, block], noise[block] = self.evaluate_block(pair, piece[block], start[block], width[block])
         return Panels(piece, start, width, both[0], np.abs(both[0] - both[1]), noise)
 
     def evaluate_block(self, pair: Pair, rows: Index, start: Array, width: Array) -> tuple[Array, Array]:

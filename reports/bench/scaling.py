@@ -8,6 +8,7 @@ from typing import Any
 import typer
 
 _SIZE = (800, 600)
+_EARLIER = "what `bench --scaling --json` printed, or a report.json of `report --full`"
 
 
 def print_scaling(
@@ -59,6 +60,7 @@ def _earlier(against: Path | None, names: list[str]) -> list[dict[str, Any]]:
     """
     from analytic.errors import InputError
     from reports.data.json_files import read_json
+    from reports.tables.scaling import is_record
     from validation.frames.baseline_files import FOLDER
 
     if against is None:
@@ -68,12 +70,9 @@ def _earlier(against: Path | None, names: list[str]) -> list[dict[str, Any]]:
         files = [against]
     records = []
     for path in files:
-        data = read_json(path, "what `bench --scaling --json` printed, or a report.json of `report --full`")
+        data = read_json(path, _EARLIER)
         found = data.get("scaling") if isinstance(data, dict) else None
-        if not isinstance(found, list) or not found:
-            raise InputError(
-                f"{path}: it holds no `scaling`; wanted what `bench --scaling --json` printed, or a report.json of "
-                "`report --full`"
-            )
+        if not isinstance(found, list) or not found or not all(map(is_record, found)):
+            raise InputError(f"{path}: it holds no `scaling`; wanted {_EARLIER}")
         records += found
     return records

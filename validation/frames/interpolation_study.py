@@ -25,13 +25,17 @@ it, and these are no sparser along lines than across.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from realtime.frame.renderer import render_frame
-from realtime.scene.camera import read_camera
-from realtime.scene.lights import host_position, place_and_weight
+from realtime.methods.epipolar.slices import image_slices, neighbour, slice_coordinate
+from realtime.numerics.aligned import aligned_array
+from realtime.scene.camera import Camera
+from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene
 from validation.configurations.methods import Configuration, prepared
 
@@ -43,7 +47,7 @@ TOLERANCES = (0.002, 0.005, 0.01, 0.02, 0.05)
 LINES = ((512, 128), (1024, 64), (1024, 128), (1024, 256), (2048, 64), (2048, 128))
 TILE = 4  #: side of a tile [pixels], as in `realtime.tiles.adaptive_sampling`
 _DEPTHS = 1.1  # largest to least distance within a cell, likewise
-_ALONG = 1e-3  # least share of the direction to the light along the view for it to have a place in the image
+_SHORT = 1e-10  # square of the length below which a line is a point [pixels^2]
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,8 @@ class Image:
 
     airlight: Array  #: (2 height, 2 width, 3) [W/(m^2 sr)]
     distance: Array  #: to the surface, (2 height, 2 width), infinite where there is none [m]
-    epipole: tuple[float, float]  #: column and row of the light's place [pixels of this image], also beyond its border
+    camera: Camera  #: with which it was taken
+    light: Light  #: through whose place the lines go
 
 
 @dataclass(frozen=True)
@@ -85,26 +90,17 @@ def rendered(scene: Scene, chosen: Configuration) -> Image:
     Raises
     ------
     InputError
-        For a scene without exactly one light without extent, and for a light beside the camera, whose epipolar lines
-        do not meet in the image's plane.
+        For a scene without exactly one light without extent.
     """
     if len(scene.lights) != 1 or scene.area_lights:
         count = len(scene.lights) + len(scene.area_lights)
         raise InputError(
-            f"--interpolation: got a scene with {count} lights, wanted one without extent, through which all lines go"
+            f"--interpolation: got a scene with {count} light(s), wanted just one, and without extent: all epipolar "
+            "lines go through its place"
         )
     frame = render_frame(prepared(scene, chosen))
-    camera = read_camera(scene.camera)
-    place, share = place_and_weight(host_position(scene.lights[0]))
-    towards = place - share * camera.origin
-    left, up, along = np.linalg.solve(np.stack([camera.left, camera.up, camera.forward], axis=1), towards)
-    if abs(along) < _ALONG * np.linalg.norm(towards):
-        raise InputError(
-            "--interpolation: got a light right beside the camera, where epipolar lines are parallel; wanted one "
-            "before or behind it"
-        )
-    epipole = 0.5 * (camera.width - 1) - left / along, 0.5 * (camera.height - 1) - up / along
-    return Image(np.asarray(frame.airlight, np.float64), np.asarray(frame.distance, np.float64), epipole)
+    airlight, distance = (np.asarray(values, np.float64) for values in (frame.airlight, frame.distance))
+    return Image(airlight, distance, scene.camera, scene.lights[0])
 
 
 def study_interpolation(
@@ -184,44 +180,37 @@ def _tiles(image: Image) -> _Cells:
 
 
 def _epipolar_lines(image: Image, count: int, samples: int) -> _Cells:
-    """Return the cells of lines to points of the border that are equally far apart, with samples between both ends.
-
-    A place on a line is its share of the way from the epipole to the border, or to the far border where the epipole
-    lies beyond the image. Pixels whose lines do not reach the image are counted as computed.
-    """
+    """Return the cells of the lines that `min-max` has, with samples at equal steps from one end to the other."""
     height, width = image.distance.shape
-    x0, y0 = image.epipole
-    border_x, border_y = _border(np.arange(count) * 4 / count, width - 1, height - 1)
-    across, upright = border_x - x0, border_y - y0
-    begin = _entry(x0, y0, across, upright, width - 1, height - 1)
-    share = begin[:, None] + (1 - begin[:, None]) * np.linspace(0, 1, samples)
-    column, row = x0 + across[:, None] * share, y0 + upright[:, None] * share
+    slices = image_slices(image.camera, image.light, count)
+    # Ends and pixels are points to the left of and above the middle of the image.
+    ends = np.array(slices.ends, np.float64).reshape(count, 2, 2)
+    along = ends[:, 1] - ends[:, 0]
+    points = ends[:, None, 0] + np.linspace(0, 1, samples)[:, None] * along[:, None]
+    column, row = 0.5 * (width - 1) - points[..., 0], 0.5 * (height - 1) - points[..., 1]
     airlight, distance = _rays(image, np.clip(row, 0, height - 1), np.clip(column, 0, width - 1))
-    reached = begin < 1 - 1e-9
-    # Line 0 lies beside the last one.
-    around = np.concatenate([airlight[-1:], airlight, airlight[:1]])
-    bends = np.where(reached[:, None], _bends(around)[1:-1], np.inf)
+    if slices.closed[0]:
+        bends = _bends(np.concatenate([airlight[-1:], airlight, airlight[:1]]))[1:-1]
+    else:
+        bends = _bends(airlight)
 
-    pixel_y, pixel_x = np.mgrid[0:height:2, 0:width:2].astype(float)
-    aim_x, aim_y = pixel_x - x0, pixel_y - y0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        reach_x = np.where(aim_x > 0, (width - 1 - x0) / aim_x, -x0 / aim_x)
-        reach_y = np.where(aim_y > 0, (height - 1 - y0) / aim_y, -y0 / aim_y)
-    reach = np.fmin(np.where(aim_x == 0, np.inf, reach_x), np.where(aim_y == 0, np.inf, reach_y))
-    reached_by = np.where(np.isfinite(reach), 1 / np.maximum(reach, 1.0), 0.0)  # 0: the pixel of the epipole
-    reach = np.where(np.isfinite(reach), np.maximum(reach, 1.0), 1.0)
-    turn = _turn(x0 + aim_x * reach, y0 + aim_y * reach, width - 1, height - 1) / 4 * count
-    first = np.floor(turn).astype(int)
-    aside = turn - first
+    row, column = np.mgrid[0:height:2, 0:width:2]
+    pixel = np.stack([0.5 * (width - 1) - column, 0.5 * (height - 1) - row], axis=-1)
+    Float = type(slices.ends)
+    coordinate = slice_coordinate(slices, *(aligned_array(Float, pixel[..., axis].ravel()) for axis in (0, 1)))
+    low = dr.floor(coordinate)
+    aside = np.array(coordinate - low, np.float64).reshape(row.shape)
     places, weights = [], []
-    for line, of_line in ((first % count, 1 - aside), ((first + 1) % count, aside)):
-        way = np.clip((reached_by - begin[line]) / np.maximum(1 - begin[line], 1e-9), 0, 1) * (samples - 1)
+    for step, of_line in ((0, 1 - aside), (1, aside)):
+        line = np.array(neighbour(slices, mi.Int32(low) + step)).reshape(row.shape)
+        length = np.maximum(np.sum(along[line] ** 2, axis=-1), _SHORT)
+        way = np.sum((pixel - ends[line, 0]) * along[line], axis=-1) * (samples - 1) / length
+        way = np.clip(way, 0, samples - 1)
         before = np.minimum(way.astype(int), samples - 2)
         places += [(line, before), (line, before + 1)]
         weights += [of_line * (1 - (way - before)), of_line * (way - before)]
-    corners = int(np.count_nonzero(reached)) * samples
-    none = np.zeros(pixel_x.shape, bool)
-    return _cells((places, weights), (airlight, distance, bends), image.distance[::2, ::2], corners, none)
+    none = np.zeros(row.shape, bool)
+    return _cells((places, weights), (airlight, distance, bends), image.distance[::2, ::2], count * samples, none)
 
 
 def _rays(image: Image, row: Array, column: Array) -> tuple[Array, Array]:
@@ -244,31 +233,3 @@ def _apart(distances: Array) -> Mask:
     """Return where distances, along the first axis, are not about equal."""
     nearest, farthest = distances.min(axis=0), distances.max(axis=0)
     return ~((farthest <= _DEPTHS * nearest) | np.isinf(nearest))
-
-
-def _border(turn: Array, width: float, height: float) -> tuple[Array, Array]:
-    """Return the point of the border after `turn` of its four sides: upper, right, lower and left, in [0, 4)."""
-    side = turn.astype(int) % 4
-    along = turn - np.floor(turn)
-    x = np.choose(side, [along * width, width, (1 - along) * width, 0.0])
-    y = np.choose(side, [0.0, along * height, height, (1 - along) * height])
-    return x, y
-
-
-def _turn(x: Array, y: Array, width: float, height: float) -> Array:
-    """Return the inverse of `_border` for points on it."""
-    near = 1e-9 * (width + height)
-    sides = [y <= near, x >= width - near, y >= height - near]
-    turns = [x / width, 1 + y / height, 2 + (width - x) / width]
-    return np.clip(np.select(sides, turns, 3 + (height - y) / height), 0.0, np.nextafter(4.0, 0.0))
-
-
-def _entry(x0: float, y0: float, across: Array, upright: Array, width: float, height: float) -> Array:
-    """Return at which share of its way a line from the epipole enters the image: 0 where it begins there, 1 at most."""
-    if 0 <= x0 <= width and 0 <= y0 <= height:
-        return np.zeros(len(across))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        enter_x = np.minimum(-x0 / across, (width - x0) / across)
-        enter_y = np.minimum(-y0 / upright, (height - y0) / upright)
-    enter = np.fmax(np.where(across == 0, -np.inf, enter_x), np.where(upright == 0, -np.inf, enter_y))
-    return np.clip(enter, 0.0, 1.0)

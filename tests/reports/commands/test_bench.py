@@ -124,9 +124,10 @@ def test_scaling_is_compared_with_an_earlier_run(variant, capfd, tmp_path):
     earlier.write_text(json.dumps(data))
     assert cli.run([*arguments, "--against", str(earlier)]) == 1
     assert "of the pixels, and did with -1" in capfd.readouterr().err
-    earlier.write_text("{}")
-    assert cli.run([*arguments, "--against", str(earlier)]) == 2
-    assert "it holds no `scaling`" in capfd.readouterr().err
+    for broken in ({}, {"scaling": []}, {"scaling": [7]}, {"scaling": [{"scene": "x"}]}, []):
+        earlier.write_text(json.dumps(broken))
+        assert cli.run([*arguments, "--against", str(earlier)]) == 2
+        assert "it holds no `scaling`" in capfd.readouterr().err
     assert cli.run(["bench", "open-fog", "--against", str(earlier)]) == 2
     assert "--against: got a file without --scaling or --fit-octaves" in capfd.readouterr().err
 
