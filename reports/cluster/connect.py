@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from reports.machine import quick_compilation
 from reports.machine.environment import MissingError, threads
 
 HELP = "Where to compute: local[:N], tcp://HOST:PORT, or the scheduler file of a Dask cluster."
@@ -84,8 +85,15 @@ def check_library() -> None:
 
 
 @contextmanager
-def connected(place: Place) -> Iterator[Cluster]:
+def connected(place: Place, *, quick: bool = False) -> Iterator[Cluster]:
     """Give the connection to a place, with workers that are of our version.
+
+    Parameters
+    ----------
+    place
+        From `parse_place`.
+    quick
+        Whether kernels may run slowly if they compile quickly, where the workers are started here: nothing is timed.
 
     Raises
     ------
@@ -97,7 +105,7 @@ def connected(place: Place) -> Iterator[Cluster]:
     check_library()
     _quiet()
     with ExitStack() as stack:
-        client = stack.enter_context(_local(place.workers) if place.workers else _remote(place))
+        client = stack.enter_context(_local(place.workers, quick=quick) if place.workers else _remote(place))
         _wait_for_workers(client, place)
         check_workers(client)
         yield Cluster(client, place)
@@ -149,7 +157,7 @@ def check_workers(client: Any) -> dict[str, dict[str, Any]]:
 
 
 @contextmanager
-def _local(workers: int) -> Iterator[Any]:
+def _local(workers: int, *, quick: bool) -> Iterator[Any]:
     """Give the client of processes of this machine, one thread each; a single one has all threads and is alone."""
     import dask
     from distributed import Client, LocalCluster
@@ -180,6 +188,7 @@ def _local(workers: int) -> Iterator[Any]:
                     local_directory=str(folder),
                     silence_logs=logging.CRITICAL,
                     resources={"alone": 1} if alone else None,
+                    env=quick_compilation.settings() if quick else None,
                 )
             )
             client = stack.enter_context(Client(cluster, set_as_default=False))

@@ -142,7 +142,9 @@ def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, aga
     def with_times(cell, key, outcome):
         return store.row(key) | (outcome.value if outcome.status == "done" else {})
 
-    parts = [_part(study, store, place, made, partial(cell_groups, again=again, **how), with_errors)]
+    # Images that nobody times are rendered once: their kernels compile longer than they run.
+    quick = study.times != "with"
+    parts = [_part(study, store, place, made, partial(cell_groups, again=again, **how), with_errors, quick=quick)]
     if study.times == "alone":
         where = replace(place, workers=1) if place.workers else place
         parts.append(_part(study, store, where, made, partial(timing_groups, **how), with_times))
@@ -170,6 +172,8 @@ def _part(
     made: "Made",
     groups_of: Callable[..., Any],
     row_from: Callable[..., dict[str, Any]],
+    *,
+    quick: bool = False,
 ) -> dict[str, Any]:
     """Run the groups of a study, and add a row for each outcome."""
     import time
@@ -198,7 +202,11 @@ def _part(
 
     if not missing:
         return {"counts": counts, "problems": problems, "refused_workers": refused, "left": 0, "missing": 0}
-    with hint_when_stopped(hint), connected(place) as cluster, progress_bar(f"sweep {study.name}") as progress:
+    with (
+        hint_when_stopped(hint),
+        connected(place, quick=quick) as cluster,
+        progress_bar(f"sweep {study.name}") as progress,
+    ):
         for outcome in run_groups(cluster, groups(), made=made, retries=study.retries, refused=refused.append):
             key = outcome.task.name
             cell = open_cells.pop(key, None)

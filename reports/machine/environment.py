@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from reports import __version__
+from reports.machine import quick_compilation
 from reports.machine.gpu import cuda_status, optix_status
 from reports.machine.llvm import LLVM_VARIABLE, OLDEST_LLVM, Llvm, find_llvm
 
@@ -66,7 +67,8 @@ class Prepared:
 def prepare(variant: str | None = None) -> Prepared:
     """Check that kernels can be compiled here, and tell Dr.Jit which libLLVM to use.
 
-    Call it before Dr.Jit compiles anything: it sets ``DRJIT_LIBLLVM_PATH``. Takes a few milliseconds.
+    Call it before Dr.Jit compiles anything: it sets ``DRJIT_LIBLLVM_PATH``. Takes a few milliseconds. Where
+    ``AIRLIGHT_COMPILATION`` is ``quick``, kernels compile quickly and run slowly (`reports.machine.quick_compilation`).
 
     Parameters
     ----------
@@ -100,6 +102,8 @@ def prepare(variant: str | None = None) -> Prepared:
     if llvm is None or not llvm.works:
         return Prepared(variant, None)
     os.environ[LLVM_VARIABLE] = llvm.path
+    if on_processor and quick_compilation.is_asked_for():
+        quick_compilation.compile_quickly(llvm.path, llvm.version)
     return Prepared(variant, llvm)
 
 

@@ -209,12 +209,11 @@ def _render(scene: Scene, chosen: Configuration, *, timed: bool) -> Rendered:
     after = dr.detail.launch_stats()
     backend = dr.JitBackend.CUDA if (mi.variant() or "").startswith("cuda") else dr.JitBackend.LLVM
     numbers: dict[str, Any] = {
-        "first_ms": 1e3 * first,
         "kernels": after[0] - before[0],
         "compiled": after[2] - before[2],
         "bytes": int(dr.detail.malloc_watermark(backend)),
     }
-    return Rendered(frame, numbers | (_times(renderer, scene, state) if timed else {}))
+    return Rendered(frame, numbers | (_times(renderer, scene, state) | {"first_ms": 1e3 * first} if timed else {}))
 
 
 def _times(renderer: FrameRenderer, scene: Scene, state: Any) -> dict[str, Any]:
