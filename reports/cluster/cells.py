@@ -4,6 +4,7 @@
 import io
 import platform
 from collections.abc import Iterator
+from contextlib import nullcontext
 from datetime import UTC, datetime
 from functools import lru_cache
 from typing import Any
@@ -19,6 +20,7 @@ from reports import __version__
 from reports.cluster.run import Group, Outcome, Task
 from reports.cluster.worker import is_alone
 from reports.machine.environment import processor
+from reports.machine.quick_compilation import in_full
 from reports.plotting.pictures import error_map, exposure, tone_mapped
 from validation.properties.properties import scene_properties
 from validation.scenes.loading import LoadedScene
@@ -29,6 +31,7 @@ from validation.sweep.study import Cell, Study
 from validation.sweep.truth import CellTruth, cell_truth, load_cell
 from validation.sweep.work import cell_columns, cell_row, cell_times
 
+_LONG = ("ray-march",)  # methods whose one image takes longer than a good compilation of its kernels
 _AGAIN = ("failed", "hung", "aborted")  #: what `--again` computes again
 _QUALITY = 60  # of WebP
 _SMALLER = 320  # pixels: wider images are shown smaller in the rows' pictures
@@ -45,7 +48,9 @@ def row_of(truth: CellTruth, cell: Cell, key: str) -> dict[str, Any]:
 
     started = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     loaded, scene = _opened(cell.image)
-    row = cell_row(cell, scene, truth, whole=loaded.scene, properties=_properties(cell.image), paint=_picture)
+    properties = _properties(cell.image)
+    with in_full() if cell.chosen.method in _LONG else nullcontext():
+        row = cell_row(cell, scene, truth, whole=loaded.scene, properties=properties, paint=_picture)
     return row | {
         "key": key,
         "started": started,
@@ -74,7 +79,7 @@ def timing_groups(
         missing = {key: cell for key, cell in wanted.items() if store.row(key)["frame_ms"] is None}
         tasks = tuple(Task(key, times_of, (cell,), study.limit, alone=True) for key, cell in missing.items())
         if tasks:
-            yield Group(tasks), missing
+            yield Group(tasks, together=True), missing
 
 
 def cell_groups(
@@ -119,7 +124,7 @@ def _group(study: Study, cells: dict[str, Cell]) -> Group:
     image = next(iter(cells.values())).image
     words = " ".join((image.scene, *image.medium, f"{image.size[0]}x{image.size[1]}"))
     tasks = tuple(Task(key, row_of, (cell, key), study.limit) for key, cell in cells.items())
-    return Group(tasks, Task(f"{NO_TRUTH}{words}", truth_of, (image,), study.limit))
+    return Group(tasks, Task(f"{NO_TRUTH}{words}", truth_of, (image,), study.limit), together=True)
 
 
 @lru_cache(maxsize=1)

@@ -18,6 +18,7 @@ from reports.machine.environment import MissingError, threads
 HELP = "Where to compute: local[:N], tcp://HOST:PORT, or the scheduler file of a Dask cluster."
 
 MEMORY = "2GiB"  #: of a local worker, above which Dask ends it
+_KEPT = 2**28  # of freed memory that a local worker keeps, and the largest array that may come of it [bytes]
 _PATIENCE = 10.0  # until a scheduler has answered [s]
 _WORKERS = 30.0  # until a worker has come [s]
 _ADDRESS = re.compile(r"(tcp|tls|ucx|ws|wss)://[^\s/]+")
@@ -157,7 +158,7 @@ def check_workers(client: Any) -> dict[str, dict[str, Any]]:
 
 
 @contextmanager
-def _local(workers: int, *, quick: bool) -> Iterator[Any]:
+def _local(workers: int, *, quick: bool = False) -> Iterator[Any]:
     """Give the client of processes of this machine, one thread each; a single one has all threads and is alone."""
     import dask
     from distributed import Client, LocalCluster
@@ -171,6 +172,15 @@ def _local(workers: int, *, quick: bool) -> Iterator[Any]:
     counts: dict[str, object] = {"distributed.scheduler.allowed-failures": 10}
     # No truth waits behind another that takes minutes while somebody has nothing to do.
     counts["distributed.scheduler.worker-saturation"] = 1.0
+    # Whoever has nothing to do takes the next image, not half of another's: both would compile the same kernels.
+    counts["distributed.scheduler.work-stealing"] = False
+    # Dask lets the C library give every freed block back, and arrays of a frame's size come as new, zeroed pages: a
+    # quarter of a sweep's time was the kernel's. `reports.cluster.worker` gives memory back where there is much of it.
+    counts["distributed.nanny.pre-spawn-environ"] = {
+        "MALLOC_TRIM_THRESHOLD_": _KEPT,
+        "MALLOC_MMAP_THRESHOLD_": _KEPT,
+        "OMP_NUM_THREADS": 1,
+    }
     # A cluster that is told of a death waits so long and then forgets the worker, though another process stands in.
     counts["distributed.deploy.lost-worker-timeout"] = 86400
     with temporary_folder() as folder, dask.config.set(memory | counts), ExitStack() as stack:

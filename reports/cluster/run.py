@@ -2,7 +2,8 @@
 """Runs groups of tasks on a cluster: every task ends in one outcome, whatever happens to workers and scheduler.
 
 A group is tasks that need the value of one first task, such as the truth of a scene. Groups are sent as there is room:
-the scheduler never knows more than a window of them, however many there are.
+the scheduler never knows more than a window of them, however many there are. A group whose tasks share what a process
+loads and compiles is offered to one worker as a whole: two workers would each do that.
 
 Dask counts the death of a worker against every task that was assigned to it, begun or not. So workers say which task
 they begin, and only what had begun counts: a task whose process died is begun again `retries` times and is then
@@ -14,6 +15,7 @@ import pickle
 import queue
 import time
 import uuid
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -48,6 +50,7 @@ class Group:
 
     tasks: tuple[Task, ...]
     first: Task | None = None
+    together: bool = False  #: whether one worker had better do it all: what is loaded and compiled serves all tasks
 
 
 @dataclass(frozen=True)
@@ -82,6 +85,7 @@ class _Flown:
     number: int
     first: _Flight | None = None
     open: dict[str, _Flight] = field(default_factory=dict)
+    worker: str = ""  #: who had better do it
 
 
 def run_groups(
@@ -182,6 +186,9 @@ class _Run:
     def _fly(self, group: Group) -> None:
         flown = _Flown(group, self._groups)
         self._groups += 1
+        if group.together and self._workers:
+            busy = Counter(other.worker for other in self._flown.values())
+            flown.worker = min(self._workers, key=lambda address: busy[address])
         self._flown[flown.number] = flown
         if group.first is not None:
             flown.first = _Flight(group.first, flown)
@@ -214,6 +221,8 @@ class _Run:
             pure=False,
             priority=-flight.group.number,
             resources={ALONE: 1} if task.alone else None,
+            workers=[flight.group.worker] if flight.group.worker else None,
+            allow_other_workers=bool(flight.group.worker),  # it may be dead by then
         )
         heard, told = self._heard, self._told
 

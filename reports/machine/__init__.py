@@ -6,6 +6,7 @@ Read in this order:
 - `streams.py`: standard streams that can be written
 - `progress.py`: progress bars with the time left
 - `llvm.py`: finds a libLLVM that works
+- `quick_compilation.py`: a hack, kernels that compile quickly and run slowly
 - `gpu.py`: whether CUDA and OptiX work, and why not
 - `environment.py`: chooses the variant; versions and processor
 - `probe.py`: one kernel in a process of its own

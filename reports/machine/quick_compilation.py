@@ -21,13 +21,20 @@ import ctypes
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from typing import Any
+
+from reports.machine.llvm import LLVM_VARIABLE
 
 VARIABLE = "AIRLIGHT_COMPILATION"  #: 'quick' asks for it; unset, or 'full', is as Dr.Jit compiles
 CACHE_VARIABLE = "DRJIT_CACHE_DIR"
 
-_OPTIONS = (b"airlight", b"-opt-bisect-verbose=0", b"-opt-bisect-limit=0", b"-optimize-regalloc=false")
+_QUICK = (b"-opt-bisect-verbose=0", b"-opt-bisect-limit=0", b"-optimize-regalloc=false")
+_FULL = (b"-opt-bisect-limit=2147483647", b"-optimize-regalloc=true")  # as if nothing had been asked for
+_FORGET = "_ZN4llvm2cl25ResetAllOptionOccurrencesEv"  # of C++: options may be given once
 _FOLDER = "quick"  # of kernels, in Dr.Jit's folder
 _QUIET_LLVM = 20  # the first that knows the first option
 _PASS_ON = """
@@ -80,10 +87,32 @@ def compile_quickly(library: str, version: tuple[int, int] | None) -> None:
     os.environ.update(asked)
     if version is None or version[0] < _QUIET_LLVM:
         _leave_out_passes()
-    llvm = ctypes.CDLL(library)
+    _give(ctypes.CDLL(library), _QUICK)
+
+
+@contextmanager
+def in_full() -> Iterator[None]:
+    """Compile as Dr.Jit does within the block, for kernels that run long, in a process that compiles quickly."""
+    library = os.environ.get(LLVM_VARIABLE)
+    llvm = ctypes.CDLL(library) if library and is_asked_for() and os.environ == os.environ | settings() else None
+    if llvm is None or not hasattr(llvm, _FORGET):
+        yield
+        return
+    _give(llvm, _FULL)
+    try:
+        yield
+    finally:
+        _give(llvm, _QUICK)
+
+
+def _give(llvm: Any, options: tuple[bytes, ...]) -> None:
+    """Give a libLLVM options, in the place of those before where it can forget them."""
+    if hasattr(llvm, _FORGET):
+        llvm[_FORGET]()
+    words = (b"airlight", *options)
     llvm.LLVMParseCommandLineOptions.argtypes = [ctypes.c_int, ctypes.POINTER(ctypes.c_char_p), ctypes.c_char_p]
     llvm.LLVMParseCommandLineOptions.restype = None
-    llvm.LLVMParseCommandLineOptions(len(_OPTIONS), (ctypes.c_char_p * len(_OPTIONS))(*_OPTIONS), None)
+    llvm.LLVMParseCommandLineOptions(len(words), (ctypes.c_char_p * len(words))(*words), None)
 
 
 def _leave_out_passes() -> None:

@@ -17,6 +17,11 @@ def add(first, number):
     return first + number
 
 
+def process(seconds):
+    time.sleep(seconds)
+    return os.getpid()
+
+
 def large(number):
     return bytes(1_000_000) + bytes([number])
 

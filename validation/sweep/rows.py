@@ -4,7 +4,8 @@
 `rows.jsonl` has a line for each row: a checksum and the row as JSON. A line is written with one call, so a process that
 is killed leaves at most one torn line at the end, which the next run cuts off; nothing that was finished is lost. A row
 whose key is there already replaces it, in the Parquet too, so no row is there twice. A full disk leaves the file as it
-was. One run at a time writes: it holds a lock that the system drops when the process ends.
+was. One run at a time writes: it holds a lock that the system drops when the process ends. Where there is a Parquet
+alone, it is as good: a run begins with its rows.
 """
 
 import base64
@@ -43,6 +44,8 @@ class RowStore:
             self._statuses: dict[str, str] = {}
             self._end = 0
             self._read()
+            if not self._places:
+                self._take_over()
         except BaseException:
             os.close(self._file)
             raise
@@ -127,6 +130,25 @@ class RowStore:
                     batch = []
             writer.write_table(pa.Table.from_pylist(batch, schema=schema))
         return target
+
+    def _take_over(self) -> None:
+        """Begin with the rows of a Parquet that somebody brought here without the file that it was made of."""
+        source = self.folder / PARQUET
+        if not source.is_file():
+            return
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        try:
+            with pq.ParquetFile(source) as file:
+                for batch in file.iter_batches(batch_size=_BATCH):
+                    for row in batch.to_pylist():
+                        self.add(row)
+        except pa.ArrowException as error:
+            words = " ".join(str(error).split())
+            raise InputError(
+                f"{source}: it cannot be read ({words}); remove it, or name another folder by -o"
+            ) from None
 
     def _read(self) -> None:
         with os.fdopen(os.dup(self._file), "rb") as file:

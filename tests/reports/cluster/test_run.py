@@ -54,6 +54,14 @@ def test_values_refusals_and_faults(cluster):
     assert "ten" not in ended
 
 
+def test_what_belongs_together_is_done_by_one_process_and_all_have_work(cluster):
+    groups = [Group(tuple(Task(f"{g}-{n}", tasks.process, (0.05,)) for n in range(4)), together=True) for g in range(8)]
+    ended = outcomes(cluster, *groups)
+    processes = [{ended[task.name].value for task in group.tasks} for group in groups]
+    assert [len(each) for each in processes] == [1] * len(groups)
+    assert len(set.union(*processes)) == 2
+
+
 @pytest.mark.claim("sweeps-end-what-hangs", tolerance="none")
 def test_a_task_that_ends_its_process_is_given_up_and_no_other(cluster):
     others = [Task(f"s{n}", tasks.square, (n, 0.05)) for n in range(12)]
@@ -110,7 +118,11 @@ def test_twenty_kills_during_two_hundred_tasks(cluster):
                 killed.append(victim)
 
     groups = [
-        Group(tuple(Task(f"{g}-{n}", tasks.add, (n,)) for n in range(10)), Task(f"truth {g}", tasks.square, (g, 0.2)))
+        Group(
+            tuple(Task(f"{g}-{n}", tasks.add, (n,)) for n in range(10)),
+            Task(f"truth {g}", tasks.square, (g, 0.2)),
+            together=g % 2 > 0,
+        )
         for g in range(20)
     ]
     slowly = [alone(*(Task(f"slow {n}", tasks.square, (n, 0.3)) for n in range(60)))]
