@@ -5,6 +5,7 @@ Read in this order:
 
 - `airlight.py`: the airlight of point and spot lights in bounded media;
 - `views.py`: bounded media as the camera and the lights see them, before there are rays;
+- `envelopes.py`: the least and the largest of lines along a ray, and where others take over;
 - `convex_clip.py`: where lines from one point cross convex bounds;
 - `ray_segments.py`: the segments of camera rays, and the parts of legs in each medium;
 - `facet_walk.py`: where legs enter a polyhedron on their way to the points of a ray;

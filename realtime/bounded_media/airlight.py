@@ -20,8 +20,8 @@ between the ends of the segment: with s = x - foot and the angle u from the near
     s = h (s_0 cos u + h sin u)/(h cos u - s_0 sin u),     u_1 = atan2(h (s_1 - s_0), h^2 + s_0 s_1),
 
 so that a segment far from the light or a ray close to it loses nothing. The parts l_k have kinks where the leg passes
-an edge of the medium, and there the rule is of second order. Where legs graze a sphere, l_k rises like a root: between
-media, segments are cut there, and the rule is used in the u of u^2 (3 - 2 u), in which roots at both ends are smooth.
+an edge of a medium, or of its outline: segments are cut there. Where legs graze a sphere, l_k rises like a root:
+segments are cut there too, and the rule is used in the u of u^2 (3 - 2 u), in which roots at both ends are smooth.
 
 The published approximation (section 4.2) puts a constant R for r in the exponent, and takes the distance x_n at which
 the ray enters from x. As printed it is
@@ -45,16 +45,27 @@ References
 Biri, Arques, Michelin 2006, sections 4.2 and 5.2.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
+from realtime.bounded_media.convex_clip import crossing_lines
 from realtime.bounded_media.directional_airlight import ParallelRay
+from realtime.bounded_media.envelopes import Envelopes, next_change
 from realtime.bounded_media.panels import MediumSegment, medium_integral
-from realtime.bounded_media.ray_segments import MediaRay, Piece, grazed_at, light_leg, other_media_near, sum_over_pieces
+from realtime.bounded_media.ray_segments import (
+    MediaRay,
+    Piece,
+    grazed_at,
+    legs_near,
+    light_leg,
+    other_media_near,
+    ray_envelopes,
+    sum_over_pieces,
+)
 from realtime.bounded_media.views import light_views
 from realtime.errors import InputError
 from realtime.numerics.array_types import chosen_value, is_single
@@ -67,6 +78,7 @@ from realtime.scene.medium import Medium, least_extinction
 FORMS = ("exact", "paper", "printed")
 _NODES, _NODES_PAPER = 24, 6
 _AT_ONCE = 8  # nodes that a kernel's code has side by side
+_MOST = 512  # parts of a segment between bends: no rounding can make a loop endless
 _OPTICAL_REACH = 18.0  # e^-18 = 1.5e-8 of the light is left
 
 
@@ -204,7 +216,7 @@ def _piece_integral(ray: MediaRay, piece: Piece, x0, x1):
     if ray.form != "exact":
         return _integral(ray, piece, x0, x1)
     if piece.number is None:
-        return _integral_past_spheres(ray, piece, x0, x1)
+        return _integral_between_bends(ray, piece, x0, x1)
     number = piece.number
     segment = MediumSegment(
         medium=piece.medium,
@@ -223,35 +235,61 @@ def _piece_integral(ray: MediaRay, piece: Piece, x0, x1):
     return dr.if_stmt(
         args=(x0, x1),
         cond=other_media_near(ray, number, x0, x1),
-        true_fn=lambda x0, x1: _integral_past_spheres(ray, piece, x0, x1),
+        true_fn=lambda x0, x1: _integral_between_bends(ray, piece, x0, x1),
         false_fn=lambda x0, x1: medium_integral(segment, x0, x1),
     )
 
 
-def _integral_past_spheres(ray: MediaRay, piece: Piece, x0, x1):
-    """Integrate one segment in one piece, cut where legs graze the spheres of other media."""
-    others = [seen for number, seen in enumerate(ray.seen) if number != piece.number]
-    cuts = [x for seen in others if seen.bounded_medium.planes is None for x in grazed_at(seen, ray)]
-    if not cuts:
-        return _integral(ray, piece, x0, x1)
+def _integral_between_bends(ray: MediaRay, piece: Piece, x0, x1):
+    """Integrate one segment in one piece, from one bend of the legs to the next."""
+    Float = type(ray.geometry.height)
+    slack = 64 * dr.epsilon(Float)
+    x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(piece.medium))
+    spheres = [seen for number, seen in enumerate(ray.seen) if number != piece.number and seen.planes is None]
+    grazes = [x for seen in spheres for x in grazed_at(seen, ray)]
+    polyhedra = [number for number, seen in enumerate(ray.seen) if seen.planes is not None]
+    ends = [x0, x1], [distance_to_light(ray.geometry, x) for x in (x0, x1)]
+    near = [number == piece.number or legs_near(ray, ray.seen[number], *ends) for number in polyhedra]
+    lines = [crossing_lines(ray.seen[number], ray.start, ray.direction) for number in polyhedra]
+    counts = [ray.seen[number].bounded_medium.count for number in polyhedra]
 
-    def part(turn, begin, total):
+    def part(turn, begin, envelopes, total):
+        at = begin + slack * (begin + 1)
+        changes = [
+            next_change(line, count, envelopes=own, x=at, active=active)
+            for line, count, own, active in zip(lines, counts, envelopes, near)
+        ]
         end = x1
-        for x in cuts:
-            end = dr.minimum(end, dr.select(x > begin, x, dr.inf))
-        return turn + 1, end, total + _integral(ray, piece, begin, end, like_roots=True)
+        for x in grazes:
+            end = dr.minimum(end, dr.select(x > at, x, dr.inf))
+        for change, own in zip(changes, envelopes):
+            end = dr.minimum(end, dr.minimum(change.next, own.crossing(at, 1)))
+        known = dict(zip(polyhedra, envelopes))
+        total += _integral(ray, piece, begin, end, envelopes=known, like_roots=bool(grazes))
+        return turn + 1, dr.maximum(end, at), [change.envelopes(end) for change in changes], total
 
     width = dr.width(ray.geometry.height, x0, x1)
+    begin = x0 + dr.zeros(Float, width)
+    inside = begin + slack * (begin + 1)
+    envelopes = [ray_envelopes(ray, number, inside, active) for number, active in zip(polyhedra, near)]
     *_, total = dr.while_loop(
-        state=(dr.zeros(mi.UInt32, width), x0 + 0, dr.zeros(type(ray.medium.albedo), width)),
-        cond=lambda turn, begin, total: (begin < x1) & (turn <= len(cuts)),
+        state=(dr.zeros(mi.UInt32, width), begin, envelopes, dr.zeros(type(ray.medium.albedo), width)),
+        cond=lambda turn, begin, envelopes, total: (begin < x1) & (turn < _MOST),
         body=part,
-        labels=("turn", "begin", "total"),
+        labels=("turn", "begin", "envelopes", "total"),
     )
     return total
 
 
-def _integral(ray: MediaRay, piece: Piece, x0, x1, *, like_roots: bool = False):
+def _integral(
+    ray: MediaRay,
+    piece: Piece,
+    x0,
+    x1,
+    *,
+    envelopes: Mapping[int, Envelopes] | None = None,
+    like_roots: bool = False,
+):
     """Integrate one segment in one piece; its integrand may rise and fall `like_roots` at the ends."""
     if ray.polynomial is not None:
         return published_integral(ray, piece, x0, x1)
@@ -261,7 +299,7 @@ def _integral(ray: MediaRay, piece: Piece, x0, x1, *, like_roots: bool = False):
     h = dr.maximum(ray.geometry.height, 1e-15)
     s0, s1 = x0 - ray.geometry.foot, x1 - ray.geometry.foot
     width = dr.select(dr.isfinite(x1), dr.atan2(h * (s1 - s0), dr.fma(h, h, s0 * s1)), dr.atan2(h, s0))
-    nodes = unit_nodes(_node_count(ray, piece, single=is_single(Float)))
+    nodes = unit_nodes(_node_count(ray.form, single=is_single(Float)))
     if like_roots:  # in the t of t^2 (3 - 2 t) it is smooth
         nodes = tuple((t * t * (3 - 2 * t), 6 * t * (1 - t) * weight) for t, weight in nodes)
 
@@ -273,7 +311,8 @@ def _integral(ray: MediaRay, piece: Piece, x0, x1, *, like_roots: bool = False):
             s = h * dr.fma(s0, cosine, h * sine) / dr.fma(h, cosine, -s0 * sine)
             xs.append(ray.geometry.foot + s)
             rs.append(dr.sqrt(dr.fma(s, s, h * h)))
-        kept = _attenuation(ray, piece, xs, rs) if ray.form == "exact" else _paper_attenuation(ray, piece, xs)
+        exact = ray.form == "exact"
+        kept = _attenuation(ray, piece, xs, rs, envelopes) if exact else _paper_attenuation(ray, piece, xs)
         return sum(
             weight * _scattered(ray, piece, value, x, r)
             for (_, weight), value, x, r in zip(nodes, kept, xs, rs, strict=True)
@@ -305,10 +344,10 @@ def _sum_in_parts(nodes: Sequence[tuple[float, float]], part: Callable[[Sequence
     return total
 
 
-def _node_count(ray: MediaRay, piece: Piece, *, single: bool) -> int:
-    if ray.form == "paper":
+def _node_count(form: str, *, single: bool) -> int:
+    if form == "paper":
         return _NODES_PAPER
-    return _NODES if single or ray.form == "printed" else 2 * _NODES
+    return _NODES if single or form == "printed" else 2 * _NODES
 
 
 def _scattered(ray: MediaRay, piece: Piece, transmittance: list[Any], x, r):
@@ -321,9 +360,11 @@ def _scattered(ray: MediaRay, piece: Piece, transmittance: list[Any], x, r):
     return piece.medium.albedo * Color(*channels)
 
 
-def _attenuation(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
+def _attenuation(
+    ray: MediaRay, piece: Piece, xs, rs, envelopes: Mapping[int, Envelopes] | None = None
+) -> list[list[Any]]:
     """Return exp(-tau) of both legs, by node and channel."""
-    insides = light_leg(ray, piece, xs, rs)
+    insides = light_leg(ray, piece, xs, rs, envelopes)
     result = []
     for node, (x, r) in enumerate(zip(xs, rs)):
         channels = []

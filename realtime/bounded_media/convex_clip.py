@@ -22,6 +22,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from realtime.bounded_media.envelopes import Lines
 from realtime.numerics.array_types import four_numbers, packed
 from realtime.scene.medium import BoundedMedium
 
@@ -48,6 +49,19 @@ def seen_from(bounded_medium: BoundedMedium, point) -> Seen:
     numbers = packed(four_numbers(type(room))(*columns))
     dr.eval(numbers, toward)
     return Seen(bounded_medium, toward, numbers)
+
+
+def crossing_lines(seen: Seen, start, direction, active=True) -> Lines:
+    """Return the lines 1/f by plane, and whether the point is outside of it; arguments as of `inverse_crossings`."""
+    Four = four_numbers(type(start.x))
+
+    def line(number):
+        # Four numbers at once: reading them is most of the work.
+        values = dr.gather(Four, seen.planes, number, active)
+        g = values.xyz
+        return dr.dot(g, start), dr.dot(g, direction), values.w > 0
+
+    return line
 
 
 def inverse_crossings(seen: Seen, start, direction, distances, active, *, leaves: bool = True):
@@ -80,11 +94,10 @@ def inverse_crossings(seen: Seen, start, direction, distances, active, *, leaves
     enter = [dr.full(Float, dr.inf, width) for _ in distances]
     leave = [dr.full(Float, -dr.inf, width) for _ in distances] if leaves else []
 
+    lines = crossing_lines(seen, start, direction, active)
+
     def plane(number, enter, leave):
-        # Four numbers at once: reading them is most of the work.
-        values = dr.gather(four_numbers(Float), seen.planes, number, active)
-        g, outside = values.xyz, values.w > 0
-        constant, slope = dr.dot(g, start), dr.dot(g, direction)
+        constant, slope, outside = lines(number)
         first, last = dr.select(outside, constant, dr.inf), dr.select(outside, -dr.inf, constant)
         enter = [dr.minimum(value, dr.fma(slope, x, first)) for value, x in zip(enter, distances)]
         leave = [dr.maximum(value, dr.fma(slope, x, last)) for value, x in zip(leave, distances)]

@@ -16,9 +16,8 @@ where 1 - exp(-z) = 2 T/(1 + T), T = tanh(z/2), cancels nothing. A bend is met a
 back to it, and no leg becomes shorter than nothing.
 
 With spheres, q = sqrt(R^2 - |w x a|^2) ends like a square root at both ends of a piece. In u, with x = x_0 + D u^2 (3 -
-2 u), such an end is smooth; Gauss and Legendre's nodes in u do the rest. So they do for media of many planes, whose
-bends lie close together and are small: there the rule is of second order. Pieces are cut so that none is optically
-thick.
+2 u), such an end is smooth; Gauss and Legendre's nodes in u do the rest, between the bends of polyhedra, too. Pieces
+are cut so that none is optically thick.
 
 In a medium without bounds nothing arrives: the light would have crossed an endless way through it.
 """
@@ -29,7 +28,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.directional_legs import ParallelSeen, cylinder_bend, parallel_legs, slope_from
+from realtime.bounded_media.directional_legs import ParallelSeen, cylinder_bend, leg_lines, linear_length, parallel_legs
+from realtime.bounded_media.envelopes import envelopes_at, next_change
 from realtime.bounded_media.ray_segments import Piece, sum_over_pieces
 from realtime.numerics.array_types import is_single
 from realtime.numerics.fast_exp import exp_bounded
@@ -37,7 +37,6 @@ from realtime.numerics.gauss_legendre import unit_nodes
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, least_extinction
 
-_FEW_PLANES = 12  # whose bends are worth the search for them
 _NODES, _NODES_DOUBLE = 10, 24
 _THICK = 8.0  # optical depth of the pieces that nodes are placed in
 _DARK = 60.0  # optical depth before the camera beyond which nothing is left, e^-60 = 9e-27
@@ -86,42 +85,49 @@ class ParallelRay:
 
 def _integral(ray: ParallelRay, piece: Piece, x0, x1):
     """Integrate one segment in one piece, from bend to bend."""
-    linear = all(_has_few_planes(seen) for seen in ray.seen)
+    linear = all(seen.planes is not None for seen in ray.seen)
     Float, Color = type(x0), type(ray.medium.albedo)
     reach = piece.begin + _DARK / least_extinction(piece.medium)
     x1 = dr.minimum(x1, reach)
     slack = 64 * dr.epsilon(Float)
 
-    def step(count, x, total):
+    polyhedra = [seen for seen in ray.seen if seen.planes is not None]
+    lines = [leg_lines(seen, ray.origin, ray.direction) for seen in polyhedra]
+    counts = [seen.bounded_medium.count for seen in polyhedra]
+
+    def step(turn, x, envelopes, total):
         at = x + slack * (x + 1)
+        changes = [
+            next_change(line, count, envelopes=own, x=at)
+            for line, count, own in zip(lines, counts, envelopes, strict=True)
+        ]
+        end = x1
+        for change, own in zip(changes, envelopes):
+            end = dr.minimum(end, dr.minimum(change.next, own.crossing(at, 0)))
         if linear:
-            slopes = [slope_from(seen, ray.origin, ray.direction, at) for seen in ray.seen]
-            end = x1
-            for slope in slopes:
-                end = dr.minimum(end, slope.until)
-            channels = _linear_channels(ray, piece, slopes, at, x, end)
+            channels = _linear_channels(ray, piece, envelopes, at, x, end)
         else:
-            end = dr.minimum(_next_facet_change(ray, at, x1), x + _THICK / _largest_extinction(piece.medium))
+            end = dr.minimum(_next_cylinder(ray, at, end), x + _THICK / _largest_extinction(piece.medium))
             channels = _node_channels(ray, piece, x, end)
-        return count + 1, dr.maximum(end, at), total + Color(*channels)
+        return turn + 1, dr.maximum(end, at), [each.envelopes(end) for each in changes], total + Color(*channels)
 
     width = dr.width(x0, x1)
-    _, _, total = dr.while_loop(
-        state=(dr.zeros(mi.UInt32, width), x0 + dr.zeros(Float, width), dr.zeros(Color, width)),
-        cond=lambda count, x, total: (x < x1) & (count < _PIECES),
+    x0 = x0 + dr.zeros(Float, width)
+    inside = x0 + slack * (x0 + 1)
+    envelopes = [envelopes_at(line, count, inside) for line, count in zip(lines, counts, strict=True)]
+    *_, total = dr.while_loop(
+        state=(dr.zeros(mi.UInt32, width), x0, envelopes, dr.zeros(Color, width)),
+        cond=lambda turn, x, envelopes, total: (x < x1) & (turn < _PIECES),
         body=step,
-        labels=("count", "x", "total"),
+        labels=("turn", "x", "envelopes", "total"),
     )
     return _weight(ray, piece) * total
 
 
-def _has_few_planes(seen: ParallelSeen) -> bool:
-    return seen.planes is not None and seen.bounded_medium.count <= _FEW_PLANES
-
-
-def _linear_channels(ray: ParallelRay, piece: Piece, slopes, at, x, end) -> list[Any]:
+def _linear_channels(ray: ParallelRay, piece: Piece, envelopes, at, x, end) -> list[Any]:
     """Return the integral from x to end, by channel, where the legs are linear."""
-    lengths = [[dr.maximum(dr.fma(slope.rate, here - at, slope.length), 0) for slope in slopes] for here in (x, end)]
+    slopes = [linear_length(own, at) for own in envelopes]
+    lengths = [[dr.maximum(dr.fma(rate, here - at, length), 0) for length, rate in slopes] for here in (x, end)]
     channels = []
     for channel, own in enumerate(piece.medium.sigma_t):
         depths = []
@@ -137,14 +143,12 @@ def _linear_channels(ray: ParallelRay, piece: Piece, slopes, at, x, end) -> list
     return channels
 
 
-def _next_facet_change(ray: ParallelRay, at, x1):
-    """Return where the legs bend next beyond `at`, or the end of the segment."""
+def _next_cylinder(ray: ParallelRay, at, x1):
+    """Return where legs begin or end to meet a sphere next beyond `at`, or the end of the segment."""
     end = x1
     for seen in ray.seen:
         if seen.planes is None:
             end = dr.minimum(end, cylinder_bend(seen, ray.origin, ray.direction, at))
-        elif _has_few_planes(seen):
-            end = dr.minimum(end, slope_from(seen, ray.origin, ray.direction, at).until)
     return end
 
 

@@ -12,9 +12,9 @@ so from phi on. The leg therefore has in the medium the part
     l = max(0, min phi over the planes with n . a < 0  -  max(0, max phi over the others)).
 
 phi is linear in P. Along a ray P = o + x d every phi is a line in x, l is linear between *bends*, and so is the optical
-depth of the leg. The bends are where another plane becomes the least or the largest, and where one of the two maxima
-changes sides. A plane along the light has lines of next to no width: tilted a little it is like the others, infinitely
-far on one side and on the other.
+depth of the leg. The bends are those of the envelopes (`realtime.bounded_media.envelopes`), and where one of the two
+maxima changes sides. A plane along the light has lines of next to no width: tilted a little it is like the others,
+infinitely far on one side and on the other.
 
 In a sphere of radius R about C, with w = P - C, the leg leaves at w . a + q and enters at w . a - q, q^2 = R^2 - |w x
 a|^2. That has no bends but where the ray enters and leaves the cylinder |w x a| = R.
@@ -26,17 +26,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from realtime.bounded_media.envelopes import Envelopes, Lines
 from realtime.numerics.array_types import four_numbers
 from realtime.scene.medium import BoundedMedium
-
-
-@dataclass(frozen=True)
-class Slope:
-    """What of the legs lies in a medium along a ray, linear from a distance on."""
-
-    length: Any  #: l there [m]
-    rate: Any  #: dl/dx [1]
-    until: Any  #: the next bend [m]
 
 
 @dataclass(frozen=True)
@@ -111,60 +103,21 @@ def parallel_legs(seen: ParallelSeen, origin, direction, distances, active=True)
     return [dr.select(active, length, 0) for length in lengths]
 
 
-def slope_from(seen: ParallelSeen, origin, direction, x) -> Slope:
-    """Return what of the legs lies in a medium that has planes, from a distance on.
-
-    Parameters
-    ----------
-    seen
-        The medium and the light.
-    origin, direction
-        Of the rays.
-    x
-        From where; at least a rounding error beyond the last bend, so that each is met once [m].
-    """
+def leg_lines(seen: ParallelSeen, origin, direction) -> Lines:
+    """Return the lines phi of a medium that has planes, along rays from `origin` [m] in unit `direction`s."""
     start = origin - seen.bounded_medium.centre
-    Float = type(x)
-    width = dr.width(start, direction, x)
+    return lambda number: _line(seen, number, start, direction)
 
-    def extremes(number, first, last, first_rate, last_rate):
-        constant, slope, comes_in = _line(seen, number, start, direction)
-        value = dr.fma(slope, x, constant)
-        later, sooner = ~comes_in & (value > first), comes_in & (value < last)
-        first, first_rate = dr.select(later, value, first), dr.select(later, slope, first_rate)
-        last, last_rate = dr.select(sooner, value, last), dr.select(sooner, slope, last_rate)
-        return number + 1, first, last, first_rate, last_rate
 
-    zero = dr.zeros(Float, width)
-    _, first, last, first_rate, last_rate = dr.while_loop(
-        state=(mi.UInt32(0), dr.full(Float, -dr.inf, width), dr.full(Float, dr.inf, width), zero, zero + 0),
-        cond=lambda number, *_: number < seen.bounded_medium.count,
-        body=extremes,
-        labels=("number", "first", "last", "first_rate", "last_rate"),
-    )
-
-    def bends(number, until):
-        constant, slope, comes_in = _line(seen, number, start, direction)
-        value = dr.fma(slope, x, constant)
-        nearing = dr.select(comes_in, last_rate - slope, slope - first_rate)
-        gap = dr.select(comes_in, value - last, first - value)
-        return number + 1, dr.minimum(until, dr.select(nearing > 0, dr.maximum(gap, 0) / nearing, dr.inf))
-
-    until = dr.full(Float, dr.inf, width)
-    for gap, closing in ((last - first, first_rate - last_rate), (-first, first_rate), (-last, last_rate)):
-        at = gap / closing
-        until = dr.minimum(until, dr.select(at > 0, at, dr.inf))
-    _, until = dr.while_loop(
-        state=(mi.UInt32(0), until),
-        cond=lambda number, until: number < seen.bounded_medium.count,
-        body=bends,
-        labels=("number", "until"),
+def linear_length(envelopes: Envelopes, x) -> tuple[Any, Any]:
+    """Return what of the legs lies in a medium at x [m], and its slope, with the planes of the legs there."""
+    (last, last_rate), (first, first_rate) = (
+        (dr.fma(rate, x, constant), rate) for constant, rate in (envelopes.least, envelopes.largest)
     )
     ahead = first > 0
     length = last - dr.select(ahead, first, 0)
-    rate = last_rate - dr.select(ahead, first_rate, 0)
     there = length > 0
-    return Slope(dr.select(there, length, 0), dr.select(there, rate, 0), x + until)
+    return dr.select(there, length, 0), dr.select(there, last_rate - dr.select(ahead, first_rate, 0), 0)
 
 
 def cylinder_bend(seen: ParallelSeen, origin, direction, x):

@@ -4,14 +4,16 @@
 Lines are followed over the facets of media (`realtime.bounded_media.facet_walk`), in packets in which any comes near.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.convex_clip import Seen, inverse_crossings, near_line, share_inside
+from realtime.bounded_media.convex_clip import Seen, crossing_lines, inverse_crossings, near_line, share_inside
 from realtime.bounded_media.directional_legs import parallel_legs, seen_along
+from realtime.bounded_media.envelopes import Envelopes, envelopes_at
 from realtime.bounded_media.facet_walk import EntryPlanes, clear_of, line_crossings
 from realtime.bounded_media.views import MediumView, medium_view
 from realtime.numerics.array_types import chosen_value
@@ -223,20 +225,41 @@ def line_ends(seen: Seen, planes, v):
     return line_crossings(planes, v)
 
 
-def light_leg(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
+def light_leg(ray: MediaRay, piece: Piece, xs, rs, envelopes: Mapping[int, Envelopes] | None = None) -> list[list[Any]]:
     """Return by medium and node what of the leg from the light lies in it [m].
 
-    `xs` are the distances of the nodes along the rays and `rs` those from the light [m].
+    Parameters
+    ----------
+    ray, piece
+        Where the nodes lie.
+    xs, rs
+        Distances of the nodes along the rays, and from the light [m].
+    envelopes
+        By number of a medium, the planes where all of these legs enter and leave it, from `ray_envelopes`, if they are
+        known.
     """
     insides = []
     for number, seen in enumerate(ray.seen):
         own = number == piece.number
-        near = dr.full(dr.mask_t(xs[0]), True, dr.width(xs[0])) if own else _near_legs(ray, seen, xs, rs)
-        enter, leave = inverse_crossings(seen, ray.start, ray.direction, xs, near, leaves=not own)
+        if envelopes is not None and number in envelopes:
+            near: Any = True
+            enter, leave = zip(*(envelopes[number].values(x) for x in xs), strict=True)
+        else:
+            near = dr.full(dr.mask_t(xs[0]), True, dr.width(xs[0])) if own else legs_near(ray, seen, xs, rs)
+            enter, leave = inverse_crossings(seen, ray.start, ray.direction, xs, near, leaves=not own)
         ends = [None] * len(xs) if own else leave
         shares = [share_inside(inverse_in, inverse_out) for inverse_in, inverse_out in zip(enter, ends)]
         insides.append([dr.select(near, share * r, 0) for share, r in zip(shares, rs)])
     return insides
+
+
+def ray_envelopes(ray: MediaRay, number: int, x, near) -> Envelopes:
+    """Return the planes where legs to the points at x [m] enter and leave a medium; those that are not near miss it."""
+    seen = ray.seen[number]
+    lines = crossing_lines(seen, ray.start, ray.direction)
+    missed, flat = type(x)(-1), type(x)(0)
+    found = envelopes_at(lines, seen.bounded_medium.count, x, near)
+    return dr.select(near, found, Envelopes((missed, flat), (missed, flat)))
 
 
 def grazed_at(seen: Seen, ray: MediaRay) -> tuple[Any, Any]:
@@ -270,7 +293,7 @@ def other_media_near(ray: MediaRay, number: int, x0, x1):
     for other, seen in enumerate(ray.seen):
         if other == number:
             continue
-        near = _near_legs(ray, seen, xs, rs)
+        near = legs_near(ray, seen, xs, rs)
         if seen.planes is not None:
             near = dr.if_stmt(
                 args=(x0, x1),
@@ -289,7 +312,7 @@ def _clear_of(ray: MediaRay, other: int, x0, x1):
     return clear_of((entering, leaving), ray.start, ray.direction, x0, x1)
 
 
-def _near_legs(ray: MediaRay, seen: Seen, xs, rs):
+def legs_near(ray: MediaRay, seen: Seen, xs, rs):
     """Return whether legs from the light to points of a segment may come near a medium.
 
     In the plane of ray and light, with u along the ray and v to it, the legs fill a triangle with the corner at the
