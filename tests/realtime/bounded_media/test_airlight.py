@@ -113,7 +113,7 @@ def test_two_media_against_sums_over_small_steps(variant, lamp):
     light = tiny_scene()["lamp"] | {"position": list(lamp)}
     scene = clear_scene(lamp=light, ball=fog_sphere(), cube=cube())
     expected = summed(scene, [SPHERE, CUBE])
-    # Segments are cut at the kinks that the edges of the box put into the leg's length: 1e-5 is left of the sums' steps.
+    # Segments are cut where the edges of the box bend the leg's length: 1e-5 is left, of the steps of the sums.
     assert relative_rmse(render(scene).airlight, expected) < 3e-5
     assert relative_rmse(render(scene, precision="single").airlight, expected) < 3e-5
 
