@@ -14,7 +14,9 @@ planes in exact order, states three:
   integral together err by two eighths of the largest second difference over the value.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,7 +27,8 @@ from realtime.scene.phase import Tabulated
 from realtime.scene.read_scene import Scene
 from reference.quadrature.segments import AMBIENT, camera_segments, optical_depth, scattering_range
 from reference.quadrature.surface import surface_hits
-from reference.scene.read import TruthMedium, TruthScene, read_truth
+from reference.scene.directional_light import DirectionalLight
+from reference.scene.read import TruthLight, TruthMedium, TruthScene, read_truth
 from validation.configurations.methods import Configuration
 
 Array = NDArray[np.float64]
@@ -91,52 +94,71 @@ def _worth_of_ends(truth: TruthScene) -> Array:
     """Return what the uncertain ends of the lit intervals of all rays of `truth` are worth, (rays, 3)."""
     distance = surface_hits(truth).distance
     worth = np.zeros((len(distance), 3))
-    for light in (*truth.lights, *truth.directional):
-        x = _places(truth, light, distance)
+    sources: list[tuple[Any, ...]] = [(light, _angles_about, _from_place) for light in truth.lights]
+    sources += [(light, _equal_steps, _from_infinity) for light in truth.directional]
+    for light, places_of, incident in sources:
+        places = np.concatenate([*_ends(truth, distance), places_of(truth, light, distance)])
+        x = np.clip(places, 0, distance).T
         ray, column = np.nonzero(np.isfinite(x))
-        scattered = x[ray, column, None] * _scattered(truth, light, ray, x[ray, column], distance)
+        x = x[ray, column]
+        scattered = x[:, None] * _scattered(truth, partial(incident, truth, light), ray, x, distance)
         largest = np.zeros_like(worth)
         np.maximum.at(largest, ray, scattered)
         worth += largest
     return _BETWEEN * END * worth
 
 
-def _places(truth: TruthScene, light: Any, distance: Array) -> Array:
-    """Return distances along rays, (rays, places) [m]: between the ends of segments, at these, and about the light."""
-    fraction = np.linspace(0, 1, _SAMPLES)[:, None]
+def _ends(truth: TruthScene, distance: Array) -> list[Array]:
+    """Return distances along rays, each (places, rays) [m]: their ends, those of segments in media and between them."""
     places = [np.zeros((1, len(distance))), distance[None]]
     if truth.media:
         segments = camera_segments(truth, distance)
         places += [segments.start, segments.end, 0.5 * (segments.start + segments.end)]
-    if hasattr(light, "position"):
-        toward = light.position - truth.origin
-        foot = truth.direction @ toward
-        height = np.linalg.norm(toward - foot[:, None] * truth.direction, axis=1)
-        first, last = np.arctan2(-foot, height), np.arctan2(distance - foot, height)
-        angle = first + fraction * (last - first)
-        places.append(np.where(angle < np.pi / 2 - 1e-6, foot + height * np.tan(angle), np.inf))
-    else:
-        low, high = scattering_range(segments)
-        places.append(low + fraction * (high - low))
-    return np.clip(np.concatenate(places), 0, distance).T
+    return places
 
 
-def _scattered(truth: TruthScene, light: Any, ray: NDArray[np.int64], x: Array, distance: Array) -> Array:
+def _angles_about(truth: TruthScene, light: TruthLight, distance: Array) -> Array:
+    """Return distances at equal angles about a light, (places, rays) [m]."""
+    toward = light.position - truth.origin
+    foot = truth.direction @ toward
+    height = np.linalg.norm(toward - foot[:, None] * truth.direction, axis=1)
+    first, last = np.arctan2(-foot, height), np.arctan2(distance - foot, height)
+    angle = first + np.linspace(0, 1, _SAMPLES)[:, None] * (last - first)
+    return np.where(angle < np.pi / 2 - 1e-6, foot + height * np.tan(angle), np.inf)
+
+
+def _equal_steps(truth: TruthScene, light: DirectionalLight, distance: Array) -> Array:
+    """Return distances at equal steps where rays scatter, (places, rays) [m]."""
+    low, high = scattering_range(camera_segments(truth, distance))
+    return low + np.linspace(0, 1, _SAMPLES)[:, None] * (high - low)
+
+
+def _from_place(truth: TruthScene, light: TruthLight, point: Array) -> tuple[Array, Array]:
+    """Return the direction in which light arrives at points, and how much of it [W/m^2], (n, 3)."""
+    leg = point - light.position
+    r = np.linalg.norm(leg, axis=1)
+    leg /= r[:, None]
+    depth = optical_depth(truth, light.position, leg, np.zeros(len(r)), r)
+    return leg, light.intensity / (r * r)[:, None] * np.exp(-depth)
+
+
+def _from_infinity(truth: TruthScene, light: DirectionalLight, point: Array) -> tuple[Array, Array]:
+    """As `_from_place`; nothing is taken off on the way, which is an upper bound."""
+    return np.broadcast_to(light.direction, point.shape), np.broadcast_to(light.irradiance, point.shape)
+
+
+def _scattered(
+    truth: TruthScene,
+    incident: Callable[[Array], tuple[Array, Array]],
+    ray: NDArray[np.int64],
+    x: Array,
+    distance: Array,
+) -> Array:
     """Return what a metre of rays scatters at distances x in the full light of one light, (n, 3) [W/(m^3 sr)]."""
     direction = truth.direction[ray]
-    point = truth.origin + x[:, None] * direction
-    if hasattr(light, "position"):
-        leg = point - light.position
-        r = np.linalg.norm(leg, axis=1)
-        leg /= r[:, None]
-        arriving = light.intensity / (r * r)[:, None]
-        from_light = optical_depth(truth, light.position, leg, np.zeros(len(x)), r)
-    else:
-        leg = np.broadcast_to(light.direction, point.shape)
-        arriving = np.broadcast_to(light.irradiance, point.shape)
-        from_light = np.zeros_like(point)  # an upper bound
+    leg, arriving = incident(truth.origin + x[:, None] * direction)
     from_camera = optical_depth(truth, truth.origin, direction, np.zeros(len(x)), x)
-    kept = arriving * np.exp(-from_camera - from_light) / (4 * np.pi)
+    kept = arriving * np.exp(-from_camera) / (4 * np.pi)
     total = np.zeros_like(kept)
     for medium, inside in _media(truth, ray, x, distance):
         phase = medium.phase(np.clip(np.sum(leg * -direction, axis=1), -1, 1))
