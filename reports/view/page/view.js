@@ -344,10 +344,12 @@ hear.opened = (said) => {
   Object.assign(camera, {started: false, sent: 0, taken: 0});
   arrange();
 };
-// What is in the user's hand stays as it is.
+// What is in the user's hand stays as it is: a slider, and a number that is half typed.
+document.addEventListener("input", ({target}) => { target.dataset.typing = "1"; });
+document.addEventListener("change", ({target}) => { delete target.dataset.typing; }, {capture: true});
 const redraw = (place, fields) => {
   const at = document.activeElement;
-  if (place.contains(at) && at.type === "range") return;
+  if (place.contains(at) && (at.type === "range" || at.dataset.typing)) return;
   const label = place.contains(at) ? at.getAttribute("aria-label") : null;
   place.replaceChildren(...fields);
   if (label) place.querySelector(`[aria-label="${CSS.escape(label)}"]`)?.focus();

@@ -124,6 +124,16 @@ def test_a_mistake_is_said_and_what_was_there_stays(page):
     page.wait_for_function("""() => document.querySelector('[aria-label="steps"]').value === '100'""")
 
 
+def test_a_number_that_is_half_typed_stays_when_something_else_changes(page):
+    field = '[aria-label="light.intensity [W/sr], number 1"]'
+    page.fill(field, "670")
+    changed(page, lambda: page.evaluate("() => say('choose', {method: 'ray-march'})"))
+    assert page.input_value(field) == "670"
+    changed(page, lambda: page.keyboard.press("Enter"))
+    assert "--change light.intensity=670,71,83" in command(page)
+    assert "--method ray-march" in command(page)
+
+
 @pytest.mark.claim("view-error", tolerance="none")
 def test_the_error_converges_beside_the_truth(page):
     changed(page, lambda: page.select_option("#choose-method", "ray-march"))
