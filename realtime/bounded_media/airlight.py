@@ -54,7 +54,7 @@ import mitsuba as mi
 
 from realtime.bounded_media.convex_clip import crossing_lines
 from realtime.bounded_media.directional_airlight import ParallelRay
-from realtime.bounded_media.envelopes import Envelopes, next_change
+from realtime.bounded_media.envelopes import MOST_BENDS, Envelopes, Lines, beyond, next_change
 from realtime.bounded_media.panels import MediumSegment, medium_integral
 from realtime.bounded_media.ray_segments import (
     MediaRay,
@@ -78,7 +78,6 @@ from realtime.scene.medium import Medium, least_extinction
 FORMS = ("exact", "paper", "printed")
 _NODES, _NODES_PAPER = 24, 6
 _AT_ONCE = 8  # nodes that a kernel's code has side by side
-_MOST = 512  # parts of a segment between bends: no rounding can make a loop endless
 _OPTICAL_REACH = 18.0  # e^-18 = 1.5e-8 of the light is left
 
 
@@ -242,39 +241,35 @@ def _piece_integral(ray: MediaRay, piece: Piece, x0, x1):
 
 def _integral_between_bends(ray: MediaRay, piece: Piece, x0, x1):
     """Integrate one segment in one piece, from one bend of the legs to the next."""
-    Float = type(ray.geometry.height)
-    slack = 64 * dr.epsilon(Float)
     x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(piece.medium))
-    spheres = [seen for number, seen in enumerate(ray.seen) if number != piece.number and seen.planes is None]
-    grazes = [x for seen in spheres for x in grazed_at(seen, ray)]
-    polyhedra = [number for number, seen in enumerate(ray.seen) if seen.planes is not None]
     ends = [x0, x1], [distance_to_light(ray.geometry, x) for x in (x0, x1)]
-    near = [number == piece.number or legs_near(ray, ray.seen[number], *ends) for number in polyhedra]
-    lines = [crossing_lines(ray.seen[number], ray.start, ray.direction) for number in polyhedra]
-    counts = [ray.seen[number].bounded_medium.count for number in polyhedra]
+    grazes: list[Any] = []
+    lines: dict[int, Lines] = {}
+    for number, seen in enumerate(ray.seen):
+        own = number == piece.number
+        if seen.planes is not None:
+            lines[number] = crossing_lines(seen, ray.start, ray.direction, own or legs_near(ray, seen, *ends))
+        elif not own:
+            grazes += grazed_at(seen, ray)
 
     def part(turn, begin, envelopes, total):
-        at = begin + slack * (begin + 1)
-        changes = [
-            next_change(line, count, envelopes=own, x=at, active=active)
-            for line, count, own, active in zip(lines, counts, envelopes, near)
-        ]
+        at = beyond(begin)
+        changes = {number: next_change(lines[number], own, at) for number, own in envelopes.items()}
         end = x1
         for x in grazes:
             end = dr.minimum(end, dr.select(x > at, x, dr.inf))
-        for change, own in zip(changes, envelopes):
-            end = dr.minimum(end, dr.minimum(change.next, own.crossing(at, 1)))
-        known = dict(zip(polyhedra, envelopes))
-        total += _integral(ray, piece, begin, end, envelopes=known, like_roots=bool(grazes))
-        return turn + 1, dr.maximum(end, at), [change.envelopes(end) for change in changes], total
+        for change in changes.values():
+            end = dr.minimum(end, change.next_bend(1))
+        total += _integral(ray, piece, begin, end, envelopes=envelopes, like_roots=bool(grazes))
+        envelopes = {number: change.envelopes(end) for number, change in changes.items()}
+        return turn + 1, dr.maximum(end, at), envelopes, total
 
     width = dr.width(ray.geometry.height, x0, x1)
-    begin = x0 + dr.zeros(Float, width)
-    inside = begin + slack * (begin + 1)
-    envelopes = [ray_envelopes(ray, number, inside, active) for number, active in zip(polyhedra, near)]
+    begin = x0 + dr.zeros(type(ray.geometry.height), width)
+    envelopes = {number: ray_envelopes(own, beyond(begin)) for number, own in lines.items()}
     *_, total = dr.while_loop(
         state=(dr.zeros(mi.UInt32, width), begin, envelopes, dr.zeros(type(ray.medium.albedo), width)),
-        cond=lambda turn, begin, envelopes, total: (begin < x1) & (turn < _MOST),
+        cond=lambda turn, begin, envelopes, total: (begin < x1) & (turn < MOST_BENDS),
         body=part,
         labels=("turn", "begin", "envelopes", "total"),
     )

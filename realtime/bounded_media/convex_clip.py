@@ -52,7 +52,7 @@ def seen_from(bounded_medium: BoundedMedium, point) -> Seen:
 
 
 def crossing_lines(seen: Seen, start, direction, active=True) -> Lines:
-    """Return the lines 1/f by plane, and whether the point is outside of it; arguments as of `inverse_crossings`."""
+    """Return the lines 1/f; of planes that the point is outside of the least counts. See `inverse_crossings`."""
     Four = four_numbers(type(start.x))
 
     def line(number):
@@ -61,7 +61,7 @@ def crossing_lines(seen: Seen, start, direction, active=True) -> Lines:
         g = values.xyz
         return dr.dot(g, start), dr.dot(g, direction), values.w > 0
 
-    return line
+    return Lines(line, seen.bounded_medium.count, active)
 
 
 def inverse_crossings(seen: Seen, start, direction, distances, active, *, leaves: bool = True):
@@ -97,7 +97,7 @@ def inverse_crossings(seen: Seen, start, direction, distances, active, *, leaves
     lines = crossing_lines(seen, start, direction, active)
 
     def plane(number, enter, leave):
-        constant, slope, outside = lines(number)
+        constant, slope, outside = lines.line(number)
         first, last = dr.select(outside, constant, dr.inf), dr.select(outside, -dr.inf, constant)
         enter = [dr.minimum(value, dr.fma(slope, x, first)) for value, x in zip(enter, distances)]
         leave = [dr.maximum(value, dr.fma(slope, x, last)) for value, x in zip(leave, distances)]

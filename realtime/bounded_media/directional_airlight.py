@@ -22,6 +22,7 @@ are cut so that none is optically thick.
 In a medium without bounds nothing arrives: the light would have crossed an endless way through it.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,7 +30,7 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.bounded_media.directional_legs import ParallelSeen, cylinder_bend, leg_lines, linear_length, parallel_legs
-from realtime.bounded_media.envelopes import envelopes_at, next_change
+from realtime.bounded_media.envelopes import MOST_BENDS, Envelopes, beyond, envelopes_at, next_change
 from realtime.bounded_media.ray_segments import Piece, sum_over_pieces
 from realtime.numerics.array_types import is_single
 from realtime.numerics.fast_exp import exp_bounded
@@ -40,7 +41,6 @@ from realtime.scene.medium import Medium, least_extinction
 _NODES, _NODES_DOUBLE = 10, 24
 _THICK = 8.0  # optical depth of the pieces that nodes are placed in
 _DARK = 60.0  # optical depth before the camera beyond which nothing is left, e^-60 = 9e-27
-_PIECES = 512  # of a ray in a medium, at most: no rounding can make a loop endless
 
 
 @dataclass(frozen=True)
@@ -89,35 +89,32 @@ def _integral(ray: ParallelRay, piece: Piece, x0, x1):
     Float, Color = type(x0), type(ray.medium.albedo)
     reach = piece.begin + _DARK / least_extinction(piece.medium)
     x1 = dr.minimum(x1, reach)
-    slack = 64 * dr.epsilon(Float)
-
-    polyhedra = [seen for seen in ray.seen if seen.planes is not None]
-    lines = [leg_lines(seen, ray.origin, ray.direction) for seen in polyhedra]
-    counts = [seen.bounded_medium.count for seen in polyhedra]
+    lines = {
+        number: leg_lines(seen, ray.origin, ray.direction)
+        for number, seen in enumerate(ray.seen)
+        if seen.planes is not None
+    }
 
     def step(turn, x, envelopes, total):
-        at = x + slack * (x + 1)
-        changes = [
-            next_change(line, count, envelopes=own, x=at)
-            for line, count, own in zip(lines, counts, envelopes, strict=True)
-        ]
+        at = beyond(x)
+        changes = {number: next_change(lines[number], own, at) for number, own in envelopes.items()}
         end = x1
-        for change, own in zip(changes, envelopes):
-            end = dr.minimum(end, dr.minimum(change.next, own.crossing(at, 0)))
+        for change in changes.values():
+            end = dr.minimum(end, change.next_bend(0))
         if linear:
             channels = _linear_channels(ray, piece, envelopes, at, x, end)
         else:
             end = dr.minimum(_next_cylinder(ray, at, end), x + _THICK / _largest_extinction(piece.medium))
-            channels = _node_channels(ray, piece, x, end)
-        return turn + 1, dr.maximum(end, at), [each.envelopes(end) for each in changes], total + Color(*channels)
+            channels = _node_channels(ray, piece, envelopes, x, end)
+        envelopes = {number: change.envelopes(end) for number, change in changes.items()}
+        return turn + 1, dr.maximum(end, at), envelopes, total + Color(*channels)
 
     width = dr.width(x0, x1)
     x0 = x0 + dr.zeros(Float, width)
-    inside = x0 + slack * (x0 + 1)
-    envelopes = [envelopes_at(line, count, inside) for line, count in zip(lines, counts, strict=True)]
+    envelopes = {number: envelopes_at(own, beyond(x0)) for number, own in lines.items()}
     *_, total = dr.while_loop(
         state=(dr.zeros(mi.UInt32, width), x0, envelopes, dr.zeros(Color, width)),
-        cond=lambda turn, x, envelopes, total: (x < x1) & (turn < _PIECES),
+        cond=lambda turn, x, envelopes, total: (x < x1) & (turn < MOST_BENDS),
         body=step,
         labels=("turn", "x", "envelopes", "total"),
     )
@@ -126,7 +123,7 @@ def _integral(ray: ParallelRay, piece: Piece, x0, x1):
 
 def _linear_channels(ray: ParallelRay, piece: Piece, envelopes, at, x, end) -> list[Any]:
     """Return the integral from x to end, by channel, where the legs are linear."""
-    slopes = [linear_length(own, at) for own in envelopes]
+    slopes = [linear_length(own, at) for own in envelopes.values()]
     lengths = [[dr.maximum(dr.fma(rate, here - at, length), 0) for length, rate in slopes] for here in (x, end)]
     channels = []
     for channel, own in enumerate(piece.medium.sigma_t):
@@ -152,21 +149,28 @@ def _next_cylinder(ray: ParallelRay, at, x1):
     return end
 
 
-def _node_channels(ray: ParallelRay, piece: Piece, x, end) -> list[Any]:
+def _node_channels(ray: ParallelRay, piece: Piece, envelopes, x, end) -> list[Any]:
     """Return the integral from x to end, by channel, by nodes that are close at both ends."""
     nodes = unit_nodes(_NODES if is_single(type(x)) else _NODES_DOUBLE)
     xs = [x + (end - x) * (u * u * (3 - 2 * u)) for u, _ in nodes]
     weights = [weight * 6 * u * (1 - u) for u, weight in nodes]
-    kept = _attenuation(ray, piece, xs)
+    kept = _attenuation(ray, piece, xs, envelopes)
     return [
         (end - x) * sum(weight * values[channel] for weight, values in zip(weights, kept))
         for channel in range(len(piece.medium.sigma_t))
     ]
 
 
-def _attenuation(ray: ParallelRay, piece: Piece, xs) -> list[list[Any]]:
-    """Return exp(-tau) of both legs, by node and channel."""
-    insides = [parallel_legs(seen, ray.origin, ray.direction, xs) for seen in ray.seen]
+def _attenuation(
+    ray: ParallelRay, piece: Piece, xs, envelopes: Mapping[int, Envelopes] | None = None
+) -> list[list[Any]]:
+    """Return exp(-tau) of both legs, by node and channel; `envelopes` by medium, where they are known for all nodes."""
+    insides = [
+        [linear_length(envelopes[number], x)[0] for x in xs]
+        if envelopes is not None and number in envelopes
+        else parallel_legs(seen, ray.origin, ray.direction, xs)
+        for number, seen in enumerate(ray.seen)
+    ]
     result = []
     for node, x in enumerate(xs):
         channels = []

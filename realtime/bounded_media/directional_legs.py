@@ -106,7 +106,7 @@ def parallel_legs(seen: ParallelSeen, origin, direction, distances, active=True)
 def leg_lines(seen: ParallelSeen, origin, direction) -> Lines:
     """Return the lines phi of a medium that has planes, along rays from `origin` [m] in unit `direction`s."""
     start = origin - seen.bounded_medium.centre
-    return lambda number: _line(seen, number, start, direction)
+    return Lines(lambda number: _line(seen, number, start, direction), seen.bounded_medium.count)
 
 
 def linear_length(envelopes: Envelopes, x) -> tuple[Any, Any]:

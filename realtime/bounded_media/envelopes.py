@@ -17,8 +17,17 @@ import drjit as dr
 import mitsuba as mi
 
 Line = tuple[Any, Any]  #: c and s [1/m]
-#: By number of a plane: its c, its s, and whether it is one of those of which the least counts.
-Lines = Callable[[Any], tuple[Any, Any, Any]]
+
+MOST_BENDS = 512  #: of a segment: no rounding can make a loop endless
+
+
+@dataclass(frozen=True)
+class Lines:
+    """The lines of the planes of a medium along rays."""
+
+    line: Callable[[Any], tuple[Any, Any, Any]]  #: by number c, s, and whether it is of those of which the least counts
+    count: int
+    active: Any = True  #: lanes in which legs may meet the medium; in others no line counts
 
 
 @dataclass
@@ -32,11 +41,10 @@ class Envelopes:
         """Return the least and the largest value at a distance [m] on both lines."""
         return _at(self.least, x), _at(self.largest, x)
 
-    def crossing(self, x, *levels: Any):
+    def crossing(self, x, level: float):
         """Return the next distance beyond x at which the lines meet one another or a level, or infinity [m]."""
         (low, high), (falling, rising) = self.values(x), (self.least[1], self.largest[1])
-        gaps = [(low - high, rising - falling)]
-        gaps += [(value - level, -slope) for level in levels for value, slope in ((low, falling), (high, rising))]
+        gaps = (low - high, rising - falling), (low - level, -falling), (high - level, -rising)
         until = type(x)(dr.inf)
         for gap, closing in gaps:
             ahead = gap / closing
@@ -58,6 +66,10 @@ class Change:
         """Where the first of them does, or infinity [m]."""
         return dr.maximum(dr.minimum(*self.ends), self.x)
 
+    def next_bend(self, level: float):
+        """Return where that is, or the lines meet one another or a level before it, or infinity [m]."""
+        return dr.minimum(self.next, self.before.crossing(self.x, level))
+
     def envelopes(self, x) -> Envelopes:
         """Return the envelopes from x on, a distance not beyond the next change of either [m]."""
         least, largest = (
@@ -69,13 +81,18 @@ class Change:
         return Envelopes(least, largest)
 
 
-def envelopes_at(lines: Lines, count: int, x, active=True) -> Envelopes:
-    """Return the envelopes of `count` lines at a distance x [m], in the lanes that are active."""
+def beyond(x):
+    """Return a distance a rounding error beyond x [m]: there the line counts that took over at x."""
+    return x + 64 * dr.epsilon(type(x)) * (x + 1)
+
+
+def envelopes_at(lines: Lines, x) -> Envelopes:
+    """Return the envelopes of lines at a distance x [m]."""
     Float = type(x)
-    width = dr.width(x, active)
+    width = dr.width(x, lines.active)
 
     def step(number, low, high, found):
-        constant, slope, of_least = lines(number)
+        constant, slope, of_least = lines.line(number)
         value = dr.fma(slope, x, constant)
         less, more = of_least & (value < low), ~of_least & (value > high)
         line = constant, slope
@@ -86,23 +103,23 @@ def envelopes_at(lines: Lines, count: int, x, active=True) -> Envelopes:
     none = Envelopes((low + 0, dr.zeros(Float, width)), (high + 0, dr.zeros(Float, width)))
     *_, found = dr.while_loop(
         state=(mi.UInt32(0), low, high, none),
-        cond=lambda number, low, high, found: active & (number < count),
+        cond=lambda number, low, high, found: lines.active & (number < lines.count),
         body=step,
         labels=("number", "low", "high", "found"),
     )
     return found
 
 
-def next_change(lines: Lines, count: int, *, envelopes: Envelopes, x, active=True) -> Change:
-    """Return where other lines take over from the envelopes at x, and which; never in lanes that are not active.
+def next_change(lines: Lines, envelopes: Envelopes, x) -> Change:
+    """Return where other lines take over from the envelopes at x, and which.
 
-    `x` is at least a rounding error beyond the last change [m]: so each is met once.
+    `x` is at least a rounding error `beyond` the last change [m]: so each is met once.
     """
     Float = type(x)
     low, high = envelopes.values(x)
 
     def step(number, until_low, until_high, after):
-        constant, slope, of_least = lines(number)
+        constant, slope, of_least = lines.line(number)
         value = dr.fma(slope, x, constant)
         nearing = dr.select(of_least, envelopes.least[1] - slope, slope - envelopes.largest[1])
         # Below 0 where rounding has let a crossing pass: the earliest is still the next of the envelope.
@@ -113,10 +130,10 @@ def next_change(lines: Lines, count: int, *, envelopes: Envelopes, x, active=Tru
         after = Envelopes(_chosen(less, line, after.least), _chosen(more, line, after.largest))
         return number + 1, dr.select(less, at, until_low), dr.select(more, at, until_high), after
 
-    never = dr.full(Float, dr.inf, dr.width(x, low, active))
+    never = dr.full(Float, dr.inf, dr.width(x, low, lines.active))
     _, until_low, until_high, after = dr.while_loop(
         state=(mi.UInt32(0), never, never + 0, envelopes),
-        cond=lambda number, until_low, until_high, after: active & (number < count),
+        cond=lambda number, until_low, until_high, after: lines.active & (number < lines.count),
         body=step,
         labels=("number", "until_low", "until_high", "after"),
     )

@@ -11,9 +11,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.convex_clip import Seen, crossing_lines, inverse_crossings, near_line, share_inside
+from realtime.bounded_media.convex_clip import Seen, inverse_crossings, near_line, share_inside
 from realtime.bounded_media.directional_legs import parallel_legs, seen_along
-from realtime.bounded_media.envelopes import Envelopes, envelopes_at
+from realtime.bounded_media.envelopes import Envelopes, Lines, envelopes_at
 from realtime.bounded_media.facet_walk import EntryPlanes, clear_of, line_crossings
 from realtime.bounded_media.views import MediumView, medium_view
 from realtime.numerics.array_types import chosen_value
@@ -253,13 +253,13 @@ def light_leg(ray: MediaRay, piece: Piece, xs, rs, envelopes: Mapping[int, Envel
     return insides
 
 
-def ray_envelopes(ray: MediaRay, number: int, x, near) -> Envelopes:
-    """Return the planes where legs to the points at x [m] enter and leave a medium; those that are not near miss it."""
-    seen = ray.seen[number]
-    lines = crossing_lines(seen, ray.start, ray.direction)
-    missed, flat = type(x)(-1), type(x)(0)
-    found = envelopes_at(lines, seen.bounded_medium.count, x, near)
-    return dr.select(near, found, Envelopes((missed, flat), (missed, flat)))
+def ray_envelopes(lines: Lines, x) -> Envelopes:
+    """Return where legs to the points at x [m] enter and leave a medium; in lanes that are not active they miss it.
+
+    `lines` are those of `realtime.bounded_media.convex_clip.crossing_lines`.
+    """
+    missed = type(x)(-1), type(x)(0)
+    return dr.select(lines.active, envelopes_at(lines, x), Envelopes(missed, missed))
 
 
 def grazed_at(seen: Seen, ray: MediaRay) -> tuple[Any, Any]:

@@ -28,7 +28,7 @@ def test_a_walk_along_a_ray_finds_what_a_search_finds(variant, kind, seed):
     import drjit as dr
     import mitsuba as mi
 
-    from realtime.bounded_media.envelopes import envelopes_at, next_change
+    from realtime.bounded_media.envelopes import Lines, beyond, envelopes_at, next_change
 
     Float = mi.Float
     rng = np.random.default_rng(seed)
@@ -36,7 +36,7 @@ def test_a_walk_along_a_ray_finds_what_a_search_finds(variant, kind, seed):
     columns = Float(constants.astype(np.float32)), Float(slopes.astype(np.float32)), mi.Bool(of_least)
     constants, slopes = (np.asarray(column, dtype=np.float64) for column in columns[:2])
 
-    def lines(number):
+    def line(number):
         return tuple(dr.gather(type(column), column, number) for column in columns)
 
     def right(place, late, sign):
@@ -47,10 +47,11 @@ def test_a_walk_along_a_ray_finds_what_a_search_finds(variant, kind, seed):
         return constants[chosen] + slopes[chosen] * place
 
     x, end, changes = 0.0, 6.0, 0
-    envelopes = envelopes_at(lines, COUNT, Float(x))
+    lines = Lines(line, COUNT)
+    envelopes = envelopes_at(lines, Float(x))
     while x < end:
-        at = x + 64 * 2.0**-24 * (x + 1)
-        change = next_change(lines, COUNT, envelopes=envelopes, x=Float(at))
+        at = float(beyond(Float(x))[0])
+        change = next_change(lines, envelopes, Float(at))
         until = min(float(change.next[0]), end)
         assert until >= at * (1 - 1e-7)
         for place in np.linspace(at, max(until, at), 5):
@@ -70,18 +71,19 @@ def test_lanes_that_are_not_active_never_change(variant):
     import drjit as dr
     import mitsuba as mi
 
-    from realtime.bounded_media.envelopes import envelopes_at, next_change
+    from realtime.bounded_media.envelopes import Lines, envelopes_at, next_change
 
     Float = mi.Float
     columns = Float([1, 2]), Float([-1, -2]), mi.Bool([True, True])
     active = mi.Bool([True, False])
 
-    def lines(number):
+    def line(number):
         return tuple(dr.gather(type(column), column, number) for column in columns)
 
-    envelopes = envelopes_at(lines, 2, Float([0, 0]), active)
+    lines = Lines(line, 2, active)
+    envelopes = envelopes_at(lines, Float([0, 0]))
     assert list(envelopes.least[0]) == [1, np.inf]
-    assert list(next_change(lines, 2, envelopes=envelopes, x=Float([0, 0]), active=active).next) == [1, np.inf]
+    assert list(next_change(lines, envelopes, Float([0, 0])).next) == [1, np.inf]
 
 
 def test_where_the_lines_cross_levels_and_one_another(variant):
