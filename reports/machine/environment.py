@@ -103,7 +103,7 @@ def prepare(variant: str | None = None) -> Prepared:
         return Prepared(variant, None)
     os.environ[LLVM_VARIABLE] = llvm.path
     if on_processor and quick_compilation.is_asked_for():
-        quick_compilation.compile_quickly(llvm.path, llvm.version)
+        quick_compilation.compile_quickly(llvm.path)
     return Prepared(variant, llvm)
 
 
