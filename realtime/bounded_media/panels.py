@@ -138,15 +138,22 @@ def _sphere_length(segment: MediumSegment, x):
     """Return the length in which the square of half the chord that legs have in a sphere changes by a share of it [m].
 
     The part of the leg in the sphere is like the root of it: steep where legs graze the sphere. With w from the light
-    to the middle of the sphere it is radius^2 - |v x w|^2/|v|^2.
+    to the middle of the sphere it is radius^2 - f, f = |v x w|^2/|v|^2, and over a length t f changes by
+
+        (2 ((v x w) . (d x w) - f v . d) t + (|d x w|^2 - f) t^2)/|v + t d|^2,
+
+    whose divisor is taken for |v|^2: panels end before it changes by much. The second term counts where the first is
+    none: where a segment begins with the longest chord of its legs.
     """
     radius, w = segment.seen.bounded_medium.radius, segment.seen.toward
     v = dr.fma(segment.direction, x, segment.start)
-    cross, square = dr.cross(v, w), dr.squared_norm(v)
+    cross, turned, square = dr.cross(v, w), dr.cross(segment.direction, w), dr.squared_norm(v)
     distance = dr.squared_norm(cross) / square
-    rate = 2 * (dr.dot(cross, dr.cross(segment.direction, w)) - distance * dr.dot(v, segment.direction)) / square
-    chord = dr.maximum(radius * radius - distance, 0)
-    return dr.clip(_STEEP * chord / dr.abs(rate), _LEAST * radius, 0.25 * radius)
+    rate = dr.abs(2 * (dr.dot(cross, turned) - distance * dr.dot(v, segment.direction)) / square)
+    bend = dr.abs(dr.squared_norm(turned) - distance) / square
+    change = _STEEP * dr.maximum(radius * radius - distance, 0)
+    length = 2 * change / (rate + dr.sqrt(dr.fma(rate, rate, 4 * bend * change)))
+    return dr.clip(dr.select(change > 0, length, 0), _LEAST * radius, 0.25 * radius)
 
 
 def _largest_tangent(segment: MediumSegment):
