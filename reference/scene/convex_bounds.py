@@ -136,6 +136,13 @@ def holds(bounds: Bounds, point: Array) -> bool:
     return bool(np.all(bounds.normal @ point < bounds.offset))
 
 
+def normals_at(bounds: Bounds, points: Array) -> Array:
+    """Return outward unit normals at points of a surface, (n, 3) each [m]; at edges that of one of the facets."""
+    if isinstance(bounds, Sphere):
+        return (points - bounds.centre) / bounds.radius
+    return bounds.normal[np.argmax(points @ bounds.normal.T - bounds.offset, axis=1)]
+
+
 def overlap(first: Bounds, second: Bounds) -> bool:
     """Return whether two bodies share more than their boundaries, to 1e-6 of their sizes."""
     if isinstance(first, Sphere) and isinstance(second, Sphere):

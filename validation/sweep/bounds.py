@@ -9,6 +9,11 @@ planes in exact order, states three:
   known to some units of float32. With s(x) the radiance that a metre of the ray scatters in full light, that is worth
   x s(x) times `END`. It is little, but a ray may be lit along little: where it clips the edge of a medium by 37 um at
   0.66 m, an error of 2.6 units changes its length, and all of its airlight, by 4e-3.
+
+  A ray that meets the bounds of a medium at a small angle knows the place less well. In x = n . (p - o)/(n . d) the
+  direction d is rounded, and so are the three products of the divisor, which are not small where their sum, the cosine
+  c, is: x is known to x `END`/|c|. A sphere of radius r has the same law: with b the distance of the ray from its middle
+  and h = sqrt(r^2 - b^2) half of the chord, dh = b/h db, where b is known to x `END` and c = h/r.
 * **Kinks.** The rules of the kernel have positive weights, and are exact for the smooth function that a tabulated phase
   function stands for. It departs from the table by an eighth of the second difference of its values, so rule and
   integral together err by two eighths of the largest second difference over the value.
@@ -27,8 +32,10 @@ from realtime.scene.phase import Tabulated
 from realtime.scene.read_scene import Scene
 from reference.quadrature.segments import AMBIENT, camera_segments, optical_depth, scattering_range
 from reference.quadrature.surface import surface_hits
+from reference.scene.convex_bounds import normals_at
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import TruthLight, TruthMedium, TruthScene, read_truth
+from reference.visibility.line_crossings import crossings
 from validation.configurations.methods import Configuration
 
 Array = NDArray[np.float64]
@@ -36,7 +43,7 @@ Array = NDArray[np.float64]
 #: The error of methods that claim rounding alone, relative to the pixel, or to a thousandth of the mean in the dark.
 ROUNDING = 1e-3
 
-END = 8 * 2.0**-24  #: uncertainty of the end of a lit interval, relative to its distance from the camera
+END = 8 * 2.0**-24  #: uncertainty of the end of a lit interval that a ray meets head on, relative to its distance
 
 _SAMPLES = 256  # of a ray, about each light: what is scattered is smooth between them
 _RAYS = 1024  # at once: so many take some 100 MB
@@ -96,25 +103,39 @@ def _worth_of_ends(truth: TruthScene) -> Array:
     worth = np.zeros((len(distance), 3))
     sources: list[tuple[Any, ...]] = [(light, _angles_about, _from_place) for light in truth.lights]
     sources += [(light, _equal_steps, _from_infinity) for light in truth.directional]
+    ends, growth = _ends(truth, distance)
     for light, places_of, incident in sources:
-        places = np.concatenate([*_ends(truth, distance), places_of(truth, light, distance)])
+        places = np.concatenate([ends, places_of(truth, light, distance)])
+        uncertain = np.concatenate([growth, np.ones_like(places[len(ends) :])]).T
         x = np.clip(places, 0, distance).T
         ray, column = np.nonzero(np.isfinite(x))
-        x = x[ray, column]
-        scattered = x[:, None] * _scattered(truth, partial(incident, truth, light), ray, x, distance)
+        uncertain, x = (uncertain * x)[ray, column], x[ray, column]
+        scattered = uncertain[:, None] * _scattered(truth, partial(incident, truth, light), ray, x, distance)
         largest = np.zeros_like(worth)
         np.maximum.at(largest, ray, scattered)
         worth += largest
     return _BETWEEN * END * worth
 
 
-def _ends(truth: TruthScene, distance: Array) -> list[Array]:
-    """Return distances along rays, each (places, rays) [m]: their ends, those of segments in media and between them."""
-    places = [np.zeros((1, len(distance))), distance[None]]
+def _ends(truth: TruthScene, distance: Array) -> tuple[Array, Array]:
+    """Return distances along rays [m], and what divides their certainty, 1/|c| [1], (places, rays) each.
+
+    They are those of the ends of rays, of segments in media and between them, and of where rays cross bounds.
+    """
+    places = [np.zeros_like(distance), distance]
     if truth.media:
         segments = camera_segments(truth, distance)
-        places += [segments.start, segments.end, 0.5 * (segments.start + segments.end)]
-    return places
+        places += [*segments.start, *segments.end, *(0.5 * (segments.start + segments.end))]
+    growth = [np.ones_like(distance)] * len(places)
+    for medium in truth.media:
+        enter, leave = crossings(medium.bounds, truth.origin, truth.direction)
+        for x in (enter, leave):
+            met = (enter < leave) & (x > 0) & (x < distance)
+            points = truth.origin + np.where(met, x, 0)[:, None] * truth.direction
+            cosine = np.abs(np.sum(normals_at(medium.bounds, points) * truth.direction, axis=1))
+            places.append(np.where(met, x, np.inf))
+            growth.append(1 / np.where(met, np.maximum(cosine, END), 1))  # below it nothing is known of x
+    return np.stack(places), np.stack(growth)
 
 
 def _angles_about(truth: TruthScene, light: TruthLight, distance: Array) -> Array:

@@ -28,10 +28,12 @@ def turned():
     return mi.ScalarTransform4f().rotate([-0.879, -0.121, 0.461], 59.11)
 
 
-def clipped_edge(fov=0.012):
+ACROSS, SKIMMING = (0.694, -0.712, 0.107), (0.99894, -0.0127, 0.0443)  # through two faces, and along one of them
+
+
+def clipped_edge(along=ACROSS, fov=0.012):
     """A camera that looks over the edge of a box of fog, 0.66 m away: its pixels are some micrometres apart."""
-    world = turned()
-    along = np.array([0.694, -0.712, 0.107])
+    world, along = turned(), np.array(along) / np.linalg.norm(along)
     edge = HALF * (1, 1, 0)
     eye = [*(world @ mi.ScalarPoint3f(edge - 0.66 * along))]
     # The box is half the image.
@@ -87,7 +89,21 @@ def test_a_chord_of_micrometres_errs_by_what_the_rounding_of_its_ends_is_worth()
     assert (error[lit] > bounds.ROUNDING * truth[lit]).any()  # so rounding of the pixel alone is no bound
     assert (error[lit] <= worth).all()
     assert error[lit].max() > 0.05 * worth.max()
-    assert worth[:, 0] == pytest.approx(1.1 * bounds.END * 0.66 * scattered, rel=2e-3)
+    # The most where rays leave, by the face that they meet at the smaller angle, behind the whole chord.
+    kept = np.exp(-SIGMA_T * chords(scene)[lit])
+    assert worth[:, 0] == pytest.approx(1.1 * bounds.END * 0.66 / ACROSS[0] * scattered * kept, rel=2e-3)
+
+
+@pytest.mark.claim("sweep-bounds", tolerance="8 units of float32 of each end; a quarter of the bends of a table")
+def test_a_ray_that_skims_a_face_errs_by_more_as_its_cosine_falls():
+    # random:184 has such pixels: they missed what ends are worth head on by a factor of 13.
+    scene = clipped_edge(SKIMMING, fov=0.3)
+    truth, error = errors(scene, "shadow-planes")
+    lit = np.flatnonzero(truth[:, 0] > 0)
+    worth = bounds.worth_of_ends(scene, lit)
+    assert (error[lit] <= worth).all()
+    head_on = worth[:, 0] * -SKIMMING[1]
+    assert 2 * head_on.min() < error[lit, 0].max()  # so the law is needed
 
 
 def columns(name, size, method="shadow-planes"):
