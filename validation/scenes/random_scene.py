@@ -203,6 +203,8 @@ def _light(light: DrawnLight) -> dict[str, Any]:
     if light.kind in AREA_KINDS:
         size = light.size if light.kind == "rectangle" else light.size[0]
         lamp = area_lamp(light.kind, light.position, light.target, size, light.colour)  # type: ignore[arg-type]
+        if light.kind == "sphere":  # Mitsuba takes the rounding of the turn of a large one for shear, and warns
+            lamp["to_world"] = mi.ScalarTransform4f().translate(list(light.position)).scale(light.size[0])
         return lamp if light.black else lamp | {"material": {"type": "null"}}
     direction = np.subtract(light.target, light.position)
     if light.kind == "directional":

@@ -122,3 +122,9 @@ def test_describe_prints_what_was_drawn(variant):
     for part in (*described["drawn"]["lights"], *described["drawn"]["media"]):
         assert part["name"] in words
     assert described["file"]["name"] == "random:7.exr"
+
+
+def test_mitsuba_has_no_doubt_about_a_large_sphere(variant, capfd):
+    """A sweep found it: rounding of the turn of a light of 26 m was taken for shear."""
+    load_scene("random:600", (8, 6))
+    assert "WARN" not in "".join(capfd.readouterr())
