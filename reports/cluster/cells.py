@@ -72,8 +72,8 @@ def times_of(cell: Cell) -> dict[str, Any]:
 def timing_groups(
     study: Study, made: Made, *, store: RowStore, scenes: dict[str, str]
 ) -> Iterator[tuple[Group, dict[str, Cell]]]:
-    """Yield what `cell_groups` does, of those rows of a study with times 'alone' that were done and have none."""
-    for cells in study.images():
+    """Yield what `cell_groups` does, of those rows of a study that are to be timed alone, were done and have no times."""
+    for cells in study.timed_images():
         keyed = {cell_key(cell, made, scenes): cell for cell in cells}
         wanted = {key: cell for key, cell in keyed.items() if store.status(key) == "done"}
         missing = {key: cell for key, cell in wanted.items() if store.row(key)["frame_ms"] is None}

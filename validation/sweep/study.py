@@ -10,6 +10,7 @@
     media = [{}, { "medium.sigma_t" = 0.17 }]               # changes as of `--change`; {} is the scene's own
     flip = false                                            # HDR-FLIP takes about a second a cell
     times = "with"                                          # or "none", or "alone"
+    timed = 150                                             # scenes that are timed alone, the first; all by default
     limit = 600                                             # seconds that a cell or a truth may take
     retries = 3                                             # how often a cell is begun again whose process died
 
@@ -92,6 +93,7 @@ class Study:
     media: tuple[tuple[str, ...], ...] = ((),)
     flip: bool = False
     times: str = "with"
+    timed: int | None = None  #: scenes that are timed alone, the first; None for all
     limit: float = 600.0  #: seconds that a cell or a truth may take
     retries: int = 3  #: how often a cell is begun again whose process died
 
@@ -127,6 +129,13 @@ class Study:
         """Yield the cells of one image after the other: they share a truth."""
         for scene, size, medium in itertools.product(self.scene_names(), self.sizes, self.media):
             yield tuple(Cell(scene, size, medium, each, self.flip, self.times) for each in self.configurations)
+
+    def timed_images(self) -> Iterator[tuple[Cell, ...]]:
+        """Yield those `images` whose cells are timed alone."""
+        if self.times != "alone":
+            return iter(())
+        count = None if self.timed is None else self.timed * len(self.sizes) * len(self.media)
+        return itertools.islice(self.images(), count)
 
 
 def default_configurations() -> tuple[Configuration, ...]:
@@ -188,11 +197,14 @@ def parse_study(data: Mapping[str, Any], *, folder: Path = Path(), name: str = "
         As `read_study`.
     """
     known = ("name", "scenes", "random", "sizes", "methods", "kernels", "parameters", "maps", "media", "flip", "times")
-    _known("", data, (*known, "limit", "retries"))
+    _known("", data, (*known, "timed", "limit", "retries"))
     sizes = tuple(parse_size(_word("sizes", size)) for size in _list("sizes", data.get("sizes", ["160x120"])))
     for size in sizes:
         if not all(1 <= side <= 16384 for side in size):
             raise InputError(f"sizes: got {size[0]}x{size[1]}, wanted at least 1x1 and at most 16384 pixels on a side")
+    times = _one_of("times", data.get("times", "with"), TIMES)
+    if "timed" in data and times != "alone":
+        raise InputError(f'timed: it is of times = "alone", got times = "{times}"; leave one of them out')
     given = Study(
         name=_word("name", data.get("name", name)),
         scenes=tuple(_scene(item, folder) for item in _list("scenes", data.get("scenes", []), empty=True)),
@@ -201,7 +213,8 @@ def parse_study(data: Mapping[str, Any], *, folder: Path = Path(), name: str = "
         configurations=_configurations(data),
         media=_once("media", tuple(_medium(item) for item in _list("media", data.get("media", [{}])))),
         flip=_truth_value("flip", data.get("flip", False)),
-        times=_one_of("times", data.get("times", "with"), TIMES),
+        times=times,
+        timed=_number("timed", data["timed"], 1, _MOST_SCENES) if "timed" in data else None,
         limit=float(_number("limit", data.get("limit", 600), 1e-3, _LONGEST, whole=False)),
         retries=_number("retries", data.get("retries", 3), 0, _MOST_RETRIES),
     )

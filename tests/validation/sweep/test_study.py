@@ -61,6 +61,15 @@ def test_a_random_scene_that_is_named_too_is_there_once():
     assert study.scene_count == 5
 
 
+@pytest.mark.parametrize(("times", "expected"), [({"timed": 2}, ["windows", "random:3"]), ({}, None)])
+def test_the_first_scenes_are_timed_alone(times, expected):
+    data = {"scenes": ["windows"], "sizes": ["8x6", "16x12"], "random": {"count": 2, "first": 3}, "times": "alone"}
+    study = parse_study(data | times)
+    timed = [cells[0].scene for cells in study.timed_images()]
+    assert timed == [name for name in expected or study.scene_names() for _ in study.sizes]
+    assert not list(parse_study(data | {"times": "none"}).timed_images())
+
+
 @pytest.mark.claim("sweep-studies", tolerance="none")
 @pytest.mark.parametrize(
     ("data", "message"),
@@ -89,6 +98,8 @@ def test_a_random_scene_that_is_named_too_is_there_once():
         ({"media": [{"medium.sigma_t": "thick"}]}, "got 'thick' for medium.sigma_t"),
         ({"flip": 1}, "flip: got 1, wanted true or false"),
         ({"times": "always"}, "times: got 'always'"),
+        ({"timed": 3}, 'timed: it is of times = "alone", got times = "with"'),
+        ({"times": "alone", "timed": 0}, "timed: got 0, wanted a whole number from 1"),
         ({"limit": 0}, "limit: got 0"),
         ({"retries": True}, "retries: got True"),
         ({"random": {"count": -1}}, "random.count: got -1"),
