@@ -72,7 +72,7 @@ def times_of(cell: Cell) -> dict[str, Any]:
 def timing_groups(
     study: Study, made: Made, *, store: RowStore, scenes: dict[str, str]
 ) -> Iterator[tuple[Group, dict[str, Cell]]]:
-    """Yield what `cell_groups` does, of those rows of a study that are to be timed alone, were done and have no times."""
+    """Yield what `cell_groups` does, of the rows of a study that are timed alone, were done and have no times."""
     for cells in study.timed_images():
         keyed = {cell_key(cell, made, scenes): cell for cell in cells}
         wanted = {key: cell for key, cell in keyed.items() if store.status(key) == "done"}

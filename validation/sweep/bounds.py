@@ -12,8 +12,8 @@ planes in exact order, states three:
 
   A ray that meets the bounds of a medium at a small angle knows the place less well. In x = n . (p - o)/(n . d) the
   direction d is rounded, and so are the three products of the divisor, which are not small where their sum, the cosine
-  c, is: x is known to x `END`/|c|. A sphere of radius r has the same law: with b the distance of the ray from its middle
-  and h = sqrt(r^2 - b^2) half of the chord, dh = b/h db, where b is known to x `END` and c = h/r.
+  c, is: x is known to x `END`/|c|. A sphere of radius r has the same law: with b the distance of its middle from the
+  ray and h = sqrt(r^2 - b^2) half of the chord, dh = b/h db, where b is known to x `END` and c = h/r.
 * **Kinks.** The rules of the kernel have positive weights, and are exact for the smooth function that a tabulated phase
   function stands for. It departs from the table by an eighth of the second difference of its values, so rule and
   integral together err by two eighths of the largest second difference over the value.
