@@ -186,7 +186,7 @@ class _Run:
     def _fly(self, group: Group) -> None:
         flown = _Flown(group, self._groups)
         self._groups += 1
-        if group.together and self._workers:
+        if group.together and len(self._workers) > 1:
             busy = Counter(other.worker for other in self._flown.values())
             flown.worker = min(self._workers, key=lambda address: busy[address])
         self._flown[flown.number] = flown
@@ -318,6 +318,20 @@ class _Run:
             self._flights[flown.first.task.name] = flown.first
         self._send(flown, True, list(flown.open.values()))
 
+    def _move(self, flown: _Flown) -> None:
+        """Send what nobody works at of a group again, to whoever is there: the worker who had better do it is gone.
+
+        Where no worker is left at that moment, Dask keeps a task for the one that it was for, although others may do
+        it, and would wait for an address that never comes back.
+        """
+        flown.worker = ""
+        waiting = [f for f in flown.open.values() if f.since is None or f.worker not in self._workers]
+        if not waiting:
+            return
+        if flown.first is not None:
+            self._flights[flown.first.task.name] = flown.first
+        self._send(flown, True, waiting)
+
     def _erred(self, flight: _Flight) -> Iterator[Outcome]:
         """Send a task again whose workers died, unless it died too often; what else goes wrong is a failure."""
         error = flight.future.exception()
@@ -364,6 +378,9 @@ class _Run:
         except (OSError, TimeoutError):
             return
         self._workers = dict(told["workers"])
+        for flown in self._flown.values():
+            if self._workers and flown.worker and flown.worker not in self._workers:
+                self._move(flown)
         able = bool(self._workers)
         if able and self._flights and all(flight.task.alone for flight in self._flights.values()):
             able = any(worker.get("resources", {}).get(ALONE) for worker in self._workers.values())

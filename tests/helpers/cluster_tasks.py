@@ -13,7 +13,8 @@ def square(number, seconds=0.0):
     return number * number
 
 
-def add(first, number):
+def add(first, number, seconds=0.0):
+    time.sleep(seconds)
     return first + number
 
 

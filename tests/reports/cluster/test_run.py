@@ -97,6 +97,26 @@ def test_what_hangs_is_stopped_and_its_process_too(cluster, hang):
     assert {each.status for each in again.values()} == {"done"}
 
 
+@pytest.mark.claim("sweeps-lose-nothing", tolerance="none: every task has one outcome, with its value")
+@pytest.mark.parametrize("first", [None, Task("truth", tasks.square, (3, 0.1))], ids=["alone", "of a truth"])
+def test_what_belongs_together_is_done_when_all_workers_are_killed_at_once(cluster, first):
+    """A sweep that was timed in one process waited for ever: Dask kept its tasks for a worker that was gone."""
+    if first is None:
+        group = Group(tuple(Task(f"c{n}", tasks.square, (n, 0.2)) for n in range(20)), together=True)
+    else:
+        group = Group(tuple(Task(f"c{n}", tasks.add, (n * n - 9, 0.2)) for n in range(20)), first, together=True)
+
+    def kill():
+        for pid in cluster.client.run(os.getpid, on_error="ignore").values():
+            os.kill(pid, signal.SIGKILL)
+
+    thread = threading.Timer(1.0, kill)
+    thread.start()
+    ended = outcomes(cluster, group, retries=30, patience=60.0)
+    thread.join()
+    assert {name: each.value for name, each in ended.items()} == {f"c{n}": n * n for n in range(20)}
+
+
 @pytest.mark.slow
 @pytest.mark.claim("sweeps-lose-nothing", tolerance="none: every task has one outcome, with its value")
 def test_twenty_kills_during_two_hundred_tasks(cluster):
