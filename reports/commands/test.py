@@ -26,12 +26,16 @@ def run_tests(
 
     Other arguments go to pytest; paths are relative to the checkout.
 
+    The fast tests compile kernels quickly, which is most of their work, unless AIRLIGHT_COMPILATION=full asks for what
+    everything else runs. Images are the same bit for bit.
+
     --all also prints a summary and writes the date, the machine and the counts into docs/verification.md. With --all
     and arguments for pytest, tests of all tiers run and nothing is written. Exit status 1 if anything failed.
     """
     import os
     import sys
 
+    from reports.machine import quick_compilation
     from reports.machine.environment import MissingError, prepare, threads
 
     root = Path(__file__).resolve().parents[2]
@@ -54,6 +58,8 @@ def run_tests(
         if not run_all(all_parts(sharing), root, machine=machine):
             raise typer.Exit(1)
         return
+    if not everything and variant == "llvm_ad_rgb" and quick_compilation.VARIABLE not in os.environ:
+        os.environ.update(quick_compilation.settings())  # of processes that have not begun
     tiers = [] if everything else ["-m", "not statistical and not slow"]
     sys.stdout.flush()
     os.execv(sys.executable, [sys.executable, "-m", "pytest", *sharing, *tiers, *context.args])
