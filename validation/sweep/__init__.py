@@ -14,6 +14,6 @@ Read in this order:
 - `rows.py`: finished rows on disk, and their Parquet.
 
 May import: `analytic.errors`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `realtime.scene`,
-`reference.quadrature`, `reference.scene`, `reference.storage`, `validation.configurations`, `validation.estimates`,
-`validation.metrics`, `validation.random_scenes`, `validation.scaling`, `validation.scenes`.
+`reference.quadrature`, `reference.scene`, `reference.storage`, `reference.visibility`, `validation.configurations`,
+`validation.estimates`, `validation.metrics`, `validation.random_scenes`, `validation.scaling`, `validation.scenes`.
 """

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from reports.commands import main as cli
+from reports.machine.quick_compilation import CACHE_VARIABLE, VARIABLE
 
 ROOT = Path(__file__).resolve().parents[3]
 SMALL = ["--size", "16x12"]
@@ -88,6 +89,8 @@ def test_ctrl_c_ends_it_with_one_line_and_no_traceback(number, status, word):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        # Quick compilation has a child of its own.
+        env={name: value for name, value in os.environ.items() if name not in (VARIABLE, CACHE_VARIABLE)},
     )
     address = process.stdout.readline().strip()
     assert address.startswith("http://127.0.0.1:")

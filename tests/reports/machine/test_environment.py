@@ -39,7 +39,7 @@ def only(tmp_path, monkeypatch):
     """A folder that is the only one in which libLLVM is looked for; no user's settings, no GPU."""
     folder = tmp_path / "lib"
     folder.mkdir()
-    for name in ("DRJIT_LIBLLVM_PATH", "AIRLIGHT_VARIANT"):
+    for name in ("DRJIT_LIBLLVM_PATH", "AIRLIGHT_VARIANT", "AIRLIGHT_COMPILATION"):
         monkeypatch.setenv(name, "")  # so that it is as it was after the test, also where `prepare` sets it
         monkeypatch.delenv(name)
     monkeypatch.setattr(llvm, "llvm_folders", lambda: [folder])

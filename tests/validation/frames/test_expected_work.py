@@ -40,12 +40,12 @@ def test_an_hour_and_the_memory_are_the_bounds(variant, monkeypatch):
     ],
     ids=" ".join,
 )
-def test_every_command_that_renders_asks(variant, tmp_path, monkeypatch, capfd, command):
+def test_every_command_that_renders_asks(variant, tmp_path, monkeypatch, capsys, command):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(expected_work.dr, "thread_count", lambda: 2)
     monkeypatch.setattr(expected_work, "usable_memory", lambda: Memory(16 * 10**9, "this machine has"))
     assert run(command) == 2
-    err = capfd.readouterr().err
+    err = capsys.readouterr().err
     assert err.count("\n") == 1
     assert "add --force to start it nevertheless" in err
     assert not list(tmp_path.iterdir())

@@ -116,8 +116,8 @@ def test_the_command_renders_meshes(variant, tmp_path):
         (["three-media", "--set", "evaluation=mesh"], "use evaluation=walk"),
     ],
 )
-def test_the_command_refuses_in_one_line(variant, capfd, arguments, message):
+def test_the_command_refuses_in_one_line(variant, capsys, arguments, message):
     assert run_command(*arguments, "--size", "4x3") == 2
-    error = capfd.readouterr().err
+    error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
