@@ -213,12 +213,15 @@ def _render(scene: Scene, chosen: Configuration, *, timed: bool) -> Rendered:
         "compiled": after[2] - before[2],
         "bytes": int(dr.detail.malloc_watermark(backend)),
     }
-    return Rendered(frame, numbers | (_times(renderer, scene, state) | {"first_ms": 1e3 * first} if timed else {}))
+    if timed:
+        numbers |= _times(renderer, state) | {"first_ms": 1e3 * first}
+        del state  # maps of many lights fill a gigabyte, and two of these a worker
+        numbers["prepare_ms"], _ = run_times(lambda: dr.eval(renderer.prepare(scene)))
+    return Rendered(frame, numbers)
 
 
-def _times(renderer: FrameRenderer, scene: Scene, state: Any) -> dict[str, Any]:
-    """Time preparation, frames, and the airlight of a frame; the first run has compiled and recorded all kernels."""
-    prepare, _ = run_times(lambda: dr.eval(renderer.prepare(scene)))
+def _times(renderer: FrameRenderer, state: Any) -> dict[str, Any]:
+    """Time frames, and the airlight of a frame; the first run has compiled and recorded all kernels."""
     frames, processor = _repeated(lambda: run_stages(renderer, state))
     low, median, high = (float(value) for value in np.percentile(frames, [25, 50, 75]))
     airlight = median  # camera rays and surfaces take little of a frame that is slow, and it takes too long to ask
@@ -232,7 +235,6 @@ def _times(renderer: FrameRenderer, scene: Scene, state: Any) -> dict[str, Any]:
         )
         airlight = float(np.median(times))
     return {
-        "prepare_ms": prepare,
         "frame_ms": median,
         "frame_ms_low": low,
         "frame_ms_high": high,
