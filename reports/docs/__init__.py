@@ -9,11 +9,12 @@ Read in this order:
 - `diagnosis.py`: the table of planted faults
 - `full_run.py`: the last full run of all tests
 - `live_view.py`: the picture of the live view
+- `thousand_scenes.py`: the digest of the sweep over a thousand scenes
 - `round_trips.py`: faults planted in Blender's Cycles, and what the diagnosis said
 - `release.py`: one number, a source distribution, a wheel
 - `verification.py`: the page of claims and of the tests that protect them
 
 May import: `analytic`, `reference.scene`, `reference.storage`, `reports.data`, `reports.interchange`,
-`reports.machine`, `reports.papers`, `reports.tables`, `validation.configurations`, `validation.diagnosis`,
-`validation.fidelity`, `validation.frames`, `validation.scenes`.
+`reports.machine`, `reports.papers`, `reports.sweep`, `reports.tables`, `validation.configurations`,
+`validation.diagnosis`, `validation.fidelity`, `validation.frames`, `validation.scenes`.
 """

@@ -44,7 +44,7 @@ def _data(candidate: "Candidate") -> dict[str, Any]:
     chosen = candidate.chosen
     numbers = {
         name: getattr(candidate, name)
-        for name in ("error", "error_bound", "covered", "cost_ms", "cost_low", "cost_high")
+        for name in ("error", "error_bound", "covered", "chance", "cost_ms", "cost_low", "cost_high")
     }
     return {
         "method": chosen.method,
@@ -87,8 +87,8 @@ def advice_lines(data: Mapping[str, Any]) -> list[str]:
         lines.append(f"take: {data['command']}")
     else:
         lines.append(
-            f"none is predicted to hold {data['error']:g}; the nearest stays below {best['error_bound']:.2g}: "
-            f"{data['command']}"
+            f"none is predicted to hold {data['error']:g}; the likeliest does in {best['chance']:.0%} of scenes like "
+            f"it: {data['command']}"
         )
     if data["beyond"]:
         lines.append(f"this scene is beyond all that were swept in: {', '.join(data['beyond'])}; trust it less")

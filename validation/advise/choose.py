@@ -2,9 +2,11 @@
 """What every configuration will cost and err by in a scene, and the one to take.
 
 A method that refuses the scene is asked, not predicted. The choice is the one of least predicted cost among those whose
-error stays below what is asked for in a stated share of scenes; if there is none, that of the least such error.
+error stays below what is asked for in a stated share of scenes; if there is none, the one whose error does in the
+largest share.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -30,6 +32,7 @@ class Candidate:
     error: float  #: relative RMSE, as likely too high as too low
     error_bound: float  #: which it stays below in a share of scenes
     covered: float  #: that share: the one asked for, or less where it was fitted to few scenes
+    chance: float  #: share of scenes in which it holds the error asked for
     cost_ms: float  #: of a frame
     cost_low: float  #: which nine of ten scenes are above
     cost_high: float  #: which nine of ten scenes are below
@@ -49,7 +52,7 @@ class Advice:
 
 
 def predicted(
-    each: ConfigurationModel, properties: Mapping[str, float], *, share: float, margin: float = 0.0
+    each: ConfigurationModel, properties: Mapping[str, float], asked: float, *, share: float, margin: float = 0.0
 ) -> Candidate:
     """Return what is predicted of a configuration.
 
@@ -59,6 +62,8 @@ def predicted(
         Of the configuration.
     properties
         Of the scene, its `pixels` among them: the cost is in proportion to these.
+    asked
+        The error that it shall hold.
     share
         Of scenes in which `error_bound` shall hold.
     margin
@@ -73,6 +78,7 @@ def predicted(
         10 ** (error + each.error.allowance(0.5)),
         10 ** (error + each.error.allowance(share) + margin),
         min(share, each.error.covered(share)),
+        each.error.chance(math.log10(asked) - margin - error),
         middle,
         low,
         high,
@@ -85,7 +91,7 @@ def choose(candidates: Sequence[Candidate], error: float) -> tuple[Candidate | N
     holding = [each for each in able if each.error_bound <= error]
     if holding:
         return min(holding, key=lambda each: each.cost_ms), True
-    return min(able, key=lambda each: each.error_bound, default=None), False
+    return min(able, key=lambda each: (-each.chance, each.cost_ms), default=None), False
 
 
 def advise(
@@ -115,7 +121,7 @@ def advise(
     margin = float(model.about.get("margin", 0.0))
     reasons = {each.chosen: (refusal or why_refused)(scene, each.chosen) for each in model.configurations}
     found = [
-        _with_reason(predicted(each, properties, share=share, margin=margin), reasons[each.chosen])
+        _with_reason(predicted(each, properties, error, share=share, margin=margin), reasons[each.chosen])
         for each in model.configurations
     ]
     best, holds = choose(found, error)

@@ -85,7 +85,9 @@ def _choice(
 ) -> Choice | None:
     measured = {row.chosen: row for row in rows if np.isfinite(row.cost)}
     able = [each for each in model.configurations if each.chosen in measured]
-    best, promised = choose([predicted(each, rows[0].properties, share=SHARE, margin=margin) for each in able], asked)
+    best, promised = choose(
+        [predicted(each, rows[0].properties, asked, share=SHARE, margin=margin) for each in able], asked
+    )
     if best is None:
         return None
     holding = [row.cost for row in measured.values() if row.error <= asked]

@@ -60,6 +60,10 @@ class Regression:
         count = len(self.residuals)
         return min(math.ceil((count + 1) * share), count) / (count + 1)
 
+    def chance(self, room: float) -> float:
+        """Return in what share of scenes the value is at most `room` above the prediction, as residuals say."""
+        return float(np.searchsorted(self.residuals, room, side="right")) / (len(self.residuals) + 1)
+
     def as_data(self) -> dict[str, Any]:
         """Return it as plain data."""
         return {

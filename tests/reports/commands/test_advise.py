@@ -46,7 +46,7 @@ def test_an_error_that_none_holds_ends_with_1(variant, capsys):
     advice = _advice(capsys, "windows", "--error", "1e-9", *SMALL, status=FAILED)
     assert not advice["holds"]
     assert run(["advise", "windows", "--error", "1e-9", *SMALL]) == FAILED
-    assert "none is predicted to hold 1e-09; the nearest stays below" in capsys.readouterr().out
+    assert "none is predicted to hold 1e-09; the likeliest does" in capsys.readouterr().out
 
 
 def test_a_method_that_refuses_says_why(variant, capsys, tmp_path):

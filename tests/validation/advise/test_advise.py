@@ -126,21 +126,22 @@ def test_a_judge_sees_a_model_that_knows_nothing():
 
 
 def test_the_cheapest_that_holds_is_taken():
-    def candidate(chosen, bound, cost, refused=""):
-        return Candidate(chosen, bound / 3, bound, 0.99, cost, cost, cost, refused)
+    def candidate(chosen, bound, chance, cost, refused=""):
+        return Candidate(chosen, bound / 3, bound, 0.99, chance, cost, cost, cost, refused)
 
-    cheap, dear = candidate(COARSE, 5e-3, 1.0), candidate(FINE, 5e-4, 9.0)
-    refuses = candidate(EXACT, 1e-6, 0.1, "it has no triangles")
+    cheap, dear = candidate(COARSE, 5e-3, 0.1, 1.0), candidate(FINE, 5e-4, 0.7, 9.0)
+    refuses = candidate(EXACT, 1e-6, 1.0, 0.1, "it has no triangles")
     assert choose([cheap, dear, refuses], 1e-3) == (dear, True)
     assert choose([cheap, dear, refuses], 1e-2) == (cheap, True)
-    assert choose([cheap, dear, refuses], 1e-5) == (dear, False)
+    assert choose([cheap, dear, refuses], 1e-5) == (dear, False)  # the likelier
+    assert choose([cheap, dear, candidate(COARSE, 6e-4, 0.7, 8.0)], 1e-5) == (candidate(COARSE, 6e-4, 0.7, 8.0), False)
     assert choose([refuses], 1e-3) == (None, False)
 
 
 def test_cost_is_in_proportion_to_pixels():
     (each, *_) = fit_rows(_rows(30, 0.03)).configurations
     properties = _rows(1, 0.0)[0].properties
-    small, large = (predicted(each, properties | {"pixels": n}, share=0.9) for n in (19200.0, 192000.0))
+    small, large = (predicted(each, properties | {"pixels": n}, 1e-3, share=0.9) for n in (19200.0, 192000.0))
     assert large.cost_ms == pytest.approx(10 * small.cost_ms)
     assert large.error == small.error
 
@@ -154,9 +155,20 @@ def test_a_model_survives_its_file(tmp_path):
     properties = _rows(1, 0.0)[0].properties
     for one, other in zip(model.configurations, again.configurations, strict=True):
         assert one.chosen == other.chosen
-        first, second = (predicted(each, properties, share=0.99) for each in (one, other))
+        first, second = (predicted(each, properties, 1e-3, share=0.99) for each in (one, other))
         assert second.error_bound == pytest.approx(first.error_bound, rel=1e-3)
         assert second.cost_ms == pytest.approx(first.cost_ms, rel=1e-3)
+        assert second.chance == pytest.approx(first.chance, abs=2 / 30)
+
+
+def test_the_chance_is_the_share_of_left_out_residuals():
+    (each, *_) = fit_rows(_rows(80, 0.03)).configurations
+    properties = _rows(1, 0.0)[0].properties
+    found = predicted(each, properties, 1e-3, share=0.9)
+    # At the error that nine of ten scenes stay below, nine of ten do.
+    again = predicted(each, properties, found.error_bound * (1 + 1e-9), share=0.9)
+    assert again.chance == pytest.approx(found.covered, abs=1 / 80)  # a scene
+    assert predicted(each, properties, 1e-12, share=0.9).chance == 0
 
 
 def test_a_file_of_another_version_is_refused(tmp_path):

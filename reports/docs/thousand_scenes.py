@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The page of the thousand scenes: the digest of the rows that are kept in `validation/baselines/thousand`.
+
+A test fails where the page is not what `python -m reports.docs.thousand_scenes` makes it.
+"""
+
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE, ROWS = "docs/thousand-scenes.md", "validation/baselines/thousand"
+_BEGIN, _END = "<!-- digest: begin -->\n", "<!-- digest: end -->"
+
+
+def current_page(root: Path = ROOT) -> str:
+    """Return what the page should hold: what stands outside of the marked part is kept."""
+    from reports.sweep.digest import digest
+    from reports.sweep.read import read_sweep
+    from reports.sweep.summary import summary_of
+
+    before, rest = (root / PAGE).read_text(encoding="utf-8").split(_BEGIN)
+    said = digest(summary_of(read_sweep(root / ROWS)))
+    return f"{before}{_BEGIN}\n{said}\n{_END}{rest.split(_END)[1]}"
+
+
+def redraw(root: Path = ROOT) -> Path:
+    """Write the page anew, and return its path."""
+    from reference.storage.files import write_text
+
+    write_text(root / PAGE, current_page(root))
+    return root / PAGE
+
+
+if __name__ == "__main__":
+    print(redraw())
