@@ -28,6 +28,7 @@ WIDTH = 10.2  #: of a figure [inches]; the page scales it
 _COLUMNS = 4  #: of small panels
 _GREY = "#b9bcc2"
 _EXACT = 1e-8  #: errors below are drawn here: float32 cannot tell them from none
+_WRONG = 1e3  #: errors above are drawn here: a series that left its range has 1e22, and no other point could be told
 _DOTS = 160  #: dots per inch of what is drawn as pixels, thousands of points that would be megabytes as shapes
 
 ERROR = "relative RMSE of the airlight [1]"
@@ -281,21 +282,21 @@ def _styles(said: Summary) -> dict[str, dict[str, Any]]:
 
 
 def _errors(sample: Sample) -> Numbers:
-    """Return the finite errors of a configuration, none below what float32 tells from none."""
-    return np.maximum(sample.errors[np.isfinite(sample.errors)], _EXACT)
+    """Return the finite errors of a configuration, within what is drawn."""
+    return np.clip(sample.errors[np.isfinite(sample.errors)], _EXACT, _WRONG)
 
 
 def _points(sample: Sample) -> tuple[Numbers, Numbers]:
     """Return times and errors of the scenes that have both."""
     both = np.isfinite(sample.times) & np.isfinite(sample.errors)
-    return sample.times[both], np.maximum(sample.errors[both], _EXACT)
+    return sample.times[both], np.clip(sample.errors[both], _EXACT, _WRONG)
 
 
 def _pairs(said: Summary, sample: Sample, name: str) -> tuple[Numbers, Numbers]:
     """Return a property and the error of the scenes that have both."""
     x = said.sweep.property(name)[list(sample.rows)]
     both = np.isfinite(x) & np.isfinite(sample.errors)
-    return x[both], np.maximum(sample.errors[both], _EXACT)
+    return x[both], np.clip(sample.errors[both], _EXACT, _WRONG)
 
 
 def _running(x: Numbers, y: Numbers) -> tuple[list[float], list[float]]:

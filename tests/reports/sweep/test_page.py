@@ -173,6 +173,19 @@ def test_figures_of_one_page_share_no_names(charts):
     assert len(names) == len(set(names))
 
 
+def test_an_error_without_measure_leaves_the_others_their_room(tmp_path):
+    """In a thousand scenes a series out of its range had an error of 4e22: all others were one line of the chart."""
+    several = [row(scene=f"random:{seed}", relative_rmse=1e-3 * 2.0**seed) for seed in range(9)]
+    several.append(row(scene="random:9", relative_rmse=4e22))
+    for _, figure in drawn(said_of(tmp_path, several)):
+        for panel in figure.axes:
+            for low, high, scale in (
+                (*panel.get_xlim(), panel.get_xscale()),
+                (*panel.get_ylim(), panel.get_yscale()),
+            ):
+                assert scale != "log" or max(low, high) < 1e5
+
+
 def test_every_configuration_is_named_in_the_figures(charts, said):
     for name in ("sweep-errors", "sweep-medians", "sweep-speed", "sweep-correlations"):
         for sample in said.samples:
