@@ -34,13 +34,29 @@ def data(page, name):
 
 
 def changed(page, do):
-    """Do something, and wait until a new frame is there and the page was told where all stands."""
+    """Do something, and wait until a new frame is there, the page was told where all stands, and nothing follows.
+
+    What follows would be taken for the beginning of what is done next.
+    """
     frame, told = (int(data(page, name)) for name in ("frame", "told"))
     do()
     page.wait_for_function(
         "([frame, told]) => +document.documentElement.dataset.frame > frame && "
         "+document.documentElement.dataset.told > told",
         arg=[frame, told],
+    )
+    settled(page)
+
+
+def settled(page):
+    """Wait until no frame and no word of where all stands has come for a while."""
+    page.wait_for_function(
+        """() => {
+            const {frame, told} = document.documentElement.dataset, now = performance.now();
+            const last = (window.settling ??= {});
+            if (last.frame !== frame || last.told !== told) Object.assign(last, {frame, told, since: now});
+            return now - last.since > 300;
+        }"""
     )
 
 
