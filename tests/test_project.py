@@ -5,7 +5,6 @@ import ast
 import subprocess
 import sys
 import tomllib
-import zipfile
 from contextlib import suppress
 from graphlib import CycleError, TopologicalSorter
 from importlib.metadata import PackageNotFoundError, version
@@ -15,7 +14,6 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
-from packaging.version import Version
 
 from tests.helpers.imports import FOLDERS, folder_graph, import_graph, inside, modules, reached
 
@@ -288,30 +286,3 @@ def test_citation_and_version_agree():
     assert f"version: {__version__}\n" in (ROOT / "CITATION.cff").read_text()
     with suppress(PackageNotFoundError):  # not installed where it runs from the source
         assert version("airlight") == __version__
-
-
-@pytest.mark.slow
-def test_the_wheel_holds_the_packages_and_nothing_else(tmp_path):
-    if Version(version("setuptools")) < Version("77"):
-        pytest.skip("needs setuptools 77 or newer, which understands the licence field")
-    source, out = tmp_path / "source", tmp_path / "out"
-    source.mkdir()
-    # Built from a copy: setuptools writes its build folder beside the sources.
-    tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True)
-    if tracked.returncode:
-        pytest.skip("not a git checkout, so what belongs to the project is unknown")
-    for name in tracked.stdout.splitlines():
-        if (ROOT / name).is_file():
-            (source / name).parent.mkdir(parents=True, exist_ok=True)
-            (source / name).write_bytes((ROOT / name).read_bytes())
-    build = ("-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "--no-index", "-q", "-w", str(out), str(source))
-    ran = _python(*build)
-    assert ran.returncode == 0, ran.stderr
-    (wheel,) = out.iterdir()
-    with zipfile.ZipFile(wheel) as archive:
-        held = {name for name in archive.namelist() if not name.endswith("/")}
-        scripts = archive.read(next(name for name in held if name.endswith("entry_points.txt"))).decode()
-    assert "airlight = reports.commands.start:main" in scripts
-    content = {name for name in held if ".dist-info/" not in name}
-    expected = {name for name in tracked.stdout.splitlines() if name == "airlight.py" or name.startswith(FOLDERS)}
-    assert content == {name for name in expected if (ROOT / name).is_file()}

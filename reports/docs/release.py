@@ -23,7 +23,7 @@ from analytic.errors import InputError
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("analytic", "realtime", "reference", "validation", "reports")
 _VERSION = re.compile(r"\d+\.\d+\.\d+(?:(?:a|b|rc)\d+)?")
-_PICTURES = "reports/images/"  #: of the README, in no wheel
+_APART = ("reports/images/", "validation/baselines/thousand/")  #: pictures and rows of the pages, in no wheel
 
 
 def tracked(root: Path = ROOT) -> list[str]:
@@ -44,9 +44,7 @@ def wheel_files(names: list[str]) -> set[str]:
     """Return what a wheel of these files must hold: the packages and `airlight.py`, nothing else."""
     packages = tuple(f"{name}/" for name in PACKAGES)
     return {
-        name
-        for name in names
-        if name == "airlight.py" or (name.startswith(packages) and not name.startswith(_PICTURES))
+        name for name in names if name == "airlight.py" or (name.startswith(packages) and not name.startswith(_APART))
     }
 
 
