@@ -165,9 +165,10 @@ def _attenuation(
     ray: ParallelRay, piece: Piece, xs, envelopes: Mapping[int, Envelopes] | None = None
 ) -> list[list[Any]]:
     """Return exp(-tau) of both legs, by node and channel; `envelopes` by medium, where they are known for all nodes."""
+    known = envelopes or {}
     insides = [
-        [linear_length(envelopes[number], x)[0] for x in xs]
-        if envelopes is not None and number in envelopes
+        [linear_length(known[number], x)[0] for x in xs]
+        if number in known
         else parallel_legs(seen, ray.origin, ray.direction, xs)
         for number, seen in enumerate(ray.seen)
     ]

@@ -238,12 +238,13 @@ def light_leg(ray: MediaRay, piece: Piece, xs, rs, envelopes: Mapping[int, Envel
         By number of a medium, the planes where all of these legs enter and leave it, from `ray_envelopes`, if they are
         known.
     """
+    known = envelopes or {}
     insides = []
     for number, seen in enumerate(ray.seen):
         own = number == piece.number
-        if envelopes is not None and number in envelopes:
+        if number in known:
             near: Any = True
-            enter, leave = zip(*(envelopes[number].values(x) for x in xs), strict=True)
+            enter, leave = zip(*(known[number].values(x) for x in xs), strict=True)
         else:
             near = dr.full(dr.mask_t(xs[0]), True, dr.width(xs[0])) if own else legs_near(ray, seen, xs, rs)
             enter, leave = inverse_crossings(seen, ray.start, ray.direction, xs, near, leaves=not own)

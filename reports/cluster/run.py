@@ -192,14 +192,14 @@ class _Run:
         self._flown[flown.number] = flown
         if group.first is not None:
             flown.first = _Flight(group.first, flown)
-            self._flights[group.first.name] = flown.first
         for task in group.tasks:
             flown.open[task.name] = self._flights[task.name] = _Flight(task, flown)
-        self._send(flown, flown.first is not None, list(flown.open.values()))
+        self._send_all(flown)
 
     def _send(self, flown: _Flown, with_first: bool, flights: list[_Flight]) -> None:
         """Submit tasks of a group: the first one where it is asked for, and others."""
         if with_first and flown.first is not None:
+            self._flights[flown.first.task.name] = flown.first
             self._submit(flown.first, None)
         for flight in flights:
             self._submit(flight, None if flown.first is None else flown.first.future)
@@ -313,9 +313,7 @@ class _Run:
         self._send_all(flight.group)
 
     def _send_all(self, flown: _Flown) -> None:
-        """Send all that is open of a group again, the first task too."""
-        if flown.first is not None:
-            self._flights[flown.first.task.name] = flown.first
+        """Send all that is open of a group, the first task too."""
         self._send(flown, True, list(flown.open.values()))
 
     def _move(self, flown: _Flown) -> None:
@@ -326,11 +324,8 @@ class _Run:
         """
         flown.worker = ""
         waiting = [f for f in flown.open.values() if f.since is None or f.worker not in self._workers]
-        if not waiting:
-            return
-        if flown.first is not None:
-            self._flights[flown.first.task.name] = flown.first
-        self._send(flown, True, waiting)
+        if waiting:
+            self._send(flown, True, waiting)
 
     def _erred(self, flight: _Flight) -> Iterator[Outcome]:
         """Send a task again whose workers died, unless it died too often; what else goes wrong is a failure."""
@@ -343,12 +338,11 @@ class _Run:
         guilty = flight
         if flown.first is not None and flown.first.future.status == "error":
             guilty = flown.first  # its value was lost, and it died when it was to be made again
-            self._flights[guilty.task.name] = guilty
         guilty.deaths += 1
         if guilty.begun > self._retries or guilty.deaths > _SILENT:
             yield from self._aborted(guilty)
         elif guilty is flown.first:
-            self._send(flown, True, list(flown.open.values()))
+            self._send_all(flown)
         else:
             self._send(flown, False, [flight])
 

@@ -4,6 +4,7 @@
 Read in this order:
 
 - `build.py`: runs Sphinx
+- `marked.py`: the part of a page that a program makes
 - `data.py`: numbers and pictures of a report, and whether they are stale
 - `fidelity.py`: the page of verdicts on papers
 - `diagnosis.py`: the table of planted faults

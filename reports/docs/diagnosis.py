@@ -13,17 +13,16 @@ from pathlib import Path
 from typing import Any
 
 from reports.data.json_files import read_json
+from reports.docs.marked import with_part
 
 ROOT = Path(__file__).resolve().parents[2]
 RECORD = "docs/data/diagnosis.json"
 _PAGE = "docs/diagnosis.md"
-_BEGIN, _END = "<!-- answers: begin -->\n", "<!-- answers: end -->"
 
 
 def page(text: str, record: Mapping[str, Any]) -> str:
     """Return the page with its table made anew; `record` is what the command printed."""
-    before, rest = text.split(_BEGIN)
-    return f"{before}{_BEGIN}{_answers(record)}{_END}{rest.split(_END)[1]}"
+    return with_part(text, "answers", _answers(record))
 
 
 def _answers(record: Mapping[str, Any]) -> str:

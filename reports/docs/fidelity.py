@@ -15,11 +15,11 @@ from typing import Any
 
 from analytic.errors import InputError
 from reports.data.json_files import read_json
+from reports.docs.marked import with_part
 
 ROOT = Path(__file__).resolve().parents[2]
 RECORD = "docs/data/fidelity.json"
 _PAGE = "docs/fidelity.md"
-_BEGIN, _END = "<!-- verdicts: begin -->\n", "<!-- verdicts: end -->"
 
 
 def page(text: str, record: Mapping[str, Any]) -> str:
@@ -32,8 +32,7 @@ def page(text: str, record: Mapping[str, Any]) -> str:
     record
         What `airlight fidelity --json` printed.
     """
-    before, rest = text.split(_BEGIN)
-    return f"{before}{_BEGIN}{_verdicts(record)}{_END}{rest.split(_END)[1]}"
+    return with_part(text, "verdicts", _verdicts(record))
 
 
 def _verdicts(record: Mapping[str, Any]) -> str:

@@ -14,10 +14,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from reports.docs.marked import with_part
+
 ROOT = Path(__file__).resolve().parents[2]
 RECORD = "docs/data/cycles-faults.json"
 _PAGE = "docs/diagnosis.md"
-_BEGIN, _END = "<!-- cycles: begin -->\n", "<!-- cycles: end -->"
 _EXAMPLE = "docs/examples/cycles_faults.py"
 #: Scenes that are rendered, and how to load them.
 SCENES = {"sphere-spot": "sphere-spot", "open-fog": "open-fog", "lobe-fog": "docs/examples/lobe-fog.xml"}
@@ -126,8 +127,7 @@ def _listed(python: str, root: Path) -> dict[str, Any]:
 
 def page(text: str, record: Mapping[str, Any]) -> str:
     """Return the page with its generated part made anew."""
-    before, rest = text.split(_BEGIN)
-    return f"{before}{_BEGIN}{_drawn(record)}{_END}{rest.split(_END)[1]}"
+    return with_part(text, "cycles", _drawn(record))
 
 
 def _drawn(record: Mapping[str, Any]) -> str:

@@ -6,9 +6,10 @@ A test fails where the page is not what `python -m reports.docs.thousand_scenes`
 
 from pathlib import Path
 
+from reports.docs.marked import with_part
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGE, ROWS = "docs/thousand-scenes.md", "validation/baselines/thousand"
-_BEGIN, _END = "<!-- digest: begin -->\n", "<!-- digest: end -->"
 
 
 def current_page(root: Path = ROOT) -> str:
@@ -17,9 +18,8 @@ def current_page(root: Path = ROOT) -> str:
     from reports.sweep.read import read_sweep
     from reports.sweep.summary import summary_of
 
-    before, rest = (root / PAGE).read_text(encoding="utf-8").split(_BEGIN)
     said = digest(summary_of(read_sweep(root / ROWS)))
-    return f"{before}{_BEGIN}\n{said}\n{_END}{rest.split(_END)[1]}"
+    return with_part((root / PAGE).read_text(encoding="utf-8"), "digest", f"\n{said}\n")
 
 
 def redraw(root: Path = ROOT) -> Path:

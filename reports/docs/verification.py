@@ -16,6 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from reports.docs.marked import with_part
+
 ROOT = Path(__file__).resolve().parents[2]
 RECORD = "docs/data/full_run.json"
 _PAGE = "docs/verification.md"
@@ -116,9 +118,7 @@ def page(text: str, claims: Iterable[Claim], marks: Sequence[Mark], record: Mapp
         What the last full run of all tests wrote; None if there was none.
     """
     for name, content in (("claims", _all_claims(list(claims), marks)), ("full run", _full_run(record))):
-        begin, end = f"<!-- {name}: begin -->\n", f"<!-- {name}: end -->"
-        before, rest = text.split(begin)
-        text = f"{before}{begin}{content}{end}{rest.split(end)[1]}"
+        text = with_part(text, name, content)
     return text
 
 

@@ -283,20 +283,24 @@ def _styles(said: Summary) -> dict[str, dict[str, Any]]:
 
 def _errors(sample: Sample) -> Numbers:
     """Return the finite errors of a configuration, within what is drawn."""
-    return np.clip(sample.errors[np.isfinite(sample.errors)], _EXACT, _WRONG)
+    return _within(sample.errors[np.isfinite(sample.errors)])
+
+
+def _within(errors: Numbers) -> Numbers:
+    return np.clip(errors, _EXACT, _WRONG)
 
 
 def _points(sample: Sample) -> tuple[Numbers, Numbers]:
     """Return times and errors of the scenes that have both."""
     both = np.isfinite(sample.times) & np.isfinite(sample.errors)
-    return sample.times[both], np.clip(sample.errors[both], _EXACT, _WRONG)
+    return sample.times[both], _within(sample.errors[both])
 
 
 def _pairs(said: Summary, sample: Sample, name: str) -> tuple[Numbers, Numbers]:
     """Return a property and the error of the scenes that have both."""
     x = said.sweep.property(name)[list(sample.rows)]
     both = np.isfinite(x) & np.isfinite(sample.errors)
-    return x[both], np.clip(sample.errors[both], _EXACT, _WRONG)
+    return x[both], _within(sample.errors[both])
 
 
 def _running(x: Numbers, y: Numbers) -> tuple[list[float], list[float]]:

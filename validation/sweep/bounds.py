@@ -120,12 +120,12 @@ def _worth_of_ends(truth: TruthScene) -> Array:
 def _ends(truth: TruthScene, distance: Array) -> tuple[Array, Array]:
     """Return distances along rays [m], and what divides their certainty, 1/|c| [1], (places, rays) each.
 
-    They are those of the ends of rays, of segments in media and between them, and of where rays cross bounds.
+    They are those of the ends of rays, the middles of segments in media and between them, and where rays cross bounds.
     """
     places = [np.zeros_like(distance), distance]
     if truth.media:
         segments = camera_segments(truth, distance)
-        places += [*segments.start, *segments.end, *(0.5 * (segments.start + segments.end))]
+        places += list(0.5 * (segments.start + segments.end))
     growth = [np.ones_like(distance)] * len(places)
     for medium in truth.media:
         enter, leave = crossings(medium.bounds, truth.origin, truth.direction)

@@ -10,7 +10,7 @@
     media = [{}, { "medium.sigma_t" = 0.17 }]               # changes as of `--change`; {} is the scene's own
     flip = false                                            # HDR-FLIP takes about a second a cell
     times = "with"                                          # or "none", or "alone"
-    timed = 150                                             # scenes that are timed alone, the first; all by default
+    # timed = 150                                           # with "alone": how many scenes, the first; else all
     limit = 600                                             # seconds that a cell or a truth may take
     retries = 3                                             # how often a cell is begun again whose process died
 

@@ -55,7 +55,7 @@ def test_a_row_has_the_errors_and_what_they_cost():
 
 @pytest.mark.usefixtures("variant")
 def test_preparation_is_timed_when_what_was_prepared_before_is_gone(monkeypatch):
-    """In `random:20` the maps of 34 light points take a gigabyte: two of these ended the worker."""
+    """In `random:20` the maps of 35 lights take a gigabyte: two of these ended the worker."""
     alive = []
 
     def counted(scene, chosen):
