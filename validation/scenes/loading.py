@@ -116,11 +116,12 @@ def _existing(name_or_path: str) -> Path:
     looks_like_path = path.suffix or os.sep in name_or_path
     if looks_like_path:
         raise InputError(
-            f"scene: there is no file {name_or_path}; wanted a Mitsuba XML file or one of {', '.join(SCENES)}"
+            f"scene: there is no file {name_or_path}; wanted a Mitsuba XML file, random:SEED or one of "
+            f"{', '.join(SCENES)}"
         )
     raise InputError(
-        f"scene: got {name_or_path!r}, wanted one of {', '.join(SCENES)} or the path of a Mitsuba XML file"
-        + nearest(name_or_path, SCENES)
+        f"scene: got {name_or_path!r}, wanted one of {', '.join(SCENES)}, random:SEED or the path of a "
+        "Mitsuba XML file" + nearest(name_or_path, SCENES)
     )
 
 
