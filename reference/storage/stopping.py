@@ -126,6 +126,17 @@ def wait_if_stopped() -> None:
         time.sleep(1)
 
 
+def end_unstopped() -> None:
+    """Let signals stop the process no more: its work is done, and its status shall say so while Python ends.
+
+    Python gives its handlers up before it has ended; a signal then would be the status of work that is done.
+    """
+    wait_if_stopped()
+    if _stopper() is not None:
+        for number in _WORDS:
+            signal.signal(number, signal.SIG_IGN)
+
+
 def _stopper() -> Stopper | None:
     """Return the handler of this process; None where the main program has its own way with signals."""
     handlers = (signal.getsignal(number) for number in _WORDS)

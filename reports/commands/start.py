@@ -16,7 +16,7 @@ def main() -> None:
         signal.pthread_sigmask(signal.SIG_BLOCK, stops)
     import sys
 
-    from reference.storage.stopping import stop_on_signals, wait_if_stopped
+    from reference.storage.stopping import end_unstopped, stop_on_signals
     from reports.machine.streams import usable_streams
 
     usable_streams()
@@ -30,5 +30,5 @@ def main() -> None:
     from reports.commands.main import run
 
     status = run(sys.argv[1:])
-    wait_if_stopped()
+    end_unstopped()
     sys.exit(status)

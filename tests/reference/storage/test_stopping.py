@@ -92,6 +92,23 @@ def test_what_the_parent_ignores_stays_ignored(start):
     assert process.communicate(timeout=20) == ("done\n", "")
 
 
+@pytest.mark.parametrize("sign", STATUS)
+def test_the_status_of_work_that_is_done_stays_while_python_ends(start, sign):
+    """An object of the module is destroyed after Python has given its handlers up: a signal then ended the process."""
+    code = f"""
+import os
+class Late:
+    def __del__(self, kill=os.kill, own=os.getpid()):
+        kill(own, {int(sign)})
+late = Late()
+end_unstopped()
+print("ready", flush=True)
+"""
+    process = start(code)
+    assert process.communicate(timeout=20) == ("", "")
+    assert process.returncode == 0
+
+
 def test_without_the_handler_nothing_is_registered():
     """In a notebook and in these tests a Ctrl-C stays Python's exception."""
     with cleaned_up(pytest.fail), hint_when_stopped(str), pytest.raises(KeyboardInterrupt):
