@@ -39,14 +39,14 @@ def disort(tau, mu0, phase, albedo, *, streams):
     peak = moments[-1] if moments[-1] > 1e-13 else 0.0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        albedo = min(albedo, 1 - 1e-9)
         return pydisort(tau, albedo, 2 * streams, moments[None, :-1], mu0, np.pi, 0.0, f_arr=peak)
 
 
 @pytest.mark.claim("slab-sums-are-disort", tolerance="1e-5 of the flux, the figure; measured 1e-6 and below")
-@pytest.mark.parametrize("albedo", [0.2, 0.5, 0.9, 0.99, 1.0])
+@pytest.mark.parametrize("albedo", [0.2, 0.5, 0.9, 0.99, 1 - 1e-6])
 @pytest.mark.parametrize("mu0", [0.2, 0.6, 1.0])
 def test_sums_of_orders_are_disort(albedo, mu0):
+    """Nearer to 1 DISORT's eigenvalues k^2 lose 1e-5 of the light, as the processor rounds; a test of its own is at 1."""
     for tau, phase in ((2.0, ISOTROPIC), (7.3, HG)):
         depths = [0.0, 0.3, tau / 2, tau]
         up, down = summed(tau, mu0, phase, albedo, depths)
