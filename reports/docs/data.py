@@ -20,7 +20,7 @@ from reports.data.reader import read_report
 SCHEMA = "airlight-docs/1"
 
 _ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative")
-_METHOD = ("label", "method", "kernel", "parameters", "knows_shadows", "refused", "note")
+_METHOD = ("label", "method", "kernel", "parameters", "knows_shadows", "refused", "left_out", "note")
 _COST = ("kernel", "family", "size", "phase", "g", "device", "wall", "median", "p99", "max", "nonfinite", "refused")
 
 
