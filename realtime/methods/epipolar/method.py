@@ -8,8 +8,9 @@ pixels (Engelhardt and Dachsbacher 2010; Yusov 2013).
 
 Three things differ from what is published, all to the good of the method: each lit interval is integrated by a kernel
 and not marched; a leaf of the tree is linear and not constant, see `realtime.methods.epipolar.min_max_tree`; and what
-is interpolated is not the airlight but its quotient by a simple estimate, see `_yardstick`: the published scenes are
-lit by the sun, and near a point light the airlight itself goes as 1 / distance.
+is interpolated is not the airlight but the share of it that is lit: the published scenes are lit by the sun, and near a
+point light the airlight itself goes as 1 / distance, and as the phase function. A share lies between 0 and 1, so no
+pixel between samples is brighter than it is without shadows.
 
 The sampling is no wrapper around other methods, as `realtime.tiles.adaptive_sampling` is. Slices are cut for one light
 and hold its tree, by which samples and pixels alike are walked, and samples lie between the centres of pixels, where
@@ -18,7 +19,6 @@ lists of tiles, which bound the sixteen rays of a tile alone, miss what concerns
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import reduce
 
 import drjit as dr
 import mitsuba as mi
@@ -50,10 +50,8 @@ from realtime.methods.interface.light_airlight import RayAirlight, integral_type
 from realtime.methods.interface.view import View, rays_in_media
 from realtime.numerics.array_types import PerMetre, bytes_of
 from realtime.parameters import Parameters, parameter
-from realtime.rays.ray_light import distance_to_light, falloff_beside
 from realtime.scene.camera import Camera
 from realtime.scene.lights import Light
-from realtime.scene.medium import transmittance
 from realtime.scene.read_scene import Scene
 from realtime.shadow_maps.projection import light_faces
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth, map_memory, map_size
@@ -61,9 +59,7 @@ from realtime.tiles.layout import Layout
 
 _MOST = 65536  # slices, and samples of a slice
 
-_LEAST_COSINE = 0.05  # of a light point, in the yardstick
-_NEXT = 6.0  #: pixels from the image of a light point within which nothing is interpolated
-_DEEP = 5.0  #: optical depth beyond which nothing is interpolated where a light point lights no more before
+_NEXT = 6.0  #: pixels from the image of a light within which nothing is interpolated
 
 
 @dataclass(frozen=True)
@@ -233,11 +229,8 @@ def _sampled_shares(view: View, number: int, kernel, samples: Samples, heights: 
         direction = dr.normalize(camera.forward + camera.left * i + camera.up * j)
         seen = replace(view, direction=direction, direction_low=None, distance=depth, layout=Layout.SOME)
         airlight = _ray_airlight(seen, number, kernel)
-        share = _lit_integral(airlight, heights, slice_number) / _yardstick(airlight)
-        known = dr.isfinite(share)
-        if airlight.light.facing is not None:
-            known &= ~_begins_deep(airlight)
-        dr.scatter(shares, dr.select(known, share, no_value(share)), sample)
+        share = _lit_integral(airlight, heights, slice_number) / airlight.integral(*airlight.segment)
+        dr.scatter(shares, dr.select(dr.isfinite(share), share, no_value(share)), sample)
         return lane
 
     lane = spread(dr.width(marked))
@@ -252,56 +245,12 @@ def _sampled_shares(view: View, number: int, kernel, samples: Samples, heights: 
     return shares
 
 
-def _yardstick(airlight: RayAirlight):
-    """Return what airlight is interpolated in units of: it has its peaks and its ends, and what remains is smooth.
-
-    That is the airlight without shadows, by one node at the middle of the angle at the light: angle / h times the
-    integrand there. The bisector of the angle meets the ray at x = (x0 r1 + x1 r0) / (r0 + r1). What one node is wrong
-    by is in the samples and in the pixels alike.
-    """
-    x0, x1 = airlight.segment
-    if airlight.media:
-        return airlight.integral(x0, x1)
-    geometry, medium = airlight.geometry, airlight.view.medium
-    foot = geometry.foot
-    # As in the kernels, so that a ray through the light has a finite share.
-    height = dr.maximum(geometry.height, 1e-9 * dr.abs(x0 - foot))
-    endless = ~dr.isfinite(x1)
-    end = dr.select(endless, x0, x1)
-    across = dr.select(endless, height, height * (x1 - x0))
-    along = dr.select(endless, x0 - foot, dr.fma(x0 - foot, end - foot, dr.square(height)))
-    r0, r1 = distance_to_light(geometry, x0), distance_to_light(geometry, end)
-    x = dr.select(endless, x0 + r0, (x0 * r1 + end * r0) / (r0 + r1))
-    r = distance_to_light(geometry, x)
-    weight = dr.atan2(across, along) / height * medium.phase.evaluate((foot - x) / r)
-    if airlight.light.facing is not None:
-        # On a ray that nearly meets the light x has not the digits for a cosine.
-        s0, s1 = x0 - foot, end - foot
-        s = dr.select(endless, s0 + r0, (s0 * r1 + s1 * r0) / (r0 + r1))
-        weight *= dr.maximum(falloff_beside(geometry, airlight.light, s), _LEAST_COSINE)
-    return dr.select(x1 > x0, transmittance(medium, x + r) * weight, 0)
-
-
-def _begins_deep(airlight: RayAirlight):
-    """Return whether a light point, which lights what lies before its plane, lights rays from deep in the medium on.
-
-    Next to rays along its plane the yardstick falls to nothing from sample to sample, and its one node is wrong by
-    orders of magnitude: a share that is multiplied with the yardstick of another ray would outshine the image. In
-    bounded media the yardstick is the integral.
-    """
-    x0, x1 = airlight.segment
-    if airlight.media:
-        return x1 < x0
-    return (reduce(dr.maximum, airlight.view.medium.sigma_t) * x0 > _DEEP) & (x1 > x0)
-
-
 def _interpolated(airlight: RayAirlight, samples: Samples, shares, heights: SliceHeights, point):
     """Return the integral of every pixel: the share of the samples around it, or its own where they do not fit."""
     share, fits = between_samples(samples, shares, point, airlight.view.distance)
-    if airlight.light.facing is not None:
-        # Next to a light that lies on a surface, samples end before it, or beyond.
-        pixel = dr.norm(airlight.view.camera.left)
-        fits &= airlight.geometry.height > _NEXT * pixel * dr.abs(airlight.geometry.foot)
-        fits &= ~_begins_deep(airlight)
+    # Next to a light, samples gather most of their airlight at other places than the pixel, and where it lies on a
+    # surface they end before it, or beyond.
+    pixel = dr.norm(airlight.view.camera.left)
+    fits &= airlight.geometry.height > _NEXT * pixel * dr.abs(airlight.geometry.foot)
     own = _lit_integral(airlight, heights, _nearest(samples.slices, point), ~fits)
-    return dr.select(fits, share * _yardstick(airlight), own)
+    return dr.select(fits, share * airlight.integral(*airlight.segment), own)

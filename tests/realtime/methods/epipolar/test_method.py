@@ -291,3 +291,27 @@ def test_a_light_point_that_lights_rays_from_deep_fog_on(variant, threads):
         dr.set_thread_count(before)
     assert np.abs(slices - pixels).max() < 0.5 * pixels.mean()
     assert (np.abs(slices - pixels) < 0.3 * pixels).all()
+
+
+@pytest.mark.claim("a-lit-share")
+@pytest.mark.parametrize("name", ["random:427", "random:705", "clutter"])
+def test_no_pixel_is_brighter_than_without_shadows(variant, name):
+    """Lights in view and sharp phase functions: shares of a rough estimate made an image 363 times too bright."""
+    from realtime.scene.read_scene import read_scene
+    from validation.configurations.methods import configuration, prepared
+    from validation.scenes.loading import load_scene
+
+    scene = read_scene(load_scene(name, (80, 60)).scene)
+    image, bare = (
+        np.asarray(prepared_image(prepared(scene, configuration(method, None, {}))))
+        for method in ("min-max", "unshadowed")
+    )
+    # Sums over lit intervals and the whole ray are rounded differently, and in float32 by the quadrature's size.
+    assert (image <= bare * 1.01 + 1e-4 * bare.mean()).all()
+    assert image.mean() < bare.mean()
+
+
+def prepared_image(renderer):
+    from realtime.frame.renderer import render_frame
+
+    return render_frame(renderer).airlight
