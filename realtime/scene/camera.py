@@ -84,6 +84,23 @@ def shifted_camera(camera: Camera, right: float, down: float) -> Camera:
     return replace(camera, forward=vectors[0], forward_low=vectors[1])
 
 
+def resized_camera(camera: Camera, width: int, height: int) -> Camera:
+    """Return the camera of the same picture with other pixels, which need not be squares.
+
+    Parameters
+    ----------
+    camera
+        The camera.
+    width, height
+        Of its image [pixels].
+    """
+    across, upwards = camera.width / width, camera.height / height
+    vectors = [camera.left * across, camera.up * upwards, camera.left_low * across, camera.up_low * upwards]
+    dr.make_opaque(*vectors)
+    left, up, left_low, up_low = vectors
+    return replace(camera, width=width, height=height, left=left, up=up, left_low=left_low, up_low=up_low)
+
+
 def tiled_pixels(width: int, height: int, tile: int = 4):
     """Return the pixel numbers (row times width + column) in square tiles, (width times height,), uint32.
 

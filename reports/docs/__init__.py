@@ -15,7 +15,7 @@ Read in this order:
 - `release.py`: one number, a source distribution, a wheel
 - `verification.py`: the page of claims and of the tests that protect them
 
-May import: `analytic`, `reference.scene`, `reference.storage`, `reports.data`, `reports.interchange`,
+May import: `analytic`, `realtime.scene`, `reference.scene`, `reference.storage`, `reports.data`, `reports.interchange`,
 `reports.machine`, `reports.papers`, `reports.sweep`, `reports.tables`, `validation.configurations`,
-`validation.diagnosis`, `validation.fidelity`, `validation.frames`, `validation.scenes`.
+`validation.diagnosis`, `validation.fidelity`, `validation.frames`, `validation.properties`, `validation.scenes`.
 """

@@ -2,8 +2,8 @@
 """What every configuration will cost and err by in a scene, and the one to take.
 
 A method that refuses the scene is asked, not predicted. The choice is the one of least predicted cost among those whose
-error stays below what is asked for in a stated share of scenes; if there is none, the one whose error does in the
-largest share.
+error stays below what is asked for in a stated share of scenes. If there is none, it is the one of least predicted cost
+among those whose chance to hold the error is nearly the best: two that err alike differ by their cost alone.
 """
 
 import math
@@ -21,6 +21,7 @@ from validation.properties.properties import scene_properties
 
 SHARE = 0.99  #: of scenes in which a choice shall hold its error
 _MEGAPIXEL = 1e6
+_NEARLY = 0.8  # of the best chance
 LEAST = 1e-8  #: errors below are rounding, and count as this
 
 
@@ -72,13 +73,13 @@ def predicted(
     numbers = features(properties)
     error, cost = each.error.predict(numbers), each.cost.predict(numbers)
     pixels = properties["pixels"] / _MEGAPIXEL
-    low, middle, high = (pixels * 10 ** (cost + each.cost.allowance(at)) for at in (0.1, 0.5, 0.9))
+    low, middle, high = (pixels * 10 ** cost.below(at) for at in (0.1, 0.5, 0.9))
     return Candidate(
         each.chosen,
-        10 ** (error + each.error.allowance(0.5)),
-        10 ** (error + each.error.allowance(share) + margin),
-        min(share, each.error.covered(share)),
-        each.error.chance(math.log10(asked) - margin - error),
+        10 ** error.below(0.5),
+        10 ** (error.below(share) + margin),
+        error.covered(share),
+        error.chance(math.log10(asked) - margin),
         middle,
         low,
         high,
@@ -91,7 +92,9 @@ def choose(candidates: Sequence[Candidate], error: float) -> tuple[Candidate | N
     holding = [each for each in able if each.error_bound <= error]
     if holding:
         return min(holding, key=lambda each: each.cost_ms), True
-    return min(able, key=lambda each: (-each.chance, each.cost_ms), default=None), False
+    best = max((each.chance for each in able), default=0.0)
+    likely = [each for each in able if each.chance >= _NEARLY * best]
+    return min(likely, key=lambda each: each.cost_ms, default=None), False
 
 
 def advise(

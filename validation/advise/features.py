@@ -39,6 +39,9 @@ FEATURES: dict[str, float | None] = {
     "lit_share": 1e-2,
     "shadow_edges": 1e-2,
     "shadow_edges_across": 1e-3,
+    "change_without_shadows": 1e-3,
+    "shadows_seen": None,
+    "change_with_points": 1e-5,
 }
 
 

@@ -14,7 +14,7 @@ from validation.advise.regression import Regression
 from validation.configurations.methods import Configuration
 
 PACKAGED = Path(__file__).with_name("model.json")
-_FORMAT = 1
+_FORMAT = 2
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class AdviceModel:
 def write_model(model: AdviceModel, path: Path = PACKAGED) -> None:
     """Write a model, whole or not at all."""
     with atomic_path(path) as part:
-        part.write_text(json.dumps(model.as_data(), indent=1) + "\n", encoding="utf-8")
+        part.write_text(json.dumps(model.as_data()) + "\n", encoding="utf-8")
 
 
 def read_model(path: Path = PACKAGED) -> AdviceModel:

@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.scene.camera import read_camera
+from realtime.scene.camera import Camera, read_camera, resized_camera
 from realtime.scene.read_scene import Scene
 
 Array = NDArray[np.float64]
@@ -82,14 +82,16 @@ def _host(vector: Any) -> Array:
     return np.array(vector, dtype=np.float64).ravel()
 
 
+def grid_camera(scene: Scene, grid: tuple[int, int] = GRID) -> Camera:
+    """Return the camera of a scene with a pixel for each ray of a grid, or its own where these are fewer."""
+    return resized_camera(scene.camera, min(grid[0], scene.camera.width), min(grid[1], scene.camera.height))
+
+
 def see(scene: Scene, lights: list[LightPlace]) -> SeenView:
     """Cast a grid of camera rays; those that meet nothing are followed as far as all lights and bounds lie."""
-    camera = read_camera(scene.camera)
-    columns, rows = min(GRID[0], camera.width), min(GRID[1], camera.height)
-    i = (np.arange(columns) + 0.5) * camera.width / columns - 0.5
-    j = (np.arange(rows) + 0.5) * camera.height / rows - 0.5
-    across = (0.5 * (camera.width - 1) - i)[None, :, None] * camera.left
-    upwards = (0.5 * (camera.height - 1) - j)[:, None, None] * camera.up
+    camera = read_camera(grid_camera(scene))
+    across = (0.5 * (camera.width - 1) - np.arange(camera.width))[None, :, None] * camera.left
+    upwards = (0.5 * (camera.height - 1) - np.arange(camera.height))[:, None, None] * camera.up
     directions = camera.forward + across + upwards
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
     depth = _cast(scene.geometry, np.broadcast_to(camera.origin, directions.shape), directions)

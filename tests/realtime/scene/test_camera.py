@@ -6,11 +6,12 @@ import pytest
 @pytest.mark.claim("pixel-centre", tolerance="5e-7: Mitsuba's float32 matrices")
 @pytest.mark.parametrize("size", [(64, 48), (37, 53)])
 @pytest.mark.parametrize("axis", ["x", "y", "smaller"])
-def test_rays_are_those_of_mitsuba(variant, size, axis):
+@pytest.mark.parametrize("pixels", [None, (10, 31)])
+def test_rays_are_those_of_mitsuba(variant, size, axis, pixels):
     import mitsuba as mi
 
     from realtime.numerics.array_types import array_types
-    from realtime.scene.camera import ray_directions
+    from realtime.scene.camera import ray_directions, resized_camera
     from realtime.scene.read_scene import _read_camera
 
     sensor = {
@@ -22,6 +23,8 @@ def test_rays_are_those_of_mitsuba(variant, size, axis):
     }
     scene = mi.load_dict({"type": "scene", "sensor": sensor})
     camera, plugin = _read_camera(scene, array_types("double"))
+    if pixels is not None:  # of the same picture, and no squares
+        camera, size = resized_camera(camera, *pixels), pixels
     pixel = np.arange(size[0] * size[1])
     direction = np.array(ray_directions(camera, mi.UInt32(pixel.astype(np.uint32)))[0])
     position = mi.Point2f((pixel % size[0] + 0.5) / size[0], (pixel // size[0] + 0.5) / size[1])

@@ -32,7 +32,7 @@ def test_auto_takes_what_advise_names(variant, capsys):
 
 
 def test_json_has_the_names_of_the_page(variant, capsys):
-    advice = _advice(capsys, "open-fog", *SMALL)
+    advice = _advice(capsys, "open-fog", "--error", "1e-2", *SMALL)
     names = {"scene", "error", "share", "holds", "best", "command", "candidates", "beyond", "fitted_to"}
     assert names == set(advice)
     assert len(advice["candidates"]) == len(read_model().configurations)

@@ -15,7 +15,7 @@ from validation.advise.features import FEATURES, features
 from validation.advise.fit import fit_and_judge, fit_rows, main
 from validation.advise.judge import held_out_choices, judged
 from validation.advise.model import read_model, write_model
-from validation.advise.regression import fit_regression
+from validation.advise.regression import _ridge, fit_regression
 from validation.advise.rows import SceneRow, read_rows
 from validation.configurations.methods import Configuration
 
@@ -58,27 +58,41 @@ def _rows(count, noise, seed=5):
 
 def test_a_regression_finds_a_law_and_how_far_off_it_is():
     generator = np.random.default_rng(3)
-    numbers = generator.normal(size=(300, len(FEATURES)))
-    values = 2.0 + 0.5 * numbers[:, 3] - 1.5 * numbers[:, 7] + generator.normal(0, 0.1, 300)
+    numbers = generator.normal(size=(3000, len(FEATURES)))
+    values = 2.0 + 0.5 * numbers[:, 3] - 1.5 * numbers[:, 7] + generator.normal(0, 0.1, 3000)
     regression = fit_regression(numbers, values)
     slopes = regression.coefficients / regression.spread
     assert slopes[3] == pytest.approx(0.5, abs=0.03)
     assert slopes[7] == pytest.approx(-1.5, abs=0.03)
     others = generator.normal(size=(2000, len(FEATURES)))
     truth = 2.0 + 0.5 * others[:, 3] - 1.5 * others[:, 7] + generator.normal(0, 0.1, 2000)
-    off = truth - np.array([regression.predict(row) for row in others])
+    predictions = [regression.predict(row) for row in others]
     for share in (0.5, 0.9, 0.99):
-        # Nine tenths of such shares lie within 0.03 of it with 300 scenes.
-        assert np.mean(off <= regression.allowance(share)) == pytest.approx(share, abs=0.04)
-    assert regression.covered(0.99) == pytest.approx(0.99, abs=0.005)
+        # Of sixty such sets of scenes none was further off than 0.031.
+        below = np.array([each.below(share) for each in predictions])
+        assert np.mean(truth <= below) == pytest.approx(share, abs=0.04)
+    assert predictions[0].covered(0.99) == pytest.approx(0.99, abs=0.005)
+
+
+def test_a_regression_finds_which_scenes_are_hard():
+    """Noise that is thirty times as large in one scene as in another: each has its own share below."""
+    generator = np.random.default_rng(8)
+    hardness = generator.uniform(0, 1.5, 4000)
+    values = 2.0 + generator.normal(0, 1, 4000) * 10**hardness
+    regression = fit_regression(hardness[:3000, None], values[:3000])
+    for low in (0.0, 0.5, 1.0):
+        those = [number for number in range(3000, 4000) if low < hardness[number] < low + 0.5]
+        below = [values[number] <= regression.predict(hardness[number, None]).below(0.9) for number in those]
+        # Six other seeds are within 0.063, and with one scale for all up to 0.2 off.
+        assert np.mean(below) == pytest.approx(0.9, abs=0.07)
 
 
 def test_left_out_residuals_are_those_of_fits_without_the_scene():
     generator = np.random.default_rng(4)
     numbers, values = generator.normal(size=(40, 3)), generator.normal(size=40)
-    regression = fit_regression(numbers, values)
+    standard = (numbers - numbers.mean(axis=0)) / numbers.std(axis=0)
+    regression = _ridge(standard, values)
     left_out = []
-    standard = (numbers - regression.mean) / regression.spread
     centred = values - regression.constant
     for number in range(40):
         others = np.arange(40) != number
@@ -87,13 +101,15 @@ def test_left_out_residuals_are_those_of_fits_without_the_scene():
         right = np.vstack([np.ones(39), standard[others].T]) @ centred[others]
         constant, *slopes = np.linalg.solve(matrix, right)
         left_out.append(centred[number] - constant - standard[number] @ slopes)
-    np.testing.assert_allclose(np.sort(left_out), regression.residuals, atol=1e-10)
+    np.testing.assert_allclose(left_out, regression.residuals, atol=1e-10)
 
 
 def test_few_scenes_say_what_they_cover():
     regression = fit_regression(np.arange(9.0)[:, None], np.array([0, 1, 0, 2, 0, 1, 3, 0, 1.0]))
-    assert regression.allowance(0.99) == regression.residuals[-1]
-    assert regression.covered(0.99) == pytest.approx(0.9)
+    prediction = regression.predict(np.array([4.0]))
+    assert prediction.below(0.99) == prediction.value + prediction.scale * regression.scores[-1]
+    assert prediction.covered(0.99) == pytest.approx(0.9)
+    assert prediction.covered(0.5) == pytest.approx(0.5)
 
 
 def test_features_beyond_the_sweep_are_held_and_named():
@@ -101,7 +117,7 @@ def test_features_beyond_the_sweep_are_held_and_named():
     regression = fit_regression(numbers, numbers[:, 0])
     far = np.array([1e6, 0.5])
     assert regression.beyond(far).tolist() == [True, False]
-    assert regression.predict(far) < 3
+    assert regression.predict(far).value < 3
 
 
 @pytest.mark.claim("advise-choice", tolerance="in 120 made scenes: 97 % of promises held (three standard deviations)")
@@ -122,7 +138,10 @@ def test_a_judge_sees_a_model_that_knows_nothing():
     errors = generator.permutation([row.error for row in rows if not row.refused]).tolist()
     mixed = [row if row.refused else SceneRow(**(vars(row) | {"error": errors.pop()})) for row in rows]
     choices = held_out_choices(rows, lambda _: fit_rows(mixed), 0.0)
-    assert judged(choices, 0.0).close < 0.6
+    judgement = judged(choices, 0.0)
+    # With five other seeds 0.60 to 0.71 were close, and 0.97 to 0.98 of the choices of a model that knows the errors.
+    assert judgement.promised < 0.1
+    assert judgement.close < 0.8
 
 
 def test_the_cheapest_that_holds_is_taken():
@@ -136,6 +155,9 @@ def test_the_cheapest_that_holds_is_taken():
     assert choose([cheap, dear, refuses], 1e-5) == (dear, False)  # the likelier
     assert choose([cheap, dear, candidate(COARSE, 6e-4, 0.7, 8.0)], 1e-5) == (candidate(COARSE, 6e-4, 0.7, 8.0), False)
     assert choose([refuses], 1e-3) == (None, False)
+    nearly, hardly = candidate(COARSE, 6e-4, 0.6, 8.0), candidate(COARSE, 6e-4, 0.5, 8.0)
+    assert choose([cheap, dear, nearly], 1e-5) == (nearly, False)  # it is cheaper, and nearly as likely
+    assert choose([cheap, dear, hardly], 1e-5) == (dear, False)
 
 
 def test_cost_is_in_proportion_to_pixels():
@@ -175,7 +197,7 @@ def test_a_file_of_another_version_is_refused(tmp_path):
     path = tmp_path / "model.json"
     with pytest.raises(InputError, match="cannot read"):
         read_model(path)
-    path.write_text(json.dumps({"format": 1, "features": ["lights"]}))
+    path.write_text(json.dumps({"format": 2, "features": ["lights"]}))
     with pytest.raises(InputError, match="of another version; fit it again by airlight advise --fit"):
         read_model(path)
 
