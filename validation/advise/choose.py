@@ -3,7 +3,8 @@
 
 A method that refuses the scene is asked, not predicted. The choice is the one of least predicted cost among those whose
 error stays below what is asked for in a stated share of scenes. If there is none, it is the one of least predicted cost
-among those whose chance to hold the error is nearly the best: two that err alike differ by their cost alone.
+over its chance to hold the error (what is paid, on average, until one holds it) among those that are at least half as
+likely to hold it as the likeliest.
 """
 
 import math
@@ -21,7 +22,7 @@ from validation.properties.properties import scene_properties
 
 SHARE = 0.99  #: of scenes in which a choice shall hold its error
 _MEGAPIXEL = 1e6
-_NEARLY = 0.8  # of the best chance
+_LIKELY = 0.5  # of the best chance
 LEAST = 1e-8  #: errors below are rounding, and count as this
 
 
@@ -93,8 +94,8 @@ def choose(candidates: Sequence[Candidate], error: float) -> tuple[Candidate | N
     if holding:
         return min(holding, key=lambda each: each.cost_ms), True
     best = max((each.chance for each in able), default=0.0)
-    likely = [each for each in able if each.chance >= _NEARLY * best]
-    return min(likely, key=lambda each: each.cost_ms, default=None), False
+    likely = [each for each in able if each.chance >= _LIKELY * best]
+    return min(likely, key=lambda each: each.cost_ms / each.chance if best else each.cost_ms, default=None), False
 
 
 def advise(

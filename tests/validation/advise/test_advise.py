@@ -155,9 +155,11 @@ def test_the_cheapest_that_holds_is_taken():
     assert choose([cheap, dear, refuses], 1e-5) == (dear, False)  # the likelier
     assert choose([cheap, dear, candidate(COARSE, 6e-4, 0.7, 8.0)], 1e-5) == (candidate(COARSE, 6e-4, 0.7, 8.0), False)
     assert choose([refuses], 1e-3) == (None, False)
-    nearly, hardly = candidate(COARSE, 6e-4, 0.6, 8.0), candidate(COARSE, 6e-4, 0.5, 8.0)
-    assert choose([cheap, dear, nearly], 1e-5) == (nearly, False)  # it is cheaper, and nearly as likely
-    assert choose([cheap, dear, hardly], 1e-5) == (dear, False)
+    nearly, hardly = candidate(COARSE, 6e-4, 0.6, 7.0), candidate(COARSE, 6e-4, 0.6, 8.0)
+    assert choose([cheap, dear, nearly], 1e-5) == (nearly, False)  # 7 / 0.6 is less than 9 / 0.7
+    assert choose([cheap, dear, hardly], 1e-5) == (dear, False)  # 8 / 0.6 is not, and nor is 1 / 0.1 likely enough
+    hopeless = [candidate(FINE, 1e-2, 0.0, 9.0), candidate(COARSE, 1e-1, 0.0, 8.0)]
+    assert choose(hopeless, 1e-5) == (hopeless[1], False)
 
 
 def test_cost_is_in_proportion_to_pixels():
