@@ -22,7 +22,7 @@ import drjit as dr
 from realtime.frame.renderer import (
     FrameRenderer,
     evaluated,
-    is_large,
+    give_memory_back,
     kept_groups,
     light_groups,
     no_light,
@@ -111,8 +111,7 @@ def next_parts(
         stages, cache = _next_of(part, caches and caches[number], state, **moved)
         if len(in_parts) > 1:
             state, cache = cache.state, replace(cache, lists=None)  # the lists of all parts may fill the memory
-        if is_large(renderer):
-            dr.flush_malloc_cache()  # what was freed: the host's images need room now
+        give_memory_back(renderer)  # the host's images need room now
         yield part, stages, cache
         del stages, cache
 

@@ -15,9 +15,10 @@ minute. What the stages of a single group take and return is a tuple by group th
 A large image of a method that computes each ray by itself is rendered in parts, one after the other (`parts`): what a
 frame needs beside the image that it shows is then that of a part. Where the method needs the whole image, its stage is
 not frozen if that is large: a replay of Dr.Jit 1.5 frees what it made on its way only at its end, and filters make some
-twenty images on theirs. To trace them again takes a hundredth of such a frame.
+twenty images on theirs.
 """
 
+import gc
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass, replace
 from typing import Any
@@ -339,8 +340,7 @@ def render_frame(renderer: FrameRenderer) -> Frame:
         layers = run_method(part, state, cast, by_light)
         stages, extra = evaluated(cast, by_light, layers), layers[2]
         del cast, by_light, layers
-        if is_large(renderer):
-            dr.flush_malloc_cache()  # what was freed: the host's images need room now
+        give_memory_back(renderer)  # the host's images need room now
         frame = frame_with_part(frame, part, stages, extra)
     assert frame is not None
     check_radiance(renderer.scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
@@ -350,6 +350,13 @@ def render_frame(renderer: FrameRenderer) -> Frame:
 def is_large(renderer: FrameRenderer) -> bool:
     """Return whether the image has so many pixels that a frame saves memory."""
     return dr.width(renderer.pixel) > _LARGE
+
+
+def give_memory_back(renderer: FrameRenderer) -> None:
+    """Free what a large frame left and nobody reads: a view and its functions hold one another."""
+    if is_large(renderer):
+        gc.collect()
+        dr.flush_malloc_cache()
 
 
 def parts(renderer: FrameRenderer) -> tuple[FrameRenderer, ...]:
