@@ -12,7 +12,7 @@ Surface and airlight are computed for every frame. Who calls says what moved: no
 being named stays where it was.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -22,9 +22,11 @@ import drjit as dr
 from realtime.frame.renderer import (
     FrameRenderer,
     evaluated,
+    give_memory_back,
     kept_groups,
     light_groups,
     no_light,
+    parts,
     run_cast_and_shade,
     run_cull,
     run_group,
@@ -41,9 +43,9 @@ from realtime.scene.read_scene import Scene
 class FrameCache:
     """What a frame leaves to the next one, by what it depends on."""
 
-    cast: Cast  #: camera and geometry
+    cast: Cast | None  #: camera and geometry; None where the first frame is yet to cast it
     state: Any  #: lights and geometry, shadow planes also the camera: `Method.prepared_from`
-    lists: Any  #: camera, geometry and lights
+    lists: Any  #: camera, geometry and lights; None of a part of a large image, whose frames sort anew
     history: History | None = None  #: the last frame, for passes over the image
     carried: Any = None  #: what the method handed on from the last frame
     extra: Any = None  #: further layers of the last frame by their names; no frame needs them
@@ -80,13 +82,60 @@ def next_frame(
     cache
         For the next frame.
     """
-    renderer = replace(renderer, scene=scene)
+    moved = {"camera_moved": camera_moved, "geometry_moved": geometry_moved, "light_moved": light_moved}
+    return _next_of(replace(renderer, scene=scene), cache, None, **moved)
+
+
+def next_parts(
+    renderer: FrameRenderer, scene: Scene, caches: tuple[FrameCache, ...] | None, **moved: bool
+) -> Iterator[tuple[FrameRenderer, tuple[Any, Any, Any], FrameCache]]:
+    """Render a scene as `next_frame` does, in parts where a large image can be.
+
+    Parameters
+    ----------
+    renderer, scene, moved
+        See `next_frame`.
+    caches
+        What the parts of the last frame left; None for the first.
+
+    Yields
+    ------
+    part
+        The stages of one part, with the scene: for `realtime.frame.renderer.frame_with_part`.
+    stages, cache
+        As of `next_frame`.
+    """
+    renderer, state = replace(renderer, scene=scene), None
+    in_parts = parts(renderer)
+    for number, part in enumerate(in_parts):
+        stages, cache = _next_of(part, caches and caches[number], state, **moved)
+        if len(in_parts) > 1:
+            state, cache = cache.state, replace(cache, lists=None)  # the lists of all parts may fill the memory
+        give_memory_back(renderer)  # the host's images need room now
+        yield part, stages, cache
+        del stages, cache
+
+
+def _next_of(
+    renderer: FrameRenderer,
+    cache: FrameCache | None,
+    state: Any,
+    *,
+    camera_moved: bool,
+    geometry_moved: bool,
+    light_moved: bool,
+) -> tuple[tuple[Any, Any, Any], FrameCache]:
+    """Do what `next_frame` does for the scene of a renderer; a `state` was made for it before, where it is not None."""
+    scene = renderer.scene
     geometry_moved |= light_moved and any(light.opaque for light in scene.area_lights)
     cast_again = camera_moved or geometry_moved
-    cull_again = cast_again or light_moved or cache is None
+    cull_again = cast_again or light_moved
     moved = {"camera": camera_moved, "geometry": geometry_moved, "light": light_moved, "look": True}
     prepare_again = cache is None or any(moved[what] for what in renderer.method.prepared_from)
-    made = _Made(not prepare_again, not cull_again, cache)
+    if state is not None:
+        cache = FrameCache(None, state, None) if cache is None else replace(cache, state=state)
+    cull_again |= cache is None or cache.lists is None
+    made = _Made(not prepare_again or state is not None, not cull_again, cache)
     if renderer.groups is not None:
         return _next_of_groups(renderer, made, cast_again=cast_again)
     state, lists, cast, by_light = _before_method(renderer, made, None, cast_again=cast_again)
@@ -111,7 +160,7 @@ class _Made:
         """Return what it left of one group of lights; states and lists of some are not kept."""
         if self.cache is None:
             return self
-        state, lists = self.cache.state[number], self.cache.lists[number]
+        state, lists = self.cache.state[number], self.cache.lists and self.cache.lists[number]
         kept = replace(self.cache, state=state, lists=lists)
         return _Made(self.state and state is not None, self.lists and lists is not None, kept)
 
@@ -127,7 +176,8 @@ def _before_method(renderer: FrameRenderer, made: _Made, cast: Cast | None, *, c
         cast, by_light = run_cast_and_shade(renderer)
     else:
         if cast is None:
-            cast = cache.cast if cache else run_cast_and_shade(renderer)[0]
+            kept = cache.cast if cache else None
+            cast = kept if kept is not None else run_cast_and_shade(renderer)[0]
         by_light = run_shade(renderer, cast)
     state = finish()
     lists = cache.lists if cache is not None and made.lists else run_cull(renderer, state, cast.distance)

@@ -144,7 +144,10 @@ def image_passes(method: Method, parameters: Any, *, surfaces: bool) -> Callable
     """
 
     def run(geometry, facets, pixel, lane, camera, medium, cast, by_light, layers, history):
-        shown = _surfaces(facets, pixel, camera, medium, cast) if surfaces else _no_surfaces(camera, medium, cast)
+        if method.passes_read_depth_alone:
+            shown = GBuffer(cast.distance, None, None)
+        else:
+            shown = _surfaces(facets, pixel, camera, medium, cast) if surfaces else _no_surfaces(camera, medium, cast)
         layers = _complete(layers, dr.width(pixel))
         dr.eval(layers, shown)
         layers, g_buffer = _in_order(layers, lane), _in_order(shown, lane)

@@ -13,9 +13,12 @@ do not grow with the lights: with five lights and two media in one kernel it had
 minute. What the stages of a single group take and return is a tuple by group then: states, surfaces and lists.
 
 A large image of a method that computes each ray by itself is rendered in parts, one after the other (`parts`): what a
-frame needs beside the image that it shows is then that of a part.
+frame needs beside the image that it shows is then that of a part. Where the method needs the whole image, its stage is
+not frozen if that is large: a replay of Dr.Jit 1.5 frees what it made on its way only at its end, and filters make some
+twenty images on theirs.
 """
 
+import gc
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass, replace
 from typing import Any
@@ -283,7 +286,8 @@ def _stages(
     passes: Callable[..., Any] | None = None
     if has_passes:
         passes = image_passes(method, chosen, surfaces=features.surfaces)
-    if method.frozen(chosen):
+    in_parts = by_rays and not has_passes and not carries and corners is None
+    if method.frozen(chosen) and (in_parts or camera.width * camera.height <= _LARGE):
         # Trace one tile without launching anything: what the method refuses must not be raised while a frozen function
         # is being recorded, which Dr.Jit 1.5 answers by aborting a later recording.
         few = mi.UInt32(np.array(pixel)[:TILE])
@@ -317,7 +321,7 @@ def _stages(
         shade_casts_rays=shade_casts_rays,
         casts_rays=casts_rays,
         carries=carries,
-        by_rays=by_rays and not has_passes and not carries and corners is None,
+        by_rays=in_parts,
         extra_layers=extra_layers,
     )
 
@@ -331,21 +335,34 @@ def render_frame(renderer: FrameRenderer) -> Frame:
     state, frame = renderer.prepare(renderer.scene), None
     for part in parts(renderer):
         cast, by_light = run_cast_and_shade(part)
+        if is_large(renderer):
+            cast = read_by_method(part, cast)
         layers = run_method(part, state, cast, by_light)
         stages, extra = evaluated(cast, by_light, layers), layers[2]
         del cast, by_light, layers
-        if dr.width(renderer.pixel) > _LARGE:
-            dr.flush_malloc_cache()  # what was freed: the host's images need room now
-        frame = _with_part(frame, part, stages, extra)
+        give_memory_back(renderer)  # the host's images need room now
+        frame = frame_with_part(frame, part, stages, extra)
     assert frame is not None
     check_radiance(renderer.scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
     return frame
 
 
+def is_large(renderer: FrameRenderer) -> bool:
+    """Return whether the image has so many pixels that a frame saves memory."""
+    return dr.width(renderer.pixel) > _LARGE
+
+
+def give_memory_back(renderer: FrameRenderer) -> None:
+    """Free what a large frame left and nobody reads: a view and its functions hold one another."""
+    if is_large(renderer):
+        gc.collect()
+        dr.flush_malloc_cache()
+
+
 def parts(renderer: FrameRenderer) -> tuple[FrameRenderer, ...]:
     """Return renderers of the parts of a large image, of about one size each; the renderer itself where that is all."""
     count = dr.width(renderer.pixel)
-    if not renderer.by_rays or count <= _LARGE:
+    if not (renderer.by_rays and is_large(renderer)):
         return (renderer,)
     block = TILE * TILE
     length = -(-count // (-(-count // _PART) * block)) * block
@@ -374,10 +391,10 @@ def image_frame(renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | N
 
 def unchecked_frame(renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None = None) -> Frame:
     """Do what `image_frame` does, and return radiance that is not finite too, for whoever counts it."""
-    return _with_part(None, renderer, stages, extra)
+    return frame_with_part(None, renderer, stages, extra)
 
 
-def _with_part(frame: Frame | None, renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None) -> Frame:
+def frame_with_part(frame: Frame | None, renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None) -> Frame:
     """Return a frame with the pixels of a renderer written into it; a new one where there is none yet."""
     distance, surface, airlight = stages
     shown = {name: _colour(renderer, values) for name, values in (extra or {}).items()}
@@ -465,6 +482,13 @@ def run_cast_and_shade(renderer: FrameRenderer) -> tuple[Cast, Any]:
         return cast, (by_light, *_shaded(others, cast, 1))
     scene = renderer.scene
     return renderer.surface(scene.geometry, scene.facets, renderer.pixel, scene.camera, scene.medium, renderer.lights)
+
+
+def read_by_method(renderer: FrameRenderer, cast: Cast) -> Cast:
+    """Return of what camera rays meet what the method reads; a frame that shades it again needs all."""
+    one_by_one = renderer.groups is not None and not renderer.groups.at_once
+    reads_surfaces = renderer.passes is not None and not renderer.method.passes_read_depth_alone
+    return cast if one_by_one or reads_surfaces else Cast(cast.distance)
 
 
 def run_shade(renderer: FrameRenderer, cast: Cast):

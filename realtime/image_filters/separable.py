@@ -15,7 +15,7 @@ import mitsuba as mi
 
 from realtime.image_filters.bilateral import reach
 from realtime.image_filters.guides import Guide, falloff
-from realtime.image_filters.raster import Raster, taps_of, with_margin
+from realtime.image_filters.raster import Margined, Raster, taps_of, with_margin
 from realtime.numerics.array_types import PerRay
 
 
@@ -34,25 +34,24 @@ def separable(
         With an array, its upper bound [pixels].
     """
     for right in (True, False):
-        image = _pass(image, raster, hd=hd, guides=guides, support=support, most=most, right=right)
+        r = reach(hd if isinstance(hd, float | int) else most, support)
+        wide = with_margin(image, guides, raster, right=r if right else 0, down=0 if right else r)
+        kind = type(image)
+        del image  # what it was made of is not needed any more: two images with margins
+        image = _pass(wide, kind, raster, r, hd=hd, support=support, right=right)
     return image
 
 
-def _pass(
-    image: PerRay, raster: Raster, *, hd: Any, guides: tuple[Guide, ...], support: float, most: float, right: bool
-) -> PerRay:
-    constant = isinstance(hd, float | int)
-    r = reach(hd if constant else most, support)
-    wide = with_margin(image, guides, raster, right=r if right else 0, down=0 if right else r)
+def _pass(wide: Margined, kind: Any, raster: Raster, r: int, *, hd: Any, support: float, right: bool) -> PerRay:
     taps, across = taps_of(wide), falloff(hd)
     Float, step = type(wide.values[0]), 1 if right else wide.row
     total, sums = dr.zeros(Float, raster.count), [dr.zeros(Float, raster.count) for _ in taps.here]
-    if constant:
+    if isinstance(hd, float | int):
         for offset in range(2 * r + 1):
             # With guides the exponent is an array.
             exponent = -across * (offset - r) ** 2
             total, sums = taps.add(exponent, wide.place - r * step + offset * step, total, sums)
-        return taps.filtered(type(image), total, sums)
+        return taps.filtered(kind, total, sums)
     own = dr.minimum(dr.ceil(support * hd), r)
 
     def body(offset: Any, total: Any, sums: Any):
@@ -68,4 +67,4 @@ def _pass(
         body=body,
         labels=("offset", "total", "sums"),
     )
-    return taps.filtered(type(image), total, sums)
+    return taps.filtered(kind, total, sums)

@@ -137,6 +137,7 @@ METHODS: dict[str, Method] = {
         casts_rays=always,
         provides_visibility=always,
         passes=(accumulate,),
+        passes_read_depth_alone=True,
         runs_passes=lambda parameters: parameters.history > 0,
         lights_at_once=always,
         by_source=shares_by_source,

@@ -63,9 +63,8 @@ def write_frames(
     """
     import numpy as np
 
-    from realtime.frame.renderer import image_frame
     from reference.storage.stopping import hint_when_stopped
-    from validation.configurations.timing import timed_frame
+    from validation.configurations.timing import timed_image
     from validation.scenes.animation import animate, moved_parts
 
     cost: list[tuple[float, float]] = []
@@ -77,11 +76,11 @@ def write_frames(
             start = time.perf_counter()
             for number, scene in enumerate(animate(renderer.scene, animation, frames), 1):
                 moved = 1e3 * (time.perf_counter() - start)
-                stages, kept, render_ms = timed_frame(renderer, scene, kept, **moved_parts(animation))
+                frame, kept, render_ms = timed_image(renderer, scene, kept, **moved_parts(animation))
                 cost.append((moved, render_ms))
-                frame = image_frame(replace(renderer, scene=scene), stages, kept.extra)
                 numbers = {kind: path and numbered(path, number, frames) for kind, path in outputs.items()}
                 curve = write_frame(name, chosen, frame, outputs=numbers, curve=curve)
+                del frame  # the next one needs its room
                 done = number
                 progress(number / frames, f"frame {number} of {frames}")
                 start = time.perf_counter()

@@ -15,9 +15,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.frame.incremental import FrameCache, next_frame
+from realtime.frame.incremental import FrameCache, next_frame, next_parts
+from realtime.frame.light_on_ray import check_radiance
 from realtime.frame.renderer import (
     FrameRenderer,
+    frame_with_part,
     parts,
     run_cast_and_shade,
     run_cull,
@@ -136,6 +138,32 @@ def timed_frame(renderer: FrameRenderer, scene: Scene, cache: FrameCache | None,
     stages, cache = next_frame(renderer, scene, cache, **moved)
     dr.sync_thread()
     return stages, cache, 1e3 * (time.perf_counter() - begin)
+
+
+def timed_image(renderer: FrameRenderer, scene: Scene, caches: tuple[FrameCache, ...] | None, **moved: bool):
+    """Render the next frame by `realtime.frame.incremental.next_parts`.
+
+    Returns
+    -------
+    frame, caches
+        The image on the host, and what its parts leave to the next frame.
+    milliseconds
+        What it took without bringing it to the host [ms].
+    """
+    in_turn, frame, kept, took = next_parts(renderer, scene, caches, **moved), None, [], 0.0
+    while True:
+        begin = time.perf_counter()
+        found = next(in_turn, None)
+        dr.sync_thread()
+        took += 1e3 * (time.perf_counter() - begin)
+        if found is None:
+            assert frame is not None
+            check_radiance(scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
+            return frame, tuple(kept), took
+        part, stages, cache = found
+        frame = frame_with_part(frame, part, stages, cache.extra)
+        kept.append(cache)
+        del found, stages, cache
 
 
 def moved_light(renderer: FrameRenderer) -> Callable[[], Any]:

@@ -39,8 +39,8 @@ class GBuffer:
     """The visible surfaces, one entry per pixel, row by row."""
 
     depth: Metres  #: distance along the ray, infinite where there is no surface [m]
-    normal: PerRay  #: unit normal on the side of the camera; 0 where there is no surface
-    albedo: PerRay  #: diffuse reflectance; 0 where there is no surface
+    normal: PerRay | None  #: unit normal on the side of the camera; 0 where there is no surface
+    albedo: PerRay | None  #: diffuse reflectance; 0 where there is no surface; None, as normals: no pass reads them
 
 
 @dataclass(frozen=True)

@@ -61,6 +61,7 @@ class Method:
     #: ``f(layers, g_buffer, history, *, camera, parameters)`` -> layers: functions over the whole image, run in turn
     #: on what `render` returned. All arrays have an entry per pixel, row by row; `history` is None in the first frame.
     passes: tuple[Callable[..., Layers], ...] = ()
+    passes_read_depth_alone: bool = False  #: whether they leave out normals and albedos, which the G-buffer then lacks
     #: Parameters -> whether `render` hands arrays of any sizes on to the next frame, as `Layers.carried`.
     carries: Callable[[Any], bool] = never
     runs_passes: Callable[[Any], bool] = always  #: parameters -> whether these run

@@ -237,16 +237,16 @@ class _Frame:
             if p.narrow:
                 # With the means over tiles: who asks for it later would cast its rays again.
                 dr.schedule(own.lit, own.all)
-            reached = self._over_tiles(own)
+            lit = self._over_tiles(own).share
         else:
-            reached = reached_surfaces(whole, state, lambda index: index, len(lights), p)
-        lit = reached.share
+            lit = reached_surfaces(whole, state, lambda index: index, len(lights), p).share
         if p.hd == AUTO:
             dr.eval(lit)
             width = self._penumbra_width(state, len(lights))
             dr.eval(width)
             if own is not None and p.narrow:
                 lit = self._where_narrow(lit, width, own, number, state, len(lights))
+            own = None  # two images that the filter needs not
             lit = self._smooth_by_width(lit, width, len(lights))
         elif p.filter != "none":
             there, levels = dr.isfinite(whole.distance), state.flat and not p.interleave

@@ -83,3 +83,95 @@ def test_a_frame_in_parts_is_timed_by_its_stages(variant, monkeypatch):
     times = time_frame(renderer("shadow-planes"))
     assert times.frame.repetitions == 3
     assert 0 < times.surface.median_ms < times.frame.median_ms < times.objects_moved.median_ms
+
+
+WHOLE = {
+    "soft-shafts": {"map": 64},
+    "soft-shafts, shared": {
+        "points": 16,
+        "interleave": True,
+        "surfaces": "ray",
+        "guide": "depth",
+        "hd": "auto",
+        "narrow": 16.0,
+        "history": 0.5,
+        "map": 64,
+    },
+    "min-max": {"map": 64},
+}
+STILL = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
+
+
+def same(frame, other):
+    for layer in ("airlight", "surface", "distance"):
+        np.testing.assert_array_equal(getattr(frame, layer), getattr(other, layer))
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_a_large_image_that_is_not_divided_is_the_same_without_a_recording(name, variant, monkeypatch):
+    """A replay would keep every image that a filter makes on its way until its end."""
+    import realtime.frame.renderer as module
+    from realtime.frame.incremental import next_frame
+    from realtime.kernels.registry import KERNELS
+    from realtime.methods.registry import METHODS as REGISTRY
+    from realtime.numerics.recorded import Frozen
+    from validation.configurations.timing import timed_image
+
+    read = scene(lamp="soft" in name)
+
+    def made():
+        method = REGISTRY[name.partition(",")[0]]
+        kernel = KERNELS["exact"].function if method.uses_kernel.__name__ != "never" else None
+        return module.frame_renderer(read, method, kernel=kernel, **WHOLE[name])
+
+    recorded = made()
+    (stages, cache), usual = next_frame(recorded, read, None, **STILL), [module.render_frame(recorded)]
+    stages, cache = next_frame(recorded, read, cache, **STILL)
+    usual += [module.image_frame(recorded, stages)]
+    monkeypatch.setattr(module, "_LARGE", 2048)
+    large = made()
+    assert module.parts(large) == (large,)
+    assert isinstance(recorded.render, Frozen)
+    assert not isinstance(large.render, Frozen)
+    same(module.render_frame(large), usual[0])
+    kept = None
+    for expected in usual:
+        frame, kept, milliseconds = timed_image(large, read, kept, **STILL)
+        same(frame, expected)
+        assert len(kept) == 1
+        assert milliseconds > 0
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_frames_of_an_animation_are_the_same_in_parts(name, variant, monkeypatch):
+    """What is shaded again by a frame that follows is shaded in parts too; the state is one for all parts."""
+    from dataclasses import replace
+
+    import realtime.frame.renderer as module
+    from realtime.frame.incremental import next_frame
+    from realtime.scene.animate import coloured_light, turned_light
+    from validation.configurations.timing import timed_image
+    from validation.scenes.parts import rotation
+
+    made = renderer(name)
+    read, turn = made.scene, rotation([0.3, 0.9, -0.2], 11.0)
+    turned = replace(read, lights=tuple(turned_light(light, np.array([0.1, 0.2, 0.3]), turn) for light in read.lights))
+    coloured = replace(turned, lights=tuple(coloured_light(light, 0.4) for light in turned.lights))
+    moves = [(read, {}), (turned, {"light_moved": True}), (coloured, {}), (read, {"light_moved": True})]
+    moves += [(read, {"geometry_moved": True, "light_moved": True})]
+    expected, cache = [], None
+    for now, moved in moves:
+        stages, cache = next_frame(made, now, cache, **(STILL | moved))
+        expected.append(module.image_frame(replace(made, scene=now), stages))
+    assert np.any(expected[0].airlight != expected[1].airlight) or not read.lights
+    monkeypatch.setattr(module, "_LARGE", 2048)
+    monkeypatch.setattr(module, "_PART", 1024)
+    prepared, kept = [], None
+    counted = replace(made, prepare=lambda scene: prepared.append(scene) or made.prepare(scene))
+    for (now, moved), whole in zip(moves, expected, strict=True):
+        frame, kept, _ = timed_image(counted, now, kept, **(STILL | moved))
+        same(frame, whole)
+        assert len(kept) == 4
+        assert all(part.lists is None for part in kept)
+    if not read.area_lights:
+        assert len(prepared) <= len(moves)  # not once for each part
