@@ -6,13 +6,17 @@ are uniformly diffuse meshes, the number of the triangle says all, and reading i
 A scene with anything else is shaded by Mitsuba's interaction.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
+from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import ArrayTypes, four_numbers
 
 _CORNERS = (0, 0), (1, 0), (0, 1)  # barycentric coordinates u, v
@@ -25,8 +29,9 @@ class Facets:
 
     first: Any  #: by number of the shape in Mitsuba's registry, its first triangle
     normals: Any  #: four numbers each, or each of its corners: the unit normal, and 1 if it is lit from both sides
-    albedos: Any  #: four numbers each: the diffuse reflectance, and 0
+    albedos: Any  #: four numbers each: the diffuse reflectance, and the number of the rotation of its shape, or 0
     smooth: bool  #: whether normals are those of corners, to be interpolated
+    rotations: Any = None  #: of shapes that moved as a whole, by their number: four numbers for each row, the last 0
 
 
 def read_facets(scene, types: ArrayTypes) -> Facets | None:
@@ -48,6 +53,27 @@ def read_facets(scene, types: ArrayTypes) -> Facets | None:
     return table
 
 
+def with_rotations(facets: Facets, rotations: Sequence[NDArray[np.float64]]) -> Facets:
+    """Return the triangles with matrices (3, 3) that turn the normals of the shapes that `numbered` named."""
+    rows = np.zeros((1 + len(rotations), 3, 4))
+    rows[:, :, :3] = np.stack([np.eye(3), *rotations])
+    return replace(facets, rotations=aligned_array(type(facets.normals), rows.ravel()))
+
+
+def numbered(facets: Facets, scene, names: Sequence[str]) -> Facets:
+    """Return the triangles of a Mitsuba scene with 1, 2, ... as the numbers of the rotations of some shapes."""
+    Float = type(facets.albedos)
+    albedos, place = Float(facets.albedos), 0
+    for shape in scene.shapes():
+        count = shape.face_count()
+        if shape.id() in names:
+            number = Float(1 + list(names).index(shape.id()))
+            dr.scatter(albedos, number, 4 * (dr.arange(mi.UInt32, count) + place) + 3)
+        place += count
+    dr.make_opaque(albedos)
+    return replace(facets, albedos=albedos)
+
+
 def facet_number(facets: Facets, hit, active):
     """Return the number of the triangle of `hit`, a preliminary intersection."""
     shape = dr.reinterpret_array(mi.UInt32, hit.shape)
@@ -60,16 +86,27 @@ def facet_at(facets: Facets, number, uv, active):
     `uv`, barycentric coordinates, is only read where normals are interpolated.
     """
     Four = four_numbers(type(facets.normals))
-    red, green, blue, _ = dr.gather(Four, facets.albedos, number, active)
+    red, green, blue, shape = dr.gather(Four, facets.albedos, number, active)
     if not facets.smooth:
         x, y, z, two_sided = dr.gather(Four, facets.normals, number, active)
-        return (x, y, z), two_sided > 0, (red, green, blue)
+        return _turned(facets, shape, (x, y, z), active), two_sided > 0, (red, green, blue)
     Float = type(red)
     u, v = Float(uv.x), Float(uv.y)
     corners = [dr.gather(Four, facets.normals, 3 * number + k, active) for k in range(3)]
     x, y, z = (dr.fma(u, b, dr.fma(v, c, (1 - u - v) * a)) for a, b, c in list(zip(*corners))[:3])
     scale = dr.rsqrt(x * x + y * y + z * z)
-    return (x * scale, y * scale, z * scale), corners[0].w > 0, (red, green, blue)
+    normal = _turned(facets, shape, (x * scale, y * scale, z * scale), active)
+    return normal, corners[0].w > 0, (red, green, blue)
+
+
+def _turned(facets: Facets, shape, normal, active):
+    """Return normals of shapes, by the numbers of their rotations, as they are where the shapes stand."""
+    if facets.rotations is None:
+        return normal
+    Four = four_numbers(type(facets.normals))
+    x, y, z = normal
+    rows = [dr.gather(Four, facets.rotations, 3 * mi.UInt32(shape) + k, active) for k in range(3)]
+    return tuple(dr.fma(row.x, x, dr.fma(row.y, y, row.z * z)) for row in rows)
 
 
 def _is_plain(shape) -> bool:
