@@ -26,7 +26,7 @@ from realtime.scene.medium import Medium
 from realtime.scene.mesh_adjacency import Casters, Placement
 from realtime.scene.placed_scene import PlacedScene, mitsuba_scene, parted, placed
 from realtime.scene.read_scene import Scene
-from realtime.scene.triangle_table import Facets, numbered, read_facets, with_rotations
+from realtime.scene.triangle_table import Facets, read_facets, with_rotations
 
 Array = NDArray[np.float64]
 
@@ -134,8 +134,9 @@ class Objects:
     parameters: Any  #: `mi.traverse` of its Mitsuba scene
     vertices: Mapping[str, NDArray[np.float32]]  #: by shape, its vertices as Mitsuba has them [m]
     middles: Mapping[str, Array]  #: of their bounding boxes [m]
+    numbers: Mapping[str, int]  #: of the shapes in the scene
     apart: tuple[str, ...]  #: the shapes that have spaces of their own
-    facets: Facets | None  #: the triangles of the scene, with the numbers of the shapes
+    facets: Facets | None  #: the triangles of the scene
 
 
 def read_objects(scene: Scene, names: Sequence[str], *, many: int = MANY) -> Objects:
@@ -170,15 +171,29 @@ def read_objects(scene: Scene, names: Sequence[str], *, many: int = MANY) -> Obj
     if scene.facets is not None:
         # Objects may have moved before in Mitsuba's scene: as it is now, vertices and normals are of one place.
         facets = read_facets(scene.geometry, types_of(type(scene.camera.origin.x)))
-    if facets is not None:
-        facets = numbered(facets, scene.geometry, names)
-    counts = {shape.id(): shape.face_count() for shape in scene.geometry.shapes() if shape.is_mesh()}
-    apart = tuple(name for name in names if facets is not None and counts[name] >= many)
+    shapes = scene.geometry.shapes()
+    numbers = _numbers(parameters, names, shapes) if facets is not None else {}
+    apart = tuple(name for name, number in numbers.items() if _stands_apart(shapes[number], name, many))
     geometry = parted(scene.geometry, apart) if apart else scene.geometry
     parameters = mi.traverse(mitsuba_scene(geometry))
     middles = {name: 0.5 * (own.min(axis=0).astype(float) + own.max(axis=0)) for name, own in vertices.items()}
     replace_positions(parameters, {name: own for name, own in vertices.items() if name not in apart})
-    return Objects(geometry, parameters, vertices, middles, apart, facets)
+    return Objects(geometry, parameters, vertices, middles, numbers, apart, facets)
+
+
+def _numbers(parameters, names: Sequence[str], shapes) -> dict[str, int]:
+    """Return which of the shapes have the vertices of these names: Mitsuba makes names for shapes without one."""
+    numbers = {}
+    for number, shape in enumerate(shapes):
+        own = mi.traverse(shape)
+        if "vertex_positions" in own:
+            numbers[own["vertex_positions"].index] = number
+    return {name: numbers[parameters[f"{name}.vertex_positions"].index] for name in names}
+
+
+def _stands_apart(shape, name: str, many: int) -> bool:
+    """Return whether a shape gets a space of its own; casters know it by its own name alone."""
+    return shape.id() == name and shape.face_count() >= many
 
 
 def replace_positions(parameters, positions: Mapping[str, NDArray[Any]]) -> None:
@@ -214,7 +229,7 @@ def turned_objects(scene: Scene, objects: Objects, turn: Array) -> Scene:
     if objects.apart:
         geometry = placed(geometry, [placements[name] for name in objects.apart])
     if facets is not None:
-        facets = with_rotations(facets, [own.rotation for own in placements.values()])
+        facets = with_rotations(facets, {objects.numbers[name]: own.rotation for name, own in placements.items()})
     return replace(
         scene,
         geometry=geometry,

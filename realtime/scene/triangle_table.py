@@ -6,7 +6,7 @@ are uniformly diffuse meshes, the number of the triangle says all, and reading i
 A scene with anything else is shaded by Mitsuba's interaction.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import Any
@@ -29,9 +29,9 @@ class Facets:
 
     first: Any  #: by number of the shape in Mitsuba's registry, its first triangle
     normals: Any  #: four numbers each, or each of its corners: the unit normal, and 1 if it is lit from both sides
-    albedos: Any  #: four numbers each: the diffuse reflectance, and the number of the rotation of its shape, or 0
+    albedos: Any  #: four numbers each: the diffuse reflectance, and the number of its shape in the scene
     smooth: bool  #: whether normals are those of corners, to be interpolated
-    rotations: Any = None  #: of shapes that moved as a whole, by their number: four numbers for each row, the last 0
+    rotations: Any  #: by shape, what turns its normals: three rows of four numbers, the last 0
 
 
 def read_facets(scene, types: ArrayTypes) -> Facets | None:
@@ -45,33 +45,30 @@ def read_facets(scene, types: ArrayTypes) -> Facets | None:
     for number, before in zip(numbers, accumulate(counts, initial=0)):
         first[number] = before
     smooth = any(_is_smooth(shape) for shape in shapes)
-    rows = [_of_shape(shape, types, smooth) for shape in shapes]
+    rows = [_of_shape(shape, types, smooth, number) for number, shape in enumerate(shapes)]
     normals, albedos = ([row[k] for row in rows] for k in range(2))
     corners = [3 * count if smooth else count for count in counts]
-    table = Facets(mi.UInt32(first), _joined(types, normals, corners), _joined(types, albedos, counts), smooth)
+    table = Facets(
+        mi.UInt32(first),
+        _joined(types, normals, corners),
+        _joined(types, albedos, counts),
+        smooth,
+        aligned_array(types.scalar, _no_rotations(len(shapes)).ravel()),
+    )
     dr.make_opaque(table)
     return table
 
 
-def with_rotations(facets: Facets, rotations: Sequence[NDArray[np.float64]]) -> Facets:
-    """Return the triangles with matrices (3, 3) that turn the normals of the shapes that `numbered` named."""
-    rows = np.zeros((1 + len(rotations), 3, 4))
-    rows[:, :, :3] = np.stack([np.eye(3), *rotations])
-    return replace(facets, rotations=aligned_array(type(facets.normals), rows.ravel()))
+def with_rotations(facets: Facets, rotations: Mapping[int, NDArray[np.float64]]) -> Facets:
+    """Return the triangles with the shapes of these numbers turned by matrices (3, 3), the others as they were read."""
+    table = _no_rotations(dr.width(facets.rotations) // 12)
+    for number, rotation in rotations.items():
+        table[number, :, :3] = rotation
+    return replace(facets, rotations=aligned_array(type(facets.rotations), table.ravel()))
 
 
-def numbered(facets: Facets, scene, names: Sequence[str]) -> Facets:
-    """Return the triangles of a Mitsuba scene with 1, 2, ... as the numbers of the rotations of some shapes."""
-    Float = type(facets.albedos)
-    albedos, place = Float(facets.albedos), 0
-    for shape in scene.shapes():
-        count = shape.face_count()
-        if shape.id() in names:
-            number = Float(1 + list(names).index(shape.id()))
-            dr.scatter(albedos, number, 4 * (dr.arange(mi.UInt32, count) + place) + 3)
-        place += count
-    dr.make_opaque(albedos)
-    return replace(facets, albedos=albedos)
+def _no_rotations(shapes: int) -> NDArray[np.float64]:
+    return np.tile(np.eye(3, 4), (shapes, 1, 1))
 
 
 def facet_number(facets: Facets, hit, active):
@@ -100,9 +97,7 @@ def facet_at(facets: Facets, number, uv, active):
 
 
 def _turned(facets: Facets, shape, normal, active):
-    """Return normals of shapes, by the numbers of their rotations, as they are where the shapes stand."""
-    if facets.rotations is None:
-        return normal
+    """Return normals of shapes, by their numbers, as they are where the shapes stand."""
     Four = four_numbers(type(facets.normals))
     x, y, z = normal
     rows = [dr.gather(Four, facets.rotations, 3 * mi.UInt32(shape) + k, active) for k in range(3)]
@@ -129,14 +124,14 @@ def _is_smooth(shape) -> bool:
     return not dr.all(flat)
 
 
-def _of_shape(shape, types: ArrayTypes, smooth: bool):
+def _of_shape(shape, types: ArrayTypes, smooth: bool, number: int):
     """Return normals and albedos of the triangles of a shape, as Mitsuba has them."""
     Float, Four = types.scalar, four_numbers(types.scalar)
     two_sided = float(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.BackSide))
     middle = _interaction(shape, 1 / 3, 1 / 3)
     middle.wi = mi.Vector3f(0, 0, 1)
     albedo = shape.bsdf().eval_diffuse_reflectance(middle)
-    albedos = Four(*(Float(channel) for channel in albedo), 0)
+    albedos = Four(*(Float(channel) for channel in albedo), number)
     if not smooth:
         return Four(*(Float(part) for part in middle.sh_frame.n), two_sided), albedos
     count = shape.face_count()
