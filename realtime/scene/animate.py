@@ -24,10 +24,14 @@ from realtime.scene.directional_extent import directional_fields, extent_spheres
 from realtime.scene.lights import DirectionalExtent, Light
 from realtime.scene.medium import Medium
 from realtime.scene.mesh_adjacency import Casters, Placement
+from realtime.scene.placed_scene import PlacedScene, mitsuba_scene, parted, placed
 from realtime.scene.read_scene import Scene
-from realtime.scene.triangle_table import read_facets
+from realtime.scene.triangle_table import Facets, read_facets, with_rotations
 
 Array = NDArray[np.float64]
+
+#: Triangles from which on a shape that moves has an acceleration structure of its own.
+MANY = 300_000
 
 
 def turned_light(light: Light, about: Array, turn: Array) -> Light:
@@ -82,7 +86,7 @@ def with_area_lights(scene: Scene, area_lights: Sequence[AreaLight]) -> Scene:
     black = [light for light in area_lights if light.opaque]
     if not black:
         return replace(scene, area_lights=tuple(area_lights))
-    parameters = mi.traverse(scene.geometry)
+    parameters = mi.traverse(mitsuba_scene(scene.geometry))
     for light in black:
         key = f"{light.name}.to_world"
         if key not in parameters:
@@ -126,42 +130,81 @@ def thicker_medium(medium: Medium, factor: float) -> Medium:
 class Objects:
     """Shapes that can move, as they stood when they were read."""
 
-    parameters: Any  #: `mi.traverse` of the scene
-    vertices: Mapping[str, Array]  #: by shape, its vertices [m]
+    geometry: Any  #: of the scene, in parts where shapes have many triangles
+    parameters: Any  #: `mi.traverse` of its Mitsuba scene
+    vertices: Mapping[str, NDArray[np.float32]]  #: by shape, its vertices as Mitsuba has them [m]
+    middles: Mapping[str, Array]  #: of their bounding boxes [m]
+    numbers: Mapping[str, int]  #: of the shapes in the scene
+    apart: tuple[str, ...]  #: the shapes that have spaces of their own
+    facets: Facets | None  #: the triangles of the scene
 
 
-def read_objects(scene: Scene, names: Sequence[str]) -> Objects:
+def read_objects(scene: Scene, names: Sequence[str], *, many: int = MANY) -> Objects:
     """Read the shapes that are to move.
+
+    Parameters
+    ----------
+    scene
+        The scene as it was read.
+    names
+        Of meshes.
+    many
+        How many triangles a shape has at least that gets an acceleration structure of its own
+        (`realtime.scene.placed_scene`), if shading reads triangles from a table.
 
     Raises
     ------
     InputError
-        For a shape that is not there, or whose vertices Mitsuba does not let move.
+        For a shape that is not there, or whose vertices Mitsuba does not let move; if objects of the scene that stand
+        in spaces of their own have moved before.
     """
+    if isinstance(scene.geometry, PlacedScene):
+        raise InputError("objects of this scene have moved before: wanted the scene as it was read")
     parameters = mi.traverse(scene.geometry)
     vertices = {}
     for name in names:
         key = f"{name}.vertex_positions"
         if key not in parameters:
             raise InputError(f"shape {name!r} cannot move: wanted the name of a mesh (obj, ply) in the scene")
-        vertices[name] = np.array(parameters[key], dtype=np.float64).reshape(-1, 3)
-    moving = replace_positions(parameters, vertices)
-    return Objects(parameters, moving)
+        vertices[name] = np.array(parameters[key], dtype=np.float32).reshape(-1, 3)
+    facets = None
+    if scene.facets is not None:
+        # Objects may have moved before in Mitsuba's scene: as it is now, vertices and normals are of one place.
+        facets = read_facets(scene.geometry, types_of(type(scene.camera.origin.x)))
+    shapes = scene.geometry.shapes()
+    numbers = _numbers(parameters, names, shapes) if facets is not None else {}
+    apart = tuple(name for name, number in numbers.items() if _stands_apart(shapes[number], name, many))
+    geometry = parted(scene.geometry, apart) if apart else scene.geometry
+    parameters = mi.traverse(mitsuba_scene(geometry))
+    middles = {name: 0.5 * (own.min(axis=0).astype(float) + own.max(axis=0)) for name, own in vertices.items()}
+    replace_positions(parameters, {name: own for name, own in vertices.items() if name not in apart})
+    return Objects(geometry, parameters, vertices, middles, numbers, apart, facets)
 
 
-def replace_positions(parameters, positions: Mapping[str, Array]) -> Mapping[str, Array]:
-    """Move the vertices of shapes in Mitsuba's scene; return them as it holds them, rounded to float32.
+def _numbers(parameters, names: Sequence[str], shapes) -> dict[str, int]:
+    """Return which of the shapes have the vertices of these names: Mitsuba makes names for shapes without one."""
+    numbers = {}
+    for number, shape in enumerate(shapes):
+        own = mi.traverse(shape)
+        if "vertex_positions" in own:
+            numbers[own["vertex_positions"].index] = number
+    return {name: numbers[parameters[f"{name}.vertex_positions"].index] for name in names}
+
+
+def _stands_apart(shape, name: str, many: int) -> bool:
+    """Return whether a shape gets a space of its own; casters know it by its own name alone."""
+    return shape.id() == name and shape.face_count() >= many
+
+
+def replace_positions(parameters, positions: Mapping[str, NDArray[Any]]) -> None:
+    """Move the vertices of shapes in Mitsuba's scene, which holds them in float32.
 
     The arrays are aligned, so that a frozen function that reads them is not recorded anew.
     """
-    rounded = {}
     for name, vertices in positions.items():
-        key = f"{name}.vertex_positions"
-        narrow = vertices.astype(np.float32)
-        parameters[key] = aligned_array(mi.Float, narrow.ravel())
-        rounded[name] = narrow.astype(np.float64)
-    parameters.update()
-    return rounded
+        parameters[f"{name}.vertex_positions"] = aligned_array(mi.Float, vertices.ravel())
+    if positions:
+        parameters.update()
 
 
 def turned_objects(scene: Scene, objects: Objects, turn: Array) -> Scene:
@@ -170,22 +213,27 @@ def turned_objects(scene: Scene, objects: Objects, turn: Array) -> Scene:
     Parameters
     ----------
     scene
-        The scene; its Mitsuba scene is changed.
+        The scene; its Mitsuba scene is changed but for shapes with spaces of their own.
     objects
         From `read_objects`.
     turn
         Rotation matrix, (3, 3).
     """
-    positions, placements = {}, {}
-    for name, vertices in objects.vertices.items():
-        middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
-        positions[name] = (vertices - middle) @ turn.T + middle
-        placements[name] = Placement(turn, middle - turn @ middle, vertices)
-    moved = replace_positions(objects.parameters, positions)
-    facets = scene.facets and read_facets(scene.geometry, types_of(type(scene.camera.origin.x)))
+    placements = {
+        name: Placement(turn, objects.middles[name] - turn @ objects.middles[name], vertices)
+        for name, vertices in objects.vertices.items()
+    }
+    inside = {name: own.positions() for name, own in placements.items() if name not in objects.apart}
+    replace_positions(objects.parameters, inside)
+    geometry, facets = objects.geometry, objects.facets
+    if objects.apart:
+        geometry = placed(geometry, [placements[name] for name in objects.apart])
+    if facets is not None:
+        facets = with_rotations(facets, {objects.numbers[name]: own.rotation for name, own in placements.items()})
     return replace(
         scene,
-        positions={**scene.positions, **moved},
+        geometry=geometry,
+        positions={name: own for name, own in scene.positions.items() if name not in placements},
         placements={**scene.placements, **placements},
         facets=facets,
     )
@@ -193,13 +241,8 @@ def turned_objects(scene: Scene, objects: Objects, turn: Array) -> Scene:
 
 def closed_shapes(casters: Casters) -> tuple[str, ...]:
     """Return the names of the shapes all of whose components are closed: things, not floors and walls."""
-    names = []
-    owner = casters.shapes_of(casters.triangles[:, 0])
-    for number, (name, _, _) in enumerate(casters.shapes):
-        components = np.unique(casters.component[owner == number])
-        if len(components) and casters.closed[components].all():
-            names.append(name)
-    return tuple(names)
+    closed = [casters.closed[casters.owner == number] for number in range(len(casters.shapes))]
+    return tuple(name for (name, _, _), own in zip(casters.shapes, closed) if len(own) and own.all())
 
 
 def _like(old, values):

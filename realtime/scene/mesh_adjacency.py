@@ -36,7 +36,18 @@ class Placement:
 
     rotation: Array  #: (3, 3)
     shift: Array  #: [m], (3,)
-    start: Array  #: its vertices before, as Mitsuba had them [m], (vertices, 3)
+    start: NDArray[np.float32]  #: its vertices before, as Mitsuba had them [m], (vertices, 3)
+
+    def seen(self, point: Array, w: int = 1) -> Array:
+        """Return a place (w = 1) or direction (w = 0) as the shape's own space has it."""
+        return (point - w * self.shift) @ self.rotation
+
+    def positions(self, vertices: Any = slice(None)) -> Array:
+        """Return where some of its vertices are, all by default, rounded to float32 as Mitsuba holds them [m]."""
+        # Sums and no product of matrices: a vertex is at the same place, bit for bit, whichever others are asked for.
+        x, y, z = np.moveaxis(self.start[vertices].astype(np.float64), -1, 0)[..., None]
+        there = x * self.rotation[:, 0] + y * self.rotation[:, 1] + z * self.rotation[:, 2] + self.shift
+        return there.astype(np.float32).astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -44,8 +55,7 @@ class _Placed:
     """A shape of casters that stands elsewhere."""
 
     placement: Placement
-    positions: Array  #: of the shape's own vertices as they are now [m]
-    own: Index  #: which of them each vertex of the casters is
+    own: Index  #: which of the shape's own vertices each vertex of the casters is
 
 
 @dataclass(frozen=True)
@@ -64,6 +74,8 @@ class Casters:
     closed: NDArray[np.bool_]  #: by component: whether every edge is met as often one way as the other
     boxes: Array  #: by component: lower and upper corner of its bounding box [m], (components, 2, 3)
     shapes: tuple[tuple[str, int, Index], ...]  #: name, its first vertex, and which of the shape's own each one is
+    first_triangles: NDArray[np.int64]  #: of every shape, and the end of the last
+    owner: NDArray[np.int64]  #: by component: the number of its shape
     warnings: tuple[str, ...] = ()  #: what is odd about the meshes, by name
     read: tuple[NDArray[np.float32], ...] = ()  #: by shape, its own vertices as they were read [m]
     placed: Mapping[int, _Placed] = field(default_factory=dict)  #: by number, shapes that stand elsewhere as a whole
@@ -73,18 +85,13 @@ class Casters:
         """The number that stands for no triangle."""
         return len(self.triangles)
 
-    def shapes_of(self, vertices: NDArray[Any]) -> NDArray[np.int64]:
-        """Return the numbers of the shapes that vertices are of."""
-        firsts = np.array([first for _, first, _ in self.shapes], dtype=np.int64)
-        return np.searchsorted(firsts, vertices, side="right") - 1
-
     def positions_of(self, vertices: NDArray[Any]) -> Array:
         """Return where some vertices are [m], (..., 3)."""
         here = self.vertices[vertices]
         for number, placed in self.placed.items():
             first = self.shapes[number][1]
             own = (vertices >= first) & (vertices < first + len(placed.own))
-            here[own] = placed.positions[placed.own[vertices[own] - first]]
+            here[own] = placed.placement.positions(placed.own[vertices[own] - first])
         return here
 
     def planes_of(self, triangles: NDArray[Any]) -> tuple[Array, Array]:
@@ -93,27 +100,27 @@ class Casters:
             return self.normals[triangles], self.offsets[triangles]
         return _planes_at(self.positions_of(self.triangles[triangles]))
 
-    def placed_vertices(self) -> list[tuple[slice, Placement]]:
-        """Return of the shapes that stand elsewhere as a whole which vertices are theirs, and where they stand."""
-        firsts = [first for _, first, _ in self.shapes] + [len(self.vertices)]
-        return [(slice(firsts[number], firsts[number + 1]), own.placement) for number, own in self.placed.items()]
+    def vertices_by_space(self) -> list[tuple[slice, Placement | None]]:
+        """Return all vertices in runs of one space, and where what is in it stands; None: where it was read."""
+        return self._by_space([*(first for _, first, _ in self.shapes), len(self.vertices)])
 
-    def seen_by_placed(self, point: Array, w: int) -> list[tuple[slice, Array]]:
-        """Return of the same shapes their triangles, and a place (w = 1) or direction (w = 0) as their space has it."""
-        # Shape after shape: whether a triangle is of a shape before another changes once.
-        first = self.triangles[:, 0]
-        return [
-            (slice(*np.searchsorted(first, [own.start, own.stop])), (point - w * at.shift) @ at.rotation)
-            for own, at in self.placed_vertices()
-        ]
+    def triangles_by_space(self) -> list[tuple[slice, Placement | None]]:
+        """Return all triangles in such runs."""
+        return self._by_space(self.first_triangles)
+
+    def _by_space(self, firsts) -> list[tuple[slice, Placement | None]]:
+        """Return runs of what of every shape begins at `firsts`, which has the end of the last too."""
+        runs: list[tuple[slice, Placement | None]] = []
+        begin = 0
+        for number in sorted(self.placed):
+            runs += [(slice(begin, firsts[number]), None)]
+            begin = firsts[number + 1]
+            runs += [(slice(firsts[number], begin), self.placed[number].placement)]
+        return [*runs, (slice(begin, firsts[-1]), None)]
 
     def of_shape(self, name: str) -> NDArray[np.bool_]:
         """Return which components are of a shape."""
-        owner = self.shapes_of(self.triangles[:, 0])
-        numbers = [number for number, (own, _, _) in enumerate(self.shapes) if own == name]
-        result = np.zeros(len(self.closed), dtype=bool)
-        result[self.component[np.isin(owner, numbers)]] = True
-        return result
+        return np.isin(self.owner, [number for number, (own, _, _) in enumerate(self.shapes) if own == name])
 
 
 def read_casters(scene, area_lights: Sequence[AreaLight] = ()) -> Casters:
@@ -172,7 +179,15 @@ def make_casters(meshes) -> Casters:
     joined: dict[str, Any] = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     for key in ("triangles", "edges", "left", "right", "component"):
         joined[key] = np.ascontiguousarray(joined[key], dtype=np.int32)
-    return Casters(**joined, shapes=tuple(shapes), warnings=tuple(warnings), read=tuple(read))
+    owner = np.repeat(np.arange(len(parts)), [len(part["closed"]) for part in parts])
+    return Casters(
+        **joined,
+        shapes=tuple(shapes),
+        first_triangles=first_triangle,
+        owner=owner,
+        warnings=tuple(warnings),
+        read=tuple(read),
+    )
 
 
 def moved(casters: Casters, vertices: Array) -> Casters:
@@ -205,36 +220,30 @@ def with_placements(casters: Casters, positions: Mapping[str, Array], placements
     """Return what `with_positions` does, with no work on the triangles of shapes that moved as a whole.
 
     Their vertices, normals and offsets stay those of the space in which the shapes were read; what of casters takes a
-    place asks for that. A shape without a placement, or with one from another start than what was
-    read, moves vertex by vertex.
+    place asks for that, and vertices move where they are asked for. A shape with positions, or with a placement from
+    another start than what was read, moves vertex by vertex.
     """
-    if not positions:
+    if not positions and not placements:
         return casters
     placed: dict[int, _Placed] = {}
     others: dict[str, Array] = {}
     boxes = casters.boxes.copy()
-    owner = casters.shapes_of(casters.triangles[_first_of(casters.component), 0])
     for number, (name, _, own) in enumerate(casters.shapes):
-        if name not in positions:
-            continue
         placement = placements.get(name)
-        if placement is None or not np.array_equal(placement.start, casters.read[number]):
-            others[name] = positions[name]
+        if placement is None:
+            if name in positions:
+                others[name] = positions[name]
             continue
-        placed[number] = _Placed(placement, positions[name], own)
-        boxes[owner == number] = _turned_boxes(boxes[owner == number], placement)
+        if not np.array_equal(placement.start, casters.read[number]):
+            others[name] = placement.positions()
+            continue
+        placed[number] = _Placed(placement, own)
+        boxes[casters.owner == number] = _turned_boxes(boxes[casters.owner == number], placement)
     standing = with_positions(casters, others)
     if others:
-        moved_otherwise = ~np.isin(owner, list(placed))
+        moved_otherwise = ~np.isin(casters.owner, list(placed))
         boxes[moved_otherwise] = standing.boxes[moved_otherwise]
     return replace(standing, boxes=boxes, placed=placed)
-
-
-def _first_of(component: Index) -> NDArray[np.int64]:
-    """Return by component one of its triangles."""
-    first = np.zeros(int(component.max(initial=-1)) + 1, dtype=np.int64)
-    first[component] = np.arange(len(component))
-    return first
 
 
 def _turned_boxes(boxes: Array, placement: Placement) -> Array:

@@ -35,14 +35,14 @@ _UPRIGHT = 1e-3  # cosine between a camera's left, or its up, and an axis that c
 class Scene:
     """A Mitsuba scene with what a real-time method reads from it."""
 
-    geometry: Any  #: an `mi.Scene` of all opaque shapes, for casting rays
+    geometry: Any  #: of all opaque shapes, for casting rays: an `mi.Scene`, or one in parts once objects moved
     camera: Camera
     medium: Medium
     lights: tuple[Light, ...]  #: those without extent
     features: SceneFeatures
     facets: Facets | None = None  #: the triangles, where a table says all that shading needs
-    positions: Mapping[str, Any] = field(default_factory=dict)  #: vertices of the shapes that moved, by name [m]
-    placements: Mapping[str, Placement] = field(default_factory=dict)  #: of those that moved as a whole, by name
+    positions: Mapping[str, Any] = field(default_factory=dict)  #: vertices of shapes that moved otherwise, by name [m]
+    placements: Mapping[str, Placement] = field(default_factory=dict)  #: of shapes that moved as a whole, by name
     area_lights: tuple[AreaLight, ...] = ()  #: those with extent, of which methods render points
     boundaries: tuple[Any, ...] = ()  #: Mitsuba's shapes around bounded media, in the order of `Medium.clouds`
 

@@ -6,13 +6,17 @@ are uniformly diffuse meshes, the number of the triangle says all, and reading i
 A scene with anything else is shaded by Mitsuba's interaction.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
+from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import ArrayTypes, four_numbers
 
 _CORNERS = (0, 0), (1, 0), (0, 1)  # barycentric coordinates u, v
@@ -25,8 +29,9 @@ class Facets:
 
     first: Any  #: by number of the shape in Mitsuba's registry, its first triangle
     normals: Any  #: four numbers each, or each of its corners: the unit normal, and 1 if it is lit from both sides
-    albedos: Any  #: four numbers each: the diffuse reflectance, and 0
+    albedos: Any  #: four numbers each: the diffuse reflectance, and the number of its shape in the scene
     smooth: bool  #: whether normals are those of corners, to be interpolated
+    rotations: Any  #: by shape, what turns its normals: three rows of four numbers, the last 0
 
 
 def read_facets(scene, types: ArrayTypes) -> Facets | None:
@@ -40,12 +45,30 @@ def read_facets(scene, types: ArrayTypes) -> Facets | None:
     for number, before in zip(numbers, accumulate(counts, initial=0)):
         first[number] = before
     smooth = any(_is_smooth(shape) for shape in shapes)
-    rows = [_of_shape(shape, types, smooth) for shape in shapes]
+    rows = [_of_shape(shape, types, smooth, number) for number, shape in enumerate(shapes)]
     normals, albedos = ([row[k] for row in rows] for k in range(2))
     corners = [3 * count if smooth else count for count in counts]
-    table = Facets(mi.UInt32(first), _joined(types, normals, corners), _joined(types, albedos, counts), smooth)
+    table = Facets(
+        mi.UInt32(first),
+        _joined(types, normals, corners),
+        _joined(types, albedos, counts),
+        smooth,
+        aligned_array(types.scalar, _no_rotations(len(shapes)).ravel()),
+    )
     dr.make_opaque(table)
     return table
+
+
+def with_rotations(facets: Facets, rotations: Mapping[int, NDArray[np.float64]]) -> Facets:
+    """Return the triangles with the shapes of these numbers turned by matrices (3, 3), the others as they were read."""
+    table = _no_rotations(dr.width(facets.rotations) // 12)
+    for number, rotation in rotations.items():
+        table[number, :, :3] = rotation
+    return replace(facets, rotations=aligned_array(type(facets.rotations), table.ravel()))
+
+
+def _no_rotations(shapes: int) -> NDArray[np.float64]:
+    return np.tile(np.eye(3, 4), (shapes, 1, 1))
 
 
 def facet_number(facets: Facets, hit, active):
@@ -60,16 +83,25 @@ def facet_at(facets: Facets, number, uv, active):
     `uv`, barycentric coordinates, is only read where normals are interpolated.
     """
     Four = four_numbers(type(facets.normals))
-    red, green, blue, _ = dr.gather(Four, facets.albedos, number, active)
+    red, green, blue, shape = dr.gather(Four, facets.albedos, number, active)
     if not facets.smooth:
         x, y, z, two_sided = dr.gather(Four, facets.normals, number, active)
-        return (x, y, z), two_sided > 0, (red, green, blue)
+        return _turned(facets, shape, (x, y, z), active), two_sided > 0, (red, green, blue)
     Float = type(red)
     u, v = Float(uv.x), Float(uv.y)
     corners = [dr.gather(Four, facets.normals, 3 * number + k, active) for k in range(3)]
     x, y, z = (dr.fma(u, b, dr.fma(v, c, (1 - u - v) * a)) for a, b, c in list(zip(*corners))[:3])
     scale = dr.rsqrt(x * x + y * y + z * z)
-    return (x * scale, y * scale, z * scale), corners[0].w > 0, (red, green, blue)
+    normal = _turned(facets, shape, (x * scale, y * scale, z * scale), active)
+    return normal, corners[0].w > 0, (red, green, blue)
+
+
+def _turned(facets: Facets, shape, normal, active):
+    """Return normals of shapes, by their numbers, as they are where the shapes stand."""
+    Four = four_numbers(type(facets.normals))
+    x, y, z = normal
+    rows = [dr.gather(Four, facets.rotations, 3 * mi.UInt32(shape) + k, active) for k in range(3)]
+    return tuple(dr.fma(row.x, x, dr.fma(row.y, y, row.z * z)) for row in rows)
 
 
 def _is_plain(shape) -> bool:
@@ -92,14 +124,14 @@ def _is_smooth(shape) -> bool:
     return not dr.all(flat)
 
 
-def _of_shape(shape, types: ArrayTypes, smooth: bool):
+def _of_shape(shape, types: ArrayTypes, smooth: bool, number: int):
     """Return normals and albedos of the triangles of a shape, as Mitsuba has them."""
     Float, Four = types.scalar, four_numbers(types.scalar)
     two_sided = float(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.BackSide))
     middle = _interaction(shape, 1 / 3, 1 / 3)
     middle.wi = mi.Vector3f(0, 0, 1)
     albedo = shape.bsdf().eval_diffuse_reflectance(middle)
-    albedos = Four(*(Float(channel) for channel in albedo), 0)
+    albedos = Four(*(Float(channel) for channel in albedo), number)
     if not smooth:
         return Four(*(Float(part) for part in middle.sh_frame.n), two_sided), albedos
     count = shape.face_count()

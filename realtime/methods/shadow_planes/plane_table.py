@@ -238,12 +238,13 @@ def _beside_axis(casters: Casters, number, start: Array, axes: Array) -> NDArray
 
     It runs through x = y = 0, and those have all three corners beyond it on one of four sides.
     """
-    x, y = axes[:2] @ casters.vertices.T - (axes[:2] @ start)[:, None]
-    for vertices, placement in casters.placed_vertices():
-        turned = axes[:2] @ placement.rotation
-        here = axes[:2] @ (start - placement.shift)
-        x[vertices], y[vertices] = turned @ casters.vertices[vertices].T - here[:, None]
-    sides = (x > 0) | (x < 0).view(np.uint8) << 1 | (y > 0).view(np.uint8) << 2 | (y < 0).view(np.uint8) << 3
+    sides = np.empty(len(casters.vertices), dtype=np.uint8)
+    for vertices, placement in casters.vertices_by_space():
+        own, here = (axes[:2] @ placement.rotation, placement.seen(start)) if placement else (axes[:2], start)
+        x, y = own @ casters.vertices[vertices].T - (own @ here)[:, None]
+        sides[vertices] = (
+            (x > 0) | (x < 0).view(np.uint8) << 1 | (y > 0).view(np.uint8) << 2 | (y < 0).view(np.uint8) << 3
+        )
     first, second, third = casters.triangles[number].T
     return np.asarray(sides[first] & sides[second] & sides[third] == 0)
 

@@ -13,7 +13,7 @@ from realtime.scene.animate import (
     turned_light,
     turned_objects,
 )
-from realtime.scene.mesh_adjacency import read_casters, with_placements, with_positions
+from realtime.scene.mesh_adjacency import Placement, read_casters, with_placements, with_positions
 from tests.helpers.scenes import spot, tiny_scene
 from validation.scenes.parts import rotation
 
@@ -37,6 +37,12 @@ def pens(variant):
     from validation.scenes.loading import load_scene
 
     return read_scene(load_scene("two-pens", (16, 12)).scene)
+
+
+def with_places(casters, scene):
+    """The casters with the vertices of all shapes that moved, moved one by one."""
+    places = {name: placement.positions() for name, placement in scene.placements.items()}
+    return with_positions(casters, {**scene.positions, **places})
 
 
 def test_a_spot_turns_with_its_axis_and_keeps_all_else(scene):
@@ -81,7 +87,7 @@ def test_turned_objects_are_where_rays_meet_them_and_where_casters_are(pens):
     objects = read_objects(pens, ["pens"])
     moved = turned_objects(pens, objects, rotation((0, 0, 1), 37.0))
     again = read_casters(moved.geometry)
-    here = with_positions(casters, moved.positions)
+    here = with_places(casters, moved)
     assert np.abs(here.vertices - casters.vertices).max() > 0.1
     # The vertices come in another order, the triangles may begin at another corner: compare what has no order.
     for turned, reread in ((here.vertices, again.vertices), (here.boxes[:, 0], again.boxes[:, 0])):
@@ -105,7 +111,7 @@ def test_shapes_that_turn_as_a_whole_keep_their_planes(pens, w):
     casters = read_casters(pens.geometry)
     moved = turned_objects(pens, read_objects(pens, ["pens"]), rotation((0.3, -0.2, 1), 37.0))
     whole = with_placements(casters, moved.positions, moved.placements)
-    one_by_one = with_positions(casters, moved.positions)
+    one_by_one = with_places(casters, moved)
     assert whole.normals is casters.normals
     assert len(whole.placed) == 1
     middle = one_by_one.vertices.mean(axis=0)
@@ -125,14 +131,15 @@ def test_shapes_that_moved_otherwise_are_moved_one_by_one(pens):
     """Without a placement, or with one that starts from other vertices than were read."""
     casters = read_casters(pens.geometry)
     moved = turned_objects(pens, read_objects(pens, ["pens", "flag"]), rotation((0, 0, 1), 37.0))
-    other = replace(moved.placements["pens"], start=moved.placements["pens"].start + 0.01)
-    for placements in ({}, {"pens": other}):
-        here = with_placements(casters, moved.positions, placements)
-        there = with_positions(casters, moved.positions)
+    places = {name: placement.positions() for name, placement in moved.placements.items()}
+    there = with_positions(casters, places)
+    started_there = Placement(np.eye(3), np.zeros(3), places["pens"].astype(np.float32))
+    for positions, placements in ((places, {}), ({"flag": places["flag"]}, {"pens": started_there})):
+        here = with_placements(casters, positions, placements)
         assert not here.placed
         for name in ("vertices", "normals", "offsets", "boxes"):
             np.testing.assert_array_equal(getattr(here, name), getattr(there, name))
-    mixed = with_placements(casters, moved.positions, {"flag": moved.placements["flag"]})
+    mixed = with_placements(casters, {"pens": places["pens"]}, {"flag": moved.placements["flag"]})
     light = np.array([1.3, -0.7, 2.9])
     assert len(mixed.placed) == 1
     np.testing.assert_array_equal(silhouette_in(mixed, light), silhouette_in(there, light))
@@ -143,7 +150,7 @@ def test_a_whole_turn_ends_where_it_began(pens):
     turned_objects(pens, objects, rotation((0, 0, 1), 180.0))
     back = turned_objects(pens, objects, np.eye(3))
     for name, vertices in objects.vertices.items():
-        np.testing.assert_array_equal(back.positions[name], vertices)
+        np.testing.assert_array_equal(back.placements[name].positions(), vertices)
 
 
 def test_moved_objects_render_as_a_scene_read_anew(pens):

@@ -133,7 +133,7 @@ def test_shapes_keep_their_names_beside_bounded_media(variant):
     base = [float(bounded_medium.medium.sigma_t[0][0]) for bounded_medium in scene.medium.bounded_media]
     moved = [
         (
-            step.positions["bar"],
+            step.placements["bar"].positions(),
             [float(bounded_medium.medium.sigma_t[0][0]) for bounded_medium in step.medium.bounded_media],
         )
         for step in frames

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shapes in spaces of their own: images are those of the same shapes with moved vertices, and nothing is built anew."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from realtime.errors import InputError
+from realtime.scene.animate import MANY, read_objects, turned_objects
+from tests.helpers.scenes import tiny_scene
+from validation.scenes.parts import rotation
+
+TURN = rotation((0.3, -0.2, 1), 71.0)
+METHODS = (
+    ("shadow-planes", {}),
+    ("shadow-planes", {"evaluation": "vertex"}),
+    ("light-volumes", {"map": 64}),
+    ("ray-march", {"steps": 24, "shadow": "ray"}),
+)
+
+
+def bumpy_ball(turn=None, *, normals: bool):
+    """A closed mesh that no turn maps to itself, turned about the middle of its bounding box as it was.
+
+    Its normals, if it has any, are arbitrary and not those that Mitsuba would compute.
+    """
+    import mitsuba as mi
+
+    from validation.scaling.subdivision import bumpy
+    from validation.scenes.solids import icosphere
+
+    sphere, faces = icosphere(3)
+    vertices = 0.31 * bumpy(sphere, np.full(3, -1.0), 3.5) * (1.0, 0.6, 1.3) + np.array([0.13, -0.07, 0.73])
+    vertices = vertices.astype(np.float32).astype(np.float64)
+    turn = np.eye(3) if turn is None else turn
+    middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+    mesh = mi.Mesh("ball", len(vertices), len(faces), has_vertex_normals=normals)
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = ((vertices - middle) @ turn.T + middle).astype(np.float32).ravel()
+    parameters["faces"] = faces.astype(np.uint32).ravel()
+    if normals:
+        parameters["vertex_normals"] = (sphere @ turn.T).astype(np.float32).ravel()
+    parameters.update()
+    return mesh
+
+
+def floor():
+    from validation.scenes.parts import grid, mitsuba_mesh
+
+    return mitsuba_mesh("floor", grid((-3.1, -3.3, -0.03), (6.7, 0, 0), (0, 6.1, 0), (2, 2)), (0.5, 0.6, 0.4))
+
+
+def read(turn=None, *, normals: bool = False):
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+
+    parts = {"ball": bumpy_ball(turn, normals=normals), "floor": floor()}
+    return read_scene(mi.load_dict(tiny_scene(size=(48, 36), **parts)))
+
+
+def image(scene, method: str, parameters):
+    from realtime.frame.renderer import render_frame
+    from validation.configurations.methods import configuration, prepared
+
+    return render_frame(prepared(scene, configuration(method, None, parameters)))
+
+
+@pytest.mark.parametrize("many", [1, MANY])
+@pytest.mark.parametrize("normals", [False, True])
+@pytest.mark.parametrize(("method", "parameters"), METHODS)
+def test_moved_objects_are_those_of_a_file_with_the_object_moved(variant, method, parameters, normals, many):
+    """Rays, normals, shadows on surfaces and in the fog; with a space of its own and with moved vertices."""
+    scene = read(normals=normals)
+    before = image(scene, method, parameters)  # moved vertices move in this scene too
+    objects = read_objects(scene, ["ball"], many=many)
+    assert objects.apart == (("ball",) if many == 1 else ())
+    moved, loaded = turned_objects(scene, objects, TURN), read(TURN, normals=normals)
+    here, there = (image(each, method, parameters) for each in (moved, loaded))
+    for name in ("airlight", "surface"):
+        old, ours, theirs = (getattr(frame, name) for frame in (before, here, there))
+        scale = theirs.mean()
+        assert np.mean(np.abs(old - theirs).max(axis=-1) > 1e-2 * scale) > 0.02  # what moved is seen
+        # Rays and vertices are rounded to float32: 1e-6 of a distance. Beside an edge, of the object or of its shadow,
+        # a ray or a sample of it is on the other side, in a few pixels. Meshes of planes are cut along the diagonal
+        # that the order of the vertices gives, which is by their places in the space of the object.
+        close = 1e-2 if "evaluation" in parameters else 1e-4
+        same = np.isclose(ours, theirs, rtol=close, atol=close * scale).all(axis=-1)
+        assert np.mean(~same) < 0.01
+
+
+def test_a_move_builds_nothing_and_touches_no_vertices(variant, monkeypatch):
+    """The cost of a move does not grow with the triangles: no vertex, no triangle and no structure is made anew."""
+    import mitsuba as mi
+
+    scene = read()
+    objects = read_objects(scene, ["ball"], many=1)
+    told = []
+    monkeypatch.setattr(type(objects.parameters), "update", lambda *_: told.append("update"))
+    monkeypatch.setattr(mi, "load_dict", lambda *_: told.append("load"))
+    first, second = (turned_objects(scene, objects, rotation((0, 0, 1), angle)) for angle in (10.0, 20.0))
+    assert not told
+    assert second.geometry.spaces[0].scene is first.geometry.spaces[0].scene
+    assert second.placements["ball"].start is first.placements["ball"].start
+    assert not second.positions
+    for name in ("normals", "albedos", "first"):
+        assert getattr(second.facets, name).index == getattr(first.facets, name).index
+
+
+def test_planes_of_a_moved_object_are_those_of_its_own_space(variant, monkeypatch):
+    """What adjacency, normals and planes were read for stays; only ends of silhouette edges are moved."""
+    from realtime.methods.shadow_planes.silhouettes import silhouette
+    from realtime.scene.mesh_adjacency import Placement, read_casters, with_placements
+
+    scene = read()
+    casters = read_casters(scene.geometry)
+    moved = turned_objects(scene, read_objects(scene, ["ball"], many=1), TURN)
+    asked = []
+    positions = Placement.positions
+
+    def counted(placement, vertices=slice(None)):
+        asked.append(np.size(vertices))
+        return positions(placement, vertices)
+
+    monkeypatch.setattr(Placement, "positions", counted)
+    here = with_placements(casters, moved.positions, moved.placements)
+    edges = silhouette(here, np.array([1.3, -0.7, 2.9])).edges
+    here.positions_of(edges)
+    assert here.normals is casters.normals
+    assert here.vertices is casters.vertices
+    assert sum(asked) <= edges.size < 0.2 * casters.edges.size
+
+
+def test_frames_of_a_moving_object_are_recorded_at_most_twice(variant):
+    """As where vertices move (`tests/realtime/numerics/test_recorded.py`): not once more for each move."""
+    from realtime.frame.renderer import render_frame
+    from validation.configurations.methods import configuration, prepared
+
+    scene = read()
+    objects = read_objects(scene, ["ball"], many=1)
+    renderer = prepared(scene, configuration("shadow-planes"))
+    for angle in (0.0, 10.0, 20.0, 50.0, 80.0, 90.0):
+        render_frame(replace(renderer, scene=turned_objects(scene, objects, rotation((0, 0, 1), angle))))
+    assert renderer.surface.n_recordings <= 2
+    assert renderer.render.n_recordings == 1
+
+
+def test_shapes_and_box_of_a_scene_in_parts(variant):
+    scene = read()
+    names = {shape.id() for shape in scene.geometry.shapes()}
+    moved = turned_objects(scene, read_objects(scene, ["ball", "floor"], many=1000), TURN)
+    assert {shape.id() for shape in moved.geometry.shapes()} == names
+    box = moved.geometry.bbox()
+    places = np.concatenate([placement.positions() for placement in moved.placements.values()])
+    # The floor in Mitsuba's own box, the ball in the box about its turned box.
+    assert np.all(np.array(box.min) <= places.min(axis=0) + 1e-6)
+    assert np.all(np.array(box.max) >= places.max(axis=0) - 1e-6)
+    assert np.all(np.array(box.max) <= places.max(axis=0) + 0.3)
+
+
+def test_objects_that_stand_apart_are_read_once(variant):
+    scene = read()
+    moved = turned_objects(scene, read_objects(scene, ["ball"], many=1), TURN)
+    with pytest.raises(InputError, match="have moved before: wanted the scene as it was read"):
+        read_objects(moved, ["ball"])
+
+
+def test_surfaces_that_mitsuba_shades_move_by_their_vertices(variant):
+    """Without a table of triangles, interactions are Mitsuba's: of a scene in parts they would be of another space."""
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+
+    parts = {"sphere": {"type": "sphere", "radius": 0.1}, "ball": bumpy_ball(normals=False), "floor": floor()}
+    scene = read_scene(mi.load_dict(tiny_scene(**parts)))
+    assert scene.facets is None
+    objects = read_objects(scene, ["ball"], many=1)
+    assert objects.apart == ()
+    assert turned_objects(scene, objects, TURN).geometry is scene.geometry
