@@ -43,7 +43,7 @@ from realtime.scene.read_scene import Scene
 class FrameCache:
     """What a frame leaves to the next one, by what it depends on."""
 
-    cast: Cast | None  #: camera and geometry; None where the first frame is yet to cast it
+    cast: Any  #: a `Cast`, of camera and geometry; None where the first frame is yet to cast it
     state: Any  #: lights and geometry, shadow planes also the camera: `Method.prepared_from`
     lists: Any  #: camera, geometry and lights; None of a part of a large image, whose frames sort anew
     history: History | None = None  #: the last frame, for passes over the image
@@ -108,7 +108,7 @@ def next_parts(
     renderer, state = replace(renderer, scene=scene), None
     in_parts = parts(renderer)
     for number, part in enumerate(in_parts):
-        stages, cache = _next_of(part, caches and caches[number], state, **moved)
+        stages, cache = _next_of(part, None if caches is None else caches[number], state, **moved)
         if len(in_parts) > 1:
             state, cache = cache.state, replace(cache, lists=None)  # the lists of all parts may fill the memory
         give_memory_back(renderer)  # the host's images need room now

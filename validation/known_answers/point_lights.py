@@ -207,8 +207,8 @@ def absorbing_medium() -> KnownAnswer:
     path = end[hit] + np.linalg.norm(point - clear.lights[0].position, axis=1)
     seen = [quadrature_image(truth) for truth in (clear, dim)]
     ratio = seen[1].surface.reshape(-1, 3)[hit] / seen[0].surface.reshape(-1, 3)[hit]
-    # The floor is met at (corner - origin) . n / (direction . n) in float32. Dot products and quotient round seven times,
-    # a distance d is off by that share of d, and the path to the light and on to the camera by twice as much at most.
+    # The floor is met at (corner - origin) . n / (direction . n) in float32. Dot products and quotient round seven
+    # times, a distance d is off by that share of d, and the path from light to camera by twice as much at most.
     off = np.abs(ratio / np.exp(-sigma_t * path)[:, None] - 1) / (2 * sigma_t * end[hit, None])
     difference = float(np.max(off)) + float(seen[1].airlight.max())
     reason = "of the distance to the surface, which is met in float32 with seven roundings"

@@ -46,7 +46,7 @@ def disort(tau, mu0, phase, albedo, *, streams):
 @pytest.mark.parametrize("albedo", [0.2, 0.5, 0.9, 0.99, 1 - 1e-6])
 @pytest.mark.parametrize("mu0", [0.2, 0.6, 1.0])
 def test_sums_of_orders_are_disort(albedo, mu0):
-    """Nearer to 1 DISORT's eigenvalues k^2 lose 1e-5 of the light, as the processor rounds; a test of its own is at 1."""
+    """Nearer to 1 DISORT's eigenvalues k^2 lose 1e-5 of the light, as processors round; another test is at 1."""
     for tau, phase in ((2.0, ISOTROPIC), (7.3, HG)):
         depths = [0.0, 0.3, tau / 2, tau]
         up, down = summed(tau, mu0, phase, albedo, depths)

@@ -266,7 +266,8 @@ def test_a_deleted_working_folder_is_one_line(tmp_path):
 @pytest.mark.claim("help-is-light", tolerance="300 modules; it imports 220")
 def test_help_imports_nothing_heavy():
     """What it imports and not how long that takes: processors differ, and so does what else runs on them."""
-    command = [sys.executable, "-S", "-X", "importtime", str(ROOT / "airlight.py"), "--help"]  # as the launcher starts it
+    # As the launcher starts it.
+    command = [sys.executable, "-S", "-X", "importtime", str(ROOT / "airlight.py"), "--help"]
     ran = subprocess.run(command, check=True, capture_output=True, text=True, timeout=60)
     modules = [line.rsplit("|", 1)[1].strip() for line in ran.stderr.splitlines()[1:]]
     installed = {name.partition(".")[0] for name in packages_distributions()}
