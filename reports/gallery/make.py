@@ -143,7 +143,16 @@ def _pixels(picture: Picture) -> tuple[Pixels, dict[str, Any]]:
 
 
 def _page() -> Pixels:
-    """Return the first window of the page of a report, as a browser shows it."""
+    """Return the first window of the page of a report, as a browser shows it.
+
+    Raises
+    ------
+    InputError
+        If there is no report.
+    MissingError
+        If there is no browser, or no program to drive it.
+    """
+    read_report(REPORT)  # its page lies beside it
     try:
         from playwright.sync_api import sync_playwright
     except ImportError as error:

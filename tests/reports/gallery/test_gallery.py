@@ -53,6 +53,12 @@ def test_no_picture_is_older_than_what_it_shows(variant, kept):
     assert not told, "\n".join([*told, "run `airlight gallery -o docs/gallery`"])
 
 
+def test_a_page_of_no_report_is_one_line(variant, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.run(["gallery", "-o", "pictures", "report-page"]) == 2
+    assert "airlight-report/report.json" in " ".join(capsys.readouterr().err.split())
+
+
 def test_stale_pictures_are_told(variant, kept, monkeypatch):
     name = "scene-hall"
     old = kept[name] | {"baselines": {"hall": -1}}
