@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+import drjit as dr
+
 from analytic.errors import InputError as TruthError
 from realtime.errors import InputError
-from realtime.frame.renderer import Frame, render_frame
+from realtime.frame.renderer import Frame, FrameRenderer, render_frame
 from realtime.methods.registry import find_method
 from realtime.numerics.recorded import Frozen
 from realtime.scene.features import SceneFeatures
@@ -163,14 +165,13 @@ def render_and_time(
         See `validation.configurations.timing.time_frame` [s].
     limit, probe
         A configuration is left out if a frame of it would take longer than `limit` [s]. The estimate comes from a frame
-        of the small scene that `probe` returns. It is made only after a long preparation and for a user's own method.
+        of the small scene that `probe` returns. It is made only where the preparation takes long, and for a user's own
+        method.
     """
     shadows = knows_shadows(chosen)
     try:
-        begin = time.perf_counter()
         renderer = prepared(scene, chosen)
-        doubtful = time.perf_counter() - begin > _DOUBTFUL or chosen.own
-        if limit is not None and probe is not None and doubtful:
+        if limit is not None and probe is not None and (chosen.own or _preparation(renderer) > _DOUBTFUL):
             reason = _too_long(probe(), chosen, scene, limit)
             if reason:
                 return Rendering(None, None, shadows, refused=reason, left_out=True)
@@ -221,6 +222,14 @@ def render_and_time_by_name(
 def render_by_name(name_or_path: str, size: tuple[int, int], chosen: Configuration) -> Frame:
     """Render a frame in a process that has loaded nothing."""
     return render_frame(prepared(read_scene(load_scene(name_or_path, size).scene), chosen))
+
+
+def _preparation(renderer: FrameRenderer) -> float:
+    """Return what a renderer's preparation takes once its kernels are compiled [s]."""
+    begin = time.perf_counter()
+    renderer.prepare(renderer.scene)
+    dr.sync_thread()
+    return time.perf_counter() - begin
 
 
 def _too_long(probe: Scene, chosen: Configuration, scene: Scene, limit: float) -> str | None:

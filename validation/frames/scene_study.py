@@ -44,7 +44,9 @@ class Effort:
     batches: int = 2048  #: largest number of batches in these comparisons
     multiple: tuple[int, int] = (8, 4)  #: batches, and samples per pixel in each, for the share of multiple scattering
     patience: float | None = None  #: an estimator that has not decided after this time is stopped [s]; None: never
-    slow: float = 0.15  #: if the airlight takes longer, whole frames are timed stage by stage [s]
+    #: If the airlight takes longer, frames are timed stage by stage [s]: from there on `seconds` allow the least number of
+    #: frames, five for each of the seven times, and five frames by their stages give all of these.
+    slow: float = 0.04
     limit: float = 20.0  #: frames that would take longer are not measured, and the report says so [s]
     flip: str = "none"  #: which configurations get HDR-FLIP: 'none', 'kinds' (those of `QUICK`) or 'all'
     mutations: bool = False  #: whether to count the mutations that the checks of the truth find
@@ -117,7 +119,7 @@ EFFORTS: dict[str, Effort] = {
             batches=4096,
             multiple=(16, 8),
             patience=75.0,
-            slow=0.5,
+            slow=0.1,
             limit=40.0,
             flip="all",
             mutations=True,

@@ -144,12 +144,17 @@ def _parts(counts: Counts) -> list[slice]:
 
 def _trace_pixels(truth: TruthScene, integrator, medium, pixels: slice, seed: int, counts: Counts) -> Array:
     direction = mi.Vector3f(truth.direction[pixels].T)
-    pixel = mi.UInt32(np.repeat(np.arange(len(counts), dtype=np.uint32), counts))
+    numbers = mi.UInt32(np.repeat(np.arange(len(counts), dtype=np.uint32), counts))
+    # A kernel is compiled for how the memory lies that it reads, and NumPy's lies anywhere.
+    pixel = dr.empty(mi.UInt32, dr.width(numbers))
+    dr.scatter(pixel, numbers, dr.arange(mi.UInt32, dr.width(numbers)))
+    dr.eval(pixel)
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, dr.width(pixel))
     start = mi.Point3f(*(float(c) for c in truth.origin))
     ray = mi.Ray3f(start, dr.normalize(dr.gather(mi.Vector3f, direction, pixel)))
     radiance, _, _ = integrator.sample(truth.scene, sampler, mi.RayDifferential3f(ray), medium)
+    dr.eval(radiance)  # all channels at once: one after the other, each would trace the paths again
     first = np.cumsum(counts, dtype=np.int64) - counts
     sums = [np.add.reduceat(np.array(channel, dtype=np.float64), first) for channel in radiance]
     return np.stack(sums, axis=1) / counts[:, None]

@@ -58,6 +58,33 @@ def test_layers_hold_what_they_say(truth):
     assert surface[hit].mean() > 0
 
 
+def test_paths_are_traced_once_for_all_channels(truth):
+    """Rationale: an array that is read channel by channel is computed as often, and its kernel compiled as often.
+
+    Setup: a grey medium, so that one path serves all channels; the kernels of more than a thousand operations.
+    Expected: two launches, one with black surfaces and one in a medium that does not scatter.
+    """
+    assert len(_large_kernels(truth, samples=4)) == 2
+
+
+def test_one_kernel_serves_any_number_of_samples(truth):
+    """Rationale: a kernel is compiled anew for how the memory lies that it reads, and NumPy's lies anywhere."""
+    kernels = [_large_kernels(truth, samples=samples, seed=samples) for samples in (3, 4, 5, 8)]
+    assert len(set(map(tuple, kernels))) == 1
+
+
+def _large_kernels(truth, *, samples, seed=0):
+    """Return the hashes of the kernels of a batch that trace paths, in the order of their launches."""
+    import drjit as dr
+
+    from reference.monte_carlo.volpath.integrator import volpath_batch
+
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+        dr.kernel_history_clear()
+        volpath_batch(truth, seed, samples)
+        return [each["hash"] for each in dr.kernel_history((dr.KernelType.JIT,)) if each["operation_count"] > 1000]
+
+
 def _distance(truth):
     from reference.quadrature.surface import surface_hits
 
