@@ -23,6 +23,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.quadrature.ahead import done_ahead
 from reference.quadrature.area_airlight import FLOOR, Keep, Kept, Share, unsettled
 from reference.quadrature.light_points import REPLICATES, PointPlan, mirrored_digits
 from reference.quadrature.segments import optical_depth
@@ -44,6 +45,7 @@ from reference.visibility.light_lines import (
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Intervals = tuple[Index, Array, Array]  # of lines: their numbers, and where they begin and end
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 _PANEL = 0.7  # rad: widest panel in theta or phi
@@ -145,15 +147,21 @@ def _sums_over(
     total = np.zeros((len(points.place), 3, REPLICATES))
     looking = active[seen.seen[active]]
     step = max(1, _LINES // (REPLICATES * (numbers[1] - numbers[0])))
-    for first in range(0, len(looking), step):
+
+    def look(first: int) -> tuple[Index, Index, ScanLines, Intervals]:
         some = looking[first : first + step]
         line = _lines(draws, some, numbers)
         lines = scan_lines(beam.light.kind, seen, points, line[:3])
-        got = _line_values(beam, seen, lines, points, bsdf, shadow_scale)
         place = np.searchsorted(some, lines.point) * REPLICATES + line[3]
+        return some, place, lines, seen_intervals(beam.light, seen, lines, points, beam.shapes)
+
+    done = 0
+    for some, place, lines, intervals in done_ahead(look, range(0, len(looking), step), workers=dr.thread_count()):
+        got = _line_values(beam, seen, lines, intervals, points, bsdf, shadow_scale)
         sums = sums_of(place, got, len(some) * REPLICATES).reshape(len(some), REPLICATES, 3)
         total[some] += np.swapaxes(sums, 1, 2)
-        tell((first + len(some)) / len(looking))
+        done += len(some)
+        tell(done / len(looking))
     return {"radiance": total[active]}
 
 
@@ -221,10 +229,16 @@ def _lines(draws: tuple[Array, Array], points: Index, numbers: tuple[int, int]) 
 
 
 def _line_values(
-    beam: Beam, seen: Facing, lines: ScanLines, points: Points, bsdf: Reflection, shadow_scale: float
+    beam: Beam,
+    seen: Facing,
+    lines: ScanLines,
+    intervals: Intervals,
+    points: Points,
+    bsdf: Reflection,
+    shadow_scale: float,
 ) -> Array:
     """Return what every line stands for of the reflected radiance, before the leg to the camera, (lines, 3)."""
-    line, low, high = seen_intervals(beam.light, seen, lines, points, beam.shapes)
+    line, low, high = intervals
     start, width = low, high - low
     if beam.light.kind == "sphere":
         middle, half = 0.5 * (lines.ends[0] + lines.ends[1]), 0.5 * (lines.ends[1] - lines.ends[0])

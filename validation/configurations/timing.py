@@ -215,7 +215,9 @@ class FrameTimes:
     colours_changed: Timing  #: a frame after only medium or colours changed: surface and airlight from what is there
 
 
-def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | None = None) -> FrameTimes:
+def time_frame(
+    renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | None = None, took: float | None = None
+) -> FrameTimes:
     """Time the stages of a frame, the whole frame, and frames after light, objects or only colours changed.
 
     Parameters
@@ -225,12 +227,23 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | N
     seconds
         Time to spend on each of the first three, and half of it on each of the others.
     slow
-        If the airlight takes longer than this, whole frames are run stage by stage and the seven are added up from
-        them: up to five frames in place of some forty; `SLOW` by default [s]. So are images that are rendered in parts.
+        If a frame takes longer than this with its preparation, frames are run stage by stage and the seven are added up
+        from them: up to five frames in place of some forty; `SLOW` by default [s]. So are images that are rendered in
+        parts.
+    took
+        What the last frame took with its preparation, if one was rendered just before [s]; else two are.
     """
     if len(parts(renderer)) > 1:
         return _slow_frame(renderer, turns=3)
     scene = renderer.scene
+    if took is None:
+        first_frame(renderer)  # compiles and records
+        begin = time.perf_counter()
+        first_frame(renderer)
+        dr.sync_thread()
+        took = time.perf_counter() - begin
+    if took > (SLOW if slow is None else slow):
+        return _slow_frame(renderer, turns=int(np.clip(_TURNS / took, 1, 5)))
     cache = first_frame(renderer)
     state, cast = cache.state, cache.cast
     by_light = run_shade(renderer, cast)
@@ -238,14 +251,6 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | N
 
     def airlight():
         dr.eval(run_method(renderer, state, cast, by_light))
-
-    dr.sync_thread()
-    begin = time.perf_counter()
-    airlight()
-    dr.sync_thread()
-    took = time.perf_counter() - begin
-    if took > (SLOW if slow is None else slow):
-        return _slow_frame(renderer, turns=int(np.clip(_TURNS / took, 1, 5)))
 
     def surface():
         dr.eval(run_cast_and_shade(renderer))

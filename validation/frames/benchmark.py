@@ -29,7 +29,7 @@ Progress = Callable[[int, int, str], None]
 #: Calls a function with arguments in another process: ``apart(function, *arguments, name=the method's)``.
 Apart = Callable[..., Any]
 
-_DOUBTFUL = 0.3  # after a longer preparation, a small frame is rendered before the large one [s]
+_DOUBTFUL = 0.1  # share of the limit: after a longer preparation, a small frame is rendered before the large one
 _LONG = 25.0  # after a longer first frame, compilation included, no larger frame is timed [s]
 
 
@@ -170,8 +170,10 @@ def render_and_time(
     """
     shadows = knows_shadows(chosen)
     try:
+        begin = time.perf_counter()
         renderer = prepared(scene, chosen)
-        if limit is not None and probe is not None and (chosen.own or _preparation(renderer) > _DOUBTFUL):
+        took = time.perf_counter() - begin
+        if limit is not None and probe is not None and (chosen.own or _takes_long(renderer, took, limit)):
             reason = _too_long(probe(), chosen, scene, limit)
             if reason:
                 return Rendering(None, None, shadows, refused=reason, left_out=True)
@@ -186,9 +188,19 @@ def render_and_time(
         notes.append(f"timed at {scene.camera.width} x {scene.camera.height}: larger frames take minutes")
     if chosen.own and not isinstance(renderer.render, Frozen):
         notes.append("not frozen: its Python runs again for every frame")
-    shown = renderer if timed is None else prepared(timed, chosen)
-    times = time_frame(shown, seconds=seconds, slow=slow)
-    memory = peak_memory(lambda: render_frame(shown))
+    shown = renderer
+    if timed is not None:
+        shown = prepared(timed, chosen)
+        render_frame(shown)
+    spent: list[float] = []
+
+    def again() -> None:
+        begin = time.perf_counter()
+        render_frame(shown)
+        spent.append(time.perf_counter() - begin)
+
+    memory = peak_memory(again)
+    times = time_frame(shown, seconds=seconds, slow=slow, took=spent[0] if spent else None)
     return Rendering(frame, times, shadows, note="; ".join(notes) or None, memory=memory)
 
 
@@ -224,12 +236,14 @@ def render_by_name(name_or_path: str, size: tuple[int, int], chosen: Configurati
     return render_frame(prepared(read_scene(load_scene(name_or_path, size).scene), chosen))
 
 
-def _preparation(renderer: FrameRenderer) -> float:
-    """Return what a renderer's preparation takes once its kernels are compiled [s]."""
+def _takes_long(renderer: FrameRenderer, first: float, limit: float) -> bool:
+    """Return whether a preparation that took so long the `first` time takes long once its kernels are compiled."""
+    if first <= _DOUBTFUL * limit:
+        return False
     begin = time.perf_counter()
     renderer.prepare(renderer.scene)
     dr.sync_thread()
-    return time.perf_counter() - begin
+    return time.perf_counter() - begin > _DOUBTFUL * limit
 
 
 def _too_long(probe: Scene, chosen: Configuration, scene: Scene, limit: float) -> str | None:

@@ -44,8 +44,8 @@ class Effort:
     batches: int = 2048  #: largest number of batches in these comparisons
     multiple: tuple[int, int] = (8, 4)  #: batches, and samples per pixel in each, for the share of multiple scattering
     patience: float | None = None  #: an estimator that has not decided after this time is stopped [s]; None: never
-    #: If the airlight takes longer, frames are timed stage by stage [s]: from there on `seconds` allow the least number of
-    #: frames, five for each of the seven times, and five frames by their stages give all of these.
+    #: If a frame takes longer, preparation included, frames are timed stage by stage [s]: from there on `seconds` allow
+    #: only the least number of frames for each of the seven times, and as many by their stages give all of these.
     slow: float = 0.04
     limit: float = 20.0  #: frames that would take longer are not measured, and the report says so [s]
     flip: str = "none"  #: which configurations get HDR-FLIP: 'none', 'kinds' (those of `QUICK`) or 'all'
