@@ -35,7 +35,14 @@ from validation.frames.result_cache import (
     source_digest,
     store_result,
 )
-from validation.frames.scene_study import SceneStudy, check_truth, study_configuration, study_multiple, with_flips
+from validation.frames.scene_study import (
+    SceneStudy,
+    check_truth,
+    study_configuration,
+    study_multiple,
+    wants_flip,
+    with_flips,
+)
 from validation.metrics.errors import plain
 from validation.metrics.flip import Flip
 
@@ -173,30 +180,42 @@ class _Parts:
     ) -> list[dict[str, Any]]:
         """Return what the report says of all configurations."""
         entries = [self._entries.method(each, self._made_from | _own_source(each)) for each in chosen]
-        methods = []
         workers = threads()
-        # HDR-FLIP of as many configurations at once as there are processors; Ctrl-C loses no earlier results.
-        for first in range(0, len(chosen), workers):
-            group = range(first, min(first + workers, len(chosen)))
-            results = {number: load_result(entries[number]) for number in group}
-            missing = [number for number in group if results[number] is None]
-            measured, seconds = [], []
-            for number in missing:
-                steps[chosen[number].label](0.0, chosen[number].label)
-                start = time.monotonic()
-                measured.append(own.measured(self._study, chosen[number]))
-                seconds.append(time.monotonic() - start)
+        written: dict[int, dict[str, Any]] = {}
+
+        def keep(done: Sequence[tuple[int, Measurement, float]]) -> None:
+            """Keep what was measured, with its HDR-FLIP."""
             start = time.monotonic()
-            measured = with_flips(self._study, measured, workers=workers)
-            flip = (time.monotonic() - start) / max(1, len(missing))
-            for number, measurement, took in zip(missing, measured, seconds):
+            measured = with_flips(self._study, [each for _, each, _ in done], workers=workers)
+            flip = (time.monotonic() - start) / max(1, len(done))
+            for (number, _, took), measurement in zip(done, measured, strict=True):
                 computed = _measured(self._study, measurement, factor)
                 if own_fault(measurement.configuration.method, measurement.refused):  # it may have gone by the next run
-                    results[number] = CachedResult(*computed, seconds=took, measured=now(), cached=False)
+                    result = CachedResult(*computed, seconds=took, measured=now(), cached=False)
                 else:
-                    results[number] = store_result(entries[number], computed, took + flip)
-            methods += [self.written(result, stems[number]) for number, result in results.items() if result is not None]
-        return methods
+                    result = store_result(entries[number], computed, took + flip)
+                written[number] = self.written(result, stems[number])
+
+        # HDR-FLIP of as many configurations at once as there are processors; Ctrl-C loses those that wait for it.
+        waiting: list[tuple[int, Measurement, float]] = []
+        for number, configuration in enumerate(chosen):
+            known = load_result(entries[number])
+            if known is not None:
+                written[number] = self.written(known, stems[number])
+                continue
+            steps[configuration.label](0.0, configuration.label)
+            start = time.monotonic()
+            measurement = own.measured(self._study, configuration)
+            done = number, measurement, time.monotonic() - start
+            if measurement.frame is None or not wants_flip(self._study.effort, configuration):
+                keep([done])
+                continue
+            waiting.append(done)
+            if len(waiting) == workers:
+                keep(waiting)
+                waiting = []
+        keep(waiting)
+        return [written[number] for number in sorted(written)]
 
     def image(self, shown: EngineImage, stem: str, factor: float) -> dict[str, Any]:
         """Return what the report says of an image from elsewhere."""

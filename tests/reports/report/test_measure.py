@@ -335,12 +335,33 @@ def test_built_in_scene_with_all_standard_configurations(variant, tmp_path):
     fog, spot = data["scenes"]
     assert fog["plan"]["shadows"].startswith("none")
     assert set(fog["agreement"]) == {"single-scatter airlight", "volpath airlight"}
-    # Neither has bounded media, for which one configuration is.
-    assert len(fog["methods"]) < len(spot["methods"]) == len(STANDARD) - 1
+    # Neither has bounded media or lights with extent, for which some configurations are.
+    usual = [each for each in STANDARD if not {"media", "points"} & set(dict(each.parameters))]
+    assert len(fog["methods"]) < len(spot["methods"]) == len(usual)
     best = {entry["label"]: entry["error"]["relative_rmse"] for entry in fog["methods"]}
     # 16 nodes without any shadow are the integral itself; float32 and the light in view leave 1e-5.
     assert best["unshadowed (quadrature)"] < 1e-4
     assert not any(entry["error"]["nonfinite"] for scene in data["scenes"] for entry in scene["methods"])
+
+
+def test_flip_runs_for_as_many_configurations_at_once_as_there_are_processors(variant, tmp_path, monkeypatch):
+    """Rationale: it has one processor and takes as long as a frame; what does not ask for it is kept before."""
+    from reports.report import scene as module
+
+    groups = []
+
+    def with_flips(study, measured, *, workers):
+        groups.append([each.configuration.label for each in measured])
+        return list(measured)
+
+    monkeypatch.setattr(module, "threads", lambda: 2)
+    monkeypatch.setattr(module, "with_flips", with_flips)
+    asked = [Configuration("unshadowed", kernel) for kernel in ("exact", "taylor", "quadrature")]
+    asked.append(Configuration("ray-march", None, (("steps", 100),)))
+    data = write_report(tmp_path, scenes=["open-fog"], effort=replace(TINY, flip="kinds"), configurations=asked)
+    labels = [each.label for each in asked]
+    assert [group for group in groups if group] == [[labels[1]], [labels[2]], [labels[0], labels[3]]]
+    assert [entry["label"] for entry in data["scenes"][0]["methods"]] == labels
 
 
 def test_a_report_times_growing_work(variant, tmp_path, monkeypatch):
