@@ -127,19 +127,23 @@ def sum_lit_intervals(index: PlaneIndex, lists: Lists | Wedges, ray: RayPlanes, 
 
     sweep = _Sweep(index, lists, ray, index.distance / x1, between, zero)
     wanted = x1 > x0
-    total, lit, lost = _walk(sweep, wanted & ray.sorted, places=FEW)
-    total, lit, lost = dr.if_stmt(
-        args=(total, lit, lost),
+    passed, lost = _walk(sweep, wanted & ray.sorted, places=FEW)
+    passed, lost = dr.if_stmt(
+        args=(passed, lost),
         cond=lost,
-        true_fn=lambda total, lit, lost: _walk(sweep, lost, places=MANY),
+        true_fn=lambda passed, lost: _walk(sweep, lost, places=MANY),
         false_fn=lambda *unchanged: unchanged,
     )
-    return dr.if_stmt(
-        args=(total, lit),
+    passed = dr.if_stmt(
+        args=(passed,),
         cond=lost | (wanted & ~ray.sorted),
-        true_fn=lambda total, lit: _collect(sweep),
-        false_fn=lambda *unchanged: unchanged,
+        true_fn=lambda passed: _collect(sweep),
+        false_fn=lambda passed: passed,
     )
+    # Here, and not behind each walk: a kernel holds the integral once for each place that calls it.
+    lit = passed.layers <= 0
+    total = sum_at_end(passed.intervals, sweep.integral, sweep.ray_end, opened=passed.opened, lit=lit, active=wanted)
+    return total, lit
 
 
 @dataclass(frozen=True)
@@ -185,12 +189,6 @@ def _pass_plane(sweep: _Sweep, passed: _Passed, quotient, gain, *, crosses, due)
     )
 
 
-def _sum(sweep: _Sweep, passed: _Passed, active):
-    """Return the sum at the end of the ray."""
-    at_end = {"opened": passed.opened, "lit": passed.layers <= 0, "active": active}
-    return sum_at_end(passed.intervals, sweep.integral, sweep.ray_end, **at_end)
-
-
 def _read(sweep: _Sweep, place, reads):
     """Return the quotient of a plane and its gain, and whether the ray crosses it before its end."""
     Float = type(sweep.ray_end)
@@ -209,8 +207,8 @@ def _walk(sweep: _Sweep, active, *, places: int):
 
     Returns
     -------
-    total, lit
-        As `sum_lit_intervals` does.
+    passed
+        What the ray has passed, right where it is not lost.
     lost
         Whether the order was wrong, or wrong by more than the queue could mend.
     """
@@ -240,7 +238,7 @@ def _walk(sweep: _Sweep, active, *, places: int):
         body=body,
         labels=("place", "waiting", "passed", "lost"),
     )
-    return _sum(sweep, passed, active & ~lost), passed.layers <= 0, lost
+    return passed, lost
 
 
 def _collect(sweep: _Sweep):
@@ -248,7 +246,7 @@ def _collect(sweep: _Sweep):
 
     Of crossings at one quotient, which come in the order of the list, as many as were gone over are left out.
 
-    Returns what `sum_lit_intervals` does.
+    Returns what the ray has passed.
     """
     Float, width = type(sweep.ray_end), dr.width(sweep.ray.x)
     count = sweep.ray.source.count
@@ -277,4 +275,4 @@ def _collect(sweep: _Sweep):
         body=body,
         labels=("place", "nearest", "more", "ties", "seen", "passed", "done"),
     )
-    return _sum(sweep, passed, mi.Bool(True)), passed.layers <= 0
+    return passed
