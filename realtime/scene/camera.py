@@ -21,10 +21,22 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from realtime.numerics.error_free import two_product, two_sum
 from realtime.numerics.host_numbers import host_numbers
+
+
+@dataclass(frozen=True)
+class PixelGrid:
+    """What kernels read of the size of an image; opaque, so that one kernel serves images of all sizes."""
+
+    columns: Any  #: width of the image [pixels]
+    reciprocal: Any  #: 2^(31 + shift) / width, rounded up
+    shift: Any  #: bits of width - 1
+    half_width: Any  #: (W - 1)/2 [pixels]
+    half_height: Any  #: (H - 1)/2 [pixels]
 
 
 @dataclass(frozen=True)
@@ -40,6 +52,7 @@ class Camera:
     forward_low: Any  #: what rounding took from `forward`
     left_low: Any
     up_low: Any
+    grid: PixelGrid
 
 
 @dataclass(frozen=True)
@@ -52,6 +65,26 @@ class HostCamera:
     forward: Any
     left: Any
     up: Any
+
+
+def pixel_grid(width: int, height: int, Float: Any) -> PixelGrid:
+    """Return the pixels of an image for a `Camera` whose numbers have the type `Float`."""
+    shift = (width - 1).bit_length()
+    columns, reciprocal, bits = map(mi.UInt32, (width, -(-(1 << (31 + shift)) // width), shift))
+    grid = PixelGrid(columns, reciprocal, bits, Float(0.5 * (width - 1)), Float(0.5 * (height - 1)))
+    dr.make_opaque(grid)
+    return grid
+
+
+def row_and_column(camera: Camera, pixel):
+    """Return the rows and columns of pixels, given their numbers, row times width plus column, below 2^31.
+
+    A division by a number that the compiler does not know takes as long as ten others. With R = 2^(31 + s)/W + d, 0 <=
+    d < 1, is p R = 2^(31 + s) p/W + p d, and the last term too small to lead to the next whole number as long as p W <
+    2^(31 + s): W <= 2^s, so for p < 2^31 (Granlund and Montgomery 1994, Theorem 4.2).
+    """
+    row = dr.mul_hi(2 * pixel, camera.grid.reciprocal) >> camera.grid.shift
+    return row, pixel - row * camera.grid.columns
 
 
 def read_camera(camera: Camera) -> HostCamera:
@@ -98,7 +131,8 @@ def resized_camera(camera: Camera, width: int, height: int) -> Camera:
     vectors = [camera.left * across, camera.up * upwards, camera.left_low * across, camera.up_low * upwards]
     dr.make_opaque(*vectors)
     left, up, left_low, up_low = vectors
-    return replace(camera, width=width, height=height, left=left, up=up, left_low=left_low, up_low=up_low)
+    grid = pixel_grid(width, height, type(camera.origin.x))
+    return replace(camera, width=width, height=height, left=left, up=up, left_low=left_low, up_low=up_low, grid=grid)
 
 
 def tiled_pixels(width: int, height: int, tile: int = 4):
@@ -132,10 +166,9 @@ def ray_directions(camera: Camera, pixel):
         What rounding took from their aim: `direction + low` is right to twice the digits, but for a common factor.
     """
     Float = type(camera.origin.x)
-    row = pixel // camera.width
-    column = pixel - row * camera.width
+    row, column = row_and_column(camera, pixel)
     # Whole and half numbers: exact.
-    i, j = 0.5 * (camera.width - 1) - Float(column), 0.5 * (camera.height - 1) - Float(row)
+    i, j = camera.grid.half_width - Float(column), camera.grid.half_height - Float(row)
     across, across_error = two_product(camera.left, i)
     upward, upward_error = two_product(camera.up, j)
     plane, plane_error = two_sum(across, upward)

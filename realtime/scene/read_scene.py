@@ -18,7 +18,7 @@ from realtime.area_lights.read import is_area_light, read_area_light
 from realtime.area_lights.shape import AreaLight
 from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes, array_types, is_single, types_of
-from realtime.scene.camera import Camera
+from realtime.scene.camera import Camera, pixel_grid
 from realtime.scene.closed_mesh import ClosedMesh
 from realtime.scene.directional_extent import directional_fields, distance_before, media_spheres, mesh_spheres
 from realtime.scene.features import SceneFeatures, camera_notes
@@ -154,7 +154,9 @@ def _read_camera(scene, types: ArrayTypes):
     low = [column - column.astype(real) for column in basis]
     vectors = [types.vector(*(float(c) for c in column)) for column in (matrix[:3, 3], *basis, *low)]
     dr.make_opaque(*vectors)
-    return Camera(width, height, *vectors), sensor
+    names = ("origin", "forward", "left", "up", "forward_low", "left_low", "up_low")
+    grid = pixel_grid(width, height, types.scalar)
+    return Camera(width, height, **dict(zip(names, vectors, strict=True)), grid=grid), sensor
 
 
 def _read_light(emitter, types: ArrayTypes) -> Light:

@@ -30,11 +30,11 @@ def opaque_camera(size, vectors):
     import drjit as dr
     import mitsuba as mi
 
-    from realtime.scene.camera import Camera
+    from realtime.scene.camera import Camera, pixel_grid
 
     arrays = [mi.Vector3d(*map(float, vector)) for vector in vectors]
     dr.make_opaque(arrays)
-    return Camera(*size, *arrays)
+    return Camera(*size, *arrays, grid=pixel_grid(*size, mi.Float64))
 
 
 def tetrahedron(points) -> VolumeMesh:

@@ -29,7 +29,7 @@ Progress = Callable[[int, int, str], None]
 #: Calls a function with arguments in another process: ``apart(function, *arguments, name=the method's)``.
 Apart = Callable[..., Any]
 
-_DOUBTFUL = 0.1  # share of the limit: after a longer preparation, a small frame is rendered before the large one
+_DOUBTFUL = 0.1  # share of the limit: after a longer preparation, the time of a frame is estimated before it begins
 _LONG = 25.0  # after a longer first frame, compilation included, no larger frame is timed [s]
 
 
@@ -164,17 +164,17 @@ def render_and_time(
     slow
         See `validation.configurations.timing.time_frame` [s].
     limit, probe
-        A configuration is left out if a frame of it would take longer than `limit` [s]. The estimate comes from a frame
-        of the small scene that `probe` returns. It is made only where the preparation takes long, and for a user's own
-        method.
+        A configuration is left out if a frame of it would take longer than `limit` [s]. The estimate comes from what
+        the frame prepares and from a frame of the small scene that `probe` returns. It is made only where the
+        preparation takes long, and for a user's own method.
     """
     shadows = knows_shadows(chosen)
     try:
         begin = time.perf_counter()
         renderer = prepared(scene, chosen)
         took = time.perf_counter() - begin
-        if limit is not None and probe is not None and (chosen.own or _takes_long(renderer, took, limit)):
-            reason = _too_long(probe(), chosen, scene, limit)
+        if limit is not None and probe is not None and (chosen.own or took > _DOUBTFUL * limit):
+            reason = _too_long(renderer, probe, chosen, limit)
             if reason:
                 return Rendering(None, None, shadows, refused=reason, left_out=True)
         begin = time.perf_counter()
@@ -236,30 +236,35 @@ def render_by_name(name_or_path: str, size: tuple[int, int], chosen: Configurati
     return render_frame(prepared(read_scene(load_scene(name_or_path, size).scene), chosen))
 
 
-def _takes_long(renderer: FrameRenderer, first: float, limit: float) -> bool:
-    """Return whether a preparation that took so long the `first` time takes long once its kernels are compiled."""
-    if first <= _DOUBTFUL * limit:
-        return False
+def _too_long(renderer: FrameRenderer, probe: Callable[[], Scene], chosen: Configuration, limit: float) -> str | None:
+    """Return why a frame would take too long, or None.
+
+    It is judged by its preparation once kernels are compiled and, where that takes long and for a user's own method,
+    by the second frame of a small scene, whose preparation takes as long.
+    """
     begin = time.perf_counter()
     renderer.prepare(renderer.scene)
     dr.sync_thread()
-    return time.perf_counter() - begin > _DOUBTFUL * limit
-
-
-def _too_long(probe: Scene, chosen: Configuration, scene: Scene, limit: float) -> str | None:
-    """Return why a frame would take too long, judged by the second frame of a small scene, or None."""
-    small, large = probe.camera, scene.camera
-    renderer = prepared(probe, chosen)
-    render_frame(renderer)
+    preparation = time.perf_counter() - begin
+    words = f"more than the limit of {limit:g} s"
+    if preparation > limit:
+        return f"not measured: what a frame prepares takes {preparation:.2g} s, {words}"
+    if not chosen.own and preparation <= _DOUBTFUL * limit:
+        return None
+    small, large = prepared(probe(), chosen), renderer.scene.camera
+    render_frame(small)
     begin = time.perf_counter()
-    render_frame(renderer)
+    render_frame(small)
     took = time.perf_counter() - begin
-    expected = took * (large.width * large.height) / (small.width * small.height)
+    camera = small.scene.camera
+    share = (large.width * large.height) / (camera.width * camera.height)
+    expected = preparation + max(0.0, took - preparation) * share
     if expected <= limit:
         return None
     return (
-        f"not measured: by a frame of {small.width} x {small.height} pixels that took {took:.2g} s, a frame of "
-        f"{large.width} x {large.height} would take {expected:.0f} s, more than the limit of {limit:g} s"
+        f"not measured: by a frame of {camera.width} x {camera.height} pixels that took {took:.2g} s, "
+        f"{min(took, preparation):.2g} s of these for what it prepares, a frame of {large.width} x {large.height} "
+        f"would take {expected:.0f} s, {words}"
     )
 
 

@@ -47,7 +47,7 @@ class Effort:
     #: If a frame takes longer, preparation included, frames are timed stage by stage [s]: from there on `seconds` allow
     #: only the least number of frames for each of the seven times, and as many by their stages give all of these.
     slow: float = 0.04
-    limit: float = 20.0  #: frames that would take longer are not measured, and the report says so [s]
+    limit: float = 10.0  #: frames that would take longer are not measured, and the report says so [s]
     flip: str = "none"  #: which configurations get HDR-FLIP: 'none', 'kinds' (those of `QUICK`) or 'all'
     mutations: bool = False  #: whether to count the mutations that the checks of the truth find
     rays: int = 0  #: number of generated rays for the stability of kernels; 0 leaves it out

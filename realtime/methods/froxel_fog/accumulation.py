@@ -34,6 +34,7 @@ from realtime.methods.froxel_fog.grid import Grid, trilinear
 from realtime.methods.froxel_fog.media import piece_length
 from realtime.methods.interface.view import View
 from realtime.numerics.array_types import PerRay, four_numbers
+from realtime.scene.camera import row_and_column
 
 _THIN = 0.1  # optical depth of a slice up to which the series serves
 _TERMS = 8  # of it: 0.1^8/9! = 3e-14 is left out
@@ -103,8 +104,7 @@ def _mean_transmittance(depth: Any, passed: Any) -> Any:
 def airlight_at_pixels(view: View, grid: Grid, volume: Any) -> PerRay:
     """Return the airlight of every ray of a view from what `accumulated` returned, a colour [W/(m^2 sr)]."""
     Float, camera = type(view.distance), view.camera
-    row = view.pixel // camera.width
-    column = view.pixel - row * camera.width
+    row, column = row_and_column(camera, view.pixel)
     u = (Float(column) + 0.5) * (grid.width / camera.width) - 0.5
     v = (Float(row) + 0.5) * (grid.height / camera.height) - 0.5
     depth = dr.minimum(view.distance * dr.dot(view.direction, camera.forward), grid.far)

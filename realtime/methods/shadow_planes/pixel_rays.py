@@ -47,7 +47,7 @@ from realtime.numerics.diamond_angle import TURN, host_diamond_angle
 from realtime.numerics.host_numbers import host_numbers
 from realtime.rays.ray_light import RayGeometry, before_plane
 from realtime.rays.spot_cone import AxisGeometry, axis_distance, cone_roots
-from realtime.scene.camera import Camera, HostCamera
+from realtime.scene.camera import Camera, HostCamera, row_and_column
 from realtime.scene.lights import Light
 from realtime.tiles.layout import SIDE
 
@@ -204,8 +204,8 @@ def tile_azimuths(camera: HostCamera, axes: Array) -> tuple[Array, Array]:
 def _aimed(aim: Aim, camera: Camera, pixel):
     """Return column and row from the reference pixel on, and w."""
     Float = type(aim.column)
-    row = pixel // camera.width
-    c, r = Float(pixel - row * camera.width) - aim.column, Float(row) - aim.row
+    row, column = row_and_column(camera, pixel)
+    c, r = Float(column) - aim.column, Float(row) - aim.row
     return c, r, _at(aim.way, c, r)
 
 

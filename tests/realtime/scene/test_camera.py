@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -63,3 +65,47 @@ def test_tiles_hold_every_pixel_once(size):
     assert np.array_equal(np.sort(pixels), np.arange(size[0] * size[1]))
     if size == (8, 8):
         assert pixels[:16].tolist() == [row * 8 + column for row in range(4) for column in range(4)]
+
+
+@pytest.mark.parametrize("width", [1, 2, 3, 5, 7, 64, 320, 641, 3200, 65535, 65536, 1 << 20, (1 << 31) - 1])
+def test_rows_and_columns_are_those_of_a_division(variant, width):
+    """Rationale: the division is a product with a rounded reciprocal, and wrong by one row where that does not do.
+
+    Setup: pixels next to the ends of rows, where it would show, up to the last that is allowed, and random ones.
+    """
+    import mitsuba as mi
+
+    from realtime.scene.camera import pixel_grid, row_and_column
+
+    most = (1 << 31) - 1
+    generator = np.random.default_rng(7)
+    rows = np.append(generator.integers(0, most // width + 1, 2000), [0, 1, most // width])
+    pixels = np.clip(np.concatenate([rows * width + step for step in (-1, 0, 1)]), 0, most)
+    pixels = np.concatenate([pixels, generator.integers(0, most, 2000), [most]])
+    camera = SimpleNamespace(grid=pixel_grid(width, 3, mi.Float))
+    row, column = row_and_column(camera, mi.UInt32(pixels.astype(np.uint32)))
+    assert np.array_equal(np.array(row), pixels // width)
+    assert np.array_equal(np.array(column), pixels % width)
+
+
+def test_one_kernel_serves_images_of_all_sizes(variant):
+    """Rationale: a kernel that holds the size of an image is compiled anew for each, for half a second and more."""
+    import drjit as dr
+
+    from realtime.frame.renderer import render_frame
+    from realtime.scene.read_scene import read_scene
+    from validation.configurations.methods import configuration, prepared
+    from validation.scenes.loading import load_scene
+
+    launched = []
+    for size in ((64, 48), (96, 80)):
+        scene = read_scene(load_scene("sphere-spot", size).scene)
+        for method in ("unshadowed", "ray-march", "shadow-planes", "light-volumes"):
+            renderer = prepared(scene, configuration(method))
+            with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+                dr.kernel_history_clear()
+                render_frame(renderer)
+                kernels = dr.kernel_history((dr.KernelType.JIT,))
+            largest = max(kernels, key=lambda kernel: kernel["operation_count"])
+            launched.append((method, largest["hash"]))
+    assert launched[:4] == launched[4:]

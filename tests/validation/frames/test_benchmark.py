@@ -196,12 +196,27 @@ def probed(loaded, monkeypatch, chosen, *, seconds, limit):
 
 
 def test_what_would_take_too_long_is_left_out_with_what_it_would_take(loaded, monkeypatch):
-    # 16 x 12 pixels are four times 8 x 6: 0.05 s there are at least 0.2 s here.
-    measurement = probed(loaded, monkeypatch, MARCH, seconds=0.05, limit=0.1)
+    # 16 x 12 pixels are four times 8 x 6: 0.15 s there, of which little is preparation, are at least 0.4 s here.
+    measurement = probed(loaded, monkeypatch, MARCH, seconds=0.15, limit=0.3)
     assert measurement.left_out
     assert measurement.frame is measurement.times is measurement.error is None
     assert "by a frame of 8 x 6 pixels" in measurement.refused
-    assert "more than the limit of 0.1 s" in measurement.refused
+    assert "more than the limit of 0.3 s" in measurement.refused
+
+
+def test_what_prepares_for_too_long_is_left_out_and_its_pixels_are_not_counted_as_preparation(loaded, monkeypatch):
+    """Rationale: what a frame prepares is the same for a small image, and does not grow with its pixels."""
+    from realtime.frame.renderer import FrameRenderer
+
+    prepare = FrameRenderer.__getattribute__
+
+    def slowed(self, name):
+        return (lambda scene: time.sleep(0.3)) if name == "prepare" else prepare(self, name)
+
+    monkeypatch.setattr(FrameRenderer, "__getattribute__", slowed)
+    assert "what a frame prepares takes 0.3" in probed(loaded, monkeypatch, MARCH, seconds=0, limit=0.2).refused
+    # Four times the small frame would be above the limit; its pixels alone are not.
+    assert probed(loaded, monkeypatch, MARCH, seconds=0, limit=1.1).refused is None
 
 
 def test_what_takes_less_than_the_limit_is_measured(loaded, monkeypatch):

@@ -41,7 +41,7 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.methods.light_volumes.published.mesh import VolumeMesh
-from realtime.scene.camera import Camera
+from realtime.scene.camera import Camera, row_and_column
 
 BATCH = 1 << 22  #: lanes of one batch: some 0.3 GB
 
@@ -256,8 +256,8 @@ def _crossings(spans: _Spans, camera: Camera, span, step) -> Crossings:
     pixel = dr.gather(mi.UInt32, spans.pixel, span) + step
     first, change, sign = (dr.gather(mi.Float64, column, span) for column in (spans.inverse, spans.step, spans.sign))
     inverse = dr.maximum(dr.fma(mi.Float64(step), change, first), 0)
-    row = pixel // camera.width
-    across = 0.5 * (camera.width - 1) - mi.Float64(pixel - row * camera.width)
+    row, column = row_and_column(camera, pixel)
+    across = 0.5 * (camera.width - 1) - mi.Float64(column)
     upward = 0.5 * (camera.height - 1) - mi.Float64(row)
     forward, left, up = (_opaque(column) for column in _camera_basis(camera)[1].T)
     return Crossings(pixel, dr.norm(forward + left * across + up * upward) / inverse, sign)

@@ -14,7 +14,7 @@ def camera_of(types, fov=50.0):
     """Return a camera and the unit directions of its pixels, float64, (pixels, 3)."""
     import drjit as dr
 
-    from realtime.scene.camera import Camera
+    from realtime.scene.camera import Camera, pixel_grid
     from realtime.scene.lights import with_low
 
     side = np.cross([0.0, 0.0, 1.0], FORWARD)
@@ -25,7 +25,7 @@ def camera_of(types, fov=50.0):
     high, low = zip(*parts)
     origin = types.vector(*(float(x) for x in ORIGIN))
     dr.make_opaque(origin, high, low)
-    camera = Camera(*SIZE, origin, *high, *low)
+    camera = Camera(*SIZE, origin, *high, *low, grid=pixel_grid(*SIZE, types.scalar))
     kept = [sum(np.array(part, dtype=float).ravel() for part in pair) for pair in parts]
     row, column = np.divmod(np.arange(SIZE[0] * SIZE[1]), SIZE[0])
     aim = kept[0] + ((SIZE[0] - 1) / 2 - column)[:, None] * kept[1] + ((SIZE[1] - 1) / 2 - row)[:, None] * kept[2]
