@@ -12,9 +12,9 @@ Read in this order:
 - `directional_sums.py`: the same for directional lights;
 - `directional_airlight.py`: the airlight of one directional light;
 - `surface.py`: the lit surface behind the medium;
+- `ahead.py`: work that threads do ahead of what needs it;
 - `light_points.py`: points on lights with extent;
 - `area_airlight.py`: the airlight of lights with extent;
-- `ahead.py`: work that threads do ahead of what needs it;
 - `area_surface.py`: the surface that they light;
 - `emission.py`: these lights seen directly;
 - `ray_values.py`: all of this along every ray;

@@ -23,7 +23,7 @@ def done_ahead(work: Callable[[Task], Result], tasks: Iterable[Task], *, workers
     work
         A function of one task that calls NumPy alone.
     tasks
-        In order.
+        In order; they are made by the caller's thread.
     workers
         Threads; as many results and one more are kept at once.
 

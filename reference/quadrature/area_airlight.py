@@ -13,16 +13,18 @@ independent scramblings (`reference.quadrature.light_points`) each give a mean, 
 Points are doubled for the rays whose standard error is above the one that was asked for.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
 
+import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
 from analytic.geometry import foot_and_height
 from analytic.panels import airlight_segments
+from reference.quadrature.ahead import done_ahead
 from reference.quadrature.light_airlight import light_airlight
 from reference.quadrature.light_points import REPLICATES, PointPlan, light_points, square_points
 from reference.quadrature.unbounded import Rays, edge_worth
@@ -31,7 +33,7 @@ from reference.scene.read import TruthLight, TruthScene
 from reference.scene.shapes import Shapes
 from reference.visibility.before_light import before_light
 from reference.visibility.intervals import RandomChecks
-from reference.visibility.many_points import Blockers, blockers, pair_intervals
+from reference.visibility.many_points import Blockers, PairIntervals, blockers, pair_intervals
 from reference.visibility.pair_checks import checked_pairs
 
 Array = NDArray[np.float64]
@@ -163,16 +165,24 @@ def _geometric_airlight(
     place, normal = _place_and_normal(points)
     radiance, bound, checks = np.zeros((len(distance), 3)), np.zeros((len(distance), 3)), []
     step = max(1, min(_PAIRS, _SHADOWS // max(1, known.most)) // len(points))
-    for start in range(0, len(distance), step):
-        rows = slice(start, start + step)
-        number, direction = np.arange(len(distance))[rows], truth.direction[rows]
-        lit = pair_intervals(known, truth.origin, (number, direction, distance[rows]), (place, normal))
+
+    def blocks() -> Iterator[tuple[int, PairIntervals]]:
+        for start in range(0, len(distance), step):
+            rows = slice(start, start + step)
+            rays = np.arange(len(distance))[rows], truth.direction[rows], distance[rows]
+            yield start, pair_intervals(known, truth.origin, rays, (place, normal))
+
+    def summed(block: tuple[int, PairIntervals]) -> tuple[int, PairIntervals, tuple[Array, Array]]:
+        start, lit = block
         ray, point = np.divmod(lit.pair, len(points))
         height, foot = lit.height[lit.pair], lit.foot[lit.pair]
         x0, x1 = np.maximum(foot + height * lit.low, 0.0), foot + height * lit.high
         stretches = start + ray, point, foot, height, x0, np.maximum(x0, x1)
-        sums = _stretch_sums(truth, points, stretches, shadow_scale, edge=lit.edge)
+        return start, lit, _stretch_sums(truth, points, stretches, shadow_scale, edge=lit.edge)
+
+    for start, lit, sums in done_ahead(summed, blocks(), workers=dr.thread_count()):
         radiance, bound = radiance + sums[0], bound + sums[1]
+        direction = truth.direction[start : start + step]
         checked, doubtful = checked_pairs(
             truth.occluders, known.shapes, lit, (truth.origin, direction), (place, normal)
         )
@@ -200,7 +210,8 @@ def _open_airlight(
     count, step = len(distance), max(1, _ROWS // max(1, len(points)))
     place, normal = _place_and_normal(points)
     radiance, bound = np.zeros((count, 3)), np.zeros((count, 3))
-    for start in range(0, count, step):
+
+    def summed(start: int) -> tuple[Array, Array]:
         ray, point = np.divmod(np.arange(len(distance[start : start + step]) * len(points)), len(points))
         ray += start
         direction, n, y = truth.direction[ray], normal[point], place[point]
@@ -212,7 +223,9 @@ def _open_airlight(
         x1 = np.where(b >= 0, distance[ray], np.minimum(zero, distance[ray]))
         lit = np.flatnonzero(x1 > x0)
         stretches = ray[lit], point[lit], foot[lit], height[lit], x0[lit], x1[lit]
-        sums = _stretch_sums(truth, points, stretches, shadow_scale)
+        return _stretch_sums(truth, points, stretches, shadow_scale)
+
+    for sums in done_ahead(summed, range(0, count, step), workers=dr.thread_count()):
         radiance, bound = radiance + sums[0], bound + sums[1]
     return radiance, bound
 
