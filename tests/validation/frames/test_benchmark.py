@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: BSD-3-Clause
-import time
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -173,8 +172,18 @@ def test_a_method_of_ones_own_that_is_not_frozen_has_a_note(tmp_path, variant):
     assert notes == ["not frozen: its Python runs again for every frame", None]
 
 
-def probed(loaded, monkeypatch, chosen, *, seconds, limit):
+class Clock:
+    """A clock that goes on only where a test says so."""
+
+    now = 0.0
+
+    def perf_counter(self):
+        return self.now
+
+
+def probed(loaded, monkeypatch, chosen, *, seconds, limit, clock=None):
     """Measure a configuration whose small frame takes so long."""
+    clock = clock or Clock()
     import mitsuba as mi
 
     from realtime.scene.read_scene import read_scene
@@ -186,9 +195,10 @@ def probed(loaded, monkeypatch, chosen, *, seconds, limit):
 
     def slowed(renderer):
         if renderer.scene.camera.width == 8:
-            time.sleep(seconds)
+            clock.now += seconds
         return render(renderer)
 
+    monkeypatch.setattr(module, "time", clock)
     monkeypatch.setattr(module, "render_frame", slowed)
     scene, truth = read_scene(loaded.scene), truth_image(loaded.scene)
     small = read_scene(mi.load_dict(tiny_scene(size=(8, 6))))
@@ -208,15 +218,19 @@ def test_what_prepares_for_too_long_is_left_out_and_its_pixels_are_not_counted_a
     """Rationale: what a frame prepares is the same for a small image, and does not grow with its pixels."""
     from realtime.frame.renderer import FrameRenderer
 
-    prepare = FrameRenderer.__getattribute__
+    clock, found = Clock(), FrameRenderer.__getattribute__
 
     def slowed(self, name):
-        return (lambda scene: time.sleep(0.3)) if name == "prepare" else prepare(self, name)
+        if name != "prepare":
+            return found(self, name)
+        clock.now += 0.3
+        return found(self, name)
 
     monkeypatch.setattr(FrameRenderer, "__getattribute__", slowed)
-    assert "what a frame prepares takes 0.3" in probed(loaded, monkeypatch, MARCH, seconds=0, limit=0.2).refused
+    given = {"seconds": 0, "clock": clock}
+    assert "what a frame prepares takes 0.3" in probed(loaded, monkeypatch, MARCH, limit=0.2, **given).refused
     # Four times the small frame would be above the limit; its pixels alone are not.
-    assert probed(loaded, monkeypatch, MARCH, seconds=0, limit=1.1).refused is None
+    assert probed(loaded, monkeypatch, MARCH, limit=1.1, **given).refused is None
 
 
 def test_what_takes_less_than_the_limit_is_measured(loaded, monkeypatch):
@@ -238,6 +252,13 @@ def test_a_quick_preparation_asks_for_no_small_frame(loaded, measured, monkeypat
     scene, truth = read_scene(loaded.scene), truth_image(loaded.scene)
     assert measure(scene, MARCH, truth=truth, seconds=0.01, limit=1.0, probe=never).refused is None
     # Nor does one that is long the first time alone, when kernels are compiled.
+    clock = Clock()
+
+    def compiled(*given):
+        clock.now += 1.5
+        return prepared(*given)
+
+    monkeypatch.setattr(module, "time", clock)
     monkeypatch.setattr(module, "_DOUBTFUL", 0.1)
-    monkeypatch.setattr(module, "prepared", lambda *given: time.sleep(1.5) or prepared(*given))
+    monkeypatch.setattr(module, "prepared", compiled)
     assert measure(scene, MARCH, truth=truth, seconds=0.01, limit=10.0, probe=never).refused is None
