@@ -2,8 +2,11 @@
 """The truth of a scene, from the cache where it was computed before."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import Field, fields
+from dataclasses import Field, fields, replace
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.ray_values import TruthImage
@@ -58,6 +61,35 @@ def truth_image(
     check_values(truth, image)
     _store(key, image)
     parts.drop()
+    return image
+
+
+def truth_of_pixels(scene, pixels: NDArray[np.integer]) -> TruthImage:
+    """Return the quadrature truth of some pixels of a Mitsuba scene's image; it is not kept.
+
+    Parameters
+    ----------
+    scene
+        The `mi.Scene`.
+    pixels
+        Their numbers, row by row, (count,).
+
+    Returns
+    -------
+    TruthImage
+        An image of one row, (1, count, 3) [W/(m^2 sr)].
+
+    Raises
+    ------
+    InputError
+        As `truth_image`.
+    """
+    whole = read_truth(scene)
+    check_camera(whole)
+    truth = replace(whole, width=len(pixels), height=1, direction=whole.direction[pixels])
+    check_rays(truth, surface_hits(truth).distance)
+    image = quadrature_image(truth)
+    check_values(truth, image)
     return image
 
 

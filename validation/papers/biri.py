@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 
 from realtime.frame.incremental import FrameCache
 from realtime.frame.renderer import (
+    Frame,
     FrameRenderer,
     render_frame,
     run_cast_and_shade,
@@ -47,6 +48,7 @@ from realtime.methods.shadow_planes.view_culling import components_in_view
 from realtime.scene.camera import read_camera
 from realtime.scene.read_scene import Scene, read_scene
 from realtime.tiles.layout import SIDE
+from reference.quadrature.ray_values import TruthImage
 from validation.configurations.methods import TOLERANCE, Configuration, configuration, prepared
 from validation.configurations.timing import (
     Timing,
@@ -57,7 +59,7 @@ from validation.configurations.timing import (
     moved_light_alone,
     time_in_turns,
 )
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import truth_image, truth_of_pixels
 from validation.metrics.errors import Metrics, error_metrics
 from validation.scenes.loading import load_scene
 
@@ -113,9 +115,9 @@ class TableRow:
     light_moved_camera_kept: Timing  #: a frame after the light moved, the camera rays of the last one kept
     colours_changed: Timing  #: a frame after only medium or colours changed: planes, tile lists, camera rays are kept
     rays: Timing  #: the camera rays alone
-    error: Metrics  #: of the airlight at pixel centres, at `error_size`
+    error: Metrics  #: of the airlight at pixel centres
     frame_error: Metrics  #: of airlight and surfaces together
-    error_size: tuple[int, int]
+    error_size: tuple[int, int]  #: of the frame that was compared with the truth [pixels]
     told_apart: bool = True  #: whether stages 3 and 5 differ by more than the spread of their timings
 
     @property
@@ -161,24 +163,28 @@ def biri_row(
     size
         Width and height of the frame that is timed [pixels].
     error_size
-        Width and height of the frame that is compared with the truth [pixels].
+        Width and height of the frame that is compared with the truth [pixels]. With a tolerance the frame that is timed
+        is compared, in as many of its pixels: the error of interpolation depends on the size of a pixel.
     seconds
         Approximate time to spend on each timing [s].
     """
     changed = {"cone": cone, "tolerance": tolerance}
     chosen = Configuration("shadow-planes", kernel, tuple((name, value) for name, value in changed.items() if value))
-    small = load_scene(published.scene, error_size).scene
-    truth = truth_image(small)
-    white = 0.0
-    if published_variant:
-        white = buffer_white(truth.airlight + truth.surface)
-        chosen = as_published(kernel, white=white, cone=cone)
-    frame = render_frame(prepared(read_scene(small), chosen))
-    error = error_metrics(truth.airlight, frame.airlight)
-    frame_error = error_metrics(truth.airlight + truth.surface, frame.airlight + frame.surface)
     loaded = load_scene(published.scene, size).scene
     scene = read_scene(loaded)
-    renderer = prepared(scene, chosen)
+    white = 0.0
+    if tolerance:
+        renderer = prepared(scene, chosen)
+        error, frame_error = _errors_of_some(loaded, render_frame(renderer), error_size[0] * error_size[1])
+    else:
+        small = load_scene(published.scene, error_size).scene
+        truth = truth_image(small)
+        if published_variant:
+            white = buffer_white(truth.airlight + truth.surface)
+            chosen = as_published(kernel, white=white, cone=cone)
+        frame = render_frame(prepared(read_scene(small), chosen))
+        error, frame_error = _errors(truth, frame.airlight, frame.surface)
+        renderer = prepared(scene, chosen)
     kept = first_frame(renderer)
     works = [
         moved_light(renderer),
@@ -207,7 +213,7 @@ def biri_row(
         rays,
         error,
         frame_error,
-        error_size,
+        size if tolerance else error_size,
         told_apart=told_apart(stages[2], stages[5]),
     )
 
@@ -234,11 +240,30 @@ def buffer_white(frame: NDArray[np.float64]) -> float:
     return float(np.quantile(frame.max(axis=-1), 0.999))
 
 
+def _errors(truth: TruthImage, airlight: Any, surface: Any) -> tuple[Metrics, Metrics]:
+    """Return the error of the airlight, and that of the whole frame."""
+    whole = error_metrics(truth.airlight + truth.surface, airlight + surface)
+    return error_metrics(truth.airlight, airlight), whole
+
+
+def _errors_of_some(scene: Any, frame: Frame, count: int) -> tuple[Metrics, Metrics]:
+    """Return the same of so many pixels of a frame at most: one, drawn at random, of as many stretches of its rows."""
+    height, width = frame.distance.shape
+    count = min(count, height * width)
+    ends = np.arange(count + 1) * (height * width) // count
+    pixels = np.random.default_rng(0).integers(ends[:-1], ends[1:])
+    airlight, surface = (
+        np.asarray(layer, dtype=np.float64).reshape(-1, 3)[None, pixels] for layer in (frame.airlight, frame.surface)
+    )
+    return _errors(truth_of_pixels(scene, pixels), airlight, surface)
+
+
 def biri_rows(
     published: Sequence[Published] = PUBLISHED,
     kernels: Sequence[str] = KERNELS,
     *,
     scale: float = 1.0,
+    error_size: tuple[int, int] | None = None,
     seconds: float = 0.6,
     progress: Callable[[float, str], None] | None = None,
 ) -> list[TableRow]:
@@ -252,6 +277,8 @@ def biri_rows(
         of the paper also with all that it has (`as_published`).
     scale
         Factor on the width and height of all images; 1 for the published sizes.
+    error_size
+        See `biri_row`; half the width and height of a frame by default.
     seconds
         Approximate time to spend on each timing [s].
     progress
@@ -267,12 +294,10 @@ def biri_rows(
     rows: list[TableRow] = []
     for entry, kernel, changed in wanted:
         size = _whole_tiles(scale * entry.size[0]), _whole_tiles(scale * entry.size[1])
-        half = (max(1, size[0] // 2), max(1, size[1] // 2))
+        compared = error_size or (max(1, size[0] // 2), max(1, size[1] // 2))
         if progress is not None:
             progress(len(rows) / len(wanted), f"{entry.scene}, {size[0]} x {size[1]}, {kernel}")
-        # The error of interpolation depends on the size of a pixel, so it is measured at the timed size.
-        error_size = size if "tolerance" in changed else half
-        rows.append(biri_row(entry, kernel, **changed, size=size, error_size=error_size, seconds=seconds))
+        rows.append(biri_row(entry, kernel, **changed, size=size, error_size=compared, seconds=seconds))
     return rows
 
 

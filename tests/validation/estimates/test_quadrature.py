@@ -7,7 +7,7 @@ import pytest
 from reference.storage.cache import cache_folder
 from tests.helpers.scenes import tiny_scene
 from validation.estimates.monte_carlo import monte_carlo_batches
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import truth_image, truth_of_pixels
 
 
 @pytest.fixture
@@ -94,6 +94,14 @@ def test_damaged_file_is_recomputed(scene, own_cache, computed, damage):
     assert len(computed) == 2
     truth_image(scene, samples=32)
     assert len(computed) == 2  # and what was damaged has been replaced
+
+
+def test_the_truth_of_some_pixels_is_that_of_the_image(scene, own_cache):
+    pixels = np.array([3, 4, 40, 7])
+    some, whole = truth_of_pixels(scene, pixels), truth_image(scene)
+    for layer in ("airlight", "surface", "distance", "light_angle"):
+        values = getattr(whole, layer)
+        np.testing.assert_array_equal(getattr(some, layer)[0], values.reshape(-1, *values.shape[2:])[pixels])
 
 
 def test_progress_is_told(scene, own_cache):

@@ -33,6 +33,17 @@ def test_a_row_has_every_stage_and_its_error(variant):
     )
 
 
+def test_with_a_tolerance_the_timed_frame_is_compared_in_as_many_of_its_pixels(variant):
+    """Rationale: the error of interpolation depends on the size of a pixel; some pixels of a frame say what all say."""
+    sizes = {"size": (96, 72), "seconds": 0.0}
+    row = biri_row(PUBLISHED[0], "exact", tolerance=0.005, error_size=(48, 36), **sizes)
+    whole = biri_row(PUBLISHED[0], "exact", tolerance=0.005, error_size=(200, 200), **sizes)
+    assert (row.error_size, row.error.pixels, row.frame_error.pixels) == ((96, 72), 48 * 36, 48 * 36)
+    assert (whole.error_size, whole.error.pixels) == ((96, 72), 96 * 72)
+    # The relative standard error of the root of a mean over a quarter of the pixels; errors are larger along shadows.
+    assert row.error.relative_rmse == pytest.approx(whole.error.relative_rmse, rel=0.2)
+
+
 def test_stages_are_told_apart_by_more_than_their_spread(variant):
     plain = Timing(10.0, 9.0, 11.0, 5)
     assert told_apart(plain, Timing(12.0, 11.5, 13.0, 5))
