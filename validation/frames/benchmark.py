@@ -11,7 +11,7 @@ import drjit as dr
 
 from analytic.errors import InputError as TruthError
 from realtime.errors import InputError
-from realtime.frame.renderer import Frame, FrameRenderer, render_frame
+from realtime.frame.renderer import Frame, FrameRenderer, light_groups, render_frame
 from realtime.methods.registry import find_method
 from realtime.numerics.recorded import Frozen
 from realtime.scene.features import SceneFeatures
@@ -29,7 +29,7 @@ Progress = Callable[[int, int, str], None]
 #: Calls a function with arguments in another process: ``apart(function, *arguments, name=the method's)``.
 Apart = Callable[..., Any]
 
-_DOUBTFUL = 0.1  # share of the limit: after a longer preparation, the time of a frame is estimated before it begins
+_DOUBTFUL = 0.5  # share of the limit: after a longer preparation, the time of a frame is estimated before it begins
 _LONG = 25.0  # after a longer first frame, compilation included, no larger frame is timed [s]
 
 
@@ -173,7 +173,8 @@ def render_and_time(
         begin = time.perf_counter()
         renderer = prepared(scene, chosen)
         took = time.perf_counter() - begin
-        if limit is not None and probe is not None and (chosen.own or took > _DOUBTFUL * limit):
+        lights = len(light_groups(renderer))
+        if limit is not None and probe is not None and (chosen.own or took * lights > _DOUBTFUL * limit):
             reason = _too_long(renderer, probe, chosen, limit)
             if reason:
                 return Rendering(None, None, shadows, refused=reason, left_out=True)
@@ -240,12 +241,16 @@ def _too_long(renderer: FrameRenderer, probe: Callable[[], Scene], chosen: Confi
     """Return why a frame would take too long, or None.
 
     It is judged by its preparation once kernels are compiled and, where that takes long and for a user's own method,
-    by the second frame of a small scene, whose preparation takes as long.
+    by the second frame of a small scene, whose preparation takes as long. Of many groups of lights only the first are
+    prepared before the frame; the others take as long each.
     """
     begin = time.perf_counter()
-    renderer.prepare(renderer.scene)
+    states = renderer.prepare(renderer.scene)
     dr.sync_thread()
     preparation = time.perf_counter() - begin
+    if renderer.groups is not None:
+        preparation *= len(states) / sum(state is not None for state in states)
+    del states
     words = f"more than the limit of {limit:g} s"
     if preparation > limit:
         return f"not measured: what a frame prepares takes {preparation:.2g} s, {words}"

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 from dataclasses import asdict, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -231,6 +232,22 @@ def test_what_prepares_for_too_long_is_left_out_and_its_pixels_are_not_counted_a
     assert "what a frame prepares takes 0.3" in probed(loaded, monkeypatch, MARCH, limit=0.2, **given).refused
     # Four times the small frame would be above the limit; its pixels alone are not.
     assert probed(loaded, monkeypatch, MARCH, limit=1.1, **given).refused is None
+
+
+def test_groups_of_lights_that_are_prepared_within_the_frame_count_as_those_before_it(monkeypatch):
+    """Rationale: the states of only so many groups of lights are kept; a frame makes the others."""
+    from validation.frames import benchmark as module
+
+    clock = Clock()
+
+    def prepare(scene):
+        clock.now += 0.1
+        return ("state", "state", *6 * [None])
+
+    monkeypatch.setattr(module, "time", clock)
+    renderer = SimpleNamespace(prepare=prepare, scene=None, groups="of lights")
+    assert "what a frame prepares takes 0.4 s" in module._too_long(renderer, None, MARCH, 0.3)
+    assert module._too_long(renderer, None, MARCH, 0.9) is None
 
 
 def test_what_takes_less_than_the_limit_is_measured(loaded, monkeypatch):

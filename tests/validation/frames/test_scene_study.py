@@ -30,6 +30,12 @@ def test_scenes_lit_by_lights_with_extent_are_compared_at_half_the_width(variant
         assert {name for name, of in sizes.items() if of.image == (width // 2, height // 2)} == wide
         assert all(sizes[name] == effort for name in set(FOG_SCENES) - wide)
         assert {of.timed for of in sizes.values()} == {effort.timed}
+        width, height = effort.checked
+        for name in wide:
+            narrow = sizes[name]
+            assert narrow.checked == (width // 2, height // 2)
+            paths = np.prod(narrow.checked) * narrow.samples["volpath"]
+            assert paths == np.prod(effort.checked) * effort.samples["volpath"]
 
 
 @pytest.mark.parametrize(
