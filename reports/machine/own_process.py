@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A function run in a process of its own: for the user's own code, which may end the process or never return.
+"""A function run in a process of its own: the user's own code, which may end the process or never return, and work of
+ours whose kernels are to compile quickly.
 
 The caller sends the name of one of our functions with arguments that name scenes and methods; the process imports the
 user's code. What it returns comes back as a file. What it prints goes to the error stream, so that the output is the
@@ -18,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from analytic.errors import InputError
+from reports.machine import quick_compilation
 from reports.machine.environment import VARIANT_VARIABLE
 
 _POSIX = os.name == "posix"
@@ -29,7 +31,14 @@ class EndedError(InputError):
     """The process ended without an answer, or not in time."""
 
 
-def in_own_process(function: Callable[..., Any], *arguments: Any, name: str, limit: float = LIMIT) -> Any:
+def in_own_process(
+    function: Callable[..., Any],
+    *arguments: Any,
+    name: str,
+    limit: float | None = LIMIT,
+    what: str = "method",
+    quick: bool = False,
+) -> Any:
     """Call a function in a new process with the current variant, and return what it returns.
 
     Parameters
@@ -39,16 +48,20 @@ def in_own_process(function: Callable[..., Any], *arguments: Any, name: str, lim
     arguments
         Of the function. They are pickled, as is what it returns.
     name
-        Of the user's method, for messages.
+        Of the user's method, or of the work, for messages.
     limit
-        After so long the process is ended [s].
+        After so long the process is ended [s]; None: never.
+    what
+        Has this name, for messages.
+    quick
+        Whether kernels may run slowly if they compile quickly (`reports.machine.quick_compilation`): nothing is timed.
 
     Raises
     ------
     InputError
         As the function.
     EndedError
-        If the process ends without an answer or not in time; the message begins with 'method NAME: '.
+        If the process ends without an answer or not in time; the message begins with what it is and its name.
     MissingError
         As the function.
     """
@@ -63,7 +76,7 @@ def in_own_process(function: Callable[..., Any], *arguments: Any, name: str, lim
                 [sys.executable, "-P", "-m", "reports.machine.own_process", str(folder), str(alive)],
                 stdin=subprocess.DEVNULL,
                 stdout=_error_stream(),
-                env=_environment(),
+                env=_environment() | (quick_compilation.settings() if quick else {}),
                 **_kept_open(alive),
             )
             with cleaned_up(lambda: _end(process)):
@@ -71,7 +84,7 @@ def in_own_process(function: Callable[..., Any], *arguments: Any, name: str, lim
                     status = process.wait(limit)
                 except subprocess.TimeoutExpired:
                     raise EndedError(
-                        f"method {name}: did not end within {limit:g} s and was stopped; --method-limit allows more"
+                        f"{what} {name}: did not end within {limit:g} s and was stopped; --method-limit allows more"
                     ) from None
                 finally:
                     _end(process)
@@ -82,7 +95,7 @@ def in_own_process(function: Callable[..., Any], *arguments: Any, name: str, lim
             answer = (folder / "answer").read_bytes()
         except FileNotFoundError:
             raise EndedError(
-                f"method {name}: ended its process, {_how(status)}; wanted a radiance or an exception"
+                f"{what} {name}: ended its process, {_how(status)}; wanted a result or an exception"
             ) from None
     returned, value = pickle.loads(answer)
     if not returned:

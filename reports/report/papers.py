@@ -11,6 +11,7 @@ from typing import Any
 
 from reports.cluster.connect import Cluster
 from reports.data.serialize import mutations_data, scaling_data
+from reports.machine.own_process import in_own_process
 from reports.machine.progress import Progress, counted, part_of
 from reports.papers.billeter import billeter_data
 from reports.papers.biri import biri_data
@@ -69,9 +70,20 @@ def published_data(results: Mapping[str, Sequence[CachedResult]]) -> dict[str, A
 
 
 def _stability(rays: int, progress: Progress) -> Computed:
+    """Return how stable kernels are. Nearly all of its time goes into compilation: a process compiles them quickly."""
+    from realtime.kernels.registry import KERNELS
     from validation.kernels.stability import stability
 
-    return {"kernels": plain(stability(count=rays, progress=counted(progress)))}, {}
+    known = in_own_process(known_kernels, rays, what="study", name="of the kernels", limit=None, quick=True)
+    added = [name for name in KERNELS if name not in {kernel["kernel"] for kernel in known}]
+    return {"kernels": known + (plain(stability(added, count=rays, progress=counted(progress))) if added else [])}, {}
+
+
+def known_kernels(rays: int) -> list[dict[str, Any]]:
+    """Return how stable the kernels of airlight are, in a process that knows no others."""
+    from validation.kernels.stability import stability
+
+    return plain(stability(count=rays))
 
 
 def _scaling(kind: str, seconds: float, cache: ResultCache) -> OtherPart:
@@ -107,10 +119,18 @@ def _biri(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[Oth
 
     def measured(published: Published, progress: Progress) -> dict[str, Any]:
         study = constant_distance_study() if published.scene == "three-media" else ()
-        return biri_data(biri_rows([published], kernels, seconds=seconds, progress=progress), [], study)
+        # At the size of the report's images, whose truths are kept.
+        rows = biri_rows([published], kernels, error_size=effort.image, seconds=seconds, progress=progress)
+        return biri_data(rows, [], study)
 
     def part(published: Published) -> OtherPart:
-        identity = {"scene": published.scene, "size": published.size, "kernels": kernels, "seconds": seconds}
+        identity = {
+            "scene": published.scene,
+            "size": published.size,
+            "compared": effort.image,
+            "kernels": kernels,
+            "seconds": seconds,
+        }
         return OtherPart(
             "biri",
             "Biri 2006",
