@@ -176,6 +176,7 @@ def _measured(
     force: bool,
 ) -> dict[str, Any]:
     """Measure and write a report; unusable input is refused before the work begins."""
+    import gc
     from contextlib import ExitStack
 
     from reference.storage.files import ensure_folder
@@ -207,6 +208,7 @@ def _measured(
     works = [truth_work(size) for size in sizes]
     works += [frame_work(size, steps=100, frames=8 * len(chosen)) for size in sizes]
     check_work("report --images", works, force=force)
+    gc.freeze()  # modules live as long as the process: what looks for garbage before each frame need not look there
     with ExitStack() as stack, progress_bar("report") as progress:
         return write_report(
             target,
