@@ -30,6 +30,7 @@ Progress = Callable[[int, int, str], None]
 Apart = Callable[..., Any]
 
 _DOUBTFUL = 0.5  # share of the limit: after a longer preparation, the time of a frame is estimated before it begins
+_RECORDED = 1.0  # in a first frame that takes less, its recording takes a part of time and memory that counts [s]
 _LONG = 25.0  # after a longer first frame, compilation included, no larger frame is timed [s]
 
 
@@ -189,10 +190,7 @@ def render_and_time(
         notes.append(f"timed at {scene.camera.width} x {scene.camera.height}: larger frames take minutes")
     if chosen.own and not isinstance(renderer.render, Frozen):
         notes.append("not frozen: its Python runs again for every frame")
-    shown = renderer
-    if timed is not None:
-        shown = prepared(timed, chosen)
-        render_frame(shown)
+    shown = renderer if timed is None else prepared(timed, chosen)
     spent: list[float] = []
 
     def again() -> None:
@@ -201,7 +199,9 @@ def render_and_time(
         spent.append(time.perf_counter() - begin)
 
     memory = peak_memory(again)
-    times = time_frame(shown, seconds=seconds, slow=slow, took=spent[0] if spent else None)
+    if timed is not None and spent and spent[0] < _RECORDED:
+        memory = peak_memory(again)
+    times = time_frame(shown, seconds=seconds, slow=slow, took=spent[-1] if spent else None)
     return Rendering(frame, times, shadows, note="; ".join(notes) or None, memory=memory)
 
 

@@ -2,10 +2,12 @@
 from dataclasses import asdict, replace
 from types import SimpleNamespace
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from realtime.scene.features import SceneFeatures
+from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
 from validation.configurations.methods import STANDARD, Configuration, configuration, prepared
 from validation.frames.benchmark import bench, configurations_for, knows_shadows, measure
@@ -28,14 +30,11 @@ FEATURES = SceneFeatures(
 
 @pytest.fixture(scope="module")
 def loaded(variant):
-    import mitsuba as mi
-
     return LoadedScene("tiny", mi.load_dict(tiny_scene(size=(16, 12))), "A tiny scene.", "")
 
 
 @pytest.fixture(scope="module")
 def measured(loaded):
-    from realtime.scene.read_scene import read_scene
     from validation.estimates.quadrature import truth_image
 
     scene, truth = read_scene(loaded.scene), truth_image(loaded.scene)
@@ -72,9 +71,6 @@ def test_surface_is_compared_too(measured):
 
 
 def test_other_size_is_timed_without_changing_what_is_compared(loaded, measured, variant):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
     from validation.estimates.quadrature import truth_image
 
     large = read_scene(mi.load_dict(tiny_scene(size=(160, 120))))
@@ -91,9 +87,6 @@ def test_other_size_is_timed_without_changing_what_is_compared(loaded, measured,
 @pytest.mark.claim("refusals-stand-in-the-report")
 def test_refusal_is_kept_and_not_raised(variant):
     """What a method cannot do is a line of the table; one bad configuration must not end a report."""
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
     from validation.estimates.quadrature import truth_image
 
     scene = mi.load_dict(
@@ -141,9 +134,6 @@ def test_configuration_says_whether_it_knows_shadows():
 
 
 def test_slow_configurations_are_not_timed_at_a_larger_size(variant, loaded, monkeypatch):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
     from validation.estimates.quadrature import truth_image
     from validation.frames import benchmark as module
 
@@ -158,9 +148,6 @@ def test_slow_configurations_are_not_timed_at_a_larger_size(variant, loaded, mon
 
 
 def test_a_method_of_ones_own_that_is_not_frozen_has_a_note(tmp_path, variant):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
     from validation.estimates.quadrature import truth_image
 
     path = tmp_path / "own_bench_for_tests.py"
@@ -185,9 +172,6 @@ class Clock:
 def probed(loaded, monkeypatch, chosen, *, seconds, limit, clock=None):
     """Measure a configuration whose small frame takes so long."""
     clock = clock or Clock()
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
     from validation.estimates.quadrature import truth_image
     from validation.frames import benchmark as module
 
@@ -250,6 +234,32 @@ def test_groups_of_lights_that_are_prepared_within_the_frame_count_as_those_befo
     assert module._too_long(renderer, None, MARCH, 0.9) is None
 
 
+@pytest.mark.parametrize(("seconds", "frames"), [(0.1, 2), (3.0, 1)])
+def test_a_first_frame_that_takes_long_is_not_rendered_twice_for_its_memory(loaded, monkeypatch, seconds, frames):
+    """Rationale: the recording of a short frame takes a part of its time and memory, that of a long one nothing."""
+    from validation.frames import benchmark as module
+
+    clock, rendered = Clock(), []
+
+    def slowed(renderer):
+        rendered.append(renderer.scene.camera.width)
+        clock.now += seconds
+        return render(renderer)
+
+    def timed(renderer, *, took, **how):
+        assert took == pytest.approx(seconds)
+        return "times"
+
+    render = module.render_frame
+    monkeypatch.setattr(module, "time", clock)
+    monkeypatch.setattr(module, "render_frame", slowed)
+    monkeypatch.setattr(module, "time_frame", timed)
+    monkeypatch.setattr(module, "peak_memory", lambda work: work() or 7.0)
+    large = read_scene(mi.load_dict(tiny_scene(size=(32, 24))))
+    found = module.render_and_time(read_scene(loaded.scene), MARCH, timed=large)
+    assert (found.times, found.memory, rendered) == ("times", 7.0, [16, *frames * [32]])
+
+
 def test_what_takes_less_than_the_limit_is_measured(loaded, monkeypatch):
     measurement = probed(loaded, monkeypatch, MARCH, seconds=0.05, limit=60.0)
     assert not measurement.left_out
@@ -258,7 +268,6 @@ def test_what_takes_less_than_the_limit_is_measured(loaded, monkeypatch):
 
 
 def test_a_quick_preparation_asks_for_no_small_frame(loaded, measured, monkeypatch):
-    from realtime.scene.read_scene import read_scene
     from validation.estimates.quadrature import truth_image
     from validation.frames import benchmark as module
 
