@@ -10,7 +10,7 @@ Read in this order:
 - `gpu.py`: whether CUDA and OptiX work, and why not
 - `environment.py`: chooses the variant; versions and processor
 - `probe.py`: one kernel in a process of its own
-- `own_process.py`: the user's own code in a process of its own
+- `own_process.py`: the user's own code, and kernels that compile quickly, in a process of their own
 - `doctor.py`: examines all of these
 - `printing.py`: how commands print the tables of one run
 
