@@ -56,7 +56,7 @@ def print_scaling(
 def _earlier(against: Path | None, names: list[str]) -> list[dict[str, Any]]:
     """Return the records of an earlier run: of the file that the user names, or the baselines of built-in scenes.
 
-    A baseline is what `airlight bench SCENE --scaling size,triangles,lights,map --json` printed once.
+    A baseline is what `airlight bench SCENE --scaling KIND --json` printed once for size, triangles, lights and map.
     """
     from analytic.errors import InputError
     from reports.data.json_files import read_json

@@ -14,7 +14,7 @@ Read in this order:
 
 May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels.registry`, `realtime.methods`,
 `realtime.scene`, `reference.storage`, `reports.cluster`, `reports.data`, `reports.machine`, `reports.page`,
-`reports.papers`, `reports.plotting`, `validation.comparison`, `validation.configurations`, `validation.estimates`, `validation.fidelity`,
-`validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`, `validation.papers`,
-`validation.scaling`, `validation.scenes`.
+`reports.papers`, `reports.plotting`, `validation.comparison`, `validation.configurations`, `validation.estimates`,
+`validation.fidelity`, `validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`,
+`validation.papers`, `validation.scaling`, `validation.scenes`.
 """
