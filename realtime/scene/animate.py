@@ -30,8 +30,8 @@ from realtime.scene.triangle_table import Facets, read_facets, with_rotations
 
 Array = NDArray[np.float64]
 
-#: Triangles from which on a shape that moves has an acceleration structure of its own; below, one for all is built anew
-#: in 30 ms at most.
+#: Triangles from which on a shape that moves has an acceleration structure of its own. Four times as many move in
+#: 93 ms with it and in 267 without (`airlight bench sphere-spot --scaling triangles --size 800x600`).
 MANY = 65_536
 
 

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.quadrature.area_airlight import Keep
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.ray_values import TruthImage
 from reference.quadrature.surface import surface_hits
-from reference.scene.read import read_truth
+from reference.scene.read import TruthScene, read_truth
 from reference.storage.cache import drop_arrays, is_kept, load_arrays, store_arrays
 from reference.storage.cache_size import make_room
 from reference.storage.scene_digest import cache_key
@@ -51,14 +52,10 @@ def truth_image(
         return TruthImage(**{field.name: _as_kept(field, stored[field.name]) for field in _fields(set(stored))})
     make_room()
     truth = read_truth(scene)
-    check_camera(truth)
-    if pixel == "centre":
-        check_rays(truth, surface_hits(truth).distance)
     parts = _Parts(key)
     # Only lights with extent take so long that a run is worth going on with.
     keep = parts if truth.area and pixel == "centre" else None
-    image = quadrature_image(truth, **settings, keep=keep, progress=progress)
-    check_values(truth, image)
+    image = _checked_image(truth, settings, keep=keep, progress=progress)
     _store(key, image)
     parts.drop()
     return image
@@ -82,13 +79,20 @@ def truth_of_pixels(scene, pixels: NDArray[np.integer]) -> TruthImage:
     Raises
     ------
     InputError
-        As `truth_image`.
+        As `truth_image`; a pixel that it names is counted among these.
     """
     whole = read_truth(scene)
-    check_camera(whole)
-    truth = replace(whole, width=len(pixels), height=1, direction=whole.direction[pixels])
-    check_rays(truth, surface_hits(truth).distance)
-    image = quadrature_image(truth)
+    return _checked_image(replace(whole, width=len(pixels), height=1, direction=whole.direction[pixels]), _USUAL)
+
+
+def _checked_image(
+    truth: TruthScene, settings: Mapping[str, Any], *, keep: Keep | None = None, progress: Progress | None = None
+) -> TruthImage:
+    """Return the truth of an image whose every value is finite."""
+    check_camera(truth)
+    if settings["pixel"] == "centre":
+        check_rays(truth, surface_hits(truth).distance)
+    image = quadrature_image(truth, **settings, keep=keep, progress=progress)
     check_values(truth, image)
     return image
 

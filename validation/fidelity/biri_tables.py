@@ -12,10 +12,7 @@ from validation.papers.biri import PUBLISHED, biri_row
 from validation.papers.constant_distance import constant_distance_study
 
 _SECONDS = 0.1  # for each timing [s]
-_COMPARED = (
-    320,
-    240,
-)  # size of the frames that are compared: that of the report's images, whose truths are kept [pixels]
+_COMPARED = (320, 240)  # size of the frames that are compared: the default report keeps these truths [pixels]
 
 
 def biri_tables(scale: float = 1.0) -> dict[str, Any]:

@@ -174,9 +174,9 @@ def render_and_time(
         begin = time.perf_counter()
         renderer = prepared(scene, chosen)
         took = time.perf_counter() - begin
-        lights = len(light_groups(renderer))
-        if limit is not None and probe is not None and (chosen.own or took * lights > _DOUBTFUL * limit):
-            reason = _too_long(renderer, probe, chosen, limit)
+        if limit is not None and probe is not None:
+            doubtful = chosen.own or took * len(light_groups(renderer)) > _DOUBTFUL * limit
+            reason = _too_long(renderer, probe, chosen, limit) if doubtful else None
             if reason:
                 return Rendering(None, None, shadows, refused=reason, left_out=True)
         begin = time.perf_counter()
