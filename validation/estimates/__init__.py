@@ -5,6 +5,7 @@ Read in this order:
 
 - `light_on_ray.py`: refuses radiance that is infinite;
 - `quadrature.py`: the quadrature image of a scene;
+- `reference_layers.py`: what the reference of another renderer's image holds;
 - `monte_carlo.py`: batches of a Monte Carlo estimator;
 - `budget.py`: when a Monte Carlo run ends;
 - `images.py`: references as layered images;

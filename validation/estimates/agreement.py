@@ -31,6 +31,7 @@ from reference.scene.read import TruthScene, read_truth
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
 from validation.estimates.monte_carlo import Spread, monte_carlo_batches
 from validation.estimates.quadrature import truth_image
+from validation.estimates.reference_layers import reference_error, reference_layer
 from validation.statistics.comparison import Estimate, Statistics, compare_statistics
 
 Array = NDArray[np.float64]
@@ -227,11 +228,11 @@ def truth_estimate(image: TruthImage, layer: str, test: Estimate) -> Estimate:
     their errors may add up; the standard error of a pooled bias takes them for independent. A value that no sample of
     the batches reached has no standard error of theirs, and must not be judged by that of the quadrature alone.
     """
-    error = getattr(image, f"{layer}_se")
+    error = reference_error(image, layer)
     reached = np.asarray(test.standard_error) > 0
     if error is None or not error.any():
-        return Estimate(getattr(image, layer))
-    return Estimate(getattr(image, layer), np.where(reached, error, 0.0), REPLICATES)
+        return Estimate(reference_layer(image, layer))
+    return Estimate(reference_layer(image, layer), np.where(reached, error, 0.0), REPLICATES)
 
 
 def _bias(expected: Array, batches: Batches, layer: str, mask: Mask) -> float:
