@@ -58,8 +58,8 @@ def published(
 
     biri: Tables 1 and 2 with `shadow-planes`: share of time by stage, frames a second; with `three-media`, the
     error of the constant R of section 4.2 by size and depth. billeter: Figures 6 and 7 and Table 1 with `light-
-    volumes` and its peers: frames a second, static against adaptive tessellation, the passes, and which of the
-    paper's conclusions hold here. ali: Fig. 5.8 with `soft-shafts` and what goes with it, by errors in the
+    volumes` and its peers: frames a second, static against adaptive tessellation, and the
+    passes. ali: Fig. 5.8 with `soft-shafts` and what goes with it, by errors in the
     penumbrae and times. bouthors: what a slab decides, Fig. 3, the printed extinction and
     densities, light by direction beside the fitted functions, Fig. 8, clouds beside light paths, Figs 11 and 12, by
     order of scattering too, and the frames a second of section 9. The others at
@@ -108,7 +108,7 @@ def published(
 
 
 def _print(data: dict[str, Any], *, as_markdown: bool) -> None:
-    """Print the tables of the papers and what follows from them."""
+    """Print the tables of the papers."""
     from reports.machine.printing import print_heading, print_tables
     from reports.papers.ali import ali_tables
     from reports.papers.billeter import billeter_tables
@@ -127,9 +127,6 @@ def _print(data: dict[str, Any], *, as_markdown: bool) -> None:
         print_tables(bouthors_tables(data["bouthors"]), as_markdown=as_markdown)
     if "billeter" in data:
         print_tables(billeter_tables(data["billeter"]), as_markdown=as_markdown)
-        if data["billeter"]["conclusions"]:
-            print("\nWhat follows:\n")
-            print("\n".join(f"- {sentence}" for sentence in data["billeter"]["conclusions"]))
 
 
 def _ali(*, scale: float, progress: Callable) -> dict[str, Any]:

@@ -18,7 +18,7 @@ PASSES = ("surface", "shadow map", "laplacian", "edge map", "tessellate", "verti
 
 
 def billeter_data(figures: Sequence[Any], views: Sequence[Any]) -> dict[str, Any]:
-    """Return what was measured and what follows from it as JSON-ready data.
+    """Return what was measured as JSON-ready data.
 
     Parameters
     ----------
@@ -28,7 +28,6 @@ def billeter_data(figures: Sequence[Any], views: Sequence[Any]) -> dict[str, Any
         From `validation.papers.billeter_tessellation.table_rows`.
     """
     from validation.metrics.errors import plain
-    from validation.papers.billeter_conclusions import conclusions
 
     return {
         "figures": plain(figures),
@@ -45,7 +44,6 @@ def billeter_data(figures: Sequence[Any], views: Sequence[Any]) -> dict[str, Any
             }
             for row in views
         ],
-        "conclusions": conclusions(figures, views),
     }
 
 
@@ -74,17 +72,16 @@ def _not_measured(row: Data) -> str:
 
 
 def _image_table(rows: Sequence[Data]) -> Table:
-    named = {"error_rmse": "rel. RMSE", "error_p99": "p99", "map_error_rmse": "against the map", "map_error_p99": "p99"}
+    named = {"error_rmse": "rel. RMSE", "error_p99": "p99"}
     columns = (*words(name="frames a second"), *COLUMNS, *numbers(**named, how={"digits": 2, "share": True}))
     table_rows = []
     for row in rows:
         values: dict[str, Value] = {"name": _image(row), **_rates(row, row["entry"]["fps"])}
-        for key in ("error", "map_error"):
-            error = row.get(key) or {}
-            values |= {f"{key}_rmse": error.get("relative_rmse"), f"{key}_p99": error.get("p99")}
+        error = row["error"] or {}
+        values |= {"error_rmse": error.get("relative_rmse"), "error_p99": error.get("p99")}
         table_rows.append(Row(values, _not_measured(row)))
     title = "Figures 6 and 7 of Billeter 2010 again: frames a second, and the error of the airlight"
-    explanation = "The error is against the truth, and against what the shadow map stands for."
+    explanation = "The error is against the truth."
     return table(title, columns, table_rows, explanation=explanation)
 
 

@@ -56,7 +56,6 @@ def _taken(take: Any) -> Any:
 
 _rate = _taken(lambda row: rate(row["light_moved"]))
 _error = _taken(lambda row: float(row["error"]["relative_rmse"]))
-_map_error = _taken(lambda row: float(row["map_error"]["relative_rmse"]))
 _MESH = {"evaluation": "mesh"}
 _MARCH = {"method": "ray-march", "sum": "transitions"}
 
@@ -467,25 +466,6 @@ _FIGURES = (
         "billeter tables",
         ratio(_error("Fig. 7b", **_MARCH), _error("Fig. 7c", **_MESH)),
         AtMost("equal is read as 10 %"),
-        unit="times",
-        command=TABLES,
-    ),
-    _row(
-        "abstract, exact",
-        "the airlight is exact with respect to the resolution of the map: relative RMSE to the volume of the map",
-        Bound(1e-4),
-        "billeter tables",
-        _map_error("Fig. 7c", **_MESH),
-        AtMost("single precision sums of many terms"),
-        command=TABLES,
-    ),
-    _row(
-        "6, peers",
-        "always exact, unlike epipolar sampling: error of the latter over that of the mesh, to the volume of the map",
-        Bound(10),
-        "billeter tables",
-        ratio(_map_error("peer", method="min-max"), _map_error("Fig. 7c", **_MESH)),
-        AtLeast("an inexact method has ten times the error; their sampling with min/max trees"),
         unit="times",
         command=TABLES,
     ),

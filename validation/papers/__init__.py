@@ -7,7 +7,6 @@ Read in this order:
 - `constant_distance.py`: how wrong the constant R of their section 4.2 is, by size and depth;
 - `billeter_images.py`: Figures 6 and 7 of Billeter, Sintorn, Assarsson 2010;
 - `billeter_tessellation.py`: their Table 1;
-- `billeter_conclusions.py`: which of their conclusions hold here;
 - `ali.py`: the figures of Ali 2016 that captions describe;
 - `bouthors.py`: what a slab decides of Bouthors, Neyret, Max, Bruneton, Crassin 2008;
 - `bouthors_transport.py`: their Fig. 8, light by direction;
@@ -17,5 +16,5 @@ Read in this order:
 May import: `analytic`, `realtime.clouds`, `realtime.errors`, `realtime.frame`, `realtime.methods`,
 `realtime.numerics`, `realtime.scene`, `realtime.shadow_maps`, `realtime.tiles`, `reference.monte_carlo`,
 `reference.quadrature`, `reference.scene`, `validation.configurations`, `validation.estimates`, `validation.frames`,
-`validation.metrics`, `validation.oracles`, `validation.scenes`, `validation.slab`.
+`validation.metrics`, `validation.scenes`, `validation.slab`.
 """

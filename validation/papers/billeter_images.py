@@ -6,12 +6,9 @@ marching and by the light volume. Neither scene is available: `omni-box` and `co
 no image size for Fig. 6, so both have that of Fig. 7. The published hall has one map; ours has a lamp that shines in
 all directions, so its map has six faces.
 
-Every frame is compared at one pixel in `stride` along both axes, with two images: with the truth, and with the volume
-that its own shadow map bounds, the height field met by the same rays in float64 (`validation.oracles.light_volume`).
-The second error of a marcher comes from its steps and from the steps of the map, which it looks up without
-interpolation. The paper's marcher samples the visibility and evaluates the airlight where that changes
-(`realtime.methods.ray_march`, ``sum=transitions``). The usual one, which sums the integrand, stands beside it as a
-peer.
+Every frame is compared with the truth at one pixel in `stride` along both axes. The paper's marcher samples the
+visibility and evaluates the airlight where that changes (`realtime.methods.ray_march`, ``sum=transitions``). The usual
+one, which sums the integrand, stands beside it as a peer.
 """
 
 import time
@@ -26,7 +23,6 @@ from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeError
 from realtime.frame.renderer import Frame, FrameRenderer, render_frame, run_stages
 from realtime.scene.read_scene import Scene, read_scene
-from realtime.shadow_maps.shadow_map import cast_shadow_map
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import TruthScene, read_truth
 from validation.configurations.methods import TOLERANCE, Configuration, configuration, prepared
@@ -39,7 +35,6 @@ from validation.configurations.timing import (
     time_in_turns,
 )
 from validation.metrics.errors import Metrics, error_metrics
-from validation.oracles.light_volume import oracle_airlight, traced_walls
 from validation.scenes.loading import load_scene
 
 Array = NDArray[np.float64]
@@ -128,7 +123,6 @@ class FigureRow:
     light_moved_camera_kept: Timing | None = None  #: after the light moved, with the camera rays of the last frame
     colours_changed: Timing | None = None  #: after only medium or colours changed: map, tiles, camera rays are kept
     error: Metrics | None = None  #: of the airlight against the truth
-    map_error: Metrics | None = None  #: of the airlight against the volume that the shadow map bounds
     missing: str | None = None
 
 
@@ -173,16 +167,15 @@ def figure_rows(
     """
     rows: list[FigureRow] = []
     stage: _Stage | None = None
-    twins: dict[tuple[int, bool], Array] = {}
     shown = None
     for entry in entries:
         chosen = entry.configuration(kernel)
         if progress is not None:
             progress(len(rows) / len(entries), f"{entry.where}, {entry.scene}, {chosen.label}")
         if entry.scene != shown:
-            stage, twins, shown = _stage(entry.scene, size), {}, entry.scene
+            stage, shown = _stage(entry.scene, size), entry.scene
         assert stage is not None
-        rows.append(_figure_row(entry, stage, chosen, twins, seconds=seconds, limit=limit))
+        rows.append(_figure_row(entry, stage, chosen, seconds=seconds, limit=limit))
     return rows
 
 
@@ -210,7 +203,6 @@ def _figure_row(
     entry: FigureEntry,
     stage: _Stage,
     chosen: Configuration,
-    twins: dict[tuple[int, bool], Array],
     *,
     seconds: float,
     limit: float,
@@ -222,26 +214,13 @@ def _figure_row(
         frame = frame_within(renderer, limit)
     except (InputError, RealtimeError, MemoryError, TimeoutError) as reason:
         return FigureRow(entry, size, missing=str(reason) or "out of memory")
-    key = entry.map, entry.upright
-    if key not in twins:
-        distance = stage.compared(np.asarray(frame.distance, dtype=np.float64))
-        twins[key] = _twin(entry, stage, distance)
     shown = stage.compared(frame.airlight)
     return FigureRow(
         entry,
         size,
         **time_rates(renderer, seconds),
         error=error_metrics(stage.airlight, shown),
-        map_error=error_metrics(twins[key], shown),
     )
-
-
-def _twin(entry: FigureEntry, stage: _Stage, distance: Array) -> Array:
-    """Return the airlight of the volume that the shadow maps of an entry bound, in float64."""
-    scene = stage.scene
-    maps = [cast_shadow_map(scene.geometry, light, entry.map) for light in scene.lights]
-    walls = traced_walls(scene, maps) if entry.upright else None
-    return oracle_airlight(stage.truth, maps, distance=distance, walls=walls)
 
 
 def frame_within(renderer: FrameRenderer, limit: float) -> Frame:

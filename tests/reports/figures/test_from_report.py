@@ -83,7 +83,7 @@ def published():
     stages = ["silhouettes", "scene", "airlight of the scene", "sorting", "shadow planes"]
     return {
         "biri": {"stages": stages, "rows": [row], "zero_cost": []},
-        "billeter": {"figures": [image], "table": [view], "conclusions": []},
+        "billeter": {"figures": [image], "table": [view]},
     }
 
 

@@ -95,7 +95,6 @@ def billeter_tables(speed):
                 "light_moved": timing(speed * fps),
                 "missing": None,
                 "error": error,
-                "map_error": {"relative_rmse": 1e-6 if values.get("evaluation") else 1e-2},
             }
         )
     table = []
