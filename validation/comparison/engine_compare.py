@@ -15,14 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from reference.quadrature.light_points import REPLICATES
 from reference.quadrature.ray_values import TruthImage
 from reference.scene.read import read_truth
 from reference.storage.exr import NOTE, TOTAL, Image, read_exr
 from validation.comparison.engine_hints import GAIN, Hints
-from validation.comparison.engine_layers import KINDS, JudgedLayer, judged_layer, truth_layer
+from validation.comparison.engine_layers import KINDS, JudgedLayer, judged_layer, truth_error, truth_layer
 from validation.comparison.engine_pixels import PIXELS, PixelFit, fit_pixel
 from validation.comparison.engine_verdict import ErrorPlace, Verdict, error_place, judge
-from validation.comparison.images import Comparison, compare_images, read_mask
+from validation.comparison.images import BATCHES, Comparison, compare_images, read_mask
 from validation.estimates.agreement import pixel_angle
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import plain
@@ -40,7 +41,7 @@ class EngineComparison:
     size: tuple[int, int]  #: width and height [pixels]
     fit: PixelFit  #: what a pixel of the truth is, and what is wrong with the image as a whole
     expected: str  #: what the layer was compared with: 'airlight', 'surface', or 'total' for both
-    truth_error: float  #: bound of the error of the truth's airlight, relative to its mean
+    truth_error: float  #: bound of the error of the truth's airlight, with its standard error, relative to its mean
     comparison: Comparison
     place: ErrorPlace | None  #: where most of the error lies; None where there is none
     verdict: Verdict
@@ -169,8 +170,13 @@ def compare_scene(
     name, with_errors = judged.name, f"{judged.name}_se" in image.layers
     layers = {name: judged.values} | ({f"{name}_se": image.layers[f"{name}_se"]} if with_errors else {})
     wanted = truth_layer(fit.truth, judged.holds)
+    expected = {name: wanted}
+    own_error = truth_error(fit.truth, judged.holds)
+    if with_errors and own_error is not None:
+        # Where no path of the image arrived it has no standard error: the truth alone must not judge such a value.
+        expected[f"{name}_se"] = np.where(layers[f"{name}_se"] > 0, own_error, 0.0)
     comparison = compare_images(
-        Image({name: wanted}),
+        Image(expected, attributes={BATCHES: REPLICATES}),
         Image(layers, attributes=image.attributes),
         layer=name,
         mask=chosen,
@@ -205,10 +211,11 @@ def truths(loaded: LoadedScene, progress: Progress | None = None) -> Callable[[s
 
 
 def relative_bound(truth: TruthImage) -> float:
-    """Return the bound of the error of the airlight relative to its mean, where both are finite."""
-    finite = np.isfinite(truth.airlight) & np.isfinite(truth.airlight_bound)
+    """Return how well the airlight is known relative to its mean, where both are finite: its bound + standard error."""
+    error = truth.airlight_bound if truth.airlight_se is None else truth.airlight_bound + truth.airlight_se
+    finite = np.isfinite(truth.airlight) & np.isfinite(error)
     mean = float(truth.airlight[finite].mean()) if finite.any() else 0.0
-    return float(truth.airlight_bound[finite].mean()) / mean if mean > 0 else 0.0
+    return float(error[finite].mean()) / mean if mean > 0 else 0.0
 
 
 def lamp_distance(loaded: LoadedScene, truth: TruthImage) -> NDArray[np.float64]:

@@ -65,6 +65,18 @@ def truth_layer(truth: TruthImage, name: str) -> NDArray[np.float64]:
     return truth.airlight + truth.surface if name == TOTAL else getattr(truth, name)
 
 
+def truth_error(truth: TruthImage, name: str) -> NDArray[np.float64] | None:
+    """Return the standard error of `truth_layer`, (height, width, 3) [W/(m^2 sr)]; None without area lights.
+
+    Airlight and surface come from points of the same lights: the errors of the total are at most the sum of both.
+    """
+    if truth.airlight_se is None or truth.surface_se is None:
+        return None
+    if name == TOTAL:
+        return truth.airlight_se + truth.surface_se
+    return truth.airlight_se if name == AIRLIGHT else truth.surface_se
+
+
 def _usual(image: Image, path: str | os.PathLike[str]) -> str:
     colours = [each for each in image.layers if not each.endswith("_se")]
     for usual in (AIRLIGHT, TOTAL):

@@ -162,7 +162,7 @@ def _block_errors(truth: Array, image: Array, side: int) -> tuple[float, float]:
     scale = np.maximum(light, floor * count)[lit]
     error = np.abs(offset[lit]) / scale
     scatter = np.maximum(square - offset**2 / np.maximum(count, 1), 0.0)[lit]
-    kept = np.argsort(error)[: max(len(error) - math.ceil(OUTLIERS * len(error)), 1)]
+    kept = np.argsort(error)[: len(error) - int(OUTLIERS * len(error))]  # of few blocks none may be wrong
     return math.sqrt(float(np.mean(error[kept] ** 2))), math.sqrt(float(np.mean((scatter / scale**2)[kept])))
 
 

@@ -5,6 +5,7 @@ A method that refuses a scene gives a row too, with its reason. Nothing here kno
 """
 
 import json
+import shlex
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -255,10 +256,12 @@ def _repeated(work: Callable[[], Any]) -> tuple[list[float], list[float]]:
 
 
 def _command(cell: Cell) -> str:
-    """Return the command that shows the image of a cell again."""
+    """Return the command that shows the image of a cell again, as a shell reads it."""
     chosen = cell.chosen
     words = ["airlight", "view", cell.scene, "--method", chosen.method]
     words += ["--kernel", chosen.kernel] if chosen.kernel else []
-    words += [f"--set {name}={value}" for name, value in chosen.parameters]
-    words += [f"--change {change}" for change in cell.medium]
-    return " ".join([*words, "--size", f"{cell.size[0]}x{cell.size[1]}"])
+    for name, value in chosen.parameters:
+        words += ["--set", f"{name}={value}"]
+    for change in cell.medium:
+        words += ["--change", change]
+    return shlex.join([*words, "--size", f"{cell.size[0]}x{cell.size[1]}"])

@@ -8,6 +8,7 @@ from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
 from validation.comparison.engine_compare import compare_scene, scene_of_size
 from validation.comparison.engine_layers import truth_layer
+from validation.comparison.images import compare_files
 from validation.estimates.quadrature import truth_image
 from validation.scenes.loading import load_scene
 
@@ -103,6 +104,37 @@ def test_standard_errors_of_the_file_are_used(scene, truth, write):
     assert verdict.comparison.statistics is not None
     assert verdict.comparison.statistics.equivalent
     assert verdict.failures == ()
+
+
+AREA_LIT = SCENE.replace(
+    '<emitter type="point"><point name="position" value="0.7, 0.3, 1.9"/></emitter>',
+    """<shape type="rectangle"><transform name="to_world"><scale value="0.3"/>
+    <lookat origin="0.7, 0.3, 1.9" target="0, 0, 0" up="0, 0, 1"/></transform>
+    <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf><emitter type="area"/></shape>""",
+)
+
+
+@pytest.mark.claim("engine-margin", tolerance="1e-5: files are float32")
+@pytest.mark.parametrize("layer", ["airlight", "total"])
+def test_the_references_own_standard_errors_count_as_those_of_its_file(tmp_path, variant, write, layer):
+    """Under an area light, `compare SCENE IMAGE` says what `compare REFERENCE.exr IMAGE` says; it left them out."""
+    path = tmp_path / "area.xml"
+    path.write_text(AREA_LIT)
+    loaded = load_scene(str(path), (16, 12))
+    truth = truth_image(loaded.scene)
+    values = truth_layer(truth, layer)
+    errors = truth.airlight_se if layer == "airlight" else truth.airlight_se + truth.surface_se
+    sure = np.full(values.shape, 1e-5 * values.mean())  # an image that is surer than the reference
+    image = {layer: values + 1e-4 * values.mean(), f"{layer}_se": sure}
+    reference = tmp_path / "reference.exr"
+    write_exr(reference, Image({layer: values, f"{layer}_se": errors}, attributes={"airlight:batches": 8}))
+    by_file = compare_files(reference, write(**image), layer, margin=0.01).statistics
+    compared = compare_scene(str(path), write(**image), layer=layer, pixel="centre", margin=0.01)
+    by_scene = compared.comparison.statistics
+    assert by_scene.reference_variance_share == pytest.approx(by_file.reference_variance_share, rel=1e-5)
+    assert by_scene.relative_bias_ci == pytest.approx(by_file.relative_bias_ci, rel=1e-5, abs=1e-7)
+    assert by_file.reference_variance_share > 0.9
+    assert compared.truth_error > truth.airlight_se.mean() / truth.airlight.mean()
 
 
 def test_pixels_can_be_means(scene, truth, write):

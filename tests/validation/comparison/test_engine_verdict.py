@@ -145,3 +145,19 @@ def test_noise_of_pixels_is_told_from_an_error_of_blocks():
     assert replace(verdict, reasons=()).right
     dark = judge(0 * truth, 0 * truth, find_hints(truth, truth), ())
     assert dark.words == "not right: nothing is lit in the pixels that are compared"
+
+
+@pytest.mark.claim("engine-verdict", tolerance="none: one of 75 lit values is wrong by a tenth, 1.2 % RMS")
+def test_one_wrong_block_of_few_is_not_forgiven():
+    """A hundredth of the values may be wrong, which of 25 blocks is none; it used to be one at least."""
+    truth = np.zeros((160, 160, 3))
+    truth[:40, :40] = 1.0
+    image = truth.copy()
+    image[8:16, 8:16, 1] *= 1.1
+    assert judge(truth, truth, find_hints(truth, truth), ()).right
+    assert not judge(truth, image, find_hints(truth, image), ()).right
+    # Of 400 lit blocks four may be as wrong as they like: that of a lamp, whose variance is infinite, among them.
+    lit = np.ones(truth.shape)
+    image = lit.copy()
+    image[8:16, 8:16] *= 3
+    assert judge(lit, image, find_hints(lit, image), ()).right

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: a cell becomes a row of finite numbers that are those of the metrics, or says why there are none."""
 
+import shlex
 import weakref
 from dataclasses import replace
 
@@ -51,6 +52,15 @@ def test_a_row_has_the_errors_and_what_they_cost():
     assert (row["rays"], row["lights"], row["property.depth"]) == (24 * 18, 1, 2.0)
     assert row["colour.ciede2000_max"] < 0.1
     assert row["command"] == "airlight view sphere-spot --method shadow-planes --kernel exact --size 24x18"
+
+
+def test_the_command_of_a_row_is_read_by_a_shell_as_it_was_meant():
+    chosen = configuration("shadow-planes", None, {"order": "none"})
+    cell = Cell("/my scenes/a (b).xml", SIZE, ("medium.sigma_t=0.1, 0.2, 0.3",), chosen)
+    words = shlex.split(work._command(cell))
+    assert words[:5] == ["airlight", "view", "/my scenes/a (b).xml", "--method", "shadow-planes"]
+    assert words[words.index("--change") + 1] == "medium.sigma_t=0.1, 0.2, 0.3"
+    assert words[words.index("--set") + 1] == "order=none"
 
 
 @pytest.mark.usefixtures("variant")
