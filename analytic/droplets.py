@@ -41,9 +41,10 @@ The paper prints f = 0.5, "converted into 50 % lowered density", and a peak of 5
 takes what lies below the angle, and `cut="flat"` leaves the value at 5 degrees there, which takes less.
 `share="matched"` lowers the density by what is cut; `share="printed"` lowers it by half whatever is cut.
 
-Light of order 1 must not lose its peak, nor count it twice: with the lowered density it takes the full phase function
-divided by 1 - albedo f (the correction of Nakajima and Tanaka 1988, TMS), since albedo' kappa' p/(1 - f) = albedo kappa
-p. That is `Modified.single_scattering_factor`, the factor of p_full where p_modified would stand.
+Light of order 1 must not lose its peak, nor count it twice: with kappa' and albedo' it takes the full phase function
+divided by 1 - f (the correction of Nakajima and Tanaka 1988, TMS), since albedo' kappa' p/(1 - f) = albedo kappa p.
+That is `Modified.single_scattering_factor`, the factor of p_full where p_modified would stand. With kappa' and the
+albedo itself the divisor is 1 - albedo f.
 """
 
 from collections.abc import Callable

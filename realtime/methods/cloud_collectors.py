@@ -72,8 +72,8 @@ from realtime.methods.interface.view import View
 from realtime.numerics.array_types import types_of
 from realtime.numerics.recorded import Frozen
 from realtime.parameters import Parameters, parameter
-from realtime.scene.closed_mesh import boundary_scene
 from realtime.scene.medium import Clouds
+from realtime.scene.named_shapes import scene_of
 from realtime.scene.read_scene import Scene
 from realtime.shadow_maps.shadow_map import map_size
 from realtime.tiles.adaptive_sampling import tolerance
@@ -214,7 +214,7 @@ def prepare_collectors(scene: Scene, parameters: CollectorParameters) -> Callabl
     )
     fillings, left = _fillings(scene, parameters)
     surfaces = cloud_surfaces(scene)
-    bodies = [boundary_scene((shape,)) for shape in scene.boundaries]
+    bodies = [scene_of((shape,)) for shape in scene.boundaries]
     stride, threshold = (dr.opaque(Float, value) for value in (parameters.stride, parameters.threshold))
     slopes = parameters.normals == "slopes"
     cast = Frozen(
@@ -231,7 +231,7 @@ def prepare_collectors(scene: Scene, parameters: CollectorParameters) -> Callabl
         filled = scene.medium.clouds
         assert filled is not None
         depths = sun_depths(surfaces, filled, scene.lights, stride=stride)
-        settings = {"threshold": parameters.threshold, "stride": stride}
+        settings = {"body": body, "threshold": parameters.threshold, "stride": stride}
         maps = tuple(
             filtered_map(
                 [

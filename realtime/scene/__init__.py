@@ -8,6 +8,7 @@ Read in this order:
 - `density.py`: clouds whose density differs from place to place;
 - `medium.py`: homogeneous media, one without bounds or several with;
 - `lights.py`: point, spot and directional lights as homogeneous positions;
+- `named_shapes.py`: a Mitsuba scene of some shapes, under their names;
 - `closed_mesh.py`: closed meshes of any shape: their flaws by the name of an edge, and what lies inside;
 - `convex_bounds.py`: the convex bounds of media;
 - `directional_extent.py`: the smallest rectangle across a directional light through which all light of the media comes;

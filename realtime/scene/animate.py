@@ -38,6 +38,8 @@ MANY = 65_536
 def turned_light(light: Light, about: Array, turn: Array) -> Light:
     """Return a light turned about a point, with its axis if it has one; a light at infinity only turns its axis.
 
+    A uniform sky is the same whichever way it turns, and the beam that stands for it stays.
+
     Parameters
     ----------
     light
@@ -47,6 +49,8 @@ def turned_light(light: Light, about: Array, turn: Array) -> Light:
     turn
         Rotation matrix, (3, 3).
     """
+    if light.sky is not None:
+        return light
     if light.extent is not None:
         return replace(light, **_turned_directional(light, light.extent, turn))
     position = np.array(light.position, dtype=np.float64).ravel()
@@ -67,8 +71,9 @@ def _turned_directional(light: Light, extent: DirectionalExtent, turn: Array) ->
 
 def coloured_light(light: Light, share: float) -> Light:
     """Return a light whose red, green and blue rotate by a share of a turn; their sum stays."""
-    intensity = np.array(light.intensity, dtype=np.float64).ravel()
-    return replace(light, intensity=_like(light.intensity, _rotated(intensity, share)))
+    colours = {"intensity": light.intensity} | ({} if light.sky is None else {"sky": light.sky})
+    turned = {name: _rotated(np.array(colour, dtype=np.float64).ravel(), share) for name, colour in colours.items()}
+    return replace(light, **{name: _like(colours[name], colour) for name, colour in turned.items()})
 
 
 def _rotated(colour: Array, share: float) -> Array:
@@ -90,8 +95,6 @@ def with_area_lights(scene: Scene, area_lights: Sequence[AreaLight]) -> Scene:
     parameters = mi.traverse(mitsuba_scene(scene.geometry))
     for light in black:
         key = f"{light.name}.to_world"
-        if key not in parameters:
-            key = f"{light.name.replace('.', '-')}.to_world"  # as `realtime.scene.read_media.opaque_scene` names it
         third = np.cross(light.across, light.up)
         third *= np.linalg.norm(light.across) / np.linalg.norm(third)
         matrix = np.eye(4)

@@ -21,11 +21,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from realtime.errors import InputError
+from realtime.scene.named_shapes import scene_of
 
 Array = NDArray[np.float64]
 
 _SIDE = 1e-6  # of the length of an edge, and of the weights of a corner: what lies nearer to an end only touches it
-_HITS = 8  # triangles at the corners of an edge that a ray along it may meet before another one
+_HITS = 8  # triangles that a ray along an edge meets, at its corners mostly, before all triangles are tried instead
 
 
 @dataclass(frozen=True)
@@ -177,15 +178,20 @@ def _parts(number: int, mesh: ClosedMesh) -> list[_Part]:
 def _check_crossings(meshes: Sequence[ClosedMesh], shapes: Sequence[Any]) -> None:
     """Refuse meshes of which an edge passes through a triangle that it does not touch.
 
-    Mitsuba finds the triangles, in float32; the crossing is computed again in float64.
+    Mitsuba finds the triangles, in float32; the crossing is computed again in float64. Edges that meet very many
+    triangles are tried against every triangle whose box theirs touches.
     """
-    boundary = boundary_scene(shapes)
+    boundary = scene_of(shapes)
     numbers = {shape_number(shape): number for number, shape in enumerate(shapes)}
     for number, mesh in enumerate(meshes):
         tail, head = _edges(mesh)
         begin, end = mesh.vertices[tail], mesh.vertices[head]
-        met, triangle, edge = _met_triangles(boundary, begin, end)
+        met, triangle, edge, left = _met_triangles(boundary, begin, end)
         other = np.array([numbers[each] for each in met.tolist()], dtype=np.int64)
+        near = [_near_triangles(other.corners, begin[left], end[left]) for other in meshes]
+        other = np.concatenate([other, *(np.full(len(found[0]), n) for n, found in enumerate(near))])
+        triangle = np.concatenate([triangle, *(found[0] for found in near)])
+        edge = np.concatenate([edge, *(left[found[1]] for found in near)])
         for second in np.unique(other):
             pairs = np.flatnonzero(other == second)
             against = meshes[second]
@@ -215,7 +221,7 @@ def _edges(mesh: ClosedMesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def _met_triangles(boundary: Any, begin: Array, end: Array):
-    """Return the numbers of shapes and triangles that edges meet, and the number of the edge, of the first few."""
+    """Return the numbers of shapes and triangles that edges meet, and of the edges; and edges that may meet more."""
     length = np.linalg.norm(end - begin, axis=1)
     unit = (end - begin) / length[:, None]
     shapes, triangles, edges = [], [], []
@@ -240,7 +246,16 @@ def _met_triangles(boundary: Any, begin: Array, end: Array):
         left = left[past[left] < length[left]]
         if not len(left):
             break
-    return np.concatenate(shapes), np.concatenate(triangles), np.concatenate(edges)
+    return np.concatenate(shapes), np.concatenate(triangles), np.concatenate(edges), left
+
+
+def _near_triangles(corners: Array, begin: Array, end: Array):
+    """Return the numbers of triangles and of segments whose boxes touch."""
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    ends = np.minimum(begin, end), np.maximum(begin, end)
+    found = [np.flatnonzero(np.all((low <= b) & (high >= a), axis=1)) for a, b in zip(*ends, strict=True)]
+    segments = np.repeat(np.arange(len(found)), [len(each) for each in found])
+    return np.concatenate([*found, np.zeros(0, dtype=np.int64)]), segments
 
 
 def _piercing(corners: Array, begin: Array, end: Array):
@@ -257,11 +272,6 @@ def _piercing(corners: Array, begin: Array, end: Array):
         share = np.einsum("ij,ij->i", second, turned) * inverse
         weights = np.stack([u, v, 1 - u - v, share, 1 - share])
         return np.all(weights > _SIDE, axis=0) & np.isfinite(inverse)
-
-
-def boundary_scene(shapes: Sequence[Any]) -> Any:
-    """Return a Mitsuba scene of shapes, for casting rays at them."""
-    return mi.load_dict({"type": "scene"} | {f"boundary-{number}": shape for number, shape in enumerate(shapes)})
 
 
 def shape_number(shape: Any) -> int:

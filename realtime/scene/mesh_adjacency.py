@@ -138,7 +138,7 @@ def read_casters(scene, area_lights: Sequence[AreaLight] = ()) -> Casters:
     InputError
         For a shape that has no triangles, with its name.
     """
-    known = {name: light for light in area_lights for name in (light.name, light.name.replace(".", "-"))}
+    known = {light.name: light for light in area_lights}
     meshes = []
     for shape in scene.shapes():
         if shape.is_emitter() and shape.id() in known:

@@ -436,10 +436,16 @@ def named_phase(words: str, *, g=None, values=None, Float: Any = None) -> Phase:
     Raises
     ------
     InputError
-        For droplets out of range.
+        For words that name no phase function, a cell that is no number, or droplets out of range.
     """
     name, *cells = words.split(":")
-    numbers = [float(cell) for cell in cells]
+    by_name = {phase.name: phase for phase in PHASES}
+    if name not in by_name:
+        raise InputError(f"the phase function is '{words}'; wanted one of {', '.join(by_name)}")
+    try:
+        numbers = [float(cell) for cell in cells]
+    except ValueError:
+        raise InputError(f"the phase function is '{words}'; wanted numbers after '{name}:'") from None
     if len(numbers) > {HenyeyGreenstein.name: 1, HgDraine.name: 1, Mie.name: 3, ModifiedMie.name: 3}.get(name, 0):
         raise InputError(f"the phase function is '{words}'; it has fewer numbers: leave some out")
     if name in (Mie.name, ModifiedMie.name):
@@ -447,10 +453,12 @@ def named_phase(words: str, *, g=None, values=None, Float: Any = None) -> Phase:
     if name == HgDraine.name:
         return HgDraine(*numbers) if numbers else HgDraine(12.0)
     if name == HenyeyGreenstein.name:
+        if numbers and not -1 < numbers[0] < 1:
+            raise InputError(f"the mean cosine of '{words}' is {numbers[0]:g}; wanted more than -1, less than 1")
         return HenyeyGreenstein((Float or mi.Float)(numbers[0]) if numbers else g)
     if name == Tabulated.name:
         return Tabulated(values) if values is None else tabulated(values)
-    return {phase.name: phase for phase in PHASES}[name]()
+    return by_name[name]()
 
 
 def tabulated(values) -> Tabulated:

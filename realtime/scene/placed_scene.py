@@ -22,6 +22,7 @@ import numpy as np
 
 from realtime.numerics.aligned import aligned_numbers
 from realtime.scene.mesh_adjacency import Placement
+from realtime.scene.named_shapes import scene_of
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ class PlacedScene:
 def parted(scene, names: Sequence[str]) -> PlacedScene:
     """Return a Mitsuba scene with spaces of their own for the shapes of these names, in this order."""
     shapes = {shape.id(): shape for shape in scene.shapes()}
-    standing = _scene_of([shape for shape in scene.shapes() if shape.id() not in names])
+    standing = scene_of([shape for shape in scene.shapes() if shape.id() not in names])
     return PlacedScene(standing, tuple(_space(shapes[name]) for name in names))
 
 
@@ -118,7 +119,7 @@ def mitsuba_scene(scene) -> Any:
 def _space(shape) -> Space:
     number = dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))
     dr.make_opaque(number)
-    return Space(_scene_of([shape]), number, **_placement(np.eye(3), np.zeros(3)))
+    return Space(scene_of([shape]), number, **_placement(np.eye(3), np.zeros(3)))
 
 
 def _placement(rotation, shift) -> Mapping[str, Any]:
@@ -126,12 +127,3 @@ def _placement(rotation, shift) -> Mapping[str, Any]:
     numbers = aligned_numbers(mi.Float64, np.append(rotation, shift))
     rows = [mi.Vector3d(numbers[first : first + 3]) for first in range(0, 12, 3)]
     return {"rotation": tuple(rows[:3]), "shift": rows[3]}
-
-
-def _scene_of(shapes: Sequence[Any]) -> Any:
-    # A key of Mitsuba's dictionaries becomes the shape's name.
-    names = [shape.id() for shape in shapes]
-    scene = mi.load_dict({"type": "scene"} | {f"shape-{number}": shape for number, shape in enumerate(shapes)})
-    for shape, name in zip(shapes, names, strict=True):
-        shape.set_id(name)
-    return scene

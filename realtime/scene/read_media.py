@@ -21,6 +21,7 @@ from realtime.scene.closed_mesh import ClosedMesh, check_bodies, encloses
 from realtime.scene.convex_bounds import Bounds, holds, mean_distance, overlap, plane_neighbours, read_bounds
 from realtime.scene.density import DensityGrid, density_on_device, read_density
 from realtime.scene.medium import BoundedMedium, Clouds, Medium
+from realtime.scene.named_shapes import scene_of
 from realtime.scene.phase import HenyeyGreenstein, Isotropic, Phase, named_phase, tabulated
 
 _PHASES = {
@@ -67,10 +68,14 @@ def opaque_scene(scene, opaque):
     """Return the scene itself where all shapes are opaque, else a scene of those that are, under their names."""
     if len(opaque) == len(scene.shapes()):
         return scene
-    # A key of Mitsuba's dictionaries becomes the shape's name, and holds no dots. Shapes without a name get one: under
-    # the same key the last would be left alone.
-    names = [shape.id().replace(".", "-") or f"{shape.class_name()}-{number}" for number, shape in enumerate(opaque, 1)]
-    return mi.load_dict({"type": "scene"} | dict(zip(names, opaque, strict=True)))
+    taken = {shape.id() for shape in opaque}
+    for number, shape in enumerate(opaque, 1):
+        if not shape.id():
+            name = f"{shape.class_name()}-{number}"
+            while name in taken:
+                name += "-unnamed"
+            shape.set_id(name)
+    return scene_of(opaque)
 
 
 def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[ClosedMesh, ...]]:
@@ -119,7 +124,6 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[Cl
             f"shape '{_first_cloud(shapes, uneven)}' bounds a medium within another one and is not convex, or that "
             "medium is not homogeneous; wanted clear air around it: remove the exterior medium, and the camera's"
         )
-    # By the names of the meshes: casting rays at shapes gave these others.
     grids = [
         read_density(shape.interior_medium(), meshes[number]) if meshes and meshes[number].name in uneven else None
         for number, shape in enumerate(boundaries)

@@ -16,13 +16,13 @@ Bounds of media and lights with extent stay as they are: they must be convex, or
 from collections.abc import Iterable
 from typing import Any
 
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from realtime.area_lights.read import is_area_light
 from realtime.scene.mesh_adjacency import mesh_triangles
+from realtime.scene.named_shapes import scene_of
 from validation.scenes.parts import mesh_with_material
 from validation.scenes.solids import divided
 
@@ -60,10 +60,9 @@ def subdivided(scene, levels: int) -> Any:
 
 def with_shapes(scene, shapes: Iterable[Any]) -> Any:
     """Return a Mitsuba scene of other shapes, with the camera and the lights without extent of one."""
-    parts: dict[str, Any] = {"type": "scene", "sensor": scene.sensors()[0]}
-    others = (emitter for emitter in scene.emitters() if not is_area_light(emitter))
-    parts |= {f"emitter-{number}": emitter for number, emitter in enumerate(others)}
-    return mi.load_dict(parts | {shape.id().replace(".", "-"): shape for shape in shapes})
+    emitters = (emitter for emitter in scene.emitters() if not is_area_light(emitter))
+    parts = {f"emitter-{number}": emitter for number, emitter in enumerate(emitters)}
+    return scene_of(list(shapes), {"sensor": scene.sensors()[0]} | parts)
 
 
 def _cut(shape, levels: int, corner: NDArray[np.float64], size: float) -> Any:

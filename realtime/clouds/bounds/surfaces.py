@@ -10,8 +10,9 @@ import numpy as np
 
 from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import four_numbers
-from realtime.scene.closed_mesh import boundary_scene, shape_number
+from realtime.scene.closed_mesh import shape_number
 from realtime.scene.mesh_adjacency import mesh_triangles
+from realtime.scene.named_shapes import scene_of
 from realtime.scene.read_scene import Scene
 
 
@@ -38,7 +39,7 @@ def cloud_surfaces(scene: Scene) -> CloudSurfaces:
     facets = aligned_array(mi.Float, np.concatenate(rows).ravel())
     spheres = not all(shape.is_mesh() for shape in shapes)
     firsts, clouds = (aligned_array(mi.UInt32, values) for values in (first, cloud))
-    surfaces = CloudSurfaces(boundary_scene(shapes), firsts, clouds, facets, spheres, len(shapes) > 1)
+    surfaces = CloudSurfaces(scene_of(shapes), firsts, clouds, facets, spheres, len(shapes) > 1)
     dr.make_opaque(surfaces.first, surfaces.cloud, surfaces.facets)
     return surfaces
 

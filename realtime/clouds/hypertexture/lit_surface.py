@@ -107,7 +107,15 @@ def dense_surface(
 
 
 def lit_dense_surface(
-    surfaces: CloudSurfaces, clouds: Clouds, light: Light, size: int, *, cloud: int, threshold: float, stride: Any
+    surfaces: CloudSurfaces,
+    clouds: Clouds,
+    light: Light,
+    size: int,
+    *,
+    cloud: int,
+    body: Any,
+    threshold: float,
+    stride: Any,
 ) -> LitSurfaces:
     """Return what rays along a light meet of one cloud, as `realtime.clouds.light_maps.surfaces.cast_surfaces` does.
 
@@ -119,6 +127,8 @@ def lit_dense_surface(
         As for `cast_surfaces`.
     cloud
         Its number.
+    body
+        By cloud, mean(rho where rho > rho_0) [1].
     """
     check_size(size)
     Float, Vector = type(light.position.x), type(light.position)
@@ -127,7 +137,6 @@ def lit_dense_surface(
     met = dense_surface(
         surfaces, clouds, origin, direction, Float(dr.inf), threshold=threshold, stride=stride, only=cloud
     )
-    assert clouds.density is not None
     there = dr.isfinite(met.distance)
     distance = dr.select(there, met.distance, 0)
     point = origin + direction * distance
@@ -140,8 +149,7 @@ def lit_dense_surface(
     length = dr.norm(normal)
     normal = dr.select(length > 0, normal / length, -direction)
     front = dr.select(there, Float(light.extent.depth) - distance, 0)
-    body = clouds.density.mean_above(cloud, threshold)
-    back = dr.select(there, front - met.behind / body, 0)
+    back = dr.select(there, front - met.behind / dr.gather(Float, body, mi.UInt32(cloud)), 0)
     lit = LitSurfaces(size, texel, there, front, back, dr.select(there, normal, 0))
     dr.eval(lit)
     return lit

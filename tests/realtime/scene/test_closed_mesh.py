@@ -57,6 +57,14 @@ def test_meshes_that_bound_no_body_are_refused_with_an_edge(parts, message):
         read_scene(loaded(sun=SUN, **named))
 
 
+@pytest.mark.parametrize("parts", [[pulled(ring(), 0, (-180.0, 10.0, 5.0))], [ring(), ring((90.3, 20.1, 4.7))]])
+def test_a_crossing_is_found_after_however_many_triangles_along_the_edge(parts, monkeypatch):
+    monkeypatch.setattr("realtime.scene.closed_mesh._HITS", 1)
+    named = {str(number): cloud(str(number), mesh) for number, mesh in enumerate(parts)}
+    with pytest.raises(InputError, match="passes through triangle"):
+        read_scene(loaded(sun=SUN, **named))
+
+
 def test_a_hollow_cloud_and_a_cloud_in_its_hollow_are_taken():
     shell = joined(
         [placed(torus(101.0, 41.0, (23, 17)), (0, 0, 0)), placed(flipped(torus(101.0, 17.0, (23, 17))), (0, 0, 0))]

@@ -60,10 +60,26 @@ def test_droplets_are_those_of_the_analytic_side(variant, words):
         assert value == pytest.approx(expected, rel=tolerance, abs=1e-12)
 
 
-def test_too_many_numbers_and_impossible_droplets_are_refused(variant):
+WRONG = (
+    "fog",
+    "",
+    "::",
+    "hg:x",
+    "hg:",
+    "hg:nan",
+    "hg:1",
+    "hg:0.1:0.2",
+    "mie:6:2:0.55:1",
+    "mie:51",
+    "hg-draine:4.9",
+    "hazy:1",
+)
+
+
+@pytest.mark.parametrize("words", WRONG)
+def test_words_that_name_no_phase_function_are_refused_as_a_mistake_of_the_user(variant, words):
     from realtime.errors import InputError
     from realtime.scene.phase import named_phase
 
-    for words in ("mie:6:2:0.55:1", "mie:51", "hg-draine:4.9", "hg:0.1:0.2", "isotropic:1"):
-        with pytest.raises(InputError):
-            named_phase(words)
+    with pytest.raises(InputError):
+        named_phase(words)

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from tests.helpers.scenes import spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 
 
 def read(**changes):
@@ -26,6 +26,25 @@ def test_reads_what_the_scene_holds(variant):
     assert float(cone.inverse_transition[0]) == pytest.approx(1 / np.deg2rad(12))
     towards = np.array([0.1, 0.1, 0.4]) - [0.7, -0.3, 2.6]
     assert np.array(cone.axis).ravel() == pytest.approx(towards / np.linalg.norm(towards), abs=1e-6)
+
+
+@pytest.mark.parametrize("names", [("a.b", "a-b"), ("Sphere-2", ""), ("", "Sphere-1"), ("", ""), ("a.b.c", "a-b.c")])
+def test_every_opaque_shape_stays_whatever_its_name(variant, names):
+    """Mitsuba's dictionaries have keys without dots, each once; beside a boundary the opaque shapes are a new scene."""
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+
+    bounded = bounded_medium({"type": "cube"}, 0.3, (0.9, 0.9, 0.9))
+    scene = clear_scene(first={"type": "sphere"}, second={"type": "sphere", "center": [5.0, 0.0, 0.0]}, box=bounded)
+    loaded = mi.load_dict(scene)
+    opaque = [shape for shape in loaded.shapes() if shape.interior_medium() is None]
+    for shape, name in zip(opaque, names, strict=True):
+        shape.set_id(name)
+    kept = read_scene(loaded).geometry.shapes()
+    assert len({shape.id() for shape in kept}) == 2
+    assert {name for name in names if name} <= {shape.id() for shape in kept}
+    assert sorted(float(shape.bbox().min[0]) for shape in kept) == [-1.0, 4.0]
 
 
 @pytest.mark.claim("not-needed-costs-nothing")

@@ -18,9 +18,11 @@ from realtime.clouds.hypertexture.lit_surface import dense_surface, lit_dense_su
 from realtime.clouds.hypertexture.march import marched_depths
 from realtime.clouds.light_maps.surfaces import cast_surfaces
 from realtime.frame.renderer import frame_renderer, render_frame
+from realtime.methods.cloud_collectors import CollectorParameters, prepare_collectors
 from realtime.methods.registry import METHODS
 from realtime.scene.camera import ray_directions
-from realtime.scene.closed_mesh import boundary_scene
+from realtime.scene.density import Density
+from realtime.scene.named_shapes import scene_of
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import SUN, TURN, cloud, cloud_scene, crossings, dense, linear_between, ring
 from validation.scenes.parts import placed
@@ -205,8 +207,8 @@ def test_the_surface_is_where_the_density_passes_the_threshold():
 def test_the_light_map_of_an_even_grid_is_that_of_the_mesh():
     read = read_scene(uneven(np.ones((2, 2, 2))))
     surfaces, clouds, light = cloud_surfaces(read), read.medium.clouds, read.lights[0]
-    own = lit_dense_surface(surfaces, clouds, light, 64, cloud=0, threshold=0.5, stride=mi.Float(1))
-    cast = cast_surfaces(boundary_scene(read.boundaries), light, 64)
+    own = lit_dense_surface(surfaces, clouds, light, 64, cloud=0, body=mi.Float(1), threshold=0.5, stride=mi.Float(1))
+    cast = cast_surfaces(scene_of(read.boundaries), light, 64)
     np.testing.assert_array_equal(own.there, cast.there)
     np.testing.assert_allclose(own.front, cast.front, atol=0.01)
     np.testing.assert_allclose(np.array(own.normal), np.array(cast.normal), atol=1e-5)
@@ -214,3 +216,12 @@ def test_the_light_map_of_an_even_grid_is_that_of_the_mesh():
     thickness, filled = np.array(own.front) - np.array(own.back), np.array(cast.front) - np.array(cast.back)
     assert np.all(thickness <= filled + 0.02)
     assert thickness.sum() < 0.9 * filled.sum()
+
+
+def test_a_light_that_moves_computes_its_map_without_the_mean_densities(monkeypatch):
+    """They are sums over all voxels, which wait for the device; they belong to the cloud and are made once."""
+    read = read_scene(uneven(np.ones((2, 2, 2))))
+    state = prepare_collectors(read, CollectorParameters(map=32))
+    before = state(read)
+    monkeypatch.setattr(Density, "mean_above", None)
+    assert state(read).body is before.body
