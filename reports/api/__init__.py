@@ -16,7 +16,7 @@ Read in this order:
 - `report.py`: `report`
 
 May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `realtime.scene`, `reference.storage`,
-`reports.data`, `reports.machine`, `reports.plotting`, `reports.report`, `reports.tables`, `validation.advise`,
-`validation.comparison`, `validation.configurations`, `validation.estimates`, `validation.fit`, `validation.frames`,
-`validation.kernels`, `validation.metrics`, `validation.scenes`, `validation.slab`.
+`reports.data`, `reports.machine`, `reports.plotting`, `reports.report`, `reports.tables`, `validation.comparison`,
+`validation.configurations`, `validation.estimates`, `validation.fit`, `validation.frames`, `validation.kernels`,
+`validation.metrics`, `validation.scenes`, `validation.slab`.
 """

@@ -65,8 +65,7 @@ def render(
         See `load_scene`.
     method
         A name (`airlight.METHODS`), one's own as 'module:function' or 'path/to/file.py:function', or such a function
-        itself, ``method(view, *, kernel=None, **parameters)``, from the top of a module or a notebook; or 'auto', what
-        the advice names for ``error=1e-3``, its one parameter.
+        itself, ``method(view, *, kernel=None, **parameters)``, from the top of a module or a notebook.
     kernel
         A name (`airlight.KERNELS`), such a name with '-N', 'module:function', or such a function itself; 'exact' by
         default, for a method that calls a kernel.
@@ -94,24 +93,23 @@ def render(
     ((24, 32, 3), 'float32')
     """
     from realtime.frame.renderer import render_frame
+    from realtime.methods.registry import find_method
     from realtime.scene.features import describe
     from realtime.scene.read_scene import read_scene
     from reports.api.results import Rendering, sealed
     from reports.machine.environment import activate
-    from validation.advise.auto import AUTO, auto_configuration
     from validation.configurations.methods import configuration, prepared
     from validation.configurations.timing import time_frame
     from validation.estimates.images import layered_frame
 
     activate()  # a user's module may need a variant when it is imported
     # A method that is not known is refused before the scene is loaded.
-    known = None if method == AUTO else configuration(method, kernel_name(kernel), parameters)
+    chosen = configuration(method, kernel_name(kernel), parameters)
     loaded = opened(scene, size)
     read = read_scene(loaded.scene, precision)
-    chosen = known or auto_configuration(read, kernel_name(kernel), parameters)[0]
-    renderer = prepared(read, chosen)
-    layered = prepared(read, chosen, extra_layers=True) if renderer.method.layers else renderer
-    image = layered_frame(loaded.name, chosen, render_frame(layered))
+    layered = bool(find_method(chosen.method).layers)
+    renderer = prepared(read, chosen, extra_layers=layered)
+    image = layered_frame(loaded.name, chosen, render_frame(renderer))
     return Rendering(
         scene=loaded.name,
         image=sealed(image),
@@ -122,7 +120,7 @@ def render(
         precision=precision,
         plan=describe(read.features),
         notes=read.features.notes,
-        times=time_frame(renderer) if timed else None,
+        times=time_frame(prepared(read, chosen)) if timed else None,
     )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight bench --kernels`: kernels alone on many rays, and what their derivatives cost."""
+"""`airlight bench --kernels`: kernels alone on many rays."""
 
 
 def print_kernels(names: list[str] | None, *, phase: str | None, json: bool, markdown: bool) -> None:
@@ -32,30 +32,3 @@ def print_kernels(names: list[str] | None, *, phase: str | None, json: bool, mar
     print("ns/ray: the kernel alone by Dr.Jit's history, median; ~ is extrapolated from fewer steps.")
     if orders:
         print_tables([order_table(orders)], as_markdown=markdown)
-
-
-def print_gradients(names: list[str] | None, *, phase: str | None, json: bool, markdown: bool) -> None:
-    """Print what derivatives of kernels cost beside their values."""
-    from analytic.phase import phase_from_words
-    from realtime.kernels.registry import KERNELS
-    from reports.machine.environment import activate, describe_environment
-    from reports.machine.printing import print_heading, print_tables
-    from reports.machine.progress import counted, progress_bar
-    from reports.tables.kernels import gradient_table
-    from reports.tables.terminal import print_json
-    from validation.kernels.gradient_cost import PHASES, gradient_costs
-    from validation.metrics.errors import plain
-
-    phases = PHASES if phase is None else ((phase, phase_from_words(phase).g),)
-    activate()
-    with progress_bar("bench --gradients") as progress:
-        costs = plain(gradient_costs(names or list(KERNELS), phases, progress=counted(progress)))
-    if json:
-        print_json({"environment": describe_environment(), "gradients": costs})
-        return
-    if markdown:
-        print_heading()
-    print_tables([gradient_table(costs)], as_markdown=markdown)
-    print(
-        "ns/ray, medians of the kernels alone by Dr.Jit's history; all: by foot, height, both distances, sigma_t and g."
-    )

@@ -9,10 +9,8 @@ Read in this order:
 - `completion.py`: what the shell completes
 - `options.py`: options that several commands have
 - `own_methods.py`: methods of the user's own
-- `advise.py`: `airlight advise`
 - `baselines.py`: `airlight baselines`
 - `bench.py`: `airlight bench`
-- `bench_stages.py`: what its `--stages` does
 - `cache.py`: `airlight cache`
 - `certify.py`: `airlight certify`
 - `compare.py`: `airlight compare`
@@ -44,7 +42,7 @@ May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`,
 `realtime.methods.shadow_planes`, `realtime.parameters`, `realtime.scene`, `realtime.shadow_maps`, `reference.storage`,
 `reports.bench`, `reports.cluster`, `reports.data`, `reports.diff`, `reports.docs`, `reports.figures`,
 `reports.gallery`, `reports.interchange`, `reports.machine`, `reports.papers`, `reports.plotting`, `reports.report`,
-`reports.sweep`, `reports.tables`, `reports.view`, `validation.advise`, `validation.canonical`, `validation.certified`,
+`reports.sweep`, `reports.tables`, `reports.view`, `validation.canonical`, `validation.certified`,
 `validation.comparison`, `validation.configurations`, `validation.diagnosis`, `validation.estimates`,
 `validation.fidelity`, `validation.fit`, `validation.frames`, `validation.kernels`, `validation.metrics`,
 `validation.mutations`, `validation.papers`, `validation.scaling`, `validation.scenes`, `validation.slab`,

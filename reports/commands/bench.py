@@ -3,17 +3,14 @@
 
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from reports.bench.decompose import print_decomposition
-from reports.bench.diagnosis import print_diagnoses
 from reports.bench.estimators import print_estimators
-from reports.bench.interpolation import print_interpolation
-from reports.bench.kernels import print_gradients, print_kernels
+from reports.bench.kernels import print_kernels
 from reports.bench.methods import print_methods, steps
-from reports.bench.octaves import print_octave_fits
 from reports.bench.scaling import print_scaling
 from reports.commands import completion
 from reports.commands.options import (
@@ -24,14 +21,23 @@ from reports.commands.options import (
     Meshes,
     MethodLimit,
     Methods,
-    OldMethods,
     Ranges,
     Scenes,
     Settings,
     Size,
     drawn_from,
-    named,
 )
+
+_MARGIN = 0.01  # relative bias of volpath that counts as agreement
+_OF_METHODS = {"a scene", "--method", "--kernel", "--set", "--size", "--meshes", "--ranges", "--method-limit"}
+#: What each table takes of the options that only some take; "" is the table of methods.
+_TAKES = {
+    "": {*_OF_METHODS, "--no-truth", "--margin", "--force", "--markdown"},
+    "--kernels": {"--kernel", "--phase", "--markdown"},
+    "--estimators": {"a scene", "--size", "--meshes", "--ranges", "--force"},
+    "--decompose": {*_OF_METHODS, "--output", "--force", "--markdown"},
+    "--scaling": {*_OF_METHODS, "--against", "--markdown"},
+}
 
 
 def bench(
@@ -51,10 +57,6 @@ def bench(
     meshes: Meshes = None,
     ranges: Ranges = None,
     kernels: Annotated[bool, typer.Option("--kernels", help="Time the kernels alone, on 480 000 rays.")] = False,
-    gradients: Annotated[
-        bool,
-        typer.Option("--gradients", help="With --kernels: what their derivatives cost, in place of time and error."),
-    ] = False,
     phase: Annotated[
         str | None,
         typer.Option(
@@ -69,17 +71,6 @@ def bench(
     decompose: Annotated[
         bool, typer.Option("--decompose", help="Split the error of every method by its causes, in place of timing it.")
     ] = False,
-    diagnosis: Annotated[
-        bool, typer.Option("--diagnosis", help="Plant faults in scenes and count how often a diagnosis names them.")
-    ] = False,
-    octaves: Annotated[
-        bool,
-        typer.Option("--fit-octaves", help="Find the constants of cloud-octaves that fit a scene of clouds best."),
-    ] = False,
-    stages: Annotated[
-        bool,
-        typer.Option("--stages", help="Time the stages of cloud-collectors, and count searches without end."),
-    ] = False,
     scaling: Annotated[
         str | None,
         typer.Option(
@@ -88,18 +79,11 @@ def bench(
             show_default=False,
         ),
     ] = None,
-    interpolation: Annotated[
-        bool,
-        typer.Option(
-            "--interpolation", help="Count the rays of interpolated images, between tiles and along epipolar lines."
-        ),
-    ] = False,
     against: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="With --scaling: what its --json printed before; the baseline of the scene by default. With "
-            "--fit-octaves: the truth, an EXR with the layer airlight; that of cloud-paths by default.",
+            help="With --scaling: what its --json printed before; the baseline of the scene by default.",
             show_default=False,
         ),
     ] = None,
@@ -120,69 +104,60 @@ def bench(
             metavar="SHARE",
             help="Relative bias of volpath that counts as agreement; the time grows like 1/margin^2.",
         ),
-    ] = 0.01,
+    ] = _MARGIN,
     method_limit: MethodLimit = USUAL_LIMIT,
     force: Force = False,
     json: Json = False,
     markdown: Markdown = False,
-    methods: OldMethods = None,
 ) -> None:
     """Print tables of speed against error: methods, or kernels.
 
     Every method is timed in every scene and compared with the truth, or with --kernels every kernel on many rays.
+    --kernels, --estimators, --decompose and --scaling are tables of their own: one of them may be given.
 
     `airlight` is the airlight alone (the kernel with its ray set-up), `frame` a frame with static geometry and light,
     `light moved` a frame after the light moved. Exit status 1 if single-scatter does not confirm the truth within
     +-0.05 %, or volpath within +- the margin, or if a method of your own is at fault.
 
-    --fit-octaves prints the extinction, contribution and anisotropy of cloud-octaves with the least relative RMSE of
-    the airlight, beside those that halve everything; other parameters come by --set.
-
-    --stages prints what light maps, order 1 and frames of cloud-collectors take, stratocumulus by default, and in how
-    many pixels a search is far from its end; parameters come by --set.
-
     --scaling prints times, memory and exponents by pixels, triangles, lights, bounded media or texels of the map, of
     colonnade and one configuration of each method with shadows by default. Exit status 1 if a time jumps, or grows with
     a higher power of the work than in the baseline.
-
-    --interpolation prints with how many rays an image of colonnade by shadow-planes, or of other scenes and methods, is
-    within 0.1 % where its airlight is interpolated between tiles or along epipolar lines.
 
     --decompose prints by which causes each image is wrong: parts that add up to its error, differences of renders in
     which one cause after the other is gone.
     """
     from analytic.errors import InputError
 
+    tables = {
+        "--kernels": kernels,
+        "--estimators": estimators,
+        "--decompose": decompose,
+        "--scaling": scaling is not None,
+    }
+    given = {
+        "a scene": scenes,
+        "--method": method,
+        "--kernel": kernel,
+        "--set": settings,
+        "--size": size,
+        "--meshes": meshes,
+        "--ranges": ranges,
+        "--method-limit": method_limit != USUAL_LIMIT,
+        "--phase": phase,
+        "--against": against,
+        "--output": output,
+        "--no-truth": not truth,
+        "--margin": margin != _MARGIN,
+        "--force": force,
+        "--markdown": markdown,
+    }
+    _check_options(tables, given)
     if not 0 < margin < 1:
         raise InputError(f"--margin: got {margin:g}, wanted a share between 0 and 1, such as 0.002 for 0.2 %")
-    if output is not None and not decompose:
-        raise InputError("--output: got a folder without --decompose, which alone writes images; add --decompose")
-    scenes = drawn_from(scenes or [], meshes, ranges) or None
-    named_kernels = named("--kernel", kernel, "--kernel", None)
-    if against is not None and not octaves and scaling is None:
-        raise InputError("--against: got a file without --scaling or --fit-octaves, which take one; add one of them")
-    if octaves:
-        print_octave_fits(scenes, size=size, against=against, settings=settings, json=json, markdown=markdown)
-        return
-    if stages:
-        from reports.commands.bench_stages import bench_stages
-
-        bench_stages(scenes, size=size, settings=settings, json=json, markdown=markdown)
-        return
     if kernels:
-        _refuse_scenes(scenes)
-        if gradients:
-            print_gradients(named_kernels or None, phase=phase, json=json, markdown=markdown)
-        else:
-            print_kernels(named_kernels or None, phase=phase, json=json, markdown=markdown)
+        print_kernels(kernel, phase=phase, json=json, markdown=markdown)
         return
-    if gradients:
-        raise InputError("--gradients: they are those of kernels; add --kernels")
-    if phase is not None:
-        raise InputError("--phase: it is for kernels; add --kernels, a scene has its own phase function")
-    if diagnosis:
-        print_diagnoses(scenes, size=size, json=json, markdown=markdown)
-        return
+    scenes = drawn_from(scenes or [], meshes, ranges) or None
     if estimators:
         print_estimators(scenes, size=size, force=force, json=json)
         return
@@ -198,19 +173,16 @@ def bench(
     from validation.scenes.registry import FOG_SCENES
 
     chosen = named_configurations(
-        named("--method", method, "--methods", methods),
-        named_kernels,
+        method or [],
+        kernel or [],
         settings or [],
-        usual=METHODS[:1] if interpolation else None if scaling is None else METHODS,
+        usual=None if scaling is None else METHODS,
         limit=method_limit,
     )
     apart = partial(in_own_process, limit=method_limit)
     pixels = parse_size(size) if size else None
     if scaling is not None:
         print_scaling(scenes, scaling, size=pixels, chosen=chosen, against=against, json=json, markdown=markdown)
-        return
-    if interpolation:
-        print_interpolation(scenes, size=pixels, chosen=chosen, json=json, markdown=markdown)
         return
     activate()
     names = scenes or list(FOG_SCENES)
@@ -228,17 +200,17 @@ def bench(
     print_methods(names, pixels, chosen, margin=margin if truth else None, apart=apart, json=json, markdown=markdown)
 
 
-def _refuse_scenes(scenes: list[str] | None) -> None:
-    """Refuse scenes beside --kernels, which needs none; in version 0.1 the words there were kernels."""
+def _check_options(tables: dict[str, bool], given: dict[str, Any]) -> None:
+    """Refuse two tables at once, and options that the table does not take: nothing is dropped in silence."""
     from analytic.errors import InputError
 
-    if not scenes:
-        return
-    known = completion.kernel_names()
-    meant = [word for word in scenes if word.rpartition("-")[0] in known or word in known or ":" in word]
-    if meant:
-        options = " ".join(f"--kernel {word}" for word in meant)
-        raise InputError(f"bench --kernels: {meant[0]!r} is a kernel and stands where scenes stand: write {options}")
-    raise InputError(
-        f"bench --kernels: got the scene {scenes[0]!r}, but kernels are timed without a scene: leave it out"
-    )
+    asked = [name for name, wanted in tables.items() if wanted]
+    if len(asked) > 1:
+        raise InputError(f"bench: got {' and '.join(asked)}, which print tables of their own; wanted one of them")
+    name = asked[0] if asked else ""
+    for option, value in given.items():
+        if value and option not in _TAKES[name]:
+            takers = " and ".join(f"bench {table}".strip() for table, takes in _TAKES.items() if option in takes)
+            raise InputError(f"{f'bench {name}'.strip()}: got {option}, which is for {takers}; leave it out")
+    if given["--no-truth"] and given["--margin"]:
+        raise InputError("bench: got --no-truth and --margin, but the margin is that of the comparison; leave one out")

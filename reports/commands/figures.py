@@ -22,7 +22,6 @@ FIGURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "convergence": ("convergence", ("quick", "progress")),
     "z-distribution": ("z_distribution", ("quick", "progress")),
     "decomposition": ("decomposition", ("quick", "progress")),
-    "froxels": ("froxels", ("quick", "progress")),
     "slab-orders": ("slab_orders", ("quick", "progress")),
     "cloud-transport": ("cloud_transport", ("quick", "progress")),
     "cloud-images": ("cloud_images", ("quick", "progress")),
@@ -102,7 +101,6 @@ def figures(
             show_default=False,
         ),
     ] = None,
-    scene: Annotated[str | None, typer.Option(hidden=True, help="The scene, which now stands behind.")] = None,
 ) -> None:
     """Write figures and tables for papers, with their data.
 
@@ -116,6 +114,7 @@ def figures(
     from reports.machine.progress import part_of, progress_bar
     from reports.plotting.style import WIDTHS
 
+    scene = None
     words = [name for name in names or () if name not in FIGURES]
     if words:
         if len(words) > 1 or words[0] not in _scene_names(report):

@@ -51,21 +51,6 @@ def list_(
             print_table(replace(made(), title=name.capitalize()))
 
 
-def scenes(json: Json = False) -> None:
-    """List the built-in scenes: `airlight list scenes`."""
-    list_("scenes", json)
-
-
-def methods(json: Json = False) -> None:
-    """List the real-time methods with their parameters: `airlight list methods`."""
-    list_("methods", json)
-
-
-def kernels(json: Json = False) -> None:
-    """List the airlight kernels with their parameters: `airlight list kernels`."""
-    list_("kernels", json)
-
-
 def _plain(table: "Table") -> list[dict[str, Any]]:
     from reports.tables.drawing import text_of
 

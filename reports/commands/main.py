@@ -16,7 +16,6 @@ from typing import Annotated, Any
 import typer
 
 from reports import __version__
-from reports.commands.advise import advise
 from reports.commands.baselines import baselines
 from reports.commands.bench import bench
 from reports.commands.cache import cache
@@ -34,7 +33,7 @@ from reports.commands.fit import fit
 from reports.commands.gallery import gallery
 from reports.commands.help import HelpfulCommand, HelpfulGroup
 from reports.commands.integrate import integrate
-from reports.commands.lists import kernels, list_, methods, scenes
+from reports.commands.lists import list_
 from reports.commands.maps import maps
 from reports.commands.merge import merge
 from reports.commands.mutations import mutations
@@ -63,7 +62,7 @@ DONE, FAILED, WRONG_INPUT, MISSING, INTERRUPTED = 0, 1, 2, 3, 130
 #: The panels of --help, by what one wants to do, and their commands in its order.
 _PANELS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start": (doctor, list_, render, view, cache),
-    "Measure": (report, diff, bench, advise, sweep, maps, stability),
+    "Measure": (report, diff, bench, sweep, maps, stability),
     "Images": (reference, compare, fit, merge, describe, integrate, slab, clouds, gallery),
     "Papers": (published, figures, fidelity),
     "Develop": (run_tests, docs, baselines, mutations, certify),
@@ -97,8 +96,6 @@ for _panel, _commands in _PANELS.items():
         # Typer hands unknown arguments of `test` on to pytest.
         _more = {"allow_extra_args": True, "ignore_unknown_options": True} if _command is run_tests else None
         app.command(_NAMES.get(_command), cls=HelpfulCommand, rich_help_panel=_panel, context_settings=_more)(_command)
-for _command in (scenes, methods, kernels):  # as `list` was called in version 0.1
-    app.command(cls=HelpfulCommand, hidden=True)(_command)
 
 
 def _print_version(wanted: bool) -> None:

@@ -39,8 +39,6 @@ Methods = Annotated[
         autocompletion=completion.methods,
     ),
 ]
-OldMethods = Annotated[str | None, typer.Option("--methods", hidden=True, help="Several of --method, with commas.")]
-OldScenes = Annotated[str | None, typer.Option("--scenes", hidden=True, help="Several of SCENE, with commas.")]
 Settings = Annotated[
     list[str] | None,
     typer.Option(
@@ -184,15 +182,3 @@ def listed(option: str, text: str) -> list[str]:
 
         raise InputError(f"{option}: got {text!r}, wanted names with commas between them, none of them empty")
     return words
-
-
-def named(option: str, words: list[str] | None, old_option: str, old: str | None) -> list[str]:
-    """Return the words of an option that may be given several times, after those of its older form with commas.
-
-    Raises
-    ------
-    InputError
-        If one of them is empty.
-    """
-    first = [] if old is None else listed(old_option, old)
-    return [*first, *(word for given in words or () for word in listed(option, given))]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What `--method`, `--kernel` and `--set` name; the command itself never imports methods of the user's own."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from reports.machine.own_process import LIMIT
@@ -31,25 +31,6 @@ def checked_configuration(
     if ":" not in method:
         return configuration(method, kernel, settings)
     return in_own_process(configuration, method, kernel, settings, name=method, limit=limit)
-
-
-def advised(
-    scene: str,
-    size: tuple[int, int] | None,
-    changes: Mapping[str, Any],
-    kernel: str | None,
-    settings: Mapping[str, Any],
-) -> "Configuration":
-    """Return what the advice names for a scene, and say so on the error stream; Mitsuba must have a variant."""
-    import sys
-
-    from realtime.scene.read_scene import read_scene
-    from validation.advise.auto import auto_configuration, words_of
-    from validation.scenes.loading import load_scene
-
-    chosen, advice = auto_configuration(read_scene(load_scene(scene, size, changes).scene), kernel, settings)
-    print(f"airlight: --method auto takes {words_of(advice)}", file=sys.stderr)
-    return chosen
 
 
 def named_configurations(

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from reports.commands import completion
-from reports.commands.options import Force, Json, Markdown, OldScenes, listed, named
+from reports.commands.options import Force, Json, Markdown, listed
 
 PAPERS = ("biri", "billeter", "ali", "bouthors")
 
@@ -49,7 +49,6 @@ def published(
     force: Force = False,
     json: Json = False,
     markdown: Markdown = False,
-    old_scenes: OldScenes = None,
 ) -> None:
     """Measure tables and figures of papers again.
 
@@ -81,7 +80,7 @@ def published(
     if not limit > 0:
         raise InputError(f"--limit: got {limit:g}, wanted more than 0 [s]")
     papers = PAPERS if paper is None else (paper,)
-    wanted = _wanted_scenes((scenes or []) + named("SCENE", None, "--scenes", old_scenes), papers)
+    wanted = _wanted_scenes(scenes or [], papers)
     names = listed("--kernels", kernels)
     for name in names:
         find_kernel(name)
@@ -99,7 +98,7 @@ def published(
             data |= _billeter(wanted, names[0], scale=scale, maps=sizes, limit=limit, progress=progress)
         if "ali" in papers and "fence" in wanted:
             data |= _ali(scale=scale, progress=progress)
-        if "bouthors" in papers and not (scenes or old_scenes):
+        if "bouthors" in papers and not scenes:
             data |= _bouthors(progress)
     if json:
         print_json({"environment": describe_environment()} | data)

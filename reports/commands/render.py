@@ -32,8 +32,8 @@ def render(
         list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="A method of `airlight list methods`, your own as MODULE:FUNCTION or FILE.py:FUNCTION, or `auto`, "
-            "what `airlight advise` names for --set error=SHARE; ray-march by default.",
+            help="A method of `airlight list methods`, or your own as MODULE:FUNCTION or FILE.py:FUNCTION; "
+            "ray-march by default.",
             show_default=False,
             autocompletion=completion.methods,
         ),
@@ -99,7 +99,7 @@ def render(
     """
     from functools import partial
 
-    from reports.commands.own_methods import advised, checked_configuration
+    from reports.commands.own_methods import checked_configuration
     from reports.machine.environment import activate
     from reports.machine.own_process import in_own_process
     from validation.configurations.methods import parse_settings
@@ -108,7 +108,7 @@ def render(
 
     name = single("--method", method) or "ray-march"
     own_kernel, given = single("--kernel", kernel), parse_settings(settings or [])
-    known = None if name == "auto" else checked_configuration(name, own_kernel, given, limit=method_limit)
+    chosen = checked_configuration(name, own_kernel, given, limit=method_limit)
     outputs = {"exr": output, "png": preview}
     _check_outputs(outputs, frames, animate)
     _check_samples(samples, outputs, frames)
@@ -116,7 +116,6 @@ def render(
     changes = parse_changes(change or [])
     variant = activate()
     (scene,) = drawn_from([scene], meshes, ranges)
-    chosen = known or advised(scene, pixels, changes, own_kernel, given)
     call = partial(in_own_process, name=name, limit=method_limit) if chosen.own else _call
     if plan:
         _print_plan(call(_plan, scene, pixels, changes, precision, chosen), json=json)

@@ -16,12 +16,9 @@ from reports.commands.options import (
     Meshes,
     MethodLimit,
     Methods,
-    OldMethods,
-    OldScenes,
     Ranges,
     Settings,
     drawn_from,
-    named,
 )
 
 
@@ -82,8 +79,6 @@ def report(
     cluster: ClusterPlace = None,
     force: Force = False,
     json: Annotated[bool, typer.Option("--json", help="Print report.json.")] = False,
-    old_scenes: OldScenes = None,
-    methods: OldMethods = None,
 ) -> None:
     """Measure methods in scenes and write the report, one page.
 
@@ -104,8 +99,8 @@ def report(
         given = {
             "--quick": quick,
             "--full": full,
-            "a scene": scenes or old_scenes,
-            "--method": method or methods,
+            "a scene": scenes,
+            "--method": method,
             "--kernel": kernel,
             "--set": settings,
             "--images": images,
@@ -125,9 +120,9 @@ def report(
         data = _measured(
             target,
             effort,
-            scenes=drawn_from(named("SCENE", None, "--scenes", old_scenes) + (scenes or []), meshes, ranges),
-            methods=named("--method", method, "--methods", methods),
-            kernels=named("--kernel", kernel, "--kernel", None),
+            scenes=drawn_from(scenes or [], meshes, ranges),
+            methods=method or [],
+            kernels=kernel or [],
             settings=settings or [],
             images=images,
             fresh=fresh,

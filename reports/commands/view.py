@@ -41,7 +41,6 @@ def view(
     from reports.view.server import check_library
 
     check_library()
-    from reports.commands.own_methods import advised
     from reports.machine.environment import activate
     from validation.configurations.methods import configuration, parse_settings
     from validation.scenes.changes import parse_changes
@@ -49,11 +48,10 @@ def view(
 
     name = single("--method", method) or "shadow-planes"
     own_kernel, given = single("--kernel", kernel), parse_settings(settings or [])
-    known = None if name == "auto" else configuration(name, own_kernel, given)
+    chosen = configuration(name, own_kernel, given)
     changes = parse_changes(change or [])
     pixels = parse_size(size)
     variant = activate()
-    chosen = known or advised(scene, pixels, changes, own_kernel, given)
 
     from reference.storage.stopping import cleaned_up, hint_when_stopped
     from reports.view.session import Session

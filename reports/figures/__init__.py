@@ -12,7 +12,6 @@ Read in this order:
 - `convergence.py`: orders of kernels and estimators
 - `decomposition.py`: errors by cause
 - `frame_speed.py`: time of frames against error
-- `froxels.py`: grids and ghosts of froxel fog
 - `kernel_errors.py`: errors of kernels over depth and angle
 - `kernel_speed.py`: time of kernels against error
 - `map_size.py`: error over the size of the shadow map

@@ -15,20 +15,16 @@ Read in this order:
 - `kernels.py`: costs, levels and orders of kernels
 - `stability.py`: where kernels and sums of shadow planes break
 - `decomposition.py`: errors by cause
-- `cloud_stages.py`: the stages of collectors for clouds, and their searches
-- `octave_fit.py`: the constants of octaves that fit best
 - `map_size.py`: error and flicker against the size of the shadow map
 - `scaling.py`: what methods cost as their work grows, and exponents
-- `interpolation.py`: how many rays interpolated images need
 - `slab.py`: a slab by order of scattering
 - `diagnosis.py`: planted faults and the answers
 - `fit.py`: parameters that explain an image
-- `advise.py`: what methods would cost and err by in a scene
 - `clouds.py`: tables of canonical transport and their errors
 - `checks.py`: baselines that moved, mutations, light left out
 - `lists.py`: scenes, methods, kernels
 - `scene.py`: the description of a scene for another renderer
 
-May import: `analytic.errors`, `realtime.kernels`, `realtime.methods`, `validation.advise`, `validation.frames`,
+May import: `analytic.errors`, `realtime.kernels`, `realtime.methods`, `validation.frames`,
 `validation.metrics`, `validation.scenes`, `validation.statistics`.
 """

@@ -93,20 +93,3 @@ def convergence_data(rate: Any) -> dict[str, Any]:
         "declared": {"kind": declared.kind, "value": declared.value, "power": declared.power} if declared else None,
         "measured": plain(rate.measured),
     }
-
-
-def gradient_table(costs: Iterable[Entry]) -> Table:
-    """Return what derivatives of kernels cost; the data are those of `airlight bench --kernels --gradients --json`."""
-    columns = (
-        *words("kernel", "phase"),
-        *numbers("value", sigma_t="by sigma_t", every="by all", how={"digits": 3}),
-        Column("ratio", "by sigma_t over value", after="x"),
-    )
-    rows = []
-    for cost in costs:
-        values = {"kernel": cost["kernel"], "phase": cost["phase"]}
-        if cost["refused"]:
-            rows.append(Row(values, f"refused: {cost['refused']}"))
-            continue
-        rows.append(Row(values | {name: cost[name] for name in ("value", "sigma_t", "every", "ratio")}))
-    return Table("Derivatives of kernels in forward mode [ns/ray]", columns, tuple(rows))

@@ -270,7 +270,7 @@ def _orders(kind: str, path: Path) -> list[list[str]]:
         file = out / f"frame-{number}.exr"
         orders.append(["render", str(path), "--json", "--method", method, "-o", str(file), *settings])
     orders.append(["compare", str(out / "truth.exr"), str(out / "frame-0.exr"), "--json"])
-    asked = ["--quick", "--scenes", str(path), "--methods", "unshadowed,ray-march", "--json"]
+    asked = ["--quick", str(path), "--method", "unshadowed", "--method", "ray-march", "--json"]
     return [*orders, ["report", *asked, "-o", str(out / "study")]]
 
 

@@ -36,14 +36,13 @@ COMMANDS = {
     "report": [
         "report",
         "--quick",
-        "--scenes",
         "open-fog",
         "--method",
         "realtime.methods.unshadowed:unshadowed",
         "-o",
         "r",
     ],
-    "bench": ["bench", "open-fog", "--size", "64x48", "--methods", "unshadowed,ray-march", "--no-truth"],
+    "bench": ["bench", "open-fog", "--size", "64x48", "--method", "unshadowed", "--method", "ray-march", "--no-truth"],
 }
 KILLS = 15  #: of each command
 # The shell's status; and for the first milliseconds, in which `env` starts, what it is made from.

@@ -90,17 +90,11 @@ def refused(capsys, *arguments):
     ],
 )
 def test_what_is_no_method_is_one_line_before_any_work(variant, mine, capsys, own_cache, name, words):
-    printed = refused(capsys, "--quick", "--scenes", "open-fog", "--methods", "unshadowed", "--method", name)
+    printed = refused(capsys, "--quick", "open-fog", "--method", "unshadowed", "--method", name)
     assert f"method {name}" in printed
     assert words in printed
     assert not any(mine.rglob("report.*"))
     assert not any(own_cache.rglob("*.npz"))  # not even the truth
-
-
-@pytest.mark.parametrize("words", [("--scenes", ""), ("--scenes", "open-fog,,hall"), ("--methods", " ")])
-def test_an_empty_name_is_no_list(capsys, words):
-    printed = refused(capsys, "--quick", *words)
-    assert f"{words[0]}: got {words[1]!r}, wanted names with commas between them" in printed
 
 
 FAULTS = {
@@ -119,7 +113,7 @@ def test_a_report_goes_on_without_methods_that_are_at_fault(variant, mine, capfd
     import json
 
     own = [word for name in (*FAULTS, "half") for word in ("--method", f"fog_of_mine:{name}")]
-    options = ["--quick", "--scenes", "open-fog", "--methods", "unshadowed", "-o", "out", "--method-limit", "20"]
+    options = ["--quick", "open-fog", "--method", "unshadowed", "-o", "out", "--method-limit", "20"]
     assert run(["report", *options, *own, "--json"]) == 1
     printed = capfd.readouterr()
     data = json.loads(printed.out)
@@ -152,7 +146,7 @@ def test_a_frame_by_a_method_that_ends_its_process_is_no_success(variant, mine, 
 
 def test_ones_own_methods_come_after_the_others(variant, mine, handed_on, capsys):
     own = ["--method", "fog_of_mine:half", "--method", "fog_of_mine.py:half"]
-    assert run(["report", "--quick", "--scenes", "open-fog", "--methods", "min-max", *own]) == 0
+    assert run(["report", "--quick", "open-fog", "--method", "min-max", *own]) == 0
     names = [configuration.method for configuration in handed_on["configurations"]]
     assert names == ["min-max", "fog_of_mine:half", "fog_of_mine.py:half"]
     assert handed_on["configurations"][1].kernel == "exact"
@@ -208,14 +202,6 @@ def test_what_is_named_is_measured_alone_and_all_are_a_word(variant, mine, hande
     assert capsys.readouterr().err == ""
 
 
-def test_older_options_mean_the_same(variant, handed_on):
-    asked = []
-    for words in (["--scenes", "open-fog,hall", "--methods", "min-max"], ["open-fog", "hall", "--method", "min-max"]):
-        assert run(["report", *words]) == 0
-        asked.append((handed_on["scenes"], handed_on["configurations"]))
-    assert asked[0] == asked[1]
-
-
 @pytest.fixture
 def images(tmp_path):
     folder = tmp_path / "engine"
@@ -233,7 +219,7 @@ def test_with_images_alone_their_scenes_are_studied(variant, images, handed_on):
 
 
 def test_scenes_pick_among_the_images(variant, images, handed_on):
-    assert run(["report", "--quick", "--images", str(images), "--scenes", "omni-box,sphere-spot"]) == 0
+    assert run(["report", "--quick", "--images", str(images), "omni-box", "sphere-spot"]) == 0
     assert handed_on["scenes"] == ["omni-box", "sphere-spot"]
     assert list(handed_on["images"]) == ["omni-box"]
 
@@ -242,13 +228,13 @@ def test_images_that_cannot_be_used_are_refused(images, capsys):
     write_exr(images / "opn-fog.exr", Image({"total": np.ones((6, 8, 3))}))
     assert "names no scene" in refused(capsys, "--images", str(images))
     (images / "opn-fog.exr").unlink()
-    assert "has no image of hall, only of" in refused(capsys, "--images", str(images), "--scenes", "hall")
+    assert "has no image of hall, only of" in refused(capsys, "--images", str(images), "hall")
     assert "wanted a folder with EXR files" in refused(capsys, "--images", str(images / "none"))
 
 
 def test_two_sizes_of_one_scene_are_refused_before_any_work(variant, images, capsys, tmp_path):
     write_exr(images / "open-fog.b.exr", Image({"total": np.ones((6, 9, 3))}))
-    printed = refused(capsys, "--images", str(images), "--scenes", "open-fog", "-o", str(tmp_path / "out"))
+    printed = refused(capsys, "--images", str(images), "open-fog", "-o", str(tmp_path / "out"))
     assert "render all images of a scene at one size" in printed
 
 
@@ -274,7 +260,7 @@ def test_images_and_ones_own_method_in_one_report(variant, mine, images, capsys)
         write_exr(images / f"open-fog.{name}.exr", Image({"airlight": factor * truth.airlight}))
     area = truth_image(load_scene("open-fog", (32, 24)).scene, pixel="area")
     write_exr(images / "open-fog.means.exr", Image({"total": area.airlight}))
-    options = ["--scenes", "open-fog", "--methods", "unshadowed", "--method", "fog_of_mine:half", "-o", "out"]
+    options = ["open-fog", "--method", "unshadowed", "--method", "fog_of_mine:half", "-o", "out"]
     assert run(["report", "--quick", "--images", str(images), *options]) == 0
     (scene,) = json.loads((mine / "out" / "report.json").read_text())["scenes"]
     assert scene["size"] == scene["timed"] == [32, 24]

@@ -38,7 +38,6 @@ def run(*arguments, status):
         (["sphere-spot", "--size", "huge"], "wanted WIDTHxHEIGHT"),
         (["sphere-spot", "--host", "192.0.2.1"], "cannot listen at 192.0.2.1"),
         (["sphere-spot", "--port", "70000"], "65535"),
-        (["sphere-spot", "--methods", "exact"], "--method"),
     ],
 )
 def test_a_mistake_is_one_line_and_ends_with_2(variant, capfd, arguments, says):

@@ -8,7 +8,6 @@ import pytest
 
 from reports.figures import convergence as figure_convergence
 from reports.figures import decomposition as figure_decomposition
-from reports.figures import froxels as figure_froxels
 from reports.figures import kernel_errors as figure_kernel_errors
 from reports.figures import kernel_speed as figure_kernel_speed
 from reports.figures import map_size as figure_map_size
@@ -39,18 +38,6 @@ def test_kernel_errors_over_depth_and_angle(variant, tmp_path):
     # float32 has 1.2e-7; the optical depth of 90 along the longest ray multiplies the rounding of the exponent.
     assert errors["exact"].max() < 2e-5
     assert np.median(errors["taylor"]) > 100 * errors["exact"].max()
-
-
-@pytest.mark.slow
-def test_froxels_have_errors_by_grid_and_ghosts_by_frame(variant, tmp_path):
-    figure_froxels.compute(tmp_path, quick=True)
-    rows = rows_of(tmp_path / "froxels.csv")
-    assert {row["panel"] for row in rows} == {"columns", "slices", "ghost"}
-    ghosts = {
-        row["series"]: float(row["relative_rmse"]) for row in rows if row["panel"] == "ghost" and row["x"] == "20"
-    }
-    assert ghosts["history=0.5"] < ghosts["history=0.8"] < ghosts["history=0.9"] < ghosts["history=0.95"]
-    assert drawn(figure_froxels, tmp_path) == drawn(figure_froxels, tmp_path)
 
 
 @pytest.mark.slow

@@ -115,5 +115,5 @@ def test_command_prints_both_tables_beside_the_published_figures(variant, monkey
 
 
 def test_unknown_scene_is_refused(capfd):
-    assert cli.run(["published", "--scenes", "three-pens"]) == cli.WRONG_INPUT
+    assert cli.run(["published", "three-pens"]) == cli.WRONG_INPUT
     assert "scene: got 'three-pens', wanted some of sphere-spot" in capfd.readouterr().err
