@@ -19,6 +19,7 @@ import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import Field, dataclass, field, fields
+from numbers import Integral, Real
 from typing import Any
 
 from realtime.errors import InputError
@@ -130,6 +131,8 @@ def wanted_values(item: Field) -> str:
 
 
 def _range(limits: Limits, default: Any) -> str:
+    if isinstance(default, bool | str):
+        return "true or false" if isinstance(default, bool) else "a word"
     words = "a whole number" if isinstance(default, int) else "a finite number"
     if limits.least is not None:
         words += f" of at least {limits.least:g}" if limits.most is None else f" from {limits.least:g}"
@@ -152,13 +155,11 @@ def _check_value(item: Field, value: Any) -> None:
 
 
 def _allowed(limits: Limits, default: Any, value: Any) -> bool:
+    if not _of_kind(value, default):
+        return False
     if limits.choices:
         return value in limits.choices
-    if not isinstance(value, int | float) or isinstance(default, bool | str):
-        return True
-    if isinstance(default, int) and (isinstance(value, bool) or not isinstance(value, int)):
-        return False
-    if value in limits.also:
+    if isinstance(default, bool | str) or value in limits.also:
         return True
     if not math.isfinite(value):
         return limits == Limits(limits.help)  # It has no limits: every value is allowed.
@@ -168,6 +169,12 @@ def _allowed(limits: Limits, default: Any, value: Any) -> bool:
         and (limits.above is None or value > limits.above)
         and (limits.below is None or value < limits.below)
     )
+
+
+def _of_kind(value: Any, default: Any) -> bool:
+    """Return whether a value is of the kind of a default: a bool is no number, and NumPy's numbers are numbers."""
+    kind = next((kind for kind in (bool, Integral, Real, str) if isinstance(default, kind)), object)
+    return isinstance(value, kind) and isinstance(value, bool) == isinstance(default, bool)
 
 
 def _converted(what: str, value: Any, default: Any) -> int | float | str:

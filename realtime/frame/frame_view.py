@@ -5,6 +5,7 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.bounded_media.views import MediaViews, media_views
+from realtime.errors import InputError
 from realtime.frame.surface import visible_triangle
 from realtime.methods.interface.view import View
 from realtime.numerics.array_types import Metres, PerRay
@@ -51,7 +52,7 @@ def frame_view(
         lights=lights,
         medium=medium,
         features=features,
-        visible=lambda point, light, asked=True: ~geometry.ray_test(light.shadow_ray(point), asked),
+        visible=_visible(geometry),
         camera=camera,
         pixel=pixel,
         layout=_layout(camera) if layout is None else layout,
@@ -61,6 +62,17 @@ def frame_view(
         part=part,
         media_views=views,
     )
+
+
+def _visible(geometry):
+    """Return the function that says which points [m] a light reaches."""
+
+    def visible(point, light: Light, asked=True):
+        if geometry is None:
+            raise InputError("visible: the method says that it casts no rays, and asks for some; wanted `casts_rays`")
+        return ~geometry.ray_test(light.shadow_ray(point), asked)
+
+    return visible
 
 
 def _rays(camera: Camera, pixel):

@@ -50,12 +50,12 @@ def check_radiance(scene: Scene, name: str, airlight: Any, surface: Any, distanc
     InputError
         With the first pixel that is wrong, and why.
     """
-    for number, light in enumerate(scene.lights, 1):
-        # A medium with bounds may end before the light, and a cone look away: there the number says more than the ray.
-        if light.kind == "point" and not scene.medium.clear:
-            _check_light(
-                read_camera(scene.camera), number, np.array(light.position, dtype=np.float64).ravel(), distance
-            )
+    # A medium with bounds may end before the light, and a cone look away: there the number says more than the ray.
+    points = [] if scene.medium.clear else [pair for pair in enumerate(scene.lights, 1) if pair[1].kind == "point"]
+    if points:
+        camera = read_camera(scene.camera)
+        for number, light in points:
+            _check_light(camera, number, np.array(light.position, dtype=np.float64).ravel(), distance)
     for what, values in (("airlight", airlight), ("surface radiance", surface)):
         wrong = ~np.isfinite(values).all(axis=2)
         if wrong.any():

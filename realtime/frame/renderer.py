@@ -276,10 +276,7 @@ def _stages(
             returned = composed(layers, by_light) if sums is None else added(sums, layers, by_light)
         return (returned, extra) if extra_layers else returned
 
-    # Every scene runs it: it checks the parameters also where nothing casts a shadow.
     prepare = method.prepare(scene, chosen) if method.prepare else _no_state
-    if not (features.shadows or method.renders_clouds):
-        prepare = _no_state
     cull = sort if method.cull and features.shadows else _no_lists
     casts_rays = method.casts_rays(chosen)
     render: Callable[..., Any] = run

@@ -35,7 +35,7 @@ from realtime.intervals.lit_intervals import add_waiting, close_interval, no_int
 from realtime.memory import check_memory
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
-from realtime.methods.interface.marching import OPTICAL_REACH, marched_integral, within
+from realtime.methods.interface.marching import OPTICAL_REACH, equal_angles, marched_integral, within
 from realtime.methods.interface.method import ErrorCause
 from realtime.methods.interface.view import View, bounded_radiance, radiance, rays_in_media
 from realtime.parameters import Parameters, parameter
@@ -101,12 +101,11 @@ def ray_march(view: View, state, lists, *, kernel, parameters: RayMarchParameter
     in_media = rays_in_media(view, kernel=asked) if view.features.bounded else ()
     for number, light in enumerate(view.lights):
         media = in_media[number] if in_media else None
+        lit = _visibility(view, state, number, parameters.shadow)
         if parameters.sum == "transitions":
             airlight = ray_airlight(view, light, kernel, media)
-            lit = _visibility(view, state, number, parameters.shadow)
             total += airlight.radiance(_lit_runs(airlight, steps=steps, spacing=spacing, lit=lit))
             continue
-        lit = _visibility(view, state, number, parameters.shadow)
         integral = marched_integral(view, light, media, steps=steps, spacing=spacing, lit=lit)
         total += bounded_radiance(light, integral) if media else radiance(view.medium, light, integral)
     return Layers(total)
@@ -121,7 +120,7 @@ def prepare_maps(scene: Scene, parameters: RayMarchParameters) -> Callable[[Scen
         If the maps need more memory than the machine has.
     """
     map = parameters.map
-    if parameters.shadow != "map":
+    if parameters.shadow != "map" or not scene.features.shadows:
         return lambda scene: ()
     needed = sum(map_memory(light, map) for light in scene.lights)
     check_memory(f"map: {map} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
@@ -154,17 +153,16 @@ def _lit_runs(airlight: RayAirlight, *, steps: int, spacing: str, lit):
     elif spacing == "uniform":
         x1 = dr.minimum(x1, x0 + OPTICAL_REACH / least_extinction(view.medium))
     uniform = spacing == "uniform" or not light.w
-    theta1 = dr.select(dr.isfinite(x1), dr.atan2(x1 - geometry.foot, geometry.height), 0.5 * dr.pi)
-    begin = x0 if uniform else dr.atan2(x0 - geometry.foot, geometry.height)
+    angles = None if uniform else equal_angles(geometry.foot, geometry.height, x0, x1)
     meets = x1 > x0  # rays that miss all bodies march on the spot, where a map can be asked
-    begin = dr.select(meets, begin, 0)
-    width = dr.select(meets, ((x1 if uniform else theta1) - begin) / steps, 0)
+    begin = dr.select(meets, angles.begin if angles else x0, 0)
+    width = dr.select(meets, ((angles.end if angles else x1) - begin) / steps, 0)
 
     def place(u):
-        return u if uniform else dr.fma(geometry.height, dr.tan(u), geometry.foot)
+        return angles.place(u) if angles else u
 
     def step(index, was_lit, opened, intervals):
-        border = dr.maximum(place(dr.fma(Float(index), width, begin)), x0)
+        border = dr.select(index == 0, x0, dr.maximum(place(dr.fma(Float(index), width, begin)), x0))
         x = place(dr.fma(Float(index) + 0.5, width, begin))
         now = meets & lit(view.origin + view.direction * x)
         closes = was_lit & ~now

@@ -156,11 +156,12 @@ def prepare_min_max(scene: Scene, parameters: MinMaxParameters) -> Callable[[Sce
         For more memory than the machine has.
     """
     map, slices, samples = parameters.map, parameters.slices, parameters.samples
-    if scene.features.shadows:
-        held = sum(2 * map_memory(light, map) for light in scene.lights)
-        drawn = max((_memory_of_slices(scene, light, map, slices, samples) for light in scene.lights), default=0)
-        what = f"map: {map} texels, slices: {slices or _usual_slices(scene.camera)}"
-        check_memory(f"{what} for {len(scene.lights)} light(s)", held + drawn, "use a smaller map, or fewer slices")
+    if not scene.features.shadows:
+        return lambda scene: ()
+    held = sum(2 * map_memory(light, map) for light in scene.lights)
+    drawn = max((_memory_of_slices(scene, light, map, slices, samples) for light in scene.lights), default=0)
+    what = f"map: {map} texels, slices: {slices or _usual_slices(scene.camera)}"
+    check_memory(f"{what} for {len(scene.lights)} light(s)", held + drawn, "use a smaller map, or fewer slices")
     return lambda scene: tuple(_epipolar_map(scene, light, map) for light in scene.lights)
 
 

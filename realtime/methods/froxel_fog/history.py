@@ -19,7 +19,7 @@ Roberts 2018, *The unreasonable effectiveness of quasirandom sequences*. Wronski
 shader based solution to atmospheric scattering*. Karis 2014, *High-quality temporal supersampling* (the clamp).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
@@ -80,9 +80,7 @@ def averaged(
         scattered = dr.select(seen, dr.lerp(scattered, before, weight), scattered)
         frame = last.frame + 1
     volume = packed(four_numbers(Float)(scattered.x, scattered.y, scattered.z, 0))
-    # Arrays of its own: those of the camera may be written anew for the next frame.
-    kept = replace(grid, camera=grid.camera)
-    return scattered, FroxelHistory(volume, kept, frame)
+    return scattered, FroxelHistory(volume, grid, frame)
 
 
 def _before(grid: Grid, last: FroxelHistory) -> tuple[Any, Any]:

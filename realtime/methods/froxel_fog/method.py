@@ -110,7 +110,7 @@ def prepare_froxel_fog(scene: Scene, parameters: FroxelFogParameters) -> Callabl
     number = bytes_of(type(scene.camera.origin.x))
     froxels = _NUMBERS * number * across * down * deep
     check_memory(f"a grid of {across} x {down} x {deep} froxels", froxels, "use fewer")
-    if parameters.shadow != "map":
+    if parameters.shadow != "map" or not scene.features.shadows:
         return lambda scene: FroxelShadows((), tabulated(scene.lights))
     map = parameters.map
     points = sum(light.source is not None for light in scene.lights)
@@ -130,7 +130,7 @@ def prepare_froxel_fog(scene: Scene, parameters: FroxelFogParameters) -> Callabl
     return cast
 
 
-def froxel_fog(view: View, state, lists, *, kernel, parameters: FroxelFogParameters) -> Layers:
+def froxel_fog(view: View, state: FroxelShadows, lists, *, kernel, parameters: FroxelFogParameters) -> Layers:
     """Return the airlight of every ray by froxels [W/(m^2 sr)].
 
     Parameters
@@ -156,9 +156,8 @@ def froxel_fog(view: View, state, lists, *, kernel, parameters: FroxelFogParamet
     pieces = column_pieces(view, grid, dr.arange(mi.UInt32, grid.columns))
     Float = type(view.distance)
     shift = frame_shift(last if parameters.jitter == "frames" else None, Float)
-    shadows = state or FroxelShadows((), ())
-    visible = _visibility(view, shadows, parameters.shadow)
-    scattered = scattered_light(view, grid, pieces, shift=shift, tables=shadows.tables, visible=visible)
+    visible = _visibility(view, state, parameters.shadow)
+    scattered = scattered_light(view, grid, pieces, shift=shift, tables=state.tables, visible=visible)
     carried = None
     if hands_on(parameters):
         scattered, carried = averaged(

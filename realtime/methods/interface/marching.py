@@ -2,9 +2,20 @@
 """The airlight integral of one light by the midpoint rule, with one visibility test a step: what marchers sum up.
 
 Where nothing ends uniform steps, they stop at 20 optical depths, where e^-20 = 2e-9 is left.
+
+Equi-angular steps are a change of variables, for any h > 0:
+
+    x = foot + h tan theta,    dx/r^2 = (h^2 + (x - foot)^2) / (h r^2) dtheta,    r^2 = height^2 + (x - foot)^2.
+
+With h = height the weight is 1/h, and the peak is gone. A ray that leads straight away from the light has height 0, and
+all its angles are pi/2; next to it the angles differ by less than their rounding. But where the light stands before or
+behind the whole segment, at the distance g, there is no peak that h = height must take away: h is then at least g/1024.
+The angles of the segment differ by about h/g, which float32 resolves to 1e-4. As h/g goes to 0 the steps are equal in
+1/r, the limit of equal angles.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
@@ -17,6 +28,33 @@ from realtime.scene.lights import Light
 from realtime.scene.medium import least_extinction, per_extinction
 
 OPTICAL_REACH = 20.0  #: where endless uniform steps stop [1]
+_LEAST_HEIGHT = 2.0**-10  # h over g, of the docstring
+
+
+@dataclass(frozen=True)
+class EqualAngles:
+    """A segment of every ray in the angle at a light."""
+
+    foot: Any  #: of the light over the ray [m]
+    height: Any  #: h [m]
+    begin: Any  #: theta where the segment begins
+    end: Any  #: theta where it ends
+
+    def place(self, theta: Any) -> Any:
+        """Return x [m]."""
+        return dr.fma(self.height, dr.tan(theta), self.foot)
+
+    def stretch(self, x: Any) -> Any:
+        """Return dx/dtheta [m]."""
+        return dr.fma(self.height, self.height, dr.square(x - self.foot)) / self.height
+
+
+def equal_angles(foot: Any, height: Any, x0: Any, x1: Any) -> EqualAngles:
+    """Return segments from `x0` to `x1` [m], which may be infinite, in the angle at a light."""
+    gap = dr.maximum(dr.maximum(x0 - foot, foot - x1), 0)
+    height = dr.maximum(height, _LEAST_HEIGHT * gap)
+    end = dr.select(dr.isfinite(x1), dr.atan2(x1 - foot, height), 0.5 * dr.pi)
+    return EqualAngles(foot, height, dr.atan2(x0 - foot, height), end)
 
 
 def marched_integral(
@@ -76,17 +114,18 @@ def _march(
     """Sum the steps of every ray in one loop, so that the kernel does not grow with their number."""
     x0, x1 = segment
     Float = type(geometry.height)
-    foot, height, medium = geometry.foot, geometry.height, view.medium
-    theta0 = dr.atan2(x0 - foot, height)
-    theta1 = dr.select(dr.isfinite(x1), dr.atan2(x1 - foot, height), 0.5 * dr.pi)
-    begin, end = (x0, x1) if spacing == "uniform" else (theta0, theta1)
+    foot, medium = geometry.foot, view.medium
+    angles = None if spacing == "uniform" else equal_angles(foot, geometry.height, x0, x1)
+    begin, end = (angles.begin, angles.end) if angles else (x0, x1)
     width = (end - begin) / steps
 
     def step(index, total):
         u = dr.fma(Float(index) + 0.5, width, begin)
-        x = u if spacing == "uniform" else dr.fma(height, dr.tan(u), foot)
+        x = angles.place(u) if angles else u
         r = distance_to_light(geometry, x)
-        weight = dr.rcp(dr.square(r)) if spacing == "uniform" else dr.rcp(height)
+        weight = dr.rcp(dr.square(r))
+        if angles:
+            weight *= angles.stretch(x)
         point = view.origin + view.direction * x
         if media:
             term = weight * media.source(x)

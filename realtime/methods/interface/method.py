@@ -41,7 +41,7 @@ def no_causes(parameters: Any, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
 class Method:
     """A method under its name: its stages in the order in which they run, then what a user and a frame must know.
 
-    In a scene where nothing casts a shadow neither `prepare` nor `cull` runs, state and lists are ().
+    In a scene where nothing casts a shadow `cull` does not run, and lists are ().
     """
 
     name: str
@@ -51,7 +51,8 @@ class Method:
     source: str
     parameters: type[Parameters] = Parameters
     #: ``prepare(scene, parameters)`` checks what parameters ask of the scene and returns what makes the state: by light
-    #: a shadow map, or shadow planes. None: the state is ().
+    #: a shadow map, or shadow planes. It runs in every scene, and makes no maps where nothing casts a shadow. None: the
+    #: state is ().
     prepare: Callable[[Scene, Any], Preparation] | None = None
     #: What `prepare` looks at; while that stands still, its state is kept.
     prepared_from: frozenset[str] = frozenset(MOVABLE)

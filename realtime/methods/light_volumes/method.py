@@ -179,9 +179,10 @@ def prepare_light_volumes(scene: Scene, parameters: LightVolumeParameters) -> Ca
             "evaluation=mesh: the scene has a medium with bounds, wanted one medium that fills all space; use "
             "evaluation=walk"
         )
-    if scene.features.shadows:
-        needed = sum(_memory_of(light, map, evaluation) for light in scene.lights)
-        check_memory(f"map: {map} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
+    if not scene.features.shadows:
+        return lambda scene: ()
+    needed = sum(_memory_of(light, map, evaluation) for light in scene.lights)
+    check_memory(f"map: {map} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
 
     def volume(scene: Scene, light: Light):
         shadow_map = cast_shadow_map(scene.geometry, light, map)

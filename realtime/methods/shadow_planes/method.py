@@ -32,6 +32,7 @@ from realtime.bounded_media.airlight import FORMS, LitRay, PlacedRay, ambient_ra
 from realtime.errors import InputError
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
+from realtime.methods.interface.method import Preparation
 from realtime.methods.interface.view import View, rays_in_media
 from realtime.methods.shadow_planes.pixel_rays import aim_at, read_spot, seen_rays, seen_ways, tile_azimuths
 from realtime.methods.shadow_planes.plane_table import PlaneIndex, index_planes
@@ -163,7 +164,7 @@ class PlanePreparation:
         return with_placements(self.casters, scene.positions, scene.placements)
 
 
-def prepare_shadow_planes(scene: Scene, parameters: ShadowPlaneParameters) -> PlanePreparation:
+def prepare_shadow_planes(scene: Scene, parameters: ShadowPlaneParameters) -> Preparation:
     """Read the casters of a scene and return the function that finds the shadow planes of a frame.
 
     Raises
@@ -171,7 +172,10 @@ def prepare_shadow_planes(scene: Scene, parameters: ShadowPlaneParameters) -> Pl
     InputError
         For casters without triangles.
     """
-    return PlanePreparation(read_casters(scene.geometry, scene.area_lights), parameters.cone, parameters.order)
+    casters = read_casters(scene.geometry, scene.area_lights)
+    if not scene.features.shadows:
+        return lambda scene: ()
+    return PlanePreparation(casters, parameters.cone, parameters.order)
 
 
 def plane_finder(

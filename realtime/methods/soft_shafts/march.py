@@ -18,7 +18,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.interface.marching import OPTICAL_REACH
+from realtime.methods.interface.marching import OPTICAL_REACH, equal_angles
 from realtime.methods.interface.view import View
 from realtime.methods.soft_shafts.light_sources import SourceState, frame_at
 from realtime.methods.soft_shafts.parameters import SoftShaftsParameters
@@ -83,24 +83,24 @@ def _of_point(view: View, state: SourceState, number: Any, shift: Any, p: SoftSh
     begin = dr.select(direction[2] > 0, dr.maximum(meets, begin), begin)
     end = dr.select(direction[2] < 0, dr.minimum(meets, end), end)
     lit_part = (end > begin) & ((direction[2] != 0) | (origin[2] > 0))
-    height = Float(1)
+    angles = None
     if p.spacing == "equiangular":
         (oa, ob, oc), (da, db, dc) = origin, direction
         height = dr.sqrt(dr.square(ob * dc - oc * db) + dr.square(oc * da - oa * dc) + dr.square(oa * db - ob * da))
-        begin = dr.atan2(begin + along, height)
-        end = dr.select(dr.isfinite(end), dr.atan2(end + along, height), 0.5 * dr.pi)
+        angles = equal_angles(-along, height, begin, end)
+        begin, end = angles.begin, angles.end
     begin, end = dr.select(lit_part, begin, 0), dr.select(lit_part, end, 0)
     width = (end - begin) / p.steps
 
     def step(index: Any, total: Any):
         u = dr.fma(Float(index) + shift, width, begin)
-        x = u if p.spacing == "uniform" else dr.fma(height, dr.tan(u), -along)
+        x = angles.place(u) if angles else u
         a, b, c = (dr.fma(d, x, o) for o, d in zip(origin, direction))
         inverse = dr.rsqrt(dr.fma(a, a, dr.fma(b, b, c * c)))
         r = dr.fma(a, a, dr.fma(b, b, c * c)) * inverse
-        weight = dr.maximum(c, 0) * inverse * medium.phase.evaluate(-(along + x) * inverse)
-        if p.spacing == "uniform":
-            weight *= dr.square(inverse)
+        weight = dr.maximum(c, 0) * inverse * medium.phase.evaluate(-(along + x) * inverse) * dr.square(inverse)
+        if angles:
+            weight *= angles.stretch(x)
         lit = lit_part
         if view.features.shadows and p.shadow == "map":
             assert isinstance(state.maps, HemisphereMaps)
@@ -117,4 +117,4 @@ def _of_point(view: View, state: SourceState, number: Any, shift: Any, p: SoftSh
         body=step,
         labels=("index", "total"),
     )
-    return total * dr.select(lit_part, width / height, 0)
+    return total * dr.select(lit_part, width, 0)

@@ -100,6 +100,7 @@ def prepare_soft_shafts(scene: Scene, parameters: SoftShaftsParameters) -> Calla
     if parameters.interleave and (most > 16 or 16 % most):
         raise InputError(f"interleave: got {most} points of a light, wanted 1, 2, 4, 8 or 16, of which a tile has each")
     with_maps = parameters.shadow == "map" or parameters.surfaces == "map" or parameters.hd == AUTO
+    with_maps = with_maps and scene.features.shadows
     if with_maps:
         needed = sum(
             map_memory(light, size) if light.facing is None else maps_memory(type(camera.origin.x), 1, size)
@@ -120,7 +121,7 @@ def prepare_soft_shafts(scene: Scene, parameters: SoftShaftsParameters) -> Calla
     return prepare
 
 
-def soft_shafts(view: View, state, lists, *, kernel, parameters: SoftShaftsParameters) -> Layers:
+def soft_shafts(view: View, state: SoftShaftsState, lists, *, kernel, parameters: SoftShaftsParameters) -> Layers:
     """Return the airlight of every ray [W/(m^2 sr)] and the share of each light that reaches its surface.
 
     Parameters
@@ -160,10 +161,10 @@ def shares_by_source(parameters: SoftShaftsParameters) -> bool:
 class _Frame:
     """The images of one frame while it is recorded: all pixels row by row, and the few that airlight is computed in."""
 
-    def __init__(self, view: View, state: Any, parameters: SoftShaftsParameters):
+    def __init__(self, view: View, state: SoftShaftsState, parameters: SoftShaftsParameters):
         width, height, scale = view.camera.width, view.camera.height, parameters.scale
         self.view, self.parameters = view, parameters
-        self.states = state.sources if state else ()
+        self.states = state.sources
         self.raster = Raster(width, height)
         depth = dr.empty(type(view.distance), width * height)
         dr.scatter(depth, view.distance, view.pixel)
@@ -178,6 +179,7 @@ class _Frame:
         self.whole = rays(dr.arange(mi.UInt32, width * height))
         self.few_raster = Raster(width // scale, height // scale)
         self.few = rays(small_pixels(self.few_raster, scale, width))
+        self.media = rays_in_media(self.few) if view.features.bounded else [None] * len(view.lights)
         self.depth = depth_guide(self.whole.distance, parameters.hz)
         self.few_depth = depth_guide(self.few.distance, parameters.hz)
 
@@ -185,13 +187,12 @@ class _Frame:
         """Return the radiance that a source scatters into every ray, in the order of the view."""
         view, p, few = self.view, self.parameters, self.few
         lights = [view.lights[light] for light in source]
-        if view.features.bounded or lights[0].facing is None or not self.states:
-            media = rays_in_media(few) if view.features.bounded else [None] * len(view.lights)
+        if view.features.bounded or lights[0].facing is None:
             integral = sum(
                 marched_integral(
                     few,
                     few.lights[light],
-                    media[light],
+                    self.media[light],
                     steps=p.steps,
                     spacing=p.spacing,
                     lit=self._lit(number, light, place),
@@ -300,9 +301,11 @@ class _Frame:
         if p.shadow == "ray":
             return lambda point: view.visible(point, view.lights[light])
         state = self.states[number]
-        if not isinstance(state.maps, HemisphereMaps):
-            return lambda point: lit_in_map(state.maps, view.lights[light], point)
-        return lambda point: _nearer(state, place, point)
+        if isinstance(state.maps, HemisphereMaps):
+            return lambda point: _nearer(state, place, point)
+        shadow_map = state.maps
+        assert shadow_map is not None
+        return lambda point: lit_in_map(shadow_map, view.lights[light], point)
 
     def _reached(self, state: SourceState, place: int, light: Any, point: Any) -> Any:
         if self.parameters.surfaces == "ray":

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from realtime.errors import InputError
 from realtime.kernels.exact import exact
@@ -10,7 +11,7 @@ from realtime.methods.registry import FOG_METHODS, METHODS
 from tests.helpers.scenes import spot, tiny_scene
 
 
-def render(method, *, position, size=(9, 9), **changes):
+def render(method, *, position, size=(9, 9), changes=None, **parameters):
     """Render a scene whose camera looks along +y, its middle pixel along the axis."""
     import mitsuba as mi
 
@@ -20,10 +21,9 @@ def render(method, *, position, size=(9, 9), **changes):
     scene = tiny_scene(size=size, floor=None)
     scene["sensor"]["to_world"] = mi.ScalarTransform4f().look_at([0, -5, 1], [0, 0, 1], [0, 0, 1])
     scene["lamp"]["position"] = position
-    scene |= {"ball": {"type": "cube", "to_world": mi.ScalarTransform4f().translate([2, 3, 0]).scale(0.3)}} | changes
+    scene |= {"ball": {"type": "cube", "to_world": mi.ScalarTransform4f().translate([2, 3, 0]).scale(0.3)}} | (changes or {})
     chosen = METHODS[method]
-    kernel = exact if chosen.uses_kernel else None
-    return render_frame(frame_renderer(read_scene(mi.load_dict(scene)), chosen, kernel=kernel))
+    return render_frame(frame_renderer(read_scene(mi.load_dict(scene)), chosen, kernel=exact, **parameters))
 
 
 @pytest.mark.claim("light-on-a-ray-refused")
@@ -40,9 +40,27 @@ def test_a_light_on_the_line_of_a_ray_but_not_on_it_is_rendered(variant, positio
     import mitsuba as mi
 
     wall = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0, 4, 1]).scale(0.5)}
-    frame = render("unshadowed", position=position, wall=wall)
+    frame = render("unshadowed", position=position, changes={"wall": wall})
     assert np.isfinite(frame.airlight).all()
     assert frame.airlight[4, 4].min() > 0
+
+
+@pytest.mark.parametrize(
+    ("method", "parameters"),
+    [
+        ("ray-march", {}),
+        ("ray-march", {"sum": "transitions"}),
+        ("soft-shafts", {"spacing": "equiangular", "steps": 100, "filter": "none"}),
+    ],
+)
+def test_a_ray_straight_away_from_a_light_has_its_airlight(variant, method, parameters):
+    """All angles at the light are 90 degrees there, and equal steps in them had no length."""
+    J, _ = quad(lambda x: np.exp(-0.31 * (2 * x + 4)) / (x + 4) ** 2, 0, np.inf)
+    wanted = J * 0.31 * np.array([0.9 * 5, 0.8 * 4, 0.7 * 3]) / (4 * np.pi)
+    for away in (0.0, 1e-7, 1e-4):
+        found = render(method, position=[away, -9.0, 1.0], **parameters).airlight[4, 4]
+        # Both ends of an angle of 1/1024 are rounded to 2^-24: 1.2e-4, and as much for the places of its steps.
+        np.testing.assert_allclose(found, wanted, rtol=3e-4)
 
 
 def test_an_even_size_has_no_ray_through_the_middle(variant):
@@ -51,7 +69,7 @@ def test_an_even_size_has_no_ray_through_the_middle(variant):
 
 def test_a_spot_that_looks_aside_is_no_reason(variant):
     """On a ray it lights neither before nor behind itself, the airlight is 0 or finite."""
-    frame = render("ray-march", position=[3.0, 3.0, 3.0], spot=spot())
+    frame = render("ray-march", position=[3.0, 3.0, 3.0], changes={"spot": spot()})
     assert np.isfinite(frame.airlight).all()
 
 
@@ -62,7 +80,7 @@ def test_what_is_not_finite_is_refused_whatever_the_reason():
 
     values = np.ones((2, 3, 3))
     values[1, 2, 0] = np.nan
-    scene = SimpleNamespace(lights=(), camera=None)
+    scene = SimpleNamespace(lights=(), medium=SimpleNamespace(clear=False))
     for layers in ((values, np.ones_like(values)), (np.ones_like(values), values)):
         with pytest.raises(InputError, match="1 of 6 pixels is not finite, first in column 2 of row 1: nan, 1, 1"):
             check_radiance(scene, "unshadowed", *layers, np.full((2, 3), np.inf))
