@@ -21,7 +21,9 @@ def render(method, *, position, size=(9, 9), changes=None, **parameters):
     scene = tiny_scene(size=size, floor=None)
     scene["sensor"]["to_world"] = mi.ScalarTransform4f().look_at([0, -5, 1], [0, 0, 1], [0, 0, 1])
     scene["lamp"]["position"] = position
-    scene |= {"ball": {"type": "cube", "to_world": mi.ScalarTransform4f().translate([2, 3, 0]).scale(0.3)}} | (changes or {})
+    scene |= {"ball": {"type": "cube", "to_world": mi.ScalarTransform4f().translate([2, 3, 0]).scale(0.3)}} | (
+        changes or {}
+    )
     chosen = METHODS[method]
     return render_frame(frame_renderer(read_scene(mi.load_dict(scene)), chosen, kernel=exact, **parameters))
 
