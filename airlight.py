@@ -47,7 +47,7 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from reports.machine.environment import MissingError as MissingError
     from reports.machine.environment import activate as activate
     from reports.machine.environment import versions as versions
-    from validation.certified.generate import certified_data as certified_data
+    from validation.certified.files import certified_data as certified_data
     from validation.comparison.images import compare_files as compare_files
     from validation.configurations.methods import configuration as configuration
     from validation.configurations.timing import time_frame as time_frame
@@ -94,7 +94,7 @@ _API = {
     "merged_references": "validation.estimates.merge",
     "multiple_scattering_share": "validation.estimates.multiple_scattering",
     "known_answers": "validation.known_answers.point_lights",
-    "certified_data": "validation.certified.generate",
+    "certified_data": "validation.certified.files",
     "compare_files": "validation.comparison.images",
     "read_exr": "reference.storage.exr",
     "write_exr": "reference.storage.exr",

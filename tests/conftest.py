@@ -16,7 +16,9 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 @pytest.fixture(scope="session")
 def data_folder() -> Path:
     """The folder of certified values."""
-    return Path(__file__).parent / "data"
+    from validation.certified.files import FOLDER
+
+    return FOLDER
 
 
 @pytest.fixture(scope="session")

@@ -8,12 +8,11 @@ Read in this order:
 - `statistics/`: tests for images with random errors, and the noise of errors and times;
 - `configurations/`: methods and kernels by name, and the timing of frames;
 - `estimates/`: the truth of a scene by each estimator, budgets, and the agreement of the estimators;
-- `certified/`: twelve scenes of fog to 12 digits, in mpmath;
+- `certified/`: files of certified values: twelve scenes of fog, and airlight integrals;
 - `known_answers/`: laws and scenes whose answer is known;
 - `mutations/`: faults of the physics in copies of the estimators, and which of them the checks detect;
 - `kernels/`: errors, cost, convergence and stability of airlight kernels;
-- `oracles/`: slow programs that compute the airlight of a light volume in float64;
-- `frames/`: errors and cost of whole frames, scene by scene, and the comparison with `baselines/`;
+- `frames/`: errors and cost of whole frames, scene by scene;
 - `scaling/`: what a method costs as its work grows;
 - `papers/`: the results of papers measured again;
 - `fidelity/`: a verdict for every claim of these papers;
@@ -22,7 +21,7 @@ Read in this order:
 - `comparison/`: images from files and engines against the truth;
 - `sweep/`: studies of many scenes, and their rows.
 
-`baselines/` holds the known errors of every configuration as JSON files.
+`baselines/` holds what sweeps and `bench --scaling` measured once.
 
 May import: `analytic`, `realtime`, `reference`.
 """

@@ -20,8 +20,8 @@ their width.
 In float32 every segment takes as many panels of eight nodes as its width in v and its optical depth ask for, see
 `realtime.kernels.panels`, or four or eight nodes in x if it is short, see `realtime.kernels.short_segments`; they
 leave less than 1e-6. In float64 the numbers of nodes are the same for all, the smallest with which the certified cases
-(tests/data) and random rays of optical depth 1e-6 to 50, heights down to 1e-7 of the distance and |g| up to 0.95 stay
-below 1e-10; the isotropic case has no lobe, and pairs of nodes about the centre share their exponentials: it is
+and random rays of optical depth 1e-6 to 50, heights down to 1e-7 of the distance and |g| up to 0.95 stay below 1e-10;
+the isotropic case has no lobe, and pairs of nodes about the centre share their exponentials: it is
 `quadrature` with 40 nodes.
 """
 

@@ -8,6 +8,7 @@ from typing import Any
 import typer
 
 _SIZE = (800, 600)
+_KEPT = Path(__file__).resolve().parents[2] / "validation/baselines/scaling"  # what `bench --scaling --json` printed
 _EARLIER = "what `bench --scaling --json` printed, or a report.json of `report --full`"
 
 
@@ -61,10 +62,9 @@ def _earlier(against: Path | None, names: list[str]) -> list[dict[str, Any]]:
     from analytic.errors import InputError
     from reports.data.json_files import read_json
     from reports.tables.scaling import is_record
-    from validation.frames.baseline_files import FOLDER
 
     if against is None:
-        kept = [FOLDER / "scaling" / f"{name}.json" for name in names]
+        kept = [_KEPT / f"{name}.json" for name in names]
         files = [path for path in kept if path.is_file()]
     else:
         files = [against]

@@ -13,7 +13,9 @@ def integrate(
     cases: Annotated[
         Path,
         typer.Argument(
-            metavar="CASES.csv", help="CSV with the columns of tests/data; x1 may be inf.", show_default=False
+            metavar="CASES.csv",
+            help="CSV with the columns of airlight_integral.csv; x1 may be inf.",
+            show_default=False,
         ),
     ],
     kernel: Annotated[

@@ -16,10 +16,8 @@ from typing import Annotated, Any
 import typer
 
 from reports import __version__
-from reports.commands.baselines import baselines
 from reports.commands.bench import bench
 from reports.commands.cache import cache
-from reports.commands.certify import certify
 from reports.commands.clouds import clouds
 from reports.commands.compare import compare
 from reports.commands.completion import one_of
@@ -65,7 +63,7 @@ _PANELS: dict[str, tuple[Callable[..., None], ...]] = {
     "Measure": (report, diff, bench, sweep, maps, stability),
     "Images": (reference, compare, fit, merge, describe, integrate, slab, clouds, gallery),
     "Papers": (published, figures, fidelity),
-    "Develop": (run_tests, docs, baselines, mutations, certify),
+    "Develop": (run_tests, docs, mutations),
 }
 _NAMES = {list_: "list", run_tests: "test"}  #: where the function cannot have the name
 _EPILOG = f"""

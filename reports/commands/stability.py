@@ -31,7 +31,7 @@ def stability(
     from reports.tables.stability import print_plane_stability, print_stability
     from reports.tables.terminal import print_json
     from validation.frames.plane_stability import broken, plane_stability
-    from validation.kernels.stability import Bar, certified_files
+    from validation.kernels.stability import CERTIFIED, Bar
     from validation.kernels.stability import stability as run
     from validation.metrics.errors import plain
 
@@ -42,13 +42,12 @@ def stability(
         wanted = names is None or "exact" in names
         planes = plane_stability(progress=lambda n, m, what: progress(0.9 + 0.1 * n / m, what)) if wanted else []
     broken_planes = broken(planes)
-    certified = [path.name for path in certified_files()]
     if json:
-        data = {"environment": describe_environment(), "certified": certified, "bar": Bar(), "kernels": results}
+        data = {"environment": describe_environment(), "certified": CERTIFIED, "bar": Bar(), "kernels": results}
         data |= {"shadow_planes": planes, "broken_planes": broken_planes}
         print_json(plain(data))
     else:
-        print_stability(plain(results), certified=bool(certified))
+        print_stability(plain(results))
         if planes:
             print_plane_stability(plain(planes), broken_planes)
     if broken_planes or any(kernel.broken for kernel in results):

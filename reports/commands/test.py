@@ -10,7 +10,8 @@ import typer
 def run_tests(
     context: typer.Context,
     everything: Annotated[
-        bool, typer.Option("--all", help="Also the statistical and slow tests, all mutations and all baselines.")
+        bool,
+        typer.Option("--all", help="Also the statistical and slow tests, all mutations and all baselines among them."),
     ] = False,
     workers: Annotated[
         int | None,

@@ -10,7 +10,6 @@ from typing import Any
 from realtime.scene.features import describe
 from reference.quadrature.ray_values import TruthImage
 from validation.comparison.engine_images import ImageMeasurement
-from validation.frames.baseline_files import read_baseline
 from validation.frames.benchmark import Measurement, knows_shadows
 from validation.frames.scene_study import SceneStudy
 from validation.metrics.errors import plain
@@ -20,13 +19,11 @@ from validation.scaling.study import Scaling
 def scene_facts(study: SceneStudy) -> dict[str, Any]:
     """Return the description of a scene."""
     loaded, effort, features = study.loaded, study.effort, study.scene.features
-    baseline = None if loaded.path else read_baseline(loaded.name)
     return {
         "name": loaded.name,
         "purpose": loaded.purpose,
         "published": loaded.published,
         "path": str(loaded.path) if loaded.path else None,
-        "baseline": baseline["revision"] if baseline else None,
         "size": list(effort.image),
         "timed": list(effort.timed),
         "plan": describe(features),

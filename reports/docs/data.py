@@ -82,12 +82,18 @@ def kept_of_report(report: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def baseline_revision(scene: str) -> int | None:
+    """Return the revision of the accuracy baseline of a scene in this checkout, None where there is none."""
+    path = Path(__file__).resolve().parents[2] / "tests/evidence/baselines" / f"{scene}.json"
+    return json.loads(path.read_text(encoding="utf-8"))["revision"] if path.is_file() else None
+
+
 def _kept_scene(scene: dict[str, Any]) -> dict[str, Any]:
     built_in = [entry for entry in scene["methods"] if entry["kind"] == "built-in"]
     return {
         "name": scene["name"],
         "size": scene["size"],
-        "baseline": scene.get("baseline"),
+        "baseline": baseline_revision(scene["name"]),
         "plan": scene["plan"],
         "counts": counts(scene["name"]),
         "truth": scene["truth"],

@@ -10,21 +10,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 from reports.docs.verification import RECORD, duration, redraw
-
-#: Tests that other parts of the run repeat.
-REPEATED = (
-    "tests/test_regression.py::test_errors_are_those_of_the_baseline",
-    "tests/validation/mutations/test_study.py::test_the_standard_run_catches_nine_in_ten",
-)
-#: Mutations below the margin of the comparison, which it must not catch.
-BELOW_THE_MARGIN = ("one-in-ten-thousand",)
 
 
 @dataclass(frozen=True)
@@ -39,14 +31,10 @@ class Counts:
 
 @dataclass(frozen=True)
 class Part:
-    """A command, and how its file is counted."""
+    """A run of pytest, whose counts are in the file that its last argument names."""
 
     name: str
     command: Sequence[str]  #: arguments of Python
-    result: (
-        str  #: "argument": counts are in the file that the last argument names; "output": in what the command prints
-    )
-    count: Callable[[bytes], Counts]
 
 
 @dataclass(frozen=True)
@@ -63,15 +51,12 @@ class Outcome:
 
 def all_parts(workers: Sequence[str]) -> tuple[Part, ...]:
     """Return the parts of a full run; `workers` are pytest's arguments for tests that other processes may disturb."""
-    airlight = str(Path(__file__).resolve().parents[2] / "airlight.py")
-    tests = ["-m", "pytest", *(word for test in REPEATED for word in ("--deselect", test))]
+    tests = ["-m", "pytest"]
     return (
-        Part("unit", _pytest(tests[:2], workers, "not statistical and not slow"), "argument", count_tests),
-        Part("statistical", _pytest(tests, workers, "statistical and not slow"), "argument", count_tests),
+        Part("unit", _pytest(tests, workers, "not statistical and not slow")),
+        Part("statistical", _pytest(tests, workers, "statistical and not slow")),
         # Some of the slow tests compare times, so nothing else runs beside them.
-        Part("slow", _pytest(tests, (), "slow"), "argument", count_tests),
-        Part("mutations", [airlight, "mutations", "--json"], "output", count_mutations),
-        Part("baselines", [airlight, "baselines", "--no-times", "--json"], "output", count_baselines),
+        Part("slow", _pytest(tests, (), "slow")),
     )
 
 
@@ -88,39 +73,16 @@ def count_tests(content: bytes) -> Counts:
     return Counts(tests - failures - errors - skipped, failures + errors, skipped)
 
 
-def count_mutations(content: bytes) -> Counts:
-    """Count the mutations in what `airlight mutations --json` prints."""
-    data = json.loads(content)
-    missed = [result["name"] for result in data["results"] if not result["caught"]]
-    failed = [name for name in missed if name not in BELOW_THE_MARGIN]
-    disagreeing = [control for control in data["control"] if not control["agrees"]]
-    failed += [f"{control['scene']}, {control['layer']}, without a mutation" for control in disagreeing]
-    remark = f"not caught: {', '.join(missed)}" if missed else ""
-    return Counts(data["caught"], len(failed), len(missed) - len(set(missed) & set(failed)), remark)
-
-
-def count_baselines(content: bytes) -> Counts:
-    """Count the scenes in what `airlight baselines --json` prints."""
-    data = json.loads(content)
-    moved = [*(name for name, moves in data["moves"].items() if moves), *data["stray"]]
-    kept = len(data["moves"]) - sum(bool(moves) for moves in data["moves"].values())
-    return Counts(kept, len(moved), remark=f"moved: {', '.join(moved)}" if moved else "")
-
-
 def run_part(part: Part, root: Path) -> Outcome:
     """Run one part; it has failed if its command does not write its file."""
     start = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "result"
         command = [sys.executable, *part.command]
-        if part.result == "argument":
-            status = subprocess.run([*command, str(path)], cwd=root, check=False).returncode
-        else:
-            with path.open("wb") as output:
-                status = subprocess.run(command, cwd=root, check=False, stdout=output).returncode
+        status = subprocess.run([*command, str(path)], cwd=root, check=False).returncode
         try:
-            counts = part.count(path.read_bytes())
-        except (OSError, ValueError, KeyError, ElementTree.ParseError):
+            counts = count_tests(path.read_bytes())
+        except (OSError, ValueError, ElementTree.ParseError):
             counts = Counts(failed=1, remark=f"ended with status {status} and no result")
     if status and not counts.failed:
         counts = Counts(counts.passed, 1, counts.skipped, f"ended with status {status}")

@@ -12,5 +12,5 @@ Read in this order:
 
 May import: `analytic.errors`, `realtime.frame`, `realtime.methods`, `realtime.methods.shadow_planes`, `realtime.scene`,
 `reference.storage`, `reports.data`, `reports.docs`, `reports.machine`, `reports.plotting`, `validation.configurations`,
-`validation.estimates`, `validation.frames`, `validation.metrics`, `validation.scenes`.
+`validation.estimates`, `validation.metrics`, `validation.scenes`.
 """

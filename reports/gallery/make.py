@@ -23,6 +23,7 @@ from realtime.scene.read_scene import read_scene
 from reference.storage.files import ensure_folder, temporary_folder, write_bytes, write_text
 from reports.data.reader import read_report
 from reports.docs.build import source_folder
+from reports.docs.data import baseline_revision
 from reports.gallery.recipes import (
     SIZE,
     SMALL,
@@ -37,7 +38,6 @@ from reports.machine.environment import MissingError, versions
 from reports.plotting.pictures import error_map, preview, tone_curve
 from validation.configurations.methods import configuration, parse_settings, prepared
 from validation.estimates.quadrature import truth_image
-from validation.frames.baseline_files import read_baseline
 from validation.metrics.errors import error_metrics
 from validation.scenes.changes import parse_changes
 from validation.scenes.loading import LoadedScene, load_scene
@@ -112,7 +112,7 @@ def _entry(picture: Picture) -> dict[str, Any]:
         "command": picture.command,
         "scene": picture.scene,
         "method": picture.method,
-        "baselines": {name: (read_baseline(name) or {}).get("revision") for name in scenes},
+        "baselines": {name: baseline_revision(name) for name in scenes},
         "digest": tutorial_digest() if picture.scene == TUTORIAL else None,
         "versions": {name: made_by[name] for name in ("airlight", "mitsuba", "drjit")},
         "made": datetime.now(UTC).date().isoformat(),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tables of what guards the numbers: baselines that moved, faults put into the estimators, light left out."""
+"""Tables of what guards the numbers: faults put into the estimators, light left out."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -7,12 +7,6 @@ from typing import Any
 from reports.tables.table import Interval, Name, Row, Table, Value, Verdict, numbers, table, words
 
 Entry = Mapping[str, Any]
-
-
-def move_table(moves: Iterable[Any]) -> Table:
-    """Return what is not as the baselines say; of `validation.frames.baseline_files.Move`."""
-    six, two = numbers(old="baseline", new="now", how={"digits": 6}), numbers("allowed", how={"digits": 2})
-    return table("", (*words(scene="", label="configuration", what=""), *six, *two), map(vars, moves))
 
 
 _SEEN = (

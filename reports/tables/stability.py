@@ -16,21 +16,15 @@ _EPSILON = {"single": 2.0**-23, "double": 2.0**-52}
 _ALARM = {"alarm": True}
 
 
-def print_stability(kernels: Sequence[Entry], *, certified: bool) -> None:
+def print_stability(kernels: Sequence[Entry]) -> None:
     """Print the tables of every kernel.
 
     Parameters
     ----------
     kernels
         An entry for each, as in JSON.
-    certified
-        Whether the files of certified values were there.
     """
     print("Relative errors; ε is 1.2e-7 in float32 and 2.2e-16 in float64, median and 99 % are of float32.")
-    if not certified:
-        print(
-            "The certified values are not installed (they are in tests/data of a clone): only generated rays are used."
-        )
     for kernel in kernels:
         claim = ", claims to be exact" if kernel["exact"] else ""
         print(f"\n=== {kernel['kernel']}{claim} ===")

@@ -115,7 +115,7 @@ def twin_of(loaded, frame, size, precision="single", *, walls="slanted"):
     from realtime.scene.read_scene import read_scene
     from realtime.shadow_maps.shadow_map import cast_shadow_map
     from reference.scene.read import read_truth
-    from validation.oracles.light_volume import oracle_airlight, traced_walls
+    from tests.evidence.oracles.light_volume import oracle_airlight, traced_walls
 
     scene = read_scene(loaded, precision)
     maps = [cast_shadow_map(scene.geometry, light, size) for light in scene.lights]

@@ -7,8 +7,6 @@ Read in this order:
 - `expected_work.py`: what a command will take, and the question before it starts;
 - `scene_study.py`: all that a report asks of one scene, by effort;
 - `result_cache.py`: results on disk, so that a report computes only what changed;
-- `baseline_runs.py`: measures the errors that baselines keep;
-- `baseline_files.py`: baselines as files, their comparison and their revisions;
 - `decomposition.py`: the error of an image by its causes, which add up to it;
 - `cloud_stages.py`: the stages of collectors for clouds, and whether their searches converge;
 - `octave_fit.py`: the constants of octaves that fit a scene of clouds best;

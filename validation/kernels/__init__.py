@@ -17,5 +17,5 @@ Read in this order:
 - `gradient_cost.py`: what derivatives cost.
 
 May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.numerics`, `realtime.rays`,
-`realtime.scene`, `reference.storage`, `validation.configurations`.
+`realtime.scene`, `reference.storage`, `validation.certified`, `validation.configurations`.
 """

@@ -7,7 +7,6 @@ a derivative that passes 0 says nothing of the digits of what goes into it.
 
 import csv
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import drjit as dr
@@ -23,11 +22,11 @@ from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
 from realtime.scene.phase import named_phase
+from validation.certified.files import certified_data
 from validation.kernels.values import Kernel
 
 Array = NDArray[np.float64]
 
-FILE = "airlight_slopes.csv"
 _SMALL = 0.1
 _LEAST = 1e-3  # size of what a derivative is by, at least [m, 1/m, 1]
 
@@ -53,11 +52,8 @@ class SlopeErrors:
 
 
 def certified_slope_cases() -> tuple[SlopeCases, ...]:
-    """Return the certified derivatives; none where airlight is installed without its tests."""
-    path = Path(__file__).resolve().parents[2] / "tests" / "data" / FILE
-    if not path.is_file():
-        return ()
-    with path.open(newline="") as file:
+    """Return the certified derivatives."""
+    with certified_data("airlight_slopes.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     cases = []
     for phase in dict.fromkeys(row["phase"] for row in rows):

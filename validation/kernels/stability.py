@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Where kernels break: every kernel on certified values, on rays of every magnitude, and against exact laws.
 
-The certified values are the files in tests/data; where the tests are not installed, only generated rays are used.
+The certified values are the files of `validation.certified`.
 
 A light volume and shadow planes add and subtract Gamma(x) = J(0, x). Of a sliver far from the light two nearly equal
 numbers are subtracted, and with relative rounding errors of size eps the difference J(0, x1) - J(0, x0) is wrong by
@@ -16,6 +16,7 @@ import numpy as np
 
 from analytic.cases import Cases, read_cases
 from realtime.kernels.registry import KERNELS
+from validation.certified.files import certified_data
 from validation.configurations.kernel_names import find_kernel
 from validation.kernels.errors import EPSILON, Errors, Rows, errors_by_group, groups
 from validation.kernels.laws import Law, laws
@@ -86,9 +87,8 @@ class Bar:
 
 
 def certified_files() -> tuple[Path, ...]:
-    """Return the files of certified values; none where airlight is installed without its tests."""
-    folder = Path(__file__).resolve().parents[2] / "tests" / "data"
-    return tuple(folder / name for name in CERTIFIED if (folder / name).is_file())
+    """Return the files of certified values."""
+    return tuple(certified_data(name) for name in CERTIFIED)
 
 
 def stability(

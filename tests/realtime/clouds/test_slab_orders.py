@@ -3,6 +3,7 @@
 
 import math
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,13 +16,14 @@ from realtime.clouds.slab_orders.radiance import slab_radiance
 from realtime.clouds.slab_orders.slab import slab_light
 from realtime.clouds.slab_orders.streams import double_gauss, mode_kernel
 
+DATA = Path(__file__).parents[2] / "data"
 ALL = [(1, math.inf)]
 ISOTROPIC, HG = HenyeyGreensteinPhase(0.0), HenyeyGreensteinPhase(0.75)
 
 
 @pytest.fixture(scope="module")
-def cloud_c1(data_folder):
-    table = np.loadtxt(data_folder / "cloud_c1_moments.csv", delimiter=",", skiprows=3)
+def cloud_c1():
+    table = np.loadtxt(DATA / "cloud_c1_moments.csv", delimiter=",", skiprows=3)
     return SeriesPhase(table[:, 1] / (2 * table[:, 0] + 1))
 
 

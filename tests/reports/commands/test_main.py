@@ -133,7 +133,7 @@ def test_commands_stand_in_panels_by_purpose_on_a_line_each(capfd, monkeypatch):
     assert {"report", "diff", "bench"} <= set(listed["Measure"])
     assert {"reference", "compare", "merge", "describe", "integrate"} <= set(listed["Images"])
     assert {"published", "figures", "fidelity"} <= set(listed["Papers"])
-    assert {"test", "docs", "baselines", "mutations", "certify"} == set(listed["Develop"])
+    assert {"test", "docs", "mutations"} == set(listed["Develop"])
     shown = [name for panel, names in listed.items() if panel != "Options" for name in names]
     assert sorted(shown) == sorted(_SHOWN)
     for panel, lines in panels.items():

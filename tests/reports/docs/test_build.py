@@ -274,7 +274,7 @@ def test_the_kernel_of_the_page_on_adding_one(variant, tmp_path, monkeypatch):
     (code,) = re.findall(r"```python\n(.*?)```", page("extending"), flags=re.DOTALL)
     (tmp_path / "twelve_steps_of_a_page.py").write_text(code)
     monkeypatch.syspath_prepend(str(tmp_path))
-    cases = read_cases(DOCS.parent / "tests/data/airlight_integral.csv")
+    cases = read_cases(DOCS.parent / "validation/certified/airlight_integral.csv")
     kernels = ("twelve_steps_of_a_page:midpoint", "equiangular-12")
     own, expected = (integrate_cases(cases, kernel, "double") for kernel in kernels)
     both = np.isfinite(own) & np.isfinite(expected)

@@ -9,9 +9,9 @@ import pytest
 from analytic.errors import InputError
 from realtime.methods.registry import FOG_METHODS
 from reports.docs.data import refresh
+from tests.evidence import baselines
 from tests.helpers.reports import checked, entry, refused, report_of, scene, timing
 from validation.configurations.methods import STANDARD, chosen_configurations
-from validation.frames import baseline_files
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -28,7 +28,7 @@ def stale_scenes(kept):
     standard = {configuration.label for configuration in STANDARD}
     known = {configuration.label for configuration in chosen_configurations(list(FOG_METHODS))}
     for row in kept["scenes"]:
-        name, baseline = row["name"], baseline_files.read_baseline(row["name"])
+        name, baseline = row["name"], baselines.read_baseline(row["name"])
         if baseline is None:
             stale.append(f"{name}: there is no such scene any more")
             continue
@@ -57,7 +57,7 @@ def report(**changes):
         method("mine.py:march", kind="function"),
     ]
     files = {"picture": "open-fog/a.png", "exr": "open-fog/a.exr", "airlight": "open-fog/b.png"}
-    fog = scene("open-fog", methods, size=[4, 1], baseline=7, files=files)
+    fog = scene("open-fog", methods, size=[4, 1], files=files)
     claims = [{"kind": "truth", "text": "All is well.", "good": True}]
     return checked(report_of([fog, {**fog, "name": "own", "path": "own.xml"}], claims=claims)) | changes
 
@@ -80,7 +80,7 @@ def test_a_report_is_kept_without_what_is_not_shown(variant, folder, tmp_path):
     (scene,) = kept["scenes"]  # the user's own is nobody's documentation, and so is his method
     assert [shown["method"] for shown in scene["methods"]] == ["unshadowed", "unshadowed", "min-max"]
     assert scene["counts"] == {"shapes": 0, "triangles": 0, "lights": 1}
-    assert scene["baseline"] == 7
+    assert scene["baseline"] == baselines.read_baseline("open-fog")["revision"]
     assert scene["methods"][2]["refused"] == "not in this fog"
     assert set(scene["methods"][0]["times"]) == {"frame", "airlight", "light_moved"}
 
@@ -143,9 +143,7 @@ def test_stale_numbers_are_told(monkeypatch):
     accurate, refused = {"airlight": {"relative_rmse": 0.01}}, {"refused": "no such light"}
     configurations = {"unshadowed (exact)": accurate, label: refused, "unshadowed (uniform)": accurate}
     baseline = {"revision": 3, "configurations": configurations}
-    monkeypatch.setattr(
-        "validation.frames.baseline_files.read_baseline", lambda name: baseline if name == "windows" else None
-    )
+    monkeypatch.setattr("tests.evidence.baselines.read_baseline", lambda name: baseline if name == "windows" else None)
     # Kernels that only baselines measure are not asked for.
     methods = [{"label": "unshadowed (exact)", "refused": None}, {"label": label, "refused": "no such light"}]
     fresh = {"name": "windows", "baseline": 3, "methods": methods}

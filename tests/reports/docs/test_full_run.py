@@ -9,7 +9,7 @@ import pytest
 
 from reports.commands import main as cli
 from reports.docs import full_run
-from reports.docs.full_run import BELOW_THE_MARGIN, REPEATED, Part, all_parts, run_all, run_part
+from reports.docs.full_run import Part, all_parts, run_all, run_part
 from reports.docs.verification import RECORD, ROOT
 
 XML = '<testsuites><testsuite tests="{}" failures="{}" errors="0" skipped="1"/></testsuites>'
@@ -18,11 +18,7 @@ WRITES = "import sys; open(sys.argv[1], 'w').write({!r})"
 
 def pytest_part(name="unit", *, tests=5, failures=0):
     code = WRITES.format(XML.format(tests, failures)) + f"; sys.exit({int(failures > 0)})"
-    return Part(name, ["-c", code], "argument", full_run.count_tests)
-
-
-def output_part(data, count, status=0):
-    return Part("other", ["-c", f"import sys; print({json.dumps(data)!r}); sys.exit({status})"], "output", count)
+    return Part(name, ["-c", code])
 
 
 @pytest.fixture
@@ -76,35 +72,8 @@ def test_one_failure_fails_the_run_and_the_other_parts_still_run(checkout):
     ],
 )
 def test_a_part_that_dies_has_failed(tmp_path, code, failed, remark):
-    outcome = run_part(Part("unit", ["-c", code], "argument", full_run.count_tests), tmp_path)
+    outcome = run_part(Part("unit", ["-c", code]), tmp_path)
     assert (outcome.failed, outcome.remark) == (failed, remark)
-
-
-def mutation_data(caught, control=True):
-    results = [{"name": name, "caught": name in caught} for name in ("no-four-pi", *BELOW_THE_MARGIN)]
-    agreement = {"scene": "hall", "layer": "airlight", "agrees": control}
-    return {"caught": len(caught), "results": results, "control": [agreement]}
-
-
-def test_mutations_are_counted(tmp_path):
-    def counted(data, status=0):
-        outcome = run_part(output_part(data, full_run.count_mutations, status), tmp_path)
-        return outcome.passed, outcome.failed, outcome.skipped, outcome.remark
-
-    below = BELOW_THE_MARGIN[0]
-    assert counted(mutation_data(["no-four-pi"])) == (1, 0, 1, f"not caught: {below}")
-    assert counted(mutation_data([])) == (0, 1, 1, f"not caught: no-four-pi, {below}")
-    assert counted(mutation_data(["no-four-pi"], control=False), 1)[1] == 1
-
-
-def test_baselines_are_counted(tmp_path):
-    outcome = run_part(
-        output_part({"moves": {"hall": [], "windows": []}, "stray": []}, full_run.count_baselines), tmp_path
-    )
-    assert (outcome.passed, outcome.failed, outcome.remark) == (2, 0, "")
-    data = {"moves": {"hall": [], "windows": [{"label": "exact"}]}, "stray": ["attic"]}
-    outcome = run_part(output_part(data, full_run.count_baselines, 1), tmp_path)
-    assert (outcome.passed, outcome.failed, outcome.remark) == (1, 2, "moved: windows, attic")
 
 
 def test_the_command_runs_every_part_and_its_status_is_theirs(checkout, monkeypatch):
@@ -135,16 +104,8 @@ def test_ctrl_c_leaves_the_record_of_the_last_run(checkout, monkeypatch, capfd):
 
 def test_parts_are_what_continuous_integration_runs_and_all_else():
     parts = {part.name: " ".join(part.command) for part in all_parts(["-n", "2"])}
-    assert list(parts) == ["unit", "statistical", "slow", "mutations", "baselines"]
+    assert list(parts) == ["unit", "statistical", "slow"]
     assert "-n 2 -m not statistical and not slow" in parts["unit"]
     assert "-n 2 -m statistical and not slow" in parts["statistical"]
     assert "-m slow" in parts["slow"]
     assert "-n 2" not in parts["slow"]
-    for test in REPEATED:
-        path, _, name = test.partition("::")
-        assert f"def {name}(" in (ROOT / path).read_text()
-    for command in ("mutations --json", "baselines --no-times --json"):
-        assert any(words.endswith(command) for words in parts.values())
-    from validation.mutations.catalogue import MUTATIONS
-
-    assert set(BELOW_THE_MARGIN) < {mutation.name for mutation in MUTATIONS}

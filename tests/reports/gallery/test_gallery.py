@@ -12,9 +12,9 @@ from PIL import Image
 
 from analytic.errors import InputError
 from reports.commands import main as cli
+from reports.docs.data import baseline_revision
 from reports.gallery.make import LARGEST, SCHEMA, _coded, chosen_pictures, tutorial_digest
 from reports.gallery.recipes import pictures
-from validation.frames import baseline_files
 
 ROOT = Path(__file__).resolve().parents[3]
 FOLDER = ROOT / "docs/gallery"
@@ -41,7 +41,7 @@ def stale(kept):
         if entry["digest"] not in (None, tutorial_digest()):
             told.append(f"{name}: made of another scene of the tutorial")
         for scene, revision in entry["baselines"].items():
-            now = (baseline_files.read_baseline(scene) or {}).get("revision")
+            now = baseline_revision(scene)
             if revision != now:
                 told.append(f"{name}: made with revision {revision} of the baseline of {scene}, now it is {now}")
     return told

@@ -6,11 +6,11 @@ import pytest
 
 from analytic.errors import InputError
 from reference.scene.read import read_truth
+from tests.evidence.oracles.light_volume import oracle_airlight
 from tests.helpers.scenes import spot, tiny_scene
 from validation.estimates.quadrature import truth_image
 from validation.frames.map_size import fitted_slope, map_errors, map_flicker
 from validation.metrics.errors import error_metrics
-from validation.oracles.light_volume import oracle_airlight
 
 # Steps enough that halving them changes no error below by more than 2 %.
 MARCH = {"steps": 1000, "shadow": "map"}

@@ -175,7 +175,7 @@ def test_any_map(variant, kind, data):
     from realtime.methods.light_volumes.published.mesh import volume_mesh
     from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
     from reference.scene.read import read_truth
-    from validation.oracles.light_volume import oracle_airlight
+    from tests.evidence.oracles.light_volume import oracle_airlight
 
     loaded, (walk, mesh), shadow_map = renderers(kind, data.draw(st.integers(0, len(VIEWS) - 1)))
     vertex = vertices_of(shadow_map)
@@ -214,7 +214,7 @@ def test_any_walls_in_any_map(variant, kind, data):
     from realtime.methods.light_volumes.texel_walls import walled_heights
     from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
     from reference.scene.read import read_truth
-    from validation.oracles.light_volume import oracle_airlight
+    from tests.evidence.oracles.light_volume import oracle_airlight
 
     loaded, (walk, _), shadow_map = renderers(kind, data.draw(st.integers(0, len(VIEWS) - 1)))
     vertex = vertices_of(shadow_map)

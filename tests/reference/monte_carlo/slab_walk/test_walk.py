@@ -5,6 +5,7 @@ The walk through the step cloud gives the consensus of I3RC.
 """
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein, Tabulat
 from reference.monte_carlo.slab_walk.step_cloud import step_cloud_reflectance
 from reference.monte_carlo.slab_walk.walk import Slab, walk
 
+DATA = Path(__file__).parents[3] / "data"
 GRID = (np.arange(200_000) + 0.5) / 200_000
 ALL = (1, math.inf)
 
@@ -92,8 +94,8 @@ def test_the_same_seed_is_the_same_whatever_the_workers():
 @pytest.mark.slow
 @pytest.mark.claim("step-cloud", tolerance="0.0005 of the mean, 0.003 RMS over columns; 4 million photons")
 @pytest.mark.parametrize("sun", [0, 60])
-def test_the_step_cloud_is_that_of_i3rc(sun, data_folder):
-    table = np.genfromtxt(data_folder / "i3rc_step_cloud.csv", delimiter=",", names=True, skip_header=2)
+def test_the_step_cloud_is_that_of_i3rc(sun):
+    table = np.genfromtxt(DATA / "i3rc_step_cloud.csv", delimiter=",", names=True, skip_header=2)
     expected = table[f"sun_{sun}"]
     reflectance, error = step_cloud_reflectance(sun, photons=4_000_000)
     assert reflectance.mean() == pytest.approx(expected.mean(), abs=5e-4)

@@ -84,7 +84,7 @@ def test_a_frame_is_that_of_the_height_field(variant, kind, precision):
     from realtime.scene.read_scene import read_scene
     from realtime.shadow_maps.shadow_map import cast_shadow_map
     from reference.scene.read import read_truth
-    from validation.oracles.light_volume import oracle_airlight
+    from tests.evidence.oracles.light_volume import oracle_airlight
 
     # A kernel in float64 for a beam with a soft edge takes ten seconds to compile.
     lamp = {"lamp": spot(beam=20.0 if precision == "single" else 33.0)} if kind == "spot" else {}

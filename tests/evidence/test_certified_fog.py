@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import json
+import re
+import subprocess
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.evidence.certified.fog import SCHEMA, certify_pixel, directions, scene_data, to_json
+from tests.evidence.certified.model import FogBox, FogScreen, load_fog, mitsuba_dict
+from tests.evidence.certified.scenes import fog_scenes
+
+ROOT = Path(__file__).resolve().parents[3]
+NAMES = [scene.name for scene in fog_scenes()]
+SCENES = {scene.name: scene for scene in fog_scenes()}
+# One ray of each kind: endless, near a light, ended by a sphere, among needles, in the fading part of a spot, dark.
+SOME = {
+    "thin-open": 27,
+    "near-light": 36,
+    "sphere-shadow": 9,
+    "three-spheres": 29,
+    "box-floor": 34,
+    "needles": 20,
+    "camera-in-shadow": 0,
+    "hard-spot": 21,
+    "soft-spot": 19,
+}
+
+
+@pytest.fixture(scope="module")
+def text(data_folder):
+    return (data_folder / "certified_fog.json").read_text()
+
+
+@pytest.fixture(scope="module")
+def certified(text):
+    return {scene["name"]: scene for scene in json.loads(text)["scenes"]}
+
+
+def radiance(scene):
+    return np.array([pixel["radiance"] for pixel in scene["pixels"]], dtype=float)
+
+
+def bound(scene):
+    return np.array([pixel["bound"] for pixel in scene["pixels"]], dtype=float)
+
+
+def truth_of(scene):
+    """Read the file's Mitsuba scene; its lights must be those of the file, bit by bit."""
+    from reference.scene.read import read_truth
+
+    truth = read_truth(load_fog(scene["mitsuba"]))
+    for light, given in zip(truth.lights, scene["lights"], strict=True):
+        assert np.array_equal(light.intensity, np.array(given["intensity"], dtype=float))
+    return truth
+
+
+@pytest.mark.claim("certified-fog")
+def test_the_file_is_whole_and_small(text, certified):
+    data = json.loads(text)
+    assert data["schema"] == SCHEMA
+    assert list(certified) == NAMES
+    assert len(text) < 1_000_000
+    assert to_json(data) == text
+    for scene in certified.values():
+        assert len(scene["pixels"]) == len(scene["camera"]["directions"]) == 64
+        assert all(len(pixel["lit"]) == len(scene["lights"]) for pixel in scene["pixels"])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_file_holds_the_scenes_of_the_code(certified, name):
+    given = {key: value for key, value in certified[name].items() if key != "pixels"}
+    assert given == json.loads(json.dumps(scene_data(SCENES[name], directions(SCENES[name]))))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_bounds_are_worth_ten_digits_and_zero_means_dark(certified, name):
+    value, most = radiance(certified[name]), bound(certified[name])
+    dark = np.array([not any(pixel["lit"]) for pixel in certified[name]["pixels"]])
+    assert np.all((value == 0) == dark[:, None])
+    assert np.all(most[dark] == 0)
+    # Twelve digits: at worst half a unit of the last of 1.00000000000.
+    assert np.all(most[~dark] <= 5.1e-12 * value[~dark])
+    assert np.all(most[~dark] > 0)
+
+
+@pytest.mark.claim("certified-fog-inputs")
+def test_all_inputs_are_exact_in_float32():
+    def numbers(value):
+        if isinstance(value, dict):
+            value = list(value.values())
+        if isinstance(value, list | tuple):
+            return [number for entry in value for number in numbers(entry)]
+        return [value] if isinstance(value, float) else []
+
+    for scene in fog_scenes():
+        given = numbers(asdict(scene))
+        assert len(given) > 20
+        assert all(float(np.float32(number)) == number for number in given), scene.name
+
+
+def corners(shape):
+    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * len(shape.half_edges))).reshape(len(shape.half_edges), -1).T
+    return {tuple(map(float, corner)) for corner in np.array(shape.centre) + signs @ np.array(shape.half_edges)}
+
+
+@pytest.mark.claim("certified-fog-inputs")
+def test_corners_are_exact_in_mitsuba(variant):
+    import mitsuba as mi
+
+    for scene in fog_scenes():
+        # Mitsuba merges meshes of one material, and then screens are among them.
+        parameters = [mi.traverse(shape) for shape in load_fog(mitsuba_dict(scene)).shapes()]
+        vertices = [
+            np.array(mesh["vertex_positions"]).reshape(-1, 3) for mesh in parameters if "vertex_positions" in mesh
+        ]
+        mesh_corners = {tuple(map(float, corner)) for part in vertices for corner in part}
+        boxes = set().union(*(corners(shape) for shape in scene.occluders if isinstance(shape, FogBox)))
+        screens = set().union(*(corners(shape) for shape in scene.occluders if isinstance(shape, FogScreen)))
+        assert boxes <= mesh_corners <= boxes | screens, scene.name
+
+
+@pytest.mark.claim("certified-fog", tolerance="none: equal digits")
+@pytest.mark.parametrize(("name", "pixel"), SOME.items())
+def test_some_rays_come_out_the_same(certified, name, pixel):
+    certificate = json.loads(json.dumps(asdict(certify_pixel(SCENES[name], directions(SCENES[name])[pixel]))))
+    assert certificate == certified[name]["pixels"][pixel]
+
+
+@pytest.mark.claim("certified-fog", tolerance="none: equal digits")
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_all_rays_come_out_the_same(certified, name):
+    for direction, expected in zip(directions(SCENES[name]), certified[name]["pixels"], strict=True):
+        assert json.loads(json.dumps(asdict(certify_pixel(SCENES[name], direction)))) == expected
+
+
+@pytest.mark.claim("bound-in-every-pixel", tolerance="the bound of the pixel, 1e-9 of the largest at most")
+@pytest.mark.claim("certified-fog", tolerance="the bound of the pixel, 1e-9 of the largest at most")
+@pytest.mark.parametrize("name", NAMES)
+def test_quadrature_agrees_within_its_own_bound(variant, certified, name):
+    """The route that shares nothing: lit intervals of triangles and spheres in a plane, Kronrod's panels in float64."""
+    from reference.quadrature.image import quadrature_image
+
+    image = quadrature_image(truth_of(certified[name]))
+    value = radiance(certified[name])
+    difference = np.abs(image.airlight.reshape(-1, 3) - value)
+    # The last term: both routes take the directions through the pixel centres for themselves, 3e-16 apart.
+    allowed = image.airlight_bound.reshape(-1, 3) + bound(certified[name]) + 1e-13 * value
+    assert np.all(difference <= allowed), (difference / np.maximum(allowed, 1e-300)).max()
+    assert image.airlight_bound.max() < 1e-9 * value.max()
+    assert image.left == 0
+    distance = np.array([float(pixel["distance"]) for pixel in certified[name]["pixels"]])
+    # `distance` is as it was cast, in float32: a few roundings of coordinates of a few metres.
+    np.testing.assert_allclose(image.distance.reshape(-1), distance, rtol=3e-6)
+
+
+@pytest.mark.claim("single-scatter-agrees", tolerance="4.5 standard errors, below 2e-3")
+@pytest.mark.statistical
+@pytest.mark.parametrize("name", NAMES)
+def test_single_scatter_agrees_within_its_noise(variant, certified, name):
+    """Monte Carlo that knows nothing of intervals: the pooled mean within 4.5 standard errors, once in 150 000 runs."""
+    from reference.monte_carlo.batches import merged
+    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+
+    truth = truth_of(certified[name])
+    batches = [single_scatter_batch(truth, seed, 256) for seed in range(24)]
+    pooled = batches[0]
+    for batch in batches[1:]:
+        pooled = merged(pooled, batch)
+    totals = pooled.totals[:, 0] / radiance(certified[name]).mean(axis=0) - 1
+    error = totals.std(axis=0, ddof=1) / np.sqrt(len(totals))
+    assert np.all(error < 2e-3)
+    # Beside the noise the intensities, which this estimator asks Mitsuba for in float32.
+    assert np.all(np.abs(totals.mean(axis=0)) < 4.5 * error + 1e-6), (totals.mean(axis=0), error)
+
+
+@pytest.mark.claim("certified-fog-snippet")
+def test_the_page_tells_of_every_scene_and_its_snippet_runs(variant):
+    page = (ROOT / "docs" / "certified-fog.md").read_text()
+    assert all(f"`{name}`" in page for name in NAMES)
+    (code,) = re.findall(r"^```python\n(.*?)^```", page, flags=re.DOTALL | re.MULTILINE)
+    code = code.replace("llvm_ad_rgb", variant)
+    ran = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=300)
+    assert ran.returncode == 0, ran.stderr
+    bias, interval = (float(word) for word in re.fullmatch(r"bias (\S+)% \+- (\S+)%\n", ran.stdout).groups())
+    assert interval < 1.5
+    assert abs(bias) < 2.5 * interval  # five standard errors
