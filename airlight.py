@@ -57,7 +57,6 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from validation.estimates.images import volpath_reference as volpath_reference
     from validation.estimates.merge import merged_references as merged_references
     from validation.estimates.multiple_scattering import multiple_scattering_share as multiple_scattering_share
-    from validation.known_answers.point_lights import known_answers as known_answers
     from validation.metrics.errors import error_metrics as error_metrics
     from validation.scenes.registry import SCENES as SCENES
 
@@ -93,7 +92,6 @@ _API = {
     "Budget": "validation.estimates.budget",
     "merged_references": "validation.estimates.merge",
     "multiple_scattering_share": "validation.estimates.multiple_scattering",
-    "known_answers": "validation.known_answers.point_lights",
     "certified_data": "validation.certified.files",
     "compare_files": "validation.comparison.images",
     "read_exr": "reference.storage.exr",

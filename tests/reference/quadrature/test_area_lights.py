@@ -284,7 +284,7 @@ def test_the_standard_error_covers_the_truth_as_often_as_it_says(variant):
 @pytest.mark.claim("area-light-errors", tolerance="a binomial test at 1 % and 0.1 %")
 def test_the_surface_error_covers_the_truth_as_often_as_it_says(variant):
     from analytic.area_light import disk_share
-    from validation.known_answers.area_lights import _occluder, _round, _truth, base_scene
+    from tests.evidence.known_answers.area_lights import _occluder, _round, _truth, base_scene
 
     truth = _truth(_round(base_scene("disk")))
     light = replace(

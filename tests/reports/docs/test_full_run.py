@@ -90,13 +90,13 @@ def test_ctrl_c_leaves_the_record_of_the_last_run(checkout, monkeypatch, capfd):
     run_all([pytest_part()], checkout, machine="the last run")
     kept = (checkout / RECORD).read_text(), (checkout / "docs/verification.md").read_text()
 
-    def interrupted(content):
+    def interrupted(part, root):
         raise KeyboardInterrupt
 
-    interrupt = Part("slow", ["-c", ""], "output", interrupted)
+    monkeypatch.setattr(full_run, "run_part", interrupted)
     monkeypatch.setattr("reports.commands.test.__file__", str(checkout / "reports/commands/test.py"))
     monkeypatch.chdir(checkout)
-    monkeypatch.setattr(full_run, "all_parts", lambda sharing: [pytest_part(), interrupt])
+    monkeypatch.setattr(full_run, "all_parts", lambda sharing: [pytest_part()])
     assert cli.run(["test", "--all"]) == 130
     assert ((checkout / RECORD).read_text(), (checkout / "docs/verification.md").read_text()) == kept
     assert "interrupted" in capfd.readouterr().err

@@ -25,9 +25,9 @@ from reference.quadrature.light_points import PointPlan
 from reference.quadrature.ray_values import TruthImage, ray_values
 from reference.scene.read import TruthLight, TruthScene, read_truth
 from reference.visibility.light_lines import Points
-from validation.certified.model import load_fog, mitsuba_dict
-from validation.certified.scenes import fog_scenes
-from validation.known_answers.record import EXACT, KnownAnswer, largest_difference
+from tests.evidence.certified.model import load_fog, mitsuba_dict
+from tests.evidence.certified.scenes import fog_scenes
+from tests.evidence.known_answers.record import EXACT, KnownAnswer, largest_difference
 
 Array = NDArray[np.float64]
 

@@ -22,8 +22,8 @@ With L = albedo sigma_t / (4 pi) int I p exp(-sigma_t (x + r)) / r^2 dx, summed 
 - An absorbing medium has no airlight and dims a surface by exp(-sigma_t path); the path through a sphere of radius R is
   a chord of length 2 sqrt(R^2 - b^2), b the distance of its centre from the ray.
 - A light in a closed box gives exactly nothing outside.
-- What directional lights obey is in `validation.known_answers.directional`, lights with extent in
-  `validation.known_answers.area_lights`.
+- What directional lights obey is in `tests.evidence.known_answers.directional`, lights with extent in
+  `tests.evidence.known_answers.area_lights`.
 
 Scale factors are powers of two and coordinates multiples of 1/1024, so that float32 scenes obey the laws exactly, too.
 Monte Carlo estimators are held against them with the same random numbers on both sides.
@@ -42,7 +42,7 @@ from analytic.geometry import foot_and_height
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.ray_values import ray_values
 from reference.scene.read import TruthScene, read_truth
-from validation.certified.model import (
+from tests.evidence.certified.model import (
     SIZE,
     FogBox,
     FogLight,
@@ -53,10 +53,10 @@ from validation.certified.model import (
     load_fog,
     mitsuba_dict,
 )
-from validation.certified.scenes import fog_scenes
-from validation.known_answers.area_lights import area_answers
-from validation.known_answers.directional import directional_answers
-from validation.known_answers.record import ESTIMATORS, EXACT, FLOAT32, KnownAnswer, largest_difference, layers
+from tests.evidence.certified.scenes import fog_scenes
+from tests.evidence.known_answers.area_lights import area_answers
+from tests.evidence.known_answers.directional import directional_answers
+from tests.evidence.known_answers.record import ESTIMATORS, EXACT, FLOAT32, KnownAnswer, largest_difference, layers
 
 Array = NDArray[np.float64]
 

@@ -2,8 +2,8 @@
 import numpy as np
 import pytest
 
-from validation.known_answers import directional as directional_answers
-from validation.known_answers.record import ESTIMATORS
+from tests.evidence.known_answers import directional as directional_answers
+from tests.evidence.known_answers.record import ESTIMATORS
 
 EXACT_FOR_ALL = ("albedo_linear", "irradiance_linear", "units", "enclosed")
 
@@ -31,7 +31,7 @@ def test_all_estimators_obey(variant, law, estimator):
 def test_the_laws_are_tried_on_a_scene_with_shadows_and_colours(variant):
     from reference.quadrature.image import quadrature_image
     from reference.scene.read import read_truth
-    from validation.certified.model import load_fog
+    from tests.evidence.certified.model import load_fog
 
     truth = read_truth(load_fog(directional_answers.base_scene()))
     image = quadrature_image(truth)

@@ -4,8 +4,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from validation.known_answers import point_lights as known_answers
-from validation.known_answers.point_lights import ESTIMATORS, KnownAnswer, base_scene
+from tests.evidence.known_answers import point_lights as known_answers
+from tests.evidence.known_answers.point_lights import ESTIMATORS, KnownAnswer, base_scene
 
 EXACT_FOR_ALL = ("albedo_linear", "intensity_linear", "units", "enclosed")
 OF_QUADRATURE = (
@@ -52,7 +52,7 @@ def test_the_laws_are_tried_on_a_scene_that_has_it_all(variant):
     """Shadows, a soft spot, three colours and both endless and ended rays: else the laws would say little."""
     from reference.quadrature.image import quadrature_image
     from reference.scene.read import read_truth
-    from validation.certified.model import load_fog, mitsuba_dict
+    from tests.evidence.certified.model import load_fog, mitsuba_dict
 
     scene = base_scene()
     image = quadrature_image(read_truth(load_fog(mitsuba_dict(scene))))

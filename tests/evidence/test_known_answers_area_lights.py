@@ -3,7 +3,7 @@
 
 import pytest
 
-from validation.known_answers import area_lights
+from tests.evidence.known_answers import area_lights
 
 LAWS = ("albedo_linear", "radiance_linear", "units", "turned", "shrinking_rectangle", "shrinking_sphere")
 

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.scene.read import read_truth
-from validation.certified.model import load_fog
-from validation.known_answers.record import ESTIMATORS, EXACT, FLOAT32, KnownAnswer, largest_difference, layers
+from tests.evidence.certified.model import load_fog
+from tests.evidence.known_answers.record import ESTIMATORS, EXACT, FLOAT32, KnownAnswer, largest_difference, layers
 
 Array = NDArray[np.float64]
 Scene = dict[str, Any]
