@@ -12,7 +12,7 @@ from analytic.droplets import moments
 from analytic.errors import InputError
 from analytic.phase import PhaseFunction, hg_draine_fit, hg_draine_moments, phase_from_words
 from analytic.series import taylor_coefficients
-from tests.data.airlight_integral_droplets import value
+from tests.evidence.certified.airlight_integral_droplets import value
 
 CERTIFIED = Path(__file__).parents[1] / "data" / "airlight_integral_droplets.csv"
 
