@@ -14,8 +14,6 @@ Read in this order:
 - `marching.py`: the midpoint rule, uniform in the distance or in the angle;
 - `taylor.py`: the polynomial of Biri 2006 with derived coefficients;
 - `taylor_printed.py`: the same with the coefficients as printed;
-- `polynomial.py`: a Chebyshev polynomial fitted to the range of each ray;
-- `polynomial_piece.py`: a piece of a ray in the variable of that polynomial;
 - `table.py`: tables of the integral;
 - `closed_form.py`: the closed form of Pegoraro and Parker 2009.
 

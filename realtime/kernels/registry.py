@@ -20,7 +20,6 @@ from typing import Any
 from realtime.kernels.closed_form import closed_form
 from realtime.kernels.exact import exact
 from realtime.kernels.marching import equiangular, uniform
-from realtime.kernels.polynomial import polynomial
 from realtime.kernels.quadrature import quadrature
 from realtime.kernels.quadrature_theta import quadrature_theta
 from realtime.kernels.table import table
@@ -69,13 +68,6 @@ KERNELS: dict[str, Kernel] = {
         "the same with the paper's coefficients as printed, misprints included",
         "Biri, Arques, Michelin 2006, annex as transcribed",
         MappingProxyType({"degree": 4}),
-    ),
-    "polynomial": Kernel(
-        "polynomial",
-        polynomial,
-        "Chebyshev polynomial fitted to each ray's range in w, integrated in closed form",
-        "realtime/kernels/polynomial.py; Trefethen 2013",
-        MappingProxyType({"degree": 15}),
     ),
     "quadrature-theta": Kernel(
         "quadrature-theta",

@@ -40,7 +40,6 @@ class Phase:
     reach: ClassVar[Reach] = Reach()
     polynomial: ClassVar[tuple[float, ...] | None] = None  #: coefficients of ((1 + cos)/2)^0, ^1, ..., if it is one
     scale: ClassVar[float] = 1.0  #: d of `realtime.kernels.exact`: about the E = q/h at which the lobe ends
-    fit_scale: ClassVar[float] = 1.0  #: m of `realtime.kernels.polynomial_piece`
     #: Panels of equal width in v that `realtime.kernels.exact` has in float64, however long the segment
     panels_double: ClassVar[int] = 10
 
@@ -73,10 +72,6 @@ class Phase:
     def lobe_scales(self, Float) -> tuple[Any, Any]:
         """Return the E where a forward lobe ends, at most 1, and the E where a backward lobe begins, at least 1."""
         return Float(self.scale), 1.0
-
-    def fit_scales(self, Float) -> tuple[Any, Any]:
-        """Return m of `realtime.kernels.polynomial_piece`, and the E beyond which p/(1 + E^2) falls like 1/E^2."""
-        return Float(self.fit_scale), Float(1)
 
     def series(self, degree: int) -> list[Any] | None:
         """Return the coefficients of p(-sin theta) in powers of theta, None where there are none."""
@@ -160,7 +155,7 @@ class Hazy(_Power):
     name = "hazy"
     reach = Reach(panel=1.15, few=0.45, more=1.3, turn=0.6)
     polynomial = (0.5, *[0.0] * 7, 4.5)
-    scale, fit_scale = 0.7, 0.6
+    scale = 0.7
     doublings, weight, mean = 3, 9.0, 2.0
 
     def evaluate_half(self, down, up) -> Any:
@@ -179,7 +174,7 @@ class Murky(_Power):
     name = "murky"
     reach = Reach(panel=0.75, few=0.4, more=1.3, turn=0.35)
     polynomial = (33 / 83, *[0.0] * 31, 50 * 33 / 83)
-    scale, fit_scale = 0.5, 0.35
+    scale = 0.5
     doublings, weight, mean = 5, 50.0, 83 / 33
 
     def evaluate_half(self, down, up) -> Any:
@@ -240,12 +235,6 @@ class HenyeyGreenstein(Phase):
         """Return (1 - |g|)/(1 + |g|) of a forward lobe, and its inverse of a backward one."""
         forward, backward = dr.maximum(Float(self.g), 0), dr.maximum(-Float(self.g), 0)
         return (1 - forward) / (1 + forward), (1 + backward) / (1 - backward)
-
-    def fit_scales(self, Float) -> tuple[Any, Any]:
-        """Return min(1, d) and d = (1 - g)/(1 + g)."""
-        g = Float(self.g)
-        spread = (1 - g) / (1 + g)
-        return dr.minimum(1, spread), spread
 
     def series(self, degree: int) -> list[Any]:
         """Return the series of (1 - g^2) b^(-3/2), b = 1 + g^2 + 2 g sin theta, from b y' = -(3/2) b' y."""

@@ -53,7 +53,6 @@ _KERNELS = {
     "quadrature-theta": ("green", "^"),
     "taylor": ("vermillion", "v"),
     "taylor-printed": ("vermillion", "x"),
-    "polynomial": ("purple", "D"),
     "equiangular": ("orange", "<"),
     "uniform": ("orange", ">"),
     "table": ("sky", "P"),
