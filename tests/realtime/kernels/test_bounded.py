@@ -86,7 +86,7 @@ def test_series_of_the_tangent_is_that_of_its_derivatives():
 
 @pytest.mark.claim("polynomial-of-bounded-media", tolerance="relative RMSE 1e-4 of nodes and of degree 25")
 @pytest.mark.parametrize(("form", "exponent"), [("paper", meant), ("printed", printed)])
-@pytest.mark.parametrize("phase", ["isotropic", "rayleigh"])
+@pytest.mark.parametrize("phase", [pytest.param("isotropic", marks=pytest.mark.slow), "rayleigh"])
 def test_both_forms_are_their_integrals_by_nodes_and_by_a_polynomial(variant, form, exponent, phase):
     # The chords pass their feet within 45 degrees at the light, where the series converge fast.
     lamp = clear_scene()["lamp"] | {"position": [-0.1, 0.5, 2.7]}

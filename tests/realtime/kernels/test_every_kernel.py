@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: every kernel takes a phase function that it never heard of, Python floats and bad numbers, or says why not."""
+
+import json
+import subprocess
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from realtime.errors import InputError
+from realtime.kernels.registry import KERNELS
+from realtime.scene.phase import Phase
+from tests.helpers.kernel_values import RAY, kernel_values, true_values
+
+REFUSED = {"table", "table-tail", "closed-form", "taylor", "taylor-printed"}
+
+
+@dataclass(frozen=True)
+class Oval(Phase):
+    """1 + cos^3: forward, smooth, of mean 1."""
+
+    name = "oval"
+
+    def evaluate_half(self, down, up):
+        cos = up - down
+        return 1 + cos * cos * cos
+
+
+@pytest.mark.parametrize("name", KERNELS)
+def test_a_phase_function_that_no_kernel_knows_is_taken_or_refused_in_a_line(variant, name):
+    foot, height, x0, x1 = np.array(
+        [[1.3, 0.7, 0.2, 4.1], [-0.4, 1.1, 0.0, 2.3], [2.9, 0.3, 0.5, 2.6], [1.7, 0.9, 1.6, 1.75]]
+    ).T
+
+    def integrand(x, foot, height):
+        r = np.hypot(x - foot, height)
+        return np.exp(-0.3 * (x + r)) * (1 + ((foot - x) / r) ** 3) / r**2
+
+    kernel = KERNELS[name].function
+    if name in REFUSED:
+        with pytest.raises(InputError, match=r"^[^\n]*phase function 'oval'[^\n]*use the kernel [^\n]*$"):
+            kernel_values(kernel, (foot, height, x0, x1, 0.3), Oval())
+        return
+    truth = [quad(integrand, *ray[2:], args=tuple(ray[:2]), epsrel=1e-11)[0] for ray in zip(foot, height, x0, x1)]
+    value = kernel_values(kernel, (foot, height, x0, x1, 0.3), Oval())
+    # Steps in the distance and a rule of 16 steps are coarse by design; the others are quadratures.
+    assert np.max(np.abs(value / truth - 1)) < {"uniform": 2e-3, "equiangular": 5e-3}.get(name, 2e-6)
+
+
+@pytest.mark.parametrize("name", sorted(set(KERNELS) - {"uniform", "equiangular", "table"}))
+def test_segments_without_length_are_dark(variant, name):
+    rays = ([1.0, 1.0, -2.0], 0.3, [0.0, 1.0, 5.0], [0.0, 1.0, 5.0], 0.7)
+    assert np.all(kernel_values(KERNELS[name].function, rays) == 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "message"),
+    [
+        ("quadrature", {"nodes": 0}, "nodes: got"),
+        ("quadrature", {"nodes": 7}, "nodes: got"),
+        ("quadrature-theta", {"nodes": 0}, "nodes: got 0"),
+        ("uniform", {"steps": 0}, "steps: got 0"),
+        ("equiangular", {"steps": 0}, "steps: got 0"),
+        ("table", {"form": "cubic"}, "form: got 'cubic'"),
+        ("table", {"size": 1}, "size: got 1"),
+        ("table", {"size": 64.0}, "size: got 64.0"),
+        ("table", {"size": 4096}, "size: got 4096"),
+    ],
+)
+def test_numbers_that_a_kernel_does_not_have_are_refused(variant, name, parameters, message):
+    with pytest.raises(InputError, match=message):
+        kernel_values(KERNELS[name].function, RAY, **parameters)
+
+
+def test_endless_rays(variant):
+    """20 optical depths end uniform steps, pi/2 ends the angle."""
+    ray = (1.3, 0.9, 0.0, np.inf, 0.4)
+    for name, parameters, close in (
+        ("uniform", {"steps": 20000}, 1e-6),
+        ("equiangular", {"steps": 20000}, 1e-6),
+        ("quadrature-theta", {"nodes": 64}, 1e-5),
+    ):
+        value = kernel_values(KERNELS[name].function, ray, precision="double", **parameters)
+        assert value == pytest.approx(true_values(ray), rel=close), name
+
+
+@pytest.mark.parametrize("name", ["quadrature", "exact"])
+def test_a_light_beside_the_segment_on_the_ray(variant, name):
+    """Height 0: the closed form int exp(-sigma_t (x + |x - t|)) / (x - t)^2 dx, behind and before the light."""
+    values = kernel_values(KERNELS[name].function, ([-0.5, 2.5], 0.0, 0.0, 1.0, 0.7))
+    for value, t in zip(values, (-0.5, 2.5), strict=True):
+        expected = quad(lambda x, t=t: np.exp(-0.7 * (x + abs(x - t))) / (x - t) ** 2, 0, 1)[0]
+        assert value == pytest.approx(expected, rel=6e-6)  # the bound of certified isotropic values
+
+
+@pytest.mark.claim("refused-phase-functions")
+@pytest.mark.parametrize("method", ["unshadowed", "light-volumes"])
+def test_a_refusal_from_the_body_of_a_loop_stays_one(variant, method):
+    """Dr.Jit wraps what is raised there: `random:13` ended `airlight render` with a traceback."""
+    import mitsuba as mi
+
+    from realtime.frame.renderer import frame_renderer, render_frame
+    from realtime.methods.registry import METHODS
+    from realtime.scene.read_scene import read_scene
+    from tests.helpers.scenes import tiny_scene
+
+    entries = tiny_scene()
+    fog = entries["fog"] | {"phase": {"type": "tabphase", "values": "1.1, 0.4, 1.7"}}
+    block = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).scale(0.31)}
+    scene = read_scene(mi.load_dict(entries | {"fog": fog, "ball": block}))
+    with pytest.raises(InputError, match="no Taylor series"):
+        render_frame(frame_renderer(scene, METHODS[method], kernel=KERNELS["taylor"].function))
+
+
+SCALAR = """
+import json, sys
+import mitsuba as mi
+mi.set_variant("scalar_rgb")
+from analytic.cases import read_cases
+from realtime.errors import InputError
+from realtime.rays.ray_light import RayGeometry
+from realtime.kernels.registry import KERNELS
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium
+from realtime.scene.phase import named_phase
+
+cases, light, found = read_cases(sys.argv[1]), Light(None, None), {}
+for name, kernel in KERNELS.items():
+    found[name] = []
+    for k in range(0, 300, 11):
+        phase = named_phase(cases.phase[k], g=float(cases.g[k]) if cases.phase[k] == "hg" else None)
+        medium = Medium((float(cases.sigma_t[k]),), mi.Color3f(1), phase)
+        geometry = RayGeometry(float(cases.foot[k]), float(cases.height[k]), None, None)
+        try:
+            J = kernel.function(geometry, float(cases.x0[k]), float(cases.x1[k]), medium, light)
+        except InputError:
+            continue
+        found[name].append(abs(float(J) / float(cases.value[k]) - 1))
+print(json.dumps(found))
+"""
+
+
+@pytest.mark.slow
+def test_kernels_run_on_python_floats(data_folder):
+    """On Dr.Jit's scalar backend a number is a Python float; in a process of its own, which has no other variant."""
+    script = [sys.executable, "-c", SCALAR, str(data_folder / "airlight_integral.csv")]
+    errors = json.loads(subprocess.run(script, capture_output=True, text=True, check=True).stdout)
+    assert max(errors["exact"]) < 1e-10
+    assert len(errors["exact"]) == 28
+    for name in ("quadrature", "quadrature-theta", "equiangular"):
+        assert sorted(errors[name])[14] < 1e-3, name  # the median; what each is good for, its own tests say
+    assert errors["closed-form"]
+    assert errors["taylor"]
+    assert errors["table"] == errors["table-tail"] == []  # refused by name: no arrays to hold a table
