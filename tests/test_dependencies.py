@@ -57,7 +57,7 @@ def test_what_the_product_imports_is_declared():
     undeclared = {name: file for name, file in imported(*PRODUCT).items() if name not in declared()}
     # What an extra is for, in the folder that does it, and nowhere else.
     folders = {"view": ["reports/view/"], "test": ["reports/docs/"], "sweep": ["validation/sweep/", "reports/cluster/"]}
-    folders["sweep"] += ["reports/sweep/", "validation/advise/"]
+    folders["sweep"] += ["reports/sweep/"]
     for folder, extra in ((folder, extra) for extra, places in folders.items() for folder in places):
         extras = declared(extra)
         undeclared = {n: file for n, file in undeclared.items() if not (n in extras and file.startswith(folder))}

@@ -43,9 +43,6 @@ def published(
         float,
         typer.Option(metavar="SECONDS", help="billeter: frames that take longer are left out, with the reason."),
     ] = 30.0,
-    zero_cost: Annotated[
-        bool, typer.Option(help="biri: also measure that casters which are not there or not seen cost nothing.")
-    ] = True,
     force: Force = False,
     json: Json = False,
     markdown: Markdown = False,
@@ -93,7 +90,7 @@ def published(
     check_work(f"published, --scale {scale:g}", works, force=force)
     with progress_bar("published") as progress:
         if "biri" in papers:
-            data |= _biri(wanted, names, scale=scale, zero_cost=zero_cost, progress=progress)
+            data |= _biri(wanted, names, scale=scale, progress=progress)
         if "billeter" in papers:
             data |= _billeter(wanted, names[0], scale=scale, maps=sizes, limit=limit, progress=progress)
         if "ali" in papers and "fence" in wanted:
@@ -172,26 +169,20 @@ def _wanted_scenes(scenes: Sequence[str], papers: Sequence[str]) -> list[str]:
     return list(scenes) or known
 
 
-def _biri(
-    wanted: Sequence[str], kernels: Sequence[str], *, scale: float, zero_cost: bool, progress: Callable
-) -> dict[str, Any]:
+def _biri(wanted: Sequence[str], kernels: Sequence[str], *, scale: float, progress: Callable) -> dict[str, Any]:
     """Measure the tables of Biri 2006, nothing where none of their scenes is wanted."""
     from reports.papers.biri import biri_data
-    from validation.frames.zero_cost import zero_costs
     from validation.papers.biri import PUBLISHED, biri_rows
 
     chosen = [row for row in PUBLISHED if row.scene in wanted]
     if not chosen:
         return {}
     rows = biri_rows(chosen, kernels, scale=scale, progress=progress)
-    if zero_cost:
-        progress(0.99, "what is not needed")
-    costs = zero_costs(size=(round(800 * scale), round(600 * scale))) if zero_cost else []
     from validation.papers.constant_distance import constant_distance_study
 
     progress(0.99, "the constant R")
     study = constant_distance_study() if any(row_set.scene == "three-media" for row_set in chosen) else ()
-    return biri_data(rows, costs, study)
+    return biri_data(rows, study)
 
 
 def _billeter(

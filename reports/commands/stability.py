@@ -20,17 +20,16 @@ def stability(
     rays: Annotated[int, typer.Option(min=64, max=1_000_000, metavar="N", help="Number of generated rays.")] = 100_000,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Look for rays and sums of planes on which kernels break.
+    """Look for rays on which kernels break.
 
-    Tries every kernel on certified values, on rays of every magnitude and against exact laws, and sums of many planes.
-    Prints the ray of each largest error in the format of `airlight integrate`. Exit status 1 if a kernel that claims to
-    be exact, or shadow planes, exceed the error that they claim; --kernels without 'exact' leaves the planes out.
+    Tries every kernel on certified values, on rays of every magnitude and against exact laws. Prints the ray of each
+    largest error in the format of `airlight integrate`. Exit status 1 if a kernel that claims to be exact exceeds the
+    error that it claims.
     """
     from reports.machine.environment import activate, describe_environment
     from reports.machine.progress import progress_bar
-    from reports.tables.stability import print_plane_stability, print_stability
+    from reports.tables.stability import print_stability
     from reports.tables.terminal import print_json
-    from validation.frames.plane_stability import broken, plane_stability
     from validation.kernels.stability import CERTIFIED, Bar
     from validation.kernels.stability import stability as run
     from validation.metrics.errors import plain
@@ -38,17 +37,11 @@ def stability(
     names = None if kernels is None else listed("--kernels", kernels)
     activate()
     with progress_bar("stability") as progress:
-        results = run(names, count=rays, progress=lambda done, total, what: progress(0.9 * done / total, what))
-        wanted = names is None or "exact" in names
-        planes = plane_stability(progress=lambda n, m, what: progress(0.9 + 0.1 * n / m, what)) if wanted else []
-    broken_planes = broken(planes)
+        results = run(names, count=rays, progress=lambda done, total, what: progress(done / total, what))
     if json:
         data = {"environment": describe_environment(), "certified": CERTIFIED, "bar": Bar(), "kernels": results}
-        data |= {"shadow_planes": planes, "broken_planes": broken_planes}
         print_json(plain(data))
     else:
         print_stability(plain(results))
-        if planes:
-            print_plane_stability(plain(planes), broken_planes)
-    if broken_planes or any(kernel.broken for kernel in results):
+    if any(kernel.broken for kernel in results):
         raise typer.Exit(1)

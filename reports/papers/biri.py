@@ -9,20 +9,18 @@ from typing import Any
 
 from reports.papers.rates import COLUMNS, rates, size_words
 from reports.tables.methods import per_second
-from reports.tables.table import Interval, Row, Table, measured, numbers, table, words
+from reports.tables.table import Row, Table, measured, numbers, table, words
 
 Data = Mapping[str, Any]
 
 
-def biri_data(rows: Sequence[Any], costs: Sequence[Any], study: Sequence[Any] = ()) -> dict[str, Any]:
+def biri_data(rows: Sequence[Any], study: Sequence[Any] = ()) -> dict[str, Any]:
     """Return what was measured as JSON-ready data.
 
     Parameters
     ----------
     rows
         From `validation.papers.biri.biri_rows`.
-    costs
-        From `validation.frames.zero_cost.zero_costs`, or none.
     study
         From `validation.papers.constant_distance.constant_distance_study`, or none.
     """
@@ -34,16 +32,14 @@ def biri_data(rows: Sequence[Any], costs: Sequence[Any], study: Sequence[Any] = 
         "rows": [
             plain(row) | {"shares": [None if share is None else float(share) for share in row.shares]} for row in rows
         ],
-        "zero_cost": plain(costs),
         "constant_distance": plain(study),
     }
 
 
 def biri_tables(data: Data) -> list[Table]:
-    """Return the tables: shares of the stages, frames a second, and what is not needed if that was measured."""
-    costs = [_cost_table(data["zero_cost"])] if data["zero_cost"] else []
+    """Return the tables: shares of the stages, frames a second."""
     study = data.get("constant_distance") or []
-    return [_share_table(data), _rate_table(data["rows"]), *([_study_table(study)] if study else []), *costs]
+    return [_share_table(data), _rate_table(data["rows"]), *([_study_table(study)] if study else [])]
 
 
 def biri_notes(data: Data) -> list[str]:
@@ -121,14 +117,3 @@ def _study_table(rows: Sequence[Data]) -> Table:
     explanation = "A sphere of fog in clear air, lit from above; against the true depth of both legs."
     title = "The constant R of Biri 2006, section 4.2: error by size and optical depth of the medium"
     return table(title, columns, rows, explanation=explanation)
-
-
-def _cost_table(costs: Sequence[Data]) -> Table:
-    columns = (
-        *words(what="what is not needed"),
-        *numbers(with_ms="with ms", without_ms="without ms"),
-        *numbers("ratio", "quartiles", how={"places": 3}),
-        *numbers("turns"),
-    )
-    rows = [{**cost, "quartiles": Interval(cost["low"], cost["high"])} for cost in costs]
-    return table("What is not needed: a frame with it against one without, in turns", columns, rows)

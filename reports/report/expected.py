@@ -41,7 +41,6 @@ _OTHERS = {
     "stability": 20.0,
     "mutations": 500.0,
     "biri": 8.0,
-    "zero_cost": 60.0,
     "billeter": 300.0,
     "fidelity": 8.0,
     "scaling": 80.0,

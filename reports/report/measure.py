@@ -141,7 +141,7 @@ def write_report(
             by_kind: dict[str, list[CachedResult]] = {}
             for number, part in enumerate(others):
                 step = part_of(steps[str(number)], 0.0, 1.0, before=f"{part.title}, ")
-                with _timed(seconds, "published" if part.kind in ("biri", "zero_cost", "billeter") else part.kind):
+                with _timed(seconds, "published" if part.kind in ("biri", "billeter") else part.kind):
                     results.append(cached_result(part.entry, partial(part.compute, step)))
                 by_kind.setdefault(part.kind, []).append(results[-1])
             stability, mutations = by_kind.get("stability"), by_kind.get("mutations")

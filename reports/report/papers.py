@@ -28,7 +28,7 @@ _GROWING_SIZE = (400, 300)  # of its images [pixels]
 class OtherPart:
     """A part of a report that belongs to no scene."""
 
-    kind: str  #: 'stability', 'mutations', 'scaling', 'biri', 'zero_cost', 'billeter' or 'fidelity'
+    kind: str  #: 'stability', 'mutations', 'scaling', 'biri', 'billeter' or 'fidelity'
     title: str  #: shown as the progress
     entry: CacheEntry
     compute: Callable[[Progress], Computed]
@@ -61,10 +61,9 @@ def published_data(results: Mapping[str, Sequence[CachedResult]]) -> dict[str, A
         return None
     tables = None
     if biri:
-        zero_cost = [cost for result in results.get("zero_cost", ()) for cost in result.data["costs"]]
         rows = [row for result in biri for row in result.data["rows"]]
         study = [row for result in biri for row in result.data["constant_distance"]]
-        tables = {"stages": biri[-1].data["stages"], "rows": rows, "zero_cost": zero_cost, "constant_distance": study}
+        tables = {"stages": biri[-1].data["stages"], "rows": rows, "constant_distance": study}
     figures = published_figures(ROWS)
     return {"biri": tables, "billeter": billeter[-1].data if billeter else None, "figures": figures}
 
@@ -111,7 +110,6 @@ def _mutations(cluster: Cluster | None, progress: Progress) -> Computed:
 
 def _biri(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[OtherPart]:
     """Return Tables 1 and 2 of Biri 2006, each entry a part."""
-    from validation.frames.zero_cost import zero_costs
     from validation.papers.biri import PUBLISHED, Published, biri_rows
     from validation.papers.constant_distance import constant_distance_study
 
@@ -121,7 +119,7 @@ def _biri(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[Oth
         study = constant_distance_study() if published.scene == "three-media" else ()
         # At the size of the report's images, whose truths are kept.
         rows = biri_rows([published], kernels, error_size=effort.image, seconds=seconds, progress=progress)
-        return biri_data(rows, [], study)
+        return biri_data(rows, study)
 
     def part(published: Published) -> OtherPart:
         identity = {
@@ -138,14 +136,7 @@ def _biri(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[Oth
             lambda progress: (measured(published, progress), {}),
         )
 
-    parts = [part(published) for published in PUBLISHED if published.scene in scenes]
-    if parts and "billeter" in effort.papers:  # the full effort leaves nothing out
-        entry = cache_entry(cache, "zero_cost", identity={})
-        costs = OtherPart(
-            "zero_cost", "what is not needed", entry, lambda progress: ({"costs": plain(zero_costs())}, {})
-        )
-        parts.append(costs)
-    return parts
+    return [part(published) for published in PUBLISHED if published.scene in scenes]
 
 
 def _billeter(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[OtherPart]:

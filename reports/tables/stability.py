@@ -41,18 +41,6 @@ def print_stability(kernels: Sequence[Entry]) -> None:
             print(f"BROKEN: {kernel['kernel']}, {reason}")
 
 
-def print_plane_stability(cases: Iterable[Entry], broken: Iterable[str]) -> None:
-    """Print what was found of shadow planes, and what of it breaks the bar of the default."""
-    print()
-    print_table(plane_table(cases))
-    print(
-        "segments: J of each lit segment (the default); gamma: differences of Gamma a segment; planes: Gamma plane by\n"
-        "plane as published, float32 against float64 (its negative pixels are the artefact of Fig. 4)"
-    )
-    for reason in broken:
-        print(f"BROKEN: shadow planes, {reason}")
-
-
 def summary_table(kernels: Iterable[Entry]) -> Table:
     """Return a row for each kernel and each set of rays, all of these together."""
     columns = (
@@ -145,14 +133,3 @@ def slope_table(slopes: Iterable[Entry]) -> Table:
     """Return how wrong the derivatives of a kernel are, by what they are taken by."""
     columns = (*words(phase="phase", by="by"), *numbers(single="float32", double="float64"))
     return table("derivatives: largest relative error", columns, slopes)
-
-
-def plane_table(cases: Iterable[Entry]) -> Table:
-    """Return the errors of shadow planes in hard cases."""
-    columns = (
-        *words(case="shadow planes", sum="", precision=""),
-        *numbers(median="", p99="99 %", max="", beyond="beyond 1e-4"),
-        *numbers("negative", nonfinite="NaN/Inf", how=_ALARM),
-    )
-    title = "cancellation between shadow planes: errors relative to each pixel's true value"
-    return table(title, columns, cases)

@@ -32,9 +32,6 @@ BIRI = {
         }
         for kernel, size, note in (("exact", [800, 600], "a note"), ("taylor", [80, 60], ""))
     ],
-    "zero_cost": [
-        {"what": "unseen", "ratio": 1.013, "low": 0.99, "high": 1.03, "with_ms": 2.0, "without_ms": 1.97, "turns": 60}
-    ],
 }
 
 _ENTRY = {"where": "Fig. 6a", "scene": "omni-box", "map": 32, "method": "light-volumes", "fps": 230}

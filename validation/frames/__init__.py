@@ -8,13 +8,8 @@ Read in this order:
 - `scene_study.py`: all that a report asks of one scene, by effort;
 - `result_cache.py`: results on disk, so that a report computes only what changed;
 - `decomposition.py`: the error of an image by its causes, which add up to it;
-- `cloud_stages.py`: the stages of collectors for clouds, and whether their searches converge;
-- `octave_fit.py`: the constants of octaves that fit a scene of clouds best;
-- `froxel_study.py`: which grid froxel fog needs, and the ghosts of its history;
-- `map_size.py`: error against the size of the shadow map, and the flicker of a light that moves;
-- `interpolation_study.py`: how many rays an image needs between tiles, and along epipolar lines;
-- `plane_stability.py`: hard cases for sums over shadow planes;
-- `zero_cost.py`: checks that what a scene does not need costs nothing.
+- `cloud_frames.py`: what frames of clouds take that go on with the collectors of the last frame;
+- `map_size.py`: error against the size of the shadow map, and the flicker of a light that moves.
 
 May import: `analytic`, `realtime.area_lights`, `realtime.clouds.canonical`, `realtime.errors`, `realtime.frame`,
 `realtime.kernels`, `realtime.memory`, `realtime.methods`, `realtime.numerics`, `realtime.parameters`, `realtime.scene`,

@@ -13,8 +13,7 @@ Read in this order:
 - `biri_misprints.py`: what the misprints of Biri 2006 cost;
 - `slopes.py`: derivatives, against certified ones;
 - `stability.py`: where kernels break;
-- `benchmark.py`: time against error;
-- `gradient_cost.py`: what derivatives cost.
+- `benchmark.py`: time against error.
 
 May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.numerics`, `realtime.rays`,
 `realtime.scene`, `reference.storage`, `validation.certified`, `validation.configurations`.

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from realtime.scene.read_scene import read_scene
-from validation.frames.cloud_stages import time_frames
+from validation.frames.cloud_frames import time_frames
 from validation.scenes.loading import load_scene
 
 Progress = Callable[[float, str], None]

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Properties of a scene: numbers that say what it holds, from what methods read of it.
 
-Sweeps keep them beside errors and times, and `validation.advise` predicts both from them. They are cheap: a grid of
-camera rays, shadow rays from a few points on each, and small images that are marched.
+Sweeps keep them beside errors and times. They are cheap: a grid of camera rays, and shadow rays from a few points on
+each.
 
 Read in this order:
 
 - `properties.py`: the properties of a scene by name;
 - `view.py`: what the camera sees: depths, and where light reaches its rays;
-- `changes.py`: how much the airlight changes without shadows, and with more points for a light with extent;
 - `lights.py`: how many silhouettes the lights see, and where they are;
 - `media.py`: optical depths, and what the phase functions are like.
 

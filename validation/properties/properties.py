@@ -5,7 +5,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.scene.read_scene import Scene
-from validation.properties.changes import change_properties
 from validation.properties.lights import caster_properties
 from validation.properties.media import optical_depth, phase_properties
 from validation.properties.view import LightPlace, SeenView, light_places, lit_points, see
@@ -34,8 +33,7 @@ def scene_properties(scene: Scene) -> dict[str, float]:
         `mean_cosine`, `forward`. Surfaces and shadows: those of `caster_properties`, `surface_share` of the pixels,
         `depth_edges` (mean difference of the logarithm of neighbouring depths), `lit_share` of the points on rays,
         `shadow_edges` (mean number of changes between light and shadow along a ray, of all lights together),
-        `shadow_edges_across` (mean share of points that another light reaches than the next ray's), and those of
-        `change_properties`. Image: `pixels`.
+        `shadow_edges_across` (mean share of points that another light reaches than the next ray's). Image: `pixels`.
     """
     lights = light_places(scene)
     view = see(scene, lights)
@@ -43,7 +41,6 @@ def scene_properties(scene: Scene) -> dict[str, float]:
     properties |= _medium_properties(scene, lights, view)
     properties |= caster_properties(scene, lights)
     properties |= _shadow_properties(scene, lights, view)
-    properties |= change_properties(scene)
     features = scene.features
     properties["soft_spots"] = float(features.soft_spots)
     properties["pixels"] = float(scene.camera.width * scene.camera.height)

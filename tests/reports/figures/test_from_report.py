@@ -82,7 +82,7 @@ def published():
     }
     stages = ["silhouettes", "scene", "airlight of the scene", "sorting", "shadow planes"]
     return {
-        "biri": {"stages": stages, "rows": [row], "zero_cost": []},
+        "biri": {"stages": stages, "rows": [row]},
         "billeter": {"figures": [image], "table": [view]},
     }
 

@@ -29,7 +29,7 @@ def test_published_tables_of_biri_stand_beside_the_measured(folder):
     assert text.count(f"1.3 {TIMES}") == 1  # 50 frames a second against 38; of another size nothing is compared
     assert f"clutter, 80 {TIMES} 60 (taylor)" in text
     assert "Fig. 7c: a note." in text
-    for caption, width in (("Table 1 of Biri", 7), ("Table 2 of Biri", 13), ("What is not needed", 6)):
+    for caption, width in (("Table 1 of Biri", 7), ("Table 2 of Biri", 13)):
         assert set(widths(table_of(page, caption))) == {width}
     assert "published" not in {a.get("id") for _, a in shown(None, folder).tags}
 

@@ -102,7 +102,7 @@ def test_command_prints_both_tables_beside_the_published_figures(variant, monkey
         return measured
 
     monkeypatch.setattr("validation.papers.biri.biri_rows", once)
-    arguments = ["published", "two-pens", "--kernels", "exact", "--scale", "0.03", "--no-zero-cost"]
+    arguments = ["published", "two-pens", "--kernels", "exact", "--scale", "0.03"]
     assert cli.run([*arguments, "--markdown"]) == 0
     out = capfd.readouterr().out
     assert "| two-pens: Table 1, Fig. 7a | 1 % | 8.7 % | 21.7 % | 9.6 % | 59 % | - |" in out

@@ -60,7 +60,6 @@ def test_optical_depth_grows_with_extinction(variant):
         "optical_depth",
         "optical_depth_light",
         "optical_depth_most",
-        "change_without_shadows",
     }
 
 

@@ -1,10 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""Claim: what a scene does not need costs nothing. No time can say it better than the same kernels and planes."""
+
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from realtime.frame.renderer import run_stages
+from realtime.scene.read_scene import read_scene
 from validation.configurations.methods import Configuration, prepared
-from validation.frames.zero_cost import sphere_spot_with, zero_costs
+from validation.scenes.loading import load_scene, resize
+from validation.scenes.parts import mitsuba_mesh, placed, rotation
+from validation.scenes.solids import torus
+from validation.scenes.sphere_spot import sphere_spot
 
 
 def kernels(renderer):
@@ -19,12 +26,9 @@ def kernels(renderer):
         return [(kernel["type"], kernel.get("hash"), kernel["size"]) for kernel in dr.kernel_history()]
 
 
-@pytest.mark.claim("without-occluders")
-def test_without_casters_shadow_planes_run_the_kernels_of_unshadowed(variant):
-    """No time can say it better: it is the same machine code on the same lanes."""
-    from realtime.scene.read_scene import read_scene
-    from validation.scenes.loading import load_scene
-
+@pytest.mark.claim("without-occluders", "not-needed-costs-nothing")
+def test_without_occluders_shadow_planes_run_the_kernels_of_unshadowed(variant):
+    """The same machine code on the same lanes."""
     scene = read_scene(load_scene("open-fog", (16, 12)).scene)
     planes, plain = (prepared(scene, Configuration(method, "exact")) for method in ("shadow-planes", "unshadowed"))
     recorded = kernels(planes)
@@ -33,18 +37,22 @@ def test_without_casters_shadow_planes_run_the_kernels_of_unshadowed(variant):
     assert recorded == kernels(plain)
 
 
+def sphere_spot_with(unseen):
+    """`sphere-spot` with a number of rings behind the camera."""
+    described = sphere_spot()
+    for number in range(unseen):
+        where = (0.73 * (number % 7) - 2.3, -9.7 - 0.61 * (number // 7), 1.3)
+        ring = placed(torus(0.29, 0.071, (31, 17)), where, rotation((0.3, 1, 0.2), 23.0 * number))
+        described[f"unseen-{number}"] = mitsuba_mesh(f"unseen-{number}", ring, (0.31, 0.37, 0.41))
+    scene = mi.load_dict(described)
+    resize(scene, (16, 12))
+    return read_scene(scene)
+
+
 @pytest.mark.claim("not-needed-costs-nothing")
-def test_unseen_casters_leave_no_plane(variant):
+def test_unseen_occluders_leave_no_plane(variant):
     """41 rings behind the camera: the planes of the frame are those of the sphere and the floor alone."""
-    scenes = [sphere_spot_with(unseen, (16, 12)) for unseen in (41, 0)]
+    scenes = [sphere_spot_with(unseen) for unseen in (41, 0)]
     more, less = (prepared(scene, Configuration("shadow-planes", "exact")).prepare(scene)[0] for scene in scenes)
     for name in ("start", "entries", "lines", "spans", "ends", "layers"):
         np.testing.assert_array_equal(np.array(getattr(more, name)), np.array(getattr(less, name)), err_msg=name)
-
-
-@pytest.mark.claim("not-needed-costs-nothing")
-@pytest.mark.slow
-def test_what_is_not_needed_costs_nothing(variant):
-    """Within 3 %; two standard errors of the median of 150 turns are what the machine's other work can add to it."""
-    for cost in zero_costs(size=(400, 300), turns=150):
-        assert cost.least_ratio < 1.03, cost
