@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sphinx's settings; `airlight docs` builds the pages."""
+"""Sphinx's settings. The pages are built by `.venv/bin/python -m sphinx -W --keep-going docs airlight-docs`."""
 
 import sys
 from pathlib import Path
@@ -21,7 +21,7 @@ extensions = [
     "mathml",
     "generated",
 ]
-exclude_patterns = ["_ext", "data"]
+exclude_patterns = ["_ext", "data", "tools"]
 highlight_language = "none"  # what is indented is a formula
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command line, the Python interface, the error report, figures and tables for papers, the documentation.
+"""The command line, the Python interface, the error report, figures and tables for papers.
 
 Read in this order:
 
@@ -12,14 +12,12 @@ Read in this order:
 - `diff/`: the comparison of two reports;
 - `page/`: the page of a report;
 - `figures/`: figures and tables for papers, one module each;
-- `gallery/`: the pictures of README and documentation;
 - `report/`: measures what a report asks for and writes it;
 - `api/`: the functions of `import airlight` and their results;
 - `bench/`: what `airlight bench` prints;
 - `view/`: the live view in the browser;
 - `sweep/`: what a sweep says, from its Parquet;
-- `commands/`: the commands, one module each;
-- `docs/`: builds the documentation.
+- `commands/`: the commands, one module each.
 
 May import: `analytic`, `realtime`, `reference`, `validation`.
 """

@@ -5,12 +5,8 @@ The real installation takes a minute and a network; it happens wherever `./airli
 """
 
 import os
-import re
 import shutil
-import signal
 import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -146,116 +142,6 @@ def test_an_interrupted_first_start_is_repaired(machine):
     assert not _left_over(machine)
 
 
-@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
-def test_a_killed_first_start_is_repaired(machine, how):
-    (machine / "programs" / "pip-is-slow").touch()
-    environment = {"PATH": str(machine / "programs")}
-    launcher = machine / "a project" / "airlight"
-    process = subprocess.Popen([launcher], env=environment, stderr=subprocess.DEVNULL, start_new_session=True)
-    deadline = time.monotonic() + 30
-    while "pip" not in (_read(machine / "programs" / "log")) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    os.killpg(process.pid, how)
-    process.wait(timeout=30)
-    (machine / "programs" / "pip-is-slow").unlink()
-    _log(machine)
-    again = _start(machine)
-    assert again.returncode == 0, again.stderr
-    assert _log(machine) == ["venv", "pip", "pip"]
-    assert not _left_over(machine)
-
-
-def _read(path: Path) -> str:
-    return path.read_text() if path.exists() else ""
-
-
-@pytest.fixture
-def real_start(tmp_path):
-    """A function that starts the launcher of a folder whose environment is that of these tests, as made before."""
-    project = tmp_path / "project"
-    (project / ".venv").mkdir(parents=True)
-    for name in ("airlight", "airlight.py", "pyproject.toml", "requirements.lock"):
-        shutil.copy(ROOT / name, project)
-    for name in ("analytic", "realtime", "reference", "validation", "reports"):
-        (project / name).symlink_to(ROOT / name)
-    for name in ("bin", "lib", "pyvenv.cfg"):
-        (project / ".venv" / name).symlink_to(Path(sys.prefix) / name)
-    sums = subprocess.run(
-        ["cksum", project / "requirements.lock", project / "pyproject.toml"], capture_output=True, text=True, check=True
-    )
-    (project / ".venv" / "airlight-stamp").write_text(f"{sums.stdout}python {project}\n\n")
-
-    def start(*arguments, **settings):
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-        return subprocess.Popen([project / "airlight", *arguments], cwd=tmp_path, **pipes, **settings)
-
-    return start
-
-
-_STOPS = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "terminated")}
-
-
-@pytest.mark.parametrize("how", _STOPS)
-def test_a_signal_in_the_first_moments_has_its_status_and_no_traceback(real_start, how):
-    """By a shell that has yet to read the launcher, and by `env` that starts, it ends the process: some 3 ms in all."""
-    status, word = _STOPS[how]
-    for after in (0, 0.002, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05):
-        process = real_start("scenes")
-        time.sleep(after)
-        process.send_signal(how)
-        out, err = process.communicate(timeout=60)
-        assert process.returncode in (status, -how), after
-        assert out == ""
-        assert err == "" if process.returncode == -how else err.startswith(f"{word}: ") and err.count("\n") == 1, err
-
-
-@pytest.mark.parametrize("how", _STOPS)
-def test_a_signal_while_python_starts_waits_until_it_is_handled(real_start, how):
-    """Both signals are sent before Python begins, and held back as `env` does for the launcher."""
-
-    def send():
-        signal.pthread_sigmask(signal.SIG_BLOCK, _STOPS)
-        os.kill(os.getpid(), how)
-
-    command = [sys.executable, "-S", ROOT / "airlight.py", "scenes"]
-    for program in (command, [sys.executable, "-c", "from reports.commands.start import main; main()"]):
-        done = subprocess.run(program, cwd=ROOT, preexec_fn=send, capture_output=True, text=True, timeout=60)
-        status, word = _STOPS[how]
-        assert (done.returncode, done.stdout) == (status, "")
-        assert done.stderr == f"{word}: no file is left half-written; run the same command again\n"
-
-
-@pytest.mark.parametrize("how", _STOPS)
-def test_a_signal_to_the_script_is_a_status_and_one_line(machine, how):
-    _start(machine)
-    _log(machine)
-    # The shell waits for it; the file says that it does.
-    (machine / "programs" / "cksum").unlink()
-    _program(machine / "programs" / "cksum", f"#!/bin/sh\ntouch {machine}/waits\nsleep 0.3\n")
-    launcher, environment = machine / "a project" / "airlight", {"PATH": f"{machine / 'programs'}:/usr/bin:/bin"}
-    process = subprocess.Popen([launcher], env=environment, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    while not (machine / "waits").exists():
-        time.sleep(0.01)
-    process.send_signal(how)
-    out, err = process.communicate(timeout=30)
-    status, word = _STOPS[how]
-    assert (process.returncode, out) == (status, "")
-    assert err == f"{word}: nothing was begun; run the same command again\n"
-
-
-def test_signals_are_held_back_from_python_where_env_can(machine):
-    _start(machine)
-    for name in ("env", "true"):
-        (machine / "programs" / name).symlink_to(shutil.which(name))
-    told = "import signal; print(*sorted(signal.pthread_sigmask(signal.SIG_BLOCK, ())))"
-    _program(machine / "programs" / "python3.11", f"#!{sys.executable}\n{told}\n")
-    if subprocess.run(["env", "--block-signal=INT", "true"], capture_output=True).returncode == 0:
-        assert _start(machine).stdout == f"{signal.SIGINT!s} {signal.SIGTERM!s}\n"
-    (machine / "programs" / "env").unlink()
-    _program(machine / "programs" / "env", "#!/bin/sh\nexit 125\n")  # another system's
-    assert _start(machine).stdout == "\n"
-
-
 def test_starts_at_the_same_time_install_once(machine):
     (machine / "programs" / "pip-is-slow").touch()
     environment = {"PATH": str(machine / "programs")}
@@ -298,14 +184,6 @@ def test_a_python_that_is_too_old_is_refused_by_its_real_version(machine):
     refused = _start(machine)
     assert (refused.returncode, refused.stdout) == (3, "")
     assert "Python 3.11 or newer is needed" in refused.stderr
-
-
-def test_the_version_test_is_understood_by_the_real_python(machine):
-    code = (ROOT / "airlight").read_text().split("describe_python='")[1].split("'")[0]
-    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    version, path = said.split(maxsplit=1)
-    assert version == f"{sys.version_info[0]}.{sys.version_info[1]}"
-    assert path.strip() == os.path.realpath(path.strip())
 
 
 @pytest.mark.claim("launcher")
@@ -361,24 +239,3 @@ class TestLibraries:
             shutil.rmtree(machine / "a project" / ".venv", ignore_errors=True)
             assert ("missing" not in _start(machine).stderr) == version, name
             file.unlink()
-
-
-@pytest.mark.claim("launcher-for-windows")
-def test_the_twin_for_windows_takes_the_same_steps():
-    """Read as text: nobody has Windows here. What can be checked without it: its steps, its labels, its line ends."""
-    script = (ROOT / "airlight.cmd").read_bytes()
-    assert script.count(b"\n") == script.count(b"\r\n") > 40  # cmd.exe loses labels otherwise
-    text = script.decode("ascii").replace("\r\n", "\n")
-    lines = text.splitlines()
-    assert "airlight.cmd text eol=crlf" in (ROOT / ".gitattributes").read_text()
-    labels = {line[1:] for line in lines if line.startswith(":")}
-    assert set(re.findall(r"(?:goto|call) :?(\w+)", text)) == labels
-    steps = ("-m venv", "requirements.lock", "--no-deps --no-build-isolation -e", "doctor --missing", 'airlight.py" %*')
-    places = [text.rindex(step) for step in steps]
-    assert places[0] < text.index("install -r") < places[2] < places[3] < places[4]
-    for name in ("requirements.lock", "pyproject.toml"):  # compared at each start, copied at the end of the first
-        assert f'fc /b "%root%{name}" "%venv%\\{name}"' in text
-        assert f'copy /y "%root%{name}" "%venv%\\{name}"' in text
-    assert "exit /b %errorlevel%" in text
-    for line in lines:  # a bracket in the name of a folder would end a block
-        assert not re.match(r"(if|else).*\($", line), line

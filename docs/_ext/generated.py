@@ -12,6 +12,7 @@ from pathlib import Path
 import listed
 import measured
 import shown
+import tested
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 
@@ -35,10 +36,13 @@ PARTS = {
     "gallery-scenes": shown.gallery_scenes,
     "gallery-methods": shown.gallery_methods,
     "claims": measured.claims,
+    "cycles": measured.cycles,
+    "tested-claims": tested.claims,
+    "last-run": tested.last_run,
     "fastest": measured.fastest,
     "provenance": measured.provenance,
 }
-_MARK = re.compile(r"^<!-- generated: ([a-z-]+)((?: [\w-]+)*) -->$", flags=re.MULTILINE)
+_MARK = re.compile(r"<!-- generated: ([a-z-]+)((?: [\w-]+)*) -->")
 _SOURCE = re.compile(r"\[([^\]]+)\]\(\.\./((?:analytic|realtime|reference|validation|reports)/[\w/]+)\.py\)")
 #: Documents in the folder above, and the pages that show them.
 _PAGES = {"../CONTRIBUTING.md": "contributing.md", "../CHANGELOG.md": "changelog.md", "../DESIGN.md": "conventions.md"}

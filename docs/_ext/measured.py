@@ -140,3 +140,25 @@ def _scene(record: Any, kept: dict[str, Any] | None) -> str:
         if kept["multiple"]:
             words.append(f"- Single scattering leaves out {_share(kept['multiple']['medium'])} of the airlight.")
     return "\n".join([*words, ""])
+
+
+def cycles() -> str:
+    """Return the faults that were set in Blender's Cycles, and what the diagnosis said of each."""
+    record = json.loads((DATA / "cycles-faults.json").read_text(encoding="utf-8"))
+    rows = record["rows"]
+    faults = [row for row in rows if row["planted"] != "right"]
+    right = [row for row in rows if row["planted"] == "right"]
+    lines = [
+        f"{sum(row['right'] for row in faults)} of {len(faults)} faults are named first; "
+        f"{sum(row['right'] for row in right)} of {len(right)} right images are called right ({record['measured']}, "
+        f"Blender {record['blender']}, 160 x 120 pixels).",
+        "",
+        "| scene | what was set wrong | should be named | first | what it says | off | left |",
+        "| --- | --- | --- | --- | --- | ---: | ---: |",
+    ]
+    for row in rows:
+        first = f"`{row['first']}`" if row["right"] else f"**`{row['first']}`**"
+        says = row["says"] + (f" (with {' and '.join(row['together'])})" if row["together"] else "")
+        cells = [row["scene"], row["words"], f"`{row['planted']}`", first, says]
+        lines.append(f"| {' | '.join([*cells, *(f'{100 * row[key]:.2g} %' for key in ('residual', 'left'))])} |")
+    return "\n".join([*lines, ""])

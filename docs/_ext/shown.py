@@ -94,4 +94,5 @@ def scene_picture(name: str) -> str:
 
 
 def _card(entry: dict[str, Any], alt: str, words: str) -> str:
-    return f"```{{container}} card\n![{alt}](gallery/{entry['file']})\n\n{words}\n\n`{entry['command']}`\n```\n"
+    command = f"`{entry['command']}`" if entry["command"] else ""
+    return f"```{{container}} card\n![{alt}](gallery/{entry['file']})\n\n{words}\n\n{command}\n```\n"

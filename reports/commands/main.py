@@ -23,12 +23,10 @@ from reports.commands.compare import compare
 from reports.commands.completion import one_of
 from reports.commands.describe import describe
 from reports.commands.diff import diff
-from reports.commands.docs import docs
 from reports.commands.doctor import doctor
 from reports.commands.fidelity import fidelity
 from reports.commands.figures import figures
 from reports.commands.fit import fit
-from reports.commands.gallery import gallery
 from reports.commands.help import HelpfulCommand, HelpfulGroup
 from reports.commands.integrate import integrate
 from reports.commands.lists import list_
@@ -61,9 +59,9 @@ DONE, FAILED, WRONG_INPUT, MISSING, INTERRUPTED = 0, 1, 2, 3, 130
 _PANELS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start": (doctor, list_, render, view, cache),
     "Measure": (report, diff, bench, sweep, maps, stability),
-    "Images": (reference, compare, fit, merge, describe, integrate, slab, clouds, gallery),
+    "Images": (reference, compare, fit, merge, describe, integrate, slab, clouds),
     "Papers": (published, figures, fidelity),
-    "Develop": (run_tests, docs, mutations),
+    "Develop": (run_tests, mutations),
 }
 _NAMES = {list_: "list", run_tests: "test"}  #: where the function cannot have the name
 _EPILOG = f"""

@@ -1,17 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight test [PYTEST ARGUMENTS]`: the tests of this checkout."""
 
+import json
+import subprocess
+import time
 from pathlib import Path
 from typing import Annotated
+from xml.etree import ElementTree
 
 import typer
+
+RECORD = "docs/data/full_run.json"  #: of the last run of all tiers, in the checkout
 
 
 def run_tests(
     context: typer.Context,
     everything: Annotated[
-        bool,
-        typer.Option("--all", help="Also the statistical and slow tests, all mutations and all baselines among them."),
+        bool, typer.Option("--all", help="Also the slow and the statistical tests, injected faults and baselines.")
     ] = False,
     workers: Annotated[
         int | None,
@@ -27,11 +32,11 @@ def run_tests(
 
     Other arguments go to pytest; paths are relative to the checkout.
 
-    The fast tests compile kernels quickly, which is most of their work, unless AIRLIGHT_COMPILATION=full asks for what
-    everything else runs. Images are the same bit for bit.
+    The fast tests compile kernels quickly, unless AIRLIGHT_COMPILATION=full asks for what everything else runs. Images
+    are the same bit for bit.
 
-    --all also prints a summary and writes the date, the machine and the counts into docs/verification.md. With --all
-    and arguments for pytest, tests of all tiers run and nothing is written. Exit status 1 if anything failed.
+    --all without arguments for pytest writes the date, the machine and the counts into docs/data/full_run.json. Exit
+    status 1 if anything failed.
     """
     import os
     import sys
@@ -46,21 +51,38 @@ def run_tests(
         )
     variant = prepare().variant
     shared = (2 if threads() > 1 else 0) if workers is None else workers
-    # Each process begins with its own half of the files, so that few kernels are compiled and few scenes loaded twice.
     sharing = ["-n", str(shared), "--dist", "worksteal"] if shared else []
     os.chdir(root)
-    if everything and not context.args:
-        from reports.docs.full_run import all_parts, run_all
-        from reports.machine.environment import describe_environment, machine_in_words
-        from reports.machine.gpu import cuda_status
-
-        device = cuda_status().reason if variant == "cuda_ad_rgb" else None
-        machine = machine_in_words(describe_environment() | {"variant": variant, "device": device})
-        if not run_all(all_parts(sharing), root, machine=machine):
-            raise typer.Exit(1)
-        return
     if not everything and variant == "llvm_ad_rgb" and quick_compilation.VARIABLE not in os.environ:
         os.environ.update(quick_compilation.settings())  # of processes that have not begun
     tiers = [] if everything else ["-m", "not statistical and not slow"]
+    command = [sys.executable, "-m", "pytest", *sharing, *tiers, *context.args]
     sys.stdout.flush()
-    os.execv(sys.executable, [sys.executable, "-m", "pytest", *sharing, *tiers, *context.args])
+    if everything and not context.args:
+        raise typer.Exit(_recorded(command, root, variant))
+    os.execv(sys.executable, command)
+
+
+def _recorded(command: list[str], root: Path, variant: str) -> int:
+    """Run all tests, write the record, and return the exit status."""
+    from reference.storage.files import temporary_folder, write_text
+    from reports.machine.environment import describe_environment, machine_in_words
+
+    start = time.monotonic()
+    with temporary_folder() as folder:
+        status = subprocess.run([*command, f"--junit-xml={folder / 'tests.xml'}"], check=False).returncode
+        suite = next(ElementTree.parse(folder / "tests.xml").iter("testsuite"))
+    tests, failed, errors, skipped = (int(suite.get(key, 0)) for key in ("tests", "failures", "errors", "skipped"))
+    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False).stdout
+    record = {
+        "date": time.strftime("%Y-%m-%d %H:%M:%S %z"),
+        "machine": machine_in_words(describe_environment() | {"variant": variant}),
+        "commit": commit.strip() or "unknown",
+        "seconds": round(time.monotonic() - start),
+        "passed": tests - failed - errors - skipped,
+        "failed": failed + errors,
+        "skipped": skipped,
+    }
+    write_text(root / RECORD, json.dumps(record, indent=1) + "\n")
+    print(f"written: {root / RECORD}")
+    return int(status != 0)

@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from contextlib import contextmanager, suppress
+from pathlib import Path
 
 import pytest
 
@@ -24,7 +25,8 @@ pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
 from reports.cluster import connect
 from reports.cluster.run import Group, Task, run_groups
 from tests.helpers import cluster_tasks as tasks
-from tests.helpers.imports import ROOT
+
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def test_places_by_their_words(tmp_path):

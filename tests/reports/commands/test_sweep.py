@@ -7,13 +7,15 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
 pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
 
-from tests.helpers.imports import ROOT
 from validation.sweep.rows import ROWS, RowStore
+
+ROOT = Path(__file__).resolve().parents[3]
 
 STUDY = """
 scenes = ["open-fog", "random:3"]

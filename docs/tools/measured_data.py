@@ -1,58 +1,39 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the documentation takes from a report: its numbers without the long tables.
+"""What the documentation takes from a report: `python docs/tools/measured_data.py [--report DIR] [--kernels FILE]`.
 
-The documentation is built from `docs/data/report.json`, schema "airlight-docs/1": `report` (when, by which command, on
-which machine), `claims`, `scenes` (each with `baseline`, `counts`, `truth`, `multiple` and `methods`), `kernels` (costs
-and errors of `airlight bench --kernels`, or null). Pictures are those of `airlight gallery`.
-
-Stale numbers fail a test, which compares what a scene's numbers were measured with and what is measured now.
+It writes `docs/data/report.json`: `report` (when, by which command, on which machine), `claims`, `scenes` (each with
+`counts`, `truth`, `multiple` and `methods`), `kernels` (costs and errors of `airlight bench --kernels`, or null).
 """
 
+import argparse
 import json
 from pathlib import Path
 from typing import Any
 
 from analytic.errors import InputError
-from reference.storage.files import ensure_folder, write_text
+from reference.storage.files import write_text
 from reports.data.json_files import read_json
 from reports.data.reader import read_report
+from reports.machine.environment import activate
 
-SCHEMA = "airlight-docs/1"
+DATA = Path(__file__).resolve().parents[1] / "data" / "report.json"
 
 _ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative")
 _METHOD = ("label", "method", "kernel", "parameters", "knows_shadows", "refused", "left_out", "note")
 _COST = ("kernel", "family", "size", "phase", "g", "device", "wall", "median", "p99", "max", "nonfinite", "refused")
 
 
-def refresh(data: Path, *, report: Path | None = None, kernels: Path | None = None) -> list[Path]:
-    """Write the data of the documentation anew from a report, from the costs of kernels, or both; return the files.
-
-    Parameters
-    ----------
-    data
-        The folder `docs/data`.
-    report
-        A folder that `airlight report` wrote.
-    kernels
-        What `airlight bench --kernels --json` printed. What is not given stays as it was.
-
-    Raises
-    ------
-    InputError
-        If a file is not what it should be; nothing is written then.
-    """
-    path = data / "report.json"
-    kept: dict[str, Any] = {"schema": SCHEMA, "kernels": None}
-    if path.exists():
-        kept = _read_object(path, "the data of the documentation")
+def refresh(report: Path | None, kernels: Path | None) -> None:
+    """Write the data again from a report, from the costs of kernels, or both; what is not given stays as it was."""
+    kept: dict[str, Any] = {"kernels": None}
+    if DATA.exists():
+        kept = _read_object(DATA, "the data of the documentation")
     if report is not None:
         kept |= kept_of_report(read_report(report))
     if kernels is not None:
         costs = _read_object(kernels, "what `airlight bench --kernels --json` prints")
         kept["kernels"] = kept_of_kernels(costs, kernels)
-    ensure_folder(data)
-    write_text(path, json.dumps(kept, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-    return [path]
+    write_text(DATA, json.dumps(kept, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 
 
 def _read_object(path: Path, what: str) -> dict[str, Any]:
@@ -82,18 +63,11 @@ def kept_of_report(report: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def baseline_revision(scene: str) -> int | None:
-    """Return the revision of the accuracy baseline of a scene in this checkout, None where there is none."""
-    path = Path(__file__).resolve().parents[2] / "tests/evidence/baselines" / f"{scene}.json"
-    return json.loads(path.read_text(encoding="utf-8"))["revision"] if path.is_file() else None
-
-
 def _kept_scene(scene: dict[str, Any]) -> dict[str, Any]:
     built_in = [entry for entry in scene["methods"] if entry["kind"] == "built-in"]
     return {
         "name": scene["name"],
         "size": scene["size"],
-        "baseline": baseline_revision(scene["name"]),
         "plan": scene["plan"],
         "counts": counts(scene["name"]),
         "truth": scene["truth"],
@@ -132,3 +106,12 @@ def kept_of_kernels(costs: dict[str, Any], path: Path) -> dict[str, Any]:
         }
     except (KeyError, TypeError) as error:
         raise InputError(f"{path}: wanted what `airlight bench --kernels --json` prints, {error} is missing") from error
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--report", type=Path, help="a folder that `airlight report` wrote")
+    parser.add_argument("--kernels", type=Path, help="what `airlight bench --kernels --json` printed")
+    chosen = parser.parse_args()
+    activate()  # counting shapes and triangles loads the scenes
+    refresh(chosen.report, chosen.kernels)

@@ -1,25 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The table of faults that were planted in Blender's Cycles, and what the diagnosis said, in docs/diagnosis.md.
+"""Faults that are set in Blender's Cycles, and what the diagnosis says of them: `docs/data/cycles-faults.json`.
 
-`python -m reports.docs.round_trips --python PYTHON --images FOLDER` describes scenes, lets an interpreter with `bpy`
-render them with faults by docs/examples/cycles_faults.py, diagnoses what is in the folder, writes the answers into
-`docs/data/cycles-faults.json` and draws the table anew. Images that are there are not rendered again. Without arguments
-it only draws the table.
+`python docs/tools/cycles_round_trips.py --python PYTHON --images FOLDER` describes scenes, lets an interpreter with
+`bpy` render them with faults by `cycles_faults.py`, diagnoses what is in the folder and writes the answers into the
+record, from which docs/diagnosis.md is built. Images that are there are not rendered again.
 """
 
 import argparse
 import json
 import subprocess
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from reports.docs.marked import with_part
-
 ROOT = Path(__file__).resolve().parents[2]
-RECORD = "docs/data/cycles-faults.json"
-_PAGE = "docs/diagnosis.md"
-_EXAMPLE = "docs/examples/cycles_faults.py"
+RECORD = ROOT / "docs/data/cycles-faults.json"
+_RENDERER = str(Path(__file__).with_name("cycles_faults.py"))
 #: Scenes that are rendered, and how to load them.
 SCENES = {"sphere-spot": "sphere-spot", "open-fog": "open-fog", "lobe-fog": "docs/examples/lobe-fog.xml"}
 _SIZE = (160, 120)
@@ -61,8 +58,7 @@ def answers(
             continue  # a scene that cannot have it
         diagnosis = diagnose_file(path, scene, pixel="area", light=light)
         first = diagnosis.ranked[0]
-        off, left = _percent(diagnosis.residual), _percent(diagnosis.left)
-        print(f"{name}, {fault}: {diagnosis.first}, {off} off, {left} left", flush=True)
+        print(f"{name}, {fault}: {diagnosis.first}, {diagnosis.residual:.2%}, {diagnosis.left:.2%} left", flush=True)
         yield {
             "scene": name,
             "fault": fault,
@@ -115,77 +111,35 @@ def render_faults(
     wanted = [fault for fault in faults or _listed(python, root) if not (folder / f"{fault}.exr").exists()]
     if wanted:
         options = ["--samples", str(samples), "--faults", *wanted]
-        command = [python, str(root / _EXAMPLE), str(described), str(gltf), str(folder), *options]
+        command = [python, _RENDERER, str(described), str(gltf), str(folder), *options]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 
 def _listed(python: str, root: Path) -> dict[str, Any]:
-    command = [python, str(root / _EXAMPLE), "--list"]
+    command = [python, _RENDERER, "--list"]
     listed: dict[str, Any] = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
     return listed
 
 
-def page(text: str, record: Mapping[str, Any]) -> str:
-    """Return the page with its generated part made anew."""
-    return with_part(text, "cycles", _drawn(record))
-
-
-def _drawn(record: Mapping[str, Any]) -> str:
-    rows = record["rows"]
-    faults = [row for row in rows if row["planted"] != "right"]
-    right = [row for row in rows if row["planted"] == "right"]
-    named = sum(row["right"] for row in faults)
-    lines = [
-        f"{named} of {len(faults)} faults are named first; {sum(row['right'] for row in right)} of {len(right)} right "
-        f"images are called right ({record['measured']}, Blender {record['blender']}, 160 x 120 pixels).",
-        "",
-        "| scene | what was set wrong | should be named | first | what it says | off | left |",
-        "| --- | --- | --- | --- | --- | ---: | ---: |",
-    ]
-    for row in rows:
-        first = f"`{row['first']}`" if row["right"] else f"**`{row['first']}`**"
-        says = row["says"] + (f" (with {' and '.join(row['together'])})" if row["together"] else "")
-        cells = [row["scene"], row["words"], f"`{row['planted']}`", first, says, _percent(row["residual"])]
-        lines.append(f"| {' | '.join([*cells, _percent(row['left'])])} |")
-    return "\n".join([*lines, ""])
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %"
-
-
-def current_page(root: Path = ROOT) -> str:
-    """Return what docs/diagnosis.md should hold."""
-    record = json.loads((root / RECORD).read_text(encoding="utf-8"))
-    return page((root / _PAGE).read_text(encoding="utf-8"), record)
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Read the command line, measure if asked, and draw the table."""
+def main() -> None:
+    """Render what is missing, diagnose all images, and write the record."""
     from reference.storage.files import write_text
+    from reports.machine.environment import activate
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--images", type=Path, help="folder of images, one folder for each scene")
+    parser.add_argument("--images", type=Path, required=True, help="folder of images, one folder for each scene")
     parser.add_argument("--python", help="an interpreter that has `bpy`; without it only what is there is diagnosed")
     parser.add_argument("--samples", type=int, default=192, help="paths per pixel")
     parser.add_argument("--scenes", nargs="*", choices=SCENES, default=list(SCENES), help="others keep their rows")
-    chosen = parser.parse_args(arguments)
-    if chosen.images is not None:
-        from datetime import UTC, datetime
-
-        from reports.machine.environment import activate
-
-        activate()
-        for name in chosen.scenes:
-            for row in answers(name, chosen.images / name, python=chosen.python, samples=chosen.samples):
-                kept = (
-                    json.loads((ROOT / RECORD).read_text(encoding="utf-8"))["rows"] if (ROOT / RECORD).exists() else []
-                )
-                rows = [each for each in kept if (each["scene"], each["fault"]) != (name, row["fault"])] + [row]
-                rows.sort(key=lambda each: list(SCENES).index(each["scene"]))
-                record = {"measured": f"{datetime.now(UTC):%Y-%m-%d}", "blender": "5.0.1", "rows": rows}
-                write_text(ROOT / RECORD, json.dumps(record, indent=1, ensure_ascii=False) + "\n")
-    write_text(ROOT / _PAGE, current_page())
+    chosen = parser.parse_args()
+    activate()
+    for name in chosen.scenes:
+        for row in answers(name, chosen.images / name, python=chosen.python, samples=chosen.samples):
+            kept = json.loads(RECORD.read_text(encoding="utf-8"))["rows"] if RECORD.exists() else []
+            rows = [each for each in kept if (each["scene"], each["fault"]) != (name, row["fault"])] + [row]
+            rows.sort(key=lambda each: list(SCENES).index(each["scene"]))
+            record = {"measured": f"{datetime.now(UTC):%Y-%m-%d}", "blender": "5.0.1", "rows": rows}
+            write_text(RECORD, json.dumps(record, indent=1, ensure_ascii=False) + "\n")
 
 
 if __name__ == "__main__":

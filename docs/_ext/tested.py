@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The part of a page that lists every claim with the tests that protect it, and the last run of all tests."""
+
+import ast
+import json
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+from sphinx.errors import ExtensionError
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def claims() -> str:
+    """Return the claims of `docs/claims.toml` by topic, each with its tests, their tier and what they allow.
+
+    Raises
+    ------
+    ExtensionError
+        If a claim has no test, or a test names a claim that is not listed.
+    """
+    topics = tomllib.loads((ROOT / "docs/claims.toml").read_text(encoding="utf-8"))
+    tests: dict[str, list[str]] = {}
+    for path in sorted((ROOT / "tests").rglob("test_*.py")):
+        for claim, line in _marks(path):
+            tests.setdefault(claim, []).append(line)
+    listed = {claim for claims in topics.values() for claim in claims}
+    if wrong := sorted(listed ^ set(tests)):
+        raise ExtensionError(f"docs/claims.toml: claims without a test, or tests of no claim: {', '.join(wrong)}")
+    lines = []
+    for topic, claims in topics.items():
+        lines += [f"## {topic}", ""]
+        for claim, words in claims.items():
+            lines += [f"**{words}**", "", *dict.fromkeys(tests[claim]), ""]
+    return "\n".join(lines)
+
+
+def _marks(path: Path) -> Iterator[tuple[str, str]]:
+    """Yield each claim that a file of tests names, with a line on the test."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    module = path.relative_to(ROOT).as_posix()
+    of_all = [
+        node for node in tree.body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "pytestmark"
+    ]
+    marked = [("", of_all)] + [
+        (f"::{node.name}", [*of_all, *node.decorator_list])
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_")
+    ]
+    for name, expressions in marked:
+        words = " ".join(ast.unparse(each) for each in expressions)
+        tiers = [tier for tier in ("statistical", "slow") if f"mark.{tier}" in words] or ["default"]
+        for call in (node for each in expressions for node in ast.walk(each) if isinstance(node, ast.Call)):
+            if ast.unparse(call.func) == "pytest.mark.claim" and (name or call in ast.walk(of_all[0])):
+                allowed = [ast.literal_eval(option.value) for option in call.keywords]
+                line = f"- `{module}{name}` ({', '.join([*tiers, *allowed])})"
+                for claim in call.args:
+                    yield ast.literal_eval(claim), line
+
+
+def last_run() -> str:
+    """Return when all tests were run, on which machine, and what came of it."""
+    path = ROOT / "docs/data/full_run.json"
+    if not path.exists():
+        return "No run of all tests is on record."
+    run = json.loads(path.read_text(encoding="utf-8"))
+    words = (
+        f"{run['passed']} passed, {run['failed']} failed, {run['skipped']} skipped in {run['seconds'] / 60:.0f} minutes"
+    )
+    return f"{run['date'][:10]}, commit {run['commit']}, {run['machine']}: {words}."

@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claims: the examples of README and documentation run as they stand, and do what the page says."""
+
+import importlib.util
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from reports.commands.main import run
+from tests.helpers.scenes import tiny_scene
+from validation.configurations.methods import configuration
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+#: By renderer: its module, and the variable that names a Python that has it.
+RENDERERS = {"cycles": ("bpy", "AIRLIGHT_CYCLES_PYTHON"), "luxcore": ("pyluxcore", "AIRLIGHT_LUXCORE_PYTHON")}
+
+
+def blocks(page, language):
+    text = page.read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.claim("snippet-of-the-readme")
+def test_python_of_the_readme(tmp_path):
+    for code in blocks(ROOT / "README.md", "python"):
+        ran = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+        printed = re.fullmatch(r"relative RMSE (\S+), (\S+) ms a frame\n", ran.stdout)
+        assert printed, ran.stdout
+        assert 0 < float(printed[1]) < 0.02  # 64 equi-angular steps against shadow edges
+        assert float(printed[2]) > 0
+
+
+@pytest.mark.claim("own-scene")
+@pytest.mark.slow
+def test_the_scene_of_the_readme_with_a_mesh_of_the_users_own(tmp_path):
+    (tmp_path / "mesh.obj").write_text(
+        "v -0.4 -0.4 0.1\nv 0.4 -0.4 0.1\nv 0.0 0.5 0.1\nv 0.0 0.0 0.9\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+    )
+    (tmp_path / "mesh-in-fog.xml").write_text(blocks(ROOT / "README.md", "xml")[0])
+    words = shlex.split(blocks(ROOT / "README.md", "sh")[1])
+    command = [sys.executable, str(ROOT / "airlight.py"), *words[1:]]
+    ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+    assert "mesh-in-fog" in (tmp_path / "airlight-report" / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.claim("tutorial")
+@pytest.mark.slow
+def test_the_tutorial_ends_with_a_figure(variant, tmp_path, monkeypatch, capfd):
+    """Every command of the page, in its order. Exit status 1 is a check of the truth that --quick had no time for."""
+    monkeypatch.chdir(tmp_path)
+    page = DOCS / "tutorial.md"
+    (tmp_path / "gate.xml").write_text(blocks(page, "xml")[0], encoding="utf-8")
+    for line in "".join(blocks(page, "sh")).splitlines():
+        program, *words = shlex.split(line)
+        assert program == "airlight"
+        status = run(words)
+        assert status in ((0, 1) if words[0] == "report" else (0,)), (line, capfd.readouterr().err)
+    for name in ("gate.png", "truth.exr", "gate-report/report.html", "figures/strip.pdf"):
+        assert (tmp_path / name).stat().st_size > 1000, name
+    # Several per cent with 32 steps, as the page says.
+    (relative,) = re.findall(r"^rmse .* relative ([\d.]+) %$", capfd.readouterr().out, flags=re.MULTILINE)
+    assert 1 < float(relative) < 10
+
+
+@pytest.mark.claim("notebook-cells")
+@pytest.mark.slow
+def test_the_cells_of_the_notebook_page_run_and_display(variant, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    import matplotlib.pyplot as plt
+
+    plt.switch_backend("agg")
+    space: dict = {}
+    displayed = []
+    for cell in blocks(DOCS / "notebooks.md", "python"):
+        exec(compile(cell, "cell", "exec"), space)
+        last = cell.strip().splitlines()[-1]
+        if last.isidentifier():
+            displayed.append(space[last]._repr_html_())
+    assert len(displayed) == 2
+    assert all("<img" in html for html in displayed)
+    assert space["errors"][0] / space["errors"][-1] > 4  # about one over the steps, from 8 to 64
+    plt.close("all")
+
+
+@pytest.fixture
+def fog(tmp_path):
+    """The examples of docs/own-method.md as files; the first one's path."""
+    for name, block in zip(("fog", "plain"), blocks(DOCS / "own-method.md", "python"), strict=True):
+        (tmp_path / f"{name}.py").write_text(block, encoding="utf-8")
+    return tmp_path / "fog.py"
+
+
+@pytest.mark.claim("own-method")
+def test_the_worked_method_is_measured_like_a_built_in_one(fog, variant):
+    """Steps in the angle without shifts are `ray-march`; twice as many come closer to the truth."""
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+    from validation.estimates.quadrature import truth_image
+    from validation.frames.benchmark import measure
+
+    loaded = mi.load_dict(tiny_scene())
+    scene, truth = read_scene(loaded), truth_image(loaded)
+
+    def measured(method, **parameters):
+        measurement = measure(scene, configuration(method, None, parameters), truth=truth, seconds=0.01)
+        assert (measurement.refused, measurement.note) == (None, None)
+        return measurement
+
+    own, built_in = measured(f"{fog}:interleaved", steps=16, jitter="no"), measured("ray-march", steps=16)
+    # The same sum in another order, in float32.
+    np.testing.assert_allclose(own.frame.airlight, built_in.frame.airlight, rtol=2e-5)
+    shifted, finer = (measured(f"{fog}:interleaved", steps=steps).error.relative_rmse for steps in (16, 64))
+    assert finer < 0.5 * shifted < 0.05
+
+
+@pytest.mark.claim("own-method")
+def test_the_plain_method_returns_what_the_page_says(fog, variant):
+    import mitsuba as mi
+
+    from realtime.frame.renderer import render_frame
+    from realtime.scene.read_scene import read_scene
+    from validation.configurations.methods import prepared
+
+    scene = read_scene(mi.load_dict(tiny_scene()))
+    frame = render_frame(prepared(scene, configuration(f"{fog.parent / 'plain.py'}:uniform_fog")))
+    wanted = 0.1 * (1 - np.exp(-0.31 * frame.distance[..., None])) * np.array([0.9, 0.8, 0.7])
+    np.testing.assert_allclose(frame.airlight, wanted, rtol=1e-5)  # float32
+
+
+@pytest.mark.claim("kernel-of-the-page")
+@pytest.mark.slow
+def test_the_kernel_of_the_page_on_extending(variant, tmp_path, monkeypatch):
+    """The snippet is what it says: `equiangular` with twelve steps."""
+    from analytic.cases import read_cases
+    from validation.kernels.cases import integrate_cases
+
+    (code,) = blocks(DOCS / "extending.md", "python")
+    (tmp_path / "twelve_steps_of_a_page.py").write_text(code)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    cases = read_cases(ROOT / "tests/data/airlight_integral.csv")
+    kernels = ("twelve_steps_of_a_page:midpoint", "equiangular-12")
+    own, expected = (integrate_cases(cases, kernel, "double") for kernel in kernels)
+    both = np.isfinite(own) & np.isfinite(expected)
+    assert both.mean() > 0.9
+    # Operations in another order; where theta nears pi/2 the tangent makes more of their rounding.
+    difference = np.abs(own - expected)[both] / np.maximum(np.abs(expected[both]), 1e-300)
+    assert np.percentile(difference, 90) < 1e-9
+
+
+def interpreter(renderer):
+    """Return the Python that an environment variable names, or this one if it has the module."""
+    module, variable = RENDERERS[renderer]
+    if named := os.environ.get(variable):
+        return named
+    if importlib.util.find_spec(module) is None:
+        pytest.skip(f"no {module} here; {variable} can name a Python that has it")
+    return sys.executable
+
+
+@pytest.mark.slow
+@pytest.mark.claim("engine-renderers", "engine-pixels", "engine-verdict")
+@pytest.mark.parametrize(
+    ("renderer", "scene", "options"),
+    [
+        ("cycles", "open-fog", ["--samples", "128"]),
+        ("cycles", "sphere-spot", ["--samples", "128"]),
+        ("cycles", "sphere-spot", ["--samples", "128", "--layers"]),
+        ("luxcore", "open-fog", ["--samples", "1024"]),
+    ],
+)
+def test_an_engine_that_knows_the_description_alone_is_called_right(
+    renderer, scene, options, variant, tmp_path, capsys
+):
+    python = interpreter(renderer)
+    described, gltf, image = (tmp_path / f"{scene}.{ending}" for ending in ("json", "glb", "exr"))
+    assert run(["describe", scene, "--size", "80x60", "--json", "--gltf", str(gltf)]) == 0
+    described.write_text(capsys.readouterr().out)
+    script = str(DOCS / "examples" / f"render_{renderer}.py")
+    command = [python, script, str(described), str(gltf), str(image), *options]
+    subprocess.run(command, capture_output=True, text=True, check=True)
+    layer = ["--layer", "ViewLayer.Volume Direct"] if "--layers" in options else []
+    assert run(["compare", "--scene", scene, str(image), *layer, "--json"]) == 0
+    compared = json.loads(capsys.readouterr().out)
+    assert compared["verdict"]["right"], compared["verdict"]["reasons"]
+    assert abs(compared["factor"] - 1) < 0.005
+
+
+@pytest.mark.slow
+@pytest.mark.claim("diagnosis-cycles")
+def test_what_is_set_wrong_in_cycles_is_named(variant, tmp_path, monkeypatch):
+    """A right image, and faults of the medium, the light, the camera and the values."""
+    from validation.diagnosis.diagnose import diagnose_file
+
+    planted = {
+        "right": "right",
+        "extinction-0.9": "extinction",
+        "near-0.1": "near-plane",
+        "spot-half": "spot-angle",
+        "linear-falloff": "distance-law",
+        "shift-1": "shift",
+        "black-level": "black-level",
+        "agx": "tone-map",
+    }
+    python = interpreter("cycles")
+    monkeypatch.syspath_prepend(str(DOCS / "tools"))
+    render_faults = importlib.import_module("cycles_round_trips").render_faults
+    render_faults(python, "sphere-spot", tmp_path, samples=256, size=(80, 60), faults=list(planted))
+    named = {fault: diagnose_file(tmp_path / f"{fault}.exr", "sphere-spot", pixel="area").first for fault in planted}
+    assert named == planted
