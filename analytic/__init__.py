@@ -17,6 +17,4 @@ Read in this order:
 - `series.py`: the power series behind the polynomial of Biri 2006;
 - `cases.py`: tables of cases in CSV files;
 - `case_columns.py`: tables of cases from arrays in memory.
-
-May import: nothing of ours.
 """

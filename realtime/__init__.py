@@ -25,6 +25,4 @@ Read in this order:
 - `methods/`: the methods: `interface/`, `unshadowed`, `ray_march`, `shadow_planes/`, `light_volumes/`, `epipolar/`,
   `froxel_fog/`, `soft_shafts/`;
 - `frame/`: camera rays, the lit surface, and whole frames, one or the next.
-
-May import: `realtime.errors`.
 """

@@ -18,6 +18,4 @@ Read in this order:
 - `visibility`: which parts of camera rays a light reaches;
 - `quadrature`: the first estimator;
 - `monte_carlo`: the other two, and batches of samples.
-
-May import: `analytic`.
 """

@@ -18,8 +18,6 @@ Read in this order:
 - `view/`: the live view in the browser;
 - `sweep/`: what a sweep says, from its Parquet;
 - `commands/`: the commands, one module each.
-
-May import: `analytic`, `realtime`, `reference`, `validation`.
 """
 
 __version__ = "0.1.0"

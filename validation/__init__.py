@@ -21,6 +21,4 @@ Read in this order:
 - `sweep/`: studies of many scenes, and their rows.
 
 `baselines/` holds what sweeps and `bench --scaling` measured once.
-
-May import: `analytic`, `realtime`, `reference`.
 """

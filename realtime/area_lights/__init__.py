@@ -8,6 +8,4 @@ Read in this order:
 - `patterns.py`: patterns of points in the unit square, on a ring and on a sphere;
 - `points.py`: the parameters `points` and `pattern`, and the light points of a light;
 - `caster.py`: the triangles of its shape, for the shadows that it casts in the light of others.
-
-May import: `realtime.errors`, `realtime.parameters`.
 """

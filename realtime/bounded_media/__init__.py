@@ -12,6 +12,4 @@ Read in this order:
 - `panels.py`: few nodes along a ray, by the kinks of the legs and the optical depth;
 - `directional_legs.py`: the lengths of the legs of a directional light;
 - `directional_airlight.py`: the airlight of a directional light.
-
-May import: `realtime.errors`, `realtime.numerics`, `realtime.rays`, `realtime.scene`.
 """

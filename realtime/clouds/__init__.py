@@ -12,6 +12,4 @@ Read in this order:
 - `hypertexture/`: clouds whose density differs from place to place;
 - `collectors/`: where the light of a set of orders enters a cloud, and how much of it comes;
 - `order_layers.py`: the names of the layers of an image by order.
-
-May import: nothing of ours.
 """

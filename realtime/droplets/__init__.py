@@ -6,6 +6,4 @@ Read in this order:
 - `spheres.py`: the amplitudes of light that spheres scatter;
 - `series.py`: the phase function of droplets as a cosine series of the angle, and its forward peak;
 - `table.py`: the table that kernels look up.
-
-May import: `realtime.errors`.
 """

@@ -11,8 +11,4 @@ Read in this order:
 - `layers.py`: adaptive sampling around a method, passes over its image, and the composition.
 - `incremental.py`: the next frame of an animation, and the cache of what stood still.
 - `samples.py`: several rays of each pixel, for pictures.
-
-May import: `realtime.area_lights`, `realtime.bounded_media`, `realtime.errors`, `realtime.kernels`,
-`realtime.methods.interface`, `realtime.numerics`, `realtime.parameters`, `realtime.rays`, `realtime.scene`,
-`realtime.tiles`.
 """

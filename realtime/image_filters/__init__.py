@@ -19,6 +19,4 @@ Read in this order:
 - `levels.py`: the bilateral filter of an image of few levels, exactly, as a sum of Gaussians;
 - `tile_average.py`: the mean over a tile of 4 x 4 in which every pixel has another sample;
 - `upsample.py`: from few pixels to many, with a depth test.
-
-May import: `realtime.numerics`.
 """

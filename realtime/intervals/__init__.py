@@ -9,6 +9,4 @@ Read in this order:
 
 - `lit_intervals.py`: the state of a ray between boundaries, what a boundary does to it, the sum, the end of the ray.
 - `nearest_crossings.py`: a queue of the nearest crossings in registers.
-
-May import: nothing of ours.
 """

@@ -16,6 +16,4 @@ Read in this order:
 - `taylor_printed.py`: the same with the coefficients as printed;
 - `table.py`: tables of the integral;
 - `closed_form.py`: the closed form of Pegoraro and Parker 2009.
-
-May import: `realtime.errors`, `realtime.numerics`, `realtime.rays`, `realtime.scene`.
 """

@@ -13,10 +13,4 @@ Read in this order:
 - `registry.py`: the records by name, and how a name becomes a record.
 - `user_method.py`: a user's plain function or record, made a method with its errors named.
 - `user_result.py`: what that returned, checked.
-
-May import: `realtime.area_lights`, `realtime.bounded_media`, `realtime.clouds`, `realtime.errors`,
-`realtime.intervals`, `realtime.kernels`, `realtime.memory`, `realtime.methods.epipolar`,
-`realtime.methods.froxel_fog`, `realtime.methods.interface`, `realtime.methods.light_volumes`,
-`realtime.methods.shadow_planes`, `realtime.methods.soft_shafts`, `realtime.numerics`, `realtime.parameters`,
-`realtime.rays`, `realtime.scene`, `realtime.shadow_maps`, `realtime.tiles`.
 """

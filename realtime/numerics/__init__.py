@@ -11,6 +11,4 @@ Read in this order:
 - `fast_exp.py`: exponentials for bounded arguments;
 - `gauss_legendre.py`: nodes and weights as constants of recorded kernels;
 - `recorded.py`: functions that Dr.Jit records once and replays.
-
-May import: `realtime.errors`.
 """

@@ -5,6 +5,4 @@ Read in this order:
 
 - `ray_light.py`: the foot of the perpendicular, the height, the lit segment of a ray;
 - `spot_cone.py`: where a ray enters and leaves the cone of a spot.
-
-May import: `realtime.numerics`, `realtime.scene`.
 """

@@ -20,6 +20,4 @@ Read in this order:
 - `read_scene.py`: reads a Mitsuba scene;
 - `light_points.py`: lights with extent as light points;
 - `animate.py`: the scene after lights, the medium or objects moved.
-
-May import: `realtime.area_lights`, `realtime.droplets`, `realtime.errors`, `realtime.numerics`.
 """

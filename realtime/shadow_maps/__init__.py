@@ -7,6 +7,4 @@ Read in this order:
 - `shadow_map.py`: casts the rays of a map: one face for a spot or a directional light, six for a point light;
 - `hemisphere_map.py`: the maps of all points of a light with extent in one array, each over its hemisphere;
 - `inverse_depth_field.py`: the light volume as a height field of inverse depth.
-
-May import: `realtime.errors`, `realtime.memory`, `realtime.numerics`, `realtime.parameters`, `realtime.scene`.
 """

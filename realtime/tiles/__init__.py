@@ -6,6 +6,4 @@ Read in this order:
 - `layout.py`: how many rays a tile has, and how the rays of a view may lie in the image.
 - `candidate_lists.py`: what the rays of a tile have to look at, and what happens where a list has no room.
 - `adaptive_sampling.py`: what is computed at the corners of tiles, and interpolated between them where that is enough.
-
-May import: `realtime.errors`, `realtime.numerics`, `realtime.parameters`, `realtime.scene`.
 """

@@ -9,6 +9,4 @@ Read in this order:
 - `volpath`: Mitsuba's volumetric path tracer;
 - `slab_walk`: photons in a slab, counted by order of scattering;
 - `cloud_paths`: paths through clouds of any shape, by order of scattering.
-
-May import: `analytic.errors`.
 """

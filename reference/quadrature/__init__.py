@@ -20,6 +20,4 @@ Read in this order:
 - `ray_values.py`: all of this along every ray;
 - `pixel_area.py`: means over the areas of pixels;
 - `image.py`: the image.
-
-May import: `analytic`, `reference.scene`, `reference.visibility`.
 """

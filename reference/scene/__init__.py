@@ -15,6 +15,4 @@ Read in this order:
 - `clouds.py`: scenes of clouds: media of any shape, suns and a sky;
 - `shapes.py`: opaque shapes as triangles and spheres;
 - `shadow_epsilon.py`: how far short of the light Mitsuba's shadow rays end.
-
-May import: `analytic`.
 """

@@ -9,6 +9,4 @@ Read in this order:
 - `scene_digest.py`: a digest of everything that decides the numbers of a reference;
 - `cache.py`: keeps finished references on disk;
 - `cache_size.py`: the size of the cache, its limit, and what is dropped.
-
-May import: `analytic.errors`.
 """

@@ -21,6 +21,4 @@ Read in this order:
 - `many_points.py`: lit intervals for many points of such a light at once;
 - `pair_checks.py`: checks these by random shadow rays;
 - `light_lines.py`: the parts of such a light that surface points see.
-
-May import: `analytic.errors`, `reference.scene`.
 """

@@ -14,9 +14,4 @@ Read in this order:
 - `studies.py`: `integrate`, `bench`
 - `slab.py`: `slab`
 - `report.py`: `report`
-
-May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `realtime.scene`, `reference.storage`,
-`reports.data`, `reports.machine`, `reports.plotting`, `reports.report`, `reports.tables`, `validation.comparison`,
-`validation.configurations`, `validation.estimates`, `validation.fit`, `validation.frames`, `validation.kernels`,
-`validation.metrics`, `validation.scenes`, `validation.slab`.
 """

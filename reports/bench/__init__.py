@@ -8,8 +8,4 @@ Read in this order:
 - `kernels.py`: kernels alone
 - `estimators.py`: Monte Carlo estimators at equal error
 - `scaling.py`: what methods cost as their work grows
-
-May import: `analytic`, `realtime.errors`, `realtime.kernels`, `realtime.scene`, `reference.storage`, `reports.data`,
-`reports.figures`, `reports.machine`, `reports.tables`, `validation.configurations`, `validation.estimates`,
-`validation.frames`, `validation.kernels`, `validation.metrics`, `validation.scaling`, `validation.scenes`.
 """

@@ -8,8 +8,4 @@ Read in this order:
 - `run.py`: every task ends in one outcome, whatever happens to workers and scheduler;
 - `cells.py`: the cells of a sweep as tasks;
 - `references.py`: truths and batches for the cache of this machine.
-
-May import: `analytic.errors`, `realtime.errors`, `realtime.scene`, `reference.monte_carlo`, `reference.quadrature`,
-`reference.storage`, `reports.machine`, `reports.plotting`, `validation.estimates`, `validation.mutations`,
-`validation.properties`, `validation.scenes`, `validation.sweep`.
 """

@@ -33,14 +33,4 @@ Read in this order:
 - `sweep.py`: `airlight sweep`
 - `test.py`: `airlight test`
 - `view.py`: `airlight view`
-
-May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.methods`,
-`realtime.methods.shadow_planes`, `realtime.parameters`, `realtime.scene`, `realtime.shadow_maps`, `reference.storage`,
-`reports.bench`, `reports.cluster`, `reports.data`, `reports.diff`, `reports.docs`, `reports.figures`,
-`reports.gallery`, `reports.interchange`, `reports.machine`, `reports.papers`, `reports.plotting`, `reports.report`,
-`reports.sweep`, `reports.tables`, `reports.view`, `validation.canonical`, `validation.certified`,
-`validation.comparison`, `validation.configurations`, `validation.diagnosis`, `validation.estimates`,
-`validation.fidelity`, `validation.fit`, `validation.frames`, `validation.kernels`, `validation.metrics`,
-`validation.mutations`, `validation.papers`, `validation.scaling`, `validation.scenes`, `validation.slab`,
-`validation.sweep`.
 """

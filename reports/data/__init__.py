@@ -10,7 +10,4 @@ Read in this order:
 - `own_faults.py`: what methods of the user's own did wrong
 - `claims.py`: the sentences at the top, from the numbers
 - `reader.py`: reads a report back, checks it, draws its page again
-
-May import: `analytic`, `realtime.scene`, `reference.quadrature`, `reference.storage`, `reports.page`, `reports.tables`,
-`validation.comparison`, `validation.frames`, `validation.metrics`, `validation.scaling`.
 """

@@ -10,6 +10,4 @@ Read in this order:
 - `papers.py`: verdicts on the claims of papers
 - `compare.py`: all of these together, and how a report is read
 - `table.py`: what `airlight diff` prints
-
-May import: `analytic`, `reports.data`, `reports.tables`, `validation.statistics`.
 """

@@ -26,9 +26,4 @@ Read in this order:
 - `stages.py`: shares of the stages of a frame
 - `strip.py`: images with insets and errors
 - `z_distribution.py`: standardised errors of the estimators
-
-May import: `analytic`, `realtime.kernels`, `realtime.scene`, `reference.storage`, `reports.data`, `reports.machine`,
-`reports.papers`, `reports.plotting`, `reports.tables`, `validation.configurations`, `validation.estimates`,
-`validation.frames`, `validation.fidelity`, `validation.kernels`, `validation.papers`, `validation.scenes`,
-`validation.scaling`, `validation.slab`.
 """

@@ -10,7 +10,4 @@ Read in this order:
 - `gltf.py`: the scene as glTF
 - `frames.py`: frames of an animation as files
 - `difference.py`: the difference of two images as an image
-
-May import: `analytic`, `realtime.frame`, `reference.scene`, `reference.storage`, `reports.machine`, `reports.plotting`,
-`validation.configurations`, `validation.estimates`, `validation.metrics`, `validation.scenes`.
 """

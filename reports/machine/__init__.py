@@ -13,6 +13,4 @@ Read in this order:
 - `own_process.py`: the user's own code, and kernels that compile quickly, in a process of their own
 - `doctor.py`: examines all of these
 - `printing.py`: how commands print the tables of one run
-
-May import: `analytic`, `realtime.errors`, `reference.scene`, `reference.storage`, `reports.tables`.
 """

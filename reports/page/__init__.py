@@ -12,6 +12,4 @@ Read in this order:
 - `image_index.py`: what the script of the page reads
 - `image_cache.py`: packed images kept between runs
 - `render.py`: the page of all these
-
-May import: `analytic`, `reference.storage`, `reports.papers`, `reports.plotting`, `reports.tables`.
 """

@@ -11,6 +11,4 @@ Read in this order:
 - `ali.py`: Fig. 5.8 of Ali 2016 and what goes with it
 - `bouthors.py`: what a slab decides of Bouthors 2008
 - `fidelity.py`: a verdict for every claim of the papers
-
-May import: `reports.tables`, `validation.fidelity`, `validation.metrics`, `validation.papers`.
 """

@@ -8,6 +8,4 @@ Read in this order:
 - `style.py`: a colour and a marker for each method and kernel
 - `colour_maps.py`: colours of error maps
 - `pictures.py`: radiance and errors as 8-bit pictures
-
-May import: `analytic`, `reference.storage`, `validation.metrics`.
 """

@@ -11,10 +11,4 @@ Read in this order:
 - `fidelity.py`: the experiments behind the claims of papers
 - `kept.py`: what the results of every report have in common
 - `measure.py`: all of these, report.json and the page
-
-May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels.registry`, `realtime.methods`,
-`realtime.scene`, `reference.storage`, `reports.cluster`, `reports.data`, `reports.machine`, `reports.page`,
-`reports.papers`, `reports.plotting`, `validation.comparison`, `validation.configurations`, `validation.estimates`,
-`validation.fidelity`, `validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`,
-`validation.papers`, `validation.scaling`, `validation.scenes`.
 """

@@ -16,7 +16,4 @@ Read in this order:
 - `page.py`: the page
 - `digest.py`: the digest in Markdown
 - `write.py`: all files
-
-May import: `analytic.errors`, `reference.storage`, `reports.page`, `reports.plotting`, `reports.tables`,
-`validation.statistics`, `validation.sweep`.
 """

@@ -24,7 +24,4 @@ Read in this order:
 - `checks.py`: mutations, light left out
 - `lists.py`: scenes, methods, kernels
 - `scene.py`: the description of a scene for another renderer
-
-May import: `analytic.errors`, `realtime.kernels`, `realtime.methods`, `validation.frames`,
-`validation.metrics`, `validation.scenes`, `validation.statistics`.
 """

@@ -15,9 +15,4 @@ Read in this order:
 - `server.py`: the page and its socket, for whoever knows the token.
 
 `page/` holds the page.
-
-May import: `analytic`, `realtime.area_lights`, `realtime.errors`, `realtime.frame`, `realtime.kernels`,
-`realtime.methods`, `realtime.numerics`, `realtime.parameters`, `realtime.scene`, `reference.quadrature`,
-`reference.scene`, `reference.storage`, `reports.machine`, `reports.plotting`, `validation.configurations`,
-`validation.metrics`, `validation.scenes`.
 """

@@ -5,6 +5,4 @@ Read in this order:
 
 - `errors.py`: errors of a look-up at random points, by set of orders;
 - `record.py`: size, time and errors by name, as the command prints them.
-
-May import: `analytic`, `realtime.clouds`, `realtime.numerics`, `validation.slab`.
 """

@@ -6,6 +6,4 @@ The programs that computed them are evidence (`tests/evidence/certified` of the 
 Read in this order:
 
 - `files.py`: which files there are, what each holds, and where it is.
-
-May import: `analytic.errors`.
 """

@@ -12,7 +12,4 @@ Read in this order:
 - `engine_compare.py`: one such image against the truth of its scene;
 - `engine_images.py`: a folder of them, found by scene, for the report;
 - `compare_text.py`: what `airlight compare` prints.
-
-May import: `analytic.errors`, `reference.quadrature`, `reference.scene`, `reference.storage`, `validation.estimates`,
-`validation.metrics`, `validation.scenes`, `validation.statistics`.
 """

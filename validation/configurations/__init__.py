@@ -7,7 +7,4 @@ Read in this order:
 - `methods.py`: a configuration is a method with a kernel and parameters; the standard ones of commands and reports;
 - `timing.py`: medians of frames and of their stages;
 - `memory.py`: the peak of the memory while a frame is made.
-
-May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.methods`,
-`realtime.numerics`, `realtime.parameters`, `realtime.scene`, `validation.scenes`.
 """

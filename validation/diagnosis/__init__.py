@@ -14,8 +14,4 @@ Read in this order:
 - `diagnose.py`: an image file against a scene;
 - `planted.py`: faults that are planted to count the right answers;
 - `diagnosis_text.py`: what the command prints.
-
-May import: `analytic`, `reference.monte_carlo`, `reference.quadrature`, `reference.scene`, `reference.storage`,
-`reference.visibility`, `validation.comparison`, `validation.estimates`, `validation.fit`, `validation.fog_model`,
-`validation.metrics`, `validation.scenes`.
 """

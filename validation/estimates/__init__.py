@@ -14,8 +14,4 @@ Read in this order:
 - `efficiency.py`: what two estimators cost at equal error;
 - `multiple_scattering.py`: the share of light that single scattering leaves out;
 - `expected_airlight.py`: the airlight that an estimator with a shadow-ray epsilon converges to.
-
-May import: `analytic`, `realtime.frame`, `reference.monte_carlo`, `reference.quadrature`, `reference.scene`,
-`reference.storage`, `validation.configurations`, `validation.scenes`, `validation.slab`,
-`validation.statistics`.
 """

@@ -30,9 +30,4 @@ Read in this order:
 - `ali.py`: the rows of Ali 2016
 - `others.py`: the rows of other papers
 - `catalogue.py`: all rows and experiments, and the judged rows of a run
-
-May import: `analytic`, `realtime.clouds`, `realtime.errors`, `realtime.frame`, `realtime.kernels`,
-`realtime.methods.light_volumes`, `realtime.methods.shadow_planes`, `realtime.scene`, `realtime.shadow_maps`,
-`reference.monte_carlo`, `reference.quadrature`, `reference.scene`, `reference.visibility`, `validation.configurations`,
-`validation.estimates`, `validation.kernels`, `validation.metrics`, `validation.papers`, `validation.scenes`.
 """

@@ -11,7 +11,4 @@ Read in this order:
 - `confounding.py`: which parameters an image does not tell apart;
 - `fit.py`: an image file against a scene;
 - `fit_text.py`: what `airlight fit` prints.
-
-May import: `analytic.errors`, `reference.scene`, `reference.storage`, `validation.comparison`, `validation.estimates`,
-`validation.fog_model`, `validation.metrics`, `validation.scenes`.
 """

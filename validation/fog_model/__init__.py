@@ -16,6 +16,4 @@ Read in this order:
 - `build.py`: all of these for some pixels of a scene;
 - `fog.py`: what describes the fog, and what a law may be read as;
 - `radiance.py`: the radiance of every pixel, in Dr.Jit, with derivatives in forward mode.
-
-May import: `analytic`, `reference.quadrature`, `reference.scene`, `reference.visibility`.
 """

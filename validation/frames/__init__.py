@@ -10,9 +10,4 @@ Read in this order:
 - `decomposition.py`: the error of an image by its causes, which add up to it;
 - `cloud_frames.py`: what frames of clouds take that go on with the collectors of the last frame;
 - `map_size.py`: error against the size of the shadow map, and the flicker of a light that moves.
-
-May import: `analytic`, `realtime.area_lights`, `realtime.clouds.canonical`, `realtime.errors`, `realtime.frame`,
-`realtime.kernels`, `realtime.memory`, `realtime.methods`, `realtime.numerics`, `realtime.parameters`, `realtime.scene`,
-`reference.quadrature`, `reference.scene`, `reference.storage`, `validation.configurations`, `validation.estimates`,
-`validation.metrics`, `validation.scenes`, `validation.statistics`.
 """

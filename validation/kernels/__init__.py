@@ -14,7 +14,4 @@ Read in this order:
 - `slopes.py`: derivatives, against certified ones;
 - `stability.py`: where kernels break;
 - `benchmark.py`: time against error.
-
-May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.numerics`, `realtime.rays`,
-`realtime.scene`, `reference.storage`, `validation.certified`, `validation.configurations`.
 """

@@ -7,6 +7,4 @@ Read in this order:
 - `other_tools.py`: the errors that other tools print, by their own formulas;
 - `colour.py`: CIEDE2000 and Delta E ITP;
 - `flip.py`: HDR-FLIP, by its authors' code in a process of its own.
-
-May import: `analytic.errors`, `reference.storage`.
 """

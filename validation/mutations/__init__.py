@@ -14,7 +14,4 @@ Read in this order:
 - `module_copies.py`: copies of modules in which a text is replaced;
 - `test_beds.py`: small scenes with the images of unchanged estimators;
 - `study.py`: counts how many faults the standard run finds.
-
-May import: `analytic.errors`, `reference.monte_carlo`, `reference.quadrature`, `reference.scene`,
-`validation.estimates`, `validation.scenes`, `validation.statistics`.
 """

@@ -12,9 +12,4 @@ Read in this order:
 - `bouthors_transport.py`: their Fig. 8, light by direction;
 - `bouthors_clouds.py`: their Figs 11 and 12, and the error by order of scattering;
 - `bouthors_frames.py`: their section 9, frames a second.
-
-May import: `analytic`, `realtime.clouds`, `realtime.errors`, `realtime.frame`, `realtime.methods`,
-`realtime.numerics`, `realtime.scene`, `realtime.shadow_maps`, `realtime.tiles`, `reference.monte_carlo`,
-`reference.quadrature`, `reference.scene`, `validation.configurations`, `validation.estimates`, `validation.frames`,
-`validation.metrics`, `validation.scenes`, `validation.slab`.
 """

@@ -10,7 +10,4 @@ Read in this order:
 - `view.py`: what the camera sees: depths, and where light reaches its rays;
 - `lights.py`: how many silhouettes the lights see, and where they are;
 - `media.py`: optical depths, and what the phase functions are like.
-
-May import: `realtime.area_lights`, `realtime.errors`, `realtime.frame`, `realtime.methods.shadow_planes`,
-`realtime.scene`, `validation.configurations`.
 """

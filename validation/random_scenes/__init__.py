@@ -16,6 +16,4 @@ Read in this order:
 - `casters.py`: solids, plates, fences, screens, cages and meshes that cast shadows, and the floor;
 - `draw.py`: a seed to the record of a scene;
 - `reach.py`: whether light reaches what the camera sees.
-
-May import: `analytic`.
 """

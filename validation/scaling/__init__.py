@@ -6,7 +6,4 @@ Read in this order:
 - `ladders.py`: a scene with less and more of one kind of work;
 - `subdivision.py`: its meshes with four times the triangles, and bumps that these resolve;
 - `study.py`: the times of every step, the exponent that fits them, and where they jump.
-
-May import: `analytic.errors`, `realtime.area_lights`, `realtime.errors`, `realtime.frame`, `realtime.scene`,
-`validation.configurations`, `validation.frames`, `validation.scenes`.
 """

@@ -39,7 +39,4 @@ Read in this order:
 - `lobes.py`: isotropic media given a mean cosine;
 - `loading.py`: a scene by its name or from a Mitsuba XML file;
 - `animation.py`: the scenes of the frames of an animation.
-
-May import: `analytic`, `realtime.area_lights`, `realtime.scene`, `validation.random_scenes`,
-`validation.scenes.clouds`.
 """

@@ -6,6 +6,4 @@ Read in this order:
 - `phases.py`: phase functions by name or from a file, for both sides;
 - `request.py`: what is asked for, and what is refused;
 - `light.py`: the numbers of both sides by name.
-
-May import: `analytic`, `realtime.clouds`, `reference.monte_carlo.slab_walk`.
 """

@@ -8,6 +8,4 @@ Read in this order:
 - `comparison.py`: all tests of one image against another;
 - `noise.py`: how far a number may move before that means something;
 - `intervals.py`: what few samples say of all: shares, quantiles, rank correlations.
-
-May import: `analytic.errors`, `validation.metrics`.
 """

@@ -12,8 +12,4 @@ Read in this order:
 - `bounds.py`: the errors that methods state for themselves;
 - `work.py`: a cell becomes a row;
 - `rows.py`: finished rows on disk, and their Parquet.
-
-May import: `analytic.errors`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `realtime.scene`,
-`reference.quadrature`, `reference.scene`, `reference.storage`, `reference.visibility`, `validation.configurations`,
-`validation.estimates`, `validation.metrics`, `validation.random_scenes`, `validation.scaling`, `validation.scenes`.
 """

@@ -6,6 +6,4 @@ Read in this order:
 - `surfaces.py`: the boundaries of all clouds as one Mitsuba scene, with the normal of every triangle;
 - `crossings.py`: the next crossing of a ray, and from crossings optical depths;
 - `stretches.py`: the first stretches of rays in clouds, kept.
-
-May import: `realtime.numerics`, `realtime.scene`.
 """

@@ -14,7 +14,4 @@ Read in this order:
 - `look_up.py`: the tables on the device, for frames;
 - `fit.py`: the 22 functions of the paper, fitted to the tables;
 - `scene_phase.py`: the phase function of a scene as the tables need it.
-
-May import: `realtime.clouds.slab_orders`, `realtime.droplets`, `realtime.errors`, `realtime.numerics`,
-`realtime.scene`.
 """

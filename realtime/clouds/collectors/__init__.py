@@ -7,6 +7,4 @@ Read in this order:
 - `search.py`: the fixed point of the collector, and the light that comes from there;
 - `orders.py`: one search for each set of orders;
 - `transport_grid.py`: the canonical transport on a grid that frames read fast.
-
-May import: `realtime.clouds.canonical`, `realtime.clouds.light_maps`, `realtime.numerics`.
 """

@@ -7,7 +7,4 @@ Read in this order:
 - `light_depths.py`: the depths of all points from a sun, in a map;
 - `scattered.py`: light that was scattered once, and opacity as printed;
 - `lit_surface.py`: where the density first exceeds a threshold, from the eye and from the sun.
-
-May import: `realtime.clouds.bounds`, `realtime.clouds.light_maps`, `realtime.clouds.single_scattering`,
-`realtime.numerics`, `realtime.scene`, `realtime.shadow_maps`.
 """

@@ -5,6 +5,4 @@ Read in this order:
 
 - `surfaces.py`: what rays along the light meet first and last;
 - `pyramid.py`: premultiplied MIP levels of that, without holes, and how they are read.
-
-May import: `realtime.numerics`, `realtime.scene`, `realtime.shadow_maps`.
 """

@@ -7,6 +7,4 @@ Read in this order:
 - `spacing.py`: nodes along a ray, exponentially spaced in optical depth;
 - `march.py`: the sum over the steps between nodes, with the legs of the light linear on each;
 - `behind.py`: the light that surfaces get through clouds, and the sky.
-
-May import: `realtime.clouds.bounds`, `realtime.numerics`, `realtime.scene`.
 """

@@ -15,6 +15,4 @@ Read in this order:
 - `moments.py`: order after order, with the moments of the displacement, and the sum of the rest;
 - `radiance.py`: the radiance of all orders in any direction;
 - `slab.py`: what leaves a slab and what is inside, with the error of every number.
-
-May import: `realtime.droplets`, `realtime.scene`.
 """

@@ -11,8 +11,4 @@ Read in this order:
 - `min_max_tree.py`: the height map of a slice, and the tree over it.
 - `walk.py`: the lit intervals of a ray, by long steps through the tree.
 - `samples.py`: which samples of a slice are computed, and interpolation between them.
-
-May import: `realtime.errors`, `realtime.intervals`, `realtime.memory`, `realtime.methods.interface`,
-`realtime.numerics`, `realtime.parameters`, `realtime.rays`, `realtime.scene`, `realtime.shadow_maps`,
-`realtime.tiles`.
 """

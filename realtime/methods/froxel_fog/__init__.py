@@ -10,7 +10,4 @@ Read in this order:
 - `history.py`: the shift of the samples from frame to frame, and the mean with what the last frame left;
 - `accumulation.py`: the airlight from the camera to the end of each slice, by the integral within a slice;
 - `method.py`: the parameters, and the stages of a frame.
-
-May import: `realtime.bounded_media`, `realtime.memory`, `realtime.errors`, `realtime.methods.interface`,
-`realtime.numerics`, `realtime.parameters`, `realtime.rays`, `realtime.scene`, `realtime.shadow_maps`.
 """

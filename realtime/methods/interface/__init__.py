@@ -8,7 +8,4 @@ Read in this order:
 - `layers.py`: what a method returns, the G-buffer and the last frame for passes, and the formula of a frame.
 - `light_airlight.py`: the airlight of one light along the rays, whatever fills the scene: what methods sum up.
 - `marching.py`: the same integral by midpoint steps: what marchers sum up.
-
-May import: `realtime.area_lights`, `realtime.bounded_media`, `realtime.errors`, `realtime.kernels`,
-`realtime.numerics`, `realtime.parameters`, `realtime.rays`, `realtime.scene`, `realtime.tiles`.
 """

@@ -20,8 +20,4 @@ Read in this order:
 - `crossings.py`: the nearest crossings of a ray, from the list of its tile.
 - `walk.py`: its lit intervals, face by face.
 - `published/`: the volume as a mesh.
-
-May import: `realtime.errors`, `realtime.intervals`, `realtime.memory`, `realtime.methods.interface`,
-`realtime.methods.light_volumes.published`, `realtime.numerics`, `realtime.parameters`, `realtime.scene`,
-`realtime.shadow_maps`, `realtime.tiles`.
 """

@@ -22,8 +22,4 @@ Read in this order:
 - `published_mesh.py`: its Gamma at the vertices of meshes.
 - `published_media.py`: its Gamma in bounded media, medium by medium.
 - `plane_counts.py`: how many casters, edges and planes there are, for `--plan`.
-
-May import: `realtime.bounded_media`, `realtime.errors`, `realtime.intervals`, `realtime.kernels`,
-`realtime.methods.interface`, `realtime.numerics`, `realtime.parameters`, `realtime.rays`, `realtime.scene`,
-`realtime.tiles`.
 """

@@ -12,8 +12,4 @@ Read in this order:
 - `smoothing.py`: the filters that the parameters ask for.
 - `history.py`: the last frame, where it still holds.
 - `method.py`: the method, and how its stages follow one another.
-
-May import: `realtime.bounded_media`, `realtime.errors`, `realtime.image_filters`, `realtime.memory`,
-`realtime.methods.interface`, `realtime.numerics`, `realtime.parameters`, `realtime.rays`, `realtime.scene`,
-`realtime.shadow_maps`, `realtime.tiles`.
 """

@@ -8,6 +8,4 @@ Read in this order:
 - `walk.py`: the paths, one ray cast a turn;
 - `opacity.py`: what clouds let through, exactly;
 - `integrator.py`: a batch of paths as layers.
-
-May import: `analytic`, `reference.monte_carlo`, `reference.scene`.
 """

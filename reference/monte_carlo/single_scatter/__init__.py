@@ -12,6 +12,4 @@ Read in this order:
 - `area_estimate.py`: the estimate under lights with extent;
 - `estimator.py`: the estimate of one camera ray;
 - `integrator.py`: the plugin, and its batches.
-
-May import: `analytic.errors`, `reference.monte_carlo`, `reference.scene`.
 """

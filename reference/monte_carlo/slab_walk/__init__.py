@@ -8,6 +8,4 @@ Read in this order:
 - `estimates.py`: sets of orders with standard errors;
 - `directions.py`: radiance in bins of directions, with where its light entered;
 - `step_cloud.py`: photons through a cloud that is thin on one side and thick on the other.
-
-May import: nothing of ours.
 """

@@ -5,6 +5,4 @@ Read in this order:
 
 - `integrator.py`: runs it in batches, airlight and surface apart;
 - `orders.py`: clouds by order of scattering.
-
-May import: `reference.monte_carlo`, `reference.scene`.
 """

@@ -6,6 +6,4 @@ Read in this order:
 - `surfaces.py`: closed surfaces from functions of points, and between two heights;
 - `lobes.py`: lobes with bumps as such functions;
 - `hypertexture.py`: density by the distance into a mesh and gradient noise.
-
-May import: nothing of ours.
 """

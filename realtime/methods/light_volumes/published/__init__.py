@@ -7,7 +7,4 @@ Read in this order:
 - `tessellation.py`: fewer triangles where the map is flat.
 - `raster.py`: every triangle against every pixel that it covers, with the sign of each crossing.
 - `signed_sum.py`: the airlight as a sum over the crossings in any order.
-
-May import: `realtime.errors`, `realtime.kernels`, `realtime.methods.interface`, `realtime.rays`, `realtime.scene`,
-`realtime.shadow_maps`.
 """
