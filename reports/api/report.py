@@ -76,7 +76,7 @@ def report(
     chosen = usual if methods is None else chosen_methods(methods)
     asked = None if scenes is None else [os.fspath(path) for path in several(scenes)]
     names, shown = scenes_of_images(asked, images, EFFORTS[effort].scenes)
-    notes_on(names)
+    notes_on(names)  # refuses a scene that cannot be read, before the work; the notes stand in report.json
     try:
         with telling(progress, "report") as callback:
             data = write_report(

@@ -15,8 +15,6 @@ from typing import Any
 from reports.machine import quick_compilation
 from reports.machine.environment import MissingError, threads
 
-HELP = "Where to compute: local[:N], tcp://HOST:PORT, or the scheduler file of a Dask cluster."
-
 MEMORY = "2GiB"  #: of a local worker, above which Dask ends it
 _KEPT = 2**28  # of freed memory that a local worker keeps, and the largest array that may come of it [bytes]
 _PATIENCE = 10.0  # until a scheduler has answered [s]

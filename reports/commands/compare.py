@@ -74,7 +74,6 @@ def compare(
         typer.Option("--diagnose", help="With a scene: say what is wrong with the image, in place of how far it is."),
     ] = False,
     json: Json = False,
-    scene: Annotated[str | None, typer.Option(hidden=True, help="The scene, which now stands first.")] = None,
 ) -> None:
     """Compare an image with another, or with the truth of a scene.
 
@@ -91,7 +90,7 @@ def compare(
     from reports.tables.terminal import print_json
     from validation.comparison.images import read_mask
 
-    scene, paths = _scene_and_files(scene, files)
+    scene, paths = _scene_and_files(files)
     if metrics not in ("basic", "all"):
         raise InputError(f"--metrics {metrics}; wanted 'basic' or 'all'")
     for option, value, known in (
@@ -161,19 +160,18 @@ def _diagnose(scene: str, file: Path, *, json: bool, **options) -> None:
     print_json(diagnosis.to_json()) if json else print("\n".join(diagnosis_lines(diagnosis)))
 
 
-def _scene_and_files(scene: str | None, words: list[str]) -> tuple[str | None, list[Path]]:
+def _scene_and_files(words: list[str]) -> tuple[str | None, list[Path]]:
     """Return the scene, if the first word is one, and the files."""
     from analytic.errors import InputError
 
-    if scene is None and len(words) == 2 and _names_scene(words[0]):
+    if len(words) != 2:
+        files = f"{len(words)} file{'s' * (len(words) != 1)}"
+        raise InputError(f"compare: got {files}, wanted REFERENCE.exr TEST.exr, or SCENE TEST.exr")
+    if _names_scene(words[0]):
         return words[0], [Path(words[1])]
-    if scene is None and len(words) == 2 and _names_scene(words[1]) and not Path(words[1]).is_file():
+    if _names_scene(words[1]) and not Path(words[1]).is_file():
         raise InputError(f"compare: the scene stands first: airlight compare {words[1]} {words[0]}")
-    wanted = 2 if scene is None else 1
-    if len(words) != wanted:
-        usage = "REFERENCE.exr TEST.exr, or SCENE TEST.exr" if scene is None else "one EXR file beside --scene"
-        raise InputError(f"compare: got {len(words)} file{'s' * (len(words) != 1)}, wanted {usage}")
-    return scene, [Path(word) for word in words]
+    return None, [Path(word) for word in words]
 
 
 def _names_scene(word: str) -> bool:

@@ -152,12 +152,11 @@ def _module(name: str) -> "ModuleType":
 
 def _report_folder(report: Path | None) -> Path | None:
     """Return the folder of the requested report, or the default one if it exists."""
-    from reports.data.reader import read_report
+    from reports.data.reader import load_report
     from reports.figures.report import FOLDER
 
     if report is not None:
-        read_report(report)
-        return report
+        return load_report(report)[1]
     return FOLDER if (FOLDER / "report.json").is_file() else None
 
 

@@ -88,9 +88,12 @@ def render(
     force: Force = False,
     method_limit: MethodLimit = USUAL_LIMIT,
     plan: Annotated[bool, typer.Option("--plan", help="Print what the scene needs of a method, and stop.")] = False,
+    time: Annotated[
+        bool, typer.Option("--time", help="Also measure what a frame costs, some seconds; --json does so too.")
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print times as JSON.")] = False,
 ) -> None:
-    """Render a frame or an animation and print what it costs.
+    """Render a frame or an animation; print what a frame costs.
 
     An animation is one turn: lights circle, objects turn, the medium's density swings, colours go round. Each frame
     recomputes only what depends on the motion. Ctrl-C keeps the finished frames.
@@ -120,7 +123,7 @@ def render(
     if plan:
         _print_plan(call(_plan, scene, pixels, changes, precision, chosen), json=json)
     elif frames is None:
-        rendered = call(_render, scene, pixels, changes, precision, chosen, outputs, samples, force)
+        rendered = call(_render, scene, pixels, changes, precision, chosen, outputs, samples, force, time or json)
         _print_times(rendered | {"device": variant}, json=json)
     else:
         rendered = call(_render_frames, scene, pixels, changes, precision, chosen, outputs, frames, animate, force)
@@ -237,36 +240,48 @@ def _render(
     outputs: dict[str, Path | None],
     samples: int,
     force: bool,
+    timed: bool,
 ) -> dict[str, Any]:
-    """Render a frame, write it and return what it costs."""
+    """Render a frame, write it and return what it costs if that is asked for."""
     import drjit as dr
 
     from realtime.frame.samples import render_samples
+    from realtime.methods.registry import find_method
     from realtime.scene.read_scene import read_scene
     from reports.interchange.frames import write_frame
     from reports.machine.progress import progress_bar
     from validation.configurations.methods import prepared
-    from validation.configurations.timing import time_frame
     from validation.frames.expected_work import TIMED
     from validation.scenes.loading import load_scene
 
     loaded = load_scene(name_or_path, pixels, changes)
     scene = read_scene(loaded.scene, precision)
-    _check_work(loaded.name, scene, chosen, TIMED + samples if samples > 1 else None, force=force)
-    renderer = _prepared(scene, chosen)
-    # A frame of its own has the further layers: they do not belong to what a frame costs.
-    layered = renderer
-    if outputs["exr"] is not None and samples == 1 and renderer.method.layers:
-        layered = prepared(scene, chosen, extra_layers=True)
+    _check_work(loaded.name, scene, chosen, samples + (TIMED if timed else 0), force=force)
+    layers = outputs["exr"] is not None and samples == 1 and bool(find_method(chosen.method).layers)
+    renderer = _prepared(scene, chosen, extra_layers=layers)
     with progress_bar(f"{loaded.name}: {samples} rays a pixel") as progress:
-        frame = render_samples(layered, samples, lambda done: progress(done, "the picture"))
+        frame = render_samples(renderer, samples, lambda done: progress(done, "the picture"))
     curve = write_frame(loaded.name, chosen, frame, outputs=outputs, samples=samples)
-    times = time_frame(renderer)
-    files = [str(path) for path in outputs.values() if path is not None]
+    # The further layers of a method do not belong to what a frame costs.
+    costs = _costs(prepared(scene, chosen) if layers else renderer) if timed else {}
     return {
         "scene": loaded.name,
         "method": chosen.label,
         "size": [scene.camera.width, scene.camera.height],
+        **costs,
+        "threads": dr.thread_count(),
+        "samples": samples,
+        "tone_curve": curve and curve.words,
+        "files": [str(path) for path in outputs.values() if path is not None],
+    }
+
+
+def _costs(renderer) -> dict[str, Any]:
+    """Return what frames cost, after nothing changed and after something did."""
+    from validation.configurations.timing import time_frame
+
+    times = time_frame(renderer)
+    return {
         "frame_ms": times.frame.median_ms,
         "fps": 1000 / times.frame.median_ms,
         "stages": [
@@ -277,10 +292,6 @@ def _render(
         "objects_moved_ms": times.objects_moved.median_ms,
         "light_moved_camera_kept_ms": times.light_moved_camera_kept.median_ms,
         "colours_changed_ms": times.colours_changed.median_ms,
-        "threads": dr.thread_count(),
-        "samples": samples,
-        "tone_curve": curve and curve.words,
-        "files": files,
     }
 
 
@@ -328,14 +339,18 @@ def _print_times(times: dict[str, Any], *, json: bool) -> None:
     if json:
         print_json(times)
         return
-    stages = ", ".join(f"{stage['name']} {stage['ms']:.3g} ms" for stage in times["stages"])
-    print(f"{times['scene']}, {times['method']}: {times['frame_ms']:.3g} ms a frame ({rate_words(times['frame_ms'])})")
-    print(f"  {stages}")
-    moved, objects = times["light_moved_ms"], times["objects_moved_ms"]
-    print(f"  {moved:.3g} ms after the light moved, {objects:.3g} ms after objects moved")
-    print(f"  camera rays kept: {times['light_moved_camera_kept_ms']:.3g} ms after the light moved,")
-    print(f"    {times['colours_changed_ms']:.3g} ms after only medium or colours changed")
-    print(f"  {times['device']}, {times['threads']} threads")
+    name = f"{times['scene']}, {times['method']}"
+    if "frame_ms" in times:
+        stages = ", ".join(f"{stage['name']} {stage['ms']:.3g} ms" for stage in times["stages"])
+        print(f"{name}: {times['frame_ms']:.3g} ms a frame ({rate_words(times['frame_ms'])})")
+        print(f"  {stages}")
+        moved, objects = times["light_moved_ms"], times["objects_moved_ms"]
+        print(f"  {moved:.3g} ms after the light moved, {objects:.3g} ms after objects moved")
+        print(f"  camera rays kept: {times['light_moved_camera_kept_ms']:.3g} ms after the light moved,")
+        print(f"    {times['colours_changed_ms']:.3g} ms after only medium or colours changed")
+        print(f"  {times['device']}, {times['threads']} threads")
+    else:
+        print(f"{name}; --time measures what a frame costs")
     if times["tone_curve"]:
         print(f"  picture: {times['tone_curve']}")
     if times["samples"] > 1:

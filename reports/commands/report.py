@@ -103,9 +103,13 @@ def report(
             "--method": method,
             "--kernel": kernel,
             "--set": settings,
+            "--meshes": meshes,
+            "--ranges": ranges,
             "--images": images,
             "--fresh": fresh,
             "--cluster": cluster,
+            "--method-limit": method_limit != USUAL_LIMIT,
+            "--force": force,
         }
         for option, value in given.items():
             if value not in (None, False, []):

@@ -11,7 +11,7 @@ from typing import Any
 
 from analytic.errors import InputError, nearest
 from reference.storage.files import ensure_folder
-from reports.data.reader import read_report
+from reports.data.reader import load_report
 from reports.figures.files import new_figure, read_data, value, write_data
 from reports.figures.picture_grid import show_picture
 from reports.figures.report import measured, report_origin
@@ -52,12 +52,13 @@ def compute(
     """
     from reference.storage.exr import Image, write_exr
 
-    target, data = ensure_folder(folder), read_report(report)
+    target = ensure_folder(folder)
+    data, place = load_report(report)
     shown = _scene(data, scene)
     chosen = _methods(shown, methods)
     layer = chosen[0].get("layer", "airlight")
-    images = [_pixels(Path(report) / shown["files"]["exr"], layer)]
-    images += [_pixels(Path(report) / entry["files"]["exr"], layer) for entry in chosen]
+    images = [_pixels(place / shown["files"]["exr"], layer)]
+    images += [_pixels(place / entry["files"]["exr"], layer) for entry in chosen]
     side = max(4, min(images[0].shape[:2]) // _INSET)
     corners = tuple(insets) if insets else _worst_squares(images, side)
     shared = (shown["name"], layer, _exposure(images[0]))
@@ -68,7 +69,7 @@ def compute(
         error = entry["error"]["relative_rmse"] if entry else None
         label = entry["label"] if entry else "reference"
         rows.append((name, label, *shared, error, *corners[0], *corners[1], side))
-    write_data(target, NAME, _HEADER, rows, **report_origin(report, data), scene=shown["name"])
+    write_data(target, NAME, _HEADER, rows, **report_origin(place, data), scene=shown["name"])
 
 
 def _scene(data: dict[str, Any], name: str | None) -> dict[str, Any]:

@@ -102,7 +102,8 @@ def _document(described: dict[str, Any], turn: Array, shapes: list[ShapeMesh]) -
     materials = [_material(surface) for surface in described["surfaces"]]
     materials += [_boundary(medium) for medium in described["bounded_media"]]
     materials += [_emission(light) for light in extended]
-    meshes = [buffer.mesh(mesh, turn, number) for number, mesh in enumerate(shapes)]
+    # glTF has no empty lists: a mesh without triangles is left out.
+    meshes = [buffer.mesh(mesh, turn, number) for number, mesh in enumerate(shapes) if len(mesh.faces)]
     nodes: list[dict[str, Any]] = [{"name": mesh["name"], "mesh": number} for number, mesh in enumerate(meshes)]
     camera = described["camera"]
     nodes.append({"name": "camera", "camera": 0, "matrix": _camera_matrix(camera, turn)})
@@ -129,7 +130,7 @@ def _document(described: dict[str, Any], turn: Array, shapes: list[ShapeMesh]) -
         "nodes": nodes,
         "cameras": [_camera(camera)],
     }
-    if punctual:  # glTF has no empty lists
+    if punctual:
         document["extensions"] = {"KHR_lights_punctual": {"lights": [_light(light) for light in punctual]}}
     if meshes:
         document |= {
@@ -281,9 +282,8 @@ class _Buffer:
     def mesh(self, mesh: ShapeMesh, turn: Array, material: int) -> dict[str, Any]:
         """Add a mesh and return its entry."""
         vertices = (mesh.vertices @ turn.T).astype("<f4")
-        ends = {"min": vertices.min(axis=0).tolist(), "max": vertices.max(axis=0).tolist()}
-        attributes = {"POSITION": self._add(vertices, "VEC3", _FLOAT, _VERTICES) if len(vertices) else None}
-        self.accessors[-1] |= ends
+        attributes = {"POSITION": self._add(vertices, "VEC3", _FLOAT, _VERTICES)}
+        self.accessors[-1] |= {"min": vertices.min(axis=0).tolist(), "max": vertices.max(axis=0).tolist()}
         if mesh.normals is not None:
             normals = (mesh.normals @ turn.T).astype("<f4")
             attributes["NORMAL"] = self._add(normals, "VEC3", _FLOAT, _VERTICES)

@@ -71,7 +71,7 @@ def method_style(method: str, variant: int = 0) -> dict[str, Any]:
     Parameters
     ----------
     method
-        Its name. One that is not built in ('module:function', an image) has one of three styles kept for such, always
+        Its name. One that is not built in ('module:function', an image) has one of the two styles kept for such, always
         the same for the same name; `report_styles` keeps several apart.
     variant
         Which of its variants: other fillings of the same marker, all different up to the twelfth.
@@ -101,7 +101,7 @@ def report_styles(scenes: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, An
     """Return the marker style of every label of a report, the same in its page and in all figures made from it.
 
     Variants of a method are numbered in the order in which the scenes name them. Of methods that are not built in the
-    first three have styles of their own.
+    first two have styles of their own, and those after them begin again.
 
     Parameters
     ----------

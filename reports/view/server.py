@@ -116,6 +116,10 @@ class Server:
         token, slash, file = request.path.partition("?")[0].removeprefix("/").partition("/")
         known = secrets.compare_digest(token.encode(), self._token.encode()) and slash
         if known and file == "socket":
+            # A page of another site must not open the socket, even if it has learnt the token.
+            origin, host = request.headers.get("Origin"), request.headers.get("Host")
+            if origin is not None and origin != f"http://{host}":
+                return connection.respond(http.HTTPStatus.FORBIDDEN, "another origin\n")
             return None
         if not (known and file in _FILES):
             return connection.respond(http.HTTPStatus.NOT_FOUND, "not found\n")

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from analytic.errors import InputError
+from analytic.errors import InputError, nearest
 from realtime.errors import InputError as MethodError
 from realtime.methods.interface.method import method_parameters
-from realtime.methods.registry import find_method
+from realtime.methods.registry import METHODS, find_method
 from realtime.parameters import values
 from reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure
 from reports.view.live_scene import LiveScene, Shown
@@ -140,9 +140,10 @@ class Session:
         waits = [60.0]
         if self._told < self._changed_at:
             waits.append(self._changed_at + _QUIET - now)
-        if self._truth_of is None:
+        # Nothing is waited for that cannot come: without a frame no truth begins, and without a truth there is no news.
+        if self._truth_of is None and self._shown is not None:
             waits.append(self._changed_at + _STILL - now)
-        if self._news:
+        if self._news and self._truth_of is not None and self._shown is not None:
             waits.append(self._news_at + _NEWS - now)
         return max(min(waits), 0.001)
 
@@ -217,7 +218,18 @@ class Session:
         given: dict[str, Any] = dict(chosen.parameters) if method == chosen.method else {}
         if "parameter" in message:
             given[str(message["parameter"])] = message.get("value")
-        self.live.choose(sparing(method, message.get("kernel", chosen.kernel), given))
+        kernel = message.get("kernel", chosen.kernel)
+        self._check_choice(method, kernel)
+        self.live.choose(sparing(method, kernel, given))
+
+    def _check_choice(self, method: str, kernel: Any) -> None:
+        """Refuse what is neither built in nor named by the user at the start: a page must not choose code to run."""
+        own = self._given.chosen
+        if method not in METHODS and method != own.method:
+            wanted = ", ".join([*METHODS, *([own.method] if own.method not in METHODS else [])])
+            raise InputError(f"method: got {method!r}, wanted one of {wanted}" + nearest(method, METHODS))
+        if kernel and ":" in str(kernel) and kernel != own.kernel:
+            raise InputError(f"kernel: got {kernel!r}, wanted one that is built in, or that of the command line")
 
     # What the page is told --------------------------------------------------------------------------------------------
 

@@ -39,11 +39,6 @@ def test_place_size_and_kinds_are_shown(filled, capsys, monkeypatch):
     }
 
 
-def test_an_empty_cache_is_nothing_wrong(own_cache, capsys):
-    assert f"{own_cache}: 0 entries, 0 bytes of at most 4 GiB" in printed(capsys).out
-    assert not own_cache.exists()
-
-
 def test_clear_says_what_it_freed(filled, capsys):
     size = sum(path.stat().st_size for path in filled.rglob("*.npz"))
     numbers = json.loads(printed(capsys, "--clear", "--json").out)

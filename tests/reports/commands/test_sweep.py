@@ -39,23 +39,6 @@ def _rows(folder):
     return pq.read_table(folder / "sweep.parquet").to_pylist()
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["none.toml"], "there is no file none.toml"),
-        (["--random", "0"], "--random: got 0, wanted a whole number from 1"),
-        (["--cluster", "tcp:"], "--cluster: got 'tcp:', wanted local, local:N, tcp://HOST:PORT"),
-        (["--cluster", "local:x"], "wanted local:N"),
-    ],
-)
-def test_mistakes_end_in_one_line(words, message, tmp_path):
-    ran = _run(*words, "-o", tmp_path / "out")
-    assert (ran.returncode, ran.stdout) == (2, "")
-    assert message in ran.stderr
-    assert len(ran.stderr.splitlines()) == 1
-    assert not (tmp_path / "out").exists()
-
-
 @pytest.mark.slow
 @pytest.mark.claim("sweeps-go-on", tolerance="none: a row for every cell, none twice, none computed again")
 def test_a_killed_sweep_goes_on_and_a_second_computes_nothing(tmp_path):
@@ -103,23 +86,6 @@ def test_times_of_a_process_alone_are_added_to_the_errors_of_all(tmp_path):
     again = json.loads(_run(study, "-o", folder, "--cluster", "local:2", "--json").stdout)
     assert (again["kept"], again["computed"], again["timed_alone"]) == (6, 0, 1)
     assert {row["timed_alone"] for row in _rows(folder)} == {True}
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for a process alone")
-def test_an_interrupted_sweep_says_what_is_kept(tmp_path):
-    study, folder = tmp_path / "study.toml", tmp_path / "rows"
-    study.write_text(STUDY)
-    words = [*COMMAND, study, "-o", folder, "--cluster", "local:1"]
-    begun = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
-    until = time.monotonic() + 600
-    while time.monotonic() < until and not ((folder / ROWS).exists() and (folder / ROWS).stat().st_size):
-        time.sleep(0.05)
-    begun.send_signal(signal.SIGINT)
-    _, said = begun.communicate(timeout=60)
-    assert begun.returncode == 130
-    assert f"rows are kept in {folder}; run the same command again to go on" in said
-    assert len(said.splitlines()) <= 2  # with a line of progress
 
 
 @pytest.mark.slow

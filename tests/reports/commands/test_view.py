@@ -23,31 +23,6 @@ def run(*arguments, status):
     assert cli.run(["view", *arguments]) == status
 
 
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (["colonade"], "did you mean 'colonnade'?"),
-        (["no-such.xml"], "there is no file no-such.xml"),
-        (["sphere-spot", "--method", "shadow-plains"], "did you mean 'shadow-planes'?"),
-        (["sphere-spot", "--method", "ray-march", "--method", "min-max"], "--method"),
-        (["sphere-spot", "--kernel", "exakt"], "did you mean 'exact'?"),
-        (["sphere-spot", "--set", "tolerence=1"], "did you mean 'tolerance'?"),
-        (["sphere-spot", "--set", "tolerance=-1"], "tolerance: got -1"),
-        (["sphere-spot", "--change", "medium.sigma=1"], "did you mean 'medium.sigma_t'?"),
-        (["sphere-spot", "--change", "camera"], "wanted NAME=NUMBER"),
-        (["sphere-spot", "--size", "huge"], "wanted WIDTHxHEIGHT"),
-        (["sphere-spot", "--host", "192.0.2.1"], "cannot listen at 192.0.2.1"),
-        (["sphere-spot", "--port", "70000"], "65535"),
-    ],
-)
-def test_a_mistake_is_one_line_and_ends_with_2(variant, capfd, arguments, says):
-    run(*arguments, *(SMALL if "--size" not in arguments else []), status=2)
-    said = capfd.readouterr()
-    assert said.out == ""
-    assert says in said.err
-    assert len(said.err.strip().splitlines()) == 1
-
-
 def test_a_port_that_is_taken_is_refused(variant, capfd):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
@@ -78,6 +53,7 @@ def _children(parent):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.claim("view-ends")
 @pytest.mark.parametrize(
     ("number", "status", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]

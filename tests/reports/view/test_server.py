@@ -49,31 +49,28 @@ def fetched(address):
             return error.code, error.headers, error.read()
 
 
-@pytest.mark.parametrize(
-    ("file", "kind", "holds"),
-    [("", "text/html", b"<title>"), ("view.js", "text/javascript", b"WebSocket"), ("view.css", "text/css", b"#stage")],
-)
-def test_who_knows_the_token_gets_the_page(server, file, kind, holds):
-    status, headers, body = fetched(server.address + file)
-    assert status == 200
-    assert headers["Content-Type"].startswith(kind)
-    assert holds in body
-    assert headers["Referrer-Policy"] == "no-referrer"
-    assert "default-src 'none'" in headers["Content-Security-Policy"]
+def test_who_knows_the_token_gets_the_page(server):
+    files = {
+        "": ("text/html", b"<title>"),
+        "view.js": ("text/javascript", b"WebSocket"),
+        "view.css": ("text/css", b"#"),
+    }
+    for file, (kind, holds) in files.items():
+        status, headers, body = fetched(server.address + file)
+        assert status == 200
+        assert headers["Content-Type"].startswith(kind)
+        assert holds in body
+        assert headers["Referrer-Policy"] == "no-referrer"
+        assert "default-src 'none'" in headers["Content-Security-Policy"]
 
 
 @pytest.mark.claim("view-token")
-@pytest.mark.parametrize(
-    "path",
-    [
-        *("/", "/view.js", "/socket", "/favicon.ico", "//view.css", "/wrong/", "/wrong/view.js", "/%2e/{token}/"),
-        *("/{short}/", "/{long}/view.js", "/{token}", "/{token}/server.py", "/{token}/../server.py"),
-    ],
-)
-def test_who_does_not_gets_nothing(server, path):
+def test_who_does_not_gets_nothing(server):
     base, token = server.address.rstrip("/").rsplit("/", 1)
-    status, _, body = fetched(base + path.format(token=token, short=token[:-1], long=token + "x"))
-    assert (status, body) == (404, b"not found\n")
+    wrong = ("/", "/view.js", "/socket", "//view.css", "/wrong/", "/%2e/{token}/", "/{short}/", "/{long}/view.js")
+    for path in (*wrong, "/{token}", "/{token}/server.py", "/{token}/../server.py"):
+        status, _, body = fetched(base + path.format(token=token, short=token[:-1], long=token + "x"))
+        assert (status, body) == (404, b"not found\n"), path
 
 
 @pytest.mark.claim("view-token")
@@ -83,8 +80,12 @@ def test_the_socket_wants_the_token_too(server, heard):
         with pytest.raises(websockets.InvalidStatus) as raised:
             websockets.connect(wrong, proxy=None)
         assert raised.value.response.status_code == 404
+    with pytest.raises(websockets.InvalidStatus) as raised:  # a page of another site that has learnt the token
+        websockets.connect(address + "socket", proxy=None, origin="http://elsewhere.example")
+    assert raised.value.response.status_code == 403
     assert heard == []
-    with websockets.connect(address + "socket", proxy=None) as right:
+    own = server.address.rsplit("/", 2)[0]
+    with websockets.connect(address + "socket", proxy=None, origin=own) as right:
         assert json.loads(right.recv(timeout=10)) == {"kind": "hello", "number": 3}
         message = right.recv(timeout=10)
         (size,) = struct.unpack_from("<I", message)
