@@ -28,7 +28,6 @@ PARTS = {
     "kernels": listed.kernels,
     "method": measured.method,
     "kernel-costs": measured.kernel_costs,
-    "kernel-orders": measured.kernel_orders,
     "left-out": measured.left_out,
     "scenes": measured.scenes,
     "strip": shown.strip,

@@ -11,7 +11,7 @@ from shown import scene_picture
 
 from reports.tables.checks import left_out_table
 from reports.tables.drawing import markdown
-from reports.tables.kernels import cost_table, order_table
+from reports.tables.kernels import cost_table
 from reports.tables.methods import COLUMNS, fastest_table, method_row
 from reports.tables.table import Column, Name, Row, Table, number
 
@@ -97,12 +97,6 @@ def kernel_costs(phase: str) -> str:
         if cost["phase"] == phase and cost["size"] in (default, None):
             costs.append(cost | {"device": cost["device"] or cost["wall"]})
     return markdown(cost_table("", costs, code=True).only("kernel", "device", "median", "p99", "max"))
-
-
-def kernel_orders() -> str:
-    """Return the declared and the measured order of convergence of the kernels that have a size."""
-    kernels = data()["kernels"]
-    return "" if kernels is None else markdown(replace(order_table(kernels["convergence"], code=True), title=""))
 
 
 def left_out() -> str:

@@ -102,7 +102,6 @@ def kept_of_kernels(costs: dict[str, Any], path: Path) -> dict[str, Any]:
             "threads": environment["threads"],
             "variant": environment["variant"],
             "costs": [{name: row[name] for name in _COST} for row in rows],
-            "convergence": costs["convergence"],
         }
     except (KeyError, TypeError) as error:
         raise InputError(f"{path}: wanted what `airlight bench --kernels --json` prints, {error} is missing") from error

@@ -22,9 +22,8 @@ def stability(
 ) -> None:
     """Look for rays on which kernels break.
 
-    Tries every kernel on certified values, on rays of every magnitude and against exact laws. Prints the ray of each
-    largest error in the format of `airlight integrate`. Exit status 1 if a kernel that claims to be exact exceeds the
-    error that it claims.
+    Tries every kernel on certified values and on rays of every magnitude. Prints the ray of each largest error in the
+    format of `airlight integrate`. Exit status 1 if a kernel that claims to be exact exceeds the error that it claims.
     """
     from reports.machine.environment import activate, describe_environment
     from reports.machine.progress import progress_bar

@@ -9,7 +9,7 @@ Read in this order:
 - `published_rows.py`: rows of papers, from a report or measured
 - `cloud_images.py`: clouds beside light paths
 - `cloud_transport.py`: light of a slab by direction
-- `convergence.py`: orders of kernels and estimators
+- `convergence.py`: the order of the estimators
 - `decomposition.py`: errors by cause
 - `frame_speed.py`: time of frames against error
 - `kernel_errors.py`: errors of kernels over depth and angle

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What kernels cost, which is cheapest at each error, and how fast they converge: `bench --kernels`, documentation.
+"""What kernels cost, and which is cheapest at each error: `bench --kernels`, documentation.
 
 The data are those that `airlight bench --kernels --json` prints.
 """
@@ -7,7 +7,7 @@ The data are those that `airlight bench --kernels --json` prints.
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from reports.tables.table import Column, Interval, Measured, Name, Row, Table, Value, numbers, table, words
+from reports.tables.table import Column, Measured, Name, Row, Table, Value, numbers, table, words
 
 Entry = Mapping[str, Any]
 
@@ -67,29 +67,3 @@ def level_table(title: str, levels: Iterable[Entry]) -> Table:
         ]
         rows.append((level["level"], level["cheapest"] or "none", level["ns"], *rivals))
     return table(title, columns, rows)
-
-
-def order_table(convergences: Iterable[Entry], *, code: bool = False) -> Table:
-    """Return the declared and the measured order of convergence."""
-    rows = []
-    for rate in convergences:
-        declared = rate["declared"] or {}
-        name = Name(rate["kernel"]) if code else rate["kernel"]
-        sizes = Interval(rate["sizes"][0], rate["sizes"][-1])
-        rows.append((name, declared.get("kind"), declared.get("value"), rate["measured"], sizes))
-    columns = (*words("kernel", "law"), *numbers("declared", "measured", "sizes"))
-    return table("convergence in float64", columns, rows)
-
-
-def convergence_data(rate: Any) -> dict[str, Any]:
-    """Return a `validation.kernels.convergence.Convergence` for JSON: what is declared and measured, not the rays."""
-    from validation.metrics.errors import plain
-
-    declared = rate.declared
-    return {
-        "kernel": rate.kernel,
-        "sizes": list(rate.sizes),
-        "errors": plain(rate.errors),
-        "declared": {"kind": declared.kind, "value": declared.value, "power": declared.power} if declared else None,
-        "measured": plain(rate.measured),
-    }

@@ -34,9 +34,6 @@ def print_stability(kernels: Sequence[Entry]) -> None:
             print_table(set_table(rays))
             _print_worst(rays)
         print_table(gamma_table(kernel["gamma"]))
-        print_table(law_table(kernel["laws"]))
-        if any(each["single"] is not None for each in kernel["slopes"]):
-            print_table(slope_table(kernel["slopes"]))
         for reason in kernel["broken"]:
             print(f"BROKEN: {kernel['kernel']}, {reason}")
 
@@ -121,15 +118,3 @@ def gamma_table(by_precision: Mapping[str, Entry]) -> Table:
         for precision, study in by_precision.items()
     ]
     return table("cancellation: thin lit slivers far from the light", columns, rows)
-
-
-def law_table(laws: Iterable[Entry]) -> Table:
-    """Return how far a kernel is off laws that hold exactly."""
-    columns = (*words(name="law"), *numbers(rows="rays", single="float32", double="float64"))
-    return table("exact laws: largest relative deviation", columns, laws)
-
-
-def slope_table(slopes: Iterable[Entry]) -> Table:
-    """Return how wrong the derivatives of a kernel are, by what they are taken by."""
-    columns = (*words(phase="phase", by="by"), *numbers(single="float32", double="float64"))
-    return table("derivatives: largest relative error", columns, slopes)

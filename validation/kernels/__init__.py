@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Studies of kernels: how wrong, how fast, how soon they converge and where they break.
+"""Studies of kernels: how wrong, how fast and where they break.
 
 Read in this order:
 
@@ -8,10 +8,7 @@ Read in this order:
 - `values.py`: values of a kernel on tables of cases;
 - `cases.py`: kernels on certified cases;
 - `rays.py`: quasi-random rays with their truth;
-- `laws.py`: exact laws of the airlight integral;
-- `convergence.py`: orders and rates of convergence;
 - `biri_misprints.py`: what the misprints of Biri 2006 cost;
-- `slopes.py`: derivatives, against certified ones;
 - `stability.py`: where kernels break;
 - `benchmark.py`: time against error.
 """

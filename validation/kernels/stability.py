@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where kernels break: every kernel on certified values, on rays of every magnitude, and against exact laws.
+"""Where kernels break: every kernel on certified values and on rays of every magnitude.
 
 The certified values are the files of `validation.certified`.
 
@@ -19,18 +19,14 @@ from realtime.kernels.registry import KERNELS
 from validation.certified.files import certified_data
 from validation.configurations.kernel_names import find_kernel
 from validation.kernels.errors import EPSILON, Errors, Rows, errors_by_group, groups
-from validation.kernels.laws import Law, laws
 from validation.kernels.rays import hard_rays, slivers
-from validation.kernels.slopes import SlopeErrors, certified_slope_cases, slope_errors
-from validation.kernels.values import Kernel, Values, evaluate_cases, take
+from validation.kernels.values import Kernel, Values, evaluate_cases
 
 Progress = Callable[[int, int, str], None]
 
 CERTIFIED = ("airlight_integral.csv", "airlight_integral_rays.csv")
 GENERATED = "generated"
 PRECISIONS = ("single", "double")
-
-_LAW_RAYS = 4096
 
 
 @dataclass(frozen=True)
@@ -63,8 +59,6 @@ class KernelStability:
     refused: dict[str, str]  #: phase function -> the kernel's words
     sets: tuple[SetStability, ...]
     gamma: dict[str, GammaDifference]  #: by precision
-    laws: tuple[Law, ...]
-    slopes: tuple[SlopeErrors, ...]  #: errors of derivatives
     broken: tuple[str, ...]  #: bars that a kernel which claims to be exact does not keep
 
 
@@ -82,8 +76,6 @@ class Bar:
     single_p99: float = 3e-6  #: 99 % quantile in float32
     single_median: float = 3e-7  #: median in float32
     double_max: float = 1e-10  #: in float64
-    single_slope: float = 1e-4  #: of derivatives in float32
-    double_slope: float = 1e-8  #: of derivatives in float64
 
 
 def certified_files() -> tuple[Path, ...]:
@@ -117,7 +109,7 @@ def stability(
 
 
 def kernel_stability(name: str, function: Kernel, sets: dict[str, Cases], thin: Cases) -> KernelStability:
-    """Study one kernel on sets of rays with known J, the generated ones among them, on slivers and against the laws."""
+    """Study one kernel on sets of rays with known J, the generated ones among them, and on slivers."""
     exact = claims_exact(name)
     broken: list[str] = []
     studied = []
@@ -128,26 +120,8 @@ def kernel_stability(name: str, function: Kernel, sets: dict[str, Cases], thin: 
         studied.append(_set_stability(label, cases, values))
         if exact:
             broken += _broken(Bar(), label, cases, values)
-    rays = take(sets[GENERATED], np.arange(min(_LAW_RAYS, len(sets[GENERATED].x0))))
     gamma = {precision: gamma_difference(function, thin, precision) for precision in PRECISIONS}
-    slopes = [each for certified in certified_slope_cases() for each in slope_errors(function, certified)]
-    broken += _broken_slopes(Bar(), slopes) if exact else []
-    return KernelStability(
-        name, exact, refused, tuple(studied), gamma, tuple(laws(function, rays)), tuple(slopes), tuple(broken)
-    )
-
-
-def _broken_slopes(bar: Bar, slopes: Sequence[SlopeErrors]) -> list[str]:
-    """Return the derivatives that a kernel which claims to be exact gets wrong, in words."""
-    return [
-        f"derivative by {each.by}, {each.phase}: {precision} {error:.3g} > {limit:g}"
-        for each in slopes
-        for precision, error, limit in (
-            ("float32", each.single, bar.single_slope),
-            ("float64", each.double, bar.double_slope),
-        )
-        if error is not None and error > limit
-    ]
+    return KernelStability(name, exact, refused, tuple(studied), gamma, tuple(broken))
 
 
 def claims_exact(name: str) -> bool:

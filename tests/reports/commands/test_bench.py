@@ -57,12 +57,11 @@ def test_kernels_are_named_by_an_option(variant, capfd, monkeypatch):
         return {"costs": [], "levels": []}
 
     monkeypatch.setattr("validation.kernels.benchmark.bench_kernels", bench_kernels)
-    monkeypatch.setattr("validation.kernels.convergence.declared", lambda: [])
     assert printed(capfd, "--kernels", "--kernel", "exact", "--kernel", "taylor-8")["kernels"] == {
         "costs": [],
         "levels": [],
     }
-    assert printed(capfd, "--kernels")["convergence"] == []
+    printed(capfd, "--kernels")
     assert asked == [["exact", "taylor-8"], None]
 
 

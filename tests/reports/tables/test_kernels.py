@@ -6,10 +6,9 @@ import typer
 
 from reports.commands.stability import stability as command
 from reports.tables.drawing import text
-from reports.tables.kernels import convergence_data, kernel_tables, order_table
+from reports.tables.kernels import kernel_tables
 from reports.tables.stability import in_epsilons
 from validation.kernels.benchmark import KernelBench, KernelCost, Spread, speed_against_error
-from validation.kernels.convergence import Convergence
 from validation.kernels.errors import Errors
 from validation.metrics.errors import plain
 
@@ -43,18 +42,7 @@ def test_costs_and_levels_are_printed():
     ]
 
 
-def test_convergence_without_a_declaration_is_printed():
-    table = order_table([convergence_data(Convergence("own", (4, 8), (0.1, 0.01), 3.3, 0.5))])
-    assert text(table).splitlines()[-2].split() == ["own", "-", "-", "-", "4..8"]
-
-
-@pytest.fixture
-def few_laws(monkeypatch):
-    """The laws have tests of their own and cost most of the time."""
-    monkeypatch.setattr("validation.kernels.stability.laws", lambda function, rays: [])
-
-
-def test_command_prints_rays_that_can_be_run_again(variant, few_laws, capsys):
+def test_command_prints_rays_that_can_be_run_again(variant, capsys):
     command(kernels="taylor-1", rays=64, json=False)
     printed = capsys.readouterr().out
     assert "=== taylor-1 ===" in printed
@@ -63,7 +51,7 @@ def test_command_prints_rays_that_can_be_run_again(variant, few_laws, capsys):
     assert "BROKEN" not in printed
 
 
-def test_command_prints_json_with_the_bar(variant, few_laws, capsys):
+def test_command_prints_json_with_the_bar(variant, capsys):
     command(kernels="taylor-1", rays=64, json=True)
     data = json.loads(capsys.readouterr().out)
     assert data["bar"]["single_max"] == 3e-5
@@ -72,7 +60,7 @@ def test_command_prints_json_with_the_bar(variant, few_laws, capsys):
 
 
 @pytest.mark.claim("exact-keeps-its-bar")
-def test_command_fails_where_the_claim_is_broken(variant, few_laws, monkeypatch, capsys):
+def test_command_fails_where_the_claim_is_broken(variant, monkeypatch, capsys):
     from realtime.kernels.registry import KERNELS
 
     monkeypatch.setitem(KERNELS, "exact", KERNELS["taylor"])
@@ -85,12 +73,3 @@ def test_command_fails_where_the_claim_is_broken(variant, few_laws, monkeypatch,
 def test_numbers_of_a_study_fit_json():
     text = json.dumps(plain(Errors(1, 0, float("nan"), float("inf"), 1.0, 1.0, 0, 0, 0, None)), allow_nan=False)
     assert [value for value in json.loads(text).values() if value is None]
-
-
-def test_a_convergence_is_json_without_its_rays(variant):
-    from validation.kernels.convergence import convergence
-
-    data = convergence_data(convergence("uniform", (4, 8)))
-    assert json.loads(json.dumps(data)) == data
-    assert data["declared"] == {"kind": "order", "value": 2.0, "power": 0.0}
-    assert len(data["errors"]) == len(data["sizes"]) == 2

@@ -45,5 +45,6 @@ def test_values_that_are_not_finite_count_as_wrong(variant):
         return 0 * geometry.foot / 0
 
     assert np.all(np.isinf(relative_errors(wide_rays(16), broken)))
-    for accuracy in printed_against_derived(64, kernels={"broken": broken}):
-        assert accuracy.rays == 0 or accuracy.within_10_percent == 0
+    tried = [each for each in printed_against_derived(64, kernels={"broken": broken}) if each.rays]
+    assert len(tried) >= 8
+    assert all(each.within_10_percent == 0 for each in tried)

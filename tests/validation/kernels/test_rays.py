@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""Claim: rays that kernels are tried on cover every magnitude, are exact float32 numbers, and have a certified J."""
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,7 @@ COLUMNS = ("g", "foot", "height", "x0", "x1", "sigma_t")
 
 @pytest.fixture
 def rays():  # of one test, so that the truth is kept in the tests' own cache
-    return hard_rays(8192)
+    return hard_rays(2048)
 
 
 def spans(column, low, high):
@@ -73,18 +75,6 @@ def test_truth_is_kept_and_found_again(monkeypatch, tmp_path):
     np.testing.assert_array_equal(wide_rays(64).value, first.value)
     with pytest.raises(AssertionError, match="computed again"):
         wide_rays(64, "rayleigh")  # another phase function is another truth
-
-
-def test_rays_are_the_same_every_time_and_prefixes_of_larger_sets():
-    small, large = hard_rays(100), hard_rays(128)
-    for name in COLUMNS:
-        np.testing.assert_array_equal(getattr(small, name), getattr(large, name)[:100])
-
-
-@pytest.mark.parametrize("count", [0, 1 << 21])
-def test_number_of_rays_is_checked(count):
-    with pytest.raises(ValueError, match="wanted 1 to"):
-        wide_rays(count)
 
 
 def test_row_of_a_case_can_be_read_and_run_again(rays, tmp_path, variant):

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""Claim: the study of kernels finds what is wrong, where it is wrong, and holds `exact` to its bar."""
+
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from analytic.cases import read_cases
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
 from validation.kernels import stability as module
 from validation.kernels.errors import errors_by_group, groups
 from validation.kernels.rays import hard_rays, slivers, table
-from validation.kernels.stability import GENERATED, certified_files, gamma_difference, kernel_stability, stability
+from validation.kernels.stability import GENERATED, gamma_difference, kernel_stability, stability
 from validation.kernels.values import Values, evaluate_cases, take
 
 
@@ -22,12 +23,6 @@ def gauss(geometry, x0, x1, medium, light):
 
 def isotropic(cases):
     return take(cases, np.array(cases.phase) == "isotropic")
-
-
-@pytest.fixture
-def no_laws(monkeypatch):
-    """The laws have tests of their own and cost most of the time."""
-    monkeypatch.setattr(module, "laws", lambda function, rays: [])
 
 
 def study(function, name="own:kernel"):
@@ -104,7 +99,7 @@ def test_faults_of_a_kernel_are_not_refusals(variant):
         evaluate_cases(four_rays(), broken, "single")
 
 
-def test_small_relative_mistake_is_found_where_it_is(variant, no_laws):
+def test_small_relative_mistake_is_found_where_it_is(variant):
     """One part in a thousand, only for rays whose light is behind the camera."""
 
     def wrong_behind(geometry, x0, x1, medium, light):
@@ -126,7 +121,7 @@ def test_small_relative_mistake_is_found_where_it_is(variant, no_laws):
 
 
 @pytest.mark.claim("exact-keeps-its-bar")
-def test_kernel_that_claims_to_be_exact_is_held_to_it(variant, no_laws):
+def test_kernel_that_claims_to_be_exact_is_held_to_it(variant):
     verdict = study(gauss, "exact")
     assert verdict.exact
     assert any("float32 maximum, |g| up to 0.9" in words and "isotropic" in words for words in verdict.broken)
@@ -134,7 +129,7 @@ def test_kernel_that_claims_to_be_exact_is_held_to_it(variant, no_laws):
     assert not any("NaN" in words or "negative" in words for words in verdict.broken)
 
 
-def test_negative_and_missing_values_break_the_claim(variant, no_laws):
+def test_negative_and_missing_values_break_the_claim(variant):
     def bad(geometry, x0, x1, medium, light):
         import drjit as dr
 
@@ -156,22 +151,8 @@ def test_differences_of_gamma_lose_what_theory_says(variant):
     assert 0.05 < loss.median_rounding < 5
 
 
-@pytest.mark.claim("exact-keeps-its-bar")
-@pytest.mark.parametrize("name", ["airlight_integral.csv", "airlight_integral_rays.csv"])
-def test_exact_keeps_its_bar_on_the_certified_values(variant, data_folder, name):
-    from validation.configurations.kernel_names import find_kernel
-
-    cases = read_cases(data_folder / name)
-    values = {precision: evaluate_cases(cases, find_kernel("exact"), precision) for precision in ("single", "double")}
-    assert module._broken(module.Bar(), name, cases, values) == []
-
-
-def test_certified_values_are_used(data_folder):
-    assert [path.parent for path in certified_files()] == [data_folder, data_folder]
-
-
 def test_study_runs_kernels_by_name(variant, monkeypatch):
-    monkeypatch.setattr(module, "certified_files", lambda: ())
+    monkeypatch.setattr(module, "CERTIFIED", ())
     told = []
     verdicts = stability(["taylor-2"], count=256, progress=lambda *progress: told.append(progress))
     assert [verdict.kernel for verdict in verdicts] == ["taylor-2"]
