@@ -93,9 +93,7 @@ def time_in_turns(
     return [Timing(float(median), float(low), float(high), len(times)) for low, median, high in quartiles]
 
 
-def times_in_turns(
-    works: Sequence[Callable[[], Any]], *, seconds: float, least: int, most: int, alternate: bool = False
-) -> NDArray[np.float64]:
+def times_in_turns(works: Sequence[Callable[[], Any]], *, seconds: float, least: int, most: int) -> NDArray[np.float64]:
     """Time several pieces of work in turns, so that other load on the machine affects all of them alike.
 
     Parameters
@@ -106,8 +104,6 @@ def times_in_turns(
         Stop after about this long [s], but not before `least` turns.
     least, most
         Bounds of the number of turns.
-    alternate
-        Whether every other turn runs backwards, since the second piece may find warm caches.
 
     Returns
     -------
@@ -122,8 +118,7 @@ def times_in_turns(
     stop = time.perf_counter() + seconds
     while len(times) < least or (time.perf_counter() < stop and len(times) < most):
         turn = [0.0] * len(works)
-        backwards = alternate and len(times) % 2
-        for place in reversed(range(len(works))) if backwards else range(len(works)):
+        for place in range(len(works)):
             start = time.perf_counter()
             works[place]()
             dr.sync_thread()

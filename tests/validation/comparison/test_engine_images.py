@@ -42,19 +42,6 @@ def test_files_are_found_by_the_name_of_their_scene(tmp_path):
     }
 
 
-def test_a_file_that_names_no_scene_is_refused_with_the_nearest(tmp_path):
-    write(tmp_path, "open_fog.exr")
-    with pytest.raises(InputError, match=r"open_fog\.exr names no scene.*the nearest is open-fog"):
-        find_images(tmp_path, SCENES)
-
-
-def test_a_folder_without_images_is_refused(tmp_path):
-    with pytest.raises(InputError, match="has no EXR file"):
-        find_images(tmp_path, SCENES)
-    with pytest.raises(InputError, match="wanted a folder with EXR files"):
-        find_images(tmp_path / "nowhere", SCENES)
-
-
 def test_images_of_a_scene_have_one_size(tmp_path):
     first, second = write(tmp_path, "hall.a.exr"), write(tmp_path, "hall.b.exr")
     images = tuple(find_images(tmp_path, SCENES)["hall"])

@@ -17,7 +17,7 @@ from validation.scenes.loading import load_scene
 SIZE = (80, 60)
 
 
-@pytest.fixture(scope="module", params=["open-fog", "sphere-spot"])
+@pytest.fixture(scope="module", params=["open-fog", pytest.param("sphere-spot", marks=pytest.mark.slow)])
 def traced(request, variant, tmp_path_factory):
     """What a path tracer with a box filter makes of a scene: means over pixels, with its noise.
 

@@ -42,11 +42,6 @@ def test_unknown_parameter_is_refused_with_the_nearest():
     assert all(name in str(caught.value) for name in METHODS["ray-march"].defaults)
 
 
-def test_parameter_of_a_method_without_any_is_refused():
-    with refused("wanted one of: points, pattern"):
-        configuration("unshadowed", None, {"steps": 7})
-
-
 def test_kernel_for_a_method_that_calls_none_is_refused():
     with refused("calls no kernel"):
         configuration("ray-march", "taylor")
@@ -75,18 +70,6 @@ def test_method_that_calls_a_kernel_has_the_exact_one_by_default():
     assert configuration("ray-march") == Configuration("ray-march")
 
 
-@pytest.mark.parametrize(
-    ("chosen", "label"),
-    [
-        (Configuration("ray-march"), "ray-march"),
-        (Configuration("unshadowed", "taylor"), "unshadowed (taylor)"),
-        (Configuration("m", "k", (("steps", 3), ("shadow", "map"))), "m (k, steps=3, shadow=map)"),
-    ],
-)
-def test_label_says_all(chosen, label):
-    assert chosen.label == label
-
-
 def test_standard_configurations_are_valid_and_tell_apart():
     assert [
         configuration(standard.method, standard.kernel, dict(standard.parameters)) for standard in STANDARD
@@ -110,11 +93,6 @@ def test_chosen_methods_bring_their_standard_configurations():
     assert set(chosen_configurations(list(FOG_METHODS))) == set(STANDARD) | for_extent
     with refused("did you mean"):
         chosen_configurations(["unshadowed", "unshadwed"])
-
-
-def test_method_without_a_standard_configuration_is_measured_with_its_defaults(monkeypatch):
-    monkeypatch.setattr("validation.configurations.methods.STANDARD", ())
-    assert chosen_configurations(["unshadowed"]) == (Configuration("unshadowed", "exact"),)
 
 
 def test_settings_are_read():

@@ -3,14 +3,13 @@ from dataclasses import asdict, replace
 from types import SimpleNamespace
 
 import mitsuba as mi
-import numpy as np
 import pytest
 
 from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
 from validation.configurations.methods import STANDARD, Configuration, configuration, prepared
-from validation.frames.benchmark import bench, configurations_for, knows_shadows, measure
+from validation.frames.benchmark import configurations_for, measure
 from validation.scenes.loading import LoadedScene
 
 MARCH = Configuration("ray-march", None, (("steps", 200),))
@@ -55,21 +54,13 @@ def test_method_without_shadows_is_too_bright_by_what_shadows_take_away(measured
     assert error.relative_rmse > 3 * measured[MARCH].error.relative_rmse
 
 
-def test_error_is_that_of_the_frame_against_the_truth(loaded, measured):
-    from validation.estimates.quadrature import truth_image
-
-    truth, frame = truth_image(loaded.scene).airlight, measured[MARCH].frame.airlight
-    difference = np.asarray(frame, dtype=np.float64) - truth
-    assert measured[MARCH].error.rmse == pytest.approx(np.sqrt(np.mean(difference**2)), rel=1e-9)
-    assert measured[MARCH].error.relative_bias == pytest.approx(difference.mean() / truth.mean(), rel=1e-9)
-
-
 def test_surface_is_compared_too(measured):
     # A pixel at the rim of the sphere may see it with one method's rays and the floor with the other's.
     assert measured[MARCH].surface_error.p50 < 1e-4
     assert measured[MARCH].surface_error.relative_bias == pytest.approx(0, abs=0.02)
 
 
+@pytest.mark.slow
 def test_other_size_is_timed_without_changing_what_is_compared(loaded, measured, variant):
     from validation.estimates.quadrature import truth_image
 
@@ -104,14 +95,6 @@ def test_refusal_is_kept_and_not_raised(variant):
     assert "\n" not in measurement.refused
 
 
-def test_bench_measures_one_after_the_other_and_tells(loaded):
-    told = []
-    measurements = list(bench(loaded, [UNSHADOWED, MARCH], progress=lambda *args: told.append(args)))
-    assert [measurement.configuration for _, measurement in measurements] == [UNSHADOWED, MARCH]
-    assert told == [(1, 2, "tiny"), (2, 2, "tiny")]
-    assert measurements[0][0].camera.width == 16
-
-
 def test_variants_of_shadows_are_left_out_where_nothing_casts_one():
     lamp = replace(FEATURES, area_lights=("disk",))
     assert configurations_for(replace(lamp, bounded=True, clear=True)) == STANDARD
@@ -126,13 +109,7 @@ def test_variants_of_shadows_are_left_out_where_nothing_casts_one():
     assert {configuration.method for configuration in left} == {configuration.method for configuration in STANDARD}
 
 
-def test_configuration_says_whether_it_knows_shadows():
-    assert not knows_shadows(UNSHADOWED)
-    assert knows_shadows(MARCH)
-    assert knows_shadows(Configuration("ray-march", None, (("shadow", "map"),)))
-    assert not knows_shadows(Configuration("ray-march", None, (("shadow", "none"),)))
-
-
+@pytest.mark.slow
 def test_slow_configurations_are_not_timed_at_a_larger_size(variant, loaded, monkeypatch):
     from validation.estimates.quadrature import truth_image
     from validation.frames import benchmark as module
@@ -199,6 +176,7 @@ def test_what_would_take_too_long_is_left_out_with_what_it_would_take(loaded, mo
     assert "more than the limit of 0.3 s" in measurement.refused
 
 
+@pytest.mark.slow
 def test_what_prepares_for_too_long_is_left_out_and_its_pixels_are_not_counted_as_preparation(loaded, monkeypatch):
     """Rationale: what a frame prepares is the same for a small image, and does not grow with its pixels."""
     from realtime.frame.renderer import FrameRenderer
@@ -267,6 +245,7 @@ def test_what_takes_less_than_the_limit_is_measured(loaded, monkeypatch):
     assert measurement.error.relative_rmse < 0.02
 
 
+@pytest.mark.slow
 def test_a_quick_preparation_asks_for_no_small_frame(loaded, measured, monkeypatch):
     from validation.estimates.quadrature import truth_image
     from validation.frames import benchmark as module

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import math
 
-import numpy as np
 import pytest
 
 from analytic.errors import InputError
@@ -22,30 +21,12 @@ def small_scene(**changes):
     return mi.load_dict(tiny_scene(size=(32, 24), **changes))
 
 
-def test_slope_of_a_power_is_its_exponent():
-    sizes = np.array([32, 64, 256, 4096])
-    fit = fitted_slope(sizes, 3.1 * sizes**-1.7)
-    assert fit.order == pytest.approx(1.7, rel=1e-12)
-    assert fit.standard_error < 1e-12
-    assert math.isnan(fitted_slope(sizes[:2], [0.2, 0.1]).standard_error)
-
-
-def test_slope_agrees_with_linear_regression():
-    from scipy.stats import linregress
-
-    rng = np.random.default_rng(6)
-    sizes = 2.0 ** np.arange(5, 13)
-    errors = sizes**-0.8 * np.exp(0.2 * rng.normal(size=8))
-    fit, regression = fitted_slope(sizes, errors), linregress(np.log(sizes), np.log(errors))
-    assert fit.order == pytest.approx(-regression.slope, rel=1e-12)
-    assert fit.standard_error == pytest.approx(regression.stderr, rel=1e-12)
-
-
 def test_what_has_no_logarithm_is_left_out():
     assert fitted_slope([8, 16, 32, 64, 128], [0.5, 0.25, 0.0, math.nan, math.inf]).order == pytest.approx(1)
     assert math.isnan(fitted_slope([8, 16], [0.0, 0.1]).order)
 
 
+@pytest.mark.slow
 @pytest.mark.claim("error-by-size-of-the-map", tolerance="order 1 within 0.2")
 @pytest.mark.parametrize("lamp", ["point", "spot"])
 def test_errors_of_a_map_are_of_first_order(variant, lamp):
@@ -59,6 +40,7 @@ def test_errors_of_a_map_are_of_first_order(variant, lamp):
     assert all(metrics.nonfinite == 0 for metrics in study.metrics)
 
 
+@pytest.mark.slow
 @pytest.mark.claim("error-by-size-of-the-map", tolerance="order 1 within 0.2")
 def test_errors_of_the_height_field_are_of_first_order(variant):
     from realtime.scene.read_scene import read_scene
@@ -73,12 +55,14 @@ def test_errors_of_the_height_field_are_of_first_order(variant):
     assert fitted_slope(sizes, errors).order == pytest.approx(1, abs=0.2)
 
 
+@pytest.mark.slow
 def test_too_few_steps_hide_the_order(variant):
     """Sixteen steps leave an error of their own, which no map mends."""
     study = map_errors(small_scene(), "ray-march", parameters=MARCH | {"steps": 16}, sizes=(64, 128, 256))
     assert study.slope.order < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.claim("flicker", tolerance="order 1/2 within 0.2")
 @pytest.mark.parametrize("lamp", ["point", "spot"])
 def test_flicker_of_fractions_of_a_texel_is_of_order_one_half(variant, lamp):
@@ -91,6 +75,7 @@ def test_flicker_of_fractions_of_a_texel_is_of_order_one_half(variant, lamp):
     assert study.nonfinite == 0
 
 
+@pytest.mark.slow
 @pytest.mark.claim("flicker", tolerance="0.8 to 1.1 of sqrt(2)")
 def test_flicker_over_texels_is_that_of_independent_frames(variant):
     """The difference of two independent errors has sqrt(2) of their RMS; the few frames here have much in common."""
@@ -100,6 +85,7 @@ def test_flicker_over_texels_is_that_of_independent_frames(variant):
         assert 0.8 * math.sqrt(2) < flicker / error < 1.1 * math.sqrt(2)
 
 
+@pytest.mark.slow
 def test_no_shadow_no_flicker(variant):
     """Without occluders the image changes as the truth does, but for the float32 sum of the steps."""
     scene = small_scene(ball=None, floor=None)
@@ -125,6 +111,7 @@ def test_what_cannot_be_studied_is_refused(variant):
         map_flicker(scene, "ray-march", parameters=MARCH, step=0.0)
 
 
+@pytest.mark.slow
 def test_a_sun_moves_in_the_truth_too(variant):
     from validation.scenes.loading import load_scene
 

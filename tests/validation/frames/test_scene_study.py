@@ -15,11 +15,6 @@ TINY = Effort("tiny", (16, 12), (16, 12), (8, 6), {"volpath": 0.5}, {"volpath": 
 OWN = Configuration("mine.py:fog")
 
 
-def test_every_effort_studies_scenes_that_there_are():
-    quick, default, full = (EFFORTS[name].scenes for name in ("quick", "default", "full"))
-    assert set(quick) < set(default) < set(full) == set(FOG_SCENES)
-
-
 def test_scenes_lit_by_lights_with_extent_are_compared_at_half_the_width(variant):
     emitters = {name: FOG_SCENES[name].build().values() for name in FOG_SCENES}
     wide = {name for name, parts in emitters.items() if any(isinstance(p, dict) and "emitter" in p for p in parts)}
@@ -84,6 +79,7 @@ def test_the_digest_is_that_of_the_content(variant):
     assert open_fog == open_study("open-fog", TINY).digest
 
 
+@pytest.mark.slow
 def test_without_patience_the_clock_decides_nothing(variant, own_cache, monkeypatch):
     """Two runs, one of them on a machine so busy that hours pass between two batches: the same samples."""
     from validation.estimates import agreement

@@ -88,13 +88,7 @@ def test_extent_and_bounds_are_read(variant):
     assert (windows["directionals"], windows["extinctions"]) == (1, 3)
 
 
-def test_a_ball_without_triangles_is_counted(variant):
-    ball = {"type": "sphere", "center": [0.9, 0.1, 0.2], "radius": 0.2}
-    properties = scene_properties(_scene(extra={"ball": ball}))
-    assert properties["plain_shapes"] == 1
-    assert properties["silhouettes"] == 0
-
-
+@pytest.mark.slow
 @pytest.mark.claim("properties-finite", tolerance="none: every property of fourteen built-in and eight random scenes")
 def test_every_scene_has_the_same_properties_all_finite(variant):
     names = None

@@ -49,6 +49,7 @@ def test_all_lie_on_one_side_of_floor_and_wall(scenes):
                     assert np.all(np.abs(own) < np.multiply(caster.numbers, caster.radius)), drawn.seed
 
 
+@pytest.mark.slow
 def test_every_choice_is_made(scenes):
     ranges = Ranges()
     counts = {

@@ -42,15 +42,6 @@ def test_a_jump_is_a_cliff():
     assert not growth("triangles", "frame", costs(works, [0.1, 0.1, 0.1, 3.9, 4.1])).cliff
 
 
-def test_one_step_has_no_exponent():
-    from validation.scaling.study import growth
-
-    found = growth("media", "frame", costs([1], [7.0]))
-    assert np.isnan(found.exponent)
-    assert np.isnan(found.steepest)
-    assert not found.cliff
-
-
 @pytest.mark.parametrize(
     ("kind", "scene", "works"),
     [

@@ -19,23 +19,6 @@ def open_edges(faces):
     return int(np.sum(np.unique(sides, axis=0, return_counts=True)[1] != 2))
 
 
-def test_a_divided_mesh_is_the_same_surface():
-    from validation.scenes.solids import divided
-
-    vertices, faces = ball()
-    finer, cut = divided((vertices, faces))
-    assert len(cut) == 4 * len(faces)
-    assert open_edges(cut) == 0
-
-    def area(points, triangles):
-        a, b, c = (points[triangles[:, k]] for k in range(3))
-        return np.cross(b - a, c - a).sum(axis=0), np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
-
-    # Midpoints of straight sides: rounding alone.
-    np.testing.assert_allclose(area(finer, cut)[1], area(vertices, faces)[1], rtol=1e-12)
-    np.testing.assert_allclose(area(finer, cut)[0], 0, atol=1e-12)
-
-
 def test_the_map_of_space_is_one_to_one():
     """Its derivative less the identity is below 1 everywhere, so that no mesh crosses itself or another."""
     from validation.scaling.subdivision import bumpy
@@ -73,6 +56,7 @@ def test_a_scene_keeps_what_has_no_triangles_to_cut(variant):
         subdivided(mi.load_dict(tiny_scene(floor=None)), 1)
 
 
+@pytest.mark.slow
 def test_finer_meshes_have_more_silhouettes():
     """About twice as many with four times the triangles: what the exponent 1/2 of shadow planes is of."""
     from validation.scaling.subdivision import bumpy

@@ -8,8 +8,7 @@ from analytic.errors import InputError
 from realtime.frame.incremental import next_frame
 from realtime.methods.registry import FOG_METHODS
 from validation.scenes.animation import animate, middle, moved_parts, parse_moves, vertical
-from validation.scenes.record import MOVES, Animation
-from validation.scenes.registry import SCENES
+from validation.scenes.record import Animation
 
 
 def host(array) -> np.ndarray:
@@ -28,13 +27,6 @@ def test_moves_are_named():
     assert parse_moves("light, colour,light") == ("light", "colour")
     with pytest.raises(InputError, match="--animate: got 'lamp', wanted some of light, objects, medium, colour"):
         parse_moves("lamp")
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_every_scene_states_what_moves(name):
-    animation = SCENES[name].animation
-    assert animation.moves
-    assert set(animation.moves) <= set(MOVES)
 
 
 @pytest.mark.parametrize("name", ["open-fog", "sphere-spot"])
@@ -81,10 +73,16 @@ def test_nothing_closed_cannot_turn(variant):
     ("name", "moves", "method"),
     [
         ("sphere-spot", ("light",), "shadow-planes"),
-        ("clutter", ("light", "colour"), "shadow-planes"),
         ("open-fog", ("light", "medium", "colour"), "shadow-planes"),
-        *(("sphere-spot", ("light",), method) for method in FOG_METHODS if method != "shadow-planes"),
-        ("fence", ("light",), "light-volumes"),
+        ("sphere-spot", ("light",), "light-volumes"),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in (
+                ("clutter", ("light", "colour"), "shadow-planes"),
+                ("fence", ("light",), "light-volumes"),
+                *(("sphere-spot", ("light",), m) for m in FOG_METHODS if m not in ("shadow-planes", "light-volumes")),
+            )
+        ),
     ],
 )
 def test_frames_record_nothing_and_compile_nothing(variant, name, moves, method):
@@ -110,6 +108,7 @@ def test_frames_record_nothing_and_compile_nothing(variant, name, moves, method)
     assert all(getattr(stage, "n_recordings", 1) == 1 for stage in (renderer.surface, renderer.shade, renderer.cull))
 
 
+@pytest.mark.slow
 def test_turning_objects_record_the_surface_once_more_at_most(variant):
     """It casts rays, so it is given Mitsuba's scene, part of which Mitsuba makes anew: Dr.Jit may notice that once."""
     from validation.configurations.methods import configuration, prepared

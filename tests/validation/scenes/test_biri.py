@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The scenes of Biri 2006's Table 2, the solids that they are made of, and the casters that other tests share."""
 
-from collections import Counter
 from functools import cache
 
 import numpy as np
 import pytest
 
-from tests.helpers.casters import AWKWARD, SOUND, flat_roof
 from tests.helpers.meshes import areas, directed_edges, is_closed, normals_by_area, volume
 from validation.scenes.clutter import SCENE as CLUTTER
 from validation.scenes.hall import SCENE as HALL
@@ -131,11 +129,7 @@ def test_walls_cover_what_they_should_and_face_across_times_up():
     assert len(borders) == 2 * 24
 
 
-@pytest.mark.parametrize(("name", "count"), [("three-media", 14_785), ("clutter", 20_747), ("hall", 107_514)])
-def test_triangle_counts_are_those_of_table_2(variant, name, count):
-    assert sum(len(faces) for _, faces in meshes(name).values()) == count
-
-
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RECORDS)
 def test_all_shapes_are_closed_but_the_named_ones(variant, name):
     for shape, (vertices, faces) in meshes(name).items():
@@ -145,6 +139,7 @@ def test_all_shapes_are_closed_but_the_named_ones(variant, name):
             assert volume(vertices - vertices.mean(axis=0), faces) > 0, shape
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RECORDS)
 def test_meshes_are_welded_and_have_no_degenerate_or_doubled_faces(variant, name):
     for shape, (vertices, faces) in meshes(name).items():
@@ -155,6 +150,7 @@ def test_meshes_are_welded_and_have_no_degenerate_or_doubled_faces(variant, name
         assert areas(vertices, faces).min() > 1e-7, shape
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RECORDS)
 def test_lamp_and_camera_are_in_no_solid(variant, name):
     import mitsuba as mi
@@ -167,11 +163,6 @@ def test_lamp_and_camera_are_in_no_solid(variant, name):
             for point in (lamp, camera):
                 # An integer, 0 outside; float64 sums of at most 5120 angles keep it to 1e-9.
                 assert winding_number(point, vertices, faces) == pytest.approx(0, abs=1e-9), shape
-
-
-def test_winding_number_tells_inside_from_outside():
-    assert winding_number(np.array([0.1, 0.2, 0.1]), *icosphere(2)) == pytest.approx(1)
-    assert winding_number(np.array([1.1, 0.2, 0.1]), *icosphere(2)) == pytest.approx(0, abs=1e-12)
 
 
 def test_media_are_convex_and_apart(variant):
@@ -210,6 +201,7 @@ def test_media_differ_and_belong_to_their_boundaries_only(variant):
     assert [int(np.argmax(albedo[name])) for name in ("red", "green", "blue")] == [0, 1, 2]
 
 
+@pytest.mark.slow
 def test_casters_lie_within_across_and_outside_media(variant):
     """The bar pierces all three, one ring and star lie wholly within, and others have no point in any medium."""
     shapes = meshes("three-media")
@@ -234,80 +226,3 @@ def test_things_stand_on_the_table_and_sink_in_a_little(variant):
     for shape, (vertices, _) in meshes("clutter").items():
         if shape not in OPEN["clutter"]:
             assert -0.03 < vertices[:, 2].min() < 0, shape
-
-
-@pytest.mark.parametrize("name", RECORDS)
-def test_records_say_what_they_answer_to(name):
-    record = RECORDS[name]
-    assert record.purpose.endswith(".")
-    assert "Biri, Arques, Michelin 2006" in record.published
-    assert "Table 2" in record.published
-
-
-@pytest.mark.parametrize("name", ["clutter", "hall"])
-def test_methods_and_truth_can_read_the_scenes_in_unbounded_fog(variant, name):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-    from reference.scene.read import read_truth
-
-    scene = mi.load_dict(built(name))
-    rendered, truth = read_scene(scene), read_truth(scene)
-    assert len(rendered.lights) == len(truth.lights) == 1
-    # Mitsuba holds it in float32: 6e-8.
-    np.testing.assert_allclose(np.array(rendered.medium.albedo).reshape(-1), truth.medium.albedo, rtol=3e-7)
-
-
-@pytest.mark.claim("scenes-of-arbitrary-numbers")
-@pytest.mark.parametrize("name", RECORDS)
-def test_no_number_of_the_scenes_is_round(variant, name):
-    import mitsuba as mi
-
-    parameters = mi.traverse(mi.load_dict(built(name)))
-    for key in parameters.keys():  # noqa: SIM118 - SceneParameters iterates over items
-        if key.endswith(("albedo.value.value", "intensity.value", "position", "x_fov", "reflectance.value")):
-            for value in np.array(parameters[key], dtype=np.float64).reshape(-1):
-                assert value % 0.5 != 0 or value > 10, (key, value)
-
-
-@pytest.mark.parametrize("name", SOUND)
-def test_sound_casters_are_sound(name):
-    vertices, faces = SOUND[name]()
-    assert is_closed(faces)
-    assert volume(vertices, faces) > 0
-    assert len(np.unique(vertices, axis=0)) == len(vertices)
-    assert areas(vertices, faces).min() > 1e-5
-
-
-def edge_meetings(name) -> Counter:
-    """Count the edges of an awkward caster by how many triangles meet there."""
-    _, faces = AWKWARD[name]()
-    return Counter(Counter(tuple(sorted(edge)) for edge in directed_edges(faces).elements()).values())
-
-
-def test_awkward_casters_have_the_flaw_that_they_are_named_for():
-    assert edge_meetings("open grid")[1] == 18
-    assert edge_meetings("open cylinder")[1] == 26
-    assert edge_meetings("Moebius strip")[1] == 48
-    assert max(directed_edges(AWKWARD["Moebius strip"]()[1]).values()) == 2
-    assert edge_meetings("boxes sharing an edge") == {2: 34, 4: 1}
-    assert edge_meetings("doubled faces")[4] > 0
-    vertices, faces = AWKWARD["doubled faces"]()
-    assert len(np.unique(np.sort(faces, axis=1), axis=0)) == len(faces) - 7
-    assert list(areas(*AWKWARD["degenerate faces"]()) == 0).count(True) == 2
-    assert is_closed(AWKWARD["sliver"]()[1])
-    assert list(areas(*AWKWARD["sliver"]()) < 1e-15).count(True) == 1
-    vertices, faces = AWKWARD["inside out"]()
-    assert is_closed(faces)
-    assert volume(vertices - vertices.mean(axis=0), faces) < 0
-    assert edge_meetings("mixed winding") == {2: 480}
-    assert not is_closed(AWKWARD["mixed winding"]()[1])
-
-
-def test_light_of_the_flat_roof_lies_exactly_in_its_plane():
-    (vertices, faces), light = flat_roof()
-    corners = vertices[faces]
-    roof = np.all(corners[:, :, 2] == 0.375, axis=1)
-    assert roof.sum() == 32
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    assert np.all(np.einsum("ij,ij->i", normal[roof], light - corners[roof, 0]) == 0)

@@ -141,15 +141,6 @@ def test_resized_scene_has_the_rays_of_one_built_at_that_size(variant, small_fil
         np.testing.assert_allclose(np.array(rays[0].o), np.array(rays[1].o), rtol=0, atol=1e-6)
 
 
-def test_resizing_moves_the_corner_rays(variant, small_file):
-    """The test of the test above: another size is another bundle of rays."""
-    from reference.scene.read import read_truth
-
-    small, large = (read_truth(load_scene(str(small_file), size).scene) for size in [(16, 12), (32, 24)])
-    assert len(large.direction) == 4 * len(small.direction)
-    assert np.abs(small.direction[0] - large.direction[0]).max() > 1e-3
-
-
 def test_nearest_says_nothing_rather_than_nonsense():
     assert nearest("quadratur", ["taylor", "quadrature"]) == "; did you mean 'quadrature'?"
     assert nearest("zzz", ["taylor", "quadrature"]) == ""

@@ -11,14 +11,10 @@ from validation.scenes.loading import load_scene
 BROKEN = {
     "position": ("nan, 0, 1", "light 'lamp': position has nan"),
     "intensity": ("1e30, 1, 1", "light 'lamp': intensity.value has 1e[+]30 in 1 of 3 places; wanted .* to 1e[+]18"),
-    "origin": ("1e30, 0, 1", "camera 1: to_world has (1e[+]30|nan)"),
     "g": ("nan", "phase_function.g has nan"),
-    "fov": ("nan", "camera 1: x_fov has nan"),
     "radius": ("nan", "shape 'ball': to_world has nan"),
     "scale": ("1e30", "medium 'fog': scale has 1e[+]30"),
-    "albedo": ("nan, 0, 0", "medium 'fog': albedo.value.value has nan"),
     "sigma_t": ("nan, 0, 0", "medium 'fog': sigma_t.value.value has nan"),
-    "center": ("1e30, 0, 0", "shape 'ball': to_world has 1e[+]30"),
 }
 
 
@@ -33,12 +29,6 @@ def test_an_odd_number_is_refused_by_its_name(variant, tmp_path, place):
     value, words = BROKEN[place]
     with pytest.raises(InputError, match=words):
         load(tmp_path, scene(**{place: value}))
-
-
-@pytest.mark.parametrize("intensity", ["-1, 1, 1", "1, 1, -1e-9"])
-def test_a_negative_intensity_is_refused(variant, tmp_path, intensity):
-    with pytest.raises(InputError, match="wanted finite numbers from 0"):
-        load(tmp_path, scene(intensity=intensity))
 
 
 def test_a_sphere_of_no_size_is_refused(variant, tmp_path):
@@ -57,11 +47,6 @@ def test_a_vertex_is_refused_by_the_name_of_its_mesh(variant, tmp_path, corner, 
 def test_a_cloud_is_refused_by_its_name(variant, tmp_path):
     with pytest.raises(InputError, match=r"sigma_t\.value.value has nan"):
         load(tmp_path, scene(extra=cloud("nan, 1, 1")))
-
-
-def test_usual_numbers_pass(variant, tmp_path):
-    loaded = load(tmp_path, scene(extra=cloud()))
-    assert len(loaded.shapes()) == 2
 
 
 def test_the_python_interface_checks_scenes_that_are_built(variant):

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""Claim: built-in scenes are what their records say, and both readers read the same; the parts of scenes are sound."""
+
 from collections import Counter
+from functools import cache
 
 import numpy as np
 import pytest
@@ -17,6 +20,17 @@ CLOSED = {
     "pen": lambda: _pen(1.83),
     "sphere": _sphere,
 }
+
+
+COSTLY = ("cumulus", "cumulus-detail")  # seconds to build
+
+
+@cache
+def loaded(name):
+    """A scene, built once for all tests that only look at it."""
+    from validation.scenes.loading import load_scene
+
+    return load_scene(name, (8, 6))
 
 
 @pytest.mark.parametrize("name", CLOSED)
@@ -89,8 +103,8 @@ def test_sphere_turns_its_axis_to_the_light_and_lies_in_the_cone():
         ("soft-hall", 612),
         ("overlap", 94),
         ("cloud-slab", 12),
-        ("cumulus", 5_120),
-        ("cumulus-detail", 5_120),
+        pytest.param("cumulus", 5_120, marks=pytest.mark.slow),
+        pytest.param("cumulus-detail", 5_120, marks=pytest.mark.slow),
         ("stratocumulus", 129_596),
         ("step-cloud", 216),
         ("ring", 7_654),
@@ -98,15 +112,8 @@ def test_sphere_turns_its_axis_to_the_light_and_lies_in_the_cone():
     ],
 )
 def test_triangle_counts(variant, name, triangles):
-    from validation.scenes.loading import load_scene
-
-    shapes = load_scene(name, (8, 6)).scene.shapes()
+    shapes = loaded(name).scene.shapes()
     assert sum(shape.face_count() for shape in shapes if shape.is_mesh() and not shape.is_emitter()) == triangles
-
-
-def test_column_has_the_triangles_that_its_docstring_states():
-    _, faces = _column()
-    assert len(faces) == 2 * 72 * 32
 
 
 @pytest.mark.parametrize("name", FOG_SCENES)
@@ -114,12 +121,11 @@ def test_methods_and_truth_can_read_every_scene_alike(variant, name):
     """The two readers share no code: that they agree says that both are right."""
     from realtime.scene.read_scene import read_scene
     from reference.scene.read import read_truth
-    from validation.scenes.loading import load_scene
 
-    loaded = load_scene(name, (8, 6))
-    scene, truth = read_scene(loaded.scene), read_truth(loaded.scene)
-    assert loaded.name == name
-    assert loaded.purpose.endswith(".")
+    built = loaded(name)
+    scene, truth = read_scene(built.scene), read_truth(built.scene)
+    assert built.name == name
+    assert built.purpose.endswith(".")
     assert (scene.camera.width, scene.camera.height) == (truth.width, truth.height) == (8, 6)
     sigma_t = np.array([np.array(value)[0] for value in scene.medium.sigma_t])
     # Mitsuba holds both in float32: 6e-8.
@@ -150,30 +156,37 @@ def _check_lights(scene, truth):
 
 
 @pytest.mark.claim("scenes-of-arbitrary-numbers")
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if name in COSTLY else ()) for name in SCENES]
+)
 def test_no_number_of_a_scene_is_round(variant, name):
     """A constant of the code must not hide behind a 1 or a 2 of the scene."""
     import mitsuba as mi
 
-    from validation.scenes.loading import load_scene
+    parameters = mi.traverse(loaded(name).scene)
+    light = ("intensity.value", "irradiance.value", "radiance.value", "position")
+    endings = ("albedo.value.value", "x_fov", "reflectance.value", *light)
+    # A light with extent is black.
+    keys = [key for key in sorted(parameters.keys()) if key.endswith(endings) and key != "lamp.bsdf.reflectance.value"]
+    assert any(key.endswith("x_fov") for key in keys)
+    assert any(key.endswith(light) for key in keys)
+    for key in keys:
+        for value in np.array(parameters[key], dtype=np.float64).reshape(-1):
+            assert value % 0.5 != 0 or value > 10, (key, value)
 
-    scene = load_scene(name).scene
-    parameters = mi.traverse(scene)
-    for key in parameters.keys():  # noqa: SIM118 - SceneParameters iterates over items
-        if key == "lamp.bsdf.reflectance.value":
-            continue  # a light with extent is black
-        light = ("intensity.value", "irradiance.value", "radiance.value", "position")
-        if key.endswith(("albedo.value.value", "x_fov", "reflectance.value", *light)):
-            for value in np.array(parameters[key], dtype=np.float64).reshape(-1):
-                assert value % 0.5 != 0 or value > 10, (key, value)
 
-
-def test_scenes_are_the_same_at_every_call(variant):
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name in ("sphere-spot", "windows", "ring") else pytest.param(name, marks=pytest.mark.slow)
+        for name in SCENES
+    ],
+)
+def test_scenes_are_the_same_at_every_call(variant, name):
     from reference.storage.scene_digest import scene_digest
     from validation.scenes.loading import load_scene
 
-    for name in SCENES:
-        assert scene_digest(load_scene(name).scene) == scene_digest(load_scene(name).scene)
+    assert scene_digest(load_scene(name, (8, 6)).scene) == scene_digest(loaded(name).scene)
 
 
 def test_grid_covers_its_rectangle_and_faces_across_times_up():

@@ -67,6 +67,7 @@ def test_methods_and_truth_see_the_same_fog_of_droplets(variant):
     assert np.sort(frame) == pytest.approx(np.sort(truth), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_bounded_fog_of_droplets(variant):
     import mitsuba as mi
 
@@ -103,15 +104,3 @@ def test_mitsuba_sees_the_same_fog_of_droplets(variant):
     assert len(agreed) == len(margins)
     for estimator, agreement in agreed.items():
         assert agreement.statistics.equivalent, estimator
-
-
-def test_a_mixture_that_no_reader_carries_is_refused_by_name(variant):
-    from realtime.errors import InputError as RealtimeInputError
-    from realtime.scene.read_scene import read_scene
-    from reference.scene.read import read_truth
-
-    lobe = {"type": "hg", "g": 0.5}
-    mixed = {"type": "blendphase", "weight": 0.5, "first": lobe, "second": {"type": "isotropic"}}
-    for read, error in ((read_scene, RealtimeInputError), (read_truth, InputError)):
-        with pytest.raises(error, match="BlendPhaseFunction; wanted one of isotropic, hg, rayleigh, tabphase"):
-            read(fog_of(mixed))

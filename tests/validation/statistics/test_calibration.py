@@ -5,22 +5,19 @@ should do.
 Every share may leave the interval that holds it with probability 1 - 1e-4 by its binomial law. Seeds are fixed.
 """
 
-from dataclasses import asdict, replace
-
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
 from tests.helpers.calibration import (
     Experiment,
-    PowerCheck,
     calibrate,
     check_power,
     log_normal,
-    normal,
     share_interval,
     spread_to_detect,
 )
+
+pytestmark = pytest.mark.statistical
 
 BIASES = [0.0005, 0.001, 0.005, 0.02]
 
@@ -28,9 +25,6 @@ BIASES = [0.0005, 0.001, 0.005, 0.02]
 def relative_spread(deviation):
     """Return the relative standard deviation of a log-normal law, with which its values are positive."""
     return float(np.sqrt(np.expm1(deviation**2)))
-
-
-# --- fast ------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.claim("rates-of-the-statistics")
@@ -48,72 +42,12 @@ def test_injected_biases_are_found_with_the_printed_power(bias):
     assert bias < check.detectable < 1.2 * bias  # by the wider interval, that of 16 batch means
 
 
-def test_the_unit_of_radiance_changes_nothing():
-    few = Experiment(runs=20)
-    for plain, rescaled in (
-        (calibrate(few), calibrate(replace(few, unit=2.0**-100))),
-        (check_power(0.005, few), check_power(0.005, replace(few, unit=2.0**100))),
-    ):
-        assert plain == rescaled  # powers of two change no digit
-    for unit in (1e-30, 1e30):
-        power_check = asdict(check_power(0.005, replace(few, unit=unit)))
-        # Rounding of the factor, magnified by the difference of two images that agree to some per mille.
-        assert power_check == pytest.approx(asdict(check_power(0.005, few)), rel=1e-9)
-
-
-def test_laws_have_mean_zero_and_deviation_one():
-    rng = np.random.default_rng(1)
-    for law, skewness in ((normal, 0.0), (log_normal(0.5), 1.75)):
-        values = law(rng, (400_000,))
-        # Standard errors of 400 000 values: 0.0016, about 0.003, and 0.05 for the skewness; four of them.
-        assert values.mean() == pytest.approx(0, abs=0.007)
-        assert values.std() == pytest.approx(1, abs=0.012)
-        assert (values**3).mean() == pytest.approx(skewness, abs=0.2)
-
-
-def test_problems_name_what_is_wrong():
-    good = calibrate(Experiment(runs=60, seed=5))
-    bad = replace(good, coverage=0.5, exceeding=0.02, exceeding_alarms=0.5, bias_uniformity=1e-9)
-    assert [problem.split()[0] for problem in bad.problems()] == [
-        "exceeding",
-        "coverage",
-        "exceeding_alarms",
-        "bias_uniformity",
-    ]
-    assert "coverage is 0.5, expected 0.95" in bad.problems()[1]
-
-
-@pytest.mark.claim("agreement-inside-the-margin")
-def test_a_wrong_prediction_does_not_agree():
-    assert PowerCheck(0.01, 0.01, 0.9, 0.88, 100).agrees
-    assert not PowerCheck(0.01, 0.01, 0.9, 0.6, 100).agrees
-
-
-def test_share_interval_by_hand():
-    # 10 trials of probability 1/2: none with 1/1024, at most one with 11/1024, and the same at the other end.
-    assert share_interval(0.5, 10, 1.9 / 1024) == (0.0, 1.0)
-    assert share_interval(0.5, 10, 2.1 / 1024) == (0.1, 0.9)
-    assert share_interval(0.5, 10, 21.9 / 1024) == (0.1, 0.9)
-    assert share_interval(0.5, 10, 22.1 / 1024) == (0.2, 0.8)
-
-
-@pytest.mark.parametrize("bias", [0.0, -1.0, np.nan])
-def test_no_power_without_a_bias(bias):
-    with pytest.raises(InputError, match="wanted a relative bias such as"):
-        check_power(bias, Experiment())
-
-
-# --- large -----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.statistical
 @pytest.mark.parametrize(("batches", "noisy_reference"), [(4, False), (16, False), (16, True)])
 def test_many_null_comparisons(batches, noisy_reference):
     calibration = calibrate(Experiment(runs=1000, batches=batches, noisy_reference=noisy_reference, seed=30 + batches))
     assert calibration.problems() == (), calibration
 
 
-@pytest.mark.statistical
 def test_two_images_of_few_batches_are_judged_too_mildly():
     """Welch's degrees of freedom are estimates too: with 4 batches on either side 0.7 % exceed instead of 1 %."""
     calibration = calibrate(Experiment(runs=400, batches=4, noisy_reference=True, seed=34))
@@ -124,7 +58,6 @@ def test_two_images_of_few_batches_are_judged_too_mildly():
     assert low <= calibration.coverage_batches <= high
 
 
-@pytest.mark.statistical
 @pytest.mark.parametrize("bias", BIASES)
 @pytest.mark.parametrize("wider", [0.6, 1.0, 1.5, 3.0])
 def test_the_printed_power_is_the_share_that_finds_a_bias(bias, wider):
@@ -137,7 +70,6 @@ def test_the_printed_power_is_the_share_that_finds_a_bias(bias, wider):
     assert check.agrees, check
 
 
-@pytest.mark.statistical
 def test_skewed_noise_breaks_the_count_of_pixels_first_and_the_interval_last():
     """Log-normal batches against an exact reference, as in the table of the module."""
     mild, skewed, heavy = (
@@ -157,7 +89,6 @@ def test_skewed_noise_breaks_the_count_of_pixels_first_and_the_interval_last():
     assert min(skewed.exceeding_alarms, heavy.exceeding_alarms) > 0.99
 
 
-@pytest.mark.statistical
 def test_skewness_of_one_law_on_both_sides_cancels():
     calibration = calibrate(
         Experiment(log_normal(0.5), runs=400, noisy_reference=True, seed=41), spread=relative_spread(0.5)

@@ -102,6 +102,7 @@ def test_a_refusal_is_a_row():
     assert row["truth_mean"] > 0
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("variant")
 def test_what_is_not_finite_is_counted_and_kept_out_of_the_errors(monkeypatch):
     made = work.unchecked_frame

@@ -53,6 +53,7 @@ def test_sigmoid_is_nought_and_one_outside_its_depths():
     np.testing.assert_allclose(sigmoid(depth, 3.0, 5.0), [0, 0, 0.5, 1, 1])
 
 
+@pytest.mark.slow
 def test_what_lies_within_a_mesh_and_how_deep():
     """A ball: the distance of a point from its surface is known. A ring: a line meets it four times."""
     ball = icosphere(4)
