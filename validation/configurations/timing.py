@@ -81,19 +81,6 @@ def run_times(work: Callable[[], Any]) -> tuple[float, float]:
 def time_in_turns(
     works: Sequence[Callable[[], Any]], *, seconds: float = 3.0, least: int = 5, most: int = 200
 ) -> list[Timing]:
-    """Time several pieces of work in turns, and return median and quartiles [ms] of each.
-
-    Parameters
-    ----------
-    works, seconds, least, most
-        See `times_in_turns`.
-    """
-    times = times_in_turns(works, seconds=seconds, least=least, most=most)
-    quartiles = np.percentile(times, [25, 50, 75], axis=0).T
-    return [Timing(float(median), float(low), float(high), len(times)) for low, median, high in quartiles]
-
-
-def times_in_turns(works: Sequence[Callable[[], Any]], *, seconds: float, least: int, most: int) -> NDArray[np.float64]:
     """Time several pieces of work in turns, so that other load on the machine affects all of them alike.
 
     Parameters
@@ -107,8 +94,8 @@ def times_in_turns(works: Sequence[Callable[[], Any]], *, seconds: float, least:
 
     Returns
     -------
-    array
-        The times after two turns of warm-up [ms], (turns, works).
+    list of Timing
+        Median and quartiles [ms] of each, after two turns of warm-up.
     """
     for _ in range(2):  # the first call compiles and records, the second is the first replay
         for work in works:
@@ -117,14 +104,15 @@ def times_in_turns(works: Sequence[Callable[[], Any]], *, seconds: float, least:
     times: list[list[float]] = []
     stop = time.perf_counter() + seconds
     while len(times) < least or (time.perf_counter() < stop and len(times) < most):
-        turn = [0.0] * len(works)
-        for place in range(len(works)):
+        turn = []
+        for work in works:
             start = time.perf_counter()
-            works[place]()
+            work()
             dr.sync_thread()
-            turn[place] = 1e3 * (time.perf_counter() - start)
+            turn.append(1e3 * (time.perf_counter() - start))
         times.append(turn)
-    return np.array(times)
+    quartiles = np.percentile(times, [25, 50, 75], axis=0).T
+    return [Timing(float(median), float(low), float(high), len(times)) for low, median, high in quartiles]
 
 
 def timed_frame(renderer: FrameRenderer, scene: Scene, cache: FrameCache | None, **moved: bool):

@@ -37,6 +37,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.stats import linregress
 
 from analytic.errors import InputError
 from realtime.frame.renderer import render_frame
@@ -106,13 +107,8 @@ def fitted_slope(sizes: ArrayLike, errors: ArrayLike) -> Slope:
     counts = (e > 0) & np.isfinite(e)
     if counts.sum() < 2:
         return Slope(math.nan, math.nan)
-    x, y = np.log(n[counts]), np.log(e[counts])
-    x -= x.mean()
-    gradient = float(x @ y / (x @ x))
-    rest = y - y.mean() - gradient * x
-    freedom = len(x) - 2
-    error = float(np.sqrt(rest @ rest / freedom / (x @ x))) if freedom else math.nan
-    return Slope(-gradient, error)
+    line = linregress(np.log(n[counts]), np.log(e[counts]))
+    return Slope(-float(line.slope), float(line.stderr) if counts.sum() > 2 else math.nan)
 
 
 def map_errors(

@@ -62,7 +62,7 @@ def test_orders_of_droplets_are_those_of_photons(phase, tau):
     assert 0.3 < (z**2).mean() < 2.5
 
 
-@pytest.mark.parametrize("diameter", [5.0, 12.0, 31.7])
+@pytest.mark.parametrize("diameter", [12.0, *(pytest.param(d, marks=pytest.mark.slow) for d in (5.0, 31.7))])
 def test_the_fit_to_droplets_is_the_same_on_both_sides(diameter):
     pair = phase_pair(f"hg-draine:{diameter}")
     assert pair.deterministic.moments(300) == pytest.approx(hg_draine_moments(diameter, 300), abs=1e-12)
@@ -101,6 +101,7 @@ def test_a_table_of_a_function_is_the_function(tmp_path):
     assert np.abs(z).max() < 4.5
 
 
+@pytest.mark.slow
 def test_the_peak_of_modified_droplets_is_gone_on_both_sides():
     pair = phase_pair("mie-modified")
     cosines = np.cos(np.deg2rad([0.0, 4.99, 5.01, 90.0, 180.0]))
@@ -175,8 +176,13 @@ def test_files_that_are_no_phase_function(text, words, tmp_path):
     assert words in str(refused.value)
 
 
-@pytest.mark.parametrize("tau", [1e-6, 0.005, pytest.param(210.0, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("sun", [0.0, 89.99])
+@pytest.mark.parametrize(
+    ("tau", "sun"),
+    [
+        (0.005, 0.0),
+        *(pytest.param(t, s, marks=pytest.mark.slow) for t in (1e-6, 0.005, 210.0) for s in (0.0, 89.99)),
+    ],
+)
 def test_hard_cases_have_finite_numbers(tau, sun):
     numbers = slab_numbers(
         slab_request(tau, sun, phase="hg:0.85", orders="1,2-3,4-inf", directions="1:0,-1:0,0.001:180,-1e-6:0")
