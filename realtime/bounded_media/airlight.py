@@ -101,18 +101,13 @@ class PlacedRay(MediaRay):
         zero = dr.zeros(type(self.medium.albedo), dr.width(self.geometry.height, x0, x1))
         return sum_over_pieces(self.pieces, panels, lambda *segment: _piece_integral(self, *segment), zero)
 
-    def gamma(self, x, *, from_camera: bool = False):
-        """Return the integral up to the distance x in the one piece and beyond, RGB [1/m^2].
-
-        It begins where the ray enters, or for a polynomial at the camera, as section 4.2 has it: then its value where
-        the ray enters is to be taken off. Nodes never begin there, since the exponent grows without end before A.
-        """
+    def gamma(self, x):
+        """Return the integral from where the ray enters the one piece up to the distance x, and beyond, RGB [1/m^2]."""
         (piece,) = self.pieces
         zero = dr.zeros(type(self.medium.albedo), dr.width(self.geometry.height, x))
         if self.polynomial is None:
             return self.airlight(type(x)(0), x)
-        begin = type(x)(0) if from_camera else piece.begin
-        segment = self.geometry.lit_segment(begin, dr.maximum(x, begin))
+        segment = self.geometry.lit_segment(piece.begin, dr.maximum(x, piece.begin))
         panels = smooth_subsegments(self.geometry, self.light, *segment)
         return sum((published_integral(self, piece, begin, end) for begin, end in panels), zero)
 

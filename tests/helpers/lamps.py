@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Small scenes with lights with extent, and frames of them."""
 
+from tests.helpers import frames
 from tests.helpers.scenes import tiny_scene
 
 
@@ -34,7 +35,5 @@ def renderer(scene, method="soft-shafts", *, kernel=None, precision="single", **
 
 
 def frame(scene, method="soft-shafts", **options):
-    """Return the frame of a method, see `renderer`."""
-    from realtime.frame.renderer import render_frame
-
-    return render_frame(renderer(scene, method, **options))
+    """Return the frame of a method, which all tests share; see `tests.helpers.frames.frame`."""
+    return frames.frame(scene, method, **options)

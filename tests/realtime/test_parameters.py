@@ -4,6 +4,7 @@
 import re
 from dataclasses import dataclass, fields
 
+import numpy as np
 import pytest
 
 from realtime.errors import InputError
@@ -61,9 +62,20 @@ def test_words_become_values():
     assert values(read_parameters("fog", Fog, {})) == defaults(Fog)
 
 
-def test_a_record_that_is_made_in_python_is_checked_too():
-    with refused("steps: got 1.5, wanted a whole number from 1 to 64"):
-        Fog(steps=1.5)
+@pytest.mark.parametrize(
+    ("name", "wanted", "values"),
+    [
+        ("steps", "a whole number from 1 to 64", (1.5, "16", True, None)),
+        ("share", "a finite number above 0 up to, but not, 1 [1/m]", ("0.5", True, None)),
+        ("word", "one of even, uneven", (1, True, None)),
+        ("on", "true or false", (1, "yes", None)),
+    ],
+)
+def test_a_record_that_is_made_in_python_takes_values_of_its_kinds_alone(name, wanted, values):
+    for value in values:
+        with refused(f"{name}: got {value!r}, wanted {wanted}"):
+            Fog(**{name: value})
+    assert Fog(steps=np.uint8(3), share=np.float32(0.25)).steps == 3
 
 
 @pytest.mark.parametrize("name", METHODS)

@@ -103,12 +103,6 @@ class ShadowPlaneParameters(Parameters):
         "`kernel` is `paper` with a polynomial kernel and otherwise `exact`, which asks no kernel",
         choices=("kernel", *FORMS),
     )
-    gamma: str = parameter(
-        "medium",
-        "evaluation=vertex in bounded media: Gamma from where a ray enters the medium, or from the camera as in "
-        "section 4.2, for polynomial kernels",
-        choices=("medium", "camera"),
-    )
     cone: int = parameter(
         0,
         "edges of the pyramid of planes that bounds a spot, 32 in the paper; 0 is the cone itself, and planes bound no "
@@ -330,7 +324,6 @@ def _drawn(
         *planes,
         rows=parameters.rows,
         cone=cone,
-        from_camera=parameters.gamma == "camera",
         order=parameters.order,
         buffer=buffer,
         start=start,

@@ -6,10 +6,10 @@ a ray enters at A and leaves at F, with the end E at F or at the surface before 
 
     L_m = sum over lit [a, b] in [A, E] of Gamma_m(b) - Gamma_m(a),
 
-where Gamma_m(P) integrates from the camera, with the exponent continued before A, and Gamma_m(A) is subtracted where
-the ray enters (4.2): ``gamma=camera``. Before A the exponent grows, so that Gamma_m is a multiple of what is to be left
-of it, and so is the error of its interpolation. With ``gamma=medium``, the default, all Gamma_m begin at A, and
-Gamma_m(A) is 0: without vertices and rounding that is the same. The passes are
+where Gamma_m(P) integrates from the camera in the paper, with the exponent continued before A, and Gamma_m(A) is
+subtracted where the ray enters (4.2). Before A the exponent grows, so that Gamma_m is a multiple of what is to be left
+of it, and so is the error of its interpolation. Here all Gamma_m begin at A, and Gamma_m(A) is 0: without vertices and
+rounding that is the same. The passes are
 
 * stage 3: add Gamma_m(E) if E is lit; "the lit areas of objects and of the medium boundary";
 * stages 4 and 5: the planes before E, and at A the bounds (`realtime.methods.shadow_planes.published_crossings`).
@@ -66,7 +66,6 @@ def sum_in_media(
     *,
     rows: int,
     cone: bool,
-    from_camera: bool,
     order: str,
     buffer: Buffer | None,
     start,
@@ -81,8 +80,6 @@ def sum_in_media(
         The planes and the rays.
     rows, cone
         See `realtime.methods.shadow_planes.published_mesh.mesh_gamma`.
-    from_camera
-        Whether Gamma begins at the camera.
     order, buffer
         See `realtime.methods.shadow_planes.published_crossings.sum_crossings`.
     start
@@ -100,10 +97,10 @@ def sum_in_media(
         own = replace(media, pieces=(_alone(media, piece, begin),))
 
         def at(x, own=own, factor=factor, meets=meets):
-            return dr.select(meets, factor * bounded_radiance(own.light, own.gamma(x, from_camera=from_camera)), 0)
+            return dr.select(meets, factor * bounded_radiance(own.light, own.gamma(x)), 0)
 
         def at_vertex(point, number=number):
-            return _vertex_gamma(view, media, views, number, point, from_camera=from_camera)
+            return _vertex_gamma(view, media, views, number, point)
 
         on_planes = mesh_gamma(view, index, media.light, kernel=None, rows=rows, cone=cone, gamma_of=at_vertex)
 
@@ -131,8 +128,8 @@ def _alone(media: PlacedRay, piece: Piece, begin) -> Piece:
     return replace(piece, begin=begin, end=end, before=none)
 
 
-def _vertex_gamma(view: View, media: PlacedRay, views: MediaViews, number: int, point, *, from_camera: bool) -> Any:
-    """Return the radiance of Gamma of one medium from the camera to points [W/(m^2 sr)]."""
+def _vertex_gamma(view: View, media: PlacedRay, views: MediaViews, number: int, point) -> Any:
+    """Return the radiance of Gamma of one medium up to points [W/(m^2 sr)]."""
     offset = point - view.origin
     distance = dr.norm(offset)
     direction = offset / distance
@@ -153,4 +150,4 @@ def _vertex_gamma(view: View, media: PlacedRay, views: MediaViews, number: int, 
         polynomial=media.polynomial,
     )
     assert isinstance(ray, PlacedRay)
-    return bounded_radiance(media.light, ray.gamma(distance, from_camera=from_camera))
+    return bounded_radiance(media.light, ray.gamma(distance))

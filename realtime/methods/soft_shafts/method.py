@@ -18,15 +18,6 @@ With `interleave` each pixel of a tile of 4 x 4 takes one of the points and a sh
 over the tile, by depth, is that of all points and of sixteen times as many steps. The mean of the share is a ratio of
 two means (Heitz, Hill, McGuire 2018): what a tile does not shadow is not noisy.
 
-What it should cost, counted before it was built, 800 x 600 on two AVX-512 cores, 5 points and 32 steps: 30 000 packets
-x 160 steps x about 75 operations, half of them two at a time, 50 ms and the look-ups 20 ms; the maps 5 x 2.1 ms; the
-filter of the share 2 x 31 x 6 sums, 10 ms; that of the airlight 961 taps of about 14 operations, 130 ms; in all 240 ms.
-
-Shared points took 57 ms there, 15 of them for the second look at narrow penumbrae: it cast the rays of the first look
-again, and three more in a fifth of the pixels. Predicted for this form: without the first rays again -5 ms, with the
-geometric mean of widths, which lets a tenth of the pixels do, -5 ms, the sum over the light points of a surface with
-what they have in common taken out -2 ms, widths in every sixteenth pixel alone -1.5 ms, 12 steps -1 ms; 42 to 43 ms.
-
 Lights without extent are one point. Their surfaces are lit by shadow rays and have no penumbra to filter. In bounded
 media every point of a light is asked, also with `interleave`.
 """

@@ -75,6 +75,18 @@ def test_a_spot_that_looks_aside_is_no_reason(variant):
     assert np.isfinite(frame.airlight).all()
 
 
+def test_the_camera_is_read_once_for_all_lights(variant, monkeypatch):
+    """Each read waits for the device."""
+    import realtime.frame.light_on_ray as module
+
+    reads = []
+    read_camera = module.read_camera
+    monkeypatch.setattr(module, "read_camera", lambda camera: reads.append(camera) or read_camera(camera))
+    lamp = tiny_scene()["lamp"]
+    render("unshadowed", position=[0.9, 0.7, 1.9], changes={"second": lamp | {"position": [0.3, 0.9, 2.9]}})
+    assert len(reads) == 1
+
+
 def test_what_is_not_finite_is_refused_whatever_the_reason():
     from types import SimpleNamespace
 

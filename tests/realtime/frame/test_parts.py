@@ -8,9 +8,7 @@ from tests.helpers.scenes import tiny_scene
 
 # No method sees the rays of another part, and a part begins where a block of tiles does: the same bits.
 METHODS = {
-    "ray-march": {"steps": 7},
     "shadow-planes": {},
-    "light-volumes": {"map": 64},
     "light-volumes, a disk": {"map": 64, "points": 3},
 }
 
@@ -39,54 +37,7 @@ def renderer(name):
     return frame_renderer(scene(lamp="disk" in name), method, kernel=KERNELS["exact"].function, **METHODS[name])
 
 
-@pytest.mark.parametrize("name", METHODS)
-def test_an_image_in_parts_is_that_of_the_whole(name, variant, monkeypatch):
-    import realtime.frame.renderer as module
-
-    made = renderer(name)
-    whole = module.render_frame(made)
-    assert len(module.parts(made)) == 1
-    monkeypatch.setattr(module, "_LARGE", 2048)
-    monkeypatch.setattr(module, "_PART", 1024)
-    pixels = [np.array(part.pixel) for part in module.parts(made)]
-    assert [len(part) for part in pixels] == [1024, 1024, 1024, 829]
-    assert set(np.concatenate(pixels)) == set(range(83 * 47))
-    in_parts = module.render_frame(made)
-    for layer in ("airlight", "surface", "distance"):
-        np.testing.assert_array_equal(getattr(in_parts, layer), getattr(whole, layer))
-
-
-@pytest.mark.parametrize("parameters", [{"tolerance": 0.01}, {"evaluation": "mesh"}])
-def test_what_needs_the_whole_image_is_not_divided(parameters, variant, monkeypatch):
-    import realtime.frame.renderer as module
-    from realtime.kernels.registry import KERNELS
-    from realtime.methods.registry import METHODS as REGISTRY
-
-    monkeypatch.setattr(module, "_LARGE", 256)
-    read = scene()
-    if "tolerance" in parameters:
-        from dataclasses import replace
-
-        read = replace(read, camera=replace(read.camera, width=84, height=48))
-    made = module.frame_renderer(
-        read, REGISTRY["light-volumes"], kernel=KERNELS["exact"].function, map=64, **parameters
-    )
-    assert module.parts(made) == (made,)
-
-
-def test_a_frame_in_parts_is_timed_by_its_stages(variant, monkeypatch):
-    import realtime.frame.renderer as module
-    from validation.configurations.timing import time_frame
-
-    monkeypatch.setattr(module, "_LARGE", 2048)
-    monkeypatch.setattr(module, "_PART", 1024)
-    times = time_frame(renderer("shadow-planes"))
-    assert times.frame.repetitions == 3
-    assert 0 < times.surface.median_ms < times.frame.median_ms < times.objects_moved.median_ms
-
-
 WHOLE = {
-    "soft-shafts": {"map": 64},
     "soft-shafts, shared": {
         "points": 16,
         "interleave": True,
@@ -97,7 +48,6 @@ WHOLE = {
         "history": 0.5,
         "map": 64,
     },
-    "min-max": {"map": 64},
 }
 STILL = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
 

@@ -11,7 +11,6 @@ from concurrent.futures import Executor, ProcessPoolExecutor
 from multiprocessing import get_context
 from typing import Any
 
-import numpy as np
 import pytest
 
 from realtime.methods.registry import METHODS
@@ -122,6 +121,7 @@ def waits_of_frames(scene: dict[str, Any], method: str) -> dict[str, Counter[str
     return waits
 
 
+@pytest.mark.slow
 @pytest.mark.claim("no-wait-in-a-frame")
 @pytest.mark.parametrize("scene", scenes())
 @pytest.mark.parametrize("method", [name for name, method in METHODS.items() if not method.renders_clouds])
@@ -131,48 +131,11 @@ def test_a_frame_waits_for_the_host_where_the_table_says(elsewhere, method, scen
     assert elsewhere.submit(waits_in_fog, scene, method).result() == expected
 
 
+@pytest.mark.slow
 @pytest.mark.claim("no-wait-in-a-frame")
 @pytest.mark.parametrize("method", [name for name, method in METHODS.items() if method.renders_clouds])
 def test_a_frame_of_clouds_never_waits(elsewhere, method):
     assert elsewhere.submit(waits_in_clouds, method).result() == {name: {} for name in MOVES}
-
-
-def test_every_wait_is_found(elsewhere):
-    assert elsewhere.submit(waits_of_reads).result() == [1] * 9
-
-
-def waits_of_reads() -> list[int]:
-    """How often each thing waits that a method could do with an array that lies on the device."""
-    import drjit as dr
-    import mitsuba as mi
-
-    numbers = dr.arange(mi.Float, 8)
-    colour = mi.Color3f(1.0, 2.0, dr.opaque(mi.Float, 3.0, 8))
-    dr.eval(numbers, colour)
-    reads: tuple[Callable[[], Any], ...] = (
-        lambda: np.array(numbers),
-        lambda: np.asarray(dr.detach(numbers)),
-        lambda: colour.numpy(),
-        lambda: float(numbers[3]),
-        lambda: bool(dr.any(numbers > 3)),
-        lambda: list(numbers),
-        lambda: dr.slice(numbers, 3),
-        lambda: dr.compress(numbers > 3),
-        lambda: dr.sync_thread(),
-    )
-    counts = []
-    for read in reads:
-        with round_trips() as waits:
-            read()
-        counts.append(sum(waits.values()))
-    with round_trips() as waits:
-        dr.eval(numbers + 1, dr.sum(numbers))
-        assert mi.Float(3.0)[0] == 3.0  # a literal: Python knows it
-    assert not waits
-    waiting: dict[str, Any] = {"state": (+numbers,), "cond": lambda x: x < 9, "body": lambda x: (x + 1,)}
-    with pytest.raises(RuntimeError, match="synchroniz"), round_trips():
-        dr.while_loop(**waiting, mode="evaluated")
-    return counts
 
 
 def spoken(source: str) -> set[str]:
@@ -194,8 +157,3 @@ def test_methods_name_no_backend_and_do_not_wait():
     assert {name: words for name, words in used.items() if words} == {
         name: set(words) for name, words in SPOKEN.items()
     }
-
-
-def test_names_of_backends_are_found():
-    source = "'''LLVM'''\nx = dr.llvm.Float(1)\nmi.set_variant('llvm_ad_rgb')\ny = x.numpy()\nraise E('use LLVM')\n"
-    assert spoken(source) == {"llvm", "numpy"}

@@ -42,7 +42,7 @@ def test_shifted_camera_looks_beside_the_centres(variant):
     assert np.dot(np.array(below).ravel(), host.up) < np.dot(np.array(ray_directions(camera, here)[0]).ravel(), host.up)
 
 
-@pytest.mark.parametrize("method", ["shadow-planes", "light-volumes", "min-max", "froxel-fog"])
+@pytest.mark.parametrize("method", ["shadow-planes", "froxel-fog"])
 def test_one_ray_is_the_frame_itself(variant, method):
     renderer = prepared(read_scene(load_scene("sphere-spot", (16, 12)).scene), configuration(method))
     np.testing.assert_array_equal(render_samples(renderer, 1).airlight, render_frame(renderer).airlight)
@@ -51,7 +51,7 @@ def test_one_ray_is_the_frame_itself(variant, method):
 @pytest.mark.claim("anti-aliased")
 def test_the_mean_converges_to_that_over_the_pixels(variant):
     """16 rays err a quarter as much as the centre alone, by the quadrature of the means over pixels."""
-    loaded = load_scene("sphere-spot", (32, 24))
+    loaded = load_scene("sphere-spot", (16, 12))
     truth = truth_image(loaded.scene, pixel="area").airlight
     renderer = prepared(read_scene(loaded.scene), configuration("shadow-planes"))
     shares = []

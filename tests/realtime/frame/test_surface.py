@@ -7,8 +7,7 @@ import pytest
 from tests.helpers.lamps import frame, lamp_scene
 
 
-@pytest.mark.parametrize("sigma_t", [0.21, (0.11, 0.31, 0.53)])
-@pytest.mark.parametrize("shape", ["rectangle", "sphere"])
+@pytest.mark.parametrize(("shape", "sigma_t"), [("rectangle", (0.11, 0.31, 0.53)), ("sphere", 0.21)])
 def test_the_sum_by_points_is_the_sum_of_the_points(variant, shape, sigma_t):
     """Rationale: rounding of float32, a dozen operations a point."""
     changes = {"ball": None, "fog": fog(sigma_t)}

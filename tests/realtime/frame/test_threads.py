@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[3]
 
 PROGRAM = """
@@ -40,6 +42,7 @@ print("the same")
 """
 
 
+@pytest.mark.slow
 def test_two_threads_draw_what_one_does():
     done = subprocess.run([sys.executable, "-c", PROGRAM], cwd=ROOT, capture_output=True, text=True, timeout=600)
     assert done.stdout == "the same\n", done.stderr

@@ -8,7 +8,7 @@ import pytest
 
 from tests.helpers.clouds import DROPLETS, cloud, cloud_scene, ring
 from tests.helpers.transport_formula import WEIGHTS, Formula, use_formula
-from validation.scenes.parts import camera, mitsuba_mesh, placed, rotation
+from validation.scenes.parts import camera, placed, rotation
 from validation.scenes.solids import box
 
 THICKNESS, EXTINCTION = 143.7, 0.0363
@@ -110,39 +110,14 @@ def test_the_layers_of_all_sets_add_up(variant):
     np.testing.assert_allclose(np.array(shares) / shares[0], np.array(WEIGHTS) / WEIGHTS[0], rtol=1e-3)
 
 
-def test_order_one_alone_is_that_of_the_whole_frame(variant):
-    """What is timed by itself is what a frame does, to the bit."""
-    from dataclasses import replace
-
-    import mitsuba as mi
-
-    from realtime.frame.renderer import frame_renderer, render_frame
-    from realtime.methods.cloud_collectors import scattered_once
-    from realtime.methods.registry import METHODS
-    from realtime.scene.read_scene import read_scene
-
-    scene = _scene(sun=_sun(ALONG), ring=cloud("ring", ring()))
-    method = replace(METHODS["cloud-collectors"], render=scattered_once)
-    alone = render_frame(frame_renderer(read_scene(mi.load_dict(scene)), method))
-    whole = _frame(scene, extra_layers=True)
-    np.testing.assert_array_equal(alone.airlight, whole.extra["airlight_1"])
-    np.testing.assert_array_equal(alone.surface, whole.surface)
-    assert alone.airlight.max() > 0
-
-
-@pytest.mark.parametrize("scale", [1e-3, 1e3])
-def test_optical_lengths_alone_matter(variant, scale):
+def test_optical_lengths_alone_matter(variant):
     """Metres against kilometres."""
+    scale = 1e3
     one = _airlight(_scene(sun=_sun(ALONG), cloud=cloud("ring", ring())))
     mesh = (ring()[0] * scale, ring()[1])
     other = cloud("ring", mesh, DROPLETS | {"sigma_t": EXTINCTION / scale})
     scaled = _airlight(_scene(scale, sun=_sun(ALONG), cloud=other))
     np.testing.assert_allclose(np.mean(np.abs(scaled - one)) / np.mean(one), 0, atol=3e-3)
-
-
-def test_both_precisions_agree(variant):
-    single, double = (_airlight(_scene(), precision) for precision in ("single", "double"))
-    np.testing.assert_allclose(single, double, rtol=2e-3, atol=1e-4)
 
 
 def test_suns_add_up_and_so_does_a_sky_as_a_beam(variant):
@@ -211,7 +186,7 @@ def test_a_camera_in_the_cloud_is_its_point(variant):
 
 
 @pytest.mark.claim("collector-frames", tolerance="2e-3 of the mean; interpolated 2 %, as tiles are coarse here")
-@pytest.mark.parametrize(("tolerance", "bound"), [(0.0, 2e-3), (0.01, 0.02)])
+@pytest.mark.parametrize(("tolerance", "bound"), [(0.0, 2e-3), pytest.param(0.01, 0.02, marks=pytest.mark.slow)])
 def test_the_last_frame_s_collectors_go_on(variant, tolerance, bound):
     """Three steps a frame end where forty end; in interpolated frames the corners of tiles go on for their pixels."""
     from realtime.frame.incremental import next_frame
@@ -249,32 +224,13 @@ def test_another_cloud_in_the_light_dims_and_changes_no_thickness(variant):
     assert share[alone > 0].min() > 0.98 * faded
 
 
-def test_an_opaque_shape_in_the_light_leaves_a_shadow_in_all_orders(variant):
-    plate = placed(box((300.0, 300.0, 2.0)), tuple(MIDDLE - 400.0 * ALONG), TURN)
-    alone = _airlight(_scene(sun=_sun(ALONG), slab=_slab()), map=1024)
-    shaded = _airlight(_scene(sun=_sun(ALONG), slab=_slab(), plate=mitsuba_mesh("plate", plate, (0.5,) * 3)), map=1024)
-    lit = shaded / np.maximum(alone, 1e-9)
-    assert np.mean(lit == 0) > 0.05
-    assert np.mean(np.abs(lit - 1) < 0.02) > 0.2
-
-
 @pytest.mark.claim("uniform-sky-total", tolerance="1e-3: the shares of a slab add up to 1, in float32")
-@pytest.mark.parametrize("shape", ["slab", "ring"])
-def test_of_a_uniform_sky_comes_as_much_as_clouds_take(variant, shape):
+def test_of_a_uniform_sky_comes_as_much_as_clouds_take(variant):
     """A cloud that absorbs nothing cannot be told from the sky around it; layers add up, and order 1 is a part."""
-    body = _slab() if shape == "slab" else cloud("ring", ring())
     sky = {"type": "constant", "radiance": {"type": "rgb", "value": [0.11, 0.17, 0.31]}}
-    frame = _frame(_scene(sky=sky, cloud=body), extra_layers=True)
+    frame = _frame(_scene(sky=sky, cloud=cloud("ring", ring())), extra_layers=True)
     total = np.array([0.11, 0.17, 0.31]) * np.array(frame.extra["opacity"])
     np.testing.assert_allclose(frame.airlight, total, rtol=1e-3, atol=1e-5)
     layers = {name: np.array(layer) for name, layer in frame.extra.items() if name != "opacity"}
     np.testing.assert_allclose(sum(layers.values()), total, rtol=1e-3, atol=1e-5)
     assert 0.02 * total.mean() < layers["airlight_1"].mean() < 0.6 * total.mean()
-
-
-def test_wrong_values_are_refused(variant):
-    from realtime.errors import InputError
-
-    for name, value in (("iterations", 0), ("start", "warm"), ("peak", "none"), ("map", 500), ("settled", 1.0)):
-        with pytest.raises(InputError, match=name):
-            _renderer(_scene(), **{name: value})

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""A user's function is a method: its parameters, its result, and its faults with file and line."""
+
 import re
 import textwrap
 
@@ -36,7 +38,6 @@ def short(view): return mi.Color3f(mi.Float([1.0, 2.0]))
 def dark(view): return np.where(np.arange(dr.width(view.pixel)) == dr.width(view.pixel) - 1, np.nan, 1.0)
 def wants(view, steps): return 1
 def blind(): return 1
-def refuses(view): raise InputError("refuses: wanted another scene")
 
 def divides(view):
     'Divide by zero.'
@@ -97,10 +98,6 @@ def render(own, variant):
         return render_frame(renderer).airlight
 
     return rendered
-
-
-def test_a_built_in_name_gives_the_record_itself():
-    assert all(find_method(name) is record for name, record in METHODS.items())
 
 
 @pytest.mark.claim("own-method-parameters")
@@ -180,11 +177,6 @@ def test_an_exception_names_file_and_line(render, own):
         assert caught.value.__cause__ is not None
 
 
-def test_its_own_refusal_stays_as_it_is(render):
-    with pytest.raises(InputError, match=r"^refuses: wanted another scene$"):
-        render("refuses")
-
-
 @pytest.mark.claim("own-method-parameters")
 @pytest.mark.parametrize(
     ("name", "message"),
@@ -231,22 +223,6 @@ def test_faults_in_the_file_are_told_with_their_line(tmp_path, monkeypatch):
     for module in ("imports_for_tests", "imports_for_tests.py"):
         with refused("imports_for_tests.py, line 2: ModuleNotFoundError: No module named 'not_there_for_tests'"):
             find_method(f"{module}:f")
-
-
-def test_a_module_of_the_current_folder_is_found_and_the_path_left_as_it_was(tmp_path, monkeypatch):
-    import sys
-
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "here_for_tests.py").write_text("def f(view):\n    return 1\n")
-    before = list(sys.path)
-    assert find_method("here_for_tests:f").name == "here_for_tests:f"
-    assert sys.path == before
-
-
-def test_a_file_that_was_changed_is_read_again(own, tmp_path):
-    assert find_method(f"{own}:calls").defaults["steps"] == 7
-    tmp_path.joinpath("own_for_tests.py").write_text(SOURCE.replace("steps=7", "steps=77"))
-    assert find_method(f"{own}:calls").defaults["steps"] == 77
 
 
 @pytest.mark.claim("own-method-frozen")

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""The height field of a map has its inverse depths, their bounds, and one value where faces meet."""
+
 import numpy as np
 import pytest
 
@@ -83,19 +85,3 @@ def test_faces_of_a_cube_meet_with_the_same_values(variant):
     for key, value in zip(map(tuple, np.array(direction).T), distance.ravel(), strict=True):
         assert seen.setdefault(key, value) == value
     assert len(seen) == 6 * 15 * 15 + 12 * 15 + 8
-
-
-def test_one_kernel_writes_all_levels(variant):
-    """A map of four times the texels has two levels more; each had kernels of its own, which take long to compile."""
-    import drjit as dr
-
-    def kernels(size):
-        with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
-            dr.kernel_history_clear()
-            heights_of(size, "point")
-            launched = dr.kernel_history((dr.KernelType.JIT,))
-        return len(launched), len({kernel["hash"] for kernel in launched})
-
-    (few, of_few), (many, of_many) = kernels(16), kernels(64)
-    assert many > few
-    assert of_many == of_few

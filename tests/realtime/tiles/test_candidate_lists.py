@@ -3,27 +3,13 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tests.helpers.planes import bundles, casters_of, crossings, index_of, listed_planes
+from tests.helpers.planes import bundles, casters_of, crossings, index_of
 
 BOXES, LONGEST = 20, 12
-
-
-@settings(deadline=None, max_examples=30)
-@given(count=st.integers(1, 70))
-def test_every_ray_is_in_its_tile(variant, count):
-    import drjit as dr
-
-    from realtime.tiles.candidate_lists import members
-
-    drawn = members(count)
-    dr.eval(drawn)  # all in one kernel
-    lanes = np.stack([np.array(lane) for lane in drawn], axis=1)
-    assert len(lanes) == -(-count // 16)
-    np.testing.assert_array_equal(lanes.ravel(), np.minimum(np.arange(lanes.size), count - 1))
 
 
 @pytest.mark.claim("lists-in-any-room")
@@ -79,21 +65,6 @@ def planes(variant):
     dr.eval(box)
     crossed = np.isfinite(crossings(index, ways)[0])
     return index, box, [set(np.flatnonzero(tile.any(axis=0)).tolist()) for tile in np.split(crossed, len(ways) // 16)]
-
-
-@pytest.mark.claim("lists-in-any-room")
-# The fixture is the same for every example.
-@settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(room=st.integers(1, 3000), order=st.sampled_from([None, "exact", "paper"]))
-def test_lists_of_planes_hold_what_is_crossed_in_any_room(planes, room, order):
-    """Their cover is the list that they are drawn on, here the bins."""
-    from realtime.methods.shadow_planes.tile_lists import bin_source, listed
-
-    index, box, crossed = planes
-    lists = listed(index, box, index.entries, bin_source(index, box), room=room, order=order)
-    for wanted, (numbers, _) in zip(crossed, listed_planes(lists), strict=True):
-        assert wanted <= set(numbers.tolist())
-        assert len(set(numbers.tolist())) == len(numbers)
 
 
 def texels_of(leaves, faces, size, side):

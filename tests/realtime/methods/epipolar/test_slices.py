@@ -47,39 +47,6 @@ def slices_of(scene, count=24):
     return image_slices(scene.camera, scene.lights[0], count)
 
 
-def points_on(slices, share):
-    """Return (i, j) on all slices, a share of the way from where they enter to where they leave."""
-    import mitsuba as mi
-
-    ends = np.array(slices.ends, dtype=float).reshape(-1, 4)
-    point = ends[:, :2] * (1 - share) + ends[:, 2:] * share
-    return mi.Float(point[:, 0]), mi.Float(point[:, 1])
-
-
-@pytest.mark.parametrize("place", PLACES)
-def test_points_of_a_slice_lie_in_its_half_plane(variant, place):
-    scene = read(PLACES[place])
-    slices, camera = slices_of(scene), scene.camera
-    towards, across = vectors(slices.towards), vectors(slices.across)
-    for share in (0.1, 0.5, 1.0):
-        i, j = points_on(slices, share)
-        direction = vectors(camera.forward + camera.left * i + camera.up * j)
-        normal = np.cross(towards, across)
-        assert np.abs(np.sum(direction * normal, axis=1)).max() < 1e-5  # float32, of lengths of about 1
-        assert np.sum(direction * across, axis=1).min() > -1e-6
-
-
-@pytest.mark.parametrize("place", PLACES)
-def test_a_point_of_a_slice_is_found_there(variant, place):
-    from realtime.methods.epipolar.slices import slice_coordinate
-
-    slices = slices_of(read(PLACES[place]))
-    for share in (0.3, 0.8):
-        coordinate = np.array(slice_coordinate(slices, *points_on(slices, share)), dtype=float)
-        # Lines that run along the border are found less sharply.
-        assert coordinate == pytest.approx(np.arange(slices.count), abs=2e-3)
-
-
 @pytest.mark.claim("slices-by-the-border", tolerance="1e-4 relative")
 @pytest.mark.parametrize("place", PLACES)
 def test_slices_leave_at_equal_steps_and_reach_every_pixel(variant, place):
@@ -230,59 +197,3 @@ def test_lit_pieces_are_those_of_many_points(variant, kind):
     assert np.mean((total > 0) & (total < inside_all - 1e-2)) > 0.1  # some rays are lit in part
     # The points are 9e-4 m apart at most; few rays have more than two pieces, of two ends each.
     assert length == pytest.approx(total, abs=4e-3)
-
-
-def test_marked_are_the_first_of_each_step_and_both_sides_of_breaks(variant):
-    import mitsuba as mi
-
-    from realtime.methods.epipolar.samples import mark_samples, marked_samples, sample_ray
-
-    slices = slices_of(read(PLACES["in view"]), 10)
-    depth = np.full(SIZE[::-1], 5.0)
-    depth[8:19, 11:22] = 2.0
-    depth[22:] = np.inf
-    samples = mark_samples(slices, mi.Float(depth.ravel()), count=64, step=8)
-    marked, count = marked_samples(samples)
-    every = np.arange(10 * 64)
-    _, number, seen = sample_ray(samples, mi.UInt32(every))
-    assert np.array_equal(np.array(number), every // 64)
-    seen = np.array(seen).reshape(10, 64)
-    expected = np.zeros((10, 64), dtype=bool)
-    expected[:, ::8] = expected[:, -1] = True
-    changes = seen[:, 1:] != seen[:, :-1]
-    expected[:, 1:] |= changes
-    expected[:, :-1] |= changes
-    listed = np.array(marked)[: int(count[0])]
-    assert sorted(listed) == sorted(every[expected.ravel()])
-    assert changes.sum() > 5
-
-
-def test_what_is_linear_along_slices_is_interpolated_exactly(variant):
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.methods.epipolar.samples import between_samples, mark_samples, sample_ray
-
-    slices = slices_of(read(PLACES["to the left"]), 400)
-    depth = mi.Float(np.full(SIZE[0] * SIZE[1], 3.0))
-    samples = mark_samples(slices, depth, count=64, step=16)
-    (i, j), _, _ = sample_ray(samples, dr.arange(mi.UInt32, 400 * 64))
-    values = 50 + 0.5 * i - 0.25 * j
-    pixel = np.arange(SIZE[0] * SIZE[1])
-    point = SIZE[0] / 2 - 0.5 - pixel % SIZE[0], SIZE[1] / 2 - 0.5 - pixel // SIZE[0]
-    value, fits = between_samples(samples, values, tuple(mi.Float(coordinate) for coordinate in point), depth)
-    assert np.all(np.array(fits))
-    # Slices are at most a quarter of a pixel apart, and pixels beyond the last one take its value.
-    assert np.array(value) == pytest.approx(50 + 0.5 * point[0] - 0.25 * point[1], abs=0.1)
-    # A pixel that is as near as none of its samples is not found.
-    _, fits = between_samples(samples, values, tuple(mi.Float(coordinate) for coordinate in point), depth * 0.5)
-    assert not np.any(np.array(fits))
-
-
-@pytest.mark.parametrize("width", [1, 16, 1000, 1024, 70000])
-def test_spread_numbers_come_once(variant, width):
-    from realtime.methods.epipolar.samples import spread
-
-    numbers = np.array(spread(width))
-    assert np.array_equal(np.sort(numbers), np.arange(len(numbers)))
-    assert width <= len(numbers) < width + 1025

@@ -30,48 +30,6 @@ def test_depths_and_shares_are_inverse_and_begin_at_the_camera(variant, near):
     assert np.array(depth)[-1] == pytest.approx(9.3, rel=1e-14)
 
 
-def test_the_exponential_distribution_becomes_linear(variant):
-    import drjit as dr
-    import mitsuba as mi
-
-    s = dr.linspace(mi.Float64, 0, 1, 17)
-    np.testing.assert_allclose(grid(1e5).depth(s), grid(None).depth(s), rtol=1e-4)
-
-
-def test_slices_behind_near_grow_with_their_depth(variant):
-    import drjit as dr
-    import mitsuba as mi
-
-    depth = np.array(grid(0.01).depth(dr.linspace(mi.Float64, 0, 1, 65)))
-    growth = np.diff(depth)[30:] / depth[31:]
-    np.testing.assert_allclose(growth, growth.mean(), rtol=0.05)
-
-
-def test_points_of_columns_have_their_places(variant):
-    import drjit as dr
-    import mitsuba as mi
-
-    froxels = grid()
-    column = dr.arange(mi.UInt32, froxels.columns)
-    u, v, depth = froxels.place(froxels.camera.origin + 3.7 * froxels.column_ray(column, (0.2, -0.3)))
-    row, across = np.divmod(np.arange(35), 7)
-    np.testing.assert_allclose(u, (across + 0.7) / 7, rtol=1e-5)
-    np.testing.assert_allclose(v, (row + 0.2) / 5, rtol=1e-5)
-    np.testing.assert_allclose(depth, 3.7, rtol=1e-5)
-
-
-def test_columns_as_fine_as_pixels_are_the_camera_rays(variant):
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.scene.camera import ray_directions
-
-    froxels = grid(size=(16, 12, 2))
-    column = dr.arange(mi.UInt32, 16 * 12)
-    ray = froxels.column_ray(column)
-    np.testing.assert_allclose(ray / dr.norm(ray), ray_directions(froxels.camera, column)[0], atol=1e-14)
-
-
 def test_values_between_froxels_are_linear_and_constant_beside_the_grid(variant):
     import mitsuba as mi
 

@@ -13,8 +13,9 @@ from realtime.frame.incremental import next_frame
 from realtime.frame.renderer import frame_renderer, image_frame
 from realtime.methods.registry import METHODS
 from realtime.scene.read_scene import read_scene
+from tests.helpers.frames import relative_rmse
 from tests.helpers.scenes import tiny_scene
-from tests.realtime.methods.froxel_fog.test_method import lamp_above, relative_rmse
+from tests.realtime.methods.froxel_fog.test_method import lamp_above
 
 STILL = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
 GRID = {"width": 24, "height": 18, "slices": 24, "far": 6.1}
@@ -44,16 +45,9 @@ def shifted_camera(now, vector):
     return replace(now, camera=replace(now.camera, origin=now.camera.origin + type(now.camera.origin)(*vector)))
 
 
-def test_what_stands_still_is_the_same_in_every_frame(variant):
-    now = scene()
-    alone = frames([(now, {})])[0]
-    for image in frames([(now, {})] * 4, history=0.9):
-        np.testing.assert_allclose(image, alone, rtol=2e-6)
-
-
 @pytest.mark.claim("froxel-ghost", tolerance="1e-4 relative: the weight to the power of the frames since")
-@pytest.mark.parametrize("weight", [0.5, 0.9])
-def test_the_ghost_of_a_light_that_changed_fades_like_a_power_of_the_weight(variant, weight):
+def test_the_ghost_of_a_light_that_changed_fades_like_a_power_of_the_weight(variant):
+    weight = 0.7
     bright = scene()
     dark = darker(bright, 0.25)
     images = frames([(bright, {})] + [(dark, {})] * 5, history=weight)
@@ -119,12 +113,3 @@ def test_what_the_last_frame_did_not_see_starts_anew(variant):
     np.testing.assert_array_equal(
         frames([(darker(now, 4.0), {}), (away, moved)], history=0.9)[1], frames([(away, {})], history=0.9)[0]
     )
-
-
-def test_a_light_that_moves_records_nothing_anew(variant):
-    now = scene()
-    renderer = frame_renderer(now, METHODS["froxel-fog"], history=0.9, jitter="frames", **GRID)
-    cache = None
-    for share in (1.0, 0.9, 0.8, 0.7, 0.6):
-        _, cache = next_frame(renderer, darker(now, share), cache, **(STILL | {"light_moved": True}))
-    assert renderer.render.n_recordings == 2  # the first frame, which has no history, and all others

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tests.helpers.area_lamps import lit_by
+from tests.helpers.frames import read, relative_rmse
 from tests.helpers.scenes import bounded_medium
-from tests.realtime.methods.froxel_fog.test_method import relative_rmse
 
 
 def frame(scene, method="froxel-fog", **parameters):
@@ -20,14 +20,7 @@ def frame(scene, method="froxel-fog", **parameters):
     return render_frame(frame_renderer(scene, METHODS[method], kernel=KERNELS["exact"].function, **parameters))
 
 
-def read(scene):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-
-    return read_scene(mi.load_dict(scene))
-
-
+@pytest.mark.slow
 @pytest.mark.claim("froxel-order", tolerance="at least 0.7 from four grids, a factor of eight apart")
 def test_the_error_falls_with_the_grid_under_a_light_with_extent(variant):
     from realtime.scene.read_scene import read_scene
@@ -43,26 +36,7 @@ def test_the_error_falls_with_the_grid_under_a_light_with_extent(variant):
     assert errors[-1] < 0.05
 
 
-def test_one_point_is_the_sum_of_the_table_and_of_a_light_alone(variant):
-    """A table is read in a loop; a light point that no table holds goes the way of ordinary lights."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.methods.froxel_fog.light_points import tabulated
-    from realtime.scene.light_points import with_light_points
-
-    lights = with_light_points(read(lit_by("sphere")), 7, "sobol").lights
-    (table,) = tabulated(lights)
-    assert (table.source, table.count) == (0, 7)
-    for number, light in enumerate(lights):
-        point = table.point(mi.UInt32(number), lights[0])
-        for mine, own in ((point.position, light.position), (point.normal, light.normal)):
-            np.testing.assert_array_equal(np.array(mine).ravel(), np.array(own).ravel())
-        assert float(point.facing.lift[0]) == float(light.facing.lift[0])
-    assert dr.width(table.across) == 4 * 7
-
-
-@pytest.mark.parametrize("kind", ["rectangle", "disk", "sphere"])
+@pytest.mark.parametrize("kind", ["disk", "sphere"])
 def test_surfaces_are_those_of_other_methods_and_airlight_nearly(variant, kind):
     scene = read(lit_by(kind))
     froxels = frame(scene, points=3, width=32, height=24, slices=96, shadow="ray")

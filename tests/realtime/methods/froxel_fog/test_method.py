@@ -9,32 +9,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tests.helpers.frames import frame, read, relative_rmse, truth
 from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
-from tests.helpers.suns import brick, pearl, sun, sunny
+from tests.helpers.suns import brick, pearl, sunny
 from validation.scenes import probes
 
 COARSE = {"width": 5, "height": 4, "slices": 7, "near": 0.6, "far": 7.3}
-
-
-def read(scene, precision="double"):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-
-    return read_scene(mi.load_dict(scene), precision)
-
-
-def render(scene, method="froxel-fog", precision="double", **parameters):
-    from realtime.frame.renderer import frame_renderer, render_frame
-    from realtime.kernels.registry import KERNELS
-    from realtime.methods.registry import METHODS
-
-    kernel = KERNELS["exact"].function
-    return render_frame(frame_renderer(read(scene, precision), METHODS[method], kernel=kernel, **parameters)).airlight
-
-
-def relative_rmse(one, two):
-    return np.sqrt(np.mean((one - two) ** 2)) / np.mean(two)
 
 
 def lamp_behind(**changes):
@@ -120,7 +100,9 @@ def test_the_sums_are_those_of_plain_numpy(variant):
     scene = tiny_scene(
         size=(13, 11), ball=None, floor=None, fog=hazy(), lamp=lamp_behind(), spot=spot(cutoff=41.0, beam=12.0)
     )
-    np.testing.assert_allclose(render(scene, **COARSE), by_hand(scene, **COARSE), rtol=2e-6)
+    np.testing.assert_allclose(
+        frame(scene, "froxel-fog", precision="double", **COARSE).airlight, by_hand(scene, **COARSE), rtol=2e-6
+    )
 
 
 @pytest.mark.claim("froxel-slice", tolerance="1e-12 relative: the closed form, whatever the number of slices")
@@ -133,7 +115,7 @@ def test_slices_of_constant_light_add_up_to_the_closed_form(variant, sigma_t, sl
     from realtime.methods.froxel_fog.accumulation import accumulated
     from realtime.methods.froxel_fog.grid import Grid
 
-    scene = read(tiny_scene(size=(2, 2)))
+    scene = read(tiny_scene(size=(2, 2)), "double")
     grid = Grid(2, 1, slices, scene.camera, mi.Float64(3.1), mi.Float64(0.7))
     medium = SimpleNamespace(sigma_t=(mi.Float64(sigma_t),))
     view = SimpleNamespace(medium=medium, distance=mi.Float64(0))
@@ -156,76 +138,60 @@ SMOOTH = {
     ),
     "sun": lambda: sunny(size=(24, 18), brick=brick(), pearl=pearl()),
 }
+OUTLINED = ("spot", "sphere of fog", "sun")
 
 
 @pytest.mark.claim(
-    "froxel-limit", tolerance="relative RMSE 1 %, and 8 % where the outline of a medium is cut into froxels"
+    "froxel-limit",
+    tolerance="relative RMSE 2.5e-3, the light from beyond the grid; order 0.5 at the outline of a medium or a cone",
 )
 @pytest.mark.parametrize("name", SMOOTH)
 def test_fine_grids_reach_the_integral_of_unshadowed_light(variant, name):
+    """Middles of froxels and lines between them err as the square of their size.
+
+    An outline that columns cut is wrong in a strip as wide as a column: by all of its light in n^-1 of the pixels, so
+    that the RMSE falls as n^-1/2 at least.
+    """
     scene = SMOOTH[name]()
-    exact = render(scene, "unshadowed", precision="single")
-    errors = [
-        relative_rmse(render(scene, precision="single", width=4 * n, height=3 * n, slices=4 * n), exact)
-        for n in (10, 40)
-    ]
-    assert errors[1] < {"spot": 0.025, "sphere of fog": 0.08, "sun": 0.04}.get(name, 0.01)
-    assert errors[1] < 0.5 * errors[0]
+    exact = frame(scene, "unshadowed").airlight
+    coarse, fine = (
+        relative_rmse(frame(scene, "froxel-fog", width=4 * n, height=3 * n, slices=4 * n).airlight, exact)
+        for n in (8, 24)
+    )
+    assert fine < 3**-0.5 * coarse
+    assert fine < 2.5e-3 or name in OUTLINED
 
 
-@pytest.mark.claim("froxel-order", tolerance="at least 0.7 from four grids, a factor of eight apart")
-@pytest.mark.parametrize("shadow", ["map", "ray"])
+@pytest.mark.claim("froxel-order", tolerance="at least 0.7 from three grids, a factor of four apart")
+@pytest.mark.parametrize("shadow", ["ray", pytest.param("map", marks=pytest.mark.slow)])
 def test_the_error_falls_with_the_grid_in_order(variant, shadow):
-    scene = tiny_scene(size=(64, 48), lamp=lamp_above())
-    exact = render(scene, "ray-march", precision="single", steps=4000)
-    sizes = np.array([8, 16, 32, 64])
+    scene = tiny_scene(size=(32, 24), lamp=lamp_above())
+    sizes = np.array([8, 16, 32])
     errors = [
         relative_rmse(
-            render(scene, precision="single", width=2 * n, height=n, slices=n, shadow=shadow, map=2048), exact
+            frame(scene, "froxel-fog", width=2 * n, height=n, slices=n, shadow=shadow, map=2048).airlight,
+            truth(scene).airlight,
         )
         for n in sizes.tolist()
     ]
     assert -np.polyfit(np.log(sizes), np.log(errors), 1)[0] > 0.7, errors
 
 
-@pytest.mark.parametrize("shadow", ["map", "ray"])
-@pytest.mark.parametrize("name", ["fog", "sun"])
+@pytest.mark.parametrize(("name", "shadow"), [("fog", "map"), ("sun", "ray")])
 def test_shadows_are_there(variant, name, shadow):
     scene = tiny_scene(size=(24, 18), lamp=lamp_above()) if name == "fog" else probes.sun()
-    exact = render(scene, "ray-march", precision="single", steps=2000)
-    without = render(scene, "unshadowed", precision="single")
-    froxels = render(scene, precision="single", shadow=shadow, map=1024)
+    exact = truth(scene).airlight
+    without = frame(scene, "unshadowed").airlight
+    froxels = frame(scene, "froxel-fog", shadow=shadow, map=1024).airlight
     assert relative_rmse(froxels, exact) < 0.25 * relative_rmse(without, exact)
-
-
-def test_a_light_at_the_middle_of_a_froxel_is_as_bright_as_the_mean_about_it(variant):
-    # The one froxel in the middle of the image and its middle slice hold the lamp.
-    import mitsuba as mi
-
-    from realtime.scene.camera import read_camera
-
-    scene = tiny_scene(size=(9, 9), ball=None, floor=None)
-    camera = read_camera(read(scene).camera)
-    scene["lamp"]["position"] = [float(c) for c in camera.origin + 2.0 * camera.forward]
-    with pytest.raises(Exception, match="from the ray through the centre"):  # that pixel has no finite airlight at all
-        render(scene, width=3, height=3, slices=4, distribution="linear", far=16 / 3.0)
-    scene["sensor"]["film"] |= {"width": 8, "height": 8}
-    mi.load_dict(scene)
-    assert np.isfinite(render(scene, width=3, height=3, slices=4, distribution="linear", far=16 / 3.0)).all()
 
 
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"width": 0}, "width: got 0, wanted a whole number from 1 to 4096"),
-        ({"slices": 5000}, "slices: got 5000, wanted a whole number from 1 to 4096"),
-        ({"near": -1.0}, "near: got -1.0, wanted"),
         ({"near": 3.0, "far": 2.0}, "near: got 3 with far=2, wanted a depth before it"),
         ({"near": 3.0, "distribution": "linear"}, "near: got 3 with distribution=linear"),
-        ({"history": 1.0}, "history: got 1.0, wanted"),
         ({"clamp": "neighbours"}, "clamp=neighbours: got history=0"),
-        ({"jitter": "halton"}, "jitter: got 'halton', wanted one of none, frames"),
-        ({"map": 100}, "map: got 100, wanted a power of two"),
         ({"width": 4096, "height": 4096, "slices": 4096}, "froxels: needs .* GB of memory"),
     ],
 )
@@ -233,11 +199,4 @@ def test_what_no_grid_can_have_is_refused(variant, parameters, message):
     from realtime.errors import InputError
 
     with pytest.raises(InputError, match=message):
-        render(tiny_scene(), **parameters)
-
-
-def test_a_sun_in_a_medium_without_bounds_is_refused_as_by_all(variant):
-    from realtime.errors import InputError
-
-    with pytest.raises(InputError, match="directional light and a medium without bounds"):
-        render(tiny_scene(lamp=None, sun=sun()))
+        frame(tiny_scene(), "froxel-fog", **parameters)

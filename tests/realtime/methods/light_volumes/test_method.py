@@ -25,10 +25,7 @@ from tests.helpers.light_frames import (
 from tests.helpers.scenes import spot
 
 #: One of a kind; a kernel in float64, above all of a spot, takes seconds to compile.
-FEW = {
-    "single": ("light in view", "fence", "spot in view", "coarse map", "fine map"),
-    "double": ("along diagonals",),
-}
+FEW = {"single": ("light in view", "fence", "spot in view"), "double": ()}
 
 #: Share of the pixels that must be within 1e-4 of their own value. Where many rays graze the rim of a cone, some
 #: millimetres of 3 m are lit, of which float32 holds 1e-4, or at the rim of a soft one what is lit is as dim.
@@ -84,7 +81,7 @@ def test_rays_cross_the_fence_more_often_than_a_queue_holds(variant):
     assert np.max(np.bincount(pixels)) > 2 * PLACES
 
 
-@pytest.mark.parametrize("size", [(1, 1), (1, 7), (5, 3), (18, 13), (20, 16)])
+@pytest.mark.parametrize("size", [(1, 1), (18, 13)])
 def test_any_size_of_image(variant, size):
     """Tiles of 4 x 4 pixels are squares in few of them."""
     loaded = loaded_scene(size=size)
@@ -96,7 +93,7 @@ def test_any_size_of_image(variant, size):
 
 
 @pytest.mark.claim("lists-in-any-room", tolerance="2e-6 of the largest")
-@pytest.mark.parametrize("rooms", [(6, 1), (8, 3), (24, 9)])
+@pytest.mark.parametrize("rooms", [(6, 1), (24, 9)])
 def test_lists_that_overflow_change_nothing(variant, monkeypatch, rooms):
     import realtime.methods.light_volumes.tile_lists
 
@@ -108,7 +105,7 @@ def test_lists_that_overflow_change_nothing(variant, monkeypatch, rooms):
     assert differ(render(loaded, map=64).airlight, wanted) < 2e-6
 
 
-@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("axis", [0, 2])
 @pytest.mark.parametrize("evaluation", EVALUATIONS)
 def test_rays_on_the_border_of_two_faces_are_lit_once(variant, axis, evaluation):
     """The plane of the border holds the camera, and a column, a row or a diagonal of its pixels."""
@@ -230,47 +227,6 @@ def test_any_walls_in_any_map(variant, kind, data):
     assert np.max(np.abs(walked.airlight - wanted)) < 1e-7 * scale
 
 
-def test_a_light_that_moves_between_frames(variant):
-    """The frozen frame of the walk replays with it, the mesh has other sizes."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.frame.renderer import image_frame, run_stages
-
-    renderer = {
-        evaluation: renderer_of(loaded_scene(), map=64, evaluation=evaluation, walls="slanted")
-        for evaluation in EVALUATIONS
-    }
-    scene = renderer["walk"].scene
-    frames = []
-    for height in (1.9, 2.3, 2.9):
-        light = replace(scene.lights[0], position=mi.Vector3f(0.9, 0.7, height))
-        dr.make_opaque(light.position)
-        there = replace(scene, lights=(light,))
-        for evaluation in EVALUATIONS:
-            moved = replace(renderer[evaluation], scene=there)
-            frames.append(image_frame(moved, run_stages(moved, moved.prepare(there))).airlight)
-        assert differ(frames[-1], frames[-2]) < 1e-5
-    assert renderer["walk"].render.n_recordings == 1
-    assert np.max(np.abs(frames[0] - frames[-1])) > 0.01 * np.max(frames[0])
-
-
-@pytest.mark.claim("tessellation-threshold")
-def test_adaptive_meshes_come_closer_with_the_threshold(variant):
-    """In a dome, which is curved everywhere."""
-    loaded = loaded_scene(floor={"type": "sphere", "center": [0.3, 0.4, 0.2], "radius": 5.1})
-    exact = render(loaded, map=128, walls="slanted").airlight
-    thresholds = (1e-1, 1e-2, 1e-3)
-    errors = []
-    for threshold in thresholds:
-        airlight = render(loaded, map=128, evaluation="mesh", tessellation="adaptive", threshold=threshold).airlight
-        errors.append(np.sqrt(np.mean((airlight - exact) ** 2)) / np.mean(exact))
-    # The airlight up to the dome is wrong by less than the depth of the dome is: all of it lies before.
-    assert np.all(np.array(errors) < thresholds)
-    assert errors == sorted(errors, reverse=True)
-    assert errors[0] > 10 * errors[-1]
-
-
 @pytest.mark.claim("without-occluders")
 def test_a_map_that_sees_nothing_lights_everything(variant):
     """Nothing in the cone of a spot, or between the rays of the map: as without shadows."""
@@ -285,8 +241,7 @@ def test_a_map_that_sees_nothing_lights_everything(variant):
 
 
 @pytest.mark.claim("enclosed-light")
-@pytest.mark.parametrize("shape", ["sphere", "cube"])
-@pytest.mark.parametrize("kind", ["point", "spot"])
+@pytest.mark.parametrize(("shape", "kind"), [("sphere", "point"), ("cube", "spot")])
 def test_a_light_inside_a_closed_occluder_lights_nothing_outside(variant, shape, kind):
     import mitsuba as mi
 
@@ -300,12 +255,3 @@ def test_a_light_inside_a_closed_occluder_lights_nothing_outside(variant, shape,
     at_wall = 0.31 * 9 / (4 * np.pi * 0.3**2)
     for frame in render_both(loaded, map=32):
         assert np.max(np.abs(frame.airlight)) < 1e-6 * at_wall
-
-
-def test_a_light_outside_the_bounds_of_the_scene(variant):
-    loaded = loaded_scene(lamp=lamp(9.1, -7.3, 12.7))
-    frames = render_both(loaded, map=128)
-    wanted = twin_of(loaded, frames[0], 128)
-    for frame in frames:
-        assert differ(frame.airlight, wanted) < 1e-5
-    assert np.max(np.abs(wanted - render(loaded, "unshadowed").airlight)) > 0.01 * np.max(wanted)

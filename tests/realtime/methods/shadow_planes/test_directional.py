@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.helpers.planes import CAMERA, casters_of, index_of
 from tests.helpers.sunlit import plank, read, relative_rmse, render, shaded, sun
 from tests.realtime.methods.shadow_planes.test_view_culling import boxes, camera_at, sees
-from validation.scenes.parts import mitsuba_mesh, placed, rotation
+from validation.scenes.parts import mitsuba_mesh, placed
 from validation.scenes.solids import box
 
 CAMERA_AT = np.array([0.2, -4.1, 1.3])  # of `tests.helpers.scenes`
@@ -25,6 +24,7 @@ def solid(sides, centre) -> Any:
 
 
 NAMES = ["aslant", "two media", "along the view", "against the view", "parallel to edges", "in a shadow"]
+FEW = ("two media", "parallel to edges")  # the others are for `slow`
 
 
 def scenes() -> dict[str, dict[str, Any]]:
@@ -44,7 +44,9 @@ def scenes() -> dict[str, dict[str, Any]]:
     }
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name", [name if name in FEW else pytest.param(name, marks=pytest.mark.slow) for name in NAMES]
+)
 def test_against_the_truth(variant, name):
     import mitsuba as mi
 
@@ -59,44 +61,6 @@ def test_against_the_truth(variant, name):
     allowed = 1e-5 if name == "two media" else 2e-6
     assert relative_rmse(render(loaded, "shadow-planes").airlight, truth) < allowed
     assert relative_rmse(render(scene, "shadow-planes", precision="single").airlight, truth) < 5e-5
-
-
-@pytest.mark.parametrize("name", ["torus", "open cylinder"])
-def test_planes_are_the_limit_of_a_light_far_away(variant, name):
-    """In the frame of each: quotients over D, spans and gains agree to the ratio of sizes."""
-    casters = casters_of(name)
-    toward = np.array([0.37, -0.61, 0.7]) / np.linalg.norm([0.37, -0.61, 0.7])
-    far = 1e7
-    directional = index_of(casters, np.append(toward, 0.0), precision="double")
-    faraway = index_of(casters, CAMERA + far * toward, precision="double")
-    assert float(np.array(directional.layers)[0]) == float(np.array(faraway.layers)[0])
-    spans, distant = (np.array(index.spans).reshape(-1, 4) for index in (directional, faraway))
-    count = int(np.max(np.flatnonzero(np.any(spans != 0, axis=1)))) + 1
-    assert count > 10
-    assert np.array_equal(spans[:count, 2], distant[:count, 2])  # layers gained
-    np.testing.assert_allclose(spans[:count, :2], distant[:count, :2], atol=1e-5)
-    lines, distant = (np.array(index.lines).reshape(-1, 4)[:count] for index in (directional, faraway))
-    # 1/x = P x + Q y is the limit of (A x + B y - z)/D, and A - D P that of A.
-    scale = np.abs(lines[:, :2]).max(axis=1, keepdims=True)
-    assert np.max(np.abs(distant[:, :2] / far - lines[:, :2]) / scale) < 1e-5
-    assert np.max(np.abs(distant[:, 2:] - lines[:, :2]) / scale) < 1e-5
-
-
-def test_layers_towards_a_light_at_infinity_are_counted(variant):
-    from realtime.methods.shadow_planes.plane_table import layers_between, light_basis
-
-    casters = casters_of("nested spheres", "open cylinder")
-    rng = np.random.default_rng(4)
-    used = np.ones(len(casters.closed), dtype=bool)
-    counts = []
-    for _ in range(60):
-        camera = 1.2 * rng.normal(size=3)
-        light = np.append(unit(rng.normal(size=3)), 0.0)
-        far = camera + 1e5 * light[:3]
-        here = layers_between(casters, light, light_basis(light, camera), used=used)
-        assert here == layers_between(casters, far, light_basis(far, camera), used=used)
-        counts.append(here)
-    assert len(set(counts)) > 1
 
 
 def unit(vector):
@@ -120,34 +84,3 @@ def test_no_component_is_dropped_whose_parallel_shadow_is_seen(variant):
                 assert used[component]
         dropped += int(np.sum(~used))
     assert dropped > 20
-
-
-@pytest.mark.parametrize("parameters", [{"order": "none"}, {"order": "paper"}, {"buffer": "8bit"}, {"sum": "gamma"}])
-def test_published_variants_take_it(variant, parameters):
-    """Where one caster stands before the light all orders agree; what the paper's buffer cuts off is a 255th."""
-    scene = shaded(solid=solid((0.5, 0.4, 0.3), (0.33, 0.27, 1.75)), floor=None)
-    frame = render(scene, "shadow-planes")
-    exact, brightest = frame.airlight, float((frame.airlight + frame.surface).max())
-    # The buffer holds surfaces too.
-    white = {"white": 2 * brightest} if "buffer" in parameters else {}
-    published = render(scene, "shadow-planes", **parameters, **white).airlight
-    assert np.max(np.abs(published - exact)) < (0.05 * brightest if white else 1e-9 * exact.max())
-
-
-def test_adaptive_sampling_and_one_record_for_a_light_that_turns(variant):
-    from dataclasses import replace
-
-    from realtime.frame.renderer import frame_renderer, render_frame
-    from realtime.kernels.registry import KERNELS
-    from realtime.methods.registry import METHODS
-    from realtime.scene.animate import turned_light
-
-    scene = read(shaded(solid=solid((0.5, 0.4, 0.3), (0.33, 0.27, 1.75)), size=(48, 36)), "single")
-    method, kernel = METHODS["shadow-planes"], KERNELS["exact"].function
-    renderer = frame_renderer(scene, method, kernel=kernel)
-    first = render_frame(renderer).airlight
-    assert relative_rmse(render(scene, "shadow-planes", tolerance=0.01).airlight, first) < 0.01
-    moved = replace(scene, lights=(turned_light(scene.lights[0], np.zeros(3), rotation((0, 0, 1), 40.0)),))
-    again = render_frame(replace(renderer, scene=moved)).airlight
-    assert relative_rmse(again, render(moved, "shadow-planes").airlight) < 1e-6
-    assert relative_rmse(again, first) > 0.01

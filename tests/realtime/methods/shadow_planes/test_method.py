@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from tests.helpers.casters import ALL, SOUND, flat_roof
+from tests.helpers.casters import ALL, SOUND
 from tests.helpers.scenes import spot, tiny_scene
 from validation.scenes.parts import joined, mitsuba_mesh
 
@@ -128,15 +128,6 @@ def test_every_mesh_in_every_place_and_light(variant, name, change):
     assert_is_truth(frame, image)
 
 
-@pytest.mark.parametrize("who", ["light", "camera"])
-def test_light_or_camera_in_the_plane_of_a_roof(variant, who):
-    roof, light = flat_roof()
-    place = light + SHIFT
-    changes = {"lamp": lamp(place)} if who == "light" else {"sensor": sensor((-2.75, -0.3, place[2]), (0, 0, place[2]))}
-    scene = scene_with(roof, **changes)
-    assert_is_truth(planes(scene), truth(scene))
-
-
 def test_light_behind_slats(variant):
     """Deep stacks: forty slats before one another, three hundred planes in many a tile."""
     from validation.scenes.solids import box
@@ -168,20 +159,6 @@ def test_enclosed_light_is_black(variant):
     assert np.all(frame.surface == 0)
 
 
-def test_scene_without_casters_but_a_floor(variant):
-    scene = scene_with(None)
-    assert_is_truth(planes(scene), truth(scene))
-
-
-@pytest.mark.parametrize("name", ["sphere", "box"])
-@pytest.mark.parametrize("order", ["none", "paper"])
-def test_orders_agree_without_shadow_in_shadow(variant, name, order):
-    """One convex body above a floor that casts its shadow below itself; Gamma is added up in float32."""
-    scene = scene_with(SOUND[name]())
-    exact, other = planes(scene), planes(scene, order=order)
-    assert np.sqrt(np.mean((exact.airlight - other.airlight) ** 2)) < 1e-4 * exact.airlight.mean()
-
-
 @pytest.mark.claim("orders-of-the-planes")
 def test_order_none_shows_the_artefact(variant):
     """Fig. 4: a sphere within a sphere takes its share of the light twice."""
@@ -190,15 +167,6 @@ def test_order_none_shows_the_artefact(variant):
     error = planes(scene, order="none").airlight - image.airlight
     assert np.sqrt(np.mean(error**2)) > 0.01 * image.airlight.mean()
     assert error.min() < -0.05 * image.airlight.mean()
-
-
-@pytest.mark.parametrize("name", ["open grid", "doubled faces", "degenerate faces", "sliver"])
-def test_what_the_warnings_say_of_order_none_is_true(variant, name):
-    """A sheet without folds, and flaws that are mended, are right without an order too."""
-    scene = scene_with(ALL[name]())
-    image = truth(scene)
-    error = planes(scene, order="none").airlight - image.airlight
-    assert np.sqrt(np.mean(error**2)) < 1e-4 * image.airlight.mean()
 
 
 @pytest.mark.claim("flawed-meshes-warn")
@@ -210,41 +178,12 @@ def test_folds_of_open_meshes_count_twice_without_an_order(variant, name):
     assert np.sqrt(np.mean(error**2)) > 1e-3 * image.airlight.mean()
 
 
-def test_sums_of_gamma_are_sums_of_segments_but_for_rounding(variant):
-    scene = scene_with(SOUND["torus"]())
-    segments, gammas = (planes(scene, "double", sum=name).airlight for name in ("segments", "gamma"))
-    assert gammas == pytest.approx(segments, rel=1e-9)
-
-
-def test_vertex_evaluation_is_near(variant):
-    """The floor, two triangles of 9 m, interpolates badly: where no surface is seen the mesh of the planes remains."""
-    scene = scene_with(SOUND["sphere"](), floor=None)
-    pixel, vertex = (planes(scene, evaluation=name).airlight for name in ("pixel", "vertex"))
-    assert np.sqrt(np.mean((vertex - pixel) ** 2)) < 0.05 * pixel.mean()
-    assert np.any(vertex != pixel)
-
-
 def test_ambient_light_is_added_by_its_formula(variant):
     scene = scene_with(SOUND["sphere"]())
     without, with_it = planes(scene, "double"), planes(scene, "double", ambient=0.23)
     depth = 0.31 * np.minimum(without.distance, 1e30)
     expected = 0.23 * np.array([0.9, 0.8, 0.7]) * (1 - np.exp(-depth))[..., None]
     assert with_it.airlight - without.airlight == pytest.approx(expected, rel=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("setting", "words"),
-    [
-        ({"order": "depth"}, "order: got 'depth', wanted one of exact, paper, none"),
-        ({"white": 0.0}, "white: got 0.0"),
-        ({"rows": 1}, "rows: got 1"),
-        ({"ambient": -1.0}, "ambient: got -1.0"),
-        ({"sum": "gamma", "order": "none"}, "sum=gamma: wanted order=exact"),
-    ],
-)
-def test_bad_settings_are_refused(variant, setting, words):
-    with pytest.raises(InputError, match=words):
-        planes(scene_with(SOUND["box"]()), **setting)
 
 
 @pytest.mark.claim("shapes-without-edges-refused")

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""A silhouette counts the layers over every direction, of any triangles and any light."""
+
 from collections import Counter
 from itertools import pairwise
 
@@ -9,7 +11,7 @@ from hypothesis import strategies as st
 
 from realtime.methods.shadow_planes.silhouettes import layers, silhouette
 from realtime.scene.mesh_adjacency import make_casters
-from tests.helpers.casters import ALL, SOUND, closed_box, closed_sphere, flat_roof
+from tests.helpers.casters import ALL, closed_sphere, flat_roof
 
 LIGHTS = {"aside": (2.9, -1.7, 2.3), "near": (0.31, 0.47, 0.71), "inside": (0.11, -0.05, 0.17)}
 
@@ -73,43 +75,6 @@ def assert_is_cycle(contour):
     assert not any(balance.values())
 
 
-def link_loops(contour):
-    """Link directed silhouette edges into closed loops of vertices, the last of which is joined to the first.
-
-    An edge with the coefficient c is passed |c| times, in its direction for c > 0 and against it for c < 0. Where loops
-    touch, they are parted at the vertex.
-    """
-    count = np.abs(contour.coefficient)
-    along = contour.coefficient > 0
-    tail = np.repeat(np.where(along, contour.edges[:, 0], contour.edges[:, 1]), count)
-    head = np.repeat(np.where(along, contour.edges[:, 1], contour.edges[:, 0]), count)
-    leaving: dict[int, list[int]] = {}
-    for edge, vertex in enumerate(tail.tolist()):
-        leaving.setdefault(vertex, []).append(edge)
-    loops = []
-    for start in tail.tolist():
-        while leaving.get(start):
-            loops.append(loop_from(start, leaving, head))
-    return loops
-
-
-def loop_from(start, leaving, head):
-    """Follow edges until the first vertex that was met before, and give the way to it back."""
-    path, place = [start], {start: 0}
-    edges: list[int] = []
-    while True:
-        edge = leaving[path[-1]].pop()
-        vertex = int(head[edge])
-        if vertex in place:
-            first = place[vertex]
-            for number, unused in enumerate(edges[:first]):
-                leaving[path[number]].append(unused)
-            return np.array(path[first:], dtype=np.int32)
-        place[vertex] = len(path)
-        path.append(vertex)
-        edges.append(edge)
-
-
 @pytest.mark.claim("silhouettes-count-layers")
 @pytest.mark.parametrize("light", LIGHTS)
 @pytest.mark.parametrize("name", ALL)
@@ -136,22 +101,6 @@ def test_any_triangles_and_any_light(vertices, faces, light, seed):
     assert_counts_layers(casters, light, seed=seed, count=4)
 
 
-@settings(max_examples=50, deadline=None)
-@given(
-    corners=st.lists(points, min_size=8, max_size=8, unique=True),
-    light=points,
-    flips=st.lists(st.booleans(), min_size=2, max_size=2),
-)
-def test_tetrahedra_either_way_round(corners, light, flips):
-    """Closed components, one or both of which may be inside out, flat, or about the light."""
-    faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
-    parts = [faces[:, ::-1] if flip else faces for flip in flips]
-    casters = casters_of((np.array(corners, dtype=float), np.concatenate([parts[0], parts[1] + 4])))
-    assume(len(casters.triangles))
-    assert_is_cycle(silhouette(casters, np.array(light, dtype=float)))
-    assert_counts_layers(casters, light, count=6)
-
-
 @pytest.mark.parametrize("turned", [False, True])
 def test_closed_component_has_the_silhouette_of_the_paper(turned):
     """The edges between a facing and an averted triangle, whichever side is out."""
@@ -171,38 +120,3 @@ def test_light_in_the_plane_of_a_roof():
     casters = casters_of(mesh)
     assert int(np.sum(layers(casters, light)[:-1] == 0)) > 0
     assert_counts_layers(casters, light, count=80)
-
-
-def test_light_inside_a_convex_caster_has_no_silhouette():
-    assert len(silhouette(casters_of(closed_box()), np.array([-0.1, 0.15, 0.1])).edges) == 0
-
-
-def test_only_components_in_use_are_looked_at():
-    both = casters_of(SOUND["nested spheres"]())
-    light = np.array(LIGHTS["aside"])
-    parts = [silhouette(both, light, used=np.array(used)) for used in ((True, False), (False, True))]
-    together = silhouette(both, light)
-    edges = np.concatenate([part.edges for part in parts])
-    assert sorted(map(tuple, edges.tolist())) == sorted(map(tuple, together.edges.tolist()))
-    assert min(len(part.edges) for part in parts) > 10
-
-
-@pytest.mark.parametrize("name", ALL)
-def test_loops_use_every_edge_once(name):
-    casters = casters_of(ALL[name]())
-    contour = silhouette(casters, np.array(LIGHTS["aside"]))
-    loops = link_loops(contour)
-    used: Counter = Counter()
-    for loop in loops:
-        assert len(set(loop.tolist())) == len(loop) >= 2
-        used.update(zip(loop.tolist(), np.roll(loop, -1).tolist()))
-    wanted: Counter = Counter()
-    for (a, b), c in zip(contour.edges.tolist(), contour.coefficient.tolist()):
-        wanted[(a, b) if c > 0 else (b, a)] += abs(c)
-    assert used == wanted
-
-
-def test_sphere_has_one_loop_and_two_spheres_two():
-    light = np.array(LIGHTS["aside"])
-    assert len(link_loops(silhouette(casters_of(closed_sphere()), light))) == 1
-    assert len(link_loops(silhouette(casters_of(SOUND["nested spheres"]()), light))) == 2

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""The pyramid of planes that bounds a spot is the cone in the limit of many edges."""
+
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
 from realtime.methods.shadow_planes.spot_pyramid import cone_ring, is_outside, ring_edges
 
 _AXIS = np.array([0.31, -0.57, 0.43]) / np.linalg.norm([0.31, -0.57, 0.43])
@@ -60,25 +61,6 @@ def test_many_edges_are_the_cone_itself_and_fewer_are_darker_by_the_square(varia
     np.testing.assert_allclose(many.airlight, whole, rtol=1e-3, atol=1e-4 * whole.mean())
 
 
-def test_a_camera_in_the_cone_sees_its_light(variant):
-    from validation.scenes.parts import camera
-
-    # 14 degrees from the axis of the cone of 24.3, the sphere takes 11.
-    sensor = camera((0.9, -0.6, 0.37), (0.2, 4.9, 1.47), fov=71.3, size=(32, 24))
-    whole = frame({}, size=(32, 24), sensor=sensor).airlight
-    planes = frame({"cone": 4096}, size=(32, 24), sensor=sensor).airlight
-    assert whole.min() > 0
-    np.testing.assert_allclose(planes, whole, rtol=1e-3)
-
-
-@pytest.mark.parametrize("order", ["paper", "none"])
-def test_one_shadow_in_a_cone_is_the_same_in_every_order(variant, order):
-    """Nothing is behind anything here but the sphere's own shadow on the cone: no plane is in shadow."""
-    exact, other = frame({"cone": 32}).airlight, frame({"cone": 32, "order": order}).airlight
-    # Sums of Gammas of both signs in float32 instead of segments.
-    np.testing.assert_allclose(other, exact, rtol=1e-4, atol=1e-4 * exact.mean())
-
-
 @pytest.mark.claim("cone-at-vertices", tolerance="second order in the logarithm of the ratio of rows")
 def test_a_cone_is_meshed_from_the_light_to_the_camera(variant, monkeypatch):
     """Rows at equal ratios: the error falls as the square of the logarithm of the ratio, near the light too."""
@@ -93,16 +75,3 @@ def test_a_cone_is_meshed_from_the_light_to_the_camera(variant, monkeypatch):
         hidden = np.abs(vertex - pixel)[: vertex.shape[0] // 3]
         errors.append(hidden.mean() / pixel.mean())
     assert 1e-5 < errors[1] < 0.4 * errors[0]
-
-
-@pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        ({"cone": 2}, "cone: got 2, wanted 0 for the cone itself, or 3 to 4096 edges"),
-        ({"cone": -1}, "cone: got -1"),
-        ({"buffer": "8bit", "tolerance": 0.01}, "buffer=8bit: wanted tolerance=0"),
-    ],
-)
-def test_what_a_cone_cannot_be_is_refused(variant, parameters, message):
-    with pytest.raises(InputError, match=message):
-        frame(parameters, size=(8, 6))

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""The list of a tile holds every plane that one of its rays crosses."""
+
 import numpy as np
 import pytest
 
@@ -38,46 +40,6 @@ def test_lists_hold_every_plane_that_a_ray_crosses(variant, name, camera):
     assert crossed.any()
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_planes_marked_full_are_crossed_by_all(variant, name):
-    """Unless the ray ends before."""
-    x, lists = endless(name, spread=0.004)
-    marked = 0
-    for tile, (numbers, full) in enumerate(listed_planes(lists)):
-        assert np.isfinite(x[16 * tile : 16 * tile + 16][:, numbers[full]]).all()
-        marked += int(full.sum())
-    assert marked > 20
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_lists_are_short(variant, name):
-    """No more than twice what rays of a narrow tile cross, over all tiles."""
-    x, lists = endless(name, spread=0.002)
-    crossed = np.isfinite(x).reshape(-1, 16, x.shape[1]).any(axis=1).sum()
-    assert sum(len(numbers) for numbers, _ in listed_planes(lists)) < 2 * crossed + 20
-
-
-@pytest.mark.parametrize("order", ["exact", "paper"])
-def test_lists_are_in_order(variant, order):
-    index = index_of(casters_of("torus"))
-    ways, ends = bundles(960, spread=0.01), np.full(960, np.inf)
-    lists, box = drawn_lists(index, ways, ends, order=order)
-    lines = np.array(index.lines, dtype=np.float64).reshape(-1, 4)
-    centre = np.array(index.spans, dtype=np.float64).reshape(-1, 4)[:, 3]
-    ordered, longest = np.array(lists.sorted), 0
-    for tile, (numbers, _) in enumerate(listed_planes(lists)):
-        if not ordered[tile]:
-            continue
-        w = [np.array(part)[tile] for part in (box.x, box.y, box.z)]
-        key = -(lines[numbers, 0] * w[0] + lines[numbers, 1] * w[1] - w[2]) if order == "exact" else centre[numbers]
-        # Quotients are float32, of terms that can cancel.
-        scale = np.abs(lines[numbers, 0] * w[0]) + np.abs(lines[numbers, 1] * w[1]) + 1
-        assert np.all(np.diff(key) > -1e-6 * (scale[1:] + scale[:-1]))
-        longest = max(longest, len(numbers))
-    assert longest > 3
-    assert ordered.mean() > 0.9
-
-
 @pytest.mark.claim("lists-hold-every-plane")
 @pytest.mark.parametrize("room", [1, 3, 6])
 def test_tiles_without_room_read_the_list_they_drew_on(variant, monkeypatch, room):
@@ -92,26 +54,6 @@ def test_tiles_without_room_read_the_list_they_drew_on(variant, monkeypatch, roo
         wanted = np.flatnonzero(np.isfinite(x[16 * tile : 16 * tile + 16]).any(axis=0))
         assert set(wanted.tolist()) <= set(numbers.tolist())
         assert len(set(numbers.tolist())) == len(numbers)
-
-
-def test_full_turns_are_seen(variant):
-    """A tile about the axis meets planes of every azimuth."""
-    light, camera = (0.13, -0.07, 3.1), (0.13, -0.07, 1.9)
-    index = index_of(casters_of("sphere"), light=light, camera=camera)
-    ways = np.random.default_rng(6).uniform(-0.4, 0.4, (16, 3)) + np.array([0, 0, 1])
-    ways /= np.linalg.norm(ways, axis=1)[:, None]
-    x, _ = crossings(index, ways)
-    lists, box = drawn_lists(index, ways, np.full(16, np.inf))
-    ((numbers, _),) = listed_planes(lists)
-    assert np.array(box.azimuth_half).item() == 4
-    assert set(np.flatnonzero(np.isfinite(x).any(axis=0)).tolist()) <= set(numbers.tolist())
-
-
-def test_a_small_image_of_many_planes_has_room(variant):
-    """Its few tiles see more planes each than those of a large one; all get lists of their own, in order."""
-    _, lists = endless("torus", "open cylinder", "sphere", spread=0.5)
-    assert np.max(np.array(lists.source.count)) > 32
-    assert np.all(np.array(lists.sorted))
 
 
 def test_bins_stay_in_the_index_whatever_the_azimuth(variant):

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""No caster is left out whose shadow is seen."""
+
 import numpy as np
 import pytest
 
-from realtime.methods.shadow_planes.view_culling import components_in_view, view_planes
+from realtime.methods.shadow_planes.view_culling import components_in_view
 from realtime.scene.mesh_adjacency import make_casters
 from tests.helpers.scenes import tiny_scene
 
@@ -57,27 +59,3 @@ def test_no_component_is_dropped_whose_shadow_is_seen(variant):
         dropped += int(np.sum(~used))
     # A third at least has its shadow elsewhere: the test is worth its time only if there is something to drop.
     assert dropped > 100
-
-
-def test_planes_of_the_view_hold_what_is_seen(variant):
-    camera = camera_at((0.3, -2.0, 0.9), (0.1, 0.4, 0.2))
-    points = np.random.default_rng(1).normal(size=(20000, 3)) * 3
-    origin, normals = view_planes(camera)
-    inside = np.all((points - origin) @ normals.T > 0, axis=1)
-    assert np.array_equal(inside, sees(camera, points))
-    assert 0.01 < inside.mean() < 0.5
-
-
-@pytest.mark.parametrize("place", ["behind the camera", "between", "far aside"])
-def test_culling_by_hand(variant, place):
-    """Light behind the camera, which looks along +y."""
-    camera = camera_at((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    centre = {"behind the camera": (0, -1, 0), "between": (0, 2, 0), "far aside": (30, 1, 0)}[place]
-    corners = np.array([[-0.1, -0.1, -0.1], [0.1, -0.1, -0.1], [0, 0.1, -0.1], [0, 0, 0.1]]) + centre
-    casters = make_casters([("caster", corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])])
-    assert components_in_view(casters, camera, np.array([0.0, -5.0, 0.0]))[0] == (place != "far aside")
-
-
-def test_no_casters_are_nothing_to_cull(variant):
-    in_view = components_in_view(make_casters([]), camera_at((0, 0, 0), (0, 1, 0)), np.zeros(3))
-    assert in_view.shape == (0,)

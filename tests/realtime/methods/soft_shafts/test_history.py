@@ -33,12 +33,6 @@ def shifted(scene, step):
     return replace(scene, camera=replace(scene.camera, origin=origin))
 
 
-def test_a_scene_that_stands_still_stays_as_it_is(variant):
-    made = renderer(lamp_scene(size=(32, 24)), history=0.9, **SHARED)
-    images = frames(made, [made.scene] * 3)
-    np.testing.assert_allclose(images[2].airlight, images[0].airlight, rtol=1e-5)
-
-
 @pytest.mark.claim("history-lowers-noise", tolerance="0.7 of the median error of a frame alone, after ten frames")
 def test_a_moving_camera_gathers_more_points(variant):
     scene = lamp_scene(size=(64, 48), ball=None)

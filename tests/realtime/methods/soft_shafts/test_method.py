@@ -6,18 +6,16 @@ import re
 import numpy as np
 import pytest
 
+from realtime.frame.renderer import render_frame
+from tests.helpers.frames import relative_rmse
 from tests.helpers.lamps import frame, lamp_scene, renderer
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 
 NONE = {"filter": "none", "surfaces": "ray"}
 
 
-def relative_rmse(one, two):
-    return np.sqrt(np.mean((one - two) ** 2)) / np.mean(two)
-
-
 @pytest.mark.claim("soft-shafts-sum-of-points", tolerance="2e-3 relative RMSE: 400 steps")
-@pytest.mark.parametrize("shape", ["rectangle", "disk", "sphere"])
+@pytest.mark.parametrize("shape", ["disk", "sphere"])
 def test_without_filter_it_is_the_sum_of_its_points(variant, shape):
     import mitsuba as mi
 
@@ -33,25 +31,12 @@ def test_without_filter_it_is_the_sum_of_its_points(variant, shape):
     assert np.mean(np.abs(ours.surface - exact.surface) > 1e-5) < 0.02
 
 
-@pytest.mark.parametrize("spacing", ["uniform", "equiangular"])
-def test_all_points_in_a_loop_are_the_points_one_by_one(variant, spacing):
-    """The table of points against the marcher that asks one light after the other."""
-    scene = lamp_scene(size=(24, 20))
-    march = frame(scene, "ray-march", steps=60, spacing=spacing, points=5, pattern="ring")
-    ours = frame(scene, points=5, pattern="ring", steps=60, shadow="ray", spacing=spacing, **NONE)
-    np.testing.assert_allclose(ours.airlight, march.airlight, rtol=2e-3, atol=2e-6)
-    # Where light grazes the ball, shadow rays towards the light and from it differ.
-    assert np.mean(np.abs(ours.surface - march.surface) > 1e-6) < 0.02
-
-
 def test_ordinary_lights_are_one_point(variant):
-    floor = tiny_scene()["floor"]
     body = bounded_medium({"type": "sphere", "center": [0.1, 0.2, 0.9], "radius": 1.1}, 0.7, (0.8, 0.7, 0.6))
     clear = {"fog": None, "body": body, "sensor": tiny_scene()["sensor"] | {"medium": None}}
     clear["sensor"] = {key: entry for key, entry in clear["sensor"].items() if entry is not None}
     sun = {"type": "directional", "direction": [0.2, 0.3, -0.9], "irradiance": {"type": "rgb", "value": 3.0}}
     scenes = [tiny_scene(), tiny_scene(lamp=spot(beam=20.0)), tiny_scene(**clear), tiny_scene(lamp=sun, **clear)]
-    assert floor
     for scene in scenes:
         march = frame(scene, "ray-march", steps=40)
         ours = frame(scene, steps=40, shadow="ray", spacing="equiangular", **NONE)
@@ -69,6 +54,23 @@ def test_a_light_with_extent_in_bounded_media_is_the_sum_of_its_points(variant):
         assert relative_rmse(ours.airlight, march.airlight) < tolerance
 
 
+def test_rays_in_bounded_media_are_found_once_for_all_lights(variant, monkeypatch):
+    """For each of them the method recorded those of all: the square of their number."""
+    import realtime.methods.soft_shafts.method as module
+
+    found = []
+    rays_in_media = module.rays_in_media
+    monkeypatch.setattr(module, "rays_in_media", lambda view: found.append(view) or rays_in_media(view))
+    body = bounded_medium({"type": "sphere", "center": [0.1, 0.2, 0.9], "radius": 1.1}, 0.7, (0.8, 0.7, 0.6))
+    sensor = {key: entry for key, entry in tiny_scene()["sensor"].items() if key != "medium"}
+    lamp = tiny_scene()["lamp"]
+    lights = {"second": lamp | {"position": [0.3, 0.9, 2.9]}, "third": lamp | {"position": [-0.7, 0.2, 2.1]}}
+    made = renderer(tiny_scene(size=(8, 4), fog=None, body=body, sensor=sensor, **lights), **NONE)
+    found.clear()
+    render_frame(made)
+    assert len(found) == 1
+
+
 def test_maps_tend_to_rays(variant):
     scene = lamp_scene(size=(40, 32))
     rays = frame(scene, points=3, shadow="ray", **NONE)
@@ -80,13 +82,12 @@ def test_maps_tend_to_rays(variant):
     assert errors[1][1] < 0.5 * errors[0][1]
 
 
-@pytest.mark.parametrize("scale", [2, 4])
-def test_few_pixels_are_interpolated(variant, scale):
-    """Without casters airlight is smooth, but for the depth; with them its edges are as wide as `scale` pixels."""
+def test_few_pixels_are_interpolated(variant):
+    """Without casters airlight is smooth, but for the depth; with them its edges are as wide as 4 pixels."""
     scene = lamp_scene(size=(48, 32))
     whole = frame(scene, points=3, **NONE)
-    few = frame(scene, points=3, scale=scale, **NONE)
-    assert relative_rmse(few.airlight, whole.airlight) < 0.06 * scale
+    few = frame(scene, points=3, scale=4, **NONE)
+    assert relative_rmse(few.airlight, whole.airlight) < 0.24
     np.testing.assert_array_equal(few.surface, whole.surface)
 
 
@@ -119,42 +120,14 @@ def test_filters_keep_what_is_not_penumbra(variant):
         assert relative_rmse(filtered.airlight, plain.airlight) < 0.2
 
 
-def test_direct_filters_of_levels_are_the_brute_force(variant):
-    """`form=direct` sums by levels; a sphere, whose points count unequally, takes the sum as it stands."""
-    scene = lamp_scene("sphere", size=(32, 24))
-    assert np.all(np.isfinite(frame(scene, points=5).surface))
-
-
-def test_moving_lights_record_nothing_anew(variant):
-    from dataclasses import replace
-
-    from realtime.frame.renderer import light_groups, render_frame
-
-    made = renderer(lamp_scene(size=(16, 12)))
-    render_frame(made)
-    light = made.scene.area_lights[0]
-    before = light_groups(made)[0].render.n_recordings
-    images = []
-    for shift in (0.0, 0.05, 0.1):
-        moved = replace(light, middle=light.middle + np.array([shift, 0, 0]))
-        images.append(render_frame(replace(made, scene=replace(made.scene, area_lights=(moved,)))).airlight)
-    assert light_groups(made)[0].render.n_recordings == before
-    assert np.abs(images[2] - images[0]).max() > 1e-4
-
-
 @pytest.mark.parametrize(
     ("parameters", "words"),
     [
         ({"hr": 0}, "hr: got 0.0, wanted a number above 0"),
-        ({"hr": -1}, "hr: got -1.0, wanted a number above 0"),
         ({"hd": 65}, "hd: got '65', wanted 'auto' or a number above 0 to 64 [pixels]"),
-        ({"hd": "wide"}, "hd: got 'wide', wanted 'auto' or a number above 0 to 64 [pixels]"),
         ({"hd": "auto"}, "hd: auto has the depth for a guide; wanted filter=bilateral guide=depth with it"),
-        ({"steps": 0}, "steps: got 0, wanted a whole number of at least 1"),
-        ({"scale": 3}, "scale: got 3, wanted one of 1, 2, 4, 8"),
         ({"scale": 8}, "scale: got 8 and an image of 16 x 12, wanted one that divides both sides"),
         ({"interleave": True}, "interleave: got 5 points of a light, wanted 1, 2, 4, 8 or 16"),
-        ({"map": 100}, "map: got 100, wanted a power of two from 4 to 8192"),
     ],
 )
 def test_wrong_parameters_are_refused_in_one_line(variant, parameters, words):
@@ -167,7 +140,6 @@ def test_wrong_parameters_are_refused_in_one_line(variant, parameters, words):
 
 @pytest.mark.claim("soft-shafts-steps", tolerance="half of the light; 2 % of it")
 def test_equal_steps_miss_the_peak_next_to_a_light_and_equal_angles_do_not(variant):
-    from realtime.frame.renderer import render_frame
     from realtime.scene.read_scene import read_scene
     from validation.configurations.methods import configuration, prepared
     from validation.estimates.quadrature import truth_image
