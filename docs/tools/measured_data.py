@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the documentation takes from a report: `python docs/tools/measured_data.py [--report DIR] [--kernels FILE]`.
 
-It writes `docs/data/report.json`: `report` (when, by which command, on which machine), `claims`, `scenes` (each with
-`counts`, `truth`, `multiple` and `methods`), `kernels` (costs and errors of `airlight bench --kernels`, or null).
+It writes the table of the README and `docs/data/report.json`: `report` (when, by which command, on which machine),
+`claims`, `scenes` (each with `counts`, `truth`, `multiple` and `methods`) and `kernels` (costs and errors of `airlight
+bench --kernels`, or null).
 """
 
 import argparse
@@ -16,7 +17,9 @@ from reports.data.json_files import read_json
 from reports.data.reader import read_report
 from reports.machine.environment import activate
 
-DATA = Path(__file__).resolve().parents[1] / "data" / "report.json"
+DOCS = Path(__file__).resolve().parents[1]
+DATA, README = DOCS / "data" / "report.json", DOCS.parent / "README.md"
+SHOWN = "colonnade"  #: in the README
 
 _ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative")
 _METHOD = ("label", "method", "kernel", "parameters", "knows_shadows", "refused", "left_out", "note")
@@ -34,6 +37,30 @@ def refresh(report: Path | None, kernels: Path | None) -> None:
         costs = _read_object(kernels, "what `airlight bench --kernels --json` prints")
         kept["kernels"] = kept_of_kernels(costs, kernels)
     write_text(DATA, json.dumps(kept, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    before, rest = README.read_text(encoding="utf-8").split("<!-- results: begin -->\n")
+    after = rest.split("<!-- results: end -->")[1]
+    write_text(README, f"{before}<!-- results: begin -->\n{results(kept)}<!-- results: end -->{after}")
+
+
+def results(kept: dict[str, Any]) -> str:
+    """Return the table of the README: one configuration of each method in one scene."""
+    scene = next(scene for scene in kept["scenes"] if scene["name"] == SHOWN)
+    report, chosen = kept["report"], {}
+    for entry in scene["methods"]:
+        if entry["times"] and entry["error"] and entry["kernel"] in (None, "exact"):
+            chosen.setdefault(entry["method"], entry)
+    lines = [
+        f"The scene `{SHOWN}`, {' x '.join(map(str, report['timed']))} pixels, {report['processor']}, "
+        f"{report['threads']} threads, {report['created'][:10]}, by `airlight report`: the median time of a frame, and "
+        "the error of its airlight against the reference.",
+        "",
+        "| method | frame \\[ms\\] | relative RMSE |",
+        "| --- | ---: | ---: |",
+    ]
+    for entry in chosen.values():
+        frame, error = entry["times"]["frame"]["median_ms"], entry["error"]["relative_rmse"]
+        lines.append(f"| {entry['label']} | {frame:.3g} | {error:.2g} |")
+    return "\n".join([*lines, ""])
 
 
 def _read_object(path: Path, what: str) -> dict[str, Any]:

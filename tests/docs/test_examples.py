@@ -38,21 +38,7 @@ def test_python_of_the_readme(tmp_path):
         assert float(printed[2]) > 0
 
 
-@pytest.mark.claim("own-scene")
-@pytest.mark.slow
-def test_the_scene_of_the_readme_with_a_mesh_of_the_users_own(tmp_path):
-    (tmp_path / "mesh.obj").write_text(
-        "v -0.4 -0.4 0.1\nv 0.4 -0.4 0.1\nv 0.0 0.5 0.1\nv 0.0 0.0 0.9\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
-    )
-    (tmp_path / "mesh-in-fog.xml").write_text(blocks(ROOT / "README.md", "xml")[0])
-    words = shlex.split(blocks(ROOT / "README.md", "sh")[1])
-    command = [sys.executable, str(ROOT / "airlight.py"), *words[1:]]
-    ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-    assert ran.returncode == 0, ran.stderr
-    assert "mesh-in-fog" in (tmp_path / "airlight-report" / "report.html").read_text(encoding="utf-8")
-
-
-@pytest.mark.claim("tutorial")
+@pytest.mark.claim("tutorial", "own-scene")
 @pytest.mark.slow
 def test_the_tutorial_ends_with_a_figure(variant, tmp_path, monkeypatch, capfd):
     """Every command of the page, in its order. Exit status 1 is a check of the truth that --quick had no time for."""
