@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Results of the Python API: frozen, arrays for NumPy, HTML and PNG for a notebook; from made-up numbers, no scene."""
 
-import copy
 import dataclasses
 import io
-import pickle
 from html.parser import HTMLParser
 from types import MappingProxyType
 
@@ -14,7 +12,7 @@ from PIL import Image as Picture
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, read_exr
-from reports.api.html import bullets, picture, table
+from reports.api.html import bullets, table
 from reports.api.images import compare
 from reports.api.results import Reference, Rendering, sealed
 from reports.api.tables import BenchTable, Report
@@ -103,15 +101,6 @@ def test_results_are_frozen_and_so_are_their_arrays(name):
     own[0] = 0  # one's own
 
 
-@pytest.mark.parametrize("name", RESULTS)
-def test_results_can_be_sent_to_another_process(name):
-    result = RESULTS[name]()
-    again = pickle.loads(pickle.dumps(result))
-    assert repr(again) == repr(result)
-    np.testing.assert_array_equal(np.asarray(again), np.asarray(result))
-    assert copy.deepcopy(result)._repr_html_() == result._repr_html_()
-
-
 def test_layers_are_arrays_of_the_precision_of_what_made_them():
     frame = rendering()
     for layer in (frame.airlight, frame.surface, frame.total):
@@ -133,18 +122,6 @@ def test_numpy_takes_a_result_as_its_total():
     assert float(np.mean(frame)) == pytest.approx(0.55 + 0.25, rel=1e-6)  # the mean of a ramp is its middle
     with pytest.raises(ValueError, match="copy"):
         np.array(frame, dtype=np.float64, copy=False)
-
-
-def test_the_picture_of_a_frame_takes_an_exposure_in_stops():
-    frame = rendering()
-    dark, bright = frame.picture(exposure=-4), frame.picture(exposure=0)
-    assert dark.dtype == np.uint8
-    assert dark.shape == (4, 6, 3)
-    assert dark.mean() < bright.mean()
-    # sRGB of 0.25 + 0.1 is 0.6262 (IEC 61966-2-1)
-    assert bright[0, 0, 0] == round(255 * (1.055 * 0.35 ** (1 / 2.4) - 0.055))
-    with pytest.raises(InputError, match="no layer 'fog'"):
-        frame.picture("fog")
 
 
 @pytest.mark.claim("image-files")
@@ -192,14 +169,6 @@ def test_a_failed_comparison_says_so():
     assert not comparison.passed
     assert "4 pixels of the test image are negative" in repr(comparison)
     assert any("negative" in text for text in parsed(comparison._repr_html_()).text)
-
-
-def test_small_pictures_are_enlarged_in_whole_multiples():
-    (image,) = tags(picture(b"png", 50, alt="a", caption="c"), "img")
-    (figure,) = tags(picture(b"png", 50, alt="a", caption="c"), "figure")
-    assert "pixelated" in image["style"]
-    assert "width:250px" in figure["style"]
-    assert "pixelated" not in picture(b"png", 800, alt="a", caption="c")
 
 
 def test_pieces_of_html_escape_what_they_are_given():

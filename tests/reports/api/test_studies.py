@@ -82,12 +82,6 @@ def test_what_is_no_case_is_refused(change, words, variant):
         airlight.integrate({name: value for name, value in rays.items() if name not in change})
 
 
-@pytest.mark.parametrize("cases", [3, [1, 2]])
-def test_what_has_no_columns_is_refused(cases):
-    with pytest.raises(airlight.InputError, match="wanted columns by name"):
-        airlight.integrate(cases)
-
-
 def test_bench_measures_names_functions_and_configurations(variant):
     told = []
     table = airlight.bench(
@@ -152,17 +146,6 @@ def test_report_hands_on_what_it_was_given(variant, tmp_path, monkeypatch):
         airlight.report(tmp_path, effort="ful")
     with pytest.raises(airlight.InputError, match="did you mean 'hall'"):
         airlight.report(tmp_path, scenes=["hal"])
-
-
-def test_ctrl_c_in_a_report_is_ctrl_c(variant, tmp_path, monkeypatch):
-    from reports.machine.progress import Interrupted
-
-    def write(folder, **options):
-        raise Interrupted("three results are kept")
-
-    monkeypatch.setattr("reports.report.measure.write_report", write)
-    with pytest.raises(KeyboardInterrupt, match="three results are kept"):
-        airlight.report(tmp_path, scenes=["open-fog"])
 
 
 @pytest.mark.claim("report-defaults")

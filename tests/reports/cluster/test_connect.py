@@ -10,7 +10,7 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -38,22 +38,10 @@ def test_places_by_their_words(tmp_path):
     assert parse_place(str(file)) == Place(file=file)
 
 
-def test_a_cluster_of_this_machine_shares_no_port_with_another():
-    """Two sweeps, or somebody's own Dask on its usual port: a warning would be an error here."""
-    with socket.socket() as taken:
-        with suppress(OSError):  # somebody else has taken it, which will do as well
-            taken.bind(("0.0.0.0", 8787))
-            taken.listen()
-        with connected(Place(1)) as cluster:
-            assert cluster.client.scheduler_info()["workers"]
-
-
 @pytest.mark.parametrize(
     ("word", "message"),
     [
         ("local:0", "local:N with a number of processes"),
-        ("local:", "local:N"),
-        ("local:two", "local:N"),
         ("10.1.2.3:8786", "wanted local, local:N, tcp://HOST:PORT or a scheduler file"),
         ("none.json", "there is no file none.json"),
     ],
@@ -144,30 +132,6 @@ def test_a_scheduler_that_comes_back_is_sent_what_was_open(tmp_path):
     assert ended == {f"{g}-{n}": ("done", g * g + n) for g in range(40) for n in range(4)}
 
 
-@pytest.mark.slow
-@pytest.mark.claim("sweep-window", tolerance="a tenth of the tasks")
-def test_a_scheduler_that_stays_away_ends_the_run():
-    """Only what the scheduler knew is lost by name: a window of the thousand tasks."""
-    port = _free_port()
-    address = f"tcp://127.0.0.1:{port}"
-    connect._quiet()
-    with _ended(_scheduler(port), _worker(address)) as running:
-        client = connect._client(Place(address=address), timeout=60)
-        client.wait_for_workers(1, timeout=60)
-        outcomes = []
-        groups = (Group((Task(f"s{n}", tasks.square, (n, 0.2)),)) for n in range(1000))
-        for outcome in run_groups(Cluster(client, Place(address=address)), groups, patience=3):
-            outcomes.append(outcome)
-            if len(outcomes) == 3:
-                for process in running:
-                    _kill(process)
-        client.close(timeout=2)
-    assert {each.status for each in outcomes[:3]} == {"done"}
-    assert {each.status for each in outcomes} == {"done", "lost"}
-    assert "went away and did not come back" in outcomes[-1].reason
-    assert len(outcomes) < 100
-
-
 def other_version(tmp_path):
     """Return a copy of the package with one more line in it."""
     other = tmp_path / "other"
@@ -176,20 +140,6 @@ def other_version(tmp_path):
     changed = other / "analytic" / "geometry.py"
     changed.write_text(changed.read_text() + "\n# another version\n")
     return other
-
-
-@pytest.mark.slow
-@pytest.mark.claim("workers-of-one-version", tolerance="none")
-def test_a_worker_of_another_version_is_refused_by_name(tmp_path, variant):
-    port = _free_port()
-    address = f"tcp://127.0.0.1:{port}"
-    message = r"worker tcp://127.* has source code \w{12}, not \w{12}: install the same"
-    with (
-        _ended(_scheduler(port), _worker(address, other_version(tmp_path))),
-        pytest.raises(InputError, match=message),
-        connected(Place(address=address)),
-    ):
-        pass
 
 
 @pytest.mark.slow

@@ -71,11 +71,13 @@ def test_a_task_that_ends_its_process_is_given_up_and_no_other(cluster):
     assert {ended[task.name].status for task in others} == {"done"}
 
 
+@pytest.mark.slow
 def test_what_died_once_is_done_again(cluster, tmp_path):
     ended = outcomes(cluster, alone(Task("phoenix", tasks.die_once, (str(tmp_path),))), retries=1)
     assert (ended["phoenix"].value, ended["phoenix"].attempts) == ("alive", 2)
 
 
+@pytest.mark.slow
 def test_a_truth_that_ends_its_process_takes_its_cells_with_it(cluster):
     cells = tuple(Task(f"c{n}", tasks.add, (n,)) for n in range(3))
     ended = outcomes(cluster, Group(cells, Task("truth", tasks.abort)), alone(Task("s", tasks.square, (3,))), retries=0)
@@ -84,6 +86,7 @@ def test_a_truth_that_ends_its_process_takes_its_cells_with_it(cluster):
     assert ended["s"].value == 9
 
 
+@pytest.mark.slow
 @pytest.mark.claim("sweeps-end-what-hangs", tolerance="none")
 @pytest.mark.parametrize("hang", [tasks.sleep_for_ever, tasks.hold_the_interpreter], ids=lambda task: task.__name__)
 def test_what_hangs_is_stopped_and_its_process_too(cluster, hang):
@@ -97,6 +100,7 @@ def test_what_hangs_is_stopped_and_its_process_too(cluster, hang):
     assert {each.status for each in again.values()} == {"done"}
 
 
+@pytest.mark.slow
 @pytest.mark.claim("sweeps-lose-nothing", tolerance="none: every task has one outcome, with its value")
 @pytest.mark.parametrize("first", [None, Task("truth", tasks.square, (3, 0.1))], ids=["alone", "of a truth"])
 def test_what_belongs_together_is_done_when_all_workers_are_killed_at_once(cluster, first):

@@ -5,7 +5,7 @@ import pytest
 
 from reports.data.claims import claims, confirmed, growth_claims, unstudied
 from reports.tables.agreement import verdict
-from tests.helpers.reports import agreement, checked, engine, entry, errors, flip, growth_record, report_of, scene
+from tests.helpers.reports import agreement, checked, entry, growth_record, report_of, scene
 from tests.helpers.reports import refused as refused_entry
 
 
@@ -46,14 +46,9 @@ def scenes():
 
 @pytest.mark.claim("claims-follow")
 def test_claims_on_a_truth_that_is_confirmed():
-    trust, left_out = texts(scenes())
-    assert [claim["good"] for claim in claims(scenes())] == [True, None]
-    assert [claim["kind"] for claim in claims(scenes())] == ["truth", "left-out"]
-    assert "confirmed by Mitsuba's volpath in 3 of 3 comparisons" in trust
-    assert "±0.5 %" in trust
-    assert trust.endswith("the worst is +0..+0.1 %, in fog (airlight).")
-    assert "NOT" not in trust
-    assert left_out.endswith("The share of the airlight that this leaves out: fog 12 %; hall 12 %.")
+    assert [(claim["kind"], claim["good"]) for claim in claims(scenes())] == [("truth", True), ("left-out", None)]
+    assert "confirmed by Mitsuba's volpath in 3 of 3 comparisons" in texts(scenes())[0]
+    assert claims([]) == []
 
 
 def test_each_estimator_that_checked_the_truth_has_a_sentence():
@@ -75,14 +70,6 @@ def test_claims_on_a_truth_that_is_not_confirmed():
     assert "fog" not in trust
 
 
-def test_claims_when_equivalence_could_not_be_decided():
-    """None (a black layer, no variance) is not a yes."""
-    data = scenes()
-    data[0]["agreement"]["airlight"] = agreed(None, None)
-    assert "NOT confirmed" in texts(data)[0]
-    assert "fog (airlight)" in texts(data)[0]
-
-
 def test_claims_without_any_comparison_confirm_nothing():
     """A scene that is black has no layer to compare."""
     data = scenes()
@@ -90,16 +77,6 @@ def test_claims_without_any_comparison_confirm_nothing():
         black["agreement"] = {}
     trust = texts(data)[0]
     assert trust.startswith("There is no light to compare with Mitsuba's volpath")
-
-
-def test_refused_methods_are_named():
-    data = scenes()
-    data[0]["methods"].insert(0, method("taylor", None, 0.0, refused="no series"))
-    assert texts(data)[-1] == "Refused, with the reason in the tables: taylor in fog."
-
-
-def test_claims_on_nothing():
-    assert claims([]) == []
 
 
 def out_of_time(interval):
@@ -131,28 +108,13 @@ def test_out_of_time_can_still_speak_against_the_truth():
     assert not confirmed(data)
 
 
-def test_a_finished_comparison_without_equivalence_is_against_the_truth():
-    comparison = agreed(False, 0.01)
-    comparison["statistics"]["relative_bias_ci"] = [-0.02, 0.004]
-    assert verdict(comparison) is False
-    assert verdict(agreed(True, 0.01)) is True
-
-
 def test_what_failed_is_named_with_its_pixels():
     data = scenes()
     data[0]["methods"][0]["error"] |= {"nonfinite": 3, "negative": 2}
     data[1]["truth"]["left"] = 7
     failed = [claim for claim in claims(data) if claim["kind"] == "failed"]
     assert [claim["good"] for claim in failed] == [False] * 3
-    assert failed[0]["text"] == "Images with values that are not finite: fast in fog (3 pixels)."
-    assert failed[1]["text"] == "Images with negative values: fast in fog (2 pixels)."
-    assert "hall (7)" in failed[2]["text"]
-
-
-def test_the_worst_interval_is_the_one_that_reaches_furthest():
-    data = scenes()
-    data[1]["agreement"]["surface"]["statistics"]["relative_bias_ci"] = [-0.0043, 0.0021]
-    assert "lies within ±0.5 %; the worst is -0.43..+0.21 %, in hall (surface)." in texts(data)[0]
+    assert all(words in claim["text"] for words, claim in zip(("fast in fog (3", "fast in fog (2", "hall (7)"), failed))
 
 
 def test_what_is_wrong_as_published_is_no_failure():
@@ -166,53 +128,12 @@ def test_what_is_wrong_as_published_is_no_failure():
     assert "failed" in [claim["kind"] for claim in claims(data)]
 
 
-def test_images_of_an_engine_are_judged():
-    data = scenes()[:1]
-    data[0]["methods"].append(engine("engine", error=errors(0.001, relative_bias=-0.02)))
-    (judged,) = [claim["text"] for claim in claims(data) if claim["kind"] == "image"]
-    assert judged == (
-        "The image engine of fog, judged by its total of airlight and surface: relative RMSE 0.1 %, relative bias -2 %."
-    )
-
-
-def test_missing_flip_is_said_once_for_each_reason():
-    data = scenes()
-    for each in data[0]["methods"]:
-        each["flip"] = flip(None, "flip-evaluator is not installed")
-    (sentence,) = [claim["text"] for claim in claims(data) if claim["kind"] == "not-measured"]
-    assert sentence == ("No HDR-FLIP (flip-evaluator is not installed): fast in fog; good in fog; slow in fog.")
-
-
-def test_missing_flip_of_different_counts_is_one_reason():
-    data = scenes()
-    for count, each in zip((3, 185), data[0]["methods"]):
-        each["flip"] = flip(None, f"{count} pixels of the test image are negative: FLIP is not defined")
-    (sentence,) = [claim["text"] for claim in claims(data) if claim["kind"] == "not-measured"]
-    assert sentence == (
-        "No HDR-FLIP (pixels of the test image are negative: FLIP is not defined): fast in fog; good in fog."
-    )
-
-
-def test_what_takes_too_long_is_not_among_the_refused():
+def test_what_takes_too_long_or_jumps_has_a_claim_of_its_own():
     data = scenes()
     data[0]["methods"].append(method("slow", None, 0, refused="a frame would take 8 min") | {"left_out": True})
     kinds = {claim["kind"]: claim["text"] for claim in claims(data)}
     assert "refused" not in kinds
-    assert kinds["not-measured"].endswith("in the tables: slow in fog.")
-
-
-def test_scenes_that_the_effort_leaves_out_are_named():
-    assert unstudied(["fog", "hall"], ["fog", "hall"]) == []
-    (claim,) = unstudied(["fog"], ["fog", "hall", "tangle"])
-    assert (claim["kind"], claim["good"]) == ("not-measured", None)
-    assert claim["text"].startswith("Scenes not studied, for the time that they take: hall, tangle.")
-
-
-def test_a_time_that_jumps_is_a_claim():
-    assert growth_claims([]) == []
-    (good,) = growth_claims([growth_record()])
-    assert (good["kind"], good["good"]) == ("growth", True)
-    assert good["text"] == "No time of a frame of hall jumps as the work grows: triangles."
-    (bad,) = growth_claims([growth_record(), growth_record(cliff=True)])
-    assert bad["good"] is False
-    assert bad["text"].startswith("A time jumps: hall, shadow-planes (exact): frame grows with the power 1.9")
+    assert "slow in fog" in kinds["not-measured"]
+    assert [claim["good"] for claim in growth_claims([growth_record()])] == [True]
+    assert [claim["good"] for claim in growth_claims([growth_record(), growth_record(cliff=True)])] == [False]
+    assert [claim["kind"] for claim in unstudied(["fog"], ["fog", "hall"])] == ["not-measured"]

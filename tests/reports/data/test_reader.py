@@ -67,15 +67,6 @@ def test_the_page_is_drawn_again_in_place_and_as_a_whole_elsewhere(folder, tmp_p
     redraw_report(data, where, new)
     assert without_ids((new / "report.html").read_text(encoding="utf-8")) == without_ids(page)
     assert load_report(new)[0] == data
-    # Under another name, too; and a name of a file is never taken for that of a folder.
-    (new / "report.json").rename(new / "my.json")
-    redraw_report(*load_report(new / "my.json"), tmp_path / "newer")
-    assert load_report(tmp_path / "newer")[0] == data
-    (new / "my.json").rename(new / "mine")
-    assert load_report(new / "mine")[0] == data
-    (new / "mine").rename(new / "report.json")
-    # A report in itself: its own page can be drawn again, too.
-    redraw_report(*load_report(new), new)
 
 
 @pytest.mark.parametrize(
@@ -128,6 +119,7 @@ def test_keys_of_later_versions_are_passed_over(folder):
     assert load_report(folder)[0]["later"] == {"a": 1}
 
 
+@pytest.mark.slow
 @pytest.mark.claim("report-drawn-again")
 def test_the_command_needs_no_mitsuba_to_draw_a_page_again(folder):
     code = (
@@ -140,21 +132,6 @@ def test_the_command_needs_no_mitsuba_to_draw_a_page_again(folder):
     assert ran.returncode == 0, ran.stderr
     assert "1 scene, drawn again" in ran.stdout
     assert (folder / "report.html").is_file()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [(["--quick"], "together with --quick"), (["--method", "m:f"], "together with --method"), ([], "has no schema")],
-)
-def test_the_command_refuses_in_one_line(folder, capsys, arguments, message):
-    from reports.commands.main import run
-
-    if not arguments:
-        (folder / "report.json").write_text("{}")
-    assert run(["report", "--from", str(folder), *arguments]) == 2
-    printed = capsys.readouterr().err
-    assert message in printed
-    assert printed.count("\n") == 1
 
 
 def test_a_full_disk_names_what_was_to_be_written(folder, tmp_path, monkeypatch):
@@ -172,9 +149,3 @@ def test_a_full_disk_names_what_was_to_be_written(folder, tmp_path, monkeypatch)
         redraw_report(data, where, tmp_path / "new")
     assert str(tmp_path / "new") in caught.value.filename
     assert not [path for path in (tmp_path / "new").rglob("*") if path.is_file()]
-
-
-def test_json_too_deep_to_read_is_refused(folder):
-    (folder / "report.json").write_text("[" * 200_000)
-    with pytest.raises(InputError, match="is not valid JSON"):
-        load_report(folder)

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from analytic.errors import InputError
 from reports.commands import figures as command_figures
 from reports.commands.figures import FIGURES, figures
 from reports.figures import polynomials
@@ -83,45 +82,6 @@ def test_every_figure_has_a_module_with_its_name_and_summary():
         assert any(map(callable, drawn))
 
 
-def test_the_page_of_the_figures_names_each():
-    page = (Path(__file__).parents[3] / "docs" / "figures.md").read_text(encoding="utf-8")
-    for name in FIGURES:
-        assert f"airlight figures {name}" in page
-
-
-def test_unknown_figures_are_refused_with_the_nearest(tmp_path):
-    with pytest.raises(InputError, match="did you mean 'polynomials'"):
-        figures(["polynomial"], output=tmp_path)
-
-
-def test_unknown_columns_are_refused_with_the_nearest(tmp_path):
-    with pytest.raises(InputError, match="--column: got 'singel', wanted one of single, double; did you mean 'single'"):
-        figures(["polynomials"], output=tmp_path, column="singel")
-
-
-def test_a_figure_of_a_report_without_one_says_what_to_run(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError, match="frame-speed, strip: made from a report: write one with `airlight report -o"):
-        figures(["frame-speed", "strip"], output=tmp_path)
-    with pytest.raises(InputError, match=r"report\.json: No such file or directory; wanted what `airlight report -o"):
-        figures(["frame-speed"], output=tmp_path, report=tmp_path / "nowhere")
-    assert not list(tmp_path.iterdir())
-
-
-def test_drawing_from_a_folder_without_data_says_what_to_run(tmp_path):
-    with pytest.raises(InputError, match="holds no data of a figure; write some with `airlight figures -o"):
-        figures(None, source=tmp_path)
-    with pytest.raises(
-        InputError, match=r"map-size\.csv is missing: .*; write them with `airlight figures map-size -o"
-    ):
-        figures(["map-size"], source=tmp_path)
-
-
-def test_options_of_the_strip_are_refused_without_it(tmp_path):
-    with pytest.raises(InputError, match="a scene and --methods choose images of the figure strip"):
-        figures(["polynomials"], output=tmp_path, scene="hall")
-
-
 @pytest.mark.claim("scenes-stand-first")
 def test_a_scene_behind_the_figures_is_that_of_the_strip(tmp_path, monkeypatch):
     asked = []
@@ -134,7 +94,3 @@ def test_a_scene_behind_the_figures_is_that_of_the_strip(tmp_path, monkeypatch):
     for scene in ("hall", "mine"):
         figures(["strip", scene], output=tmp_path)
     assert [(name, given["scene"]) for name, given in asked] == [("strip", "hall"), ("strip", "mine")]
-    with pytest.raises(InputError, match=r"figure: got 'strp', wanted one of .*; did you mean 'strip'"):
-        figures(["strp"], output=tmp_path)
-    with pytest.raises(InputError, match="a scene and --methods choose images of the figure strip"):
-        figures(["polynomials", "hall"], output=tmp_path)

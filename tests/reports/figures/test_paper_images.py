@@ -8,6 +8,8 @@ from reference.storage.exr import layer, read_exr
 from reports.figures import paper_images
 from reports.figures.files import plot, read_data
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def folder(variant, tmp_path_factory):

@@ -3,15 +3,10 @@ from itertools import combinations
 
 import pytest
 
-from analytic.errors import InputError
-from realtime.kernels.registry import KERNELS
 from realtime.methods.registry import FOG_METHODS, METHODS
 from reports.plotting.style import (
     COLOURS,
     LEAST_DIFFERENCE,
-    WIDTHS,
-    figure_style,
-    kernel_style,
     method_style,
     report_styles,
 )
@@ -30,6 +25,7 @@ def lab(hexadecimal: str, sight: str):
     return colour.XYZ_to_Lab(colour.RGB_to_XYZ(linear, "sRGB", apply_cctf_decoding=False))
 
 
+@pytest.mark.slow
 @pytest.mark.claim("colours-of-figures", tolerance="CIEDE2000 above 10")
 @pytest.mark.parametrize("sight", _SIGHTS)
 @pytest.mark.filterwarnings("ignore")  # colour-science warns of optional packages
@@ -42,18 +38,6 @@ def test_any_two_colours_differ_for_every_sight(sight):
         assert difference > LEAST_DIFFERENCE, (first, other, sight, difference)
 
 
-def test_the_simulation_sees_what_such_eyes_do_not():
-    """Red and green of one lightness, far apart for most, are closer than the bound without the middle cones."""
-    import colour
-
-    pair = ("#b8711a", "#7f8b1a")
-    normal, without = (
-        float(colour.delta_E(*(lab(colour_name, sight) for colour_name in pair), method="CIE 2000"))
-        for sight in ("normal", "Deuteranomaly")
-    )
-    assert normal > 2 * LEAST_DIFFERENCE > 2 * without
-
-
 def test_one_colour_and_one_marker_for_each_method():
     # No chart has methods for fog and for clouds.
     clouds = [name for name in METHODS if name not in FOG_METHODS]
@@ -63,13 +47,6 @@ def test_one_colour_and_one_marker_for_each_method():
     own = method_style("my_module:fog")
     assert own == method_style("my_module:fog")
     assert own["color"] not in {look["color"] for look in looks}
-
-
-def test_one_pair_of_colour_and_marker_for_each_kernel():
-    looks = {(kernel_style(name)["color"], kernel_style(name)["marker"]) for name in (*KERNELS, "my_module:kernel")}
-    assert len(looks) == len(KERNELS) + 1
-    assert kernel_style("quadrature-32") == kernel_style("quadrature")
-    assert kernel_style("quadrature-theta-8") == kernel_style("quadrature-theta")
 
 
 def test_variants_keep_colour_and_marker():
@@ -90,33 +67,3 @@ def test_a_report_has_a_style_for_each_label_in_every_scene():
     assert styles["ray-march (steps=16)"] == method_style("ray-march", 0)
     assert styles["ray-march (steps=100)"] == method_style("ray-march", 1)
     assert styles["a:f"]["color"] != styles["b:f"]["color"]
-
-
-@pytest.mark.parametrize(("column", "width"), [("single", 3.5), ("double", 7.16)])
-def test_style_sheets_give_the_width_and_are_gone_after_the_block(column, width):
-    import matplotlib
-
-    before = matplotlib.rcParams["font.size"], matplotlib.rcParams["pdf.fonttype"]
-    with figure_style(column) as given:
-        assert given == WIDTHS[column] == width == matplotlib.rcParams["figure.figsize"][0]
-        assert matplotlib.rcParams["pdf.fonttype"] == 42
-    assert (matplotlib.rcParams["font.size"], matplotlib.rcParams["pdf.fonttype"]) == before
-
-
-def test_further_style_sheets_lie_on_top(tmp_path):
-    import matplotlib
-
-    (tmp_path / "mine.mplstyle").write_text("font.size: 11\n")
-    with figure_style("single", (str(tmp_path / "mine.mplstyle"),)):
-        assert matplotlib.rcParams["font.size"] == 11
-        assert matplotlib.rcParams["pdf.fonttype"] == 42
-
-
-def test_unknown_columns_and_sheets_are_refused():
-    with pytest.raises(InputError, match="column: got 'triple', wanted one of single, double"), figure_style("triple"):
-        pass
-    with (
-        pytest.raises(InputError, match="style: got nothing-like-this"),
-        figure_style("single", ("nothing-like-this",)),
-    ):
-        pass

@@ -61,14 +61,6 @@ def test_media_have_coefficients_and_the_sign_of_g(variant):
     assert len(three["media"]) == 3
 
 
-def test_what_cycles_does_not_have_is_said(variant):
-    _, cycles = properties(soft=spot(cutoff=40.0, beam=25.0))
-    assert "another function of the angle" in cycles["lights"][1]["cannot"]
-    table = {"type": "tabphase", "values": "1, 2, 4"}
-    _, cycles = properties(fog=tiny_scene()["fog"] | {"phase": table})
-    assert "tabulated" in cycles["world"]["cannot"]
-
-
 def test_settings_ask_for_one_scattering_linear_values_and_means_over_pixels(variant):
     described, cycles = properties()
     settings = cycles["scene"]

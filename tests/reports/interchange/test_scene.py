@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import json
 import math
-import re
 
 import numpy as np
 import pytest
 
 from reports.commands.main import run
 from reports.interchange.scene import describe_scene, spot_power_angle, up_axis
-from reports.tables.scene import description_text
 from tests.helpers.area_lights import lamp
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from validation.scenes.loading import LoadedScene, load_scene
@@ -71,9 +69,6 @@ def test_bodies_of_media_are_listed_with_their_bounds(variant):
     assert haze["bounds"] == {"kind": "sphere", "centre": [2.0, 0.3, 1.1], "radius": 0.3}
     assert haze["sigma_t"] == [0.5, 0.25, 1.0]
     assert box["bounds"]["kind"] == "convex mesh"
-    text = description_text(description)
-    assert "around the bounded media: none, clear air" in text
-    assert "a sphere about (2, 0.3, 1.1), radius 0.3" in text
 
 
 def test_lights_have_what_their_kind_needs(variant):
@@ -96,9 +91,6 @@ def test_a_light_at_infinity_has_a_direction_and_no_place(variant):
     assert sun["irradiance"] == [33.1, 28.7, 22.3]
     direction = np.array([0.737, -0.271, -0.419])
     np.testing.assert_allclose(sun["axis"], direction / np.linalg.norm(direction), atol=1e-6)
-    text = description_text(describe_scene(loaded))
-    assert "directional, travels along (0.828" in text
-    assert "(33.1, 28.7, 22.3) W/m^2 on a plane that faces it" in text
 
 
 @pytest.mark.claim("describe-area-lights", tolerance="1e-6 relative: float32")
@@ -124,9 +116,6 @@ def test_lights_with_extent_have_radiance_power_and_luminous_flux(variant, kind,
     # The primaries of sRGB as four digits of IEC 61966-2-1.
     assert light["luminous_flux"] == pytest.approx(683 * power @ [0.2126, 0.7152, 0.0722], rel=2e-4)
     assert [surface["name"] for surface in found["surfaces"]] == ["ball", "floor"]
-    text = description_text(found)
-    assert " lm: 683 lm/W times the luminance of the power as linear sRGB" in text
-    assert "(not tried)" in found["recipes"]["Cycles"][0]
     if kind == "sphere":
         assert light["radius"] == pytest.approx(0.3, rel=1e-6)
     else:
@@ -175,52 +164,9 @@ def test_lights_have_their_power(variant):
     np.testing.assert_allclose(soft["power_all_round"], 4 * np.pi * np.array(soft["intensity"]), rtol=1e-12)
 
 
-def test_recipes_name_what_another_renderer_cannot_do(variant):
-    fog = tiny_scene()["fog"]
-    plain = described(ball=None, floor=None)["recipes"]
-    assert plain["Cycles"][0] == "light: Point, power 62.83185 W, colour (1, 0.8, 0.6), radius 0, no soft falloff"
-    assert plain["LuxCore"][0].startswith("light: `point`, colour 4 pi I = (62.83185, 50.26548, 37.69911)")
-    description = described(
-        soft=spot(cutoff=40.0, beam=25.0), hard=spot(), fog=fog | {"phase": {"type": "hg", "g": 0.37}}
-    )
-    cycles, luxcore = (description["recipes"][name] for name in ("Cycles", "LuxCore"))
-    assert "spot size 80 degrees, which is the whole angle" in cycles[1]
-    assert "this edge cannot be made" in cycles[1]
-    assert "spot size 66 degrees" in cycles[2]
-    assert cycles[2].endswith("blend 0")
-    assert "Henyey-Greenstein" in cycles[3]
-    assert "this light cannot be made" in luxcore[1]
-    assert "Schlick's: no hg" in luxcore[3]
-    (sun, *_) = describe_scene(load_scene("windows", (8, 6)))["recipes"]["Cycles"]
-    assert sun == "light: Sun of strength 33.1, colour (1, 0.8670695, 0.673716), angle 0"
-
-
 @pytest.mark.parametrize(("up", "axis"), [((0, 0.1, 1), "z"), ((0.1, -1, 0), "-y"), ((1, 0, 0), "x")])
 def test_up_axis_is_the_nearest(up, axis):
     assert up_axis(np.array(up)) == axis
-
-
-def test_text_says_what_the_numbers_are(variant):
-    text = description_text(described(ball=None, floor=None, spot=spot(cutoff=40.0, beam=25.0)))
-    for words in (
-        "tiny, 16 x 12 pixels. A tiny scene.",
-        "sigma_t 0.31 1/m",
-        "(0.9, 0.8, 0.7)",
-        "49 degrees horizontally, 37.7",
-        "beam 25, cut-off 40 degrees from the axis",
-        "(5, 4, 3) W/sr",
-        "airlight compare tiny tiny.exr",
-    ):
-        assert words in text
-    assert re.search(r"^ *surfaces +none$", text, flags=re.MULTILINE)
-    assert max(len(line) for line in text.splitlines()) <= 120
-
-
-def test_long_lists_are_cut_in_the_text_alone(variant):
-    many = {f"ball{k}": tiny_scene()["ball"] | {"center": [0.1 * k, 3.0, 1.0]} for k in range(20)}
-    description = described(**many)
-    assert len(description["surfaces"]) == 22
-    assert "and 10 more: --json lists them" in description_text(description)
 
 
 def test_command_prints_json_and_writes_gltf(capsys, tmp_path):

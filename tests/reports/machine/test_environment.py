@@ -12,9 +12,7 @@ from analytic.errors import InputError
 from reports.machine import environment, gpu, llvm
 from reports.machine.environment import (
     MissingError,
-    activate,
     describe_environment,
-    machine_in_words,
     missing_packages,
     prepare,
     versions,
@@ -54,13 +52,9 @@ class TestFindLlvm:
     @pytest.mark.parametrize(
         ("name", "version", "works"),
         [
-            ("libLLVM-14.so.1", (14, 0), False),
             ("libLLVM-14.0.6.so", (14, 0), False),
-            ("libLLVM-15.so", (15, 0), False),
             ("libLLVM-16.so.1", (16, 0), False),
             ("libLLVM-17.so.1", (17, 0), True),
-            ("libLLVM.so.18.1", (18, 1), True),
-            ("libLLVM.so.19.1", (19, 1), True),
             ("libLLVM.so.20.1", (20, 1), True),
         ],
     )
@@ -69,27 +63,11 @@ class TestFindLlvm:
         (library,) = find_llvm()
         assert (library.version, library.works) == (version, works)
 
-    def test_version_through_links_and_folders(self, tmp_path, only):
-        real = _library(only, "libLLVM.so.19.1")
-        linked = tmp_path / "llvm-19" / "lib"
-        linked.mkdir(parents=True)
-        (linked / "libLLVM.so").symlink_to(real)
-        assert examine_llvm(str(linked / "libLLVM.so")).version == (19, 1)
-        brewed = tmp_path / "llvm" / "18.1.8" / "lib"
-        brewed.mkdir(parents=True)
-        _library(brewed, "libLLVM.so")
-        assert examine_llvm(str(brewed / "libLLVM.so")).version == (18, 1)
-
     def test_the_newest_that_works_first_and_each_once(self, only):
         for name in ("libLLVM-14.so.1", "libLLVM.so.18.1", "libLLVM.so.20.1", "libLLVM.so.19.1"):
             _library(only, name)
         (only / "libLLVM-19.so").symlink_to(only / "libLLVM.so.19.1")
         assert [library.version for library in find_llvm()] == [(20, 1), (19, 1), (18, 1), (14, 0)]
-
-    def test_what_is_no_whole_llvm_is_not_listed(self, only):
-        for name in ("libLLVMCore.so.19.1", "libLLVMX86CodeGen.a", "libLLVM.a", "libclang-19.so"):
-            _library(only, name)
-        assert find_llvm() == []
 
     def test_files_that_cannot_be_loaded_here(self, only):
         other_machine = HEADER[:18] + bytes([HEADER[18] ^ 0x80, HEADER[19]]) + HEADER[20:]
@@ -101,14 +79,6 @@ class TestFindLlvm:
     def test_a_library_that_does_not_tell_is_asked_in_another_process(self, only):
         library = examine_llvm(str(_library(only, "libLLVM.so")))  # a header alone cannot be loaded
         assert (library.version, library.works) == (None, False)
-
-    def test_asking_and_naming_agree_on_this_machine(self):
-        here = [library for library in find_llvm() if library.works]
-        if not here:
-            pytest.skip("no libLLVM that works on this machine")
-        asked = llvm._version_asked(here[0].path)
-        assert asked is not None
-        assert asked[0] == here[0].version[0]
 
 
 @linux
@@ -145,12 +115,6 @@ class TestPrepare:
         assert "\n" not in str(caught.value)
         assert "DRJIT_LIBLLVM_PATH" not in os.environ
 
-    def test_without_libatomic_both_are_named_in_one_line(self, only, monkeypatch):
-        monkeypatch.setattr(environment, "atomic_problem", lambda: "libatomic.so.1 is missing")
-        monkeypatch.setattr(environment.shutil, "which", lambda name: "/usr/bin/apt-get" if "apt" in name else None)
-        with pytest.raises(MissingError, match=r"no libLLVM.*libatomic.*apt-get install -y libllvm19 libatomic1"):
-            prepare()
-
     @pytest.mark.claim("variant")
     def test_cuda_is_chosen_where_it_works_and_does_without_llvm(self, only, monkeypatch):
         monkeypatch.setattr(environment, "cuda_problem", lambda: "")
@@ -177,6 +141,7 @@ class TestPrepare:
 
 
 @linux
+@pytest.mark.slow
 def test_a_machine_with_llvm_14_alone_gets_a_message_and_no_abort(tmp_path):
     _library(tmp_path / "lib", "libLLVM-14.so.1")
     code = (
@@ -192,7 +157,7 @@ def test_a_machine_with_llvm_14_alone_gets_a_message_and_no_abort(tmp_path):
     ran = subprocess.run([sys.executable, "-c", code], env=variables, capture_output=True, text=True, timeout=120)
     assert (ran.returncode, ran.stdout, ran.stderr.count("\n")) == (3, "", 1)
     assert ran.stderr.startswith("airlight: error: the newest libLLVM here")
-    assert "libllvm19" in ran.stderr or "installer" in ran.stderr or "llvm" in ran.stderr
+    assert "17 or newer is needed" in ran.stderr
 
 
 def test_drjit_loads_the_library_that_was_chosen(variant):
@@ -203,12 +168,6 @@ def test_drjit_loads_the_library_that_was_chosen(variant):
     kernel = try_kernel(variant)
     assert os.path.realpath(kernel["library"]) == os.path.realpath(os.environ["DRJIT_LIBLLVM_PATH"])
     assert kernel["threads"] >= 1
-
-
-def test_activate_keeps_a_current_variant(variant):
-    import mitsuba as mi
-
-    assert activate() == variant == mi.variant()
 
 
 def test_no_gpu_gives_a_reason(monkeypatch):
@@ -283,117 +242,3 @@ def test_versions_and_description_are_json_ready(variant):
     described = json.loads(json.dumps(describe_environment()))
     assert described["versions"] == installed
     assert described["variant"] == variant
-
-
-def test_times_on_a_gpu_stand_beside_its_name():
-    machine = {"processor": "P", "threads": 2, "variant": "llvm_ad_rgb"}
-    assert machine_in_words(machine) == "P, 2 threads, llvm_ad_rgb"
-    on_gpu = machine | {"variant": "cuda_ad_rgb", "device": "A GPU, compute capability 9.0"}
-    assert machine_in_words(on_gpu) == "A GPU, compute capability 9.0, P, 2 threads, cuda_ad_rgb"
-
-
-def test_the_headings_of_tables_name_the_gpu(monkeypatch, capsys):
-    from reports.api.tables import BenchTable
-    from reports.machine import environment as module
-    from reports.machine.printing import print_heading
-
-    machine = {"processor": "P", "threads": 2, "variant": "cuda_ad_rgb", "device": "A GPU"}
-    monkeypatch.setattr(module, "describe_environment", lambda: machine)
-    print_heading()
-    assert capsys.readouterr().out.endswith(", A GPU, P, 2 threads, cuda_ad_rgb.\n")
-    assert BenchTable(rows=(), environment=machine)._title().startswith("A GPU, ")
-
-
-_WINDOWS = {"ProgramFiles": "{root}/Program Files", "LOCALAPPDATA": "{root}/Local", "USERPROFILE": "{root}/me"}
-
-
-@linux
-class TestElsewhere:
-    """Where other systems and installers put LLVM, with folders that stand for theirs; nobody tried the real ones."""
-
-    @pytest.mark.claim("llvm-is-found")
-    @pytest.mark.parametrize(
-        ("platform", "processor", "environment", "place", "version"),
-        [
-            ("darwin", "arm64", {}, "opt/homebrew/opt/llvm/lib/libLLVM.dylib", None),
-            ("darwin", "arm64", {}, "opt/homebrew/opt/llvm@19/lib/libLLVM.dylib", (19, 0)),
-            ("darwin", "arm64", {}, "opt/homebrew/Cellar/llvm@18/18.1.8/lib/libLLVM.dylib", (18, 1)),
-            ("darwin", "x86_64", {}, "usr/local/Cellar/llvm/20.1.7/lib/libLLVM.dylib", (20, 1)),
-            ("darwin", "x86_64", {}, "opt/local/libexec/llvm-19/lib/libLLVM.dylib", (19, 0)),
-            ("darwin", "arm64", {"CONDA_PREFIX": "{root}/conda"}, "conda/lib/libLLVM.21.1.dylib", (21, 1)),
-            ("darwin", "arm64", {}, "prefix/lib/libLLVM-19.dylib", (19, 0)),
-            ("linux", "x86_64", {"CONDA_PREFIX": "{root}/conda"}, "conda/lib/libLLVM.so.21.1", (21, 1)),
-            ("linux", "x86_64", {}, "prefix/lib/libLLVM-19.so", (19, 0)),
-            ("linux", "aarch64", {}, "usr/lib/aarch64-linux-gnu/libLLVM.so.19.1", (19, 1)),
-            ("linux", "x86_64", {}, "usr/lib/llvm-20/lib/libLLVM.so.20.1", (20, 1)),
-            ("linux", "x86_64", {}, "home/linuxbrew/.linuxbrew/opt/llvm/lib/libLLVM.so.21.1", (21, 1)),
-            ("linux", "x86_64", {}, "opt/LLVM-19.1.7-Linux-X64/lib/libLLVM.so", (19, 1)),
-            ("win32", "AMD64", _WINDOWS, "Program Files/LLVM/bin/LLVM-C.dll", None),
-            ("win32", "AMD64", _WINDOWS, "Local/Programs/LLVM/bin/LLVM-C.dll", None),
-            ("win32", "AMD64", _WINDOWS, "me/scoop/apps/llvm/current/bin/LLVM-C.dll", None),
-            ("win32", "AMD64", {"PATH": "{root}/nothing;{root}/on path"}, "on path/LLVM-C.dll", None),
-            ("win32", "AMD64", {"CONDA_PREFIX": "{root}/conda"}, "conda/Library/bin/LLVM-C.dll", None),
-            ("win32", "AMD64", {}, "prefix/Library/bin/LLVM-C.dll", None),
-        ],
-    )
-    def test_llvm_is_found(self, tmp_path, monkeypatch, platform, processor, environment, place, version):
-        monkeypatch.delenv("DRJIT_LIBLLVM_PATH", raising=False)
-        # A file whose name does not tell is loaded and asked; here it is no library.
-        monkeypatch.setattr(llvm, "_version_asked", lambda path: (22, 1))
-        path = tmp_path / place
-        path.parent.mkdir(parents=True)
-        path.write_bytes(HEADER)
-        machine = llvm.Machine(
-            platform,
-            processor,
-            root=tmp_path,
-            prefix=tmp_path / "prefix",
-            environment={name: value.format(root=tmp_path) for name, value in environment.items()},
-        )
-        (found,) = find_llvm(llvm.llvm_folders(machine))
-        assert (found.path, found.version, found.works) == (str(path), version or (22, 1), True)
-
-    def test_what_the_other_processor_loads_is_not_found(self, tmp_path, monkeypatch):
-        monkeypatch.delenv("DRJIT_LIBLLVM_PATH", raising=False)
-        path = tmp_path / "usr/local/opt/llvm/lib/libLLVM.dylib"
-        path.parent.mkdir(parents=True)
-        path.write_bytes(HEADER)
-        machine = llvm.Machine("darwin", "arm64", root=tmp_path, prefix=tmp_path / "prefix", environment={})
-        assert find_llvm(llvm.llvm_folders(machine)) == []
-
-    @pytest.mark.claim("llvm-is-found")
-    @pytest.mark.parametrize(
-        ("platform", "programs", "line"),
-        [
-            ("linux", ["apt-get"], "sudo apt-get install -y libllvm19 libatomic1"),
-            ("linux", ["dnf"], "sudo dnf install -y llvm-libs libatomic"),
-            ("linux", ["pacman"], "sudo pacman -S llvm-libs gcc-libs"),
-            ("linux", [], "your system's installer for libllvm19 and libatomic1"),
-            ("darwin", ["brew", "port"], "brew install llvm gcc"),
-            ("darwin", ["port"], "sudo port install llvm-19"),
-            ("darwin", [], "Homebrew (https://brew.sh), and then brew install llvm"),
-            ("win32", ["winget", "choco"], "winget install -e --id LLVM.LLVM"),
-            ("win32", ["choco"], "choco install -y llvm"),
-            ("win32", ["scoop"], "scoop install llvm"),
-            ("win32", [], "LLVM's installer for Windows, LLVM-*-win64.exe of https://github.com/llvm/llvm-project/rel"),
-        ],
-    )
-    def test_the_line_to_type_is_that_of_the_installer_at_hand(self, monkeypatch, tmp_path, platform, programs, line):
-        monkeypatch.setattr(environment.sys, "platform", platform)
-        monkeypatch.setattr(environment.sys, "prefix", str(tmp_path))
-        monkeypatch.setattr(environment.shutil, "which", lambda name: name if name in programs else None)
-        monkeypatch.setattr(environment.os, "geteuid", lambda: 1000)
-        packages = ["libllvm19", "libatomic1"] if "libatomic" in line or "gcc" in line else ["libllvm19"]
-        assert environment.install_line(packages).startswith(line)
-        monkeypatch.setattr(environment.os, "geteuid", lambda: 0)
-        assert environment.install_line(packages).startswith(line.removeprefix("sudo "))
-        if platform == "win32":
-            monkeypatch.delattr(environment.os, "geteuid")  # which Windows has not
-            assert environment.install_line(packages).startswith(line)
-
-    @pytest.mark.parametrize(("platform", "package"), [("linux", "libllvm19"), ("win32", "libllvm-c19")])
-    def test_in_an_environment_of_conda_the_line_is_condas(self, monkeypatch, tmp_path, platform, package):
-        (tmp_path / "conda-meta").mkdir()
-        monkeypatch.setattr(environment.sys, "platform", platform)
-        monkeypatch.setattr(environment.sys, "prefix", str(tmp_path))
-        assert environment.install_line(["libllvm19"]) == f"conda install -y -c conda-forge {package}"

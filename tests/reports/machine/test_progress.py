@@ -38,21 +38,6 @@ def test_long_work_says_what_is_left_in_plain_lines(capsys, clock):
     assert captured.out == ""  # --json must stay JSON
 
 
-def test_the_bar_says_what_is_left_of_the_whole_and_not_of_the_last_half_minute(monkeypatch, clock):
-    """A part that takes as long as all before it moves the time left by no more than it should."""
-    screen = Terminal()
-    monkeypatch.setattr("sys.stderr", screen)
-    monkeypatch.setenv("TERM", "xterm-256color")
-    monkeypatch.setenv("COLUMNS", "120")
-    with progress_bar("report") as progress:
-        for _ in range(5):
-            clock.now += 2
-            progress(0.1, "x")
-        clock.now += 110
-        progress(0.5, "x")
-    assert "about 2:00 left" in screen.getvalue()
-
-
 def test_plain_lines_are_ten_seconds_apart(capsys, clock):
     with progress_bar("bench") as progress:
         for step in range(1, 101):
@@ -71,11 +56,6 @@ def test_beginning_and_end_are_no_news(capsys, clock, share):
         clock.now += 60
         progress(share, "x")
     assert capsys.readouterr().err == ""
-
-
-def test_failure_goes_through(clock):
-    with pytest.raises(KeyError), progress_bar("x"):
-        raise KeyError
 
 
 class Terminal(io.StringIO):
@@ -100,22 +80,6 @@ def test_bar_on_a_terminal_appears_after_two_seconds_and_goes_away(monkeypatch, 
         assert "\x1b[2K" in text  # the line is erased at the end
     else:
         assert text == ""
-
-
-def test_bar_goes_away_after_a_failure(monkeypatch, clock):
-    screen = Terminal()
-    monkeypatch.setattr("sys.stderr", screen)
-    monkeypatch.setenv("TERM", "xterm-256color")
-
-    def fail():
-        with progress_bar("report") as progress:
-            clock.now += 5
-            progress(0.25, "work")
-            raise KeyError
-
-    with pytest.raises(KeyError):
-        fail()
-    assert screen.getvalue().endswith("\x1b[2K") or "\x1b[?25h" in screen.getvalue()  # the cursor is back
 
 
 def test_parts_tell_shares_of_the_whole():

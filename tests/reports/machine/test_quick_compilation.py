@@ -65,6 +65,7 @@ def rendered(variant, tmp_path_factory) -> dict[str, tuple[subprocess.CompletedP
     return results
 
 
+@pytest.mark.slow
 @pytest.mark.claim("quick-kernels")
 def test_images_are_the_same_bit_for_bit_and_the_kernels_are_not(rendered):
     images, compiled = zip(*((result.stdout, kept) for result, kept in rendered.values()))
@@ -76,16 +77,19 @@ def test_images_are_the_same_bit_for_bit_and_the_kernels_are_not(rendered):
     assert sum(full[name] != quick[name] for name in common) > 0.9 * len(common)
 
 
+@pytest.mark.slow
 def test_a_quick_process_can_compile_as_well_as_any(rendered):
     (_, full), (_, in_full) = rendered["full"], rendered["in-full"]
     assert full.keys() == in_full.keys()
     assert sum(full[name] == in_full[name] for name in full) > 0.9 * len(full)
 
 
+@pytest.mark.slow
 def test_llvm_says_nothing_and_others_do(rendered):
     assert {result.stderr for result, _ in rendered.values()} == {"one line\n"}
 
 
+@pytest.mark.slow
 def test_what_is_said_before_an_abort_is_passed_on(variant, tmp_path):
     result = run(ABORT, tmp_path, quick=True)
     assert result.returncode < 0

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from realtime.scene.read_scene import read_scene
-from reports.sweep.claims import best_claims, claim, percent, written
+from reports.sweep.claims import best_claims, claim, percent
 from reports.sweep.correlations import correlations, sentence, sentences, strongest, sure
-from reports.sweep.faults import checks, faults, reasons, without_numbers
+from reports.sweep.faults import checks, faults, reasons
 from reports.sweep.properties import WORDS, property_words
 from reports.sweep.read import FILE, read_sweep
 from reports.sweep.samples import samples
@@ -95,22 +95,12 @@ def test_what_the_truth_cannot_tell_widens_the_interval_on_one_side(sweep_of):
     assert made.text.endswith("the truth is not exact enough to tell in 2 scenes.")
 
 
-def test_of_no_scene_nothing_is_claimed(sweep_of):
-    made = claim(samples(sweep_of([row(status="refused", reason="x")]))[0], 1e-3)
-    assert (made.share, made.low, made.high) == (None, 0.0, 1.0)
-    assert made.text == "ray-march: no scene was tried."
-
-
 @pytest.mark.parametrize(
     ("share", "trials", "text"),
     [(0.992, 1000, "99.2"), (0.9999, 1000, "99.9"), (1.0, 1000, "100.0"), (0.0001, 100, "1"), (0.5, 1, "50")],
 )
 def test_a_share_is_not_rounded_to_all_or_none(share, trials, text):
     assert percent(share, trials) == text
-
-
-def test_errors_of_claims_are_written_as_powers_of_ten():
-    assert [written(target) for target in (0.1, 0.01, 0.001, 1e-5, 0.02)] == ["1e-1", "1e-2", "1e-3", "1e-5", "0.02"]
 
 
 @pytest.mark.claim("sweep-properties")
@@ -174,11 +164,6 @@ def test_intervals_hold_together(sweep_of):
     assert any(abs(each.r) > 0.2 for each in found)
 
 
-def test_too_few_scenes_have_no_correlation(sweep_of):
-    sweep = sweep_of([row(f"random:{n}", relative_rmse=0.1 * n, property_depth=float(n)) for n in range(1, 9)])
-    assert correlations(sweep, samples(sweep)) == []
-
-
 def test_worst_scenes_come_first_and_those_without_numbers_before_them(sweep_of):
     several = [row(f"random:{n}", relative_rmse=0.01 * n, property_depth=float(n)) for n in range(1, 15)]
     several += [
@@ -208,11 +193,6 @@ def test_refusals_are_counted_by_reason(sweep_of):
     assert refusal.labels == ("light-volumes (exact)",)
     assert refusal.example == refused[0]["command"]
     assert (hung.status, hung.reason, hung.cells) == ("hung", "longer than N s", 1)
-
-
-def test_numbers_are_taken_out_of_reasons_and_names_are_not():
-    assert without_numbers("random:17: light 3 of 8\n at -1.5e-3 m", "random:17") == "SCENE: light N of N at N m"
-    assert without_numbers("RGB8 in light-volumes2 takes x2", "hall") == "RGB8 in light-volumes2 takes x2"
 
 
 @pytest.mark.claim("sweep-faults")

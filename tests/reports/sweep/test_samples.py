@@ -43,10 +43,6 @@ def test_order_in_which_rows_were_finished_does_not_matter(tmp_path):
     assert [each.label for each in samples(first)] == [each.label for each in samples(second)]
 
 
-def test_same_key_counts_once(sweep_of):
-    assert len(sweep_of([row(), row(), row("random:1")])) == 2
-
-
 @pytest.mark.claim("sweep-last-rows")
 def test_cells_that_were_computed_again_count_once(sweep_of):
     """A fault that is mended is gone; a cell that was computed for its error and again for its time has both."""
@@ -96,18 +92,6 @@ def test_what_is_no_sweep_is_refused_in_a_line(tmp_path, make, words):
     with pytest.raises(InputError, match=words) as caught:
         read_sweep(tmp_path)
     assert "\n" not in str(caught.value)
-
-
-def test_column_of_another_type_and_unknown_status_are_refused(tmp_path):
-    table = pq.read_table(write_rows(tmp_path / FILE, [row()]))
-    place = table.column_names.index("relative_rmse")
-    pq.write_table(table.set_column(place, "relative_rmse", pa.array(["0.1"])), tmp_path / FILE)
-    with pytest.raises(InputError, match="has string in the column 'relative_rmse', wanted float64"):
-        read_sweep(tmp_path)
-    place = table.column_names.index("status")
-    pq.write_table(table.set_column(place, "status", pa.array(["lost"])), tmp_path / FILE)
-    with pytest.raises(InputError, match="has the status 'lost'"):
-        read_sweep(tmp_path)
 
 
 @pytest.mark.claim("sweep-scenes-are-the-sample")
@@ -220,11 +204,3 @@ def test_names_say_in_what_configurations_of_a_method_differ():
     # What has no words of its own is named by those that it has.
     shared = ["ray-march (steps=100)", "ray-march (steps=100, shadow=map)"]
     assert short_names(["ray-march"] * 2, shared) == ["ray-march (steps=100)", "ray-march (shadow=map)"]
-
-
-def test_long_names_are_cut_between_words_and_stay_apart():
-    long = [f"soft-shafts (points=16, pattern=sobol, interleave=True, scale=2, steps={steps})" for steps in (1, 2)]
-    names = short_names(["soft-shafts"] * 3, [*long, "soft-shafts (points=5)"])
-    assert names[0] == "soft-shafts (points=16, ..) #1"
-    assert len(set(names)) == 3
-    assert all(len(name) <= 40 for name in names)

@@ -12,12 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from reports.tables.drawing import DASH, csv, html, latex, markdown, text, typeset
+from reports.tables.drawing import DASH, csv, html, latex, markdown, text
 from reports.tables.table import (
     Column,
     Interval,
     Measured,
-    Name,
     Row,
     Table,
     Verdict,
@@ -156,14 +155,6 @@ def test_what_means_something_to_a_format_is_escaped(words):
     assert flat.split()[0] in text(drawn)
 
 
-def test_brackets_are_words():
-    """Units stand in brackets, which rich would take for its own marks and leave out."""
-    shown = text(
-        table("times [ms]", (Column("a", "[red] scene", words=True), Column("b", "time", "[ms]")), [("x [m]", 1)])
-    )
-    assert all(words in shown for words in ("times [ms]", "[red] scene", "time [ms]", "x [m]"))
-
-
 def drawn_row(**values):
     return Table("title", COLUMNS, (Row(values),))
 
@@ -198,11 +189,6 @@ def test_values_are_written_by_their_column():
     assert (read["time"], read["time_low"], read["ends_high"], read["bias"]) == ("12.345", "12", "2.5", "-0.0012345")
 
 
-def test_quartiles_without_a_column_are_the_title_of_a_cell():
-    shown = html(table("", (Column("a", "a"), Column("b", "b", "ms")), [(1, Measured(2.0, 1.5, 3.0, about=True))]))
-    assert '<td title="quartiles 1.5 … 3 ms">~2</td>' in shown
-
-
 @pytest.mark.parametrize(("value", "words"), [(None, None), (math.nan, "nan"), (math.inf, "inf"), (-math.inf, "-inf")])
 def test_what_is_no_number_is_said(value, words):
     row = table("", (Column("a", "a"), Column("b", "b")), [("x", value)])
@@ -210,17 +196,6 @@ def test_what_is_no_number_is_said(value, words):
     assert html_rows(html(row))[0][1] == (words or DASH)
     assert latex_rows(latex([row]))[0][1] == {"inf": r"$\infty$", "-inf": r"$-\infty$"}.get(words, words or "--")
     assert csv_rows(csv(row))[0]["b"] == ("" if words in (None, "nan") else words)
-
-
-def test_tables_without_rows_have_headings():
-    empty = table("nothing", COLUMNS, [])
-    assert markdown(empty).splitlines()[2] == (
-        "| what is\\_it | time ms | quartiles | frames/s | bias | 95 % interval | not finite | agrees |"
-    )
-    assert "frames/s" in text(empty)
-    assert html_rows(html(empty)) == []
-    assert latex_rows(latex([empty])) == []
-    assert csv(empty) == "name,time,rate,bias,ends,count,agrees\n"
 
 
 def test_a_row_that_ends_early_says_why():
@@ -237,19 +212,6 @@ def test_a_row_that_ends_early_says_why():
         ("no <light>", ""),
         ("no_room", "slow"),
     ]
-
-
-def test_names_are_code_with_a_link():
-    drawn = table("", (Column("a", "a", words=True),), [(Name("min-max", "min-max.md"),), (Name("a_b"),)])
-    assert markdown(drawn).splitlines()[2:] == ["| [`min-max`](min-max.md) |", "| `a_b` |"]
-    assert '<a href="min-max.md"><code>min-max</code></a>' in html(drawn)
-    assert latex_rows(latex([drawn]))[1] == [r"\texttt{a\_b}"]
-
-
-def test_shares_are_in_per_cent_in_html_alone():
-    row = table("", (Column("a", "a", words=True), Column("b", "b", digits=2, share=True)), [("x", 0.012345)])
-    assert (markdown_rows(markdown(row))[0][1], html_rows(html(row))[0][1]) == ("0.012", "1.23 %")
-    assert latex_rows(latex([row]))[0][1] == r"\num{0.012}"
 
 
 @pytest.mark.claim("latex-tables")
@@ -292,10 +254,6 @@ def test_latex_has_the_rules_of_booktabs_and_says_what_it_needs():
 )
 def test_numbers_have_three_digits(value, plain, zeros):
     assert (number(value), number(value, zeros=True)) == (plain, zeros)
-
-
-def test_powers_of_ten_are_typeset():
-    assert (typeset("1.2e-05"), typeset("3e+03"), typeset("-"), typeset("12")) == ("1.2·10⁻⁵", "3·10³", DASH, "12")
 
 
 @pytest.mark.claim("latex-tables")

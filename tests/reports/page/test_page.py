@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The page of a report, from a golden report.json: its numbers, nothing from elsewhere, and names that are words."""
+
+import json
+
+import pytest
+
+from analytic.errors import InputError
+from reports.page.chart import speed_error_chart
+from reports.page.filters import DASH
+from reports.page.render import SCRIPTS, render_page
+from reports.tables.methods import fastest_table
+from tests.helpers.page import DATA, Page, engine_image, report_data, table_of, widths, write_files
+from tests.helpers.published import BILLETER, BIRI, MUTATIONS, STABILITY
+from tests.helpers.reports import growth_record, refused, timing
+
+EVIL = "</script><script>alert('1')</script> & \"q\" $x^2$ {{ 7 * 7 }}"
+
+
+@pytest.fixture
+def data():
+    return report_data()
+
+
+@pytest.fixture(autouse=True)
+def _no_chart(monkeypatch):
+    """Draw no charts for the pages: they take longer than everything else, and have a test of their own."""
+    monkeypatch.setattr("reports.page.render.speed_error_chart", lambda scenes: "<svg></svg>")
+    monkeypatch.setattr("reports.page.render.scene_chart", lambda scenes, place: "<svg></svg>")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return write_files(tmp_path_factory.mktemp("page"))
+
+
+def render(data, folder):
+    return Page(render_page(data, folder))
+
+
+def test_page_shows_the_numbers_of_the_data(data, folder):
+    whole = data | {"stability": STABILITY, "mutations": MUTATIONS, "published": {"biri": BIRI, "billeter": BILLETER}}
+    page = render(whole | {"scaling": [growth_record()]}, folder)
+    text = page.text
+    for shown in ("1.23 %", "-0.45 %", "5.55 %", "3.21", "312", "0.98765", "4321", "-0.110 … +0.140 %", "0.5 %", "11"):
+        assert shown in text, shown
+    for claim in DATA["claims"]:
+        assert claim["text"] in text
+    for row in fastest_table(DATA["scenes"]).rows:
+        assert all(cell in text for cell in row.values.values())
+    for words in ("airlight report --quick", "mitsuba 3.9.1", "my-kernel", "no-falloff", "clutter", "Sponza"):
+        assert words in text
+    for caption in ("Times and errors", "Table 1 of Biri", "Table 2 of Biri", "Figures 6 and 7", "Table 1 of Billeter"):
+        assert len(set(widths(table_of(page, caption)))) == 1, caption
+    index = json.loads(page.script("images"))
+    assert [entry["label"] for entry in index["scenes"][0]["methods"]] == ["good (k)", "flat"]
+    assert render_page(data, folder) == render_page(report_data(), folder)
+
+
+@pytest.mark.claim("report-stands-alone")
+def test_page_needs_nothing_but_itself(data, folder):
+    """Only the pictures that are named for readers without scripts are other files, and they are not loaded.
+
+    Their addresses begin in this folder: `random:7/a.png` would be of a scheme called random.
+    """
+    data["scenes"][0]["files"] |= {"picture": "random:7/reference.png"}
+    page = render(data, folder)
+    linked = []
+    for tag, attributes in page.tags:
+        for name in ("src", "href", "xlink:href", "data", "poster", "srcset", "action"):
+            target = attributes.get(name)
+            if tag == "a" and target is not None and not target.startswith("#"):
+                linked.append(target)
+            else:
+                assert target is None or target.startswith(("#", "data:,")), (tag, target)
+    assert "./random:7/reference.png" in linked
+    assert all(target.startswith("./") for target in linked)
+    assert not {tag for tag, _ in page.tags} & {"iframe", "object", "embed", "img"}
+    assert "@import" not in page.source
+    assert "url(http" not in page.source
+
+
+def test_page_can_be_read_without_eyes(data, folder):
+    page = render(data, folder)
+    assert page.attributes("html") == [{"lang": "en"}]
+    assert len(page.attributes("h1")) == len(page.attributes("main")) == 1
+    names = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
+    assert len(names) == len(set(names))
+    assert all(a["href"][1:] in names for a in page.attributes("a") if a["href"][0] == "#")
+    pictures = [each for each in page.attributes("canvas") if each.get("role") == "img"]
+    assert len({each["aria-label"] for each in pictures}) == len(pictures) == 3
+    for table in page.tables:
+        headers = [attributes for tag, attributes in table if tag == "th"]
+        assert any(tag == "caption" for tag, _ in table)
+        assert all(attributes.get("scope") in ("col", "row") for attributes in headers)
+
+
+def test_names_and_notes_are_words_and_never_html(data, folder):
+    scene = data["scenes"][0]
+    scene["name"] = scene["purpose"] = scene["published"] = EVIL
+    scene["notes"] = [EVIL]
+    scene["plan"][EVIL] = EVIL
+    scene["methods"][0]["label"] = EVIL
+    scene["methods"].append(refused("x", EVIL))
+    data["claims"].append({"kind": EVIL, "text": EVIL, "good": None})
+    data["command"] = data["environment"]["variant"] = EVIL
+    page = render(data, folder)
+    # Scripts of our own, the index and one scene's pixels; none by what a file is called.
+    assert len(page.scripts) == len(SCRIPTS) + 2
+    # Claim twice, name, purpose, published, note, plan twice, label, refusal, command, environment: all as they came.
+    assert page.text.count(EVIL) >= 12
+    index = json.loads(page.script("images"))
+    assert index["scenes"][0]["name"] == index["scenes"][0]["methods"][0]["label"] == EVIL
+
+
+def test_missing_values_are_dashes_and_failures_are_marked(data, folder):
+    scene = data["scenes"][0]
+    scene["truth"] |= {"mean": None, "relative_bound": None, "missed": None}
+    scene["methods"][0]["error"] |= dict.fromkeys(("relative_rmse", "relative_bias", "p50", "p99"))
+    scene["methods"] += [refused("bad", "no series"), engine_image()]
+    scene["agreement"]["airlight"]["statistics"] |= {"relative_bias": None, "relative_bias_ci": [None, None]}
+    scene["agreement"]["surface"]["statistics"] |= {"equivalent": False}
+    data["claims"] = [{"kind": "truth", "text": "The truth is NOT confirmed.", "good": False}]
+    page = render(data, folder)
+    assert "None" not in page.text
+    assert "nan" not in page.text.lower().replace("airlight", "").split()
+    for words in (DASH, "refused: no series", "(image, total)", "does not hold: The truth is NOT confirmed."):
+        assert words in page.text
+    marked = [tag for tag, attributes in page.tags if "bad" in (attributes.get("class") or "").split()]
+    assert {"li", "td"} <= set(marked)
+
+
+def test_viewer_begins_with_the_fastest_within_one_per_cent_and_shows_what_was_not_refused(data, folder):
+    good, flat = data["scenes"][0]["methods"]
+    good["error"]["relative_rmse"] = flat["error"]["relative_rmse"] = 0.001
+    flat["times"] = flat["times"] | {"frame": timing(1.0)}
+    blank = report_data()["scenes"][0] | {"name": "dark", "methods": [refused("x", "too dark")]}
+
+    def first():
+        page = render(data | {"scenes": [blank, data["scenes"][0]]}, folder)
+        (viewer,) = (attributes for _, attributes in page.tags if attributes.get("class") == "viewer")
+        return viewer["data-method"]
+
+    assert first() == "1"
+    flat["error"]["nonfinite"] = 1  # pixels that are left out of the error must not win
+    assert first() == "0"
+
+
+def test_a_page_that_cannot_be_made_small_enough_is_refused(data, folder):
+    with pytest.raises(InputError, match="MB"):
+        render_page(data, folder, limit=2_500_100)
+
+
+def test_the_chart_has_a_panel_for_each_scene_whatever_it_is_called():
+    """A dollar begins mathematics in matplotlib; half a formula would end the report after all its work."""
+    scenes = [report_data()["scenes"][0] | {"name": name} for name in ("hall", "50$ a_b^c $\\frac{$")]
+    scenes[1]["methods"] += [refused("refused", "x"), engine_image()]  # no place on a logarithmic axis
+    svg = speed_error_chart(scenes)
+    assert svg == speed_error_chart(scenes)
+    assert all(svg.count(f">{label}<") == 1 for label in ("hall", "good (k)", "flat"))

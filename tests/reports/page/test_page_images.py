@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The images in a page: what is decoded is what the files hold, to the bound of the code, whatever the limit."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from analytic.errors import InputError
+from reference.storage.exr import Image, write_exr
+from reports.page.image_cache import page_images
+from reports.page.image_codec import (
+    DIFFERENCE_BITS,
+    PRECISIONS,
+    REFERENCE_BITS,
+    difference_codes,
+    pack_planes,
+    reference_codes,
+    reference_values,
+)
+from tests.helpers.decoding import decode_planes, difference_values
+from tests.helpers.page import images, report_data, write_files
+
+
+@given(st.lists(st.floats(width=32), min_size=1, max_size=12))
+@settings(max_examples=150, deadline=None)
+def test_any_float_survives_as_a_difference(values):
+    """Nothing is clamped: what is larger than the codes reach makes the steps coarser, infinities and NaN stay."""
+    difference = np.array(values, dtype=np.float64)[None, :, None]
+    codes, k = difference_codes(difference, PRECISIONS[0])
+    decoded = decode_planes(pack_planes(codes, DIFFERENCE_BITS), (len(values), 1), DIFFERENCE_BITS)
+    back = difference_values(decoded, k, PRECISIONS[0].s)
+    np.testing.assert_array_equal(np.isnan(back), np.isnan(difference))
+    np.testing.assert_array_equal(np.isinf(back), np.isinf(difference))
+    finite = np.isfinite(difference)
+    # The bound of the module; near the end of float32 k is about 340: half a step is 1.5e-3, its square the next term.
+    bound = np.sqrt(PRECISIONS[0].s ** 2 + difference[finite] ** 2) / (2 * k)
+    assert np.all(np.abs(back[finite] - difference[finite]) <= 1.01 * bound)
+
+
+def test_a_reference_keeps_sixteen_binary_digits_and_what_is_not_finite():
+    rng = np.random.default_rng(7)
+    values = np.concatenate([rng.lognormal(sigma=12, size=5000), -rng.lognormal(size=100), [0.0, 1.0, 2.0**-126]])
+    single = values.astype(np.float32)
+    back = reference_values(reference_codes(single))
+    assert np.all(np.abs(back - single) <= 2.0**-16 * np.abs(single.astype(np.float64)))
+    odd = reference_values(reference_codes(np.array([np.nan, np.inf, -np.inf, 0.0])))
+    np.testing.assert_array_equal(odd, [np.nan, np.inf, -np.inf, 0.0])
+
+
+def test_planes_come_back_as_they_went():
+    rng = np.random.default_rng(3)
+    for bits, low, high in ((DIFFERENCE_BITS, -(1 << 15), 1 << 15), (REFERENCE_BITS, 0, 1 << REFERENCE_BITS)):
+        for size in ((1, 9), (37, 64)):
+            codes = rng.integers(low, high, (*size, 3)).astype(np.int32)
+            np.testing.assert_array_equal(decode_planes(pack_planes(codes, bits), size[::-1], bits), codes)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return write_files(tmp_path_factory.mktemp("images"))
+
+
+@pytest.fixture
+def scene():
+    return report_data()["scenes"][0]
+
+
+def scene_images(scene, folder, limit):
+    return page_images([scene], folder, limit)[0]
+
+
+def test_limits_are_kept_by_coarser_differences_then_fewer_pixels(scene, folder):
+    whole = scene_images(scene, folder, 10**8)
+    seen, limit = [], len(whole.data)
+    while True:
+        try:
+            stored = scene_images(scene, folder, limit)
+        except InputError as error:
+            assert "one pixel in 16" in str(error)  # noqa: PT017 - the loop goes on until one limit is refused
+            break
+        assert len(stored.data) <= limit
+        seen.append((stored.index["stride"], stored.index["of_difference"]))
+        limit = int(0.9 * len(stored.data))
+    assert seen[0][0] == 1
+    assert seen[-1][0] > 1
+    assert [stride for stride, _ in seen] == sorted(stride for stride, _ in seen)
+    small = scene | {"methods": scene["methods"][:1]}
+    both = page_images([small, scene], folder, 10**8)
+    fitted = page_images([small, scene], folder, sum(len(packed.data) for packed in both) - 1)
+    assert fitted[0] == both[0]  # the largest scene gives way first
+    assert fitted[1].index["of_difference"] > both[1].index["of_difference"]
+
+
+def test_packed_images_are_kept_until_a_file_changes_or_the_entry_is_damaged(scene, own_cache, tmp_path, monkeypatch):
+    write_files(tmp_path)
+    first = scene_images(scene, tmp_path, 10**8)
+    with monkeypatch.context() as patched:
+        patched.setattr("reports.page.image_cache.packed_scene", None)
+        assert scene_images(scene, tmp_path, 10**8) == first  # not packed again
+    (kept,) = own_cache.glob("page-*.npz")
+    kept.write_bytes(kept.read_bytes()[:-9])
+    assert scene_images(scene, tmp_path, 10**8) == first
+    changed = images()["flat"]
+    brighter = Image(changed | {"airlight": 1.01 * changed["airlight"]})
+    write_exr(tmp_path / "s" / "flat.exr", brighter, finite=False)  # the fake report has a pixel of NaN
+    assert scene_images(scene, tmp_path, 10**8).data != first.data
+
+
+def test_a_file_that_is_missing_or_of_another_size_is_refused(scene, tmp_path):
+    with pytest.raises(InputError, match="cannot read"):
+        scene_images(scene, tmp_path, 10**8)
+    write_files(tmp_path)
+    write_exr(tmp_path / "s" / "flat.exr", Image({"airlight": np.ones((4, 5, 3))}))
+    with pytest.raises(InputError, match=r"flat.exr: got 5 x 4 pixels, wanted the 32 x 24"):
+        scene_images(scene, tmp_path, 10**8)
