@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What tests see and do in a browser that shows a report's page."""
 
-import os
 import shutil
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -81,19 +79,3 @@ def probe_row(page, label, number=0):
 def as_number(words):
     mantissa, _, power = words.replace("\N{MINUS SIGN}", "-").removesuffix(" %").partition("·10")
     return float(mantissa) * 10.0 ** int(power.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")) or 0)
-
-
-def chromium_processes():
-    """The processes of Chromium that this process started, on Linux."""
-    parents = {}
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            parents[int(path.parent.name)] = int(path.read_text(errors="replace").rsplit(")", 1)[1].split()[1])
-        except OSError:
-            continue
-
-    def below(pid):
-        return [pid, *(found for child, parent in parents.items() if parent == pid for found in below(child))]
-
-    mine = below(os.getpid())
-    return [pid for pid in mine if "chrom" in Path(f"/proc/{pid}/cmdline").read_text(errors="replace").split("\0")[0]]

@@ -167,39 +167,3 @@ def report_data() -> dict[str, Any]:
 def engine_image() -> dict[str, Any]:
     """The entry of an engine's image: judged by its total, without times."""
     return engine("engine", 0.0123, method="engine", files={"exr": "s/engine.exr"})
-
-
-def write_large_report(folder: Path, *, scenes: int, methods: int, size: tuple[int, int]) -> dict[str, Any]:
-    """Write the files of one scene as large as a real one, and return a report that shows them in so many scenes.
-
-    The reference is smooth but for shafts of shadow. A method is wrong by some smooth part, by the places of the edges,
-    and in every pixel by the rounding of single precision.
-    """
-    rng = np.random.default_rng(13)
-    x, y = np.meshgrid(np.linspace(0, 1, size[0]), np.linspace(0, 1, size[1]))
-
-    def light(shift):
-        shafts = 1 - 0.6 * (np.sin(40 * (x - 0.3 + shift) / (0.3 + y)) > 0.4)
-        return np.exp(-3 * np.hypot(x - 0.5, y - 0.2))[..., None] * shafts[..., None] ** np.array([1.0, 1.2, 1.5])
-
-    def write(name, **layers):
-        write_exr(folder / "s" / f"{name}.exr", Image(layers), finite=False)
-        return {"exr": f"s/{name}.exr", "picture": f"s/{name}.png", "error": f"s/{name}-error.png"}
-
-    airlight = light(0.0)
-    surface = np.where(y > 0.7, 0.2 + 0.1 * np.sin(60 * x) ** 2, 0.0)[..., None] * np.array([1.0, 0.9, 0.8])
-    reference = write("reference", airlight=airlight, surface=surface)
-    entries = []
-    for number in range(methods):
-        wrong = 10 ** (-1 - 0.4 * number) * np.cos(7 * x + number)[..., None]
-        rounding = [1 + 6e-8 * rng.standard_normal(airlight.shape) for _ in range(2)]
-        flip = np.repeat(np.clip(np.abs(wrong) + 0.004 * rng.random(wrong.shape), 0, 1), 3, axis=2)
-        files = write(
-            f"m{number}",
-            airlight=light(0.002 * (number % 3)) * (1 + wrong) * rounding[0],
-            surface=surface * rounding[1],
-            flip=flip,
-        )
-        entries.append(method(f"method {number}", method=f"method-{number}", files=files))
-    scene = report_data()["scenes"][0] | {"size": list(size), "methods": entries, "files": reference}
-    return report_data() | {"scenes": [scene | {"name": f"scene {number}"} for number in range(scenes)]}
