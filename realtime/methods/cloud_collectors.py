@@ -163,7 +163,7 @@ class Filling:
     """A phase function and an albedo that occur in clouds, and the canonical transport of both."""
 
     transport: Any
-    clouds: tuple[Any, ...]  #: by channel, 1 for each cloud that is filled with it, otherwise 0
+    clouds: tuple[Any, ...]  #: by channel, 1 for each cloud that is filled with it, otherwise 0; None if none is
 
 
 @dataclass(frozen=True)
@@ -277,10 +277,11 @@ def _fillings(scene: Scene, parameters: CollectorParameters) -> tuple[tuple[Fill
             transport = transport_grid(transport, tables.angular, len(SETS))
         elif parameters.transport == "fit":
             transport = fit_on_device(fitted_functions(*medium, tables, transport, types), types)
-        fillings.append(Filling(transport, tuple(mi.UInt32(row.astype(np.uint32)) for row in filled)))
-    by_channel = tuple(types.scalar(row) for row in left)
-    dr.make_opaque([filling.clouds for filling in fillings], by_channel)
-    return tuple(fillings), by_channel
+        by_channel = (mi.UInt32(row.astype(np.uint32)) if row.any() else None for row in filled)
+        fillings.append(Filling(transport, tuple(by_channel)))
+    lefts = tuple(types.scalar(row) for row in left)
+    dr.make_opaque([filling.clouds for filling in fillings], lefts)
+    return tuple(fillings), lefts
 
 
 def collector_errors(parameters: CollectorParameters, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
@@ -489,9 +490,13 @@ def _many_times(
         if state.body is not None:
             own = own * state.body
         sigma_t = dr.gather(Float, own, entry.cloud, entry.there)
-        of_fillings, of_channel = [], []
-        for number, filling in enumerate(state.fillings):
-            filled = entry.there & (dr.gather(mi.UInt32, filling.clouds[channel], entry.cloud, entry.there) != 0)
+        of_fillings: list[Any] = []
+        of_channel: list[Any] = []
+        for filling in state.fillings:
+            own_clouds = filling.clouds[channel]
+            if own_clouds is None:  # no search is recorded for an albedo that other channels have
+                continue
+            filled = entry.there & (dr.gather(mi.UInt32, own_clouds, entry.cloud, entry.there) != 0)
             light = light_of_orders(
                 of_sun.of_cloud(entry.cloud),
                 filling.transport,
@@ -501,7 +506,7 @@ def _many_times(
                 extinction=dr.select(filled, sigma_t, 1),
                 behind=rays.depths[channel],
                 search=search,
-                last=None if last is None else last[channel][number],
+                last=None if last is None else last[channel][len(of_channel)],
                 place=view.tile if view.layout is Layout.SOME else None,
                 active=filled,
             )

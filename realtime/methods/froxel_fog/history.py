@@ -10,13 +10,12 @@ A froxel holds then the mean of frames, the newest with the weight 1 - h:
     S_n = (1 - h) S + h S_{n-1}(P).
 
 P is the middle of the froxel, looked up where the last frame's camera saw it; what it did not see starts anew. A change
-of the light is forgotten like h^n: to within a share e after log e / log h frames. That is the ghost. `clamp` cuts the
-history off at the least and the largest value of the froxel and its six neighbours in this frame.
+of the light is forgotten like h^n: to within a share e after log e / log h frames. That is the ghost.
 
 References
 ----------
 Roberts 2018, *The unreasonable effectiveness of quasirandom sequences*. Wronski 2014, *Volumetric fog: unified, compute
-shader based solution to atmospheric scattering*. Karis 2014, *High-quality temporal supersampling* (the clamp).
+shader based solution to atmospheric scattering*.
 """
 
 from dataclasses import dataclass
@@ -50,7 +49,7 @@ def frame_shift(last: FroxelHistory | None, Float: Any) -> tuple[Any, Any, Any]:
 
 
 def averaged(
-    scattered: PerRay, grid: Grid, last: FroxelHistory | None, *, weight: float, clamp: bool
+    scattered: PerRay, grid: Grid, last: FroxelHistory | None, *, weight: float
 ) -> tuple[PerRay, FroxelHistory]:
     """Return the mean of what froxels scatter in this frame and in those before, and what to hand on.
 
@@ -64,20 +63,13 @@ def averaged(
         What the last frame handed on; None for the first.
     weight
         h, of the history.
-    clamp
-        Whether to cut it off.
     """
     Float, Color = type(grid.far), type(scattered)
     if last is None:
         frame = dr.opaque(mi.UInt32, 1)
     else:
-        if clamp:
-            dr.eval(scattered)
         before, seen = _before(grid, last)
-        before = Color(before)
-        if clamp:
-            before = dr.clip(before, *_bounds(scattered, grid))
-        scattered = dr.select(seen, dr.lerp(scattered, before, weight), scattered)
+        scattered = dr.select(seen, dr.lerp(scattered, Color(before), weight), scattered)
         frame = last.frame + 1
     volume = packed(four_numbers(Float)(scattered.x, scattered.y, scattered.z, 0))
     return scattered, FroxelHistory(volume, grid, frame)
@@ -96,18 +88,3 @@ def _before(grid: Grid, last: FroxelHistory) -> tuple[Any, Any]:
     size = grid.width, grid.height, grid.slices
     steps = [dr.fma(place, count, -0.5) for place, count in zip((u, v, s), size)]
     return trilinear(last.volume, size, (steps[0], steps[1], steps[2])), seen
-
-
-def _bounds(scattered: PerRay, grid: Grid) -> tuple[Any, Any]:
-    """Return the least and the largest value of every froxel and its six neighbours."""
-    lane = dr.arange(mi.UInt32, grid.columns * grid.slices)
-    number = lane // grid.columns
-    row = lane // grid.width - number * grid.height
-    column = lane % grid.width
-    least = largest = scattered
-    steps = (column, 1, grid.width), (row, grid.width, grid.height), (number, grid.columns, grid.slices)
-    for place, stride, count in steps:
-        for there in (dr.select(place > 0, lane - stride, lane), dr.select(place + 1 < count, lane + stride, lane)):
-            value = dr.gather(type(scattered), scattered, there)
-            least, largest = dr.minimum(least, value), dr.maximum(largest, value)
-    return least, largest

@@ -60,11 +60,6 @@ class FroxelFogParameters(Parameters):
         "none", "samples in the middle of froxels, or moved from frame to frame", choices=("none", "frames")
     )
     history: float = parameter(0.0, "weight of the frames before; 0: each frame for itself", least=0, below=1)
-    clamp: str = parameter(
-        "none",
-        "the history as it is, or cut off at the range of this frame in the six neighbours of a froxel",
-        choices=("none", "neighbours"),
-    )
     shadow: str = parameter("map", "a look-up in a shadow map a froxel, or a shadow ray", choices=("map", "ray"))
     map: int = map_size(
         512,
@@ -74,8 +69,6 @@ class FroxelFogParameters(Parameters):
     def _check_together(self) -> None:
         if self.far and self.near >= self.far:
             raise InputError(f"near: got {self.near:g} with far={self.far:g}, wanted a depth before it")
-        if self.clamp != "none" and not self.history:
-            raise InputError(f"clamp={self.clamp}: got history=0, wanted a weight above 0, or clamp=none")
         if self.distribution == "linear" and self.near:
             raise InputError(f"near: got {self.near:g} with distribution=linear, wanted 0: all slices are equal")
 
@@ -160,9 +153,7 @@ def froxel_fog(view: View, state: FroxelShadows, lists, *, kernel, parameters: F
     scattered = scattered_light(view, grid, pieces, shift=shift, tables=state.tables, visible=visible)
     carried = None
     if hands_on(parameters):
-        scattered, carried = averaged(
-            scattered, grid, last, weight=parameters.history, clamp=parameters.clamp != "none"
-        )
+        scattered, carried = averaged(scattered, grid, last, weight=parameters.history)
     dr.eval(scattered, carried)
     volume = accumulated(view, grid, scattered, pieces)
     return Layers(airlight_at_pixels(view, grid, volume), carried=carried)

@@ -130,6 +130,24 @@ def test_suns_add_up_and_so_does_a_sky_as_a_beam(variant):
     np.testing.assert_allclose(both, alone, rtol=2e-3)
 
 
+def test_a_search_is_recorded_for_what_occurs_alone(variant):
+    """Three albedos of three channels are three searches, where nine were recorded."""
+    coloured = DROPLETS | {"albedo": {"type": "rgb", "value": [0.99, 0.97, 0.93]}}
+    made = _renderer(_scene(sun=_sun(ALONG), slab=_slab(medium=coloured)))
+    occurs = [[of is not None for of in filling.clouds] for filling in made.prepare(made.scene).fillings]
+    assert sorted(occurs) == [[False, False, True], [False, True, False], [True, False, False]]
+
+
+@pytest.mark.slow
+def test_coloured_albedos_are_three_grey_ones(variant):
+    albedo = (0.99, 0.97, 0.93)
+    coloured = DROPLETS | {"albedo": {"type": "rgb", "value": list(albedo)}}
+    image = _airlight(_scene(sun=_sun(ALONG), slab=_slab(medium=coloured)))
+    for channel, value in enumerate(albedo):
+        grey = _airlight(_scene(sun=_sun(ALONG), slab=_slab(medium=DROPLETS | {"albedo": value})))
+        np.testing.assert_allclose(image[..., channel], grey[..., channel], rtol=1e-4, atol=1e-7)
+
+
 def test_coloured_clouds_are_three_grey_ones(variant):
     sigma = (0.05, 0.03, 0.02)
     spectral = {"sigma_t": {"type": "rgb", "value": list(sigma)}, "has_spectral_extinction": True}

@@ -57,18 +57,6 @@ def test_the_ghost_of_a_light_that_changed_fades_like_a_power_of_the_weight(vari
         assert ghost == pytest.approx(weight**number, rel=1e-4)
 
 
-@pytest.mark.claim("froxel-ghost", tolerance="exact: a history that is cut off is within the range of this frame")
-def test_the_clamp_leaves_no_ghost_of_a_brighter_light(variant):
-    bright = scene()
-    dark = darker(bright, 1e-3)
-    kept, clamped = (
-        frames([(bright, {}), (dark, {})], history=0.9, clamp=clamp)[1] for clamp in ("none", "neighbours")
-    )
-    alone = frames([(dark, {})])[0]
-    assert kept.mean() > 100 * alone.mean()
-    assert alone.mean() < clamped.mean() < 2 * alone.mean()
-
-
 @pytest.mark.claim("froxel-jitter", tolerance="below 0.8 of the error of a frame alone")
 def test_frames_that_sample_elsewhere_come_closer_to_a_finer_grid(variant):
     now = scene()

@@ -191,7 +191,6 @@ def test_shadows_are_there(variant, name, shadow):
     [
         ({"near": 3.0, "far": 2.0}, "near: got 3 with far=2, wanted a depth before it"),
         ({"near": 3.0, "distribution": "linear"}, "near: got 3 with distribution=linear"),
-        ({"clamp": "neighbours"}, "clamp=neighbours: got history=0"),
         ({"width": 4096, "height": 4096, "slices": 4096}, "froxels: needs .* GB of memory"),
     ],
 )
