@@ -14,6 +14,7 @@ Read in this order:
 - `surface.py`: the lit surface behind the medium;
 - `ahead.py`: work that threads do ahead of what needs it;
 - `light_points.py`: points on lights with extent;
+- `replicates.py`: how many of them a ray needs, and means whose intervals hold;
 - `area_airlight.py`: the airlight of lights with extent;
 - `area_surface.py`: the surface that they light;
 - `emission.py`: these lights seen directly;

@@ -10,7 +10,7 @@ The inner integral is that of a point light with the cosine in its integrand: a 
 the angle at the light like the cone of a spot, and a weight like that of a soft spot. It is continuous in y where the
 light's visibility from a surface is not, so that few points do; the table in docs/ground-truth.md shows how few. Eight
 independent scramblings (`reference.quadrature.light_points`) each give a mean, and their spread the standard error.
-Points are doubled for the rays whose standard error is above the one that was asked for.
+`reference.quadrature.replicates` says how many points a ray gets.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -27,6 +27,7 @@ from analytic.panels import airlight_segments
 from reference.quadrature.ahead import done_ahead
 from reference.quadrature.light_airlight import light_airlight
 from reference.quadrature.light_points import REPLICATES, PointPlan, light_points, square_points
+from reference.quadrature.replicates import PILOT, replicate_means
 from reference.quadrature.unbounded import Rays, edge_worth
 from reference.scene.area_light import TruthAreaLight
 from reference.scene.read import TruthLight, TruthScene
@@ -47,7 +48,6 @@ _ROWS = 1 << 16  # rays and points at once
 _PAIRS = 1 << 17  # the same, where lit intervals are looked for
 _SHADOWS = 1 << 22  # shadows of that many rays and points at once
 _CHECKS = 1  # random shadow rays of each ray and point: there are many points
-FLOOR = 0.05  #: of the mean over rays: below this a ray's error need not be small relative to its value
 
 
 @dataclass(frozen=True)
@@ -90,15 +90,14 @@ def area_airlight(
         Called with the name of each part of the work and a function that does it; may return what it did before.
     """
     count = len(truth.direction)
-    total, bound = np.zeros((count, 3, REPLICATES)), np.zeros((count, 3))
-    used, checks = np.zeros(count), []
+    bound, checks = np.zeros((count, 3)), list[RandomChecks]()
     lights = [(light, *before_light(truth, light)) for light in truth.area]
-    squares = [[square_points(plan, i, k, light.kind) for k in range(REPLICATES)] for i, light in enumerate(truth.area)]
-    active, low, high = np.arange(count), 0, min(plan.first, plan.most)
-    floor: Array | None = None
-    rounds = 1 + int(np.log2(max(1, plan.most // max(1, plan.first))))
+    rounds = 2 * plan.rounds * len(lights) * REPLICATES
     done = 0
-    while len(active):
+
+    def sums(part: str, chosen: PointPlan, active: Index, numbers: tuple[int, int]) -> Array:
+        nonlocal done
+        total = np.zeros((len(active), 3, REPLICATES))
         for number, (light, scene, shapes) in enumerate(lights):
             rays = replace(scene, direction=truth.direction[active])
             ways = how | {"shapes": shapes, "checks": _CHECKS}
@@ -107,23 +106,19 @@ def area_airlight(
                     partial(blockers, light, shapes, truth.origin, rays.direction, distance[active])
                 )
             for replicate in range(REPLICATES):
-                some = light_points(light, squares[number][replicate][low:high])
-                work = partial(_sums_over, rays, some, distance[active], shadow_scale, ways)
-                sums = keep(f"airlight-{number}-{high}-{replicate}", work)
-                total[active, :, replicate] += sums["radiance"]
-                bound[active] += sums["bound"]
-                checked, disagreements, refined, left = (int(value) for value in sums["checks"][:4])
-                checks.append(RandomChecks(checked, disagreements, refined, left, float(sums["checks"][4])))
-                tell((done + (number + (replicate + 1) / REPLICATES) / len(lights)) / rounds)
-        used[active] = high
-        done += 1
-        if high >= plan.most:
-            break
-        if floor is None:
-            floor = FLOOR * (total.mean(axis=-1) / high + known).mean(axis=0)
-        active = unsettled(total[active] / high, known, active, plan.error, floor)
-        low, high = high, 2 * high
-    means = total / used[:, None, None]
+                square = square_points(chosen, number, replicate, light.kind)[slice(*numbers)]
+                work = partial(_sums_over, rays, light_points(light, square), distance[active], shadow_scale, ways)
+                got = keep(f"airlight-{part}{number}-{numbers[1]}-{replicate}", work)
+                total[..., replicate] += got["radiance"]
+                if part != PILOT:
+                    bound[active] += got["bound"]
+                    checked, disagreements, refined, left = (int(value) for value in got["checks"][:4])
+                    checks.append(RandomChecks(checked, disagreements, refined, left, float(got["checks"][4])))
+                done += 1
+                tell(done / rounds)
+        return total
+
+    means, used = replicate_means(count, known, plan, sums)
     return AreaAirlight(means, bound / (REPLICATES * used[:, None]), RandomChecks.of_all(checks))
 
 
@@ -266,31 +261,3 @@ def _stretch_sums(
         for target, column in zip((radiance, bound), known[sigma_t], strict=True):
             target[:, channel] = factor * np.bincount(ray, column, len(target))
     return radiance, bound
-
-
-def standard_error(replicates: Array) -> Array:
-    """Return the standard errors of the means over the replicates, the last axis."""
-    return replicates.std(axis=-1, ddof=1) / np.sqrt(replicates.shape[-1])
-
-
-def unsettled(
-    replicates: Array, known: Array, active: NDArray[np.int64], error: float, floor: Array
-) -> NDArray[np.int64]:
-    """Return which of the active rays have too large a standard error.
-
-    Parameters
-    ----------
-    replicates
-        Of the active rays, (active, 3, replicates) [W/(m^2 sr)].
-    known
-        What else all rays receive, (rays, 3) [W/(m^2 sr)].
-    active
-        Numbers of the rays.
-    error
-        The largest standard error, relative to the value or to `floor` [1].
-    floor
-        (3,) [W/(m^2 sr)].
-    """
-    value = replicates.mean(axis=-1) + known[active]
-    above = standard_error(replicates) > error * np.maximum(value, floor)
-    return active[above.any(axis=1)]

@@ -24,12 +24,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.area_airlight import Keep, area_airlight, standard_error
+from reference.quadrature.area_airlight import Keep, area_airlight
 from reference.quadrature.area_surface import area_surface
 from reference.quadrature.directional_airlight import directional_airlight
 from reference.quadrature.emission import emitted_light
 from reference.quadrature.light_airlight import light_airlight
 from reference.quadrature.light_points import PointPlan
+from reference.quadrature.replicates import standard_error
 from reference.quadrature.surface import lit_surface, surface_hits
 from reference.scene.read import TruthScene
 from reference.scene.shapes import Shapes, read_shapes

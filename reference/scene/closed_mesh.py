@@ -19,8 +19,6 @@ from reference.scene.read import scene_from
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_CASTS = 64  #: faces that share a corner with an edge and may hide what lies behind them, at most
-
 
 def check_closed(shape: Any) -> None:
     """Check that the surface of a shape is closed and faces outwards.
@@ -99,7 +97,8 @@ def _check_crossings(scene, shapes: list[Any], shape: Any) -> None:
     corners = [_merged(other)[0][_merged(other)[1]] if other.is_mesh() else None for other in shapes]
     passed = np.zeros(len(edges))
     left = np.arange(len(edges))
-    for _ in range(_CASTS):
+    # Faces that share a corner with an edge may hide what lies behind them: the edge is cast on from there to its end.
+    while left.size:
         origin = start[left] + passed[left, None] * direction[left]
         ray = mi.Ray3f(mi.Point3f(origin.T), mi.Vector3f(direction[left].T))
         ray.maxt = mi.Float(length[left] - passed[left])
@@ -124,8 +123,6 @@ def _check_crossings(scene, shapes: list[Any], shape: Any) -> None:
                 )
         passed[left] = travelled + 1e-6 * length[left] + 1e-6 * np.abs(start[left]).max(axis=1)
         left = left[passed[left] < length[left]]
-        if not left.size:
-            return
 
 
 def _outermost(shape: Any) -> Array:

@@ -15,7 +15,7 @@ from reference.scene.shapes import Shapes
 from reference.visibility.intervals import RandomChecks
 from reference.visibility.lit_intervals import CLEAR
 from reference.visibility.many_points import PairIntervals
-from reference.visibility.random_checks import JUDGED, ROUNDING, lit_by_all_shapes
+from reference.visibility.random_checks import JUDGED, ROUNDING, fresh_generator, lit_by_all_shapes
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -52,7 +52,7 @@ def checked_pairs(
     pair = pair[end[pair] > begin[pair]]
     if not len(pair) or not occluders.shapes():
         return RandomChecks(), np.empty(0, np.int64)
-    theta = begin[pair] + (end[pair] - begin[pair]) * np.random.default_rng(count).random(len(pair))
+    theta = begin[pair] + (end[pair] - begin[pair]) * fresh_generator(lit.foot, lit.height).random(len(pair))
     low, high = np.arctan(lit.low), np.arctan(lit.high)
     at = np.full(count, np.nan)
     at[pair] = theta

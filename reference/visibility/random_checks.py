@@ -12,6 +12,7 @@ ray-triangle intersection, J. Graphics Tools 2(1)) and every sphere, and for oth
 alone.
 """
 
+import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -147,10 +148,21 @@ def checked_geometry(
 
 def _random_samples(ray: Index, ends: tuple[Array, Array], checks: int, number: int) -> tuple[Index, Array]:
     """Return one random angle in each of `checks` equal parts of every ray."""
-    generator = np.random.default_rng((number, len(ray)))
+    generator = fresh_generator(*ends, number=number)
     share = (np.arange(checks) + generator.random((len(ray), checks))) / checks
     low, high = ends[0][ray, None], ends[1][ray, None]
     return np.repeat(ray, checks), (low + (high - low) * share).ravel()
+
+
+def fresh_generator(*drawn_for: Array, number: int = 0) -> np.random.Generator:
+    """Return a generator whose seed is the digest of what numbers are drawn for, and a number.
+
+    Rays, lights and scenes are then checked at places of their own, and at the same ones in every run.
+    """
+    digest = hashlib.blake2b(digest_size=16)
+    for array in drawn_for:
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return np.random.default_rng((int.from_bytes(digest.digest()), number))
 
 
 def _cast(visible: Visible, ray: Index, theta: Array) -> Bools:

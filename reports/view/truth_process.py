@@ -62,8 +62,8 @@ def answers(task: Task) -> Iterator[Answer]:
     InputError
         For a scene that has no truth.
     """
-    from reference.quadrature.area_airlight import standard_error
     from reference.quadrature.ray_values import ray_values
+    from reference.quadrature.replicates import standard_error
     from reference.scene.read import read_truth
     from reference.scene.shapes import read_shapes
     from reports.view.truth_order import pixel_order

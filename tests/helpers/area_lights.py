@@ -1,10 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Scene dictionaries with lights that have extent."""
+"""Scenes with area lights, and their airlight."""
 
 from typing import Any
 
+import numpy as np
+
+from reference.quadrature.area_airlight import AreaAirlight, area_airlight
+from reference.quadrature.light_points import PointPlan
+from reference.quadrature.surface import surface_hits
+from reference.scene.read import TruthScene, read_truth
+
 BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0, 0.0, 0.0]}}
 NULL = {"type": "null"}
+GREY = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.6, 0.5, 0.4]}}
 
 
 def lamp(kind: str = "rectangle", *, radiance=(3.0, 2.0, 1.0), bsdf=None, **shape: Any) -> dict[str, Any]:
@@ -35,3 +43,52 @@ def lit_scene(*, size=(4, 3), to_world=None, medium=None, **shapes: Any):
         "medium": medium,
     }
     return mi.load_dict({"type": "scene", "sensor": sensor, **shapes})
+
+
+def turned(place, angle, scale):
+    """Return a transformation that scales, turns by an angle [degrees] and moves to a place."""
+    import mitsuba as mi
+
+    return mi.ScalarTransform4f().translate(list(place)).rotate([0.8, 0.6, 0.0], angle).scale(list(scale))
+
+
+def flat(kind: str = "rectangle", **changes: Any) -> dict[str, Any]:
+    """Return a rectangle or disk over the room that faces it."""
+    return lamp(kind, to_world=turned((0.3, 0.4, 2.9), 163, (0.5, 0.5 if kind == "disk" else 0.3, 1.0)), **changes)
+
+
+def ball(**changes: Any) -> dict[str, Any]:
+    """Return a sphere over the room."""
+    return lamp("sphere", center=[0.3, 0.4, 2.9], radius=0.4, **changes)
+
+
+def lit_room(light, *, size=(5, 4), medium=None, empty=False, **shapes: Any) -> TruthScene:
+    """Return a floor with a leaning block and a ball under a light, seen from the side, or the light alone."""
+    import mitsuba as mi
+
+    usual = {
+        "floor": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(5.1), "bsdf": GREY},
+        "block": {"type": "cube", "to_world": turned((0.4, 0.2, 0.9), 27, (0.4, 0.2, 0.3)), "bsdf": GREY},
+        "ball": {"type": "sphere", "center": [-0.6, 0.3, 0.6], "radius": 0.31, "bsdf": GREY},
+    }
+    shapes = ({} if empty else usual) | shapes
+    camera = mi.ScalarTransform4f().look_at([0.2, -4.1, 1.9], [0.1, 0.0, 0.7], [0, 0, 1])
+    chosen = {name: shape for name, shape in shapes.items() if shape is not None}
+    return read_truth(lit_scene(size=size, to_world=camera, medium=medium, lamp=light, **chosen))
+
+
+def fixed(points: int, seed: int = 0) -> PointPlan:
+    """Return the plan of so many points for every ray."""
+    return PointPlan(error=0.0, first=points, most=points, seed=seed)
+
+
+def area_airlight_of(truth: TruthScene, plan: PointPlan, distance=None) -> AreaAirlight:
+    """Return the airlight of the area lights of a scene along its rays up to their surfaces, or to a distance [m]."""
+    distance = surface_hits(truth).distance if distance is None else distance
+    known, how = np.zeros((len(distance), 3)), {"samples": 64, "edges": "auto"}
+    return area_airlight(truth, distance, known, plan=plan, shadow_scale=1.0, how=how, tell=lambda share: None)
+
+
+def airlight_replicates(truth: TruthScene, plan: PointPlan, distance=None):
+    """Return the same as replicates alone, (rays, 3, replicates) [W/(m^2 sr)]."""
+    return area_airlight_of(truth, plan, distance).replicates

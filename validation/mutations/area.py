@@ -53,9 +53,9 @@ QUADRATURE: tuple[Mutation, ...] = (
     _fault(
         "area-wrong-count",
         "N - 1 in the place of N points",
-        _SUMS,
-        "means = total / used[:, None, None]",
-        "means = total / (used[:, None, None] - 1)",
+        "reference.quadrature.replicates",
+        "means = total / counts[:, None, None]",
+        "means = total / (counts[:, None, None] - 1)",
     ),
     _fault(
         "area-projected-sphere",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`single-scatter`: an integrator for Mitsuba that estimates exactly one scattering.
+"""`single-scatter`: a Monte Carlo estimate of exactly one scattering, on rays that Mitsuba casts.
 
 Read in this order:
 
@@ -11,5 +11,5 @@ Read in this order:
 - `stretches.py`: camera rays, their stretches in one medium, cells of samples;
 - `area_estimate.py`: the estimate under lights with extent;
 - `estimator.py`: the estimate of one camera ray;
-- `integrator.py`: the plugin, and its batches.
+- `integrator.py`: its batches.
 """

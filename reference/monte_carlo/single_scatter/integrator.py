@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`single-scatter`: a Mitsuba integrator that estimates exactly one scattering, in the medium or on a surface.
+"""`single-scatter`: batches of an estimator of exactly one scattering, in the medium or on a surface.
 
-The plugin and its batches; what is estimated along a ray, and how, is in
+What is estimated along a ray, and how, is in
 `reference.monte_carlo.single_scatter.estimator`. It is the check of `reference.quadrature`. The two share the rays
 through the pixel centres, which `reference.scene` reads as facts of the scene, and Mitsuba's ray casting; no derivation
 beyond the integral itself (`tests/test_independence.py` follows the imports to their end).
@@ -14,61 +14,17 @@ Rounding: a ray's foot and height are computed in double precision; everything a
 the variant's precision. Sums over at most 256 samples are single, over batches double.
 """
 
-import functools
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from analytic.errors import InputError
-from reference.monte_carlo.batches import LARGEST_BATCH, Batches, check_samples, single_batch
+from reference.monte_carlo.batches import Batches, check_samples, single_batch
 from reference.monte_carlo.single_scatter.estimator import ray_light
 from reference.monte_carlo.single_scatter.scene_data import read_task
 from reference.monte_carlo.single_scatter.stretches import double_ray
 from reference.scene.read import TruthScene
 
-PLUGIN = "single-scatter"
 _RAYS = 1 << 20  # camera rays in one kernel
-
-
-def register() -> str:
-    """Register the integrator with the current variant, and return the name of the plugin.
-
-    Afterwards ``mi.load_dict({"type": "single-scatter", "samples": 16})`` loads it. `samples` is the number of
-    stratified distances for each light and medium of one camera ray, 1 by default; the film's own samples multiply it.
-    A film's rays begin at the near clip plane, so what lies before it is missing from an image by `mi.render`
-    (DESIGN section 6.3); `single_scatter_batch` has no such plane.
-    """
-    mi.register_integrator(PLUGIN, _integrator_class(mi.variant()))
-    return PLUGIN
-
-
-@functools.cache
-def _integrator_class(variant: str):
-    """Return the integrator's class of a variant, the current one; each variant has its own base class."""
-
-    class SingleScatterIntegrator(mi.SamplingIntegrator):
-        """Exactly one scattering of point, spot, directional and area lights (see
-        `reference.monte_carlo.single_scatter.integrator`).
-        """
-
-        def __init__(self, properties):
-            super().__init__(properties)
-            self.samples = properties.get("samples", 1)
-            if not isinstance(self.samples, int) or not 1 <= self.samples <= LARGEST_BATCH:
-                raise InputError(f"{PLUGIN}: samples is {self.samples}; wanted an integer from 1 to {LARGEST_BATCH}")
-
-        def sample(self, scene, sampler, ray, medium=None, active=True):
-            lanes = double_ray(mi.Point3d(ray.o), mi.Vector3d(ray.d))
-            airlight, surface = ray_light(
-                read_task(scene, medium, self.samples), sampler, lanes, medium, mi.Bool(active)
-            )
-            return airlight + surface, dr.full(mi.Bool, True, dr.width(ray)), []
-
-        def to_string(self):
-            return f"SingleScatterIntegrator[samples = {self.samples}]"
-
-    return SingleScatterIntegrator
 
 
 def single_scatter_batch(truth: TruthScene, seed: int, samples: int) -> Batches:

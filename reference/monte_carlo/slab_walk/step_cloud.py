@@ -27,7 +27,10 @@ _BATCH = 25_000
 
 
 def step_cloud_reflectance(sun: float, *, photons: int, seed: int = 0, workers: int = 2) -> tuple[Array, Array]:
-    """Return the reflectance of each column by place of exit, and its standard error, both (32,).
+    """Return the reflectance of each column by place of exit, and its standard error, both (32,) [1].
+
+    A photon leaves through a column or not, and photons are independent: the error is sqrt(R' (1 - R')/photons) with R'
+    the share of all photons that leave there.
 
     Parameters
     ----------
@@ -40,13 +43,15 @@ def step_cloud_reflectance(sun: float, *, photons: int, seed: int = 0, workers: 
     workers
         Threads.
     """
-    batches = math.ceil(photons / _BATCH)
-    seeds = np.random.SeedSequence(seed).spawn(batches)
+    if photons < 1:
+        raise ValueError(f"photons: got {photons}, wanted at least 1")
+    sizes = [min(_BATCH, photons - start) for start in range(0, photons, _BATCH)]
+    seeds = np.random.SeedSequence(seed).spawn(len(sizes))
     with ThreadPoolExecutor(workers) as pool:
-        walked = pool.map(lambda each: _walk(math.radians(sun), _BATCH, np.random.default_rng(each)), seeds)
-        counts = np.stack(list(walked))
-    share = counts * (COLUMNS / _BATCH)
-    return share.mean(0), share.std(0, ddof=1) / math.sqrt(batches)
+        generators = map(np.random.default_rng, seeds)
+        walked = pool.map(lambda size, random: _walk(math.radians(sun), size, random), sizes, generators)
+        share = sum(walked) / photons
+    return COLUMNS * share, COLUMNS * np.sqrt(share * (1 - share) / photons)
 
 
 def _walk(sun: float, photons: int, random: np.random.Generator) -> Array:

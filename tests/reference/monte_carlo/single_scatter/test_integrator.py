@@ -311,37 +311,6 @@ def test_light_without_fog_leaves_the_surface(variant):
     assert batches.mean[1].max() > 0
 
 
-def test_plugin_works_like_any_integrator(variant):
-    """Rationale: what `mi.render` gives by name, averaged over the pixel, is the mean over batches at pixel centres.
-
-    Setup: no surface, the light behind the camera, so that the radiance is almost linear over a pixel.
-    Expected: the two images' means within 0.1 %.
-    """
-    import mitsuba as mi
-
-    from reference.monte_carlo.single_scatter.integrator import register
-
-    lamp = {"type": "point", "position": [1.9, -7.0, 2.3], "intensity": 5.0}
-    scene = _load(ball=None, floor=None, lamp=lamp)
-    integrator = mi.load_dict({"type": register(), "samples": 8})
-    assert "samples = 8" in str(integrator)
-    image = np.array(mi.render(scene, integrator=integrator, spp=64, seed=5), dtype=np.float64)
-    assert image.shape == (12, 16, 3)
-    centres = _run(scene, batches=4).mean.sum(axis=0).reshape(12, 16, 3)
-    assert image.mean(axis=(0, 1)) == pytest.approx(centres.mean(axis=(0, 1)), rel=1e-3)
-    again = np.array(mi.render(scene, integrator=integrator, spp=64, seed=5), dtype=np.float64)
-    assert np.array_equal(image, again)
-
-
-def test_plugin_refuses_samples_out_of_range(variant):
-    import mitsuba as mi
-
-    from reference.monte_carlo.single_scatter.integrator import register
-
-    with pytest.raises(Exception, match="samples is 0; wanted an integer from 1 to 256"):
-        mi.load_dict({"type": register(), "samples": 0})
-
-
 def test_seeds_decide(variant):
     """Rationale: a batch is a function of its seed, and batches of different seeds are not correlated."""
     from reference.monte_carlo.single_scatter.integrator import single_scatter_batch

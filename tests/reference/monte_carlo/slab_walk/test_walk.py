@@ -90,6 +90,15 @@ def test_the_same_seed_is_the_same_whatever_the_workers():
     assert BATCH >= 10_000
 
 
+def test_the_error_of_the_step_cloud_is_its_spread_and_as_many_photons_walk_as_were_asked():
+    runs = [step_cloud_reflectance(30, photons=700, seed=seed) for seed in range(60)]
+    values, errors = (np.array(column) for column in zip(*runs, strict=True))
+    assert np.unique(np.rint(values * 700 / 32)).size > 5
+    assert values * 700 / 32 == pytest.approx(np.rint(values * 700 / 32), abs=1e-9)
+    # 60 runs of 32 columns know a variance to sqrt(2/(60 32)) = 3.2 %: four of these.
+    assert values.var(axis=0, ddof=1).mean() == pytest.approx((errors**2).mean(), rel=0.13)
+
+
 @pytest.mark.statistical
 @pytest.mark.slow
 @pytest.mark.claim("step-cloud", tolerance="0.0005 of the mean, 0.003 RMS over columns; 4 million photons")

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""How many points of an area light a ray needs, and replicates of their sums whose intervals hold.
+
+Eight independent scramblings of N points each give a mean; their spread S gives the standard error S/sqrt(8). If the
+means are normal, (mean - truth)/(S/sqrt(8)) has Student's distribution with 7 degrees of freedom, and 2.365 standard
+errors to either side hold the truth in 95 % of all runs. That is so for an N that is fixed beforehand. If points are
+doubled until S *of the same points* is small, N is a stopping time, and S, given that it stopped the doubling, is too
+small. With n_k = 2^k n_0, means of variance sigma_k^2 and S_k^2 = sigma_k^2 chi^2_7/7 the intervals hold the truth with
+
+    sum_k  P(S_0, ..., S_{k-1} > e)  P(S_k <= e, |mean - truth| < 2.365 S_k/sqrt(8)),
+
+where a round that stops by chance has an S_k below e and far below sigma_k. For independent rounds with S ~ 1/N this is
+92.4 to 95 % as e/sigma_0 varies, for S ~ N^-1/2 it is 90.4 to 95 %: too few.
+
+So a pilot decides, and is not counted: eight replicates of other scramblings, doubled until they foresee a standard
+error at twice their points that is small enough. N is then independent of the points that count, and Student's
+distribution holds whatever N is. The pilot takes half of the points that it foresees, so all costs one and a half times
+as much as the points that count. It foresees S ~ 1/N: the sums are continuous in the point of the light, and scrambled
+nets of such functions do at least about as well; where that is too hopeful, the error that is stated is larger than the
+one that was asked for, and right. A ray that could not reach the error with all its points even if S fell as N^-3/2,
+the rate of smooth functions (Owen 1997, Scrambled net variance for integrals of smooth functions), gets all at once.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.quadrature.light_points import REPLICATES, PointPlan
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Range = tuple[int, int]
+Sums = Callable[[str, PointPlan, Index, Range], Array]
+
+FLOOR = 0.05  #: of the mean over rays: below this a ray's error need not be small relative to its value
+PILOT = "pilot-"  #: the name of the part of the work that decides
+_PILOT_SEED = 1 << 30  # apart from the seeds of points that count
+_SMOOTH = 1.5  # the largest power of 1/N by which a standard error falls
+
+
+def replicate_means(rays: int, known: Array, plan: PointPlan, sums: Sums) -> tuple[Array, Index]:
+    """Return the means of every ray and replicate, (rays, 3, replicates) [W/(m^2 sr)], and of how many points, (rays,).
+
+    Parameters
+    ----------
+    rays
+        How many.
+    known
+        What else they receive, to which errors are relative too, (rays, 3) [W/(m^2 sr)].
+    plan
+        The error to reach, and how many points a ray has.
+    sums
+        Called with `PILOT`, or an empty name for what counts, the plan with its seed, the numbers of some rays, and the
+        range of the numbers of points; returns what these give in each replicate, added up, (rays, 3, replicates).
+    """
+    counts = np.full(rays, plan.most)
+    if plan.error > 0 and plan.first < plan.most:
+        counts = _planned(rays, known, plan, sums)
+    total = np.zeros((rays, 3, REPLICATES))
+    low = 0
+    for high in sorted(set(counts.tolist())):
+        active = np.flatnonzero(counts >= high)
+        total[active] += sums("", plan, active, (low, high))
+        low = high
+    means = total / counts[:, None, None]
+    return means, counts
+
+
+def _planned(rays: int, known: Array, plan: PointPlan, sums: Sums) -> Index:
+    """Return how many points each ray needs."""
+    pilot = replace(plan, seed=plan.seed + _PILOT_SEED)
+    counts = np.full(rays, plan.most)
+    total = np.zeros((rays, 3, REPLICATES))
+    active, low, high = np.arange(rays), 0, max(1, plan.first // 2)
+    floor: Array | None = None
+    while len(active) and 2 * high < plan.most:
+        total[active] += sums(PILOT, pilot, active, (low, high))
+        mean = total[active] / high
+        value = mean.mean(axis=-1) + known[active]
+        if floor is None:
+            floor = FLOOR * value.mean(axis=0)
+        # The largest of the channels: standard error over the one that is allowed.
+        excess = (standard_error(mean) / (plan.error * np.maximum(value, floor) + np.finfo(float).tiny)).max(axis=1)
+        enough, hopeless = excess <= 2, excess > (plan.most / high) ** _SMOOTH
+        counts[active[enough]] = 2 * high
+        active, low, high = active[~(enough | hopeless)], high, 2 * high
+    return counts
+
+
+def standard_error(replicates: Array) -> Array:
+    """Return the standard errors of the means over the replicates, the last axis."""
+    return replicates.std(axis=-1, ddof=1) / np.sqrt(replicates.shape[-1])
