@@ -6,6 +6,7 @@ import pytest
 
 from realtime.numerics.aligned import aligned_array
 from realtime.scene.convex_bounds import mesh_bounds
+from tests.helpers.kernel_values import opaque
 from validation.scenes.parts import placed, rotation, scaled
 from validation.scenes.solids import box, gem, icosphere, prism
 
@@ -35,7 +36,7 @@ def seen_medium(name, light, precision="double"):
     types = array_types(precision)
     medium = Medium((types.scalar(1.0),), types.color(1.0), named_phase("isotropic"))
     bounded_medium = make_bounded_medium(medium, bounds_of(name), types)
-    return seen_from(bounded_medium, types.vector(*(float(c) for c in light))), types
+    return seen_from(bounded_medium, opaque(types.vector(*(float(c) for c in light)))), types
 
 
 def lines_in(name, light, *, count=400, seed=5):
@@ -61,9 +62,14 @@ def least_of_all(name, light, v):
 
 
 @pytest.mark.claim("bounded-media-of-methods", tolerance="1e-9 relative, in float32 2e-4")
-@pytest.mark.parametrize("precision", ["single", "double"])
-@pytest.mark.parametrize("light", [(2.4, 1.9, 2.1), (-1.9, 1.5, 0.9)])
-@pytest.mark.parametrize("name", SOLIDS)
+@pytest.mark.parametrize(
+    ("name", "light", "precision"),
+    [
+        *((name, (2.4, 1.9, 2.1), "double") for name in SOLIDS),
+        ("box", (-1.9, 1.5, 0.9), "double"),
+        ("gem", (2.4, 1.9, 2.1), "single"),
+    ],
+)
 def test_a_walk_meets_the_least_of_all_planes_everywhere(variant, name, light, precision):
     import drjit as dr
 

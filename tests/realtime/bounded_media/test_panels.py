@@ -1,19 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """As few panels as a segment in a medium needs: against many more, smaller ones."""
 
+import drjit as dr
 import numpy as np
 import pytest
 
 from realtime.numerics.aligned import aligned_array
+from tests.helpers.kernel_values import opaque, phase_of
 from tests.realtime.bounded_media.test_facet_walk import CENTRE, lines_in, seen_medium
 
-PHASES = [
-    ("isotropic", 0.0),
-    pytest.param(("rayleigh", 0.0), marks=pytest.mark.slow),
-    pytest.param(("murky", 0.0), marks=pytest.mark.slow),
-    pytest.param(("hg", 0.6), marks=pytest.mark.slow),
-    ("hg", -0.95),
-]
+PHASES = [("isotropic", 0.0), ("hg", -0.95), *(pytest.param(("murky", 0.0), marks=pytest.mark.slow),)]
 
 
 def segments(name, light, phase, *, sigma_t, precision="double"):
@@ -22,16 +18,13 @@ def segments(name, light, phase, *, sigma_t, precision="double"):
     from realtime.rays.ray_light import ray_geometry
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import named_phase
 
     seen, types = seen_medium(name, light, precision)
     start, direction, low, high = lines_in(name, light)
     part = np.where(np.arange(len(low)) % 2, 0.37, 1.0) * (high - low)
     kind, g = phase
-    medium = Medium(
-        (types.scalar(sigma_t),), types.color(1.0), named_phase(kind, g=types.scalar(g) if kind == "hg" else None)
-    )
-    lamp = Light(types.vector(*(float(c) for c in light)), types.color(1.0))
+    medium = opaque(Medium((types.scalar(sigma_t),), types.color(1.0), phase_of(kind, g, types.scalar)))
+    lamp = opaque(Light(types.vector(*(float(c) for c in light)), types.color(1.0)))
     v0, d = (types.vector(*(aligned_array(types.scalar, c) for c in v.T)) for v in (start, direction))
     from realtime.bounded_media.facet_walk import entry_planes
 
@@ -44,7 +37,7 @@ def segments(name, light, phase, *, sigma_t, precision="double"):
         start=v0,
         direction=d,
         begin=x0,
-        before=(types.scalar(0.0),),
+        before=(dr.opaque(types.scalar, 0.0),),
         seen=seen,
         planes=entry_planes(seen),
     )
@@ -58,7 +51,7 @@ def integral(segment, x0, x1):
 
 
 @pytest.mark.parametrize("phase", PHASES)
-@pytest.mark.parametrize("away", [0.1, 0.9, 3.3, 30.0])
+@pytest.mark.parametrize("away", [0.1, 3.3, 30.0])
 @pytest.mark.parametrize("name", ["icosphere", "box"])
 def test_panels_of_three_nodes_leave_little(variant, monkeypatch, name, away, phase):
     """Lights within, at and far from the medium; optical depths of it from 0.3 to 15."""
@@ -77,9 +70,9 @@ def test_panels_of_three_nodes_leave_little(variant, monkeypatch, name, away, ph
         assert np.abs(three_nodes / truth - 1)[seen].max() < 3e-5
 
 
-@pytest.mark.parametrize("name", ["icosphere", "gem", "column"])
+@pytest.mark.parametrize("name", ["gem", "column"])
 def test_panels_against_a_sum_over_small_steps(variant, name):
-    """What the leg leaves before the medium by the least of all planes; midpoints of 40 000 steps."""
+    """What the leg leaves before the medium by the least of all planes; midpoints of 8000 steps."""
     from tests.realtime.bounded_media.test_facet_walk import least_of_all
 
     light, sigma_t = np.array([1.7, 0.4, 2.9]), 1.3
@@ -89,7 +82,7 @@ def test_panels_against_a_sum_over_small_steps(variant, name):
         start, direction, low, _ = lines_in(name, light)
         begin, end = np.array(x0, dtype=np.float64), np.array(x1, dtype=np.float64)
         for ray in range(0, len(low), 41):
-            steps = begin[ray] + (np.arange(40_000) + 0.5) / 40_000 * (end[ray] - begin[ray])
+            steps = begin[ray] + (np.arange(8000) + 0.5) / 8000 * (end[ray] - begin[ray])
             v = start[ray] + steps[:, None] * direction[ray]
             r = np.linalg.norm(v, axis=1)
             enter, _ = least_of_all(name, light, v)
