@@ -45,8 +45,14 @@ def disort(tau, mu0, phase, albedo, *, streams):
 
 
 @pytest.mark.claim("slab-sums-are-disort", tolerance="1e-5 of the flux, the figure; measured 1e-6 and below")
-@pytest.mark.parametrize("albedo", [0.2, 0.5, 0.9, 0.99, 1 - 1e-6])
-@pytest.mark.parametrize("mu0", [0.2, 0.6, 1.0])
+@pytest.mark.parametrize(
+    ("albedo", "mu0"),
+    [
+        (0.9, 0.6),
+        (1 - 1e-6, 0.2),
+        *(pytest.param(albedo, mu0, marks=pytest.mark.slow) for albedo in (0.2, 0.99) for mu0 in (0.2, 1.0)),
+    ],
+)
 def test_sums_of_orders_are_disort(albedo, mu0):
     """Nearer to 1 DISORT's eigenvalues k^2 lose 1e-5 of the light, as processors round; another test is at 1."""
     for tau, phase in ((2.0, ISOTROPIC), (7.3, HG)):
@@ -82,6 +88,7 @@ def test_fluxes_of_cloud_c1(cloud_c1):
     assert down == pytest.approx([1.74767, 0.233975, 6.38345e-5], rel=2e-5)
 
 
+@pytest.mark.slow
 def test_radiance_of_cloud_c1(cloud_c1):
     """DISORT's test 5 prints what 48 streams give; resolved, its glory is 0.8 % darker, as DISORT with 200 has it."""
     directions = [(0.1, 0.0), (0.5, 0.0), (1.0, 0.0)]
@@ -95,6 +102,7 @@ def test_radiance_of_cloud_c1(cloud_c1):
     assert np.pi * more == pytest.approx([0.458734, 0.772606, 1.063698], rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.claim("slab-published", tolerance="half of the last printed digit, and 1e-5")
 def test_tables_of_van_de_hulst():
     """Multiple Light Scattering (1980), Tables 12 and 37; radiance is R mu0 for a flux of pi across the beam."""
@@ -111,6 +119,7 @@ def test_tables_of_van_de_hulst():
     assert (light.reflectance, light.transmittance) == pytest.approx((0.09739, 0.66096), abs=6e-6)
 
 
+@pytest.mark.slow
 def test_disort_1_with_its_own_streams_and_resolved():
     """Isotropic, albedo 1, mu0 = 0.1, a flux of pi/mu0: the printed digits are those of 16 streams."""
     for tau, printed, converged in (
@@ -156,14 +165,18 @@ def test_order_one_is_its_closed_form():
 
 
 @pytest.mark.claim("slab-conserves", tolerance="1e-8: the albedo is kept 1e-12 below 1")
-@pytest.mark.parametrize("tau", [1e-4, 0.01, 3.0, 300.0])
-def test_light_is_neither_made_nor_lost(tau):
-    for mu0 in (1e-3, 0.5, 1.0):
+@pytest.mark.parametrize(
+    ("tau", "suns"),
+    [(3.0, [0.5]), *(pytest.param(tau, [1e-3, 0.5, 1.0], marks=pytest.mark.slow) for tau in (1e-4, 0.01, 3.0, 300.0))],
+)
+def test_light_is_neither_made_nor_lost(tau, suns):
+    for mu0 in suns:
         light, _ = slab_light(tau, mu0, HG, 1.0, sets=ALL)
         assert light.reflectance + light.transmittance == pytest.approx(1, abs=1e-8)
         assert light.reflectance > 0
 
 
+@pytest.mark.slow
 def test_thin_slabs_scatter_in_proportion_and_nothing_scatters_nothing():
     thin, thinner = (slab_light(tau, 0.7, ISOTROPIC, 0.6, sets=[(1, 1), (2, 2)])[0] for tau in (2e-4, 1e-4))
     assert thin.sets[0].reflected.value == pytest.approx(2 * thinner.sets[0].reflected.value, rel=1e-2)
@@ -176,6 +189,7 @@ def test_thin_slabs_scatter_in_proportion_and_nothing_scatters_nothing():
     assert not dark.radiance.any()
 
 
+@pytest.mark.slow
 def test_the_estimated_error_covers_the_change_with_more_streams():
     fine, coarse = slab_light(1.0, 0.3, HG, 0.9, sets=[(1, 1), (2, 4)], depths=[0.4])
     slab = SlabOrders(1.0, 0.3, HG, 0.9, depths=[0.4], streams=128, nodes=10)
@@ -189,7 +203,9 @@ def test_the_estimated_error_covers_the_change_with_more_streams():
 def test_azimuth_is_forward_at_zero_and_mirrored():
     mu0 = 0.5
     directions = [(-mu0, 0.0), (-mu0, math.pi), (0.3, 1.0), (0.3, -1.0)]
-    forward, back, left, right = slab_radiance(1.0, mu0, HG, 0.9, depths=[1.0, 0.0], directions=directions).T
+    forward, back, left, right = slab_radiance(
+        1.0, mu0, HG, 0.9, depths=[1.0, 0.0], directions=directions, streams=16
+    ).T
     assert forward[0] > 20 * back[0]  # along the beam, its peak of order 1
     assert left[1] == pytest.approx(right[1], rel=1e-12)
 

@@ -27,7 +27,7 @@ def test_angular_factors_have_their_known_ends():
 
 
 @pytest.mark.claim("droplets-two-sides", tolerance="1e-7 relative: series of Mie's theory leave out terms of 1e-8")
-@pytest.mark.parametrize("droplets", [Droplets(), Droplets(2.0, 8.0)], ids=["6 um", "2 um"])
+@pytest.mark.parametrize("droplets", [pytest.param(Droplets(), marks=pytest.mark.slow), Droplets(2.0, 8.0)])
 def test_two_routes_give_one_phase_function(droplets):
     series = droplet_series(droplets.effective_radius, droplets.gamma)
     truth = optics(droplets)

@@ -52,33 +52,6 @@ def test_what_the_rule_of_panels_leaves_without_rounding(name):
     assert np.abs(rule[long_enough] / truth[long_enough] - 1).max() < LEFT
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("panels", [1, 2, 3])
-@pytest.mark.parametrize("name", NAMES)
-def test_segments_as_wide_and_as_deep_as_their_panels_may_be(name, panels):
-    rng = np.random.default_rng(panels)
-    types = array_types("double")
-    for g in (-0.95, 0.95) if name == "hg" else (0.0,):
-        phase = phase_of(name, g, types.scalar)
-        scale, _ = phase.lobe_scales(types.scalar)
-        widths = np.linspace(0.1, 10, 9901)
-        widest = widths[counts(name, g, widths, np.zeros(9901)) <= panels].max()
-        depths = np.linspace(1, 40, 3901)
-        deepest = depths[counts(name, g, np.full(3901, 1e-3), depths) <= panels].max()
-        deep = np.where(rng.random(30_000) < 0.3, 0, rng.uniform(0.3, 1, 30_000))
-        columns = 10 ** rng.uniform(-3, 2.5, 30_000), widest * rng.uniform(0.6, 1, 30_000), deepest * deep
-        start, width, depth = (aligned_array(types.scalar, column) for column in columns)
-        cosh = dr.sqrt(start * start + 1)
-        decay = depth / (scale * cosh * width)
-        parts = (phase, (start, cosh), scale, width, [decay], None)
-        rule, truth = np.array(panels_mean(*parts)[0]), np.array(_double_mean(*parts)[0])
-        # A segment is cut where extinction has left e^-20.
-        kept = np.array(decay * scale * (dr.sinh(dr.asinh(start) + width) - start)) < 20
-        assert kept.sum() > 3000
-        assert np.max(np.abs(rule / truth - 1)[kept]) < LEFT
-        assert np.array(panel_count(phase, width, depth))[kept].max() == panels
-
-
 @pytest.mark.parametrize("name", ["isotropic", "murky", "hg"])
 def test_no_seam_where_a_segment_takes_another_panel(name):
     """The end of a segment moves; where the number of panels changes, J must not jump: an image would show it.

@@ -6,9 +6,10 @@ import pytest
 
 
 @pytest.mark.claim("pixel-centre", tolerance="5e-7: Mitsuba's float32 matrices")
-@pytest.mark.parametrize("size", [(64, 48), (37, 53)])
-@pytest.mark.parametrize("axis", ["x", "y", "smaller"])
-@pytest.mark.parametrize("pixels", [None, (10, 31)])
+@pytest.mark.parametrize(
+    ("size", "axis", "pixels"),
+    [((64, 48), "x", None), ((37, 53), "y", None), ((37, 53), "smaller", (10, 31)), ((64, 48), "smaller", (10, 31))],
+)
 def test_rays_are_those_of_mitsuba(variant, size, axis, pixels):
     import mitsuba as mi
 
@@ -67,7 +68,7 @@ def test_tiles_hold_every_pixel_once(size):
         assert pixels[:16].tolist() == [row * 8 + column for row in range(4) for column in range(4)]
 
 
-@pytest.mark.parametrize("width", [1, 2, 3, 5, 7, 64, 320, 641, 3200, 65535, 65536, 1 << 20, (1 << 31) - 1])
+@pytest.mark.parametrize("width", [1, 3, 641, 65535, 1 << 20, (1 << 31) - 1])
 def test_rows_and_columns_are_those_of_a_division(variant, width):
     """Rationale: the division is a product with a rounded reciprocal, and wrong by one row where that does not do.
 
@@ -100,7 +101,7 @@ def test_one_kernel_serves_images_of_all_sizes(variant):
     launched = []
     for size in ((64, 48), (96, 80)):
         scene = read_scene(load_scene("sphere-spot", size).scene)
-        for method in ("unshadowed", "ray-march", "shadow-planes", "light-volumes"):
+        for method in ("unshadowed", "light-volumes"):
             renderer = prepared(scene, configuration(method))
             with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
                 dr.kernel_history_clear()
@@ -108,4 +109,4 @@ def test_one_kernel_serves_images_of_all_sizes(variant):
                 kernels = dr.kernel_history((dr.KernelType.JIT,))
             largest = max(kernels, key=lambda kernel: kernel["operation_count"])
             launched.append((method, largest["hash"]))
-    assert launched[:4] == launched[4:]
+    assert launched[:2] == launched[2:]

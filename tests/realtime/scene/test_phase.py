@@ -42,7 +42,15 @@ def test_tabulated_interpolates_between_its_cosines(variant):
 
 
 @pytest.mark.claim("phase-two-sides", tolerance="2e-5 relative in float32, 1e-6 in float64: a table's own error")
-@pytest.mark.parametrize("words", ["hg-draine:5", "hg-draine", "hg-draine:50", "mie:2:8", "mie-modified:2:8", "mie"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        "hg-draine:5",
+        "hg-draine:50",
+        "mie-modified:2:8",
+        *(pytest.param(words, marks=pytest.mark.slow) for words in ("mie", "mie:2:8")),
+    ],
+)
 def test_droplets_are_those_of_the_analytic_side(variant, words):
     import mitsuba as mi
 

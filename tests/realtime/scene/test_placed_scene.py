@@ -67,9 +67,20 @@ def image(scene, method: str, parameters):
     return render_frame(prepared(scene, configuration(method, None, parameters)))
 
 
-@pytest.mark.parametrize("many", [1, MANY])
-@pytest.mark.parametrize("normals", [False, True])
-@pytest.mark.parametrize(("method", "parameters"), METHODS)
+@pytest.mark.parametrize(
+    ("method", "parameters", "normals", "many"),
+    [
+        (*METHODS[0], True, 1),
+        (*METHODS[0], False, MANY),
+        (*METHODS[2], False, 1),
+        *(
+            pytest.param(*method, normals, many, marks=pytest.mark.slow)
+            for method in METHODS
+            for normals in (False, True)
+            for many in (1, MANY)
+        ),
+    ],
+)
 def test_moved_objects_are_those_of_a_file_with_the_object_moved(variant, method, parameters, normals, many):
     """Rays, normals, shadows on surfaces and in the fog; with a space of its own and with moved vertices."""
     scene = read(normals=normals)

@@ -108,6 +108,7 @@ def test_bins_of_directions_are_those_of_photons():
         assert math.sqrt(np.mean(off**2)) < 1.35
 
 
+@pytest.mark.slow
 def test_suns_shine_alone_and_directions_keep_their_order():
     slabs = DirectionalMoments(HG, 1.0, [0.5, -0.3, 0.1])
     both, one = slabs(1.0, [0.9, 0.3], [0.4]), slabs(1.0, [0.3], [0.4])

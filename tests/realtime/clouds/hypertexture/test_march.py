@@ -124,7 +124,7 @@ def test_depths_are_the_sums_of_the_grid_and_converge():
 
 @pytest.mark.claim("hypertexture-even", tolerance="1e-5 of opacity, 1 % of light: the map of depths has 256 texels")
 @pytest.mark.parametrize("name", ["cloud-octaves", "cloud-collectors"])
-@pytest.mark.parametrize("precision", ["single", "double"])
+@pytest.mark.parametrize("precision", ["single", pytest.param("double", marks=pytest.mark.slow)])
 def test_an_even_grid_is_a_homogeneous_cloud(name, precision):
     even, homogeneous = even_and_homogeneous(sky=SKY)
     # A uniform sky needs a slab, which no grid has: it is a beam there. Collectors in grids count whole.
@@ -151,7 +151,7 @@ def test_the_printed_equations_run_on_grids(name):
 
 
 @pytest.mark.claim("hypertexture-converges", tolerance="none: errors that shrink at least by half")
-@pytest.mark.parametrize("name", ["cloud-octaves", "cloud-collectors"])
+@pytest.mark.parametrize("name", ["cloud-octaves", pytest.param("cloud-collectors", marks=pytest.mark.slow)])
 def test_finer_grids_of_a_smooth_field_converge(name):
     # Light of the formula does not fade where there is no slab behind a point, which `way=ray` divides by.
     whole = {"way": "printed"} if name == "cloud-collectors" else {}
