@@ -20,7 +20,6 @@ from reports.machine.progress import Progress, part_of
 from reports.plotting.pictures import error_map, exposure, png_bytes, tone_mapped
 from reports.report.expected import SceneEntries, scene_seconds, shares
 from validation.comparison.engine_images import EngineImage, ImageMeasurement, image_flip, measure_image
-from validation.comparison.engine_layers import truth_layer
 from validation.configurations.methods import Configuration
 from validation.estimates.images import layered_frame, layered_truth
 from validation.estimates.monte_carlo import Spread
@@ -271,13 +270,12 @@ def _measured(study: SceneStudy, measured: Measurement, factor: float) -> Comput
 def _judged(study: SceneStudy, shown: EngineImage, factor: float) -> Computed:
     measured = measure_image(shown, study.truth_of, surfaces=study.scene.features.surfaces)
     if study.effort.flip != "none":
-        measured = replace(measured, flip=image_flip(measured, measured.truth))
-    expected = truth_layer(measured.truth, measured.layer)
+        measured = replace(measured, flip=image_flip(measured))
     test = np.asarray(measured.image.layers[measured.layer], dtype=np.float64)
     files = {
         "exr": _exr_bytes(_with_flip(_named(study, measured), measured.flip)),
         "picture": png_bytes(tone_mapped(measured.light, factor)),
-        "error": png_bytes(error_map(expected, test)),
+        "error": png_bytes(error_map(measured.expected, test)),
     }
     return image_data(measured), files
 

@@ -20,12 +20,13 @@ from reference.quadrature.ray_values import TruthImage
 from reference.scene.read import read_truth
 from reference.storage.exr import NOTE, TOTAL, Image, read_exr
 from validation.comparison.engine_hints import GAIN, Hints
-from validation.comparison.engine_layers import KINDS, JudgedLayer, judged_layer, truth_error, truth_layer
+from validation.comparison.engine_layers import KINDS, JudgedLayer, expected_layer, judged_layer
 from validation.comparison.engine_pixels import PIXELS, PixelFit, fit_pixel
 from validation.comparison.engine_verdict import ErrorPlace, Verdict, error_place, judge
 from validation.comparison.images import BATCHES, Comparison, compare_images, read_mask
 from validation.estimates.agreement import pixel_angle
 from validation.estimates.quadrature import truth_image
+from validation.estimates.reference_layers import reference_error, reference_layer
 from validation.metrics.errors import plain
 from validation.scenes.loading import LoadedScene, load_scene
 
@@ -169,9 +170,9 @@ def compare_scene(
     fit = replace(fit, hints=replace(fit.hints, words=(*fit.hints.words, *other)))
     name, with_errors = judged.name, f"{judged.name}_se" in image.layers
     layers = {name: judged.values} | ({f"{name}_se": image.layers[f"{name}_se"]} if with_errors else {})
-    wanted = truth_layer(fit.truth, judged.holds)
+    wanted = expected_layer(fit.truth, judged)
     expected = {name: wanted}
-    own_error = truth_error(fit.truth, judged.holds)
+    own_error = reference_error(fit.truth, judged.holds)
     if with_errors and own_error is not None:
         # Where no path of the image arrived it has no standard error: the truth alone must not judge such a value.
         expected[f"{name}_se"] = np.where(layers[f"{name}_se"] > 0, own_error, 0.0)
@@ -245,8 +246,15 @@ def scene_of_size(scene: str, size: tuple[int, int], path: str | os.PathLike[str
 def _other_light(judged: JudgedLayer, fitting: list[TruthImage]) -> tuple[str, ...]:
     """Say so where an image is the airlight or the surface alone, or all light, and not what it was taken for."""
     errors, powers = {}, {}
+    if judged.holds == TOTAL and judged.emitted and fitting[0].emitted is not None:
+        shown, hidden = (
+            min(_mean_square(judged.values - reference_layer(truth, TOTAL, emitted=emitted)) for truth in fitting)
+            for emitted in (True, False)
+        )
+        if GAIN**2 * hidden < shown:
+            return ("the image does not show the area lights that the camera sees: compare its airlight",)
     for name in KINDS:
-        layers = [truth_layer(truth, name) for truth in fitting]
+        layers = [reference_layer(truth, name, emitted=judged.emitted) for truth in fitting]
         errors[name] = min(_mean_square(judged.values - values) for values in layers)
         powers[name] = _mean_square(layers[0])
     nearest = min(errors, key=errors.__getitem__)

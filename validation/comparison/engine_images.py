@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.quadrature.ray_values import TruthImage
-from reference.storage.exr import NOTE, Image, read_exr
-from validation.comparison.engine_layers import AIRLIGHT, SURFACE, judged_layer, truth_layer
+from reference.storage.exr import NOTE, TOTAL, Image, read_exr
+from validation.comparison.engine_layers import AIRLIGHT, SURFACE, expected_layer, judged_layer
 from validation.comparison.engine_pixels import TruthOf, fit_pixel
 from validation.metrics.errors import Metrics, error_metrics
 from validation.metrics.flip import Flip, flip_hdr
@@ -40,7 +40,8 @@ class ImageMeasurement:
     shown: EngineImage
     image: Image  #: only the layers that were judged, named by what they hold
     layer: str  #: what `error` is of: 'airlight', 'surface', or 'total' for both together
-    truth: TruthImage  #: what it was compared with
+    truth: TruthImage  #: of the scene, of the pixels that fit
+    expected: NDArray[np.float64]  #: what `layer` was compared with, (height, width, 3) [W/(m^2 sr)]
     pixel: str  #: 'centre' or 'area': what a pixel of that truth is
     error: Metrics
     surface_error: Metrics | None  #: where the image has both layers
@@ -124,7 +125,8 @@ def measure_image(shown: EngineImage, truth_of: TruthOf, *, surfaces: bool) -> I
     if judged.name == AIRLIGHT and SURFACE in image.layers:
         layers[SURFACE] = image.layers[SURFACE]
     fit = fit_pixel(judged, truth_of)
-    error = error_metrics(truth_layer(fit.truth, judged.holds), judged.values)
+    expected = expected_layer(fit.truth, judged)
+    error = error_metrics(expected, judged.values)
     surface = (
         error_metrics(fit.truth.surface, layers[SURFACE])
         if surfaces and AIRLIGHT in layers and SURFACE in layers
@@ -133,16 +135,17 @@ def measure_image(shown: EngineImage, truth_of: TruthOf, *, surfaces: bool) -> I
     notes = [str(image.attributes[NOTE])] if NOTE in image.attributes else []
     notes += ["judged by the means over the areas of pixels, which fit"] if fit.pixel == "area" else []
     return ImageMeasurement(
-        shown, Image(layers), judged.holds, fit.truth, fit.pixel, error, surface, "; ".join(notes) or None
+        shown, Image(layers), judged.holds, fit.truth, expected, fit.pixel, error, surface, "; ".join(notes) or None
     )
 
 
-def image_flip(measured: ImageMeasurement, truth: TruthImage) -> Flip | None:
+def image_flip(measured: ImageMeasurement) -> Flip | None:
     """Return HDR-FLIP of all light, or of the airlight where an image has no more; None if it lacks the surface."""
-    layers = measured.image.layers
+    layers, truth = measured.image.layers, measured.truth
     if AIRLIGHT in layers and "surface" not in layers and np.any(truth.surface > 0):
         return None
-    return flip_hdr(truth.airlight + truth.surface, measured.light)
+    whole = measured.expected if measured.layer == TOTAL else truth.airlight + truth.surface
+    return flip_hdr(whole, measured.light)
 
 
 def _light(image: Image) -> NDArray[np.float64]:

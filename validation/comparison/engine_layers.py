@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from reference.quadrature.ray_values import TruthImage
 from reference.storage.exr import TOTAL, Image, layer, layer_names
+from validation.estimates.reference_layers import reference_layer
 
 AIRLIGHT, SURFACE = "airlight", "surface"
 KINDS = (AIRLIGHT, SURFACE, TOTAL)  #: what a layer may hold; the total is the sum of the others
@@ -26,6 +27,7 @@ class JudgedLayer:
     name: str
     holds: str  #: 'airlight', 'surface' or 'total'
     values: NDArray[np.floating]  #: (height, width, 3) [W/(m^2 sr)]
+    emitted: bool = True  #: whether its total shows the area lights themselves: files of our own do not
 
     @property
     def size(self) -> tuple[int, int]:
@@ -57,24 +59,13 @@ def judged_layer(
         raise InputError(f"--as {holds}; wanted one of {', '.join(KINDS)}")
     chosen = _usual(image, path) if name is None else name or TOTAL
     values = layer(image, chosen, path)
-    return JudgedLayer(chosen, holds or _HOLDS.get(chosen.rpartition(".")[2].lower(), TOTAL), values)
+    emitted = "emitted" not in image.layers and "airlight:scene" not in image.attributes
+    return JudgedLayer(chosen, holds or _HOLDS.get(chosen.rpartition(".")[2].lower(), TOTAL), values, emitted)
 
 
-def truth_layer(truth: TruthImage, name: str) -> NDArray[np.float64]:
-    """Return 'airlight', 'surface' or their sum, 'total', (height, width, 3) [W/(m^2 sr)]."""
-    return truth.airlight + truth.surface if name == TOTAL else getattr(truth, name)
-
-
-def truth_error(truth: TruthImage, name: str) -> NDArray[np.float64] | None:
-    """Return the standard error of `truth_layer`, (height, width, 3) [W/(m^2 sr)]; None without area lights.
-
-    Airlight and surface come from points of the same lights: the errors of the total are at most the sum of both.
-    """
-    if truth.airlight_se is None or truth.surface_se is None:
-        return None
-    if name == TOTAL:
-        return truth.airlight_se + truth.surface_se
-    return truth.airlight_se if name == AIRLIGHT else truth.surface_se
+def expected_layer(truth: TruthImage, judged: JudgedLayer) -> NDArray[np.float64]:
+    """Return what a layer should be, (height, width, 3) [W/(m^2 sr)]."""
+    return reference_layer(truth, judged.holds, emitted=judged.emitted)
 
 
 def _usual(image: Image, path: str | os.PathLike[str]) -> str:

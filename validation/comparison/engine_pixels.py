@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from reference.quadrature.ray_values import TruthImage
 from validation.comparison.engine_hints import Hints, find_hints
-from validation.comparison.engine_layers import JudgedLayer, truth_layer
+from validation.comparison.engine_layers import JudgedLayer, expected_layer
 from validation.metrics.errors import FLOOR
 
 Array = NDArray[np.float64]
@@ -67,14 +67,14 @@ def fit_pixel(image: JudgedLayer, truth_of: TruthOf, pixel: str | None = None) -
     """
     if pixel is not None:
         truth = truth_of(pixel)
-        return PixelFit(pixel, truth, find_hints(truth_layer(truth, image.holds), image.values), None, None)
+        return PixelFit(pixel, truth, find_hints(expected_layer(truth, image), image.values), None, None)
     at_centre = truth_of("centre")
-    centre = truth_layer(at_centre, image.holds)
+    centre = expected_layer(at_centre, image)
     hints = find_hints(centre, image.values)
     if _fits(centre, hints.corrected):
         return PixelFit("centre", at_centre, hints, None, None)
     over_area = truth_of("area")
-    area = truth_layer(over_area, image.holds)
+    area = expected_layer(over_area, image)
     apart = np.abs(area - centre) > APART * np.maximum(area, centre)  # an infinite centre counts
     area_hints = find_hints(area, image.values)
     errors = _error(centre, hints.corrected, apart), _error(area, area_hints.corrected, apart)

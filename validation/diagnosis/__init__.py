@@ -12,6 +12,5 @@ Read in this order:
 - `search.py`: the parameter with which a hypothesis fits best, alone and with another;
 - `verdict.py`: evidence, and which one comes first;
 - `diagnose.py`: an image file against a scene;
-- `planted.py`: faults that are planted to count the right answers;
 - `diagnosis_text.py`: what the command prints.
 """

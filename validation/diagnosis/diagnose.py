@@ -37,7 +37,7 @@ from validation.diagnosis.verdict import (
     usual_error,
 )
 from validation.fit.fit import said_pixel, three_channels
-from validation.fit.image_model import Task
+from validation.fit.image_model import Task, without_lights
 from validation.metrics.errors import plain
 from validation.scenes.loading import LoadedScene
 
@@ -157,7 +157,7 @@ def diagnose_image(
     judged = judged_layer(image, path, name=layer, holds=holds)
     light = light or SceneLight(read_truth(loaded.scene))
     values = three_channels(judged)
-    used = np.asarray(np.isfinite(values).all(axis=1))
+    used = np.isfinite(values).all(axis=1) & without_lights(light.truth, judged)
     if not used.any() or not np.any(values[used] > 0):
         raise InputError(f"{path}: the layer '{judged.name}' has no finite value above 0; there is nothing to diagnose")
     said = pixel or said_pixel(image)

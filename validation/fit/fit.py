@@ -28,6 +28,7 @@ from validation.fit.image_model import (
     needed_points,
     pixels_of_rays,
     usable_pixels,
+    without_lights,
 )
 from validation.fit.intervals import SIGMAS, interval_ends
 from validation.fit.least_squares import Solution, best_start, robust_fit, weighted_derivatives, weighted_fit
@@ -214,7 +215,7 @@ def fit_image(
     truth = read_truth(loaded.scene)
     unknowns = read_unknowns(parameters, truth, scene_fog(truth), starts or {})
     values = three_channels(judged)
-    used = usable_pixels(values)
+    used = usable_pixels(values) & without_lights(truth, judged)
     if mask is not None:
         used &= _fitting_mask(mask, judged)
     fewest = max(_FEWEST, 4 * len(unknowns))

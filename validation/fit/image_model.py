@@ -9,9 +9,13 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 
+from reference.quadrature.emission import emitted_light
+from reference.quadrature.surface import surface_hits
 from reference.scene.read import TruthScene
-from validation.comparison.engine_layers import AIRLIGHT, SURFACE
+from reference.storage.exr import TOTAL
+from validation.comparison.engine_layers import AIRLIGHT, SURFACE, JudgedLayer
 from validation.fit.unknowns import Unknown, with_values
 from validation.fog_model.build import Progress, scattering_paths
 from validation.fog_model.fog import Fog, scene_fog
@@ -184,6 +188,17 @@ def usable_pixels(values: Array) -> Bools:
     largest = values[finite].max()
     stopped: Bools = np.asarray(np.any(values == largest, axis=1) & finite)
     return finite & ~stopped if largest > 0 and np.count_nonzero(stopped) >= _SATURATED else finite
+
+
+def without_lights(truth: TruthScene, judged: JudgedLayer) -> Bools:
+    """Return which pixels show no area light, and have none beside them, where an image shows these, (pixels,).
+
+    Neither a fit nor a diagnosis explains the light itself, whose radiance no fog makes.
+    """
+    if not truth.area or judged.holds != TOTAL or not judged.emitted:
+        return np.ones(truth.width * truth.height, dtype=bool)
+    lit = emitted_light(truth, surface_hits(truth).distance).any(axis=1).reshape(truth.height, truth.width)
+    return ~binary_dilation(lit, np.ones((3, 3), dtype=bool)).ravel()
 
 
 def _with_partners(pixels: Index, task: Task, apart: int) -> Index:

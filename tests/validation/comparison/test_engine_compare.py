@@ -5,11 +5,15 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from reference.storage.exr import Image, write_exr
-from validation.comparison.engine_compare import compare_scene, scene_of_size
-from validation.comparison.engine_layers import truth_layer
+from reference.scene.read import read_truth
+from reference.storage.exr import Image, read_exr, write_exr
+from validation.comparison.engine_compare import compare_scene, scene_of_size, truths
+from validation.comparison.engine_images import EngineImage, measure_image
+from validation.comparison.engine_layers import expected_layer, judged_layer
 from validation.comparison.images import compare_files
 from validation.estimates.quadrature import truth_image
+from validation.estimates.reference_layers import reference_error, reference_layer
+from validation.fit.image_model import without_lights
 from validation.scenes.loading import load_scene
 
 SCENE = """<scene version="3.0.0">
@@ -70,7 +74,7 @@ def test_airlight_is_compared_where_there_is_one(scene, truth, write):
 
 @pytest.mark.claim("engine-layers")
 def test_plain_channels_are_compared_with_all_light(scene, truth, write):
-    total = truth_layer(truth, "total")
+    total = reference_layer(truth, "total")
     for layers in ({"total": total}, {"Final__Combined": total}):
         verdict = compare_scene(scene, write(**layers))
         assert verdict.expected == "total"
@@ -109,27 +113,54 @@ def test_standard_errors_of_the_file_are_used(scene, truth, write):
 AREA_LIT = SCENE.replace(
     '<emitter type="point"><point name="position" value="0.7, 0.3, 1.9"/></emitter>',
     """<shape type="rectangle"><transform name="to_world"><scale value="0.3"/>
-    <lookat origin="0.7, 0.3, 1.9" target="0, 0, 0" up="0, 0, 1"/></transform>
+    <lookat origin="0.6, 0.3, 1.2" target="0.2, -4.1, 1.3" up="0, 0, 1"/></transform>
     <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf><emitter type="area"/></shape>""",
 )
 
 
-@pytest.mark.claim("engine-margin", tolerance="1e-5: files are float32")
-@pytest.mark.parametrize("layer", ["airlight", "total"])
-def test_the_references_own_standard_errors_count_as_those_of_its_file(tmp_path, variant, write, layer):
-    """Under an area light, `compare SCENE IMAGE` says what `compare REFERENCE.exr IMAGE` says; it left them out."""
-    path = tmp_path / "area.xml"
+@pytest.fixture(scope="module")
+def area_lit(variant, tmp_path_factory):
+    """A scene under an area light that the camera sees: its file, the scene at 16 x 12 pixels and its reference."""
+    path = tmp_path_factory.mktemp("area") / "area.xml"
     path.write_text(AREA_LIT)
     loaded = load_scene(str(path), (16, 12))
-    truth = truth_image(loaded.scene)
-    values = truth_layer(truth, layer)
-    errors = truth.airlight_se if layer == "airlight" else truth.airlight_se + truth.surface_se
+    return str(path), loaded, truth_image(loaded.scene)
+
+
+def test_an_area_light_in_view_is_part_of_the_total_of_an_engine_but_not_of_our_files(area_lit, write):
+    """The same engine image was right in the live view and wrong in `compare` and `report --images`, or the reverse."""
+    path, loaded, truth = area_lit
+    assert truth.emitted.max() > 10 * (truth.airlight + truth.surface).max()
+    file = write(total=reference_layer(truth, "total"))
+    assert compare_scene(path, file, pixel="centre").verdict.right
+    assert measure_image(EngineImage("area", "engine", file), truths(loaded), surfaces=True).error.relative_rmse < 1e-6
+    dark = compare_scene(path, write(total=truth.airlight + truth.surface), pixel="centre")
+    assert not dark.verdict.right
+    assert dark.hints.words == ("the image does not show the area lights that the camera sees: compare its airlight",)
+    for layers, made in (({"emitted": truth.emitted}, {}), ({}, {"airlight:scene": "area"})):
+        own = judged_layer(
+            Image({"total": truth.airlight + truth.surface, **layers}, attributes=made), "own.exr", name=""
+        )
+        np.testing.assert_array_equal(expected_layer(truth, own), own.values)
+    # Neither a fit nor a diagnosis explains the radiance of the light itself.
+    left = without_lights(read_truth(loaded.scene), judged_layer(read_exr(file), file))
+    assert 0.7 < left.mean() < 1
+    assert not left.reshape(12, 16)[truth.emitted.any(axis=2)].any()
+
+
+@pytest.mark.claim("engine-margin", tolerance="1e-5: files are float32")
+@pytest.mark.parametrize("layer", ["airlight", "total"])
+def test_the_references_own_standard_errors_count_as_those_of_its_file(tmp_path, area_lit, write, layer):
+    """Under an area light, `compare SCENE IMAGE` says what `compare REFERENCE.exr IMAGE` says; it left them out."""
+    path, _, truth = area_lit
+    values = reference_layer(truth, layer)
+    errors = reference_error(truth, layer)
     sure = np.full(values.shape, 1e-5 * values.mean())  # an image that is surer than the reference
     image = {layer: values + 1e-4 * values.mean(), f"{layer}_se": sure}
     reference = tmp_path / "reference.exr"
     write_exr(reference, Image({layer: values, f"{layer}_se": errors}, attributes={"airlight:batches": 8}))
     by_file = compare_files(reference, write(**image), layer, margin=0.01).statistics
-    compared = compare_scene(str(path), write(**image), layer=layer, pixel="centre", margin=0.01)
+    compared = compare_scene(path, write(**image), layer=layer, pixel="centre", margin=0.01)
     by_scene = compared.comparison.statistics
     assert by_scene.reference_variance_share == pytest.approx(by_file.reference_variance_share, rel=1e-5)
     assert by_scene.relative_bias_ci == pytest.approx(by_file.relative_bias_ci, rel=1e-5, abs=1e-7)
@@ -162,7 +193,7 @@ def test_another_aspect_is_refused_with_the_scenes_own(scene, variant, size):
 
 
 def test_layers_that_are_not_there_are_refused(scene, truth, write):
-    total = truth_layer(truth, "total")
+    total = reference_layer(truth, "total")
     with refused("has no layer 'airlihgt'"):
         compare_scene(scene, write(airlight=truth.airlight), layer="airlihgt")
     file = write(A__Combined=total, B__Combined=total)

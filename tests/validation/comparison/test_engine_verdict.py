@@ -9,9 +9,9 @@ import pytest
 from reference.storage.exr import Image, write_exr
 from validation.comparison.engine_compare import compare_scene
 from validation.comparison.engine_hints import find_hints
-from validation.comparison.engine_layers import truth_layer
 from validation.comparison.engine_verdict import error_place, judge
 from validation.estimates.quadrature import truth_image
+from validation.estimates.reference_layers import reference_layer
 from validation.scenes.loading import load_scene
 
 SIZE = (80, 60)
@@ -25,7 +25,7 @@ def traced(request, variant, tmp_path_factory):
     pixel of the lamp is twice as bright as it should be: its variance is infinite.
     """
     truth = truth_image(load_scene(request.param, SIZE).scene, pixel="area")
-    total = truth_layer(truth, "total")
+    total = reference_layer(truth, "total")
     beside = truth.light_angle < 3 * np.deg2rad(58 / SIZE[0])
     noise = np.where(beside, 0.3, 0.02)[:, :, None] * np.random.default_rng(7).standard_normal((*total.shape[:2], 1))
     noise[np.unravel_index(truth.light_angle.argmin(), truth.light_angle.shape)] += 1.0 if beside.any() else 0.0
@@ -53,7 +53,7 @@ def test_the_right_image_of_a_path_tracer_is_called_right_without_options(traced
 @pytest.mark.claim("engine-verdict", "engine-pixels")
 def test_the_right_image_of_pixel_centres_is_called_right_too(traced):
     scene, *_ = traced
-    centre = truth_layer(truth_image(load_scene(scene, SIZE).scene), "total")
+    centre = reference_layer(truth_image(load_scene(scene, SIZE).scene), "total")
     noise = 1 + 0.02 * np.random.default_rng(8).standard_normal((*centre.shape[:2], 1))
     judged = compared(traced, noise * centre)
     assert (judged.pixel, judged.verdict.right) == ("centre", True)

@@ -11,11 +11,11 @@ from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_truth
 from reference.storage.exr import Image, write_exr
 from tests.helpers.aside import write_scenes
+from tests.helpers.planted_faults import PAIRS, PLANTED
 from validation.comparison.whole_image import to_srgb
 from validation.diagnosis.diagnose import HYPOTHESES, diagnose_file, diagnose_image
 from validation.diagnosis.diagnosis_text import diagnosis_lines
 from validation.diagnosis.encoding import gamma, srgb_in_8_bits
-from validation.diagnosis.planted import PAIRS, PLANTED
 from validation.diagnosis.prediction import Guess, SceneLight, Scenery, changed_scene
 from validation.diagnosis.search import Explanation
 from validation.diagnosis.verdict import correlation, is_noise

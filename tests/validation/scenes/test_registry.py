@@ -22,7 +22,7 @@ CLOSED = {
 }
 
 
-COSTLY = ("cumulus", "cumulus-detail")  # seconds to build
+COSTLY = ("cumulus", "cumulus-detail", "stratocumulus")  # seconds to build
 
 
 @cache
@@ -105,7 +105,7 @@ def test_sphere_turns_its_axis_to_the_light_and_lies_in_the_cone():
         ("cloud-slab", 12),
         pytest.param("cumulus", 5_120, marks=pytest.mark.slow),
         pytest.param("cumulus-detail", 5_120, marks=pytest.mark.slow),
-        ("stratocumulus", 129_596),
+        pytest.param("stratocumulus", 129_596, marks=pytest.mark.slow),
         ("step-cloud", 216),
         ("ring", 7_654),
         ("two-lobes", 5_120),

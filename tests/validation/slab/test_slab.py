@@ -114,6 +114,7 @@ def test_the_peak_of_modified_droplets_is_gone_on_both_sides():
     assert sampled.max() < math.cos(math.radians(4.99))
 
 
+@pytest.mark.slow
 def test_every_number_has_its_error_in_its_place():
     numbers = slab_numbers(slab_request(1.0, 0.0, orders="1,31-inf", depths=[0.5], directions=[(1.0, 0.0)]))
     assert numbers["error"]["orders"][1]["orders"] == "31-inf"

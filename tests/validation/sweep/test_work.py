@@ -121,6 +121,7 @@ def test_what_is_not_finite_is_counted_and_kept_out_of_the_errors(monkeypatch):
     assert row["max"] > 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("variant")
 def test_under_a_light_with_extent_a_sixteenth_of_the_pixels_has_a_truth(own_cache):
     loaded = load_cell(Cell("penumbra-plane", (40, 32), (), configuration("unshadowed")))

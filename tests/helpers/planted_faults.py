@@ -6,7 +6,7 @@ Where a fault is one of the scene, such as another extinction, the image is the 
 was done to an image is done to that of the right scene.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,20 +23,16 @@ from reference.quadrature.surface import lit_surface, surface_hits
 from reference.scene.area_light import is_area
 from reference.scene.camera import film_directions, pixel_centres
 from reference.scene.directional_light import is_directional
-from reference.scene.read import TruthLight, TruthScene, read_truth
-from reference.storage.exr import Image
-from validation.comparison.engine_layers import truth_layer
+from reference.scene.read import TruthLight, TruthScene
 from validation.comparison.whole_image import to_srgb
-from validation.diagnosis.diagnose import diagnose_image
 from validation.diagnosis.encoding import agx, blender_filmic, filmic
-from validation.diagnosis.prediction import SceneLight, Scenery, changed_scene
+from validation.diagnosis.prediction import Scenery, changed_scene
+from validation.estimates.reference_layers import reference_layer
 from validation.fog_model.build import scattering_paths
 from validation.fog_model.fog import scene_fog
 from validation.fog_model.radiance import as_array, fog_total, on_device
-from validation.scenes.loading import load_scene
 
 Array = NDArray[np.float64]
-Progress = Callable[[float, str], None]
 
 _SAMPLES = 16  # of visibility, where it is not exact: images of planted faults are small
 _POINTS = 128  # of lights with extent: 0.03 % off in the mean
@@ -76,7 +72,7 @@ def _quadrature(truth: TruthScene, **how: Any) -> TruthImage:
 
 
 def _total(image: TruthImage) -> Array:
-    return truth_layer(image, _HOLDS)
+    return reference_layer(image, _HOLDS, emitted=False)  # pixels that show a light take no part
 
 
 def right_image(truth: TruthScene) -> Array:
@@ -314,53 +310,3 @@ PAIRS = (
     _and_then("transfer", "the way from the light not attenuated", "sRGB", to_srgb),
     _and_then("channels", "no absorption", "B, G, R", _swapped),
 )  #: two faults of different kinds: a diagnosis should name both
-
-
-def planted_answers(
-    scenes: Sequence[str], size: tuple[int, int], *, progress: Progress | None = None
-) -> list[dict[str, Any]]:
-    """Plant every fault in scenes and return the answers, a row each: 'scene', 'planted', 'words', 'first',
-    'answer' with both of two faults, 'pair', 'right'.
-
-    Parameters
-    ----------
-    scenes
-        Built-in scenes or Mitsuba XML files.
-    size
-        Of the images [pixels].
-    progress
-        Called with (share done, what).
-
-    Raises
-    ------
-    InputError
-        For scenes that have no truth.
-    """
-    rows = []
-    for number, name in enumerate(scenes):
-        loaded = load_scene(name, size)
-        truth = read_truth(loaded.scene)
-        light, right = SceneLight(truth), right_image(truth)
-        for turn, planted in enumerate((*PLANTED, *PAIRS)):
-            if progress is not None:
-                share = (number + turn / len((*PLANTED, *PAIRS))) / len(scenes)
-                progress(share, f"{loaded.name}: {planted.words}")
-            image = planted.image(truth, right)
-            if image is None:
-                continue
-            diagnosis = diagnose_image(Image({_HOLDS: image}), loaded, layer=_HOLDS, pixel="centre", light=light)
-            answer = " and ".join(diagnosis.ranked[0].together) or diagnosis.first
-            rows.append(
-                {
-                    "scene": loaded.name,
-                    "planted": planted.name,
-                    "words": planted.words,
-                    "first": diagnosis.first,
-                    "answer": answer,
-                    "pair": planted in PAIRS,
-                    "right": planted.name == (answer if planted in PAIRS else diagnosis.first),
-                    "residual": diagnosis.residual,
-                    "left": diagnosis.left,
-                }
-            )
-    return rows
