@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where faults are tried: small scenes with the unchanged images of the estimators, and what a changed one must meet.
+
+A changed quadrature is compared with the batches of the unchanged `single-scatter`, and a changed `single-scatter`
+with the unchanged quadrature, layer by layer. They agree where the 95 % interval of the pooled relative bias lies
+inside the margin, as in a report (`validation.estimates.agreement`). Where a stage has volpath too, a changed
+quadrature has a second opponent, at a wider margin.
+"""
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.monte_carlo.batches import LAYERS, Batches, merged
+from reference.monte_carlo.single_scatter import integrator as single_scatter
+from reference.monte_carlo.volpath import integrator as volpath
+from reference.quadrature import image as quadrature
+from reference.quadrature.light_points import PointPlan
+from reference.quadrature.ray_values import TruthImage
+from reference.scene import read
+from reference.scene.shadow_epsilon import measure_shadow_epsilon
+from tests.evidence.injected import injected
+from tests.evidence.mutations import Mutation
+from validation.estimates.agreement import batch_estimate, layer_masks, truth_estimate, width_to_reach
+from validation.scenes.loading import load_scene, resize
+from validation.scenes.probes import PROBES, WIDE_PROBES
+from validation.statistics.comparison import compare_statistics
+
+#: Of the relative bias of quadrature against single-scatter, by stage [1]; each fault there but one is larger.
+MARGINS = {
+    "many-lights": 5e-4,
+    "two-pens": 5e-4,
+    "rayleigh": 5e-4,
+    "sun": 2e-3,  # its media have bounds that batches feel as noise
+    "wide-lights": 2.5e-3,  # 8 x 32 points of each light leave the quadrature errors of 3e-4
+}
+VOLPATH_MARGIN = 0.01
+#: Points of each of eight replicates under area lights.
+PLAN = PointPlan(error=0.0, first=32, most=32)
+_DISTANCES, _SAMPLES = 64, 256  # of single-scatter and volpath, a pixel and batch
+_LEAST, _MOST = 32, 1024  # batches
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A scene with the images of unchanged estimators."""
+
+    scene: Any  # the `mi.Scene`
+    image: TruthImage
+    masks: dict[str, NDArray[np.bool_]]  # pixels to compare, by layer
+    margin: float
+    batches: Batches  # of single-scatter
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """One comparison of a changed estimator with an unchanged one."""
+
+    layer: str
+    against: str
+    bias: float
+    interval: tuple[float, float]
+    agrees: bool
+
+
+def stage_scene(name: str) -> Any:
+    """Return a built-in scene, a probe, or `rayleigh`, the probe `many-lights` in air."""
+    size = (16, 12) if name in WIDE_PROBES else (24, 18)
+    if name in PROBES | WIDE_PROBES:
+        entries = (PROBES | WIDE_PROBES)[name]()
+    elif name == "rayleigh":
+        entries = PROBES["many-lights"]()
+        entries["fog"] |= {"phase": {"type": "rayleigh"}}
+    else:
+        return load_scene(name, size).scene
+    scene = mi.load_dict(entries)
+    resize(scene, size)
+    return scene
+
+
+def stage_of(name: str) -> Stage:
+    """Return a stage; single-scatter runs until its intervals are narrow enough, whatever they say."""
+    scene, margin = stage_scene(name), MARGINS[name]
+    truth = read.read_truth(scene)
+    image = quadrature.quadrature_image(truth, plan=PLAN)
+    masks = {layer: mask for layer, mask in layer_masks(truth, image).items() if np.any(getattr(image, layer) > 0)}
+    batches = _batches(truth, range(_LEAST))
+    while len(batches.seeds) < _MOST and not all(
+        width_to_reach(_statistics(image, batches, layer, mask, margin), margin) < 1 for layer, mask in masks.items()
+    ):
+        batches = merged(batches, _batches(truth, range(len(batches.seeds), 2 * len(batches.seeds))))
+    return Stage(scene, image, masks, margin, batches)
+
+
+def _batches(truth, seeds: range) -> Batches:
+    return reduce(merged, (single_scatter.single_scatter_batch(truth, seed, _DISTANCES) for seed in seeds))
+
+
+def _statistics(image: TruthImage, batches: Batches, layer: str, mask: Any, margin: float):
+    test = batch_estimate(batches, layer, mask)
+    return compare_statistics(truth_estimate(image, layer, test), test, mask=mask, margin=margin)
+
+
+def seen(estimator: str, mutation: Mutation | None, stage: Stage) -> Iterator[Sighting]:
+    """Compare an estimator with the other one, changed by a mutation, or not at all."""
+    # A fault may divide by zero or overflow: its image shows that.
+    with injected(*(mutation.changes if mutation else ())), np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        truth = read.read_truth(stage.scene)
+        image, batches = stage.image, stage.batches
+        if estimator == "quadrature":
+            image = quadrature.quadrature_image(truth, plan=PLAN)
+        else:
+            batches = _batches(truth, range(len(batches.seeds)))
+    against = "single-scatter" if estimator == "quadrature" else "quadrature"
+    for layer, mask in stage.masks.items():
+        yield _sighting(image, batches, layer, mask, stage.margin, against)
+
+
+def _sighting(image: TruthImage, batches: Batches, layer: str, mask: Any, margin: float, against: str) -> Sighting:
+    finite = np.isfinite(getattr(image, layer)[mask]).all() and np.isfinite(batches.mean[LAYERS.index(layer)]).all()
+    if not finite:
+        return Sighting(layer, against, float("nan"), (-np.inf, np.inf), agrees=False)
+    statistics = _statistics(image, batches, layer, mask, margin)
+    low, high = statistics.relative_bias_ci
+    return Sighting(layer, against, statistics.relative_bias, (low, high), bool(statistics.equivalent))
+
+
+def volpath_seen(mutation: Mutation | None, stage: Stage, batches: int) -> list[Sighting]:
+    """Compare a quadrature that may be changed with volpath, over its shortened shadow rays."""
+    truth = read.read_truth(stage.scene)
+    traced = reduce(merged, (volpath.volpath_batch(truth, seed, _SAMPLES) for seed in range(batches)))
+    with injected(*(mutation.changes if mutation else ())), np.errstate(all="ignore"):
+        image = quadrature.quadrature_image(read.read_truth(stage.scene), shadow_scale=1 - measure_shadow_epsilon())
+    return [_sighting(image, traced, layer, mask, VOLPATH_MARGIN, "volpath") for layer, mask in stage.masks.items()]

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claims: two estimators that agree as they are disagree over every injected fault of the physics of one of them.
+
+What all estimators share, the certified scenes find, although the estimators agree.
+"""
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+
+from reference.quadrature import image as quadrature
+from reference.scene import read
+from tests.evidence import stages
+from tests.evidence.certified.model import load_fog
+from tests.evidence.injected import Rewrite, injected, replacements, rewritten
+from tests.evidence.mutations import BELOW_THE_MARGIN, MUTATIONS, SHARED
+from validation.certified.files import certified_data
+
+#: Faults of single-scatter that the default tier tries: each takes 32 batches and kernels of its own.
+QUICK = ("no-weights", "traced-bright-shadow-leg", "traced-shadow-epsilon")
+QUICK_STAGES = ("many-lights", "two-pens", "sun")
+ESTIMATORS = ("quadrature", "single-scatter")
+NAMES = [mutation.name for mutation in MUTATIONS]
+
+
+def tiered(mutation):
+    quick = mutation.stage in QUICK_STAGES and (mutation.estimator == "quadrature" or mutation.name in QUICK)
+    return pytest.param(mutation, id=mutation.name, marks=() if quick else pytest.mark.slow)
+
+
+@pytest.fixture(scope="module")
+def stage_of(variant):
+    return cache(stages.stage_of)
+
+
+@pytest.mark.parametrize("mutation", [*MUTATIONS, *SHARED, BELOW_THE_MARGIN], ids=lambda mutation: mutation.name)
+def test_what_a_fault_names_is_there(variant, mutation):
+    """Whoever moves or rewrites a formula must move its fault: it must not vanish unnoticed."""
+    for change in mutation.changes:
+        assert rewritten(change) if isinstance(change, Rewrite) else replacements(change)
+
+
+def test_there_are_ninety_faults_and_each_estimator_has_some():
+    assert len(set(NAMES)) == len(NAMES) == 90
+    assert {mutation.estimator for mutation in MUTATIONS} == set(ESTIMATORS)
+    assert {mutation.stage for mutation in MUTATIONS} == set(stages.MARGINS)
+
+
+@pytest.mark.claim("mutations-are-caught")
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK_STAGES else pytest.param(name, marks=pytest.mark.slow) for name in stages.MARGINS]
+)
+def test_without_a_fault_they_agree(stage_of, name, estimator):
+    """The control of all that follows, by the same code: without it, what could not agree would be 'found'."""
+    found = list(stages.seen(estimator, None, stage_of(name)))
+    assert [sighting.layer for sighting in found] == ["airlight", "surface"]
+    assert all(sighting.agrees for sighting in found), found
+
+
+@pytest.mark.claim("mutations-are-caught")
+@pytest.mark.claim("area-mutations-are-caught")
+@pytest.mark.parametrize("mutation", [tiered(mutation) for mutation in MUTATIONS])
+def test_a_fault_is_found(stage_of, mutation):
+    found = list(stages.seen(mutation.estimator, mutation, stage_of(mutation.stage)))
+    assert not all(sighting.agrees for sighting in found), found
+
+
+def test_a_fault_below_the_margin_is_not_found(stage_of):
+    """The comparison has a margin, and says so: a fifth of it agrees."""
+    found = list(stages.seen("quadrature", BELOW_THE_MARGIN, stage_of("many-lights")))
+    assert all(sighting.agrees for sighting in found)
+    assert found[0].bias == pytest.approx(-1e-4, abs=5e-5)  # half width of its interval, 3e-5, and the control's bias
+
+
+def test_a_fault_leaves_nothing_behind(stage_of):
+    stage = stage_of("many-lights")
+    for mutation in (mutation for mutation in MUTATIONS if mutation.stage == "many-lights"):
+        with injected(*mutation.changes):
+            pass
+    image = quadrature.quadrature_image(read.read_truth(stage.scene), plan=stages.PLAN)
+    assert np.array_equal(image.airlight, stage.image.airlight)
+    assert np.array_equal(image.surface, stage.image.surface)
+
+
+@pytest.mark.slow
+@pytest.mark.claim("mutations-are-caught")
+def test_volpath_finds_gross_faults_and_no_others(stage_of):
+    """32 batches of Mitsuba's path tracer have intervals below its margin of 1 %: it must see a fault of 3 %."""
+    stage = stage_of("many-lights")
+    by_name = {mutation.name: mutation for mutation in MUTATIONS}
+    assert all(sighting.agrees for sighting in stages.volpath_seen(None, stage, 32))
+    for name in ("no-four-pi", "bright-shadow-leg", "forward-is-backward", "surface-bright-camera-leg"):
+        assert not all(sighting.agrees for sighting in stages.volpath_seen(by_name[name], stage, 32)), name
+
+
+def test_agreement_is_blind_to_what_all_share(stage_of):
+    stage = stage_of("many-lights")
+    mutation = next(mutation for mutation in SHARED if mutation.name == "camera-mirrored")
+    with injected(*mutation.changes):
+        changed = stages.stage_of("many-lights")
+    assert not np.array_equal(changed.image.airlight, stage.image.airlight)
+    assert all(sighting.agrees for sighting in stages.seen("quadrature", mutation, changed))
+
+
+@pytest.fixture(scope="module")
+def certified(variant):
+    """Two certified scenes without a symmetry that would hide a fault of the camera."""
+    scenes = json.loads(certified_data().read_text())["scenes"]
+    chosen = [scene for scene in scenes if scene["name"] in ("box-floor", "soft-spot")]
+    return [
+        (load_fog(scene["mitsuba"]), np.array([pixel["radiance"] for pixel in scene["pixels"]], dtype=float))
+        for scene in chosen
+    ]
+
+
+def furthest(certified):
+    """Return the largest difference between the quadrature and the certified radiance, over the largest of these."""
+    images = [quadrature.quadrature_image(read.read_truth(scene)).airlight.reshape(-1, 3) for scene, _ in certified]
+    return max(np.abs(image - known).max() / known.max() for image, (_, known) in zip(images, certified))
+
+
+@pytest.mark.parametrize("mutation", SHARED, ids=lambda mutation: mutation.name)
+def test_the_certified_scenes_find_what_all_share(certified, mutation):
+    assert furthest(certified) < 1e-9  # the tolerance of the integrals, 1e-10, and twelve digits
+    with injected(*mutation.changes):
+        assert furthest(certified) > 1e-3
