@@ -9,7 +9,6 @@ Read in this order:
 - `configurations/`: methods and kernels by name, and the timing of frames;
 - `estimates/`: the truth of a scene by each estimator, budgets, and the agreement of the estimators;
 - `certified/`: files of certified values: twelve scenes of fog, and airlight integrals;
-- `mutations/`: faults of the physics in copies of the estimators, and which of them the checks detect;
 - `kernels/`: errors, cost, convergence and stability of airlight kernels;
 - `frames/`: errors and cost of whole frames, scene by scene;
 - `scaling/`: what a method costs as its work grows;

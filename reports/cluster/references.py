@@ -22,8 +22,6 @@ from reports.cluster.run import Group, Task, run_groups
 from reports.machine.environment import activate
 from validation.estimates.monte_carlo import Elsewhere, Spread, Trace, batch_tracer
 from validation.estimates.quadrature import has_truth, keep_truth, truth_image
-from validation.mutations.record import Mutation
-from validation.mutations.study import Seen, seen_on_stage
 from validation.scenes.loading import load_scene
 from validation.sweep.keys import Made, made_here
 
@@ -120,15 +118,6 @@ def tracing(
 def spread(cluster: Cluster, picture: Picture) -> Spread:
     """Return what lets workers trace the batches that check a truth."""
     return lambda estimator, samples, counts: tracing(cluster, picture, estimator, samples=samples, counts=counts)
-
-
-def mutations_seen(
-    cluster: Cluster, names: tuple[str, ...], mutations: tuple[Mutation, ...], size: tuple[int, int], margin: float
-) -> dict[str, Seen]:
-    """Let each worker try all mutations on a stage; arguments as of `validation.mutations.study.Elsewhere`."""
-    groups = [Group((Task(name, seen_on_stage, (name, mutations, size, margin), _LIMIT),)) for name in names]
-    ended = run_groups(cluster, groups, made=_made())
-    return {outcome.task.name: outcome.value for outcome in ended if outcome.status == "done"}
 
 
 def _truth(picture: Picture, pixel: str) -> TruthImage:

@@ -22,7 +22,6 @@ Read in this order:
 - `lists.py`: `airlight list`
 - `maps.py`: `airlight maps`
 - `merge.py`: `airlight merge`
-- `mutations.py`: `airlight mutations`
 - `published.py`: `airlight published`
 - `reference.py`: `airlight reference`
 - `render.py`: `airlight render`

@@ -32,7 +32,6 @@ from reports.commands.integrate import integrate
 from reports.commands.lists import list_
 from reports.commands.maps import maps
 from reports.commands.merge import merge
-from reports.commands.mutations import mutations
 from reports.commands.published import published
 from reports.commands.reference import reference
 from reports.commands.render import render
@@ -61,7 +60,7 @@ _PANELS: dict[str, tuple[Callable[..., None], ...]] = {
     "Measure": (report, diff, bench, sweep, maps, stability),
     "Images": (reference, compare, fit, merge, describe, integrate, slab, clouds),
     "Papers": (published, figures, fidelity),
-    "Develop": (run_tests, mutations),
+    "Develop": (run_tests,),
 }
 _NAMES = {list_: "list", run_tests: "test"}  #: where the function cannot have the name
 _EPILOG = f"""

@@ -96,16 +96,6 @@ def image_data(measured: ImageMeasurement) -> dict[str, Any]:
     }
 
 
-def mutations_data(study: Any) -> dict[str, Any]:
-    """Return all results of `validation.mutations.study.study_mutations`."""
-    return {
-        "caught": study.caught,
-        "count": len(study.results),
-        "passed": study.passed,
-        "results": plain(study.results),
-    }
-
-
 def scaling_data(name: str, size: tuple[int, int], found: Scaling) -> dict[str, Any]:
     """Return how a method grows with one kind of work, in a scene with images of a size [pixels]."""
     shown = {"scene": Path(name).stem, "size": list(size), "label": found.configuration.label, "kind": found.kind}

@@ -34,7 +34,6 @@ def compare_claims(old: Report, new: Report) -> Iterator[Finding]:
     """Compare the parts that concern the whole report."""
     yield from _claims(old, new)
     yield from _stability(old, new)
-    yield from _mutations(old, new)
     yield from _growth(old, new)
 
 
@@ -60,15 +59,6 @@ def _stability(old: Report, new: Report) -> Iterator[Finding]:
             yield Finding("worse", "", kernel, f"breaks its bar: {after[kernel][0]}")
         elif kernel in after and before[kernel] and not after[kernel]:
             yield Finding("better", "", kernel, "keeps its bars again")
-
-
-def _mutations(old: Report, new: Report) -> Iterator[Finding]:
-    """Compare how many faults of the physics the checks of the truth miss."""
-    if not (old.get("mutations") and new.get("mutations")):
-        return
-    before, after = ((entry["count"] - entry["caught"]) for entry in (old["mutations"], new["mutations"]))
-    if before != after:
-        yield Finding("worse" if after > before else "better", "", "", "faults that nothing catches", before, after)
 
 
 def _growth(old: Report, new: Report) -> Iterator[Finding]:

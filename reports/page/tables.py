@@ -10,7 +10,7 @@ from reports.papers.billeter import billeter_tables
 from reports.papers.biri import biri_notes, biri_tables
 from reports.papers.fidelity import fidelity_tables
 from reports.tables.agreement import agreement_table, trust_table, verdict
-from reports.tables.checks import left_out_table, mutation_table
+from reports.tables.checks import left_out_table
 from reports.tables.drawing import html
 from reports.tables.methods import fastest_table, method_row, methods_table
 from reports.tables.peers import published_as
@@ -63,11 +63,6 @@ def agreement(scene: Data) -> Table:
     return replace(shown, columns=tuple(columns))
 
 
-def mutations(results: Iterable[Data]) -> Table:
-    """Return which faults of the physics were caught."""
-    return mutation_table(results).only("name", "caught", "meaning", "estimator", "reason")
-
-
 def seconds(scenes: Sequence[Data]) -> Table:
     """Return where the time went."""
     parts = list(scenes[0]["seconds"])
@@ -117,7 +112,6 @@ TABLES: dict[str, Callable[..., Any]] = {
     "stability_table": drawn(summary_table),
     "scaling_tables": drawn(scaling_tables),
     "left_out_table": drawn(left_out_table),
-    "mutation_table": drawn(mutations),
     "seconds_table": drawn(seconds),
     "facts_table": drawn(facts),
     "biri_tables": drawn(biri_tables),

@@ -39,7 +39,6 @@ _TYPICAL: Mapping[str, tuple[float, float, float, float]] = {
 _USUAL = (6.0, 25.0, 20.0, 4.0)  #: the same of any other scene
 _OTHERS = {
     "stability": 20.0,
-    "mutations": 500.0,
     "biri": 8.0,
     "billeter": 300.0,
     "fidelity": 8.0,

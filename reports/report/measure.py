@@ -109,11 +109,11 @@ def write_report(
     start = time.monotonic()
     cache = report_cache(environment, fresh=fresh)
     efforts = {name: effort.of(name).at(sizes.get(Path(name).stem)) for name in scenes}
-    others = [*other_parts(effort, scenes, cache, cluster), *fidelity_parts(effort, scenes, cache)]
+    others = [*other_parts(effort, scenes, cache), *fidelity_parts(effort, scenes, cache)]
     steps = _steps(progress, cache, efforts, configurations, others)
     apart = None if method_limit is None else partial(in_own_process, limit=method_limit)
     ended: dict[Configuration, str] = {}
-    seconds = dict.fromkeys(("scenes", "stability", "mutations", "scaling", "published", "fidelity"), 0.0)
+    seconds = dict.fromkeys(("scenes", "stability", "scaling", "published", "fidelity"), 0.0)
     try:
         with hint_when_stopped(lambda: _kept_words(results, "")), staged(target) as hidden:
             if cluster is not None:
@@ -144,7 +144,7 @@ def write_report(
                 with _timed(seconds, "published" if part.kind in ("biri", "billeter") else part.kind):
                     results.append(cached_result(part.entry, partial(part.compute, step)))
                 by_kind.setdefault(part.kind, []).append(results[-1])
-            stability, mutations = by_kind.get("stability"), by_kind.get("mutations")
+            stability = by_kind.get("stability")
             scaling = [record for result in by_kind.get("scaling", ()) for record in result.data["scaling"]]
             data = {
                 "schema": SCHEMA,
@@ -160,7 +160,6 @@ def write_report(
                 + (unstudied(scenes, list(FOG_SCENES)) if tuple(scenes) == effort.scenes else []),
                 "scenes": studied,
                 "stability": stability[-1].data["kernels"] if stability else [],
-                "mutations": mutations[-1].data if mutations else None,
                 "scaling": scaling,
                 "published": published_data(by_kind),
                 "fidelity": fidelity_rows(by_kind),

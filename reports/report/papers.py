@@ -1,16 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The parts of a report that belong to no scene of it.
 
-These are tables of papers, the stability of the kernels, faults of the physics, and how times grow with the work.
+These are tables of papers, the stability of the kernels, and how times grow with the work.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
-from reports.cluster.connect import Cluster
-from reports.data.serialize import mutations_data, scaling_data
+from reports.data.serialize import scaling_data
 from reports.machine.own_process import in_own_process
 from reports.machine.progress import Progress, counted, part_of
 from reports.papers.billeter import billeter_data
@@ -28,23 +26,18 @@ _GROWING_SIZE = (400, 300)  # of its images [pixels]
 class OtherPart:
     """A part of a report that belongs to no scene."""
 
-    kind: str  #: 'stability', 'mutations', 'scaling', 'biri', 'billeter' or 'fidelity'
+    kind: str  #: 'stability', 'scaling', 'biri', 'billeter' or 'fidelity'
     title: str  #: shown as the progress
     entry: CacheEntry
     compute: Callable[[Progress], Computed]
 
 
-def other_parts(
-    effort: Effort, scenes: Sequence[str], cache: ResultCache, cluster: Cluster | None = None
-) -> list[OtherPart]:
+def other_parts(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[OtherPart]:
     """Return the parts that an effort asks for; those of papers in the scenes that are studied, table by table."""
     parts = []
     if effort.rays:
         entry = cache_entry(cache, "stability", identity={"rays": effort.rays})
         parts.append(OtherPart("stability", "stability", entry, lambda progress: _stability(effort.rays, progress)))
-    if effort.mutations:
-        entry = cache_entry(cache, "mutations", identity={})
-        parts.append(OtherPart("mutations", "faults of the physics", entry, partial(_mutations, cluster)))
     if _GROWING in scenes:
         parts += [_scaling(kind, effort.seconds, cache) for kind in effort.scaling]
     if "biri" in effort.papers:
@@ -98,14 +91,6 @@ def _scaling(kind: str, seconds: float, cache: ResultCache) -> OtherPart:
 
     identity = {"scene": _GROWING, "size": _GROWING_SIZE, "kind": kind, "seconds": seconds}
     return OtherPart("scaling", "how times grow", cache_entry(cache, "scaling", identity=identity), compute)
-
-
-def _mutations(cluster: Cluster | None, progress: Progress) -> Computed:
-    from reports.cluster.references import mutations_seen
-    from validation.mutations.study import study_mutations
-
-    elsewhere = None if cluster is None else partial(mutations_seen, cluster)
-    return mutations_data(study_mutations(progress=progress, elsewhere=elsewhere)), {}
 
 
 def _biri(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[OtherPart]:

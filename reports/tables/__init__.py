@@ -21,7 +21,7 @@ Read in this order:
 - `diagnosis.py`: planted faults and the answers
 - `fit.py`: parameters that explain an image
 - `clouds.py`: tables of canonical transport and their errors
-- `checks.py`: mutations, light left out
+- `checks.py`: the light that single scattering leaves out
 - `lists.py`: scenes, methods, kernels
 - `scene.py`: the description of a scene for another renderer
 """

@@ -73,6 +73,3 @@ STABILITY = [
         "sets": [{"name": "certified", "single": {"all": _ERRORS}, "double": {"all": _ERRORS}}],
     }
 ]
-
-_FAULT = {"name": "no-falloff", "meaning": "1/r not squared", "estimator": "quadrature", "caught": False}
-MUTATIONS = {"caught": 0, "count": 1, "passed": False, "results": [_FAULT | {"reason": "too small"}]}

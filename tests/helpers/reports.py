@@ -194,7 +194,6 @@ def settings(**changes: Any) -> dict[str, Any]:
         "slow": 1.0,
         "limit": 1.0,
         "flip": "none",
-        "mutations": False,
         "rays": 0,
         "papers": [],
         "paper_kernels": ["exact"],
@@ -229,7 +228,6 @@ def report_of(scenes: list[dict[str, Any]], **changes: Any) -> dict[str, Any]:
         "claims": [{"kind": "truth", "text": "The truth is confirmed by volpath.", "good": True}],
         "scenes": scenes,
         "stability": [],
-        "mutations": None,
         "published": None,
     } | changes
 
@@ -279,8 +277,7 @@ def report(seed: int | None = None, *, busy: float = 0.0, machine: float = 1.0) 
             for place, label in enumerate(LABELS)
         ]
         scenes.append(scene(name, methods, truth=truth(mean=0.127 + number)))
-    mutations = {"count": 20, "caught": 20, "passed": True, "results": []}
-    return report_of(copy.deepcopy(scenes), stability=[stable("exact")], mutations=mutations)
+    return report_of(copy.deepcopy(scenes), stability=[stable("exact")])
 
 
 def method(data: dict[str, Any], scene: str = "hall", label: str = "shadow-planes (exact)") -> dict[str, Any]:

@@ -49,7 +49,6 @@ class Effort:
     slow: float = 0.04
     limit: float = 10.0  #: frames that would take longer are not measured, and the report says so [s]
     flip: str = "none"  #: which configurations get HDR-FLIP: 'none', 'kinds' (those of `QUICK`) or 'all'
-    mutations: bool = False  #: whether to count the mutations that the checks of the truth find
     rays: int = 0  #: number of generated rays for the stability of kernels; 0 leaves it out
     papers: tuple[str, ...] = ()  #: papers whose tables are measured again: 'biri', 'billeter'
     paper_kernels: tuple[str, ...] = ("exact",)  #: kernels of these tables
@@ -129,7 +128,6 @@ EFFORTS: dict[str, Effort] = {
             slow=0.1,
             limit=40.0,
             flip="all",
-            mutations=True,
             rays=100_000,
             papers=("biri", "billeter"),
             paper_kernels=("exact", "taylor"),

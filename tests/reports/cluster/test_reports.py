@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: a report whose truths, checks and mutations a cluster computed says what it says without one."""
+"""Claim: a report whose truths and checks a cluster computed says what it says without one."""
 
 import json
 from dataclasses import replace
@@ -9,12 +9,9 @@ import pytest
 pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
 
 from reports.cluster.connect import Place, connected
-from reports.cluster.references import mutations_seen
 from reports.report.measure import write_report
 from validation.configurations.methods import configuration
 from validation.frames.scene_study import EFFORTS
-from validation.mutations.catalogue import MUTATIONS
-from validation.mutations.study import study_mutations
 
 #: Names of what is measured by the clock.
 TIMES = {"created", "seconds", "parts", "measured", "stages", "times", "environment", "claims"}
@@ -51,19 +48,3 @@ def test_a_report_from_a_cluster_says_the_same(tmp_path, monkeypatch, variant):
     assert together == alone
     assert len(images) == 1
     assert others == images
-
-
-@pytest.mark.slow
-@pytest.mark.claim("reports-from-clusters", tolerance="none: the same numbers")
-def test_mutations_on_workers_are_those_seen_here(own_cache, variant):
-    some = [mutation for mutation in MUTATIONS if not mutation.wide][::45]
-    looked = []
-    with connected(Place(2)) as cluster:
-
-        def elsewhere(*asked):
-            looked.append(mutations_seen(cluster, *asked))
-            return looked[-1]
-
-        together = study_mutations(some, size=(8, 6), margin=0.3, elsewhere=elsewhere)
-    assert len(looked[0]) == 6  # no stage was left for this process
-    assert together == study_mutations(some, size=(8, 6), margin=0.3)

@@ -215,12 +215,11 @@ def test_claims_that_flipped():
     assert "no longer: The truth is NOT confirmed." in words(compare_reports(new, report()), "better")
 
 
-def test_kernels_and_mutations():
+def test_kernels():
     new = report()
     new["stability"][0]["broken"] = ["float32 maximum 0.1 > 0.01"]
-    new["mutations"]["caught"] = 19
     worse = words(compare_reports(report(), new))
-    assert worse == ["exact breaks its bar: float32 maximum 0.1 > 0.01", "faults that nothing catches"]
+    assert worse == ["exact breaks its bar: float32 maximum 0.1 > 0.01"]
 
 
 def test_another_method_is_the_fastest_is_a_note():
