@@ -30,7 +30,7 @@ class KnownTruth:
     """What is known of the truth of an image; what is not is NaN."""
 
     airlight: Array  #: (height, width, 3) [W/(m^2 sr)]
-    surface: Array  #: with lights with extent that are seen directly [W/(m^2 sr)]
+    surface: Array  #: [W/(m^2 sr)]
     bound: Array  #: of the error of the airlight; with lights with extent, and twice its standard error [W/(m^2 sr)]
 
     @staticmethod

@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -40,7 +40,7 @@ class Answer:
     task: int
     pixels: Any = None  #: numbers of pixels, (rays,)
     airlight: Any = None  #: (rays, 3) [W/(m^2 sr)]
-    surface: Any = None  #: with what is seen of lights with extent, (rays, 3) [W/(m^2 sr)]
+    surface: Any = None  #: (rays, 3) [W/(m^2 sr)]
     bound: Any = None  #: of the error of the airlight, and twice its standard error, (rays, 3) [W/(m^2 sr)]
     done: bool = False
     failure: str = ""
@@ -62,29 +62,28 @@ def answers(task: Task) -> Iterator[Answer]:
     InputError
         For a scene that has no truth.
     """
-    from reference.quadrature.ray_values import ray_values
-    from reference.quadrature.replicates import standard_error
-    from reference.scene.read import read_truth
-    from reference.scene.shapes import read_shapes
     from reports.view.truth_order import pixel_order
+    from validation.estimates.quadrature import truth_of_pixels
+    from validation.estimates.reference_layers import reference_error
     from validation.scenes.loading import load_scene
 
-    truth = read_truth(load_scene(task.scene, task.size, task.changes).scene)
-    shapes = read_shapes(truth.occluders)
-    order = pixel_order(truth.width, truth.height)
+    scene = load_scene(task.scene, task.size, task.changes).scene
+    order = pixel_order(*task.size)
     begin, rays = 0, _FIRST
     while begin < len(order):
         chosen = order[begin : begin + rays]
         start = time.perf_counter()
-        values = ray_values(replace(truth, direction=truth.direction[chosen]), shapes=shapes)
+        found = truth_of_pixels(scene, chosen)
         taken = time.perf_counter() - start
         begin += len(chosen)
         rays = int(np.clip(rays * np.clip(_CHUNK / max(taken, 1e-3), 0.25, 2), 16, _MOST))
-        surface, bound = values.surface, values.bound
-        if truth.area:
-            surface = surface + values.emitted
-            bound = bound + 2 * standard_error(values.replicates)[:, :3]
-        yield Answer(task.number, chosen, values.airlight, surface, bound)
+        # The lights that the camera sees are left out: the frames beside this show none.
+        layers = found.airlight, found.surface, found.airlight_bound
+        airlight, surface, bound = (layer.reshape(-1, 3) for layer in layers)
+        error = reference_error(found, "airlight")
+        if error is not None:
+            bound = bound + 2 * error.reshape(-1, 3)
+        yield Answer(task.number, chosen, airlight, surface, bound)
     yield Answer(task.number, done=True)
 
 

@@ -179,6 +179,7 @@ def test_a_report_from_python(variant, tmp_path):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.claim("python-tutorial")
 def test_the_tutorial_runs(tmp_path):
     """Every snippet of docs/python.md, one after the other as in a notebook, prints what the page says."""

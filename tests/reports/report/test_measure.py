@@ -289,6 +289,7 @@ def test_built_in_scene_with_all_standard_configurations(variant, tmp_path):
     assert not any(entry["error"]["nonfinite"] for scene in data["scenes"] for entry in scene["methods"])
 
 
+@pytest.mark.slow
 def test_flip_runs_for_as_many_at_once_as_there_are_processors(variant, tmp_path, own_cache, monkeypatch):
     """Rationale: it has one processor and takes as long as a frame; what does not ask for it is kept before."""
     from reports.report import scene as module
@@ -309,6 +310,7 @@ def test_flip_runs_for_as_many_at_once_as_there_are_processors(variant, tmp_path
     assert [entry["label"] for entry in data["scenes"][0]["methods"]] == labels
 
 
+@pytest.mark.slow
 def test_a_report_times_growing_work(variant, tmp_path, monkeypatch):
     from reports.report import papers
 

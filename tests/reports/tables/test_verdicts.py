@@ -73,7 +73,6 @@ def test_the_cheapest_kernel_is_that_within_the_error():
 def test_stability_fails_where_the_claim_is_broken(variant, monkeypatch, capsys):
     from realtime.kernels.registry import KERNELS
 
-    monkeypatch.setattr("validation.kernels.stability.laws", lambda function, rays: [])  # they have tests of their own
     stability(kernels="taylor", rays=64, json=False)
     assert "BROKEN" not in capsys.readouterr().out
     monkeypatch.setitem(KERNELS, "exact", KERNELS["taylor"])
