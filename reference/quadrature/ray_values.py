@@ -62,6 +62,9 @@ class TruthImage:
     emitted: Array | None = None  #: lights with extent seen directly [W/(m^2 sr)]; None where the scene has none
     airlight_se: Array | None = None  #: standard error of the airlight of such lights [W/(m^2 sr)]
     surface_se: Array | None = None  #: of the surface that they light [W/(m^2 sr)]
+    #: means over the image of what area lights add to airlight and surface, by replicate of their points, which all
+    #: pixels share, (2, replicates, 3) [W/(m^2 sr)]
+    replicate_means: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -108,6 +111,7 @@ def image_of(
     if truth.area:
         errors = standard_error(wide[1]).reshape(*shape, 6)
         extra = {"emitted": wide[0].reshape(*shape, 3), "airlight_se": errors[..., :3], "surface_se": errors[..., 3:]}
+        extra["replicate_means"] = wide[1].mean(axis=0).reshape(2, 3, -1).swapaxes(1, 2)
     return TruthImage(
         airlight,
         bound,
