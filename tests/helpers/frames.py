@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Frames of small scenes that tests share: a process renders each once, whoever looks at it."""
+"""Frames of small scenes that tests share: a process renders each once, whoever looks at it.
+
+Scenes are read anew for each frame: Dr.Jit's virtual calls go over all shapes that are alive. A scene that holds shapes
+of Mitsuba, such as meshes, has no description to find its frame by, and is rendered each time.
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -28,7 +32,7 @@ def frame(scene: dict[str, Any], method: str, *, kernel: str = "exact", precisio
         function = KERNELS[kernel].function
         return render_frame(frame_renderer(read(scene, precision), METHODS[method], kernel=function, **parameters))
 
-    return _once(("frame", _key(scene), method, kernel, precision, _key(parameters)), rendered)
+    return _once(("frame", scene, method, kernel, precision, parameters), rendered)
 
 
 def truth(scene: dict[str, Any]):
@@ -38,7 +42,7 @@ def truth(scene: dict[str, Any]):
     from reference.quadrature.image import quadrature_image
     from reference.scene.read import read_truth
 
-    return _once(("truth", _key(scene)), lambda: quadrature_image(read_truth(mi.load_dict(scene)), edges="geometry"))
+    return _once(("truth", scene), lambda: quadrature_image(read_truth(mi.load_dict(scene)), edges="geometry"))
 
 
 def relative_rmse(values: Any, expected: Any) -> float:
@@ -46,7 +50,11 @@ def relative_rmse(values: Any, expected: Any) -> float:
     return float(np.sqrt(np.mean((np.asarray(values, dtype=np.float64) - expected) ** 2)) / np.mean(expected))
 
 
-def _once(key: Any, make: Any) -> Any:
+def _once(description: tuple[Any, ...], make: Any) -> Any:
+    try:
+        key = _key(description)
+    except TypeError:
+        return make()
     if key not in _FRAMES:
         _FRAMES[key] = make()
     return _FRAMES[key]
@@ -58,4 +66,8 @@ def _key(value: Any) -> Any:
         return tuple((name, _key(entry)) for name, entry in value.items())
     if isinstance(value, list | tuple):
         return tuple(_key(entry) for entry in value)
-    return np.array(value.matrix).tobytes() if hasattr(value, "matrix") else value
+    if hasattr(value, "matrix"):
+        return np.array(value.matrix).tobytes()
+    if value is None or isinstance(value, str | int | float):
+        return value
+    raise TypeError

@@ -18,6 +18,7 @@ from realtime.scene.animate import with_area_lights
 from realtime.scene.light_points import with_light_points
 from realtime.scene.read_scene import read_scene
 from tests.helpers.area_lamps import area_lamp, lit_by
+from tests.helpers.frames import relative_rmse
 from tests.helpers.scenes import tiny_scene
 from tests.helpers.sunlit import fog_sphere, shaded
 from validation.scenes.loading import load_scene
@@ -44,10 +45,6 @@ def renderer_of(scene, name, **parameters):
     return frame_renderer(scene, method, kernel=KERNELS["exact"].function, **parameters)
 
 
-def relative(values, wanted):
-    return float(np.sqrt(np.mean((values - wanted) ** 2)) / wanted.mean())
-
-
 @pytest.fixture(scope="module")
 def one_by_one(variant):
     """Frames of each of five points as the only light, added up: what every method must come close to."""
@@ -65,8 +62,8 @@ def one_by_one(variant):
 def test_every_method_renders_the_points_of_a_light(variant, one_by_one, name):
     parameters, bound = CLOSE[name]
     frame = render_frame(renderer_of(scene_of(), name, points=5, pattern="sobol", **parameters))
-    assert relative(frame.airlight, one_by_one[0]) < bound
-    assert relative(frame.surface, one_by_one[1]) < (0.1 if name.startswith("light-volumes") else 1e-4)
+    assert relative_rmse(frame.airlight, one_by_one[0]) < bound
+    assert relative_rmse(frame.surface, one_by_one[1]) < (0.1 if name.startswith("light-volumes") else 1e-4)
 
 
 def test_points_of_a_small_light_are_a_point_light(variant):
@@ -83,8 +80,8 @@ def test_points_of_a_small_light_are_a_point_light(variant):
     # The lamp itself is seen in one pixel at most, where a surface ends the ray.
     seen = np.isclose(frame.distance, wanted.distance, rtol=1e-4)
     assert (~seen).sum() <= 2
-    assert relative(frame.airlight[seen], wanted.airlight[seen]) < 1e-2
-    assert relative(frame.surface[seen], wanted.surface[seen]) < 1e-2
+    assert relative_rmse(frame.airlight[seen], wanted.airlight[seen]) < 1e-2
+    assert relative_rmse(frame.surface[seen], wanted.surface[seen]) < 1e-2
 
 
 @pytest.mark.slow
@@ -95,7 +92,7 @@ def test_a_larger_number_of_points_converges(variant, name):
     wanted = render_frame(renderer_of(scene, "shadow-planes", points=512))
     frames = [render_frame(renderer_of(scene, "shadow-planes", points=points)) for points in (4, 16, 64)]
     airlight, surface = (
-        [relative(getattr(frame, layer), getattr(wanted, layer)) for frame in frames]
+        [relative_rmse(getattr(frame, layer), getattr(wanted, layer)) for frame in frames]
         for layer in ("airlight", "surface")
     )
     assert airlight[0] > 2 * airlight[1] > 4 * airlight[2]
@@ -212,7 +209,7 @@ def test_a_black_lamp_shadows_others_and_not_itself(variant):
         ]
 
     planes, marched = frames(None)
-    assert relative(planes.airlight, marched.airlight) < 4e-3  # a polygon stands for the disk
+    assert relative_rmse(planes.airlight, marched.airlight) < 4e-3  # a polygon stands for the disk
     clear, _ = frames({"type": "null"})
     assert planes.airlight.mean() < 0.97 * clear.airlight.mean()
 

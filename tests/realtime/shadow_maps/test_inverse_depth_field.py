@@ -19,23 +19,6 @@ def heights_of(size: int, kind: str):
     return shadow_map, inverse_depth_field(shadow_map)
 
 
-@pytest.mark.parametrize("kind", ["point", "spot"])
-def test_heights_are_inverse_planar_depths(variant, kind):
-    shadow_map, heights = heights_of(16, kind)
-    distance = np.array(shadow_map.distance, dtype=float).reshape(shadow_map.faces, 17, 17)
-    u = np.linspace(-1, 1, 17)
-    tangent = 1.0 if kind == "point" else np.linalg.norm(np.array(shadow_map.projection.basis[0]))
-    # By the angle between the ray and the axis, not by the norm of the direction.
-    cosine = np.cos(np.arctan(tangent * np.hypot(u[None, :], u[:, None])))
-    expected = 1 / (distance * cosine)
-    texels = np.array(heights.texels).reshape(shadow_map.faces, 16, 16, 4)
-    assert texels[..., 0] == pytest.approx(expected[:, :-1, :-1], rel=1e-6)
-    assert texels[..., 1] == pytest.approx(expected[:, :-1, 1:], rel=1e-6)
-    assert texels[..., 2] == pytest.approx(expected[:, 1:, :-1], rel=1e-6)
-    assert texels[..., 3] == pytest.approx(expected[:, 1:, 1:], rel=1e-6)
-    assert np.any(expected > 0)
-
-
 @pytest.mark.parametrize(("size", "kind", "finest"), [(16, "point", 2), (64, "spot", 4), (4, "spot", 0)])
 def test_bounds_are_those_of_the_texels(variant, size, kind, finest):
     from realtime.shadow_maps.inverse_depth_field import level_start
@@ -50,24 +33,6 @@ def test_bounds_are_those_of_the_texels(variant, size, kind, finest):
         nodes = bounds[:, level_start(level) : level_start(level + 1)].reshape(heights.faces, side, side, 2)
         assert np.array_equal(nodes[..., 0], squares.min(axis=(2, 4, 5)))
         assert np.array_equal(nodes[..., 1], squares.max(axis=(2, 4, 5)))
-
-
-@pytest.mark.parametrize(("size", "kind"), [(32, "point"), (64, "spot")])
-def test_texels_of_a_leaf_are_sorted_about_a_gap(variant, size, kind):
-    _, heights = heights_of(size, kind)
-    side = size // 4
-    texels = np.array(heights.texels).reshape(heights.faces, side, 4, side, 4, 4).swapaxes(2, 3)
-    texels = texels.reshape(-1, 16, 4)  # by leaf, then by row and column
-    least, largest = texels.min(axis=2), texels.max(axis=2)
-    sides = np.array(heights.sides)[:, None] >> np.arange(16)
-    low, both = (sides & 1) == 1, (sides >> 16 & 1) == 1
-    below, above = np.array(heights.gaps).reshape(-1, 2).T[:, :, None]
-    assert not np.any(low & both)
-    assert np.all(largest[low] <= np.broadcast_to(below, low.shape)[low])
-    assert np.all(least[~low & ~both] >= np.broadcast_to(above, low.shape)[~low & ~both])
-    gap = np.any(low, axis=1) & ~np.all(low | both, axis=1)
-    assert np.any(gap & np.any(both, axis=1))
-    assert np.all(below[gap] <= above[gap])
 
 
 def test_faces_of_a_cube_meet_with_the_same_values(variant):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.casters import closed_sphere
+from tests.helpers.frames import relative_rmse
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 from validation.scenes.parts import mitsuba_mesh
 
@@ -21,10 +22,6 @@ def render(scene, kernel="exact", *, precision="double", **parameters):
 
     read = read_scene(mi.load_dict(scene), precision)
     return render_frame(prepared(read, configuration("shadow-planes", kernel, parameters)))
-
-
-def relative_rmse(values, expected):
-    return np.sqrt(np.mean((values - expected) ** 2)) / np.mean(expected)
 
 
 def caster(centre=(0.55, 0.2, 1.35), radius=0.28):
