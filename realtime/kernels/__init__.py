@@ -12,8 +12,8 @@ Read in this order:
 - `panels.py`: its rule for all others;
 - `quadrature_theta.py`: nodes in the angle at the light;
 - `marching.py`: the midpoint rule, uniform in the distance or in the angle;
-- `taylor.py`: the polynomial of Biri 2006 with derived coefficients;
-- `taylor_printed.py`: the same with the coefficients as printed;
+- `taylor_printed.py`: the coefficients of the annex of Biri 2006 as printed;
+- `taylor.py`: the polynomial of Biri 2006 with derived or printed coefficients;
 - `table.py`: tables of the integral;
 - `closed_form.py`: the closed form of Pegoraro and Parker 2009.
 """

@@ -24,7 +24,6 @@ from realtime.kernels.quadrature import quadrature
 from realtime.kernels.quadrature_theta import quadrature_theta
 from realtime.kernels.table import table
 from realtime.kernels.taylor import taylor
-from realtime.kernels.taylor_printed import taylor_printed
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
@@ -64,7 +63,7 @@ KERNELS: dict[str, Kernel] = {
     ),
     "taylor-printed": Kernel(
         "taylor-printed",
-        taylor_printed,
+        partial(taylor, printed=True),
         "the same with the paper's coefficients as printed, misprints included",
         "Biri, Arques, Michelin 2006, annex as transcribed",
         MappingProxyType({"degree": 4}),

@@ -17,7 +17,7 @@ The coefficients follow from three recurrences, for any degree:
   out.
 * c_n = sum_k e_{n-k} p_k, where p_k is the series of p(-sin theta), by `realtime.scene.phase`.
 
-The printed annex of the paper differs in six places (DESIGN section 3).
+The printed annex of the paper differs in six places (DESIGN section 3); `realtime.kernels.taylor_printed` has it.
 
 The difference of powers is written (theta1 - theta0) sum_k theta1^k theta0^(n-k), and theta1 - theta0 as one arc
 tangent, so that short segments and rays that pass the light do not cancel.
@@ -28,6 +28,7 @@ import numpy as np
 
 from realtime.errors import InputError
 from realtime.kernels.bounded import ConstantLeg, bounded_by, tangent_series
+from realtime.kernels.taylor_printed import HIGHEST_DEGREE, PRINTED_PHASES, printed_coefficients
 from realtime.numerics.array_types import largest
 from realtime.rays.ray_light import RayGeometry, falloff
 from realtime.scene.lights import Light
@@ -35,35 +36,41 @@ from realtime.scene.medium import Medium, per_extinction
 from realtime.scene.phase import PHASES, Phase, series_product
 
 
-def taylor_bounded(geometry: RayGeometry, x0, x1, light: Light, phase: Phase, leg: ConstantLeg, *, degree: int = 4):
+def taylor_bounded(
+    geometry: RayGeometry,
+    x0,
+    x1,
+    light: Light,
+    phase: Phase,
+    leg: ConstantLeg,
+    *,
+    degree: int = 4,
+    printed: bool = False,
+):
     """Return the airlight integral of a bounded medium by the polynomial, see `realtime.kernels.bounded` [1/m].
 
-    Valid near theta = 0, as `taylor`, and as far as a constant stands for the light's way in the medium.
+    Valid near theta = 0, as `taylor`, and as far as a constant stands for the light's way in the medium. The paper
+    prints no coefficients for the derived exponent.
     """
-    _check_degree(degree)
-    argument = leg.sigma_t * (leg.distance if leg.printed else geometry.height)
-    series = _extinction_series(argument, degree) if leg.printed else tangent_series(argument, degree)
-    coefficients = series_product(series, phase_series(phase, degree, "taylor"), degree)
-    return bounded_integral(geometry, x0, x1, light, leg, coefficients)
-
-
-def bounded_integral(geometry: RayGeometry, x0, x1, light: Light, leg: ConstantLeg, coefficients):
-    """Return the integral of a polynomial in theta over a segment in a bounded medium [1/m]."""
-    h = geometry.height
-    s0, s1 = x0 - geometry.foot, dr.minimum(x1 - geometry.foot, largest(type(h)))
-    theta0, theta1 = dr.atan2(s0, h), dr.atan2(s1, h)
-    if light.varies:
-        total = _weighted(geometry, light, (theta0, theta1), coefficients)
+    if leg.printed:
+        coefficients = _coefficients(leg.sigma_t * leg.distance, phase, degree, printed=printed)
+    elif printed:
+        raise InputError(
+            "kernel taylor-printed: the paper prints no coefficients for the exponent that section 4.2 must mean; use "
+            "media=printed, or the kernel 'taylor'"
+        )
     else:
-        total = _integrated(geometry, (s0, s1), (theta0, theta1), coefficients)
+        _check_degree(degree)
+        series = tangent_series(leg.sigma_t * geometry.height, degree)
+        coefficients = series_product(series, _phase_series(phase, degree, "taylor"), degree)
     depth = dr.fma(leg.sigma_t, geometry.foot, leg.depth)
     if leg.printed:
         depth = dr.fma(leg.sigma_t, leg.distance, depth)  # e^-b, which the coefficients leave out
-    return total * dr.exp(-depth) / h
+    return _polynomial(geometry, x0, x1, light, coefficients) * dr.exp(-depth) / geometry.height
 
 
 @bounded_by(taylor_bounded)
-def taylor(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, degree: int = 4):
+def taylor(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, degree: int = 4, printed: bool = False):
     """Return the airlight integral J by the Taylor polynomial about the foot [1/m].
 
     Parameters
@@ -71,34 +78,59 @@ def taylor(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, degre
     geometry, x0, x1, medium, light
         See `realtime.kernels`.
     degree
-        Degree of the polynomial, 4 in the paper.
+        Degree of the polynomial, 4 in the paper; at most 4 as printed, where with 2 every coefficient is a printed one.
+    printed
+        Whether the coefficients are those of the paper's annex, misprints included: the kernel `taylor-printed`.
 
     Raises
     ------
     InputError
-        For a tabulated phase function, which has no series, and for a negative degree.
+        For a phase function that has no series, or that the annex does not have, and for a degree that there is not.
 
     Notes
     -----
     Valid near theta = 0 only: the error is large where the segment ends more than about 1 rad from the foot or where
     sigma_t h is large; far behind the camera exp(-sigma_t foot) overflows. That is the published method's own limit.
+    As printed it is valid nowhere in particular: even near the foot the error is of first order in theta (hazy, murky)
+    or of second (isotropic, Rayleigh).
     """
-    _check_degree(degree)
-    foot, h = geometry.foot, geometry.height
-    s0, s1 = x0 - foot, dr.minimum(x1 - foot, largest(type(h)))
-    theta0, theta1 = dr.atan2(s0, h), dr.atan2(s1, h)
-    series = phase_series(medium.phase, degree, "taylor")
+    h = geometry.height
 
     def integral(sigma_t):
         a = sigma_t * h
-        coefficients = series_product(_extinction_series(a, degree), series, degree)
-        if light.varies:
-            total = _weighted(geometry, light, (theta0, theta1), coefficients)
-        else:
-            total = _integrated(geometry, (s0, s1), (theta0, theta1), coefficients)
-        return total * dr.exp(-sigma_t * foot - a) / h
+        coefficients = _coefficients(a, medium.phase, degree, printed=printed)
+        total = _polynomial(geometry, x0, x1, light, coefficients)
+        return total * dr.exp(-sigma_t * geometry.foot - a) / h
 
     return per_extinction(medium, integral)
+
+
+def _coefficients(a, phase: Phase, degree: int, *, printed: bool) -> list:
+    """Return c_0 to c_N without e^-a; as printed, those that the annex does not have are the derived ones."""
+    _check_degree(degree)
+    name = phase.name
+    if printed and name not in PRINTED_PHASES:
+        raise InputError(
+            f"kernel taylor-printed: the paper prints no coefficients for the phase function {name!r}; use the kernel "
+            f"'taylor' or 'quadrature', or one of {', '.join(PRINTED_PHASES)}"
+        )
+    if printed and degree > HIGHEST_DEGREE:
+        raise InputError(f"degree: got {degree}, wanted 0 to {HIGHEST_DEGREE}; for more use the kernel 'taylor'")
+    series = _phase_series(phase, degree, "taylor-printed" if printed else "taylor")
+    derived = series_product(_extinction_series(a, degree), series, degree)
+    if not printed:
+        return derived
+    known = printed_coefficients(a, name)[: degree + 1]
+    return known + derived[len(known) :]
+
+
+def _polynomial(geometry: RayGeometry, x0, x1, light: Light, coefficients):
+    """Return the integral of a polynomial in theta over a segment [1]."""
+    s0, s1 = x0 - geometry.foot, dr.minimum(x1 - geometry.foot, largest(type(geometry.height)))
+    angles = dr.atan2(s0, geometry.height), dr.atan2(s1, geometry.height)
+    if light.varies:
+        return _weighted(geometry, light, angles, coefficients)
+    return _integrated(geometry, (s0, s1), angles, coefficients)
 
 
 def _check_degree(degree: int) -> None:
@@ -144,7 +176,7 @@ def _extinction_series(a, degree: int):
     return e
 
 
-def phase_series(phase: Phase, degree: int, kernel: str):
+def _phase_series(phase: Phase, degree: int, kernel: str):
     """Return the coefficients of p(-sin theta) in powers of theta; refuse a phase function without them."""
     series = phase.series(degree)
     if series is None:

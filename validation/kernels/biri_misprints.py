@@ -13,6 +13,7 @@ near-foot       both ends within one radian of the foot of the perpendicular, as
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 
 import numpy as np
@@ -21,14 +22,16 @@ from numpy.typing import NDArray
 from analytic.cases import Cases
 from realtime.kernels.exact import exact
 from realtime.kernels.taylor import taylor
-from realtime.kernels.taylor_printed import PRINTED_PHASES, taylor_printed
+from realtime.kernels.taylor_printed import PRINTED_PHASES
 from validation.kernels.rays import wide_rays
 from validation.kernels.values import Kernel, evaluate_cases
 
 Array = NDArray[np.float64]
 
 #: The kernels compared, by the names that tables and figures give them.
-COMPARED: Mapping[str, Kernel] = MappingProxyType({"taylor-printed": taylor_printed, "taylor": taylor, "exact": exact})
+COMPARED: Mapping[str, Kernel] = MappingProxyType(
+    {"taylor-printed": partial(taylor, printed=True), "taylor": taylor, "exact": exact}
+)
 #: Percentages of rays at which the distribution of the error is given.
 PERCENTS = tuple(range(0, 101, 5))
 
