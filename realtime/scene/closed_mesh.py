@@ -224,7 +224,7 @@ def _met_triangles(boundary: Any, begin: Array, end: Array):
     """Return the numbers of shapes and triangles that edges meet, and of the edges; and edges that may meet more."""
     length = np.linalg.norm(end - begin, axis=1)
     unit = (end - begin) / length[:, None]
-    shapes, triangles, edges = [], [], []
+    shapes, triangles, edges = ([np.zeros(0, dtype=np.int64)] for _ in range(3))
     left, past = np.arange(len(begin)), np.zeros(len(begin))
     for _ in range(_HITS):
         start = begin[left] + unit[left] * past[left, None]

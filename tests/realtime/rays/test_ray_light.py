@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""Claim: foot and height of a ray, and what of it a cone lights, keep their digits however near the light it passes."""
+
 import numpy as np
 import pytest
+
+from tests.helpers.kernel_values import opaque
 
 
 def point_light(types, position):
     from realtime.scene.lights import Light
 
-    return Light(types.vector(*(float(p) for p in position)), types.color(1))
+    return opaque(Light(types.vector(*(float(p) for p in position)), types.color(1)))
 
 
 def spot_light(types, position, axis, degrees):
@@ -14,7 +18,7 @@ def spot_light(types, position, axis, degrees):
 
     angle = float(np.deg2rad(degrees))
     fields = spot_fields(np.asarray(axis) / np.linalg.norm(axis), angle, angle, types)
-    return Light(types.vector(*(float(p) for p in position)), types.color(1), **fields)
+    return opaque(Light(types.vector(*(float(p) for p in position)), types.color(1), **fields))
 
 
 @pytest.mark.parametrize("kind", ["point", "spot"])
