@@ -223,26 +223,6 @@ def test_surfaces_are_seen_and_lit_through_bounded_media(variant):
     assert ratio == pytest.approx(np.exp(-length[:, None] * SPHERE[1]), rel=1e-4)
 
 
-@pytest.mark.slow
-def test_shadow_planes_in_bounded_media_against_marching(variant):
-    # A smooth sphere has no silhouette edges; the wall throws a shadow through both media.
-    import mitsuba as mi
-
-    to_world = mi.ScalarTransform4f().translate([0.3, 0.6, 1.4]).rotate([1, 0.3, 0], 37).scale([0.43, 0.33, 0.05])
-    wall = {"type": "cube", "to_world": to_world}
-    scene = clear_scene(ball=fog_sphere(), cube=cube(), wall=wall)
-    planes = render(scene, "shadow-planes").airlight
-    marched = render(scene, "ray-march", steps=3000).airlight
-    assert relative_rmse(render(scene).airlight, planes) > 0.02  # there is a shadow
-    # Steps across the edges of the shadow: 1/3000 of a chord of about a metre.
-    assert relative_rmse(planes, marched) < 3e-3
-    for order in ("paper", "none"):
-        assert np.all(np.isfinite(render(scene, "shadow-planes", order=order).airlight))
-    differences = render(scene, "shadow-planes", sum="gamma").airlight
-    # Gammas have kinks where segments have none.
-    assert relative_rmse(differences, planes) < 3e-3
-
-
 def test_an_ambient_field_fills_bounded_media(variant):
     scene = clear_scene(ball=fog_sphere(sigma_t=0.7))
     gain = render(scene, "shadow-planes", ambient=0.3).airlight - render(scene, "shadow-planes").airlight
@@ -279,29 +259,6 @@ def test_an_ambient_field_fills_bounded_media(variant):
 def test_refusals_name_what_is_in_the_way(variant, changes, message):
     with pytest.raises((InputError, RuntimeError), match=message):
         render(clear_scene(**changes()))
-
-
-@pytest.mark.parametrize(
-    ("parameters", "message"), [({"media": "coarse"}, "media: got"), ({"gamma": "light"}, "gamma: got")]
-)
-def test_parameters_that_do_not_fit_are_refused(variant, parameters, message):
-    with pytest.raises(InputError, match=message):
-        render(clear_scene(ball=fog_sphere()), "shadow-planes", **parameters)
-
-
-def test_scenes_without_bounded_media_plan_none(variant):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-
-    scene = mi.load_dict(tiny_scene())
-    read = read_scene(scene)
-    assert not read.features.bounded
-    assert read.geometry is scene
-    bounded = read_scene(mi.load_dict(clear_scene(ball=fog_sphere())))
-    assert bounded.features.bounded
-    assert not bounded.features.surfaces
-    assert len(bounded.geometry.shapes()) == 0
 
 
 @pytest.mark.claim("bounded-media-of-methods", tolerance="relative RMSE 2e-5")

@@ -119,18 +119,6 @@ def test_tables_of_van_de_hulst():
     assert (light.reflectance, light.transmittance) == pytest.approx((0.09739, 0.66096), abs=6e-6)
 
 
-@pytest.mark.slow
-def test_disort_1_with_its_own_streams_and_resolved():
-    """Isotropic, albedo 1, mu0 = 0.1, a flux of pi/mu0: the printed digits are those of 16 streams."""
-    for tau, printed, converged in (
-        (1 / 32, (0.422922, 0.420233), (0.42287, 0.42028)),
-        (32.0, (3.07390, 0.0676954), (3.07390, 0.0676954)),
-    ):
-        for streams, expected in ((8, printed), (64, converged)):
-            up, down = summed(tau, 0.1, ISOTROPIC, 1.0, [0.0, tau], streams)
-            assert (up[0] / 0.1, down[1] / 0.1) == pytest.approx(expected, rel=1.5e-5)
-
-
 @pytest.mark.claim("slab-orders-add-up", tolerance="1e-9 relative: rounding of the direct solution")
 def test_orders_one_by_one_add_up_to_all_and_the_rest_is_the_rest():
     slab = SlabOrders(6.0, 0.5, HG, 0.95, depths=[2.0], streams=16)
@@ -177,19 +165,6 @@ def test_light_is_neither_made_nor_lost(tau, suns):
 
 
 @pytest.mark.slow
-def test_thin_slabs_scatter_in_proportion_and_nothing_scatters_nothing():
-    thin, thinner = (slab_light(tau, 0.7, ISOTROPIC, 0.6, sets=[(1, 1), (2, 2)])[0] for tau in (2e-4, 1e-4))
-    assert thin.sets[0].reflected.value == pytest.approx(2 * thinner.sets[0].reflected.value, rel=1e-2)
-    assert thinner.sets[0].reflected.value == pytest.approx(0.6 * 1e-4 / 0.7 / 2, rel=1e-2)
-    dark, _ = slab_light(2.0, 0.7, HG, 0.0, sets=ALL, depths=[1.0], directions=[(0.5, 0.0)])
-    assert dark.reflectance == 0
-    assert dark.transmittance == pytest.approx(math.exp(-2 / 0.7), rel=1e-12)
-    assert dark.sets[0].reflected.mean is None
-    assert dark.sets[0].reflected.rms is None
-    assert not dark.radiance.any()
-
-
-@pytest.mark.slow
 def test_the_estimated_error_covers_the_change_with_more_streams():
     fine, coarse = slab_light(1.0, 0.3, HG, 0.9, sets=[(1, 1), (2, 4)], depths=[0.4])
     slab = SlabOrders(1.0, 0.3, HG, 0.9, depths=[0.4], streams=128, nodes=10)
@@ -198,16 +173,6 @@ def test_the_estimated_error_covers_the_change_with_more_streams():
         expected = edges.up[0, 0] / 0.3
         error = abs(found.reflected.value - other.reflected.value)
         assert abs(found.reflected.value - expected) <= error + 1e-12
-
-
-def test_azimuth_is_forward_at_zero_and_mirrored():
-    mu0 = 0.5
-    directions = [(-mu0, 0.0), (-mu0, math.pi), (0.3, 1.0), (0.3, -1.0)]
-    forward, back, left, right = slab_radiance(
-        1.0, mu0, HG, 0.9, depths=[1.0, 0.0], directions=directions, streams=16
-    ).T
-    assert forward[0] > 20 * back[0]  # along the beam, its peak of order 1
-    assert left[1] == pytest.approx(right[1], rel=1e-12)
 
 
 def test_scattering_by_modes_is_the_phase_function():

@@ -119,30 +119,6 @@ def test_a_move_builds_nothing_and_touches_no_vertices(variant, monkeypatch):
         assert getattr(second.facets, name).index == getattr(first.facets, name).index
 
 
-def test_planes_of_a_moved_object_are_those_of_its_own_space(variant, monkeypatch):
-    """What adjacency, normals and planes were read for stays; only ends of silhouette edges are moved."""
-    from realtime.methods.shadow_planes.silhouettes import silhouette
-    from realtime.scene.mesh_adjacency import Placement, read_casters, with_placements
-
-    scene = read()
-    casters = read_casters(scene.geometry)
-    moved = turned_objects(scene, read_objects(scene, ["ball"], many=1), TURN)
-    asked = []
-    positions = Placement.positions
-
-    def counted(placement, vertices=slice(None)):
-        asked.append(np.size(vertices))
-        return positions(placement, vertices)
-
-    monkeypatch.setattr(Placement, "positions", counted)
-    here = with_placements(casters, moved.positions, moved.placements)
-    edges = silhouette(here, np.array([1.3, -0.7, 2.9])).edges
-    here.positions_of(edges)
-    assert here.normals is casters.normals
-    assert here.vertices is casters.vertices
-    assert sum(asked) <= edges.size < 0.2 * casters.edges.size
-
-
 def test_frames_of_a_moving_object_are_recorded_at_most_twice(variant):
     """As where vertices move (`tests/realtime/numerics/test_recorded.py`): not once more for each move."""
     from realtime.frame.renderer import render_frame
