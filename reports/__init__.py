@@ -7,7 +7,6 @@ Read in this order:
 - `data/`: report.json: its schema, writing, reading and claims;
 - `plotting/`: the style of charts, colour maps, pictures;
 - `tables/`: tables as data, and how they are drawn;
-- `papers/`: tables of papers beside the published figures;
 - `interchange/`: descriptions of scenes for other renderers, glTF, frames of animations;
 - `diff/`: the comparison of two reports;
 - `page/`: the page of a report;

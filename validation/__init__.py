@@ -12,8 +12,7 @@ Read in this order:
 - `kernels/`: errors, cost, convergence and stability of airlight kernels;
 - `frames/`: errors and cost of whole frames, scene by scene;
 - `scaling/`: what a method costs as its work grows;
-- `papers/`: the results of papers measured again;
-- `fidelity/`: a verdict for every claim of these papers;
+- `papers/`: the claims of papers as data, and the experiments that decide them;
 - `slab/`: a slab by order of scattering, on both sides;
 - `canonical/`: tables of light scattered in a slab, as frames look them up, against their computation;
 - `comparison/`: images from files and engines against the truth;

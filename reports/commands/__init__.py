@@ -15,14 +15,13 @@ Read in this order:
 - `describe.py`: `airlight describe`
 - `diff.py`: `airlight diff`
 - `doctor.py`: `airlight doctor`
-- `fidelity.py`: `airlight fidelity`
 - `figures.py`: `airlight figures`
 - `fit.py`: `airlight fit`
 - `integrate.py`: `airlight integrate`
 - `lists.py`: `airlight list`
 - `maps.py`: `airlight maps`
 - `merge.py`: `airlight merge`
-- `published.py`: `airlight published`
+- `paper.py`: `airlight paper`
 - `reference.py`: `airlight reference`
 - `render.py`: `airlight render`
 - `report.py`: `airlight report`

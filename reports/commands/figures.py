@@ -23,11 +23,10 @@ FIGURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "z-distribution": ("z_distribution", ("quick", "progress")),
     "decomposition": ("decomposition", ("quick", "progress")),
     "slab-orders": ("slab_orders", ("quick", "progress")),
-    "cloud-transport": ("cloud_transport", ("quick", "progress")),
+    "cloud-transport": ("cloud_transport", ()),
     "cloud-images": ("cloud_images", ("quick", "progress")),
     "map-size": ("map_size", ("quick", "progress")),
     "scaling": ("scaling", ("quick", "progress")),
-    "stages": ("stages", ("quick", "progress", "published")),
     "published": ("published", ("quick", "progress", "published")),
     "paper-images": ("paper_images", ("quick",)),
     "shafts-strip": ("shafts_strip", ("quick", "progress")),
@@ -183,10 +182,10 @@ def _chosen(names: list[str] | None, report: Path | None) -> list[str]:
         return names
     if need:
         print(f"Left out: {', '.join(need)}: {reason}.")
-    if report is None or not read_report(report).get("published"):
+    if report is None or not read_report(report).get("papers"):
         need.append("published")
         print(
-            "Left out: published: no report holds the tables of the papers; named, they are measured in some minutes."
+            "Left out: published: no report holds the claims of the papers; named, they are measured in some minutes."
         )
     return [name for name in FIGURES if name not in need]
 

@@ -24,7 +24,6 @@ from reports.commands.completion import one_of
 from reports.commands.describe import describe
 from reports.commands.diff import diff
 from reports.commands.doctor import doctor
-from reports.commands.fidelity import fidelity
 from reports.commands.figures import figures
 from reports.commands.fit import fit
 from reports.commands.help import HelpfulCommand, HelpfulGroup
@@ -32,7 +31,7 @@ from reports.commands.integrate import integrate
 from reports.commands.lists import list_
 from reports.commands.maps import maps
 from reports.commands.merge import merge
-from reports.commands.published import published
+from reports.commands.paper import paper
 from reports.commands.reference import reference
 from reports.commands.render import render
 from reports.commands.report import report
@@ -59,7 +58,7 @@ _PANELS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start": (doctor, list_, render, view, cache),
     "Measure": (report, diff, bench, sweep, maps, stability),
     "Images": (reference, compare, fit, merge, describe, integrate, slab, clouds),
-    "Papers": (published, figures, fidelity),
+    "Papers": (paper, figures),
     "Develop": (run_tests,),
 }
 _NAMES = {list_: "list", run_tests: "test"}  #: where the function cannot have the name

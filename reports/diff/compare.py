@@ -11,7 +11,7 @@ from typing import Any
 from analytic.errors import InputError
 from reports.diff.errors import compare_methods
 from reports.diff.finding import Finding, Report
-from reports.diff.papers import compare_fidelity
+from reports.diff.papers import compare_papers
 from reports.diff.times import TimeComparison, compare_times
 from reports.diff.truth_and_claims import compare_claims, compare_truth, compare_winners
 from validation.statistics.noise import ERROR_TOLERANCE, TIME_TOLERANCE
@@ -81,7 +81,7 @@ def compare_reports(
     findings += [Finding("note", name, "", "the scene is new") for name in after if name not in before]
     times = compare_times(old, new, tolerance=time_tolerance)
     findings += [*times.findings, *compare_claims(old, new), *compare_winners(before, after)]
-    findings += compare_fidelity(old, new, gone)
+    findings += compare_papers(old, new, gone)
     if not compared and not times.compared:
         raise InputError(
             "reports: no number can be compared: no method of a scene was measured in both at one size; "

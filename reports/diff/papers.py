@@ -9,7 +9,7 @@ from reports.diff.finding import Finding, Report
 _TIMED = ("frames/s", "ms", "%", "times")
 
 
-def compare_fidelity(old: Report, new: Report, gone: str) -> Iterator[Finding]:
+def compare_papers(old: Report, new: Report, gone: str) -> Iterator[Finding]:
     """Compare which claims are reproduced.
 
     Parameters
@@ -19,7 +19,7 @@ def compare_fidelity(old: Report, new: Report, gone: str) -> Iterator[Finding]:
     gone
         What a row is that only the old report has: 'worse', or 'note'.
     """
-    before, after = ({(row["paper"], row["item"]): row for row in report.get("fidelity", ())} for report in (old, new))
+    before, after = ({(row["paper"], row["item"]): row for row in report.get("papers", ())} for report in (old, new))
     if not before or not after:
         return
     for (paper, item), row in before.items():

@@ -6,7 +6,6 @@ Read in this order:
 - `files.py`: the files of a figure
 - `picture_grid.py`: pictures from EXR files
 - `report.py`: what figures read of a report
-- `published_rows.py`: rows of papers, from a report or measured
 - `cloud_images.py`: clouds beside light paths
 - `cloud_transport.py`: light of a slab by direction
 - `convergence.py`: the order of the estimators
@@ -20,10 +19,9 @@ Read in this order:
 - `paper_images.py`: the pictures of the papers in our scenes
 - `phase_functions.py`: phase functions of droplets and what stands in for them
 - `polynomials.py`: Biri's polynomials
-- `published.py`: frames a second beside the papers
+- `published.py`: numbers of the papers beside ours
 - `slab_orders.py`: a slab by order of scattering
 - `scaling.py`: time of a frame over its work
-- `stages.py`: shares of the stages of a frame
 - `strip.py`: images with insets and errors
 - `z_distribution.py`: standardised errors of the estimators
 """

@@ -31,7 +31,7 @@ def compute(folder: Path | str, *, quick: bool = False, progress: Progress | Non
     """
     from reference.storage.exr import Image, write_exr
     from reports.plotting.pictures import exposure
-    from validation.papers.bouthors_clouds import GAP, LOBES, RESULTS, SAMPLES, SIZE, pair_of, shown
+    from validation.papers.clouds import GAP, LOBES, RESULTS, SAMPLES, SIZE, pair_of, shown
 
     target = ensure_folder(folder)
     size, samples = ((24, 18), 16) if quick else (SIZE, SAMPLES)
@@ -41,7 +41,7 @@ def compute(folder: Path | str, *, quick: bool = False, progress: Progress | Non
         part = part_of(progress, number / len(scenes), (number + 1) / len(scenes), before=f"{name}, ")
         pair = pair_of(shown(name, size), samples, part)
         factor = exposure(pair.image)
-        for way, image in (("collectors", pair.image), ("light paths", pair.truth)):
+        for way, image in (("collectors", pair.image), ("light paths", pair.reference)):
             file = f"{NAME}-{name}-{way.replace(' ', '-')}.exr"
             write_exr(target / file, Image({LAYER: image}))
             rows.append((file, f"{figure}, {name}", way, factor))

@@ -1,45 +1,37 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fig. 8 of Bouthors 2008 again: the light that leaves a point of a slab by its direction, in four ways."""
+"""Fig. 8 of Bouthors 2008 again: the light that leaves a point of a slab by its direction, in three ways."""
 
 from pathlib import Path
 
 from reference.storage.files import ensure_folder
 from reports.figures.files import new_figure, read_data, value, write_data
-from reports.machine.progress import Progress
-from reports.plotting.style import COLOURS, WIDTHS, truth_style
+from reports.plotting.style import COLOURS, WIDTHS
 
 NAME = "cloud-transport"
-SUMMARY = "Fig. 8 of Bouthors 2008: light by direction in slabs, computed, by photons, from tables and by 22 functions"
+SUMMARY = "Fig. 8 of Bouthors 2008: light by direction in slabs, computed, from tables and by 22 functions"
 
 _ORDERS = ("2", "5-6", "13-18", "31-inf")  #: that are drawn
-_WAYS = ("exact", "table", "fit", "photons", "photons_se")
+_WAYS = ("exact", "table", "fit")
 _HEADER = ("thickness", "depth", "orders", "angle", *_WAYS)
-_QUICK = 40_000  #: photons
 
 
-def compute(folder: Path | str, *, quick: bool = False, progress: Progress | None = None) -> None:
+def compute(folder: Path | str) -> None:
     """Write `cloud-transport.csv` into a folder: T of all sets of orders by angle.
 
     Parameters
     ----------
     folder
         Where the data go.
-    quick
-        A tenth of the photons.
-    progress
-        Called with (share done, what).
     """
-    from validation.papers.bouthors_transport import transport_study
+    from validation.papers.slab import SUN, transport_curves
 
     target = ensure_folder(folder)
-    few = {"photons": _QUICK} if quick else {}
-    study = transport_study(progress=progress, **few)["transport"]
     rows = [
-        (*(curve[name] for name in _HEADER[:3]), angle, *numbers)
-        for curve in study["curves"]
-        for angle, *numbers in zip(study["angles"], *(curve[way] for way in _WAYS), strict=True)
+        (*(curve[name] for name in _HEADER[:3]), *numbers)
+        for curve in transport_curves()
+        for numbers in zip(curve["angle"], *(curve[way] for way in _WAYS), strict=True)
     ]
-    write_data(target, NAME, _HEADER, rows, sun=study["sun"])
+    write_data(target, NAME, _HEADER, rows, sun=SUN)
 
 
 def draw(folder: Path | str, column: str = "double"):
@@ -52,7 +44,6 @@ def draw(folder: Path | str, column: str = "double"):
     down = -(-len(places) // across)
     figure = new_figure(width, 0.6 * down * width / across)
     panels = figure.subplots(down, across, sharex=True, squeeze=False).ravel()
-    dots = truth_style() | {"linestyle": "none", "marker": "o", "markersize": 1.5}
     for panel, place in zip(panels, places):
         for number, orders in enumerate(_ORDERS):
             own = [row for row in rows if (row["thickness"], row["depth"], row["orders"]) == (*place, orders)]
@@ -62,9 +53,6 @@ def draw(folder: Path | str, column: str = "double"):
             for way, style, colour in (("exact", "-", "blue"), ("table", ":", "green"), ("fit", "--", "vermillion")):
                 curve = np.where(lit & (ways[way] > 0), ways[way], np.nan)
                 panel.plot(angles, curve, style, color=COLOURS[colour], label=None if number else _LABELS[way])
-            seen = lit & (ways["photons"] > 2 * ways["photons_se"])
-            label = None if number else _LABELS["photons"]
-            panel.plot(np.array(angles)[seen], ways["photons"][seen], label=label, **dots)
         panel.set_yscale("log")
         panel.set_title(
             f"{float(place[0]):g} m thick, {float(place[1]):g} m deep, orders {', '.join(_ORDERS)}", fontsize=6
@@ -77,4 +65,4 @@ def draw(folder: Path | str, column: str = "double"):
     return figure
 
 
-_LABELS = {"exact": "computed", "table": "tables", "fit": "22 functions", "photons": "photons"}
+_LABELS = {"exact": "computed", "table": "tables", "fit": "22 functions"}

@@ -30,7 +30,7 @@ def compute(folder: Path | str, *, quick: bool = False) -> None:
 
     from reference.storage.exr import Image, write_exr
     from reports.plotting.pictures import exposure
-    from validation.fidelity.paper_images import tessellations, triptych, two_lights_image
+    from validation.papers.pictures import tessellations, triptych, two_lights_image
 
     target = ensure_folder(folder)
     size = (80, 60) if quick else (400, 300)

@@ -1,25 +1,29 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The figure of the published results: frames a second of each table and figure of the papers, beside our own.
+"""The numbers that papers print beside our own: rates, times of passes, fractions of stages, a panel for each unit.
 
-Biri, Arques, Michelin 2006, Table 2, and Billeter, Sintorn, Assarsson 2010, Figures 6 and 7 and Table 1. Everything is
-rebuilt after the light moved, as published. The machines are not the same: what can be compared are ratios within a
-paper, and what the error of each is.
+The machines are not the same: what can be compared are ratios within a paper.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import new_figure, pixels, read_data, value, write_data
-from reports.figures.published_rows import HEADER, billeter_entries, biri_entries, measured_papers
+from reports.figures.files import new_figure, read_data, write_data
 from reports.figures.report import reported_papers
 from reports.machine.progress import Progress
-from reports.plotting.style import WIDTHS, method_style
+from reports.plotting.style import COLOURS, WIDTHS
 from reports.tables.drawing import latex
-from reports.tables.table import Column, Measured, Table, Value, table
+from reports.tables.table import Measured, Table, numbers, table, words
 
 NAME = "published"
-SUMMARY = "frames a second of each table of the papers, published and measured"
+SUMMARY = "rates, passes and fractions of stages of the papers, published and measured"
+
+_NUMBERS = ("published", "measured", "low", "high")
+_HEADER = ("paper", "item", "unit", *_NUMBERS, "why")
+_UNITS = ("frames/s", "ms", "%")
+_EXPERIMENTS = ("biri tables", "billeter tables", "cloud frames")
+_QUICK = _EXPERIMENTS[-1:]
 
 
 def compute(
@@ -29,110 +33,79 @@ def compute(
     quick: bool = False,
     progress: Progress | None = None,
 ) -> None:
-    """Write `published.csv` into a folder: a row for each published figure and everything that was measured for it.
+    """Write `published.csv` into a folder: a row for each number that a paper prints of its times.
 
     Parameters
     ----------
     report
-        The folder of a report: the papers that it holds are taken from it; if it holds none, all are measured, which
-        takes minutes.
+        The folder of a report: if it holds such rows they are taken from it, else they are measured in some minutes.
     quick
-        Measure at a quarter of the published size, Billeter's Table 1 for its smallest map.
+        Measure the rates of clouds alone.
     """
     target = ensure_folder(folder)
-    papers, origin = reported_papers(report)
-    if not any(papers.values()):
-        papers, origin = measured_papers(quick, progress), {}
-    rows = biri_entries(papers.get("biri") or {}) + billeter_entries(papers.get("billeter") or {})
-    write_data(target, NAME, HEADER, rows, **origin)
+    rows, origin = reported_papers(report)
+    shown = _shown(rows)
+    if not shown:
+        shown, origin = _shown(_measured(_QUICK if quick else _EXPERIMENTS, progress)), {}
+    write_data(target, NAME, _HEADER, [tuple(row[key] for key in _HEADER) for row in shown], **origin)
+
+
+def _shown(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [row for row in rows if row["published"] is not None and row["measured"] and row["unit"] in _UNITS]
+
+
+def _measured(names: Sequence[str], progress: Progress | None) -> list[dict[str, Any]]:
+    from reports.report.claims import decided
+    from validation.papers.claims import claims
+    from validation.papers.experiments import EXPERIMENTS
+
+    figures = {}
+    for number, name in enumerate(names):
+        if progress is not None:
+            progress(number / len(names), name)
+        figures[name] = EXPERIMENTS[name].run()
+    return decided(claims(), figures)
+
+
+def _panels(rows: Sequence[dict[str, str]]) -> dict[str, list[dict[str, str]]]:
+    """Return the rows by paper and unit, in words."""
+    panels: dict[str, list[dict[str, str]]] = {}
+    for row in rows:
+        panels.setdefault(f"{row['paper']} [{row['unit']}]", []).append(row)
+    return panels
 
 
 def draw(folder: Path, column: str):
     """Return the figure, see `reports.figures.files.plot`."""
-    rows = read_data(folder, NAME)
-    names = dict.fromkeys(row["table"] for row in rows)
-    tables = {name: [row for row in rows if row["table"] == name] for name in names}
-    lines = [len({row["row"] for row in chosen}) for chosen in tables.values()]
-    width, double = WIDTHS[column], column == "double"
-    figure = new_figure(width, 0.24 * sum(lines) + (0.4 if double else 0.8) * len(tables) + 0.3)
-    panels = figure.subplots(len(tables), 1, sharex=True, squeeze=False, height_ratios=lines)[:, 0]
-    for panel, (name, chosen) in zip(panels, tables.items()):
-        _panel(panel, chosen)
-        title = name + _scale(chosen[0])
-        if double:
-            panel.set_title(title)
-            panel.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-        else:
-            panel.legend(loc="lower right", bbox_to_anchor=(1.02, 0.98), ncols=2, title=title, title_fontsize=7)
-    figure.supxlabel("frames a second after the light moved [1/s]", fontsize="medium")
+    panels = _panels(read_data(folder, NAME))
+    lines = [len(rows) for rows in panels.values()]
+    figure = new_figure(WIDTHS[column], 0.17 * sum(lines) + 0.5 * len(panels) + 0.3)
+    for panel, (title, rows) in zip(
+        figure.subplots(len(panels), 1, squeeze=False, height_ratios=lines)[:, 0], panels.items()
+    ):
+        places = range(len(rows))
+        printed, middle, low, high = ([float(row[name]) for row in rows] for name in _NUMBERS)
+        panel.plot(printed, places, "|", color="black", markersize=8, markeredgewidth=1.4, label="published")
+        spread = [[m - a for m, a in zip(middle, low)], [b - m for m, b in zip(middle, high)]]
+        panel.errorbar(middle, places, xerr=spread, fmt="o", markersize=3, color=COLOURS["blue"], label="measured")
+        panel.set_yticks(places, [row["item"] for row in rows])
+        panel.set(xscale="log", ylim=(len(rows) - 0.5, -0.5), title=title)
+        panel.grid(False, axis="y")
+    figure.axes[0].legend(loc="best")
     return figure
-
-
-def _scale(row: dict[str, str]) -> str:
-    """Return the size of the images in words, if it is not the published one."""
-    scale = int(row["width"]) / int(row["published_width"])
-    return "" if scale == 1 else f", here at {100 * scale:.3g} % of its size"
-
-
-def _panel(panel, rows: list[dict[str, str]]) -> None:
-    """Draw a table: a line for each row, on it the published figure and what was measured, a little apart."""
-    names = list(dict.fromkeys(row["row"] for row in rows))
-    printed = {(value(row, "published_fps"), names.index(row["row"])) for row in rows if row["published_fps"]}
-    if printed:
-        style = {"color": "black", "linestyle": "none", "marker": "|", "markersize": 9, "markeredgewidth": 1.4}
-        panel.plot(*zip(*sorted(printed)), label="published", zorder=1, **style)
-    styles: dict[tuple[str, str], dict[str, Any]] = {}
-    for row in rows:
-        key = (row["method"], row["variant"])
-        if key not in styles:
-            variant = sum(method == row["method"] for method, _ in styles)
-            styles[key] = method_style(row["method"], variant) | {"linestyle": "none"}
-            panel.plot([], [], label=row["variant"], **styles[key])
-    for place, name in enumerate(names):
-        on_line = [row for row in rows if row["row"] == name]
-        for number_, row in enumerate(on_line):
-            shift = 0.6 * ((number_ + 0.5) / len(on_line) - 0.5)
-            _measured(panel, row, place + shift, styles[row["method"], row["variant"]])
-    panel.set_yticks(range(len(names)), names)
-    panel.set(xscale="log", ylim=(len(names) - 0.5, -0.5))
-    panel.grid(False, axis="y")
-
-
-def _measured(panel, row: dict[str, str], height: float, style: dict[str, Any]) -> None:
-    middle, low, high = (value(row, name) for name in ("fps", "fps_low", "fps_high"))
-    if middle is not None and low is not None and high is not None:  # a row without a measurement has its name alone
-        panel.errorbar([middle], [height], xerr=[[middle - low], [high - middle]], **style)
 
 
 def tabular(rows: list[dict[str, str]]) -> str:
     """Return the LaTeX table, see `reports.figures.files.plot`."""
-    comment = (
-        "Frames a second after the light moved, everything rebuilt, medians with the distances to the quartiles; the",
-        "error of the airlight is against the quadrature truth.",
-    )
-    papers = dict.fromkeys(row["table"] for row in rows)
-    return latex([_table(paper, [row for row in rows if row["table"] == paper]) for paper in papers], comment=comment)
+    comment = ("Medians with the distances to the quartiles.",)
+    return latex([_table(title, several) for title, several in _panels(rows).items()], comment=comment)
 
 
 def _table(title: str, rows: list[dict[str, str]]) -> Table:
-    columns = (
-        Column("row", "", words=True),
-        Column("variant", "", words=True),
-        Column("published", "published", "1/s"),
-        Column("measured", "measured", "1/s"),
-        Column("ratio", "ratio", digits=2),
-        Column("relative_rmse", "rel. RMSE", digits=2, share=True),
-    )
-    return table(title, columns, [_cells(row) for row in rows])
-
-
-def _cells(row: dict[str, str]) -> tuple[Value, ...]:
-    fps, low, high, published = (value(row, name) for name in ("fps", "fps_low", "fps_high", "published_fps"))
-    as_published = (row["width"], row["height"]) == (row["published_width"], row["published_height"])
-    variant = "" if row["row"].endswith(row["variant"]) else row["variant"]
-    size = "" if as_published else f"{', ' if variant else ''}{pixels(row)}"
-    shown = None if fps is None or low is None or high is None else Measured(fps, low, high)
-    ratio = fps / published if fps and published and as_published else None
-    # Published numbers keep the digits that were printed.
-    printed = None if published is None else int(published) if published == int(published) else published
-    return (row["row"], variant + size, printed, shown, ratio, value(row, "relative_rmse"))
+    columns = (*words(item=""), *numbers("published", "measured"), *numbers("ratio", how={"digits": 2}))
+    cells = []
+    for row in rows:
+        printed, middle, low, high = (float(row[name]) for name in _NUMBERS)
+        shown = int(printed) if printed == int(printed) else printed  # the digits that were printed
+        cells.append((row["item"], shown, Measured(middle, low, high), middle / printed))
+    return table(title, columns, cells)

@@ -18,12 +18,12 @@ def report_origin(folder: Path | str, data: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def reported_papers(folder: Path | str | None) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the papers' tables in a report, and its origin as of `report_origin`; two empty dicts without a report."""
+def reported_papers(folder: Path | str | None) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+    """Return the claims of papers in a report, and its origin as of `report_origin`; nothing without a report."""
     if folder is None:
-        return {}, {}
+        return [], {}
     data = read_report(folder)
-    return data.get("published") or {}, report_origin(folder, data)
+    return data.get("papers") or [], report_origin(folder, data)
 
 
 def measured(scene: dict[str, Any], layer: str = "airlight") -> Iterator[dict[str, Any]]:

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fig. 5.8 of Ali 2016 again, in `fence`: R1 to R4, the shared points, the truth, each with its error and time.
+"""Fig. 5.8 of Ali 2016 again, in `fence`: R1 to R4, the shared points, the reference, each with its error and time.
 
 `compute` writes an EXR file for each picture, `draw` only reads them.
 """
 
 from pathlib import Path
-from typing import Any
 
 from reference.storage.files import ensure_folder
 from reports.figures.files import Row, read_data, value, write_data
@@ -13,10 +12,9 @@ from reports.figures.picture_grid import LAYER, picture_grid, stored_image
 from reports.machine.progress import Progress
 
 NAME = "shafts-strip"
-SUMMARY = "Fig. 5.8 of Ali 2016 again: 150 or 32 samples, Gaussian, bilateral, shared points, the truth"
+SUMMARY = "Fig. 5.8 of Ali 2016 again: 150 or 32 samples, Gaussian, bilateral, shared points, the reference"
 
 _HEADER = ("file", "label", "error", "ms", "exposure")
-_SHOWN = ("R1", "R2", "R3", "R4", "shared points")
 _WORDS = {
     "R1": "R1: 150 samples",
     "R2": "R2: 32",
@@ -34,27 +32,33 @@ def compute(folder: Path | str, *, quick: bool = False, progress: Progress | Non
     folder
         Where the data go.
     quick
-        Smaller images, and fewer light points of the truth.
+        Smaller images.
     progress
         Callback with the share done and what comes next, or None.
     """
+    from realtime.scene.read_scene import read_scene
     from reference.storage.exr import Image, write_exr
     from reports.plotting.pictures import exposure
-    from validation.papers.ali import shafts_study
+    from validation.papers.soft_shafts import RENDERINGS, SCENE, VARIANTS, rendered, shafts_reference, timings
+    from validation.scenes.loading import load_scene
 
     target = ensure_folder(folder)
-    size = (80, 60) if quick else (400, 300)
-    study = shafts_study(size, seconds=0.05 if quick else 0.6, points=16 if quick else 64, progress=progress)
-    rows = [study.row(name) for name in _SHOWN]
-    pictures: list[Any] = [
-        (_WORDS[row.name], row.image, row.error, row.timing and row.timing.median_ms) for row in rows
-    ]
-    pictures.append(("truth", study.truth.image, None, None))
-    factor, lines = exposure(study.truth.image), []
-    for number, (label, image, error, milliseconds) in enumerate(pictures):
-        assert image is not None
+    size = (80, 60) if quick else (200, 152)
+    if progress is not None:
+        progress(0.0, "the reference")
+    reference = shafts_reference(size)
+    scene = read_scene(load_scene(SCENE, size).scene)
+    chosen = {name: {**RENDERINGS, **VARIANTS}[name] for name in _WORDS}
+    times = timings(scene, chosen, 0.05 if quick else 0.6)
+    images = {_WORDS[name]: rendered(scene, values) for name, values in chosen.items()}
+    milliseconds = [timing.median_ms for timing in times.values()]
+    errors = [reference.error(image) for image in images.values()]
+    factor, lines = exposure(reference.image), []
+    images["reference"] = reference.image
+    for number, (label, image) in enumerate(images.items()):
         write_exr(target / f"{NAME}-{number}.exr", Image({LAYER: image}))
-        lines.append((f"{NAME}-{number}.exr", label, error, milliseconds, factor))
+        numbers = (errors[number], milliseconds[number]) if number < len(errors) else (None, None)
+        lines.append((f"{NAME}-{number}.exr", label, *numbers, factor))
     write_data(target, NAME, _HEADER, lines, size=list(size))
 
 

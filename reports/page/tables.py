@@ -6,13 +6,11 @@ from dataclasses import replace
 from typing import Any
 
 from reports.page.filters import MARKS, words
-from reports.papers.billeter import billeter_tables
-from reports.papers.biri import biri_notes, biri_tables
-from reports.papers.fidelity import fidelity_tables
 from reports.tables.agreement import agreement_table, trust_table, verdict
 from reports.tables.checks import left_out_table
 from reports.tables.drawing import html
 from reports.tables.methods import fastest_table, method_row, methods_table
+from reports.tables.papers import paper_tables
 from reports.tables.peers import published_as
 from reports.tables.scaling import scaling_tables
 from reports.tables.stability import summary_table
@@ -114,8 +112,5 @@ TABLES: dict[str, Callable[..., Any]] = {
     "left_out_table": drawn(left_out_table),
     "seconds_table": drawn(seconds),
     "facts_table": drawn(facts),
-    "biri_tables": drawn(biri_tables),
-    "biri_notes": biri_notes,
-    "billeter_tables": drawn(billeter_tables),
-    "fidelity_tables": drawn(fidelity_tables),
+    "paper_tables": drawn(paper_tables),
 }

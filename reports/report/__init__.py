@@ -7,8 +7,8 @@ Read in this order:
 - `staging.py`: a folder out of sight until it is whole
 - `expected.py`: how long the parts will take
 - `scene.py`: one scene: truth, its checks, every method
-- `papers.py`: what belongs to no scene: papers, stability
-- `fidelity.py`: the experiments behind the claims of papers
+- `papers.py`: what belongs to no scene: stability, growth
+- `claims.py`: the experiments behind the claims of papers
 - `kept.py`: what the results of every report have in common
 - `measure.py`: all of these, report.json and the page
 """

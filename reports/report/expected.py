@@ -39,9 +39,7 @@ _TYPICAL: Mapping[str, tuple[float, float, float, float]] = {
 _USUAL = (6.0, 25.0, 20.0, 4.0)  #: the same of any other scene
 _OTHERS = {
     "stability": 20.0,
-    "biri": 8.0,
-    "billeter": 300.0,
-    "fidelity": 8.0,
+    "papers": 8.0,
     "scaling": 80.0,
 }
 PAGE_SECONDS = 1.0  #: to pack the images of a scene and draw its part of the page

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the kept results of every report, and of `airlight fidelity`, have in common."""
+"""What the kept results of every report, and of `airlight paper`, have in common."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,8 +12,6 @@ _MAKERS = (
     "data/serialize.py",
     "plotting/pictures.py",
     "plotting/colour_maps.py",
-    "papers/biri.py",
-    "papers/billeter.py",
     "report/scene.py",
     "report/papers.py",
 )

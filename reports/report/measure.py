@@ -31,10 +31,10 @@ from reports.machine.environment import describe_environment
 from reports.machine.own_process import EndedError, in_own_process
 from reports.machine.progress import Interrupted, Progress, part_of
 from reports.page.render import render_page
+from reports.report.claims import paper_parts, paper_rows
 from reports.report.expected import PAGE_SECONDS, SceneEntries, other_seconds, scene_seconds, shares
-from reports.report.fidelity import fidelity_parts, fidelity_rows
 from reports.report.kept import report_cache
-from reports.report.papers import OtherPart, other_parts, published_data
+from reports.report.papers import OtherPart, other_parts
 from reports.report.scene import OwnMethods, scene_report
 from reports.report.staging import staged
 from validation.comparison.engine_images import EngineImage, images_size
@@ -109,11 +109,11 @@ def write_report(
     start = time.monotonic()
     cache = report_cache(environment, fresh=fresh)
     efforts = {name: effort.of(name).at(sizes.get(Path(name).stem)) for name in scenes}
-    others = [*other_parts(effort, scenes, cache), *fidelity_parts(effort, scenes, cache)]
+    others = [*other_parts(effort, scenes, cache), *paper_parts(effort, scenes, cache)]
     steps = _steps(progress, cache, efforts, configurations, others)
     apart = None if method_limit is None else partial(in_own_process, limit=method_limit)
     ended: dict[Configuration, str] = {}
-    seconds = dict.fromkeys(("scenes", "stability", "scaling", "published", "fidelity"), 0.0)
+    seconds = dict.fromkeys(("scenes", "stability", "scaling", "papers"), 0.0)
     try:
         with hint_when_stopped(lambda: _kept_words(results, "")), staged(target) as hidden:
             if cluster is not None:
@@ -141,7 +141,7 @@ def write_report(
             by_kind: dict[str, list[CachedResult]] = {}
             for number, part in enumerate(others):
                 step = part_of(steps[str(number)], 0.0, 1.0, before=f"{part.title}, ")
-                with _timed(seconds, "published" if part.kind in ("biri", "billeter") else part.kind):
+                with _timed(seconds, part.kind):
                     results.append(cached_result(part.entry, partial(part.compute, step)))
                 by_kind.setdefault(part.kind, []).append(results[-1])
             stability = by_kind.get("stability")
@@ -161,8 +161,7 @@ def write_report(
                 "scenes": studied,
                 "stability": stability[-1].data["kernels"] if stability else [],
                 "scaling": scaling,
-                "published": published_data(by_kind),
-                "fidelity": fidelity_rows(by_kind),
+                "papers": paper_rows(by_kind),
             }
             steps["page"](0.0, "the page")
             write_page(data, images=hidden, folder=hidden)

@@ -10,6 +10,7 @@ Read in this order:
 - `drawing.py`: the five ways to draw it
 - `terminal.py`: how commands print tables and JSON
 - `methods.py`: what methods cost and how wrong they are; the fastest within an error
+- `papers.py`: verdicts on the claims of papers, and their numbers beside ours
 - `peers.py`: which configurations are a paper as published, errors included
 - `agreement.py`: the truth against Monte Carlo, the verdict, and the table of trust
 - `kernels.py`: costs, levels and orders of kernels

@@ -195,8 +195,6 @@ def settings(**changes: Any) -> dict[str, Any]:
         "limit": 1.0,
         "flip": "none",
         "rays": 0,
-        "papers": [],
-        "paper_kernels": ["exact"],
     } | changes
 
 
@@ -228,7 +226,6 @@ def report_of(scenes: list[dict[str, Any]], **changes: Any) -> dict[str, Any]:
         "claims": [{"kind": "truth", "text": "The truth is confirmed by volpath.", "good": True}],
         "scenes": scenes,
         "stability": [],
-        "published": None,
     } | changes
 
 

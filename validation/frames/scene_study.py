@@ -50,9 +50,6 @@ class Effort:
     limit: float = 10.0  #: frames that would take longer are not measured, and the report says so [s]
     flip: str = "none"  #: which configurations get HDR-FLIP: 'none', 'kinds' (those of `QUICK`) or 'all'
     rays: int = 0  #: number of generated rays for the stability of kernels; 0 leaves it out
-    papers: tuple[str, ...] = ()  #: papers whose tables are measured again: 'biri', 'billeter'
-    paper_kernels: tuple[str, ...] = ("exact",)  #: kernels of these tables
-    fidelity: bool = False  #: whether to measure the claims of papers that need images
     scaling: tuple[str, ...] = ()  #: kinds of work by whose growth a scene is timed, see `validation.scaling.ladders`
 
     def at(self, size: tuple[int, int] | None) -> "Effort":
@@ -110,8 +107,6 @@ EFFORTS: dict[str, Effort] = {
             patience=18.0,
             flip="kinds",
             rays=10_000,
-            papers=("biri",),
-            fidelity=True,
         ),
         Effort(
             "full",
@@ -129,9 +124,6 @@ EFFORTS: dict[str, Effort] = {
             limit=40.0,
             flip="all",
             rays=100_000,
-            papers=("biri", "billeter"),
-            paper_kernels=("exact", "taylor"),
-            fidelity=True,
             scaling=("size", "triangles", "lights", "map"),
         ),
     )

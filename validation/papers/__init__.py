@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The results of papers measured again, beside the published figures.
+"""The claims of papers as data, the experiments that measure their figures, and a verdict for each.
 
 Read in this order:
 
-- `biri.py`: Tables 1 and 2 of Biri, Arques, Michelin 2006;
-- `constant_distance.py`: how wrong the constant R of their section 4.2 is, by size and depth;
-- `billeter_images.py`: Figures 6 and 7 of Billeter, Sintorn, Assarsson 2010;
-- `billeter_tessellation.py`: their Table 1;
-- `ali.py`: the figures of Ali 2016 that captions describe;
-- `bouthors.py`: what a slab decides of Bouthors, Neyret, Max, Bruneton, Crassin 2008;
-- `bouthors_transport.py`: their Fig. 8, light by direction;
-- `bouthors_clouds.py`: their Figs 11 and 12, and the error by order of scattering;
-- `bouthors_frames.py`: their section 9, frames a second.
+- `claims.py`: a claim, its figure and the rule that makes its verdict; `claims.toml` has them all
+- `experiments.py`: which experiment is which function, and how long it takes
+- `measured.py`: times and refusals as figures
+- `formulas.py`: printed formulas beside what they must be, and droplets
+- `stencil.py`: the stencil of shadow planes along a ray
+- `shadow_planes.py`: orders and shortcuts of shadow planes in images
+- `scattering.py`: multiple scattering, and the constant R of bounded media
+- `biri_tables.py`: Tables 1 and 2 of Biri 2006
+- `light_volumes.py`: meshes, depths and maps of light volumes
+- `billeter_tables.py`: Figures 6 and 7 and Table 1 of Billeter 2010
+- `soft_shafts.py`: the figures of Ali 2016
+- `slab.py`: what a slab decides of Bouthors 2008
+- `clouds.py`: the clouds of Bouthors 2008
+- `pictures.py`: the pictures of papers again
 """

@@ -329,16 +329,18 @@ def test_reports_are_read_by_their_folder(files):
 
 def claimed(verdict, measured, *, unit="", published=None, item="eq. 1"):
     """Return a report with one verdict on a paper."""
-    row = {"paper": "biri", "item": item, "claim": "words", "verdict": verdict, "published": published}
-    return report() | {"fidelity": [row | {"measured": measured, "unit": unit, "command": "airlight", "why": "so"}]}
+    row = {"paper": "biri", "item": item, "words": "words", "verdict": verdict, "published": published}
+    row |= {"measured": measured, "low": measured, "high": measured, "unit": unit, "why": "so"}
+    return report() | {"papers": [row]}
 
 
 def test_verdicts_on_papers_are_compared():
-    good, bad = claimed("reproduced", 1.0), claimed("refuted", 2.0)
-    assert words(compare_reports(good, bad)) == ["biri, eq. 1: refuted, was reproduced"]
-    assert words(compare_reports(bad, good), "better") == ["biri, eq. 1: reproduced, was refuted"]
+    good, bad = claimed("reproduced", 1.0), claimed("not reproduced", 2.0)
+    assert words(compare_reports(good, bad)) == ["biri, eq. 1: not reproduced, was reproduced"]
+    assert words(compare_reports(bad, good), "better") == ["biri, eq. 1: reproduced, was not reproduced"]
     assert words(compare_reports(good, good)) == []
-    assert words(compare_reports(bad, claimed("impossible", None)), "note") == ["biri, eq. 1: impossible, was refuted"]
+    gone = compare_reports(bad, claimed("impossible", None))
+    assert words(gone, "note") == ["biri, eq. 1: impossible, was not reproduced"]
     slow = compare_reports(claimed("reproduced", 30.0, unit="frames/s"), claimed("differs", 20.0, unit="frames/s"))
     assert (words(slow), words(slow, "note")) == ([], ["biri, eq. 1: differs, was reproduced"])
 

@@ -3,8 +3,8 @@
 
 import numpy as np
 
-import validation.papers.bouthors_clouds as bouthors_clouds
-import validation.papers.bouthors_transport as bouthors_transport
+import validation.papers.clouds as clouds
+import validation.papers.slab as slab
 from reports.figures import cloud_images, cloud_transport
 from reports.figures.files import plot, read_data
 from validation.scenes.loading import LoadedScene
@@ -19,16 +19,14 @@ def drawn_twice(module, folder):
 
 
 def test_light_by_direction_is_drawn_from_the_study(monkeypatch, tmp_path):
-    angles = [2.5, 47.5, 92.5, 177.5]
     curves = [
-        {"thickness": thickness, "depth": depth, "orders": orders}
-        | {way: [0.1, 0.2, 0.0, 0.3] for way in ("exact", "table", "fit", "photons", "photons_se")}
+        {"thickness": thickness, "depth": depth, "orders": orders, "angle": [2.5, 47.5, 92.5, 177.5]}
+        | {way: [0.1, 0.2, 0.0, 0.3] for way in ("exact", "table", "fit")}
         for thickness, depth in ((100.0, 0.0), (100.0, 100.0), (1000.0, 0.0))
         for orders in ("2", "3-4", "31-inf")
     ]
-    study = {"transport": {"sun": 25.0, "angles": angles, "curves": curves}}
-    monkeypatch.setattr(bouthors_transport, "transport_study", lambda **options: study)
-    cloud_transport.compute(tmp_path, quick=True)
+    monkeypatch.setattr(slab, "transport_curves", lambda: curves)
+    cloud_transport.compute(tmp_path)
     rows = read_data(tmp_path, "cloud-transport")
     assert len(rows) == 9 * 4
     assert [row["exact"] for row in rows[:4]] == ["0.1", "0.2", "0", "0.3"]
@@ -39,10 +37,10 @@ def test_light_by_direction_is_drawn_from_the_study(monkeypatch, tmp_path):
 def test_clouds_stand_above_the_truth_in_the_same_exposure(monkeypatch, tmp_path):
     def pair(loaded, samples, progress):
         assert loaded.name in ("stratocumulus", "cumulus", "ring", "two-lobes")
-        return bouthors_clouds._Pair(np.full((18, 24, 3), 0.5), np.full((18, 24, 3), 0.25), None, {}, {})
+        return clouds.Pair(np.full((18, 24, 3), 0.5), np.full((18, 24, 3), 0.25), np.zeros((18, 24, 3)))
 
-    monkeypatch.setattr(bouthors_clouds, "pair_of", pair)
-    monkeypatch.setattr(bouthors_clouds, "shown", lambda name, size: LoadedScene(name, None, "", ""))
+    monkeypatch.setattr(clouds, "pair_of", pair)
+    monkeypatch.setattr(clouds, "shown", lambda name, size: LoadedScene(name, None, "", ""))
     cloud_images.compute(tmp_path, quick=True)
     rows = read_data(tmp_path, "cloud-images")
     assert [row["way"] for row in rows] == ["collectors"] * 4 + ["light paths"] * 4

@@ -71,7 +71,7 @@ def test_drawing_again_only_reads_and_gives_the_same_bytes_without_mitsuba(folde
 
 def test_every_figure_has_a_module_with_its_name_and_summary():
     modules = {path.stem for path in (Path(__file__).parents[3] / "reports" / "figures").glob("*.py")}
-    helpers = {"__init__", "files", "report", "published_rows", "picture_grid"}
+    helpers = {"__init__", "files", "report", "picture_grid"}
     assert {module for module, _ in FIGURES.values()} == modules - helpers
     for name in FIGURES:
         module = command_figures._module(name)

@@ -12,7 +12,6 @@ from reference.storage.exr import Image, read_exr, write_exr
 from reports.figures import frame_speed as figure_frame_speed
 from reports.figures import methods_table as figure_methods_table
 from reports.figures import published as figure_published
-from reports.figures import stages as figure_stages
 from reports.figures import strip as figure_strip
 from reports.figures.files import plot
 from tests.helpers.reports import (
@@ -39,52 +38,10 @@ def method(label, error, **changes):
     return entry(label, error=errors(error, relative_bias=-error), times=times) | changes
 
 
-def published():
-    biri = {
-        "scene": "two-pens",
-        "where": "Fig. 7a",
-        "size": [800, 600],
-        "fps": 23,
-        "shares": [1, 9, 22, 9, 59],
-        "note": "",
-        "cone": 0,
-    }
-    row = {
-        "published": biri,
-        "kernel": "exact",
-        "cone": 0,
-        "size": [800, 600],
-        "triangles": 34_549,
-        "stages_ms": [1.0, 2.0, 3.0, 4.0, 10.0],
-        "shares": [5.0, 10.0, 15.0, 20.0, 50.0],
-        "light_moved": timing(20.0),
-        "static": timing(10.0),
-        "error": errors(8e-7),
-        "error_size": [160, 120],
-    }
-    image_of = {
-        "where": "Fig. 6a",
-        "scene": "omni-box",
-        "map": 32,
-        "method": "light-volumes",
-        "parameters": [["evaluation", "mesh"]],
-        "fps": 230,
-    }
-    image = {"entry": image_of, "size": [512, 512], "light_moved": timing(50.0), "error": {"relative_rmse": 0.04}}
-    view = {
-        "published": {"what": "Sponza", "fps": 86, "passes": {}},
-        "scene": "colonnade",
-        "map": 1024,
-        "evaluation": "static",
-        "size": [1024, 1024],
-        "light_moved": None,
-        "missing": "a frame takes 40 s",
-    }
-    stages = ["silhouettes", "scene", "airlight of the scene", "sorting", "shadow planes"]
-    return {
-        "biri": {"stages": stages, "rows": [row]},
-        "billeter": {"figures": [image], "table": [view]},
-    }
+def claimed(item, published, measured, **changes):
+    row = {"paper": "biri", "item": item, "words": "a rate", "verdict": None, "published": published}
+    row |= {"measured": measured, "low": 0.9 * measured, "high": 1.2 * measured, "unit": "frames/s", "why": ""}
+    return row | changes
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +65,7 @@ def report(tmp_path_factory):
         created="2031-01-02 03:04:05 +0000",
         settings=settings(image=[32, 24], timed=[32, 24]),
         environment=environment(processor="a slide rule"),
-        published=published(),
+        papers=[claimed("Fig. 7a", 23.0, 50.0), claimed("eq. 1", None, 1.0, verdict="reproduced", unit="")],
     )
     checked(data)
     (folder / "report.json").write_text(json.dumps(data))
@@ -160,34 +117,14 @@ def test_methods_table_has_units_quartiles_and_what_was_refused(report, tmp_path
             assert line.count("&") == 6
 
 
-def test_stages_come_from_the_report_and_add_up(report, tmp_path):
-    figure_stages.compute(tmp_path, report=report)
-    rows = rows_of(tmp_path / "stages.csv")
-    for name in ("published", "exact"):
-        assert sum(float(row["share_percent"]) for row in rows if row["row"] == name) == 100
-    plot(figure_stages, tmp_path)
-    text = (tmp_path / "stages.tex").read_text(encoding="utf-8")
-    assert r"published & \num{1} & \num{9} & \num{22} & \num{9} & \num{59} & -- \\" in text
-    assert (
-        r"exact, 800 $\times$ 600 & \num{5.00} & \num{10.0} & \num{15.0} & \num{20.0} & \num{50.0} & \num{20.0} \\"
-        in text
-    )
-
-
-def test_published_compares_only_what_has_the_published_size(report, tmp_path):
+def test_published_numbers_stand_beside_the_measured(report, tmp_path):
     figure_published.compute(tmp_path, report=report)
     rows = rows_of(tmp_path / "published.csv")
-    assert [float(rows[0][name]) for name in ("published_fps", "fps")] == [23, 50]
-    # The slower quartile of the time is the lower one of the rate.
-    assert float(rows[0]["fps_low"]) == pytest.approx(1000 / 24)
-    assert float(rows[0]["fps_high"]) == pytest.approx(1000 / 18)
-    assert rows[2]["fps"] == ""
-    assert rows[2]["missing"] == "a frame takes 40 s"
+    assert [float(rows[0][name]) for name in ("published", "measured", "low", "high")] == [23, 50, 45, 60]
+    assert len(rows) == 1  # a verdict is no rate
     plot(figure_published, tmp_path)
     text = (tmp_path / "published.tex").read_text(encoding="utf-8")
-    assert r"& \num{23} & $\num{50.0}_{-\num{8.3}}^{+\num{5.6}}$ & \num{2.2} & \num{8.0e-7} \\" in text
-    rate = r"$\num{20.0}_{-\num{3.3}}^{+\num{2.2}}$"
-    assert rf"light-volumes, mesh, 512 $\times$ 512 & \num{{230}} & {rate} & -- & \num{{0.040}} \\" in text
+    assert r"Fig. 7a & \num{23} & $\num{50}_{-\num{5}}^{+\num{10}}$ & \num{2.2} \\" in text
 
 
 def test_the_strip_shows_where_methods_are_wrong(report, tmp_path):

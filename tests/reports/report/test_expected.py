@@ -2,13 +2,12 @@
 """Claim: the time left that a report prints is right from the start, where this machine has made one before."""
 
 import itertools
-from dataclasses import replace
 
 import pytest
 
 from reports.machine.progress import part_of, seconds_left
+from reports.report.claims import paper_parts
 from reports.report.expected import PAGE_SECONDS, SceneEntries, other_seconds, scene_seconds, shares
-from reports.report.fidelity import fidelity_parts
 from reports.report.measure import _steps
 from reports.report.papers import other_parts
 from validation.configurations.methods import STANDARD, Configuration
@@ -17,7 +16,7 @@ from validation.frames.scene_study import EFFORTS
 from validation.scenes.registry import FOG_SCENES
 
 MACHINE = {"processor": "abacus", "threads": "2"}
-EFFORT = replace(EFFORTS["default"], papers=())
+EFFORT = EFFORTS["default"]
 USED = tuple(chosen for chosen in STANDARD if "points" not in dict(chosen.parameters))  #: where no light has an extent
 #: Seconds on this machine: truth, checks, multiple scattering, each method.
 COSTS = {"open-fog": (1.0, 6.0, 1.0, 1.0), "hall": (20.0, 80.0, 9.0, 12.0), "windows": (4.0, 90.0, 5.0, 3.0)}
@@ -108,7 +107,7 @@ def test_every_scene_and_part_has_its_usual_time():
 
     assert set(_TYPICAL) == set(FOG_SCENES)
     asked = EFFORTS["full"], list(FOG_SCENES), result_cache(MACHINE)
-    full = {part.kind for part in (*other_parts(*asked), *fidelity_parts(*asked))}
+    full = {part.kind for part in (*other_parts(*asked), *paper_parts(*asked))}
     assert full == set(_OTHERS)
     assert PAGE_SECONDS > 0
 

@@ -33,7 +33,6 @@ def test_an_hour_and_the_memory_are_the_bounds(variant, monkeypatch):
         ["reference", "open-fog", "--estimator", "volpath", "--spp", "100000000000"],
         ["bench", "open-fog", "--size", "16384x16384"],
         ["maps", "sphere-spot", "--size", "16384x16384", "--sizes", "32"],
-        ["published", "--scale", "4"],
     ],
     ids=" ".join,
 )

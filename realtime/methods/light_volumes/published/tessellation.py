@@ -23,7 +23,7 @@ These are the terms of the Laplacian of the inverse depth s, but taken
 As each corner is examined in the quad that would introduce it, a tessellation is wrong nowhere by more than a small
 multiple of the threshold: the errors of a corner and of the corners it was interpolated from add up. A plain Laplacian
 of the depth at the texels, with as many triangles, 227 000 for six maps of 512^2 of the colonnade, leaves 5.8 times the
-error of the depth (root mean square) and 1.3 times that of the airlight (`airlight fidelity --paper billeter`).
+error of the depth (root mean square) and 1.3 times that of the airlight (`airlight paper billeter`).
 
 Levels: a node of level l has N / 2^l texels on a side; level 0 is a face, level log2 N the texels. `divided[l]` has one
 flag for each node of each face, (faces, 2^l, 2^l), row by row, and nodes that do not exist have the flag unset. Heights

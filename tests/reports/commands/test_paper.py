@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: `airlight paper` measures each experiment once, prints verdicts, and tables and JSON where asked."""
+
+import json
+
+import pytest
+
+from reports.commands import main as cli
+from validation.papers.experiments import EXPERIMENTS, Experiment
+
+
+@pytest.fixture
+def experiments(own_cache, monkeypatch):
+    """Experiments that give the same number for every figure; returns which were run."""
+    from validation.papers.claims import claims
+
+    ran = []
+
+    def run(self):
+        (name,) = (name for name, each in EXPERIMENTS.items() if each is self)
+        ran.append(name)
+        names = [part for each in claims() if each.experiment == name for part in each.figure.split(" / ")]
+        return dict.fromkeys(names, 1.0)
+
+    monkeypatch.setattr(Experiment, "run", run)
+    return ran
+
+
+def test_verdicts_tables_and_json(variant, experiments, tmp_path, capfd):
+    assert cli.run(["paper", "bouthors", "--tables", "-o", str(tmp_path / "claims.json")]) == 0
+    out = capfd.readouterr().out
+    assert "not reproduced" in out
+    assert "numbers beside ours" in out
+    needed = ["formulas", "cloud slab", "cloud transport", "clouds", "cloud frames"]
+    assert experiments == needed
+    written = json.loads((tmp_path / "claims.json").read_text())
+    assert cli.run(["paper", "bouthors", "--json"]) == 0
+    assert experiments == needed  # the second time nothing is measured
+    printed = json.loads(capfd.readouterr().out)
+    assert printed["papers"] == written["papers"]
+    rows = {row["item"]: row for row in printed["papers"]}
+    assert (rows["eq. 1"]["verdict"], rows["eq. 5"]["verdict"]) == ("reproduced", "not reproduced")
+    assert rows["9, stratocumulus of 130 000 triangles"]["verdict"] is None
+
+
+def test_quick_leaves_out_what_needs_images(variant, experiments, capfd):
+    assert cli.run(["paper", "--quick", "--json"]) == 0
+    assert experiments == ["formulas", "stencil"]
+    printed = json.loads(capfd.readouterr().out)
+    assert printed["left_out"] > 100
+    assert {row["verdict"] for row in printed["papers"] if row["paper"] == "ali"} == {"impossible"}
+
+
+def test_an_unknown_paper_is_refused_with_the_nearest(capfd):
+    assert cli.run(["paper", "billetter"]) == cli.WRONG_INPUT
+    assert "wanted one of biri, billeter, ali, bouthors; did you mean 'billeter'" in capfd.readouterr().err

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: the experiments behind the claims of papers measure what they say, by hand where a hand can."""
+
+import numpy as np
+import pytest
+
+from tests.validation.papers.test_claims import JUDGED, key, measured
+from validation.configurations.timing import Timing
+from validation.papers.claims import taken, verdict
+from validation.papers.experiments import EXPERIMENTS
+
+
+def test_a_stencil_of_one_ray_by_hand():
+    """Two shadows that overlap, [0.2, 0.5] and [0.4, 0.7]: lit are 0.2 before and 0.3 behind them."""
+    from validation.papers.stencil import drawn
+
+    shadows = [(0.2, 0.5), (0.4, 0.7)]
+    # Back to front by 5.1.5: 1, less 0.7, then 0.5 is not drawn, 0.4 neither, and 0.2 more: 1 - 0.7 + 0.2.
+    assert drawn(shadows, -1) == pytest.approx(0.5)
+    # By section 5, stage 5: less 0.7, then the stencil is below 0 for good, and 0.2 is not added.
+    assert drawn(shadows, 1) == pytest.approx(0.3)
+
+
+def test_printed_formulas_by_hand():
+    from validation.papers.formulas import _annex, _cloud_equations, _droplets
+
+    annex = _annex()
+    # Printed a^2 - a for (a^2 - a)/2: of the largest derived value it has twice, wherever that is.
+    assert annex["isotropic c2"] == pytest.approx(2)
+    assert annex["isotropic c0"] == 1
+    # The mean of ((1 + c)/2)^n over the sphere is 1/(n + 1).
+    assert (annex["hazy mean"], annex["murky mean"]) == (pytest.approx(1 + 9 / 9), pytest.approx(1 + 50 / 33))
+    clouds = _cloud_equations()
+    assert clouds["eq. 2"] == pytest.approx(-1)  # the sign of the integral of exp(-kappa x)
+    # With s = (l1 - l0)/(x1 - x0) the true integral is the printed one over -(1 + s).
+    assert clouds["eq. 1"] == pytest.approx(-(1 + (4.0 - 11.0) / (19.0 - 3.0)))
+    light = _droplets()
+    assert light["peak"] + light["lobe"] == pytest.approx(light["forward"])
+
+
+def test_where_rising_values_reach_a_level():
+    from validation.papers.slab import crossing
+
+    assert crossing((50.0, 100.0, 400.0), [1e-6, 0.1, 1.6], 0.8) == pytest.approx(100 * 8**0.5)  # grows as x^2
+
+
+def test_fractions_of_stages_have_intervals():
+    """Six works of 1, 2, 3, 5, 1 and 13 ms, each 10 % sure: planes take 13 - 3, sorting 5 - 1 + 1 ms of 21."""
+    from validation.papers.biri_tables import STAGES, fractions
+
+    times = [Timing(ms, 0.9 * ms, 1.1 * ms, 5) for ms in (1.0, 2.0, 3.0, 5.0, 1.0, 13.0)]
+    found = fractions(times)
+    assert [found[name][0] for name in STAGES] == pytest.approx([100 * ms / 21 for ms in (1, 2, 3, 5, 10)])
+    low, high = found["planes"][1:]
+    assert low == pytest.approx(100 * 8.4 / (8.4 + 1.1 + 2.2 + 3.3 + (5.5 - 0.9 + 1.1)))
+    assert high == pytest.approx(100 * 11.6 / (11.6 + 0.9 + 1.8 + 2.7 + (4.5 - 1.1 + 0.9)))
+    assert found["main cost"][0] == pytest.approx(2)
+
+
+def test_ratios_of_errors_have_the_interval_of_a_jackknife():
+    from validation.papers.soft_shafts import Reference
+
+    random = np.random.default_rng(0)
+    reference = Reference(np.ones((40, 64, 3)), np.ones((40, 64), dtype=bool))
+    noise = random.normal(size=(2, 40, 64, 3))
+    _, low, high = reference.ratio(1 + 0.1 * noise[0], 1 + 0.1 * noise[1])
+    # The logarithm of a root mean square of n normal numbers has the variance 1/(2 n): of the ratio, 1/n.
+    assert (high - low) / 2 == pytest.approx(2 / np.sqrt(noise[0].size), rel=0.5)
+    assert low < 1 < high
+    assert reference.ratio(1 + 0.1 * noise[0], 1 + 0.2 * noise[0]) == pytest.approx([0.5] * 3)
+
+
+def test_what_a_constant_leaves_of_two_noisy_images():
+    from validation.papers.scattering import fitted_constant, left_over
+
+    random = np.random.default_rng(1)
+    fog = random.uniform(1, 2, 100_000)
+    first, second = (3 * fog + random.normal(size=fog.size) for _ in range(2))
+    constant = fitted_constant(fog, (first + second) / 2)
+    assert constant == pytest.approx(3, rel=0.01)
+    assert left_over(first, second, 2 * fog) == pytest.approx(1 / 3, rel=0.02)  # a third of the light is left
+    assert left_over(first, second, 3 * fog) < 0.03  # the noise is not counted
+
+
+def test_the_plain_laplacian_and_its_threshold():
+    from realtime.methods.light_volumes.published.tessellation import divide, triangles
+    from validation.papers.light_volumes import laplacian, plain_edges
+
+    depth = np.fromfunction(lambda face, row, column: 2 + 3 * row + column + row**2, (1, 17, 17))
+    assert laplacian(1 / depth)[0, 1:-1, 1:-1] == pytest.approx(2)  # of row^2 alone
+    heights = 1 + np.random.default_rng(2).random((1, 33, 33))
+    every = len(triangles(divide(plain_edges(heights, 10**9))))
+    assert abs(len(triangles(divide(plain_edges(heights, every // 2)))) - every // 2) < 0.1 * every
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name, each in EXPERIMENTS.items() if each.effort in ("quick", "default")])
+def test_experiments_have_the_recorded_verdicts(variant, name):
+    """Verdicts on the machine or on our scenes are not compared: they are those of the machine at hand."""
+    figures = EXPERIMENTS[name].run()
+    for each in JUDGED:
+        if each.experiment == name:
+            figure = taken(each, figures)
+            assert not isinstance(figure, str), figure
+            if not each.ours:
+                assert verdict(each, figure) == verdict(each, measured(each)), key(each)

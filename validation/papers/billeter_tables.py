@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Figures 6 and 7 and Table 1 of Billeter, Sintorn, Assarsson 2010 measured again, after the light moved.
+
+Neither scene is available: `omni-box` stands for that of Fig. 6, `colonnade` for the Sponza atrium and `tangle` for the
+mesh "Yeah Right". The paper gives no image size for Fig. 6 and Table 1: all have that of Fig. 7. The published hall has
+one map; ours has a lamp that shines in all directions, so its map has six faces in Fig. 7; in Table 1 a spot takes its
+place. The light volume is the paper's mesh; its height field walked without triangles stands beside it as `walk`. The
+paper's marcher evaluates the airlight where the visibility changes.
+
+Errors are against the quadrature, at one pixel in `stride` along both axes. The passes, in wall-clock time, are those
+of `realtime.methods.light_volumes.published.mesh.tessellation_stages`, and `volume`: the rasterisation of the triangles
+and the signed sum.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.frame.renderer import FrameRenderer, run_cast_and_shade, run_method
+from realtime.methods.light_volumes.published.mesh import tessellation_stages
+from realtime.scene.read_scene import Scene, read_scene
+from realtime.shadow_maps.shadow_map import cast_shadow_map
+from reference.quadrature.image import quadrature_image
+from reference.scene.read import TruthScene, read_truth
+from validation.configurations.methods import configuration, prepared
+from validation.configurations.timing import moved_light, time_repeated
+from validation.metrics.errors import error_metrics
+from validation.papers.measured import attempted, frame_within, milliseconds, rate
+from validation.scenes.colonnade import colonnade
+from validation.scenes.loading import load_scene, resize
+
+Array = NDArray[np.float64]
+
+SIZE = (1024, 1024)  #: of the published images [pixels]
+MAPS = (1024, 2048, 4096)  #: of Table 1 [texels]
+_SECONDS = 0.1  # for each timing [s]
+_MESH: dict[str, Any] = {"evaluation": "mesh"}
+_MARCH: dict[str, Any] = {"sum": "transitions", "spacing": "uniform", "shadow": "map"}
+#: Scene, method and parameters of the images, by the names of their figures.
+IMAGES: Mapping[str, tuple[str, str, Mapping[str, Any]]] = {
+    "Fig. 6a": ("omni-box", "light-volumes", _MESH | {"map": 32}),
+    "Fig. 6b": ("omni-box", "light-volumes", _MESH | {"map": 128}),
+    "Fig. 6c": ("omni-box", "light-volumes", _MESH | {"map": 512}),
+    "Fig. 7a": ("colonnade", "ray-march", _MARCH | {"map": 512, "steps": 150}),
+    "Fig. 7b": ("colonnade", "ray-march", _MARCH | {"map": 512, "steps": 400}),
+    "Fig. 7c": ("colonnade", "light-volumes", _MESH | {"map": 512}),
+    "walk": ("colonnade", "light-volumes", {"evaluation": "walk", "walls": "slanted", "map": 512}),
+    "epipolar": ("colonnade", "min-max", {"map": 512}),
+}
+
+
+def billeter_tables(size: tuple[int, int] = SIZE, maps: tuple[int, ...] = MAPS) -> dict[str, Any]:
+    """Return rates, errors, passes and numbers of triangles, at a size of the frames and of the maps of Table 1."""
+    return _images(size) | _table(size, maps)
+
+
+def _images(size: tuple[int, int]) -> dict[str, Any]:
+    figures: dict[str, Any] = {}
+    # An odd stride: then every position in tiles of 4 x 4 pixels is compared somewhere.
+    stride = 2 * (max(size) // 256) + 1
+    for scene_name in dict.fromkeys(scene_name for scene_name, *_ in IMAGES.values()):
+        loaded = load_scene(scene_name, size).scene
+        scene = read_scene(loaded)
+        true = quadrature_image(sampled_truth(read_truth(loaded), stride)).airlight
+        for name, (where, method, values) in IMAGES.items():
+            if where == scene_name:
+                renderer = partial(prepared, scene, configuration(method, "exact", values))
+                figures |= attempted((f"{name} fps", f"{name} error"), partial(_image, name, renderer, true, stride))
+    return figures
+
+
+def _image(name: str, renderer: Callable[[], FrameRenderer], true: Array, stride: int) -> dict[str, Any]:
+    ready = renderer()
+    error = error_metrics(true, sampled(frame_within(ready).airlight, stride)).relative_rmse
+    return {f"{name} error": error, f"{name} fps": _rate(ready)}
+
+
+def _rate(renderer: FrameRenderer) -> list[float]:
+    return rate(time_repeated(moved_light(renderer), seconds=_SECONDS, least=3))
+
+
+def sampled(image: Array, stride: int) -> Array:
+    """Return one pixel in `stride` along both axes of an image, beginning at the middle of the first block."""
+    return image[stride // 2 :: stride, stride // 2 :: stride]
+
+
+def sampled_truth(truth: TruthScene, stride: int) -> TruthScene:
+    """Return the scene with the rays of only those pixels that `sampled` takes."""
+    direction = sampled(truth.direction.reshape(truth.height, truth.width, 3), stride)
+    height, width, _ = direction.shape
+    return replace(truth, width=width, height=height, direction=direction.reshape(-1, 3))
+
+
+def _table(size: tuple[int, int], maps: tuple[int, ...]) -> dict[str, Any]:
+    figures: dict[str, Any] = {}
+    for name in ("colonnade", "tangle"):
+        scene = read_scene(table_scene(name, size))
+        for texels in maps:
+            for tessellation in ("static", "adaptive"):
+                figures |= _view(scene, f"{name} {texels}", texels, tessellation)
+    last = maps[-1]
+    static, adaptive = (figures[f"colonnade {last} {how} fps"] for how in ("static", "adaptive"))
+    gain: Any = next((each for each in (static, adaptive) if isinstance(each, str)), None)
+    if gain is None:
+        gain = [adaptive[at] / static[other] for at, other in ((0, 0), (1, 2), (2, 1))]
+    return figures | {f"colonnade {last} gain": gain}
+
+
+def table_scene(name: str, size: tuple[int, int]) -> Any:
+    """Return the `mi.Scene` of a view: a built-in scene, the hall with a spot in place of its lamp."""
+    if name != "colonnade":
+        return load_scene(name, size).scene
+    described = colonnade()
+    lamp = described["lamp"]
+    described["lamp"] = {
+        "type": "spot",
+        "to_world": mi.ScalarTransform4f().look_at(lamp["position"], [-1.13, 0.97, 1.67], [0, 0, 1]),
+        "cutoff_angle": 56.7,
+        "beam_width": 56.7,
+        "intensity": lamp["intensity"],
+    }
+    scene = mi.load_dict(described)
+    resize(scene, size)
+    return scene
+
+
+def _view(scene: Scene, view: str, texels: int, tessellation: str) -> dict[str, Any]:
+    """Return the rate of a view of Table 1, the times of its passes, and the triangles of the static mesh."""
+    named = f"{view} {tessellation}"
+    values = {"evaluation": "mesh", "tessellation": tessellation, "map": texels}
+
+    def measured() -> dict[str, Any]:
+        renderer = prepared(scene, configuration("light-volumes", "exact", values))
+        frame_within(renderer)
+        ready = renderer.prepare(scene)
+        cast, by_light = run_cast_and_shade(renderer)
+        dr.eval(cast, by_light)
+        volume = time_repeated(lambda: dr.eval(run_method(renderer, ready, cast, by_light)), seconds=_SECONDS, least=3)
+        found: dict[str, Any] = {f"{named} fps": _rate(renderer), f"{named} volume": milliseconds(volume)}
+        if tessellation == "static":
+            return found | {f"{view} triangles": sum(len(mesh.triangles) for mesh in ready)}
+        return found | {f"{named} {name}": time for name, time in _passes(scene, texels).items()}
+
+    passes = ("volume",) if tessellation == "static" else ("volume", "laplacian", "edge map", "tessellate", "vertices")
+    names = (f"{named} fps", f"{view} triangles", *(f"{named} {name}" for name in passes))
+    return attempted(names, measured)
+
+
+def _passes(scene: Scene, texels: int) -> dict[str, float]:
+    """Return the times of the passes of the tessellation, summed over the lights [ms], medians of three."""
+    pairs = [(cast_shadow_map(scene.geometry, light, texels), light) for light in scene.lights]
+    runs = [[tessellation_stages(shadow_map, light)[0] for shadow_map, light in pairs] for _ in range(3)]
+    return {name: float(np.median([sum(times[name] for times in run) for run in runs])) for name in runs[0][0]}

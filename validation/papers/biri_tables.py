@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tables 1 and 2 and the times of section 6 of Biri, Arques, Michelin 2006 measured again, at the published sizes.
+
+*As published* has everything that the paper has at once: its polynomial, its order of the planes, Gamma at vertices, a
+frame buffer of 8 bits, the cone of 32 planes about a spot. "A reasonable intensity for the light source" leaves nothing
+to clamp: the buffer is full at the radiance that all but one in a thousand pixels of the true frame stay below.
+
+The stages of Table 1 are wall-clock times, measured in turns with the whole frame:
+
+1. Silhouettes: of the parts whose shadow is in view, on the host.
+2. The scene with surface shadows: camera rays and lit surface. Stage 5 provides the shadows, since it counts the layers
+   of shadow anyway.
+3. The airlight of the scene without shadows: that of the method `unshadowed` with the same kernel. `shadow-planes`
+   never computes it alone, because each lit segment is a part of it. So this is the cost of one evaluation per ray, and
+   stage 5 is reduced by it.
+4. Sorting: the planes with their bins, that is the rest of the preparation on the host, and the tile lists.
+5. Shadow planes: the airlight after the tile lists, less stage 3.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+from realtime.frame.renderer import (
+    FrameRenderer,
+    render_frame,
+    run_cast_and_shade,
+    run_cull,
+    run_method,
+    run_shade,
+)
+from realtime.methods.shadow_planes.method import PlanePreparation
+from realtime.methods.shadow_planes.silhouettes import silhouette
+from realtime.methods.shadow_planes.view_culling import components_in_view
+from realtime.scene.camera import read_camera
+from realtime.scene.read_scene import Scene, read_scene
+from validation.configurations.methods import Configuration, configuration, prepared
+from validation.configurations.timing import Timing, first_frame, moved_light, time_in_turns
+from validation.estimates.quadrature import truth_image
+from validation.metrics.errors import error_metrics
+from validation.papers.measured import milliseconds, rate
+from validation.scenes.loading import load_scene
+
+STAGES = ("silhouettes", "scene", "airlight", "sorting", "planes")  #: of Table 1
+_COMPARED = (320, 240)  # size of the frames that are compared: the default report keeps these references [pixels]
+_SECONDS = 0.1  # for each timing [s]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A scene that stands for one of the paper, at a size."""
+
+    name: str  #: of its figures
+    scene: str
+    size: tuple[int, int] = (800, 600)  #: [pixels]
+    cone: int = 0  #: edges of the paper's cone over the spot; 0: no spot
+    staged: bool = False  #: whether Table 1 has it
+
+
+ENTRIES = (
+    Entry("sphere-spot 800", "sphere-spot", cone=32),
+    Entry("sphere-spot 1024", "sphere-spot", (1024, 768), cone=32),
+    Entry("two-pens", "two-pens", staged=True),
+    Entry("three-media", "three-media"),
+    Entry("clutter", "clutter", staged=True),
+    Entry("hall", "hall"),
+)
+
+
+def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, Any]:
+    """Return rates as published and by our exact form, fractions of stages [%], and the largest median error.
+
+    Parameters
+    ----------
+    scale
+        Of the width and height of all images; 1 for the published sizes.
+    seconds
+        For each timing, about [s].
+    """
+    figures: dict[str, Any] = {}
+    errors = []
+    for entry in ENTRIES:
+        size, compared = (
+            tuple(max(16, 4 * round(scale * side / 4)) for side in sides) for sides in (entry.size, _COMPARED)
+        )
+        scene = read_scene(load_scene(entry.scene, size).scene)
+        small = load_scene(entry.scene, compared).scene
+        truth = truth_image(small)
+        whole = truth.airlight + truth.surface
+        chosen = as_published("taylor", white=float(np.quantile(whole.max(axis=-1), 0.999)), cone=entry.cone)
+        frame = render_frame(prepared(read_scene(small), chosen))
+        errors.append(error_metrics(whole, frame.airlight + frame.surface).p50)
+        published, ours = prepared(scene, chosen), prepared(scene, configuration("shadow-planes", "exact"))
+        works = [moved_light(published), moved_light(ours)]
+        stages = _stage_works(published, "taylor") if entry.staged else []
+        times = time_in_turns(works + stages, seconds=(len(works) + len(stages)) * seconds)
+        figures |= {f"{entry.name} fps": rate(times[0]), f"{entry.name} ours fps": rate(times[1])}
+        if entry.staged:
+            figures |= {f"{entry.name} {name}": each for name, each in fractions(times[2:]).items()}
+    return figures | {"median error": max(errors)}
+
+
+def as_published(kernel: str, *, white: float, cone: int = 0) -> Configuration:
+    """Return shadow planes with all that the paper has.
+
+    Parameters
+    ----------
+    kernel
+        The polynomial, 'taylor' or 'taylor-printed'.
+    white
+        The radiance that fills the buffer [W/(m^2 sr)].
+    cone
+        Edges of the cone over a spot; 0 for other lights.
+    """
+    media = {"media": "printed"} if kernel == "taylor-printed" else {}
+    values = {"order": "paper", "evaluation": "vertex", "buffer": "8bit", "white": white, "cone": cone}
+    return configuration("shadow-planes", kernel, values | media)
+
+
+def fractions(times: list[Timing]) -> dict[str, list[float]]:
+    """Return of the stages their fraction in the sum [%], and of the planes the time over that of the next stage.
+
+    Each has the ends of its interval: the quartile of the stage that is least, with the others' that are most, and the
+    other way round.
+
+    Parameters
+    ----------
+    times
+        Of `_stage_works`.
+    """
+    silhouettes, surface, unshadowed, host, in_tiles, airlight = (milliseconds(time) for time in times)
+
+    def less(whole: list[float], part: list[float]) -> list[float]:
+        return [max(0.0, whole[at] - part[other]) for at, other in ((0, 0), (1, 2), (2, 1))]
+
+    sorting = [rest + tiles for rest, tiles in zip(less(host, silhouettes), in_tiles)]
+    stages = silhouettes, surface, unshadowed, sorting, less(airlight, unshadowed)
+    sums = [sum(stage[at] for stage in stages) for at in range(3)]
+    found = {}
+    for name, (middle, low, high) in zip(STAGES, stages):
+        ends = middle / sums[0], low / (low + sums[2] - high), high / (high + sums[1] - low)
+        found[name] = [100 * end for end in ends]
+    *others, planes = stages
+    next_stage = [max(stage[at] for stage in others) for at in range(3)]
+    found["main cost"] = [planes[at] / next_stage[other] for at, other in ((0, 0), (1, 2), (2, 1))]
+    return found
+
+
+def _stage_works(renderer: FrameRenderer, kernel: str) -> list[Callable[[], Any]]:
+    """Return the work of silhouettes, scene, unshadowed airlight, all on the host, tile lists, and airlight."""
+    scene, cached = renderer.scene, first_frame(renderer)
+    cast = cached.cast
+    by_light = run_shade(renderer, cast)
+    dr.eval(cast, by_light)
+    plain = prepared(scene, Configuration("unshadowed", kernel))
+    return [
+        lambda: _silhouettes(renderer, scene),
+        lambda: dr.eval(run_cast_and_shade(renderer)),
+        lambda: dr.eval(run_method(plain, (), cast, (), ())),
+        lambda: renderer.prepare(scene),
+        lambda: run_cull(renderer, cached.state, cast.distance),
+        lambda: dr.eval(run_method(renderer, cached.state, cast, by_light, cached.lists)),
+    ]
+
+
+def _silhouettes(renderer: FrameRenderer, scene: Scene) -> None:
+    assert isinstance(renderer.prepare, PlanePreparation)
+    occluders, camera = renderer.prepare.standing(scene), read_camera(scene.camera)
+    for light in scene.lights:
+        position = np.array(light.position, dtype=np.float64).ravel()
+        silhouette(occluders, position, used=components_in_view(occluders, camera, position))

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The claims of papers as data, and the rule that makes a verdict of what a paper says and what was measured.
+
+`claims.toml` has every claim: where it stands, its words, the experiment and the figure that measure it, and which way
+the paper says that the figure lies. Nobody types a verdict in:
+
+reproduced      the figure lies where the paper says
+not reproduced  it does not, and the claim is about mathematics or accuracy, which no machine changes
+differs         it does not, and the figure depends on the machine or on a scene of our own
+impossible      the figure cannot be measured here, or its interval holds both answers
+
+A row without a direction is a number beside ours and has no verdict: rates of graphics cards of 2004 to 2016 are such.
+"""
+
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+REPRODUCED, NOT_REPRODUCED, DIFFERS, IMPOSSIBLE = "reproduced", "not reproduced", "differs", "impossible"
+VERDICTS = (REPRODUCED, NOT_REPRODUCED, DIFFERS, IMPOSSIBLE)
+DIRECTIONS = ("at most", "at least", "equal", "unequal", "within")
+
+#: What an experiment gives: by name a number, a number with the ends of its interval, or why there is none.
+Figures = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A measured number with the interval of its noise."""
+
+    value: float
+    low: float
+    high: float
+
+    def scaled(self, factor: float) -> "Figure":
+        """Return the figure times a factor."""
+        return Figure(self.value * factor, *sorted((self.low * factor, self.high * factor)))
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One equation, figure, table cell or sentence of a paper."""
+
+    paper: str  #: a name of `papers()`
+    item: str  #: where it stands
+    words: str  #: what the paper says, and what is measured for it
+    experiment: str = ""  #: that measures it; none where nothing can be measured: `why` says so
+    figure: str = ""  #: name of the number that the experiment gives, or 'a / b'
+    direction: str = ""  #: of `DIRECTIONS`; none for a number without a verdict
+    published: float | None = None  #: the number that the paper prints
+    limit: float | Sequence[float] | None = None  #: the number that its words are read as; two for 'within'
+    tolerance: float = 0.0  #: of 'equal' and 'unequal', relative; absolute where the number is 0
+    unit: str = ""
+    why: str = ""  #: why the words are read so, or why nothing can be measured
+    ours: bool = False  #: the figure depends on the machine or on a scene of our own
+
+    def holds(self, value: float) -> bool:
+        """Return whether a value lies where the paper says."""
+        if self.direction == "within":
+            assert isinstance(self.limit, Sequence)
+            return self.limit[0] <= value <= self.limit[1]
+        goal = self.goal
+        away = abs(value - goal) > self.tolerance * (abs(goal) or 1.0)
+        answers = {"at most": value <= goal, "at least": value >= goal, "equal": not away, "unequal": away}
+        return answers[self.direction]
+
+    @property
+    def goal(self) -> float:
+        """The number of the claim, printed or read out of its words; of a range its middle."""
+        number = self.published if self.limit is None else self.limit
+        assert number is not None, self.item
+        return sum(number) / len(number) if isinstance(number, Sequence) else float(number)
+
+    @property
+    def rule(self) -> str:
+        """The rule in words."""
+        if isinstance(self.limit, Sequence):
+            return f"within {self.limit[0]:g} and {self.limit[1]:g}"
+        words = f"{'' if self.direction == 'equal' else self.direction + ' '}{self.goal:.4g}"
+        percent = f"{100 * self.tolerance:g} %"
+        return words + (f" to {percent}" if self.tolerance > 1e-6 else "")
+
+
+@cache
+def _data() -> dict[str, Any]:
+    return tomllib.loads(Path(__file__).with_name("claims.toml").read_text(encoding="utf-8"))
+
+
+def papers() -> dict[str, str]:
+    """Return the papers, by the name of the command line, in words."""
+    return dict(_data()["papers"])
+
+
+@cache
+def claims() -> tuple[Claim, ...]:
+    """Return every claim, in the order of the file; a block with `rows` is as many claims that share its keys."""
+    found = []
+    for block in _data()["claims"]:
+        shared = {key: value for key, value in block.items() if key != "rows"}
+        found += [Claim(**(shared | row)) for row in block.get("rows", [{}])]
+    return tuple(found)
+
+
+def taken(claim: Claim, figures: Figures) -> Figure | str:
+    """Return the figure of a claim, or why there is none."""
+    parts = [_figure(figures[name]) for name in claim.figure.split(" / ")]
+    for part in parts:
+        if isinstance(part, str):
+            return part
+    first, *below = (part for part in parts if isinstance(part, Figure))
+    for other in below:
+        first = Figure(first.value / other.value, first.low / other.high, first.high / other.low)
+    return first if math.isfinite(first.value) else "the measured figure is not finite"
+
+
+def _figure(number: Any) -> Figure | str:
+    if isinstance(number, str):
+        return number
+    value, low, high = number if isinstance(number, Sequence) else (number, number, number)
+    return Figure(float(value), float(low), float(high))
+
+
+def verdict(claim: Claim, figure: Figure) -> str:
+    """Return the verdict on a claim. Where the ends of the interval disagree, nothing can be told."""
+    answers = {claim.holds(value) for value in (figure.low, figure.value, figure.high)}
+    if len(answers) == 2:
+        return IMPOSSIBLE
+    return REPRODUCED if answers == {True} else DIFFERS if claim.ours else NOT_REPRODUCED
+
+
+def judged(claim: Claim, figures: Figures) -> dict[str, Any]:
+    """Return a claim beside what was measured, ready for JSON: `verdict` is None for a number without a direction."""
+    row: dict[str, Any] = {"paper": claim.paper, "item": claim.item, "words": claim.words, "verdict": None}
+    row |= {"published": claim.published, "measured": None, "low": None, "high": None}
+    row |= {"unit": claim.unit, "why": claim.why}
+    figure = taken(claim, figures) if claim.experiment else claim.why
+    if isinstance(figure, str):
+        return row | {"verdict": IMPOSSIBLE if claim.direction or not claim.experiment else None, "why": figure}
+    row |= {"measured": figure.value, "low": figure.low, "high": figure.high}
+    if not claim.direction:
+        return row
+    found = verdict(claim, figure)
+    why = f"{claim.rule}: {claim.why}"
+    if found == IMPOSSIBLE:
+        why = f"cannot be told apart, the figure lies between {figure.low:.3g} and {figure.high:.3g}; {why}"
+    return row | {"verdict": found, "why": why}

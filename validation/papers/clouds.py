@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Figs 11 and 12 and section 9 of Bouthors, Neyret, Max, Bruneton, Crassin 2008 again, against light paths.
+
+* Fig. 12, results of the method: `stratocumulus` and `cumulus` by `cloud-collectors`, beside the reference.
+* Fig. 11a, a gap that depth maps take for cloud: `ring`, the parts of it that another part shades.
+* Fig. 11b, two collectors of equal importance: `two-lobes`. From each point one search starts on the left and one on
+  the right; where they end apart there are two collectors, and the method has one.
+* Section 9, frames a second at 800 x 600: frames go on with the collectors of the last one, and the light moves, so
+  that its maps are made again. Clouds are of the paper's kinds and sizes, noise is in a grid of 128^3 voxels, where the
+  paper's shader evaluates noise at each step and stores distances in 512^3.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.clouds.canonical.sets import SETS
+from realtime.clouds.collectors.search import Collector
+from realtime.clouds.order_layers import order_layer
+from realtime.frame.renderer import frame_renderer, render_frame, run_cast_and_shade, run_method
+from realtime.methods.registry import METHODS
+from realtime.scene.read_scene import Scene, read_scene
+from reference.scene.clouds import CloudScene, read_clouds
+from validation.configurations.timing import first_frame
+from validation.estimates.budget import Budget
+from validation.estimates.images import monte_carlo_reference
+from validation.frames.cloud_frames import time_frames
+from validation.papers.measured import rate
+from validation.scenes.cloud_parts import cloud, droplets, sun
+from validation.scenes.loading import LoadedScene, load_scene, resize
+from validation.scenes.parts import medium_boundary
+from validation.scenes.registry import SCENES
+from validation.scenes.ring import ring_mesh
+from validation.scenes.two_lobes import two_lobes_mesh
+
+Array = NDArray[np.float64]
+Progress = Callable[[float, str], None]
+
+SIZE, SAMPLES = (80, 60), 512
+_FEWER = 4  #: times as few in Fig. 11, of which means over pixels are compared
+RESULTS = ("stratocumulus", "cumulus")  #: of Fig. 12
+FRAMES = (*RESULTS, "cumulus-detail")  #: of section 9
+GAP, LOBES = "ring", "two-lobes"  #: of Fig. 11
+_MESHES = {GAP: ring_mesh, LOBES: two_lobes_mesh}
+_METHOD = "cloud-collectors"
+_HIGH = (0.013, 0.029, -1.0)  #: way of the sun's light over the ring
+_MOST = 16  #: crossings of a ray towards the sun
+_ASIDE, _WIDTH = 250.0, 60.0  #: where searches start beside a point, and how wide [m]
+_APART = 1.0  #: distance of their ends from which on there are two [sigma]
+_SURE = 2.0  #: standard errors to both sides of a mean
+
+
+@dataclass(frozen=True)
+class Pair:
+    """The method and the reference of one scene, (height, width, 3) [W/(m^2 sr)]."""
+
+    image: Array
+    reference: Array
+    error: Array  #: standard error of the reference
+
+    def ratio(self, where: NDArray[np.bool_]) -> list[float]:
+        """Return the light of the image over that of the reference in some pixels, with the ends of its interval."""
+        light, expected = self.image[where].sum(), self.reference[where].sum()
+        # Errors of colours of one pixel come from the same paths; they are added, not their squares.
+        spread = _SURE * np.sqrt((self.error[where].sum(-1) ** 2).sum())
+        return [float(light / at) for at in (expected, expected + spread, expected - spread)]
+
+
+def clouds_figures(*, size: tuple[int, int] = SIZE, samples: int = SAMPLES) -> dict[str, Any]:
+    """Return light over that of the reference in Figs 11 and 12, and what shaded surfaces of Fig. 11a lack [%]."""
+    every = np.ones(size[::-1], dtype=bool)
+    figures: dict[str, Any] = {name: pair_of(shown(name, size), samples).ratio(every) for name in RESULTS}
+    fewer = max(2, samples // _FEWER)
+    loaded = shown(GAP, size)
+    pair, shaded = pair_of(loaded, fewer), _shaded(read_clouds(loaded.scene)).reshape(size[::-1])
+    figures["gap, shaded"] = pair.ratio(shaded)
+    part = 100 * float(pair.reference[shaded].sum() / pair.reference.sum())
+    figures["gap, lost"] = [part * (1 - ratio) for ratio in (figures["gap, shaded"][place] for place in (0, 2, 1))]
+    loaded = shown(LOBES, size)
+    two = _two_collectors(loaded)
+    figures["lobes, two"] = pair_of(loaded, fewer).ratio(two) if two.any() else "no pixel has two collectors"
+    return figures
+
+
+def cloud_frames() -> dict[str, Any]:
+    """Return the frames a second of section 9."""
+    return {name: rate(time_frames(read_scene(load_scene(name, (800, 600)).scene))["light_moved"]) for name in FRAMES}
+
+
+def shown(name: str, size: tuple[int, int]) -> LoadedScene:
+    """Return a scene of these figures.
+
+    Those of Fig. 11 are filled with droplets, whose tables are there already; over the ring the sun stands so high that
+    the upper part shades the lower.
+    """
+    if name in RESULTS:
+        return load_scene(name, size)
+    record = SCENES[name]
+    description = record.build() | ({"sun": sun(_HIGH, (3.17, 3.05, 2.83))} if name == GAP else {})
+    description["cloud"] = medium_boundary("cloud", _MESHES[name](), cloud(droplets()))
+    loaded = LoadedScene(name, mi.load_dict(description), record.purpose, record.published)
+    resize(loaded.scene, size)
+    return loaded
+
+
+def pair_of(loaded: LoadedScene, samples: int, progress: Progress | None = None) -> Pair:
+    """Return a scene by the method and by light paths, so many a pixel."""
+    frame = render_frame(frame_renderer(read_scene(loaded.scene), METHODS[_METHOD]))
+    traced = monte_carlo_reference(loaded, "cloud-paths", budget=Budget(samples=samples), progress=progress).image
+    layers = (frame.airlight, traced.layers["airlight"], traced.layers["airlight_se"])
+    return Pair(*(np.array(layer, dtype=np.float64) for layer in layers))
+
+
+def _shaded(clouds: CloudScene) -> NDArray[np.bool_]:
+    """Return which pixel-centre rays meet a cloud at a point whose way to the sun leaves the cloud and enters again."""
+    toward = -np.asarray(clouds.suns[0].direction, dtype=np.float64)
+    first = clouds.scene.ray_intersect(_rays(np.broadcast_to(clouds.origin, clouds.direction.shape), clouds.direction))
+    going = np.array(first.is_valid(), dtype=bool)
+    step = 1e-4 * float(np.abs(np.array([clouds.scene.bbox().min, clouds.scene.bbox().max])).max())
+    origin = np.array(first.p, dtype=np.float64).T + step * clouds.direction
+    enters = np.zeros_like(going)
+    for _ in range(_MOST):
+        hit = clouds.scene.ray_intersect(_rays(origin, np.broadcast_to(toward, origin.shape)), going)
+        going &= np.array(hit.is_valid(), dtype=bool)
+        enters |= going & ((np.array(hit.n, dtype=np.float64).T @ toward) < 0)
+        origin = np.where(going[:, None], np.array(hit.p, dtype=np.float64).T + step * toward, origin)
+    return enters
+
+
+def _rays(origin: Array, direction: Array) -> Any:
+    return mi.Ray3f(mi.Point3f(np.ascontiguousarray(origin.T)), mi.Vector3f(np.ascontiguousarray(direction.T)))
+
+
+def _two_collectors(loaded: LoadedScene) -> NDArray[np.bool_]:
+    """Return the pixels in which two searches end apart in some set of orders, both with light, (height, width)."""
+    sides = [_searched_from(read_scene(loaded.scene), aside) for aside in (-_ASIDE, _ASIDE)]
+    found = []
+    for (left, light_left, width), (right, light_right, _) in zip(*sides, strict=True):
+        far = np.linalg.norm(left - right, axis=-1) > _APART * width
+        found.append(far & (width > 0) & (light_left > 0) & (light_right > 0))
+    return np.any(found, axis=0)
+
+
+def _searched_from(scene: Scene, aside: float) -> list[tuple[Array, Array, Array]]:
+    """Return by set places, light and widths of the collectors that searches end with which start beside points."""
+    renderer = frame_renderer(scene, METHODS[_METHOD], extra_layers=True, start="previous", iterations=40)
+    cache = first_frame(renderer)
+    start = _each(cache.carried, lambda collector: _beside(collector, aside))
+    cast, by_light = run_cast_and_shade(renderer)
+    *_, extra, _, carried = run_method(renderer, cache.state, cast, by_light, cache.lists, None, start)
+    assert extra is not None
+    dr.eval(extra, carried)
+    shape = scene.camera.height, scene.camera.width
+    found = []
+    for (first, _), collector in zip(SETS, carried[0][0][0], strict=True):
+        centre = np.array(collector.centre, dtype=np.float64).T.reshape(*shape, 3)
+        light = np.array(extra[order_layer(int(first))], dtype=np.float64).sum(0).reshape(shape)
+        found.append((centre, light, np.array(collector.width, dtype=np.float64).reshape(shape)))
+    return found
+
+
+def _each(carried: Any, change: Callable[[Collector], Collector]) -> Any:
+    """Return what is carried from frame to frame with every collector changed."""
+    if isinstance(carried, tuple):
+        return tuple(_each(part, change) for part in carried)
+    return change(carried)
+
+
+def _beside(collector: Collector, aside: float) -> Collector:
+    zero = dr.zeros(type(collector.width), dr.width(collector.width))
+    made = Collector(type(collector.centre)(zero + aside, zero, zero), dr.select(collector.width > 0, zero + _WIDTH, 0))
+    dr.eval(made)
+    return made

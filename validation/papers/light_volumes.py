@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Sections 4 to 6 of Billeter 2010: the mesh of a light volume, its adaptive tessellation, its depths, its map.
+
+*Plain Laplacian.* The paper finds edges by a Laplacian filter of the shadow map; ours takes the terms of the Laplacian
+of the inverse depth one by one, at the spacing of every level (`realtime.methods.light_volumes.published.
+tessellation`). Here the plain filter, of the depth at the texels alone, stands beside it: its threshold is chosen so
+that both meshes have as many triangles, and both are compared with the static mesh of the same map.
+
+*Depths.* With depth testing, what the mesh crosses behind the visible surface is not drawn, and the mesh must be pushed
+towards the light so that its own image of the surface stays in front. The paper clamps crossings to the depth of the
+surface instead. Both sums are taken from the same crossings.
+
+*Triangles.* The sphere of `sphere-spot` with ever finer facets. Timed in turns: a frame of shadow planes after the
+light moved, and of light volumes what is not the rendering of the view or of the shadow map, that is the volume.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.geometry import foot_and_height
+from analytic.panels import airlight_segments
+from analytic.phase import PhaseFunction
+from realtime.frame.renderer import (
+    FrameRenderer,
+    evaluated,
+    image_frame,
+    render_frame,
+    run_cast_and_shade,
+    run_method,
+)
+from realtime.methods.light_volumes.published.mesh import THRESHOLD, VolumeMesh, adaptive_mesh, volume_mesh
+from realtime.methods.light_volumes.published.raster import signed_crossings
+from realtime.methods.light_volumes.published.tessellation import configuration, divide, edges, quads, triangles
+from realtime.scene.lights import Light
+from realtime.scene.read_scene import Scene, read_scene
+from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth
+from reference.scene.read import read_truth
+from validation.configurations import methods
+from validation.configurations.timing import moved_light, time_in_turns
+from validation.estimates.quadrature import truth_image
+from validation.metrics.errors import error_metrics
+from validation.papers.measured import milliseconds
+from validation.scenes.loading import load_scene, resize
+from validation.scenes.parts import lathe, mitsuba_mesh, placed
+from validation.scenes.sphere_spot import sphere_spot
+
+Array = NDArray[np.float64]
+
+MAP = 512  #: of the colonnade, six faces, and of the sphere [texels]
+SIZE = (160, 120)  #: of images [pixels]
+BIASES = (0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  #: by which the mesh is pushed towards the light, of its depth [1]
+_BIAS_MAP, _BIAS_SIZE = 128, (64, 64)  # of omni-box
+_MAPS = (32, 128, 512)  # of Fig. 6 [texels]
+FACETS = {"few": 16, "many": 512}  #: of a ring of the sphere: 514 triangles, and half a million
+_TRIANGLE_SIZE = (512, 512)
+_HALVINGS = 24  # of the interval of the threshold
+
+
+def maps() -> dict[str, float]:
+    """Return the errors of the mesh in `omni-box` by size of the map, and of the image of 128 texels to that of 512."""
+    loaded = load_scene("omni-box", SIZE).scene
+    scene, true = read_scene(loaded), truth_image(loaded).airlight
+    images = {size: render_frame(_renderer(scene, "mesh", size)).airlight for size in _MAPS}
+    errors = {str(size): error_metrics(true, image).relative_rmse for size, image in images.items()}
+    return errors | {"128 to 512": error_metrics(images[512], images[128]).relative_rmse}
+
+
+def _renderer(scene: Scene, evaluation: str, size: int) -> FrameRenderer:
+    walls = {"walls": "slanted"} if evaluation == "walk" else {}
+    chosen = methods.configuration("light-volumes", "exact", {"evaluation": evaluation, "map": size, **walls})
+    return methods.prepared(scene, chosen)
+
+
+def triangle_times(seconds: float = 0.3) -> dict[str, Any]:
+    """Return the times of the volume and of a frame of shadow planes with few and with many triangles [ms]."""
+    times = {}
+    for name, facets in FACETS.items():
+        scene = _sphere(facets)
+        volumes = _renderer(scene, "walk", MAP)
+        state = volumes.prepare(scene)
+        cast, by_light = run_cast_and_shade(volumes)
+        dr.eval(cast, by_light)
+        planes = methods.prepared(scene, methods.configuration("shadow-planes", "exact"))
+        works = [_evaluation(volumes, state, cast, by_light), moved_light(planes)]
+        volume, frame = time_in_turns(works, seconds=seconds * len(works))
+        times |= {f"volume, {name}": milliseconds(volume), f"planes, {name}": milliseconds(frame)}
+    return times
+
+
+def _evaluation(volumes: FrameRenderer, *given: Any) -> Callable[[], None]:
+    return lambda: dr.eval(run_method(volumes, *given))
+
+
+def _sphere(facets: int) -> Scene:
+    """Return `sphere-spot` with a round sphere of so many facets a ring."""
+    described = sphere_spot()
+    polar = np.pi * (1 - (np.arange(facets) + 0.5) / facets)
+    mesh = placed(lathe(0.47 * np.sin(polar), 0.47 * np.cos(polar), facets), (0.11, -0.07, 1.93))
+    described["sphere"] = mitsuba_mesh("sphere", mesh, (0.57, 0.31, 0.23))
+    scene = mi.load_dict(described)
+    resize(scene, _TRIANGLE_SIZE)
+    return read_scene(scene)
+
+
+def tessellation() -> dict[str, Any]:
+    """Return what holds of the mesh of the colonnade, and what two filters and two treatments of depths cost.
+
+    Returns
+    -------
+    dict
+        `configurations`, `most triangles`: that occur, and of a quad. `level steps`: the largest difference of levels
+        between neighbours. `flat`, `jump`: median side of the quads without and with a jump of the map [texels]. `our
+        error`, `plain error`: of the airlight to that of the static mesh. `bias ...`, `best bias`: relative RMSE of the
+        sum with depth testing to the clamped sum.
+    """
+    scene = read_scene(load_scene("colonnade", SIZE).scene)
+    light = scene.lights[0]
+    shadow_map = cast_shadow_map(scene.geometry, light, MAP)
+    heights = corner_heights(shadow_map)
+    divided = divide(edges(heights, THRESHOLD))
+    used = {int(level) for _, _, sides in quads(divided) for level in np.unique(sides)}
+    level = quad_levels(divided)
+    side, jump = MAP / 2.0**level, _jumps(heights)
+    errors = {f"bias {bias:g}": error for bias, error in zip(BIASES, _biased())}
+    return {
+        "configurations": len(used),
+        "most triangles": max(len(configuration(sides)) for sides in used),
+        "level steps": max(int(np.abs(np.diff(level, axis=axis)).max()) for axis in (1, 2)),
+        "flat": float(np.median(side[~jump])),
+        "jump": float(np.median(side[jump])),
+        "best bias": min(errors.values()),
+        **errors,
+        **_filter_errors(_renderer(scene, "mesh", MAP), shadow_map, heights, divided),
+    }
+
+
+def corner_heights(shadow_map: ShadowMap) -> Array:
+    """Return the inverse depths at the corners of texels, (faces, N + 1, N + 1) [1/m]."""
+    side = shadow_map.size + 1
+    return np.array(inverse_depth(shadow_map)).reshape(shadow_map.faces, side, side)
+
+
+def quad_levels(divided: list[Any]) -> NDArray[np.int64]:
+    """Return the level of the quad in which each texel lies, (faces, size, size); 0 is a whole face.
+
+    Parameters
+    ----------
+    divided
+        From `realtime.methods.light_volumes.published.tessellation.divide`.
+    """
+    size = 2 ** len(divided)
+    level = np.zeros((len(divided[0]), size, size), dtype=np.int64)
+    for number, numbers, _ in quads(divided):
+        step = size >> number
+        face, rest = np.divmod(numbers, 4**number)
+        row, column = np.divmod(rest, 2**number)
+        down = (row * step)[:, None, None] + np.arange(step)[:, None]
+        level[face[:, None, None], down, (column * step)[:, None, None] + np.arange(step)] = number
+    return level
+
+
+def _jumps(heights: Array) -> NDArray[np.bool_]:
+    """Return the texels whose corners differ by more than a tenth."""
+    corners = np.stack([heights[:, a : a - 1 or None, b : b - 1 or None] for a in (0, 1) for b in (0, 1)])
+    return np.ptp(corners, axis=0) > 0.1 * corners.max(axis=0)
+
+
+def plain_edges(heights: Array, wanted: int) -> list[Any]:
+    """Return the nodes of each level that hold a texel beyond the threshold of the plain Laplacian of the depth.
+
+    Parameters
+    ----------
+    heights
+        Inverse depths, (faces, N + 1, N + 1) [1/m].
+    wanted
+        Triangles of the mesh; the threshold is found by bisection, so their number is close to it.
+    """
+    response = laplacian(heights)
+    low, high = -20.0, float(np.log(response.max() + 1))
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if len(triangles(divide(_marked(response > np.exp(middle))))) > wanted:
+            low = middle
+        else:
+            high = middle
+    return _marked(response > np.exp(high))
+
+
+def laplacian(heights: Array) -> Array:
+    """Return |sum of the four neighbours - 4 times the corner| of the depth, (faces, N + 1, N + 1), edges repeated.
+
+    Parameters
+    ----------
+    heights
+        Inverse depths at the corners of texels [1/m]; where they are 0 the depth is that of the farthest other corner.
+    """
+    depth = 1 / np.maximum(heights, heights[heights > 0].min())
+    wide = np.pad(depth, ((0, 0), (1, 1), (1, 1)), mode="edge")
+    around = wide[:, :-2, 1:-1] + wide[:, 2:, 1:-1] + wide[:, 1:-1, :-2] + wide[:, 1:-1, 2:]
+    return np.abs(around - 4 * depth)
+
+
+def _marked(corners: NDArray[np.bool_]) -> list[Any]:
+    """Return the nodes of each level that have a marked corner."""
+    marked = corners[:, :-1, :-1] | corners[:, 1:, :-1] | corners[:, :-1, 1:] | corners[:, 1:, 1:]
+    levels = []
+    while marked.shape[1] > 1:
+        marked = marked[:, ::2, ::2] | marked[:, 1::2, ::2] | marked[:, ::2, 1::2] | marked[:, 1::2, 1::2]
+        levels.append(marked)
+    return levels[::-1]
+
+
+def _filter_errors(renderer: FrameRenderer, shadow_map: ShadowMap, heights: Array, ours: Any) -> dict[str, float]:
+    """Return the error of the airlight of both filters, with as many triangles."""
+    light = renderer.scene.lights[0]
+    cast, by_light = run_cast_and_shade(renderer)
+    dr.eval(cast, by_light)
+
+    def airlight(mesh: VolumeMesh) -> Array:
+        return image_frame(renderer, evaluated(cast, by_light, run_method(renderer, (mesh,), cast, by_light))).airlight
+
+    def adaptive(divided: list[Any]) -> VolumeMesh:
+        return adaptive_mesh(shadow_map, light, heights, triangles(divided))
+
+    static = airlight(volume_mesh(shadow_map, light))
+    plain = divide(plain_edges(heights, len(triangles(ours))))
+    return {
+        f"{name} error": error_metrics(static, airlight(adaptive(divided))).relative_rmse
+        for name, divided in (("our", ours), ("plain", plain))
+    }
+
+
+def _biased() -> list[float]:
+    """Return for each bias the relative RMSE of the sum with depth testing to the sum with clamped depths."""
+    loaded = load_scene("omni-box", _BIAS_SIZE).scene
+    scene, truth = read_scene(loaded), read_truth(loaded)
+    light = scene.lights[0]
+    depth = render_frame(_renderer(scene, "mesh", _BIAS_MAP)).distance.astype(np.float64).ravel()
+    foot, height = foot_and_height(truth.origin, truth.direction, truth.lights[0].position)
+    sigma = float(truth.medium.sigma_t[0])
+    mesh = volume_mesh(cast_shadow_map(scene.geometry, light, _BIAS_MAP), light)
+
+    def summed(shown: VolumeMesh, *, clamp: bool) -> Array:
+        total = np.zeros(len(depth))
+        for batch in signed_crossings(shown, scene.camera):
+            pixel, x, sign = (np.array(each) for each in (batch.pixel, batch.distance, batch.sign))
+            drawn = np.ones(len(x), dtype=bool) if clamp else x < depth[pixel]
+            pixel, sign, end = pixel[drawn], sign[drawn], np.minimum(x, depth[pixel])[drawn]
+            J, _ = airlight_segments(foot[pixel], height[pixel], 0.0, end, sigma, PhaseFunction("isotropic"))
+            np.add.at(total, pixel, sign * J)
+        return np.repeat(total.reshape(_BIAS_SIZE[::-1])[:, :, None], 3, axis=2)
+
+    clamped = summed(mesh, clamp=True)
+    return [error_metrics(clamped, summed(_pushed(mesh, light, bias), clamp=False)).relative_rmse for bias in BIASES]
+
+
+def _pushed(mesh: VolumeMesh, light: Light, bias: float) -> VolumeMesh:
+    """Return a mesh pushed towards the light by a fraction of its depth: vertices are (light s + k, s)."""
+    place = np.array(light.position, dtype=np.float64).ravel()
+    s = mesh.vertices[:, 3:]
+    nearer = s / (1 - bias)
+    return VolumeMesh(np.hstack([mesh.vertices[:, :3] + place * (nearer - s), nearer]), mesh.triangles)

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The pictures of Biri 2006 and Billeter 2010 again, in our own scenes.
+
+Fig. 1 of Biri 2006 is a triptych: a hall lit classically, with single scattering, and with volumetric shadows. Fig. 1
+of Billeter 2010 is a cathedral with two lights, which is not ours to ship: `colonnade` has two lamps in its place. Fig.
+8b there is a tessellation: here one face of the colonnade's map, by our filter and by the plain Laplacian.
+"""
+
+from dataclasses import replace
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.frame.renderer import render_frame
+from realtime.methods.light_volumes.published.mesh import THRESHOLD
+from realtime.methods.light_volumes.published.tessellation import divide, edges, triangles
+from realtime.scene.animate import thicker_medium
+from realtime.scene.read_scene import Scene, read_scene
+from realtime.shadow_maps.shadow_map import cast_shadow_map
+from validation.configurations.methods import configuration, prepared
+from validation.papers.light_volumes import corner_heights, plain_edges, quad_levels
+from validation.scenes.colonnade import colonnade
+from validation.scenes.loading import load_scene, resize
+from validation.scenes.parts import point_light
+
+Array = NDArray[np.float64]
+
+_FACE = 1  # of the six, the one that sees the columns
+
+
+def triptych(size: tuple[int, int]) -> dict[str, Array]:
+    """Return the three images of Fig. 1 of Biri 2006 in `hall`, all light, each (height, width, 3) [W/(m^2 sr)]."""
+    scene = read_scene(load_scene("hall", size).scene)
+    clear = replace(scene, medium=thicker_medium(scene.medium, 0.0))
+    return {
+        "lit classically": _all_light(clear, "unshadowed"),
+        "single scattering": _all_light(scene, "unshadowed"),
+        "with volumetric shadows": _all_light(scene, "shadow-planes"),
+    }
+
+
+def two_lights_image(size: tuple[int, int]) -> Array:
+    """Return the hall with two lamps by light volumes with maps of 1024 texels, all light [W/(m^2 sr)]."""
+    described = colonnade()
+    described["lamp-2"] = point_light((-0.73, 3.31, 6.23), (97.0, 103.0, 111.0))
+    scene = mi.load_dict(described)
+    resize(scene, size)
+    return _all_light(read_scene(scene), "light-volumes", map=1024)
+
+
+def tessellations(size: int) -> dict[str, Array]:
+    """Return by filter the side of the quads of one face of the colonnade's map, (size, size) [texels].
+
+    Parameters
+    ----------
+    size
+        Of a face, a power of two [texels].
+    """
+    scene = read_scene(load_scene("colonnade", (64, 48)).scene)
+    heights = corner_heights(cast_shadow_map(scene.geometry, scene.lights[0], size))
+    ours = divide(edges(heights, THRESHOLD))
+    plain = divide(plain_edges(heights, len(triangles(ours))))
+    return {name: size / 2.0 ** quad_levels(divided)[_FACE] for name, divided in (("ours", ours), ("plain", plain))}
+
+
+def _all_light(scene: Scene, method: str, **values: int) -> Array:
+    frame = render_frame(prepared(scene, configuration(method, "exact", values)))
+    return np.asarray(frame.airlight, dtype=np.float64) + frame.surface

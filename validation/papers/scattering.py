@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What Biri 2006 and Billeter 2010 leave out of the light: multiple scattering, and the constant R of bounded media.
+
+*Ambient fog.* Biri adds a constant ambient light in the medium, albedo A (1 - exp(-sigma_t x)), in place of what
+scatters more than once. `volpath` with long paths less `volpath` with one scattering, of the same seeds, is what it
+should be, of the medium alone. The constant A that fits best is a least-squares fit over the pixels and channels of an
+image. What is then left over is taken from two images M1, M2 of other seeds, sqrt(mean((M1 - m)(M2 - m)) / mean(M1
+M2)), so that the noise of the paths does not count.
+
+*The constant R* (section 4.2). The camera looks at a sphere of one medium in clear air, which a lamp outside the sphere
+lights from above. R, the mean distance between a point of the boundary and a point of the medium, is 1.2 radii in a
+sphere. A path from far away has a mean length of 0.75 radii within the sphere (the mean of half a chord over the
+volume): R is 60 % too long, and the airlight too dark by about exp(-0.45 sigma_t radius).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from statistics import median
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.frame.renderer import render_frame
+from realtime.scene.read_scene import Scene, read_scene
+from reference.monte_carlo.batches import LAYERS
+from validation.configurations.methods import configuration, prepared
+from validation.estimates.monte_carlo import monte_carlo_batches
+from validation.estimates.multiple_scattering import multiple_scattering_share
+from validation.metrics.errors import error_metrics
+from validation.scenes.loading import load_scene, resize
+from validation.scenes.open_fog import open_fog
+from validation.scenes.parts import camera
+
+Array = NDArray[np.float64]
+
+_SCENES = ("open-fog", "two-pens", "colonnade")
+_SIZE = (32, 24)  # of the images of multiple scattering [pixels]
+_BATCHES, _SAMPLES, _DEPTH = 8, 8, 64
+_THIN = 0.00173  # extinction of `open-fog` a hundred times as thin [1/m]: optical depth 0.009 to the lamp
+
+SIZES = (0.05, 0.17, 0.43, 0.83)  #: radius over the distance from the lamp to the centre
+OPTICAL_DEPTHS = (0.03, 0.31, 1.1, 3.1, 9.7)  #: of the diameter
+_LAMP = np.array([0.37, -0.31, 3.07])  # [m]
+_RADIUS = 0.97  # [m]
+
+
+def multiple_scattering() -> dict[str, Any]:
+    """Return what a constant leaves of multiple scattering, the worst of three scenes, and its fraction in thin fog."""
+    described = open_fog()
+    described["fog"]["scale"] = _THIN
+    scene = mi.load_dict(described)
+    resize(scene, _SIZE)
+    thin = multiple_scattering_share(scene, batches=_BATCHES, samples=_SAMPLES).medium
+    return {"left over": max(map(_left_over, _SCENES)), "thin": [thin.value, *thin.interval]}
+
+
+def _left_over(name: str) -> float:
+    scene = load_scene(name, _SIZE).scene
+    first, second = (_multiple(scene, seed) for seed in (0, 1000))
+    fog = _fog(read_scene(scene))
+    return left_over(first, second, fitted_constant(fog, 0.5 * (first + second)) * fog)
+
+
+def fitted_constant(fog: Array, multiple: Array) -> float:
+    """Return the factor of an image of ambient fog that brings it closest to one of multiple scattering."""
+    return float(np.sum(fog * multiple) / np.sum(fog * fog))
+
+
+def left_over(first: Array, second: Array, model: Array) -> float:
+    """Return the relative RMSE of a model to the mean of two images with independent noise, without it; 0 at least."""
+    squares = float(np.mean((first - model) * (second - model)) / np.mean(first * second))
+    return max(0.0, squares) ** 0.5
+
+
+def _multiple(scene: Any, seed: int) -> Array:
+    """Return the airlight of two and more scatterings, (pixels, 3)."""
+    whole, single = (
+        monte_carlo_batches(
+            scene, "volpath", batches=_BATCHES, samples=_SAMPLES, first_seed=seed, max_depth=depth
+        ).batches.mean[LAYERS.index("airlight")]
+        for depth in (_DEPTH, 2)
+    )
+    return whole - single
+
+
+def _fog(scene: Scene) -> Array:
+    """Return the ambient fog of constant 1, (pixels, 3), as the method draws it."""
+    lit, unlit = (
+        render_frame(prepared(scene, configuration("shadow-planes", "exact", values))).airlight.astype(np.float64)
+        for values in ({"ambient": 1.0}, {})
+    )
+    return (lit - unlit).reshape(-1, 3)
+
+
+@dataclass(frozen=True)
+class ConstantDistance:
+    """The errors of one medium with the constant R, over the pixels that see the medium, against `media=exact`."""
+
+    size: float  #: radius over the distance of the lamp
+    optical_depth: float  #: of the diameter
+    bias: float  #: relative
+    rmse: float  #: relative
+    polynomial: float  #: relative RMSE of the same by the kernel 'taylor', of degree 4 as in the paper
+    printed: float  #: relative RMSE of the equation as printed, summed over nodes
+
+
+def constant_distance() -> dict[str, float]:
+    """Return the largest bias of the constant R, and what the polynomial and the printed equation have of its error."""
+    rows = list(constant_distances())
+    printed, polynomial = ([getattr(row, name) / row.rmse for row in rows] for name in ("printed", "polynomial"))
+    return {
+        "largest bias": max(abs(row.bias) for row in rows),
+        "printed, median": median(printed),
+        "polynomial, median": median(polynomial),
+        "polynomial, largest": max(polynomial),
+    }
+
+
+def constant_distances(image: tuple[int, int] = (64, 48)) -> Iterator[ConstantDistance]:
+    """Yield the errors by `SIZES` and `OPTICAL_DEPTHS`, in float64, at a size of the images [pixels]."""
+    for size in SIZES:
+        for depth in OPTICAL_DEPTHS:
+            scene = read_scene(mi.load_dict(sphere_in_clear_air(size, depth, image)), "double")
+            exact = _airlight(scene, "exact")
+            forms = [("paper", "exact"), ("paper", "taylor"), ("printed", "exact")]
+            paper, taylor, printed = (
+                error_metrics(exact, _airlight(scene, *form), mask=exact[..., 1] > 0) for form in forms
+            )
+            errors = paper.relative_bias, paper.relative_rmse, taylor.relative_rmse, printed.relative_rmse
+            yield ConstantDistance(size, depth, *errors)
+
+
+def sphere_in_clear_air(size: float, optical_depth: float, image: tuple[int, int]) -> dict[str, Any]:
+    """Return a sphere of fog as high as the view, and a lamp at radius/size from its centre."""
+    lamp = _LAMP / np.linalg.norm(_LAMP) * (_RADIUS / size)
+    medium = {
+        "type": "homogeneous",
+        "sigma_t": 1.0,
+        "scale": 0.5 * optical_depth / _RADIUS,
+        "albedo": 0.83,
+        "has_spectral_extinction": False,
+    }
+    return {
+        "type": "scene",
+        "sensor": camera((0.13, -5.3, 0.21), (0.0, 0.0, 0.0), fov=27.1, size=image, in_fog=False),
+        "lamp": {"type": "point", "position": lamp.tolist(), "intensity": {"type": "rgb", "value": [3.1, 3.1, 3.1]}},
+        "ball": {"type": "sphere", "radius": _RADIUS, "bsdf": {"type": "null"}, "interior": medium},
+    }
+
+
+def _airlight(scene: Scene, media: str, kernel: str = "exact") -> Array:
+    return render_frame(prepared(scene, configuration("shadow-planes", kernel, {"media": media}))).airlight

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the order of shadow planes and the other shortcuts of Biri 2006 cost in images of the built-in scenes.
+
+Errors are relative RMSE and relative bias of the airlight against the quadrature. What is noticeable is what an 8-bit
+display shows: by how many of its 255 steps 99 % of the pixels are right, with the radiance `white` shown as 255.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.geometry import foot_and_height
+from realtime.frame.renderer import render_frame
+from realtime.scene.read_scene import read_scene
+from reference.scene.read import read_truth
+from validation.configurations.methods import configuration, prepared
+from validation.estimates.quadrature import truth_image
+from validation.metrics.errors import Metrics, error_metrics
+from validation.scenes.loading import load_scene, resize
+from validation.scenes.parts import camera, fog, point_light
+
+Array = NDArray[np.float64]
+
+SIZE = (160, 120)  #: of the images [pixels]
+SCENES = ("two-pens", "clutter", "hall", "colonnade")  #: whose planes are ordered
+_CLOSE = 0.3  # optical depth between camera and light
+
+
+def orders() -> dict[str, float]:
+    """Return the errors without shadows, without an order of the planes, and in the paper's order."""
+    paper = {scene: _error(scene, {"order": "paper"}) for scene in SCENES}
+    unshadowed = error_metrics(_truth("hall"), _rendered("hall", {}, method="unshadowed"))
+    return {
+        "hall, unshadowed": unshadowed.relative_rmse,
+        "clutter, no order": _error("clutter", {"order": "none"}).relative_rmse,
+        "hall, paper's order": paper["hall"].relative_rmse,
+        "paper's order, largest": max(error.relative_rmse for error in paper.values()),
+        "paper's order, p99": max(error.p99 for error in paper.values()),
+    }
+
+
+def shortcuts() -> dict[str, float]:
+    """Return the errors of the polynomial, of Gamma at the vertices and of an 8-bit buffer.
+
+    Returns
+    -------
+    dict
+        `near, steps`: see `_steps`. `vertex`: Gamma at the vertices, in `two-pens`. `bright, bias` and
+        `dim, bias`: of an 8-bit buffer in `clutter`, over the pixels whose truth is below white, which is a quarter of
+        the brightest airlight of 99 % of the pixels, and four times as much.
+    """
+    true = _truth("clutter")
+    brightest = float(np.percentile(true.max(axis=2), 99))
+    biases = {}
+    for name, white in (("bright", brightest / 4), ("dim", 4 * brightest)):
+        image = _rendered("clutter", {"buffer": "8bit", "white": white})
+        below = true < white
+        biases[f"{name}, bias"] = float((image - true)[below].sum() / true[below].sum())
+    return {"near, steps": _steps(), "vertex": _error("two-pens", {"evaluation": "vertex"}).relative_rmse, **biases}
+
+
+def _steps() -> float:
+    """Return by how many of 255 steps of a display the paper's polynomial is off in 99 % of the pixels near a lamp.
+
+    The lamp stands in front of the camera, before which the whole fog is lit; near is within 10 degrees of the lamp.
+    White is the brightest radiance of 99 % of the picture.
+    """
+    scene = mi.load_dict(_lamp_in_fog(_CLOSE))
+    resize(scene, SIZE)
+    read = read_scene(scene)
+    true, shown = (
+        render_frame(prepared(read, configuration("unshadowed", kernel))).airlight.astype(np.float64)
+        for kernel in ("exact", "taylor")
+    )
+    white, near = float(np.percentile(true, 99)), _close_to_lamp(scene)
+    on_screen = [255 * np.clip(image[near] / white, 0, 1) for image in (true, shown)]
+    return float(np.percentile(np.abs(on_screen[1] - on_screen[0]).max(axis=1), 99))
+
+
+def _lamp_in_fog(depth: float) -> dict[str, Any]:
+    distance = 5.3
+    return {
+        "type": "scene",
+        "fog": fog(depth / distance, (0.93, 0.93, 0.93)),
+        "sensor": camera((0.31, -distance, 1.13), (0.37, 0.0, 0.91), fov=58.3, size=SIZE),
+        "lamp": point_light((0.33, 0.03, 1.17), (23.1, 23.1, 23.1)),
+    }
+
+
+def _close_to_lamp(scene: Any) -> NDArray[np.bool_]:
+    truth = read_truth(scene)
+    foot, height = foot_and_height(truth.origin, truth.direction, truth.lights[0].position)
+    return (np.arctan2(height, foot) < np.radians(10)).reshape(truth.height, truth.width)
+
+
+def _error(scene: str, values: Mapping[str, Any]) -> Metrics:
+    return error_metrics(_truth(scene), _rendered(scene, values))
+
+
+def _truth(scene: str) -> Array:
+    return truth_image(load_scene(scene, SIZE).scene).airlight
+
+
+def _rendered(scene: str, values: Mapping[str, Any], method: str = "shadow-planes") -> Array:
+    read = read_scene(load_scene(scene, SIZE).scene)
+    frame = render_frame(prepared(read, configuration(method, "exact", values)))
+    return np.asarray(frame.airlight, dtype=np.float64)

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Sections 2, 3 and 5 of Bouthors, Neyret, Max, Bruneton, Crassin 2008 again, on a slab: what the slab alone decides.
+
+Clouds are of droplets with r_e = 6 um, gamma = 2, 4e8 in a cubic metre, at 0.55 um; lengths in metres become optical by
+their extinction, lowered by what is cut out of the peak where the phase function is the modified one. For Fig. 8, light
+by direction, three ways to T stand side by side: the computation with more streams than the tables had, the tables that
+frames look up, and the paper's 22 functions, fitted to the tables.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import drjit as dr
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.droplets import Modified, optics
+from realtime.clouds.canonical.directional_moments import DirectionalMoments
+from realtime.clouds.canonical.fit import fit_on_device, fitted_functions
+from realtime.clouds.canonical.look_up import LookUp, on_device
+from realtime.clouds.canonical.sets import SETS, set_name
+from realtime.clouds.canonical.tables import canonical_tables
+from realtime.clouds.slab_orders.droplets import droplet_phase
+from realtime.clouds.slab_orders.moments import SlabOrders, order_sets
+from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SlabPhase
+from realtime.numerics.array_types import ArrayTypes, array_types
+from validation.slab.phases import phase_pair
+
+Array = NDArray[np.float64]
+
+THICKNESSES = (50.0, 100.0, 300.0, 1000.0)  #: [m]
+_SUNS = (0.0, 75.0)  # [degrees]
+_FIGURE_3 = (1000.0, 100.0, 75.0)  # thickness [m], depth [m] and sun [degrees] of its left part
+#: What is compared with the droplets, by thickness [m].
+_REFLECTANCES: Mapping[float, tuple[str, ...]] = {
+    50.0: ("printed", "modified", "half", "printed g"),
+    300.0: ("printed", "matched g"),
+    1000.0: ("printed",),
+}
+_PRINTED_G = 0.99
+_DROPLETS = (6.0, 2.0, 0.55)
+_STREAMS, _NODES = 48, 6  # which give reflectances to 1e-4
+_APPEARS = 1.0  # fraction from which on orders appear [%]
+
+SUN = 25.0  #: of Fig. 8 [degrees]
+#: Thickness and depths of Fig. 8 [m].
+PANELS: tuple[tuple[float, tuple[float, ...]], ...] = ((100.0, (0.0, 100.0)), (1000.0, (0.0, 100.0, 1000.0)))
+_ANGLES = 36  # zenith angles of the view
+_DIM = 1e-6  # of the light of all sets, below which a set is not compared
+
+
+def slab_figures() -> dict[str, Any]:
+    """Return reflectances over those of the droplets, fractions of orders [%] and how radiance changes by azimuth."""
+    green = optics()
+    cut = float(Modified(green).removed)
+    full, modified = (droplet_phase(*_DROPLETS, modified=cut_off) for cut_off in (False, True))
+    lowered = (1 - cut) * green.extinction
+    figures = {f"azimuth, {name}": ratio for name, ratio in _by_azimuth(lowered, modified).items()}
+    for thickness, asked in _REFLECTANCES.items():
+        tau = thickness * green.extinction
+        slabs: dict[str, tuple[float, SlabPhase]] = {
+            "printed": (thickness * green.printed_extinction, full),
+            "modified": ((1 - cut) * tau, modified),
+            "half": (0.5 * tau, modified),
+            "matched g": (tau, HenyeyGreensteinPhase(green.g)),
+            "printed g": (tau, HenyeyGreensteinPhase(_PRINTED_G)),
+        }
+        whole = _reflectance(tau, full)
+        figures |= {f"{thickness:g} m, {name}": _reflectance(*slabs[name]) / whole for name in asked}
+    fractions = {(t, sun): _fractions(t * lowered, sun, modified) for t in THICKNESSES for sun in _SUNS}
+    overhead = [fractions[t, 0.0][0] for t in THICKNESSES]
+    return figures | {
+        "isotropic from": crossing(THICKNESSES, [100 - each for each in overhead], _APPEARS),
+        "transmitted, 1000 m": fractions[1000.0, 0.0][1],
+        "reflected, least": min(reflected for reflected, _ in fractions.values()),
+    }
+
+
+def crossing(places: tuple[float, ...], values: list[float], level: float) -> float:
+    """Return where rising values reach a level, by a power law between the two places around it."""
+    after = next(number for number, value in enumerate(values) if value >= level)
+    (x0, x1), (y0, y1) = np.log(places[after - 1 : after + 1]), np.log(values[after - 1 : after + 1])
+    return float(np.exp(x0 + (math.log(level) - y0) / (y1 - y0) * (x1 - x0)))
+
+
+def _reflectance(tau: float, phase: SlabPhase) -> float:
+    _, total = order_sets(_slab(tau, 1.0, phase), [(1, math.inf)])
+    return float(total.up[0, 0])
+
+
+def _slab(tau: float, mu0: float, phase: SlabPhase) -> SlabOrders:
+    return SlabOrders(tau, mu0, phase, 1.0, streams=_STREAMS, nodes=_NODES)
+
+
+def _fractions(tau: float, sun: float, phase: SlabPhase) -> tuple[float, float]:
+    """Return the fraction of orders 1 to 30 in the light that is reflected, and transmitted after scattering [%]."""
+    (few, _), total = order_sets(_slab(tau, math.cos(math.radians(sun)), phase), [(1, 30), (31, math.inf)])
+    return 100 * float(few.up[0, 0] / total.up[0, 0]), 100 * float(few.down[0, -1] / total.down[0, -1])
+
+
+def _by_azimuth(lowered: float, phase: SlabPhase) -> dict[str, float]:
+    """Return by set how far radiance changes with the azimuth, at the point of Fig. 3, where it changes most."""
+    thickness, depth, sun = _FIGURE_3
+    slab = DirectionalMoments(phase, 1.0, np.array([-0.9, -0.6, -0.3, 0.3, 0.6, 0.9]))
+    modes = slab(thickness * lowered, [math.cos(math.radians(sun))], [depth * lowered])[:, :, 0, 0, 0]
+    phi = np.linspace(0, np.pi, 37)
+    m = np.arange(modes.shape[1])[:, None]
+    radiance = np.einsum("smv,mp->svp", modes, np.cos(m * phi) * np.where(m > 0, 2.0, 1.0))
+    ratios = radiance.max(-1) / np.maximum(radiance.min(-1), 1e-300)
+    return {set_name(number): float(ratios[number].max()) for number in range(len(SETS))}
+
+
+def transport_figures() -> dict[str, Any]:
+    """Return by how much the 22 functions are off in half of the directions, the median over the curves [%]."""
+    medians = []
+    for curve in transport_curves():
+        shown = curve["exact"] > _DIM * curve["all"]
+        if shown.any():
+            medians.append(np.median(np.abs(curve["fit"][shown] / curve["exact"][shown] - 1)))
+    return {"fit, median": 100 * float(np.median(medians))}
+
+
+def transport_curves() -> list[dict[str, Any]]:
+    """Return T of Fig. 8 by direction.
+
+    Returns
+    -------
+    list of dict
+        `thickness` and `depth` [m], `orders`, and by zenith angle of the view, `angle` [degrees], in the plane of the
+        sun: `exact`, `table`, `fit`, and `all`, the light of all sets [1/sr].
+    """
+    pair, types = phase_pair("mie-modified"), array_types("single")
+    tables = canonical_tables(pair.deterministic, 1.0)
+    look_up = on_device(tables, types)
+    fit = fit_on_device(fitted_functions(pair.deterministic, 1.0, tables, look_up, types), types)
+    lowered = (1 - Modified(optics()).removed) * optics().extinction
+    angles = (np.arange(_ANGLES) + 0.5) * np.pi / _ANGLES
+    slab = DirectionalMoments(
+        pair.deterministic, 1.0, np.cos(angles), streams=48, modes=47, nodes=5, negligible=1e-5, single=False
+    )
+    curves = []
+    for thickness, depths in PANELS:
+        t, at = thickness * lowered, [depth * lowered for depth in depths]
+        modes = slab(t, [math.cos(math.radians(SUN))], at)[:, :, 0, 0]
+        twice = np.where(np.arange(modes.shape[1]) > 0, 2.0, 1.0)
+        exact = np.einsum("smdv,m->sdv", modes, twice)
+        for place, depth in enumerate(depths):
+            for orders in range(len(SETS)):
+                table, fitted = (_looked_up(each, types, orders, t, at[place], angles) for each in (look_up, fit))
+                curve = {"exact": exact[orders, place], "table": table, "fit": fitted, "all": exact[:, place].sum(0)}
+                named = {"thickness": thickness, "depth": depth, "orders": set_name(orders)}
+                curves.append(named | {"angle": np.degrees(angles)} | curve)
+    return curves
+
+
+def _looked_up(look_up: LookUp, types: ArrayTypes, orders: int, t: float, d: float, angles: Array) -> Array:
+    numbers = np.broadcast_arrays(t, d, np.cos(angles), 1.0, 0.0, math.cos(math.radians(SUN)))
+    T, *_ = look_up(orders, *(types.scalar(np.array(each)) for each in numbers))
+    dr.eval(T)
+    return np.array(T, dtype=np.float64)

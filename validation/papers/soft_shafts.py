@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Figures 4.7, 4.8, 4.19 and 5.8 of Ali 2016 measured again, in `fence`, with `soft-shafts`.
+
+The source prints no equation, no scene and no table of errors; the method is reconstructed from captions. It gives:
+
+* Fig. 5.8: R1 150 samples along each ray, R2 32, R3 32 and a Gaussian, R4 32 and the bilateral filter;
+* Fig. 4.8: 3 light points with hd = 3, hr = 0.5;
+* Fig. 4.19: 4, 8, 16, 32 taps.
+
+Errors are those of airlight plus surface, as root mean square over the mean, against the quadrature, and in the
+*penumbra*: where the visible surface gets more than 0.02 and less than 0.98 of the light that it would get without
+occluders. Both lights of this fraction are sums over the same `POINTS` points of the area light, so that a surface that
+sees all of the light has the fraction 1. The interval of a ratio of two errors is that of a jackknife over vertical
+strips of the image.
+
+*At equal time* R2 and R3 get more steps, so many that by the times of R1 and R2 (linear in the steps) they take as long
+as R4. *Edges* is the median, over the hundredth of the penumbra where the reference is steepest, of the gradient over
+that of the reference. *Flicker* is the root mean square of the second difference of frames in time, of a light that
+moves in equal steps, over that of the exact sum over the points for the same frames, in the penumbra of the first.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.frame.renderer import FrameRenderer, render_frame, run_cast_and_shade
+from realtime.scene.read_scene import Scene, read_scene
+from validation.configurations.methods import SHARED_POINTS, Configuration, prepared
+from validation.configurations.timing import Timing, moved_light, time_in_turns
+from validation.estimates.quadrature import truth_image
+from validation.papers.measured import rate
+from validation.scenes.loading import load_scene
+
+Array = NDArray[np.float64]
+
+SCENE, SIZE = "fence", (200, 152)  #: of the frames [pixels]; the source prints none
+POINTS = 64
+STEPS, MANY = 32, 150
+TAPS = (4, 8, 16, 32)
+_FRAMES, _TRAVEL = 5, 0.02  # of the flicker: frames, and how far the light goes from one to the next [m]
+_STRIPS = 16  # of the jackknife
+_SURE = 2.0  # standard errors to both sides of a ratio
+
+#: Names and values of parameters, beside the defaults: 5 points on a ring, uniform steps, hd = 5, hr = 0.5.
+RENDERINGS: Mapping[str, dict[str, Any]] = {
+    "R1": {"steps": MANY, "filter": "none"},
+    "R2": {"steps": STEPS, "filter": "none"},
+    "R3": {"steps": STEPS, "filter": "gauss"},
+    "R4": {"steps": STEPS},
+}
+VARIANTS: Mapping[str, dict[str, Any]] = {
+    "3 points": {"points": 3, "hd": "3"},
+    "16 points": {"points": 16},
+    "scale 2": {"scale": 2},
+    "hd auto": {"guide": "depth", "hd": "auto", "surfaces": "ray"},
+    "shared points": dict(SHARED_POINTS),
+}
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The quadrature of the scene."""
+
+    image: Array  #: airlight plus surface, (height, width, 3) [W/(m^2 sr)]
+    penumbra: NDArray[np.bool_]  #: (height, width)
+
+    def error(self, image: Array, left_out: int | None = None) -> float:
+        """Return the relative RMSE of an image in the penumbra, if wanted without one of the strips."""
+        where = self.penumbra
+        if left_out is not None:
+            where = where & (np.arange(where.shape[1]) * _STRIPS // where.shape[1] != left_out)
+        expected = self.image[where]
+        return float(np.sqrt(np.mean((image[where] - expected) ** 2)) / np.mean(expected))
+
+    def ratio(self, above: Array, below: Array) -> list[float]:
+        """Return the error of an image over that of another, with the ends of its interval."""
+        whole = self.error(above) / self.error(below)
+        rest = [self.error(above, strip) / self.error(below, strip) for strip in range(_STRIPS)]
+        spread = _SURE * float(np.sqrt((_STRIPS - 1) * np.var(rest)))
+        return [whole, whole - spread, whole + spread]
+
+    def edges(self, image: Array) -> float:
+        """Return the median gradient of an image over the reference's, at the steepest hundredth of the penumbra."""
+        shown, true = (np.hypot(*np.gradient(picture[..., 1])) for picture in (image, self.image))
+        steep = self.penumbra & (true > np.quantile(true[self.penumbra], 0.99))
+        return float(np.median(shown[steep] / true[steep]))
+
+
+def soft_shafts(size: tuple[int, int] = SIZE, *, seconds: float = 0.3) -> dict[str, Any]:
+    """Return errors, ratios of errors, edges, flicker and rates by the names of the renderings.
+
+    Parameters
+    ----------
+    size
+        Of the frames [pixels].
+    seconds
+        For the timings of each rendering [s].
+    """
+    scene = read_scene(load_scene(SCENE, size).scene)
+    reference = shafts_reference(size)
+    times = timings(scene, RENDERINGS, seconds)
+    taps = {f"{count} taps": {"steps": count} for count in TAPS}
+    chosen = {**RENDERINGS, **_at_equal_time(times), **VARIANTS, **taps}
+    images = {name: rendered(scene, values) for name, values in chosen.items()}
+    errors = {name: reference.error(image) for name, image in images.items()}
+    fewer = min((f"{count} taps" for count in TAPS[:-1]), key=errors.__getitem__)
+    ratio = {name: partial(reference.ratio, image) for name, image in images.items()}
+    return {
+        **{f"{name} error": error for name, error in errors.items()},
+        **{f"{name} flicker": each for name, each in _flicker(scene, reference).items()},
+        "R4 edges": reference.edges(images["R4"]),
+        "R4 fps": rate(times["R4"]),
+        "R4 over R1": ratio["R4"](images["R1"]),
+        "R4 over R2": ratio["R4"](images["R2, equal time"]),
+        "R4 over R3": ratio["R4"](images["R3, equal time"]),
+        "3 points over 16": ratio["3 points"](images["16 points"]),
+        "32 taps over fewer": ratio["32 taps"](images[fewer]),
+    }
+
+
+def shafts_reference(size: tuple[int, int]) -> Reference:
+    """Return the quadrature of the scene and its penumbra."""
+    loaded = load_scene(SCENE, size).scene
+    truth = truth_image(loaded)
+    renderer = prepared(read_scene(loaded), _exact())
+    image = np.asarray(truth.airlight + truth.surface, dtype=np.float64)
+    return Reference(image, penumbra(renderer))
+
+
+def penumbra(renderer: FrameRenderer) -> NDArray[np.bool_]:
+    """Return where the visible surface gets a part of the light, with and without occluders from the same points."""
+    surface = render_frame(renderer).surface
+    _, by_light = run_cast_and_shade(renderer)
+    lanes = np.array(sum(by_light[0]), dtype=np.float64).T
+    unshadowed = np.empty_like(lanes)
+    unshadowed[np.array(renderer.pixel)] = lanes
+    unshadowed = unshadowed.reshape(surface.shape)[..., 1]
+    reached = unshadowed > 0
+    fraction = np.where(reached, surface[..., 1], 0) / np.where(reached, unshadowed, 1)
+    return (fraction > 0.02) & (fraction < 0.98)
+
+
+def _exact() -> Configuration:
+    # Sobol's sequence: the columns of a grid would fall together behind upright bars.
+    return Configuration("shadow-planes", "exact", (("points", POINTS), ("pattern", "sobol")))
+
+
+def _configuration(values: Mapping[str, Any]) -> Configuration:
+    return Configuration("soft-shafts", None, tuple(values.items()))
+
+
+def rendered(scene: Scene, values: Mapping[str, Any]) -> Array:
+    """Return airlight plus surface of a rendering [W/(m^2 sr)]."""
+    frame = render_frame(prepared(scene, _configuration(values)))
+    return np.asarray(frame.airlight + frame.surface, dtype=np.float64)
+
+
+def timings(scene: Scene, chosen: Mapping[str, Mapping[str, Any]], seconds: float) -> dict[str, Timing]:
+    """Return the times of renderings after the light moved, measured in turns, by name."""
+    works = [moved_light(prepared(scene, _configuration(values))) for values in chosen.values()]
+    return dict(zip(chosen, time_in_turns(works, seconds=seconds * len(works), least=3), strict=True))
+
+
+def _at_equal_time(times: Mapping[str, Timing]) -> dict[str, dict[str, Any]]:
+    """Return R2 and R3 with as many steps as take the time of R4."""
+    ms = {name: timing.median_ms for name, timing in times.items()}
+    a_step = max((ms["R1"] - ms["R2"]) / (MANY - STEPS), 1e-6)
+    more = {name: round(max(ms["R4"] - ms[name], 0.0) / a_step) for name in ("R2", "R3")}
+    return {f"{name}, equal time": RENDERINGS[name] | {"steps": STEPS + more[name]} for name in more}
+
+
+def _flicker(scene: Scene, reference: Reference) -> dict[str, float]:
+    """Return the flicker of R2, R4 and the shared points over that of the exact sum over the points."""
+    (light,) = scene.area_lights
+    across = light.across / np.linalg.norm(light.across)
+    path = [
+        replace(scene, area_lights=(replace(light, middle=light.middle + step * _TRAVEL * across),))
+        for step in range(_FRAMES)
+    ]
+
+    def second_difference(chosen: Configuration) -> float:
+        renderer = prepared(scene, chosen)
+        images = [render_frame(replace(renderer, scene=now)) for now in path]
+        frames = np.array([(each.airlight + each.surface)[reference.penumbra] for each in images], dtype=np.float64)
+        return float(np.sqrt(np.mean(np.diff(frames, 2, axis=0) ** 2)))
+
+    smooth = second_difference(_exact())
+    chosen = {"R2": RENDERINGS["R2"], "R4": RENDERINGS["R4"], "shared points": VARIANTS["shared points"]}
+    return {name: second_difference(_configuration(values)) / smooth for name, values in chosen.items()}
