@@ -1,0 +1,372 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Claim: images of the reference obey exact laws, and have the known answer where there is one.
+
+With L = albedo sigma_t / (4 pi) int I p exp(-sigma_t (x + r)) / r^2 dx, summed over lights and lit intervals:
+
+- L is linear in the albedo and in what lights send, and adds up over lights.
+- Lengths times k and sigma_t over k leave the exponent; of the rest sigma_t gives 1/k and dx/r^2 another: L falls as
+  k^-2. A directional light has no 1/r^2, and of an area light dA/r^2 has no unit: there L stays as it is.
+- Moving, turning or mirroring the whole scene changes nothing but the order of the pixels.
+- A light in a closed box gives exactly nothing outside.
+
+Monte Carlo estimators are held against the laws with the same random numbers on both sides.
+"""
+
+import math
+from dataclasses import replace
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from analytic.area_light import disk_share, polygon_in_disk, polygon_overlap, sphere_airlight
+from analytic.geometry import foot_and_height
+from reference.quadrature.area_surface import visible_share
+from reference.quadrature.light_points import PointPlan
+from reference.quadrature.ray_values import ray_values
+from reference.scene.read import TruthLight
+from reference.visibility.light_lines import Points
+from tests.evidence.certified.model import SIZE, FogLight, FogScreen, load_fog, mitsuba_dict
+from tests.evidence.injected import injected
+from tests.evidence.known_answers import (
+    BOX,
+    SCENES,
+    TURN,
+    G,
+    airlight,
+    brighter,
+    darker,
+    difference,
+    enclosed,
+    floor,
+    fog_scene,
+    in_units,
+    lamps,
+    layers,
+    mapped,
+    one_light_each,
+    panel,
+    sun,
+    truth_of,
+    white,
+)
+from tests.evidence.mutations import MUTATIONS
+
+EXACT = 1e-10  # the tolerance of the integrals
+FLOAT32 = 2e-5  # of single precision, which rounds otherwise after a change; the random numbers are the same
+
+MOVE = np.eye(4)
+MOVE[:3, 3] = 3.0, -5.0, 2.0
+
+#: By law: what it does to a scene, and by what factor it changes the airlight of each scene.
+LINEAR = {
+    "albedo": (lambda scene: darker(scene, 0.5), dict.fromkeys(SCENES, 0.5)),
+    "power": (lambda scene: brighter(scene, 4.0), dict.fromkeys(SCENES, 4.0)),
+    "units": (lambda scene: in_units(scene, 8.0), {"lamps": 1 / 64, "sun": 1.0, "panel": 1.0}),
+}
+SAME = {"turned": TURN, "moved": MOVE}
+
+
+def law(name: str, scene: str, estimator: str = "quadrature") -> float:
+    """Return how far images are from a law, over the largest pixel."""
+    change, factor = LINEAR[name]
+    before = SCENES[scene]()
+    return difference(airlight(change(before), estimator), factor[scene] * airlight(before, estimator))
+
+
+def additivity(scene) -> float:
+    return difference(airlight(scene), np.asarray(sum(airlight(one) for one in one_light_each(scene))))
+
+
+@pytest.mark.claim("known-answers")
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("name", LINEAR)
+def test_quadrature_obeys(variant, name, scene):
+    assert law(name, scene) <= EXACT
+
+
+@pytest.mark.claim("known-answers")
+@pytest.mark.parametrize("scene", ["lamps", "sun"])
+@pytest.mark.parametrize("name", LINEAR)
+@pytest.mark.parametrize("estimator", ["single-scatter", pytest.param("volpath", marks=pytest.mark.slow)])
+def test_monte_carlo_obeys(variant, name, scene, estimator):
+    assert law(name, scene, estimator) <= FLOAT32
+
+
+@pytest.mark.claim("known-answers")
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("name", SAME)
+def test_a_scene_can_be_elsewhere(variant, name, scene):
+    before = SCENES[scene]()
+    assert difference(airlight(mapped(before, SAME[name])), airlight(before)) <= EXACT
+
+
+@pytest.mark.claim("known-answers")
+def test_a_mirrored_scene_has_a_mirrored_image(variant):
+    mirrored = airlight(mapped(lamps(), np.diag([-1.0, 1, 1, 1]))).reshape(SIZE, SIZE, 3)
+    assert difference(mirrored[:, ::-1], airlight(lamps()).reshape(SIZE, SIZE, 3)) <= EXACT
+
+
+@pytest.mark.claim("known-answers")
+@pytest.mark.parametrize("name", ["lamps", "sun"])
+def test_lights_add_up(variant, name):
+    lamp = {"type": "point", "position": [0.5, -0.25, 2.5], "intensity": {"type": "rgb", "value": [5.0, 6.0, 7.0]}}
+    scene = lamps() if name == "lamps" else sun() | {"lamp": lamp}
+    assert len(one_light_each(scene)) == 2
+    assert additivity(scene) <= 1e-13  # the same sums in another order
+
+
+@pytest.mark.claim("known-answers")
+@pytest.mark.parametrize("name", ["lamps", "sun"])
+@pytest.mark.parametrize("estimator", ["quadrature", "single-scatter", pytest.param("volpath", marks=pytest.mark.slow)])
+def test_no_light_leaves_a_closed_box(variant, name, estimator):
+    assert np.abs(layers(truth_of(enclosed(name)), estimator)).max() == 0
+
+
+def test_the_laws_are_tried_on_scenes_that_have_it_all(variant):
+    """Shadows and three colours, endless and ended rays, a soft spot: else the laws would say little."""
+    for name, scene in SCENES.items():
+        truth, light = truth_of(scene()), layers(truth_of(scene()))[0]
+        clear = layers(replace(truth, occluders=load_fog({"type": "scene"})))[0]
+        assert 0.3 < light.mean() / clear.mean() < 0.97, name
+        media = truth.media or (truth.medium,)
+        assert len(set(media[0].sigma_t)) == 3, name
+    ends = ray_values(truth_of(lamps())).distance
+    assert 0 < np.isfinite(ends).sum() < ends.size
+    assert any(light.is_soft for light in truth_of(lamps()).lights)
+
+
+def test_a_law_that_is_broken_is_seen(variant):
+    """An albedo that counts twice, a near clip plane, a forgotten light: each fails one law alone."""
+    by_name = {mutation.name: mutation for mutation in MUTATIONS}
+    broken = {}
+    for name in ("albedo-squared", "near-clip", "first-light-only"):
+        with injected(*by_name[name].changes):
+            found = {each: law(each, "lamps") > EXACT for each in LINEAR} | {"sum": additivity(lamps()) > 1e-13}
+        broken[name] = [each for each, wrong in found.items() if wrong]
+    # Seen alone, each of the lights is the first.
+    assert broken == {"albedo-squared": ["albedo"], "near-clip": ["units"], "first-light-only": ["sum"]}
+
+
+# --- Closed forms: media ---
+
+
+def floor_distance(truth) -> np.ndarray:
+    """Return where rays meet the floor z = 0, a parallelogram."""
+    with np.errstate(divide="ignore"):
+        distance = -truth.origin[2] / truth.direction[:, 2]
+    point = truth.origin + np.where(distance > 0, distance, 0)[:, None] * truth.direction
+    u, v = (np.array(edge[:2]) for edge in floor().half_edges)
+    share = np.linalg.solve(np.stack([u, v], axis=1), (point[:, :2] - np.array(floor().centre[:2])).T)
+    return np.where((distance > 0) & np.all(np.abs(share) < 1, axis=0), distance, np.inf)
+
+
+@pytest.mark.claim("known-answers")
+def test_the_limit_of_a_vacuum(variant):
+    """As sigma_t goes to 0, L / (albedo sigma_t I / (4 pi)) goes to int dx / r^2 = (theta1 - theta0)/h."""
+    sigma_t = 2.0**-40
+    truth = truth_of(replace(fog_scene(), lights=fog_scene().lights[:1], occluders=(floor(),), sigma_t=(sigma_t,) * 3))
+    (light,) = truth.lights
+    foot, height = foot_and_height(truth.origin, truth.direction, light.position)
+    end = floor_distance(truth)
+    theta1 = np.where(np.isfinite(end), np.arctan2(np.where(np.isfinite(end), end, 0) - foot, height), math.pi / 2)
+    expected = (theta1 - np.arctan2(-foot, height)) / height
+    factor = truth.medium.albedo * sigma_t * light.intensity / (4 * math.pi)
+    # In each pixel the tolerance of the integrals; the medium itself is worth 1e-11.
+    np.testing.assert_allclose(layers(truth)[0], expected[:, None] * factor, rtol=2e-10)
+    assert np.all(airlight(mitsuba_dict(replace(fog_scene(), sigma_t=(0.0, 0.0, 0.0)))) == 0)
+
+
+@pytest.mark.claim("known-answers")
+@pytest.mark.parametrize("r", [0.25, 1.0, 3.0])
+def test_fluence_of_first_order(variant, r):
+    """Add up the airlight over all directions at a distance r from a source of unit power.
+
+    phi = int albedo sigma_t exp(-sigma_t (r1 + r2)) / ((4 pi r1^2) r2^2 4 pi) dV, r1 and r2 the distances of dV from
+    source and point. In prolate spheroidal coordinates, r1 + r2 = r xi and r1 - r2 = r eta, dV = r^3/8 (xi^2 - eta^2)
+    dxi deta dphi and r1 r2 = r^2/4 (xi^2 - eta^2). The integral over eta is elementary, and with u = r xi
+
+        phi = albedo sigma_t / (4 pi r) int_r^inf exp(-sigma_t u) log((u + r)/(u - r)) / u du.
+
+    With psi the angle from the direction of the source, phi = 2 pi int L sin(psi) dpsi. L grows as 1/psi towards the
+    source; in psi = pi t^2 the integrand is smooth enough for 96 Gauss-Legendre nodes.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(96)
+    t = 0.5 * (nodes + 1)
+    psi = math.pi * t**2
+    albedo, sigma_t = 0.75, 1.0
+    light = FogLight((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    scene = replace(fog_scene(), lights=(light,), occluders=(), sigma_t=(sigma_t,) * 3, albedo=(albedo,) * 3)
+    directions = np.stack([np.sin(psi), np.zeros_like(psi), np.cos(psi)], axis=1)
+    around = replace(truth_of(scene), origin=np.array([0.0, 0.0, -r]), direction=directions, width=len(psi), height=1)
+    values = ray_values(around).airlight[:, 0] / (4 * math.pi)
+    flux = 2 * math.pi * float(np.sum(values * np.sin(psi) * weights * math.pi * t))
+
+    def integrand(v: float) -> float:  # u = r (1 + v^2) takes the logarithm off the end
+        return math.exp(-sigma_t * r * (1 + v * v)) * math.log((2 + v * v) / (v * v)) / (1 + v * v) * 2 * v
+
+    integral = quad(integrand, 0, 1, epsrel=1e-12)[0] + quad(integrand, 1, np.inf, epsrel=1e-12)[0]
+    # 96 directions: 48 give the same to 1e-6.
+    assert flux == pytest.approx(albedo * sigma_t / (4 * math.pi * r) * integral, rel=1e-6)
+
+
+@pytest.mark.claim("known-answers")
+def test_a_floor_in_an_absorbing_medium(variant):
+    """It is dimmed by exp(-sigma_t (camera to floor + floor to light)), and there is no airlight."""
+    sigma_t = 0.75
+    scene = replace(fog_scene(), lights=fog_scene().lights[:1], occluders=(floor(),), albedo=(0.0,) * 3)
+    clear, dim = (truth_of(white(mitsuba_dict(replace(scene, sigma_t=(each,) * 3)))) for each in (0.0, sigma_t))
+    end = floor_distance(clear)
+    hit = np.isfinite(end)
+    point = clear.origin + end[hit, None] * clear.direction[hit]
+    path = end[hit] + np.linalg.norm(point - clear.lights[0].position, axis=1)
+    (_, bright), (nothing, surface) = layers(clear), layers(dim)
+    assert np.all(nothing == 0)
+    # The floor is met at (corner - origin) . n / (direction . n) in float32. Dot products and quotient round seven
+    # times, a distance d is off by that share of d, and the path from light to camera by twice as much at most.
+    allowed = 2 * sigma_t * end[hit, None] * 7 * 2.0**-24
+    assert np.all(np.abs(surface[hit] / bright[hit] / np.exp(-sigma_t * path)[:, None] - 1) <= allowed)
+
+
+@pytest.mark.claim("known-answers")
+@pytest.mark.parametrize(("estimator", "tolerance"), [("quadrature", 1e-6), ("single-scatter", FLOAT32)])
+def test_a_wall_behind_an_absorbing_sphere(variant, estimator, tolerance):
+    """It is dimmed by exp(-sigma_t chord), the chord 2 sqrt(R^2 - b^2) of a float32 sphere."""
+    sigma_t, centre, radius = 0.75, np.array([0.125, 0.0625, 1.25]), 0.75
+    wall = FogScreen((0.0, 6.0, 1.0), ((8.0, 0.0, 0.0), (0.0, 0.0, 8.0)))
+    scene = replace(fog_scene(), lights=(FogLight((0.0, 5.0, 6.0), (9.0, 9.0, 9.0)),), occluders=(wall,))
+    clear = white(mitsuba_dict(scene))
+    del clear["fog"], clear["sensor"]["medium"]
+    medium = mitsuba_dict(replace(scene, sigma_t=(sigma_t,) * 3, albedo=(0.0,) * 3))["fog"]
+    ball = {"type": "sphere", "center": centre.tolist(), "radius": radius, "bsdf": {"type": "null"}}
+    empty = medium | {"sigma_t": {"type": "rgb", "value": [0.0, 0.0, 0.0]}}
+    truths = [truth_of(clear | {"ball": ball | {"interior": inside}}) for inside in (empty, medium)]
+    bright, dim = (layers(truth, estimator)[1] for truth in truths)
+    closest = np.linalg.norm(np.cross(centre - truths[0].origin, truths[0].direction), axis=1)
+    chord = 2 * np.sqrt(np.maximum(radius**2 - closest**2, 0))
+    assert 0.1 < np.mean(chord > 0) < 0.9
+    np.testing.assert_allclose(dim / bright, np.repeat(np.exp(-sigma_t * chord)[:, None], 3, axis=1), rtol=tolerance)
+
+
+@pytest.mark.claim("known-answers")
+def test_a_box_of_fog_under_vertical_light(variant):
+    """The leg from a height z goes straight up to the lid at z_1.
+
+    A ray that is in the box from (height z_0) on for the length l, and rises by w_z a metre, has
+    tau = sigma_t (z_1 - z_0 + (1 - w_z) y) after y metres, so
+
+        L = albedo E p(w_z) / (4 pi) exp(-sigma_t (z_1 - z_0)) (1 - exp(-sigma_t (1 - w_z) l)) / (1 - w_z).
+    """
+    scene = {name: entry for name, entry in sun().items() if name != "slab"}
+    scene["sun"] = scene["sun"] | {"to_world": {"matrix": np.diag([1.0, -1, -1, 1]).tolist()}}
+    truth = truth_of(scene)
+    (medium,), (light,) = truth.media, truth.directional
+    with np.errstate(divide="ignore"):
+        lower, upper = ((BOX[0] + sign * BOX[1] - truth.origin) / truth.direction for sign in (-1, 1))
+    low, high = np.minimum(lower, upper).max(axis=1), np.maximum(lower, upper).min(axis=1)
+    length = np.maximum(high - low, 0.0)[:, None]
+    rise = truth.direction[:, 2:]
+    above = BOX[0][2] + BOX[1][2] - truth.origin[2] - low[:, None] * rise
+    p = (1 - G**2) / (1 + G**2 - 2 * G * rise) ** 1.5
+    integral = np.exp(-medium.sigma_t * above) * -np.expm1(-medium.sigma_t * (1 - rise) * length) / (1 - rise)
+    expected = medium.albedo * light.irradiance * p / (4 * math.pi) * np.where(length > 0, integral, 0.0)
+    assert difference(layers(truth)[0], expected) <= 1e-13  # float64 rounding
+
+
+# --- Closed forms: area lights ---
+
+
+@pytest.fixture(scope="module")
+def lit(variant):
+    """The rectangle of `panel` without occluders, and eight rays."""
+    truth = truth_of(panel())
+    return replace(truth, occluders=load_fog({"type": "scene"}), direction=truth.direction[4::8], width=8, height=1)
+
+
+def by_points(truth, light, count: int) -> np.ndarray:
+    plan = PointPlan(error=0.0, first=count, most=count)
+    return ray_values(replace(truth, area=(light,)), plan=plan).airlight
+
+
+@pytest.mark.claim("known-answers")
+def test_a_rectangle_shrinks_to_a_point(lit):
+    """At equal power, and symmetric about its middle, it differs from a point by the square of its size."""
+    (light,) = lit.area
+
+    def sized(size: float) -> np.ndarray:
+        return by_points(lit, replace(light, half=size * light.half, radiance=light.radiance / size**2), 256)
+
+    first, second, point = (sized(size) for size in (2.0**-4, 2.0**-5, 2.0**-12))
+    ratio = np.linalg.norm(first - point) / np.linalg.norm(second - point)
+    assert ratio == pytest.approx(4, rel=0.05)  # the next term of the series, and that of the points
+
+
+@pytest.mark.claim("known-answers")
+def test_a_sphere_shrinks_to_a_point_of_intensity_le_pi_r_squared(lit):
+    (light,) = lit.area
+    radius = 2.0**-12
+    small = by_points(lit, replace(light, kind="sphere", half=np.full(2, radius)), 1024)
+    point = TruthLight(light.centre, light.radiance * math.pi * radius**2)
+    expected = ray_values(replace(lit, area=(), lights=(point,))).airlight
+    assert difference(small, expected) <= 3e-4  # 8 x 1024 points
+
+
+@pytest.mark.slow
+@pytest.mark.claim("known-answers")
+@pytest.mark.claim("area-light-closed-forms", tolerance="2e-6 by 8 x 16384 points, whose standard error is 5e-7")
+@pytest.mark.parametrize("height", [0.35, 0.83])
+def test_a_sphere_beside_a_ray(lit, height):
+    sigma_t, radius, foot = 0.21, 0.3, 2.0
+    medium = replace(lit.medium, sigma_t=np.full(3, sigma_t), albedo=np.ones(3))
+    light = replace(lit.area[0], kind="sphere", half=np.full(2, radius), radiance=np.ones(3), frame=np.eye(3))
+    light = replace(light, centre=np.array([height, 0.0, foot]))
+    ray = replace(lit, medium=medium, origin=np.zeros(3), direction=np.array([[0.0, 0, 1]]), width=1, height=1)
+    expected = sphere_airlight(sigma_t, height, radius, foot=foot, x0=0.0, x1=300.0) * sigma_t / (4 * math.pi)
+    assert by_points(ray, light, 16384)[0, 0] == pytest.approx(float(expected), rel=2e-6)
+
+
+TRIANGLE = np.array([[-0.25, -0.25], [0.5, 0.0], [0.125, 0.5]])
+HALF_PLANE = np.array([[0.0, -64], [64, -64], [64, 64], [0, 64]])
+
+
+def lid(corners: np.ndarray, height: float):
+    """Return a Mitsuba scene of one convex polygon, as a fan of triangles."""
+    mesh = mi.Mesh("lid", vertex_count=len(corners), face_count=len(corners) - 2)
+    parameters = mi.traverse(mesh)
+    vertices = np.concatenate([corners, np.full((len(corners), 1), height)], axis=1)
+    parameters["vertex_positions"] = vertices.astype(np.float32).ravel()
+    parameters["faces"] = np.array([[0, k, k + 1] for k in range(1, len(corners) - 1)], dtype=np.uint32).ravel()
+    parameters.update()
+    return mi.load_dict({"type": "scene", "lid": mesh})
+
+
+@pytest.mark.claim("known-answers")
+@pytest.mark.claim("area-light-closed-forms", tolerance="1e-6 of the share by 8 x 32768 lines")
+@pytest.mark.parametrize("lines", [64, pytest.param(32768, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("kind", "corners"), [("disk", HALF_PLANE), ("rectangle", TRIANGLE)], ids=["half plane", "triangle"]
+)
+def test_what_a_polygon_leaves_of_a_light(variant, kind, corners, lines):
+    """A light at the height 4 over points at 0, where a polygon at the height 2 is in the way.
+
+    Of a disk a half plane leaves 1 - (acos u - u sqrt(1 - u^2))/pi, of a rectangle a triangle what clipping leaves.
+    """
+    truth = truth_of(panel(kind))
+    half = np.array([0.625, 0.375]) if kind == "rectangle" else np.full(2, 0.5)
+    middle = np.array([0.125, 0.25])
+    light = replace(truth.area[0], centre=np.array([*middle, 4.0]), half=half, frame=np.diag([1.0, 1.0, -1.0]))
+    truth = replace(truth, area=(light,), occluders=lid(corners, 2.0))
+    place = np.array([[-0.375, 0.25, 0], [-0.1875, 0.125, 0], [0.0, 0.0625, 0], [0.125, 0.25, 0], [0.3125, 0.125, 0]])
+    points = Points(place, np.tile([0.0, 0.0, 1.0], (len(place), 1)))
+    share = visible_share(truth, 0, points, lines).mean(axis=1)
+    # A corner at half the height is twice as far from the foot of the point where it falls on the light's plane.
+    fallen = [foot + 2 * (corners - foot) - middle for foot in place[:, :2]]
+    if kind == "disk":
+        expected = [1 - float(disk_share(shape[0, 0] / half[0])) for shape in fallen]
+        assert expected[2] == pytest.approx(1 - polygon_in_disk(fallen[2] / half[0]) / math.pi, abs=1e-9)
+    else:
+        sides = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+        expected = [1 - polygon_overlap(shape, sides) / (4 * half[0] * half[1]) for shape in fallen]
+    # 8 x lines: their error falls as N^-1.7, to 1e-6 at 16384.
+    np.testing.assert_allclose(share, expected, atol=1e-6 * max(1.0, 16384 / lines) ** 1.7, rtol=0)
