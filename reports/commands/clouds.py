@@ -19,11 +19,6 @@ def clouds(
         ),
     ] = "mie-modified",
     albedo: Annotated[float, typer.Option(metavar="A", help="Single-scattering albedo.")] = 1.0,
-    check: Annotated[int, typer.Option(metavar="N", help="Compare with the computation at so many random points.")] = 0,
-    fit: Annotated[
-        bool, typer.Option("--fit", help="Fit the 22 functions of Bouthors 2008 to the tables, and print their errors.")
-    ] = False,
-    seed: Annotated[int, typer.Option(metavar="N", help="Of the random points.")] = 0,
     json: Json = False,
 ) -> None:
     """Make the tables that methods for clouds look up.
@@ -34,20 +29,17 @@ def clouds(
     from analytic.errors import InputError
     from reports.machine.environment import activate
     from reports.machine.progress import progress_bar
-    from reports.tables.clouds import clouds_sentence, clouds_tables
+    from reports.tables.clouds import clouds_sentence, clouds_table
     from reports.tables.terminal import print_json, print_table
-    from validation.canonical.record import canonical_record
+    from validation.slab.canonical import canonical_record
 
     if not tables:
-        raise InputError("clouds: got nothing to do, wanted --tables, with --check or --fit if wanted")
-    if seed < 0:
-        raise InputError(f"--seed: got {seed}, wanted a whole number from 0 on")
+        raise InputError("clouds: got nothing to do, wanted --tables")
     activate()
     with progress_bar("clouds") as progress:
-        record = canonical_record(phase, albedo, check=check, fit=fit, seed=seed, progress=progress)
+        record = canonical_record(phase, albedo, progress=progress)
     if json:
         print_json(record)
         return
-    for each in clouds_tables(record):
-        print_table(each)
+    print_table(clouds_table(record))
     print(f"\n{clouds_sentence(record)}")

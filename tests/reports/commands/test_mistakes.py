@@ -78,7 +78,6 @@ MISTAKES = (
     ("clouds", "--tables"),
     ("clouds --tables --phase hg:0.5 --albedo 1.2", "albedo"),
     ("clouds --tables --phase hg:2", "mean cosine"),
-    ("clouds --tables --check -1", "--check"),
     ("maps omni-box --sizes a", "--sizes: got 'a'"),
     ("maps omni-box --sizes 12", "map: got 12, wanted a power of two"),
     ("maps omni-box --method unshadowed", "got a parameter 'map'"),

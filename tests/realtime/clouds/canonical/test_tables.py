@@ -7,7 +7,7 @@ import pytest
 
 import realtime.clouds.canonical.fit as fit_module
 import realtime.clouds.canonical.tables as tables_module
-import validation.canonical.errors as errors_module
+import tests.helpers.canonical_errors as errors_module
 from realtime.clouds.canonical import coordinates
 from realtime.clouds.canonical.fit import FittedSet, fit_on_device, fit_tables, fitted_functions
 from realtime.clouds.canonical.look_up import on_device
@@ -16,7 +16,7 @@ from realtime.clouds.canonical.tables import RANKS, Grid, canonical_tables
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
 from realtime.errors import InputError
 from realtime.numerics.array_types import array_types
-from validation.canonical.errors import look_up_errors, looked_up_points, random_points, transport_at
+from tests.helpers.canonical_errors import look_up_errors, looked_up_points, random_points, transport_at
 
 PHASE, ALBEDO = HenyeyGreensteinPhase(0.5), 0.95
 GRID = Grid(thicknesses=21, depths=13, suns=5, directions=17, azimuths=8)
@@ -86,13 +86,13 @@ def test_between_entries_they_are_close_to_it_all_over_the_domain(look_up):
 @pytest.mark.slow
 @pytest.mark.claim("clouds-tables-figure", tolerance="1 % of T and 2 % of sigma in c at 95 % of 2000 points, each set")
 def test_whole_tables_keep_to_their_figure(variant):
-    from validation.canonical.record import canonical_record
+    from validation.slab.phases import phase_pair
 
-    record = canonical_record("mie-modified", 1.0, check=2000)
-    assert record["bytes"] <= 32e6
-    assert record["seconds"] <= 1200  # ten minutes of two quiet cores
-    assert record["check"]["slabs"] >= 100
-    for row in record["check"]["sets"]:
+    phase = phase_pair("mie-modified").deterministic
+    tables = canonical_tables(phase, 1.0)
+    assert tables.size <= 32e6
+    types = array_types("single")
+    for row in look_up_errors(on_device(tables, types), types, random_points(phase, 1.0, 2000)):
         assert row["T"]["p95"] <= 0.01
         assert row["c"]["p95"] <= 0.02
 

@@ -8,7 +8,6 @@ takes time. It has more streams and modes than the one that tables are made of, 
 A set that holds less than `NEGLIGIBLE` of the light at a point is left out there, and counted.
 """
 
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -25,7 +24,6 @@ from realtime.clouds.slab_orders.phases import SlabPhase
 from realtime.numerics.array_types import ArrayTypes
 
 Array = NDArray[np.float64]
-Progress = Callable[[float, str], None]
 
 TOGETHER = 16
 NEGLIGIBLE = 1e-6
@@ -53,22 +51,8 @@ class Points:
     sigma: Array
 
 
-def random_points(
-    phase: SlabPhase, albedo: float, count: int, *, seed: int = 0, progress: Progress | None = None
-) -> Points:
-    """Draw points and compute the transport there.
-
-    Parameters
-    ----------
-    phase, albedo
-        Of the medium.
-    count
-        Number of points.
-    seed
-        Of the points.
-    progress
-        Called with (share done, what).
-    """
+def random_points(phase: SlabPhase, albedo: float, count: int, *, seed: int = 0) -> Points:
+    """Draw points and compute the transport there."""
     random = np.random.default_rng(seed)
     slabs = []
     for start in range(0, count, TOGETHER):
@@ -76,14 +60,9 @@ def random_points(
         t, mu_l = np.exp(random.uniform(np.log(THINNEST), np.log(THICKEST))), random.uniform(LOWEST_SUN, 1)
         d, mu = np.sort(random.uniform(0, t, size)), random.uniform(-1, 1, size)
         slabs.append(np.stack([np.full(size, t), d, mu, random.uniform(0, 2 * np.pi, size), np.full(size, mu_l)]))
-    parts: list[tuple[Array, Array]] = []
     with ThreadPoolExecutor(_WORKERS) as pool:
-        for given, values in zip(slabs, pool.map(lambda each: transport_at(phase, albedo, *each), slabs), strict=True):
-            parts.append((given, values))
-            if progress is not None:
-                progress(len(parts) / len(slabs), f"slab {len(parts)} of {len(slabs)}")
-    given, values = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
-    return Points(*given, *values)
+        values = list(pool.map(lambda each: transport_at(phase, albedo, *each), slabs))
+    return Points(*np.concatenate(slabs, axis=-1), *np.concatenate(values, axis=-1))
 
 
 def transport_at(
