@@ -68,14 +68,6 @@ def test_a_scene_by_name_dictionary_mitsuba_scene_and_again(variant):
     assert "1 point" in scene._repr_html_()
 
 
-def test_a_scene_that_no_method_can_render_shows_why(variant):
-    dark = {name: value for name, value in SCENES["open-fog"].build().items() if not _is_light(value)}
-    scene = airlight.load_scene(dark, TINY)
-    assert "the scene has no light" in scene._repr_html_()
-    with pytest.raises(airlight.InputError, match="the scene has no light"):
-        scene.plan()
-
-
 def _is_light(value):
     return isinstance(value, dict) and value.get("type") in ("point", "spot")
 
@@ -99,13 +91,6 @@ def test_what_is_no_scene_is_refused(scene, size, words, variant):
     with pytest.raises(airlight.InputError, match=words) as raised:
         airlight.load_scene(scene, size)
     assert "\n" not in str(raised.value)
-
-
-def test_another_size_of_a_loaded_scene_is_refused_and_the_scene_stays_as_it_is(variant):
-    scene = airlight.load_scene("open-fog", TINY)
-    with pytest.raises(airlight.InputError, match="got 8x6 for a scene that is loaded already, at 16x12"):
-        airlight.render(scene, size=(8, 6))
-    assert scene.size == TINY
 
 
 # Frames
@@ -139,11 +124,6 @@ def test_precision_decides_the_type(variant):
     assert (single.airlight.dtype, double.airlight.dtype) == (np.float32, np.float64)
     np.testing.assert_allclose(single.airlight, double.airlight, rtol=1e-4)  # float32, beside the light
     assert np.any(single.airlight != double.airlight)
-
-
-def test_what_a_frame_costs_where_it_is_asked_for(variant):
-    times = airlight.render("open-fog", "unshadowed", "taylor", size=(8, 6), timed=True).times
-    assert 0 < times.frame.low_ms <= times.frame.median_ms <= times.frame.high_ms
 
 
 def test_a_function_of_ones_own_is_a_method(variant):

@@ -16,7 +16,6 @@ from reports.api.html import bullets, table
 from reports.api.images import compare
 from reports.api.results import Reference, Rendering, sealed
 from reports.api.tables import BenchTable, Report
-from validation.configurations.timing import FrameTimes, Timing
 
 VOID = {"img", "br", "hr"}
 
@@ -101,17 +100,6 @@ def test_results_are_frozen_and_so_are_their_arrays(name):
     own[0] = 0  # one's own
 
 
-def test_layers_are_arrays_of_the_precision_of_what_made_them():
-    frame = rendering()
-    for layer in (frame.airlight, frame.surface, frame.total):
-        assert layer.shape == (4, 6, 3)
-        assert layer.dtype == np.float32
-    assert frame.depth.shape == (4, 6)
-    assert frame.size == (6, 4)
-    assert rendering(dtype=np.float64).total.dtype == truth().total.dtype == np.float64
-    np.testing.assert_array_equal(frame.total, frame.airlight + np.float32(0.25))
-
-
 @pytest.mark.claim("results-are-frozen")
 def test_numpy_takes_a_result_as_its_total():
     frame = rendering()
@@ -137,21 +125,6 @@ def test_save_writes_exr_and_png_and_refuses_others(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["frame.exr", "frame.png"]
 
 
-def test_times_and_oddities_stand_in_the_table():
-    timing = Timing(12.5, 12.0, 13.0, 9)
-    frame = rendering(times=FrameTimes(timing, timing, Timing(7.5, 7, 8, 9), timing, timing, timing, timing))
-    facts = frame.facts()
-    assert "12.5 ms" in facts["a frame"]
-    assert facts["of it airlight"] == "7.5 ms"
-    broken = layered()
-    broken.layers["airlight"][0, 0] = np.nan
-    broken.layers["airlight"][1, 0] = -1
-    odd = dataclasses.replace(frame, image=sealed(broken))
-    assert "1 pixels not finite, 1 pixels negative" in odd.facts()["mean airlight"]
-    parsed(odd._repr_html_())
-    assert odd._repr_png_()
-
-
 def test_the_error_of_a_comparison_by_hand():
     comparison = compare(np.full((2, 2, 3), 2.0), np.full((2, 2, 3), 3.0))
     np.testing.assert_array_equal(comparison.error, np.full((2, 2, 3), 0.5))
@@ -162,13 +135,6 @@ def test_the_error_of_a_comparison_by_hand():
     red, green, blue = comparison.picture()[0, 0]
     assert red > green
     assert red > blue
-
-
-def test_a_failed_comparison_says_so():
-    comparison = compare(np.ones((2, 2, 3)), np.full((2, 2, 3), -1.0))
-    assert not comparison.passed
-    assert "4 pixels of the test image are negative" in repr(comparison)
-    assert any("negative" in text for text in parsed(comparison._repr_html_()).text)
 
 
 def test_pieces_of_html_escape_what_they_are_given():

@@ -95,30 +95,3 @@ def test_scaling_of_a_real_method_has_a_cost_for_each_step(variant, capfd):
     (record,) = json.loads(capfd.readouterr().out)["scaling"]
     assert [cost["work"] for cost in record["costs"]] == [8 * 6, 16 * 12, 32 * 24, 64 * 48]
     assert all(cost["frame"]["median_ms"] > 0 for cost in record["costs"])
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--kernels", "--decompose"], "got --kernels and --decompose"),
-        (["--scaling", "size", "--estimators"], "got --estimators and --scaling"),
-        (["hall", "--kernels"], "bench --kernels: got a scene, which is for bench and bench --estimators"),
-        (["--estimators", "--method", "ray-march"], "bench --estimators: got --method"),
-        (["--estimators", "--markdown"], "bench --estimators: got --markdown"),
-        (["--decompose", "--margin", "0.1"], "bench --decompose: got --margin, which is for bench"),
-        (["--scaling", "size", "-o", "x"], "bench --scaling: got --output, which is for bench --decompose"),
-        (["--against", "x.json"], "bench: got --against, which is for bench --scaling"),
-        (["--phase", "mie:6"], "bench: got --phase, which is for bench --kernels"),
-        (["--no-truth", "--margin", "0.1"], "got --no-truth and --margin"),
-        (["open-fog", "--margin", "nan"], "--margin: got nan, wanted a share between 0 and 1"),
-        (["open-fog", "--scaling", "size,speed"], "--scaling: got 'speed', wanted some of"),
-        (["open-fog", "--scaling", "media"], "0 bounded media"),
-        (["open-fog", "--set", "slices=9"], "--set: got no single method that it is for"),
-        (["open-fog", "--method", "froxel-fog", "--set", "slice=9"], "did you mean 'slices'"),
-    ],
-)
-def test_no_option_is_dropped_in_silence(variant, capfd, arguments, words):
-    assert cli.run(["bench", *arguments]) == 2
-    said = capfd.readouterr().err
-    assert words in said
-    assert said.count("\n") == 1

@@ -16,7 +16,6 @@ import typer
 import airlight
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
-from reports import __version__
 from reports.commands import main as cli
 from reports.machine.environment import MissingError
 
@@ -140,11 +139,6 @@ def test_lists_have_one_command(capfd):
     assert all(f"{name.capitalize()}\n" in printed for name in data)
     assert cli.run(["list", "scene"]) == 2
     assert "did you mean 'scenes'" in capfd.readouterr().err
-
-
-def test_version(capfd):
-    assert cli.run(["--version"]) == 0
-    assert capfd.readouterr().out == f"airlight {__version__}\n"
 
 
 @pytest.mark.claim("variant")

@@ -113,12 +113,6 @@ def test_files_elsewhere_are_refused(folder, name):
         load_report(folder)
 
 
-@pytest.mark.claim("report-schema")
-def test_keys_of_later_versions_are_passed_over(folder):
-    changed(folder, lambda data: data.update(later={"a": 1}) or data["scenes"][0].update(more=[1]))
-    assert load_report(folder)[0]["later"] == {"a": 1}
-
-
 @pytest.mark.slow
 @pytest.mark.claim("report-drawn-again")
 def test_the_command_needs_no_mitsuba_to_draw_a_page_again(folder):
@@ -132,20 +126,3 @@ def test_the_command_needs_no_mitsuba_to_draw_a_page_again(folder):
     assert ran.returncode == 0, ran.stderr
     assert "1 scene, drawn again" in ran.stdout
     assert (folder / "report.html").is_file()
-
-
-def test_a_full_disk_names_what_was_to_be_written(folder, tmp_path, monkeypatch):
-    import errno
-
-    from reference.storage import files
-
-    data, where = load_report(folder)
-
-    def full(path):
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(files, "_flush", full)
-    with pytest.raises(OSError, match="No space left") as caught:
-        redraw_report(data, where, tmp_path / "new")
-    assert str(tmp_path / "new") in caught.value.filename
-    assert not [path for path in (tmp_path / "new").rglob("*") if path.is_file()]

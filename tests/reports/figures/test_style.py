@@ -49,12 +49,6 @@ def test_one_colour_and_one_marker_for_each_method():
     assert own["color"] not in {look["color"] for look in looks}
 
 
-def test_variants_keep_colour_and_marker():
-    looks = [method_style("ray-march", number) for number in range(12)]
-    assert {(look["color"], look["marker"]) for look in looks} == {(looks[0]["color"], looks[0]["marker"])}
-    assert len({(look["fillstyle"], look["markeredgecolor"]) for look in looks}) == 12
-
-
 def test_a_report_has_a_style_for_each_label_in_every_scene():
     def methods(*pairs):
         return {"methods": [{"method": method, "label": label} for method, label in pairs]}

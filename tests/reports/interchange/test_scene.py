@@ -8,7 +8,7 @@ import pytest
 from reports.commands.main import run
 from reports.interchange.scene import describe_scene, spot_power_angle, up_axis
 from tests.helpers.area_lights import lamp
-from tests.helpers.scenes import bounded_medium, spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, tiny_scene
 from validation.scenes.loading import LoadedScene, load_scene
 from validation.scenes.registry import FOG_SCENES
 
@@ -49,13 +49,6 @@ def test_medium_is_in_every_form_that_engines_ask_for(variant):
     assert medium["phase"] == {"name": "isotropic", "formula": "1/(4 pi) [1/sr]"}
 
 
-def test_phase_functions_have_their_numbers(variant):
-    fog = tiny_scene()["fog"]
-    assert described(fog=fog | {"phase": {"type": "hg", "g": 0.37}})["medium"]["phase"]["g"] == 0.37
-    table = described(fog=fog | {"phase": {"type": "tabphase", "values": "1, 2, 4"}})["medium"]["phase"]
-    assert (table["name"], len(table["table"])) == ("tabulated", 3)
-
-
 def test_bodies_of_media_are_listed_with_their_bounds(variant):
     ball = bounded_medium(
         {"type": "sphere", "center": [2.0, 0.3, 1.1], "radius": 0.3}, (0.5, 0.25, 1.0), (0.5, 0.4, 0.3)
@@ -69,18 +62,6 @@ def test_bodies_of_media_are_listed_with_their_bounds(variant):
     assert haze["bounds"] == {"kind": "sphere", "centre": [2.0, 0.3, 1.1], "radius": 0.3}
     assert haze["sigma_t"] == [0.5, 0.25, 1.0]
     assert box["bounds"]["kind"] == "convex mesh"
-
-
-def test_lights_have_what_their_kind_needs(variant):
-    lamp, soft, hard = described(soft=spot(cutoff=40.0, beam=25.0), hard=spot())["lights"]
-    assert lamp["intensity"] == [5.0, 4.0, 3.0]
-    assert "axis" not in lamp
-    assert (soft["beam_angle"], soft["cutoff_angle"]) == (25.0, 40.0)
-    assert "(cutoff - angle)/(cutoff - beam)" in soft["falloff"]
-    assert (hard["beam_angle"], hard["cutoff_angle"]) == (33.0, 33.0)
-    assert "full intensity within the cut-off" in hard["falloff"]
-    axis = np.array([0.1, 0.1, 0.4]) - [0.7, -0.3, 2.6]
-    np.testing.assert_allclose(soft["axis"], axis / np.linalg.norm(axis), atol=1e-6)
 
 
 def test_a_light_at_infinity_has_a_direction_and_no_place(variant):
@@ -123,23 +104,6 @@ def test_lights_with_extent_have_radiance_power_and_luminous_flux(variant, kind,
         assert light["axis"] == pytest.approx(expected, abs=1e-6)
 
 
-def test_surfaces_have_their_reflectance(variant):
-    checkers = {"type": "diffuse", "reflectance": {"type": "checkerboard", "color0": 0.2, "color1": 0.6}}
-    floor = tiny_scene()["floor"] | {"bsdf": {"type": "twosided", "bsdf": checkers}}
-    ball, floor = described(floor=floor)["surfaces"]
-    assert ball == {
-        "name": "ball",
-        "kind": "Sphere",
-        "triangles": None,
-        "reflectance": [0.6, 0.5, 0.3],
-        "textured": False,
-        "two_sided": False,
-        "diffuse": True,
-    }
-    assert (floor["kind"], floor["triangles"], floor["textured"], floor["two_sided"]) == ("Rectangle", 2, True, True)
-    np.testing.assert_allclose(floor["reflectance"], 0.4, atol=0.05)  # the mean of 64 places
-
-
 @pytest.mark.claim("described-power", tolerance="1e-9 relative: the quadrature's; 1e-7: float32 angles")
 @pytest.mark.parametrize(
     ("beam", "cutoff"), [(25.0, 40.0), (33.0, 33.0), (0.0, 90.0), (24.3, 24.3000001), (0.01, 0.02)]
@@ -152,16 +116,6 @@ def test_power_of_a_spot_is_the_integral_of_its_falloff(beam, cutoff):
     edge = quad(lambda t: (c - t) / (c - b) * np.sin(t), b, c, epsabs=0)[0] if c > b else 0.0
     tolerance = 1e-9 if cutoff > 1 else 1e-8  # 1 - cos of a hundredth of a degree has lost eight digits
     np.testing.assert_allclose(spot_power_angle(b, c), 2 * np.pi * (inside + edge), rtol=tolerance)
-
-
-@pytest.mark.claim("described-power")
-def test_lights_have_their_power(variant):
-    lamp, soft = described(soft=spot(cutoff=40.0, beam=25.0))["lights"]
-    np.testing.assert_allclose(lamp["power"], 4 * np.pi * np.array(lamp["intensity"]), rtol=1e-12)
-    assert lamp["power"] == lamp["power_all_round"]
-    angle = spot_power_angle(*np.deg2rad([25.0, 40.0]))
-    np.testing.assert_allclose(soft["power"], angle * np.array(soft["intensity"]), rtol=1e-6)
-    np.testing.assert_allclose(soft["power_all_round"], 4 * np.pi * np.array(soft["intensity"]), rtol=1e-12)
 
 
 @pytest.mark.parametrize(("up", "axis"), [((0, 0.1, 1), "z"), ((0.1, -1, 0), "-y"), ((1, 0, 0), "x")])

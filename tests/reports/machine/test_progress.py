@@ -49,15 +49,6 @@ def test_plain_lines_are_ten_seconds_apart(capsys, clock):
     assert shares == sorted(shares)
 
 
-@pytest.mark.parametrize("share", [0.0, 1.0])
-def test_beginning_and_end_are_no_news(capsys, clock, share):
-    """Nothing can be said of the time left at 0, and at 1 the result says it."""
-    with progress_bar("x") as progress:
-        clock.now += 60
-        progress(share, "x")
-    assert capsys.readouterr().err == ""
-
-
 class Terminal(io.StringIO):
     def isatty(self):
         return True

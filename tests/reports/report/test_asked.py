@@ -9,11 +9,6 @@ from reference.storage.exr import Image, write_exr
 from reports.report.asked import scenes_of_images
 
 
-def test_no_scene_is_a_mistake(variant, tmp_path):
-    with pytest.raises(airlight.InputError, match=r"^scenes: got none, wanted some of open-fog"):
-        airlight.report(tmp_path / "report", scenes=[])
-
-
 def test_images_of_other_scenes_are_a_mistake(variant, tmp_path):
     write_exr(tmp_path / "open-fog.exr", Image({"total": np.ones((6, 8, 3))}))
     with pytest.raises(airlight.InputError, match="has no image of hall, only of open-fog"):

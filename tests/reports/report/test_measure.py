@@ -159,15 +159,6 @@ def test_every_number_of_the_data_is_on_the_page(written):
     assert not re.search(r"""(src|href)\s*=\s*["']?(https?:)?//""", page)
 
 
-def test_progress_rises_to_one(written):
-    shares = [share for share, _ in written.told]
-    assert shares == sorted(shares)
-    assert shares[0] == 0.0
-    assert shares[-1] == pytest.approx(1.0)
-    assert all(what.startswith("my <fog>: ") for _, what in written.told[:-2])
-    assert [what for _, what in written.told[-2:]] == ["the page", "done"]
-
-
 def again(written, tmp_path, **options):
     """The same report, into another folder."""
     given = {"scenes": [written.data["scenes"][0]["path"]], "effort": TINY, "configurations": CHOSEN}
@@ -241,13 +232,6 @@ def test_json_keeps_to_its_schema(written):
     jsonschema.Draft202012Validator.check_schema(schema)
     data = json.loads((written.folder / "report.json").read_text(encoding="utf-8"))
     assert list(jsonschema.Draft202012Validator(schema).iter_errors(data)) == []
-
-
-def test_folder_that_is_a_file_is_refused_before_the_work(variant, tmp_path):
-    (tmp_path / "taken").write_text("mine")
-    with pytest.raises(InputError, match="not a folder"):
-        write_report(tmp_path / "taken", scenes=["open-fog"], effort=TINY)
-    assert (tmp_path / "taken").read_text() == "mine"
 
 
 def test_scenes_of_one_name_are_refused_before_the_work(variant, tmp_path):

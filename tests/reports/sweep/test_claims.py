@@ -4,17 +4,12 @@
 import numpy as np
 import pytest
 
-from realtime.scene.read_scene import read_scene
 from reports.sweep.claims import best_claims, claim, percent
 from reports.sweep.correlations import correlations, sentence, sentences, strongest, sure
 from reports.sweep.faults import checks, faults, reasons
-from reports.sweep.properties import WORDS, property_words
 from reports.sweep.read import FILE, read_sweep
 from reports.sweep.samples import samples
-from reports.sweep.worst import worst
 from tests.helpers.sweeps import row, rows, write_rows
-from validation.properties.properties import scene_properties
-from validation.scenes.loading import load_scene
 from validation.statistics.intervals import binomial_interval
 
 
@@ -164,24 +159,6 @@ def test_intervals_hold_together(sweep_of):
     assert any(abs(each.r) > 0.2 for each in found)
 
 
-def test_worst_scenes_come_first_and_those_without_numbers_before_them(sweep_of):
-    several = [row(f"random:{n}", relative_rmse=0.01 * n, property_depth=float(n)) for n in range(1, 15)]
-    several += [
-        row("random:20", relative_rmse=1e-4, nonfinite=3),
-        row("random:21", relative_rmse=None, rmse=None, nonfinite=19200),
-        row("random:22", status="refused", reason="x"),
-    ]
-    sweep = sweep_of(several)
-    found = worst(sweep, samples(sweep)[0], ["depth"])
-    assert [each.scene for each in found[:4]] == ["random:21", "random:20", "random:14", "random:13"]
-    assert len(found) == 10
-    assert found[0].relative_rmse is None
-    assert found[1].nonfinite == 3
-    assert found[2].properties == {"depth": 14.0}
-    assert found[2].command == "airlight compare random:14 --method ray-march"
-    assert found[2].key == several[13]["key"]
-
-
 @pytest.mark.claim("sweep-faults")
 def test_refusals_are_counted_by_reason(sweep_of):
     several = rows(60)
@@ -214,9 +191,3 @@ def test_planted_faults_are_found_and_counted(sweep_of):
     assert counted["outside of the bound"].faulty_scenes == 1
     assert counted["surface not finite"].rows == 0
     assert counted["negative"].rows == sum(each["status"] == "done" for each in several)
-
-
-def test_every_property_has_words(variant):
-    properties = scene_properties(read_scene(load_scene("open-fog").scene))
-    assert set(properties) == set(WORDS)
-    assert property_words("something_new") == "something new"

@@ -8,7 +8,7 @@ import pytest
 
 from analytic.errors import InputError
 from reports.sweep.read import FILE, read_sweep
-from reports.sweep.samples import fastest_counts, samples, short_names
+from reports.sweep.samples import fastest_counts, samples
 from tests.helpers.sweeps import row, rows, write_rows
 
 
@@ -63,12 +63,6 @@ def test_cells_that_were_computed_again_count_once(sweep_of):
     sweep = sweep_of(several)
     assert sorted(sweep.texts("key")) == ["c", "d", "e", "g"]
     assert sweep.superseded == 3
-
-
-def test_pictures_are_read_by_key(sweep_of):
-    with_picture = row("random:3", picture=b"RIFF")
-    sweep = sweep_of([row(), with_picture])
-    assert sweep.pictures([with_picture["key"], row()["key"]]) == {with_picture["key"]: b"RIFF"}
 
 
 @pytest.mark.parametrize(
@@ -140,18 +134,6 @@ def test_sizes_of_an_image_are_configurations(sweep_of):
     assert [sample.label for sample in made] == [sample.name for sample in made] == wanted
 
 
-def test_black_truth_and_image_without_a_number(sweep_of):
-    sweep = sweep_of(
-        [
-            row("random:0", relative_rmse=None, rmse=0.0),  # black, as the truth
-            row("random:1", relative_rmse=None, rmse=1e-9),  # light where the truth is black
-            row("random:2", relative_rmse=None, rmse=None, nonfinite=19200),
-        ]
-    )
-    (sample,) = samples(sweep)
-    assert list(sample.errors) == [0.0, np.inf, np.inf]
-
-
 @pytest.mark.claim("sweep-times-alone")
 def test_times_count_only_where_the_machine_had_nothing_else_to_do(sweep_of):
     (sample,) = samples(sweep_of([row(frame_ms=2.0), row("random:1", frame_ms=1.0, timed_alone=False)]))
@@ -183,24 +165,3 @@ def test_fastest_is_counted_where_all_were_timed_alone(sweep_of):
         ]
     )
     assert fastest_counts(samples(sweep), 0.01) == ([1, 1], 2, 4)
-
-
-def test_names_say_in_what_configurations_of_a_method_differ():
-    labels = [
-        "ray-march (steps=16)",
-        "ray-march (steps=100, shadow=map)",
-        "min-max (exact)",
-        "planes (exact)",
-        "planes",
-    ]
-    methods = ["ray-march", "ray-march", "min-max", "planes", "planes"]
-    assert short_names(methods, labels) == [
-        "ray-march (steps=16)",
-        "ray-march (steps=100, shadow=map)",
-        "min-max",
-        "planes (exact)",
-        "planes",
-    ]
-    # What has no words of its own is named by those that it has.
-    shared = ["ray-march (steps=100)", "ray-march (steps=100, shadow=map)"]
-    assert short_names(["ray-march"] * 2, shared) == ["ray-march (steps=100)", "ray-march (shadow=map)"]

@@ -20,7 +20,6 @@ from reports.tables.table import (
     Row,
     Table,
     Verdict,
-    number,
     numbers,
     table,
     with_spread,
@@ -189,15 +188,6 @@ def test_values_are_written_by_their_column():
     assert (read["time"], read["time_low"], read["ends_high"], read["bias"]) == ("12.345", "12", "2.5", "-0.0012345")
 
 
-@pytest.mark.parametrize(("value", "words"), [(None, None), (math.nan, "nan"), (math.inf, "inf"), (-math.inf, "-inf")])
-def test_what_is_no_number_is_said(value, words):
-    row = table("", (Column("a", "a"), Column("b", "b")), [("x", value)])
-    assert markdown_rows(markdown(row))[0][1] == (words or "-")
-    assert html_rows(html(row))[0][1] == (words or DASH)
-    assert latex_rows(latex([row]))[0][1] == {"inf": r"$\infty$", "-inf": r"$-\infty$"}.get(words, words or "--")
-    assert csv_rows(csv(row))[0]["b"] == ("" if words in (None, "nan") else words)
-
-
 def test_a_row_that_ends_early_says_why():
     """In the row where cells can be joined, below it elsewhere; a name alone is no row there."""
     rows = (Row({"name": "a", "time": Measured(1, 1, 1)}, "no <light>"), Row({"name": "b"}, "no_room", ("slow",)))
@@ -239,34 +229,11 @@ def test_latex_has_the_rules_of_booktabs_and_says_what_it_needs():
     ]
 
 
-@pytest.mark.parametrize(
-    ("value", "plain", "zeros"),
-    [
-        (None, "-", "-"),
-        (0.0, "0", "0"),
-        (12.34, "12.3", "12.3"),
-        (25.0, "25", "25.0"),
-        (999.9, "1e+03", "1.00e+03"),
-        (100.0, "100", "100"),
-        (-4.56e-7, "-4.56e-07", "-4.56e-07"),
-        (math.inf, "inf", "inf"),
-    ],
-)
-def test_numbers_have_three_digits(value, plain, zeros):
-    assert (number(value), number(value, zeros=True)) == (plain, zeros)
-
-
 @pytest.mark.claim("latex-tables")
 def test_a_median_has_the_digits_of_its_quartiles():
     assert with_spread(12.347, 12.123, 12.903) == ("12.35", "0.22", "0.56")
     assert with_spread(144.4, 139.2, 153.7) == ("144.4", "5.2", "9.3")
     assert with_spread(140.0, 133.0, 171.0) == ("140", "7", "31")
-
-
-def test_a_value_without_a_column_is_a_mistake():
-    with pytest.raises(ValueError, match="no column for nmae"):
-        drawn_row(nmae="a")
-    assert drawn_row(name="a", count=2).only("count").columns == (COLUMNS[5],)
 
 
 def _wide(*, long: bool = False) -> Table:
