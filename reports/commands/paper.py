@@ -10,7 +10,7 @@ import typer
 def paper(
     name: Annotated[
         str | None,
-        typer.Argument(metavar="[NAME]", show_default=False, help="biri, billeter, ali or bouthors; all by default."),
+        typer.Argument(metavar="NAME", show_default=False, help="biri, billeter, ali or bouthors; all by default."),
     ] = None,
     tables: Annotated[
         bool, typer.Option("--tables", help="The numbers without a verdict too: rates of graphics cards beside ours.")
