@@ -44,6 +44,7 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from reports.api.slab import slab as slab
     from reports.api.studies import bench as bench
     from reports.api.studies import integrate as integrate
+    from reports.api.studies import paper as paper
     from reports.machine.environment import MissingError as MissingError
     from reports.machine.environment import activate as activate
     from reports.machine.environment import versions as versions
@@ -69,6 +70,7 @@ _API = {
     "fit": "reports.api.fit",
     "integrate": "reports.api.studies",
     "bench": "reports.api.studies",
+    "paper": "reports.api.studies",
     "slab": "reports.api.slab",
     "report": "reports.api.report",
     "InputError": "analytic.errors",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The Python API for studies: integrals by kernels, speed against error."""
+"""The Python API for studies: integrals by kernels, speed against error, claims of papers."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -12,7 +12,7 @@ from reports.api.inputs import Progress, SceneLike, Size, kernel_name, one_error
 
 if TYPE_CHECKING:
     from analytic.cases import Cases
-    from reports.api.tables import BenchTable, Integrals
+    from reports.api.tables import BenchTable, Integrals, PaperClaims
     from validation.configurations.methods import Configuration
     from validation.frames.benchmark import Measurement
 
@@ -211,3 +211,47 @@ def _numbers(measured: "Measurement") -> dict[str, Any]:
         row[name] = error and plain(getattr(error, name))
     row["flip"] = measured.flip and measured.flip.value
     return row | {"refused": measured.refused, "note": measured.note}
+
+
+@one_error
+def paper(
+    name: str | None = None, *, quick: bool = False, fresh: bool = False, progress: Progress = None
+) -> "PaperClaims":
+    """Measure what the claims of papers need, and judge them.
+
+    Parameters
+    ----------
+    name
+        'biri', 'billeter', 'ali' or 'bouthors'; all by default, which takes an hour or so.
+    quick
+        Only the claims that need no image.
+    fresh
+        Measure again what was cached by earlier runs.
+    progress
+        Called with (share done, what); True shows a bar.
+
+    Returns
+    -------
+    PaperClaims
+        A row for each claim, and for each number that a paper prints without one.
+
+    Raises
+    ------
+    InputError
+        For an unknown paper.
+    """
+    from analytic.errors import nearest
+    from reports.api.tables import PaperClaims
+    from reports.machine.environment import activate, describe_environment
+    from reports.report.claims import measure_claims
+    from reports.report.kept import report_cache
+    from validation.papers.claims import claims, papers
+
+    if name is not None and name not in papers():
+        raise InputError(f"paper: got {name!r}, wanted one of {', '.join(papers())}" + nearest(name, papers()))
+    chosen = [claim for claim in claims() if name in (None, claim.paper)]
+    activate()
+    cache = report_cache(describe_environment(), fresh=fresh)
+    with telling(progress, "paper") as step:
+        rows = measure_claims(chosen, cache, quick=quick, progress=step)
+    return PaperClaims(tuple(rows), left_out=len(chosen) - len(rows))

@@ -207,3 +207,30 @@ def _bench_row(row: Mapping[str, Any]) -> "Row":
     times = {"frame": frame, "frame_rate": per_second(frame)}
     times |= {name: row[f"{name}_ms"] for name in ("airlight", "light_moved")}
     return Row({"label": row["label"], **times, **{name: row.get(name) for name in ERRORS}}, remarks=remarks)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PaperClaims:
+    """The claims of papers with their verdicts."""
+
+    rows: tuple[Mapping[str, Any], ...]  #: as they stand under `papers` of report.json
+    left_out: int  #: claims that need images
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def to_dict(self) -> dict[str, list[Any]]:
+        """Return columns by name, a value for each claim, as `pandas.DataFrame` takes them."""
+        return {name: [row[name] for row in self.rows] for name in (self.rows[0] if self.rows else ())}
+
+    def _repr_html_(self) -> str:
+        from reports.api.html import block
+        from reports.tables.drawing import html
+        from reports.tables.papers import paper_tables
+
+        return block(repr(self), *(html(each) for each in paper_tables(self.rows)))
+
+    def __repr__(self) -> str:
+        from reports.tables.papers import count_words
+
+        return f"PaperClaims({count_words([row for row in self.rows if row['verdict'] is not None])})"

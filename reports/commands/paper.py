@@ -32,26 +32,17 @@ def paper(
     """
     import json as json_format
 
-    from analytic.errors import InputError, nearest
     from reference.storage.files import write_text
-    from reports.machine.environment import activate, describe_environment
+    from reports.api.studies import paper as measured
+    from reports.machine.environment import describe_environment
     from reports.machine.printing import print_heading, print_tables
-    from reports.machine.progress import progress_bar
-    from reports.report.claims import measure_claims
-    from reports.report.kept import report_cache
     from reports.tables.papers import count_words, number_tables, verdict_tables
     from reports.tables.terminal import print_json
     from validation.frames.result_cache import now
-    from validation.papers.claims import claims, papers
 
-    if name is not None and name not in papers():
-        raise InputError(f"paper: got {name!r}, wanted one of {', '.join(papers())}" + nearest(name, papers()))
-    chosen = [claim for claim in claims() if name in (None, claim.paper)]
-    activate()
-    environment = describe_environment()
-    with progress_bar("paper") as progress:
-        rows = measure_claims(chosen, report_cache(environment, fresh=fresh), quick=quick, progress=progress)
-    data = {"measured": now(), "environment": environment, "papers": rows, "left_out": len(chosen) - len(rows)}
+    found = measured(name, quick=quick, fresh=fresh, progress=True)
+    rows = found.rows
+    data = {"measured": now(), "environment": describe_environment(), "papers": rows, "left_out": found.left_out}
     if output is not None:
         write_text(output, json_format.dumps(data, indent=1) + "\n")
     if json:
@@ -61,5 +52,5 @@ def paper(
         print_heading()
     print_tables([*verdict_tables(rows), *(number_tables(rows) if tables else [])], as_markdown=markdown)
     print(f"\n{count_words([row for row in rows if row['verdict'] is not None])}.")
-    if len(rows) < len(chosen):
-        print(f"{len(chosen) - len(rows)} more rows need images: leave out --quick.")
+    if found.left_out:
+        print(f"{found.left_out} more rows need images: leave out --quick.")

@@ -55,7 +55,7 @@ def _by_paper(rows: Sequence[Data]) -> dict[str, list[Data]]:
     named = papers()
     found: dict[str, list[Data]] = {}
     for row in rows:
-        found.setdefault(named.get(row["paper"], row["paper"]), []).append(row)
+        found.setdefault(named.get(row["paper"], str(row["paper"])), []).append(row)
     return found
 
 
