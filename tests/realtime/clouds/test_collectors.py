@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from realtime.numerics.aligned import aligned_array
 from tests.helpers.sunlit import clear_scene, cube, read, sun, unit
 from validation.scenes.parts import medium_boundary, rotation
 from validation.scenes.solids import box
@@ -27,7 +28,8 @@ def _map(direction, *, sides=SLAB, turn=SLAB_TURN, size=256):
 def _vectors(points):
     import mitsuba as mi
 
-    return mi.Vector3f(np.asarray(points, dtype=np.float32).reshape(-1, 3).T)
+    columns = np.asarray(points, dtype=np.float64).reshape(-1, 3).T
+    return mi.Vector3f(*(aligned_array(mi.Float, column) for column in columns))
 
 
 def _search(light_map, transport, points, towards, *, behind=100.0, **options):

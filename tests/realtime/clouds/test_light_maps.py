@@ -5,6 +5,7 @@ beside it."""
 import numpy as np
 import pytest
 
+from realtime.numerics.aligned import aligned_array
 from tests.helpers.sunlit import ALONG, SIDES, TURN, clear_scene, cube, read, sun, unit
 from tests.helpers.sunlit import CUBE_AT as MIDDLE
 
@@ -26,7 +27,8 @@ def _cube_map(precision="single", *, size=SIZE, direction=ALONG, slopes=True):
 def _vectors(points):
     import mitsuba as mi
 
-    return mi.Vector3f(np.asarray(points, dtype=np.float32).T)
+    columns = np.asarray(points, dtype=np.float64).reshape(-1, 3).T
+    return mi.Vector3f(*(aligned_array(mi.Float, column) for column in columns))
 
 
 def test_the_finest_level_holds_the_faces_of_a_box(variant):
@@ -140,6 +142,7 @@ def test_levels_are_means_over_the_cloud_alone(variant, slopes):
 @pytest.mark.parametrize("width", [0.0, 0.03, 0.4, 50.0])
 def test_beside_the_cloud_is_what_is_nearest_of_it(variant, width):
     """Past the silhouette A = 0: there is no mean, and yet a surface."""
+    import drjit as dr
     import mitsuba as mi
 
     from realtime.clouds.light_maps.pyramid import filtered_surface
@@ -147,7 +150,7 @@ def test_beside_the_cloud_is_what_is_nearest_of_it(variant, width):
     _, light_map = _cube_map()
     rng = np.random.default_rng(7)
     points = np.asarray(MIDDLE) + rng.uniform(-3, 3, (500, 3))
-    surface = filtered_surface(light_map, _vectors(points), mi.Float(width))
+    surface = filtered_surface(light_map, _vectors(points), dr.opaque(mi.Float, width))
     for value in (surface.cover, surface.middle, surface.thickness, surface.normal):
         assert np.isfinite(np.array(value)).all()
     assert (np.linalg.norm(np.array(surface.middle).T - MIDDLE, axis=1) < 0.51 * np.linalg.norm(SIDES)).all()

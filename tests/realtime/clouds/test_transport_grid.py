@@ -6,6 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from realtime.numerics.aligned import aligned_array
+
 SETS = 2
 
 
@@ -35,7 +37,7 @@ def _both(points):
 
     look_up = _formula(SimpleNamespace(scalar=mi.Float))
     grid = transport_grid(look_up, np.ones((SETS, ENTRIES)), SETS)
-    arguments = [mi.Float(np.asarray(column, dtype=np.float32)) for column in points]
+    arguments = [aligned_array(mi.Float, np.asarray(column)) for column in points]
     return [
         [[np.array(value) for value in transport(number, *arguments)] for number in range(SETS)]
         for transport in (look_up, grid)

@@ -8,6 +8,7 @@ import pytest
 
 from realtime.clouds.bounds.crossings import next_crossing, optical_depths
 from realtime.clouds.bounds.surfaces import cloud_surfaces
+from realtime.numerics.aligned import aligned_array
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import SUN, cloud, length_inside, loaded, ring
 from validation.scenes.parts import placed
@@ -28,8 +29,8 @@ def depths_of(scene, origin, direction, end, precision="single"):
     read = read_scene(scene, precision)
     Float = type(read.camera.origin.x)
     Vector = type(read.camera.origin)
-    arrays = (Vector(*(Float(column) for column in values.T)) for values in (origin, direction))
-    depths = optical_depths(cloud_surfaces(read), read.medium.clouds, *arrays, Float(end))
+    arrays = (Vector(*(aligned_array(Float, column) for column in values.T)) for values in (origin, direction))
+    depths = optical_depths(cloud_surfaces(read), read.medium.clouds, *arrays, dr.opaque(Float, end))
     return [np.array(depth, dtype=np.float64) for depth in depths]
 
 
@@ -75,7 +76,7 @@ def test_points_on_the_boundary_are_neither_lost_nor_counted_twice():
     read = read_scene(loaded())
     surfaces = cloud_surfaces(read)
     origin, direction = random_rays(2000, seed=11)
-    o, d = (mi.Vector3f(*(mi.Float(column) for column in values.T)) for values in (origin, direction))
+    o, d = (mi.Vector3f(*(aligned_array(mi.Float, column) for column in values.T)) for values in (origin, direction))
     first = next_crossing(surfaces, o, d, mi.Float(0))
     met = np.array(dr.isfinite(first.distance) & ~first.leaves)
     place = o + d * first.distance

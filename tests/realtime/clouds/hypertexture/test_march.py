@@ -20,6 +20,7 @@ from realtime.clouds.light_maps.surfaces import cast_surfaces
 from realtime.frame.renderer import frame_renderer, render_frame
 from realtime.methods.cloud_collectors import CollectorParameters, prepare_collectors
 from realtime.methods.registry import METHODS
+from realtime.numerics.aligned import aligned_array
 from realtime.scene.camera import ray_directions
 from realtime.scene.density import Density
 from realtime.scene.named_shapes import scene_of
@@ -81,7 +82,7 @@ def rendered(scene, name, precision="single", **parameters):
 
 def rays_of(scene, precision="single"):
     read = read_scene(scene, precision)
-    pixel = mi.UInt32(np.arange(16 * 12, dtype=np.uint32))
+    pixel = dr.arange(mi.UInt32, 16 * 12)
     return read, ray_directions(read.camera, pixel)[0]
 
 
@@ -111,13 +112,19 @@ def test_depths_are_the_sums_of_the_grid_and_converge():
     errors = []
     for stride in (2.0, 1.0, 0.5, 0.25):
         (found,) = marched_depths(
-            surfaces, clouds, read.camera.origin, direction, mi.Float(dr.inf), stride=mi.Float(stride), seen=False
+            surfaces,
+            clouds,
+            read.camera.origin,
+            direction,
+            mi.Float(dr.inf),
+            stride=dr.opaque(mi.Float, stride),
+            seen=False,
         )
         errors.append(np.sqrt(np.mean((np.array(found) - expected) ** 2)) / expected.mean())
     assert errors[1] < 0.02
     assert errors[3] < 0.3 * errors[1]
     (seen,) = marched_depths(
-        surfaces, clouds, read.camera.origin, direction, mi.Float(dr.inf), stride=mi.Float(0.25), seen=True
+        surfaces, clouds, read.camera.origin, direction, mi.Float(dr.inf), stride=dr.opaque(mi.Float, 0.25), seen=True
     )
     np.testing.assert_allclose(np.exp(-np.array(seen)), np.exp(-expected), atol=2e-3)
 
@@ -168,8 +175,8 @@ def test_the_map_of_a_sun_holds_the_depths_of_legs():
     read = read_scene(uneven())
     surfaces, clouds, light = cloud_surfaces(read), read.medium.clouds, read.lights[0]
     random = np.random.default_rng(3)
-    points = mi.Vector3f(random.uniform(LOW, HIGH, (4000, 3)).T)
-    stride = mi.Float(0.25)
+    points = mi.Vector3f(*(aligned_array(mi.Float, column) for column in random.uniform(LOW, HIGH, (4000, 3)).T))
+    stride = dr.opaque(mi.Float, 0.25)
     (expected,) = (np.array(leg) for leg in marched_leg(surfaces, clouds, light, stride=stride)(points, True))
     found = (
         0.0363 * waves(13).max() * np.array(light_depths(surfaces, clouds, light, cloud=0, stride=stride).at(points))

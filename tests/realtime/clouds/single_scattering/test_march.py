@@ -10,6 +10,7 @@ from realtime.clouds.bounds.surfaces import cloud_surfaces
 from realtime.clouds.single_scattering.march import Beam, _step, cloud_rays, exact_leg, scattered
 from realtime.clouds.single_scattering.opacity import opacity, opacity_of, printed_opacity
 from realtime.clouds.single_scattering.spacing import node_depth, node_share
+from realtime.numerics.aligned import aligned_array
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import SUN, cloud, crossings, length_inside, loaded, ring
 from validation.scenes.parts import placed
@@ -69,7 +70,7 @@ def summed_up(origin, direction, scale=1.0, steps=200):
 
 
 def device(array):
-    return mi.Vector3f(*(mi.Float(column) for column in np.asarray(array).T))
+    return mi.Vector3f(*(aligned_array(mi.Float, column) for column in np.asarray(array).T))
 
 
 def marched(scene, origin, direction, *, steps, scales=(1.0,), printed=False):
