@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction
 from realtime.numerics.aligned import aligned_array
-from realtime.numerics.array_types import array_types
+from realtime.numerics.array_types import ArrayTypes, array_types
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
@@ -26,6 +26,12 @@ def opaque(tree: Any) -> Any:
     """Return a light, a medium or a phase function whose numbers are arrays and no literals."""
     dr.make_opaque(tree)
     return tree
+
+
+def vectors(types: ArrayTypes, rows: Any) -> Any:
+    """Return three-vectors from the rows of an array, (n, 3), in aligned memory: one kernel serves all of them."""
+    columns = np.asarray(rows, dtype=np.float64).reshape(-1, 3).T
+    return types.vector(*(aligned_array(types.scalar, column) for column in columns))
 
 
 def phase_of(name: str | Phase, g: Any, Float: Any) -> Phase:

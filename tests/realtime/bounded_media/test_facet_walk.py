@@ -6,7 +6,7 @@ import pytest
 
 from realtime.numerics.aligned import aligned_array
 from realtime.scene.convex_bounds import mesh_bounds
-from tests.helpers.kernel_values import opaque
+from tests.helpers.kernel_values import opaque, vectors
 from validation.scenes.parts import placed, rotation, scaled
 from validation.scenes.solids import box, gem, icosphere, prism
 
@@ -120,9 +120,9 @@ def test_no_leg_to_a_segment_that_is_called_clear_meets_the_medium(variant, name
     direction = rng.normal(size=(900, 3))
     direction /= np.linalg.norm(direction, axis=1)[:, None]
     length = rng.uniform(0.1, 1.5, 900)
-    ends = types.scalar(np.zeros(900)), types.scalar(length)
+    ends = aligned_array(types.scalar, np.zeros(900)), aligned_array(types.scalar, length)
     planes = entry_planes(seen), exit_planes(seen)
-    clear = clear_of(planes, types.vector(*start.T), types.vector(*direction.T), *ends)
+    clear = clear_of(planes, vectors(types, start), vectors(types, direction), *ends)
     clear = np.array(clear)
     x = np.linspace(0, 1, 51) * length[:, None]
     enter, leave = least_of_all(name, light, start[:, None] + x[..., None] * direction[:, None])
@@ -141,7 +141,7 @@ def test_lines_enter_and_leave_by_the_planes_that_all_planes_name(variant, name,
     light = np.array(light)
     seen, types = seen_medium(name, light)
     v = CENTRE - light + np.random.default_rng(3).normal(size=(3000, 3)) * 1.3
-    inverses = line_crossings((entry_planes(seen), exit_planes(seen)), types.vector(*v.T))
+    inverses = line_crossings((entry_planes(seen), exit_planes(seen)), vectors(types, v))
     enter, leave = (np.array(inverse) for inverse in inverses)
     first, last = least_of_all(name, light, v)
     hits = (first > 0) & (first > last)

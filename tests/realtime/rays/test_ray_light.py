@@ -4,13 +4,13 @@
 import numpy as np
 import pytest
 
-from tests.helpers.kernel_values import opaque
+from tests.helpers.kernel_values import opaque, vectors
 
 
 def point_light(types, position):
     from realtime.scene.lights import Light
 
-    return opaque(Light(types.vector(*(float(p) for p in position)), types.color(1)))
+    return opaque(Light(vectors(types, position), types.color(1)))
 
 
 def spot_light(types, position, axis, degrees):
@@ -18,7 +18,7 @@ def spot_light(types, position, axis, degrees):
 
     angle = float(np.deg2rad(degrees))
     fields = spot_fields(np.asarray(axis) / np.linalg.norm(axis), angle, angle, types)
-    return opaque(Light(types.vector(*(float(p) for p in position)), types.color(1), **fields))
+    return opaque(Light(vectors(types, position), types.color(1), **fields))
 
 
 @pytest.mark.parametrize("kind", ["point", "spot"])
@@ -36,7 +36,7 @@ def test_height_of_rays_that_nearly_meet_the_light(variant, kind):
     types = array_types()
     axis = np.array([0.6, 0.0, -0.8])
     lamp = point_light(types, light) if kind == "point" else spot_light(types, light, axis, 40.0)
-    geometry = ray_geometry(mi.Vector3f(0), mi.Vector3f(direction.T), lamp)
+    geometry = ray_geometry(mi.Vector3f(0), vectors(types, direction), lamp)
     exact = direction.astype(np.float64)
     height = np.linalg.norm(np.cross(light, exact), axis=1)
     # 1.5 units in the last place for each component, and one for each step of the norm.
@@ -62,7 +62,7 @@ def test_rounding_of_light_and_direction_is_no_height(variant, kind):
     axis = np.array([0.48, 0.6, -0.64])
     lamp = point_light(types, light) if kind == "point" else spot_light(types, light, axis, 40.0)
     at = types.vector(*(float(x) for x in origin))
-    geometry = ray_geometry(at, types.vector(high.T), lamp, low=types.vector(low.T))
+    geometry = ray_geometry(at, vectors(types, high), lamp, low=vectors(types, low))
     cross = np.cross(light - origin, direction)
     height = np.linalg.norm(cross, axis=1)
     assert np.max(np.abs(np.array(geometry.height) / height - 1)) < 4e-7  # three roundings of a component and a norm
@@ -84,7 +84,7 @@ def test_cone_clip_against_sampling(variant, precision):
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     for degrees in (3.0, 37.0, 71.0, 89.0):
         light = spot_light(types, (0.3, -0.2, 0.1), (0.4, 0.5, -0.7), degrees)
-        geometry = ray_geometry(types.vector(origin.T), types.vector(direction.T), light)
+        geometry = ray_geometry(vectors(types, origin), vectors(types, direction), light)
         clipped = geometry.lit_segment(types.scalar(0), types.scalar(9.0))
         low, high = (np.broadcast_to(np.array(x, dtype=np.float64), n) for x in clipped)
         x = np.linspace(0.01, 8.99, m)
@@ -121,7 +121,7 @@ def test_rays_through_the_light(variant, degrees):
     light = spot_light(types, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), degrees)
     direction = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (0.6, 0.0, 0.8), (0.6, 0.0, -0.8), (1.0, 0.0, 0.0)])
     origin = -2 * direction.astype(np.float32).astype(np.float64)
-    geometry = ray_geometry(types.vector(origin.T), types.vector(direction.T), light)
+    geometry = ray_geometry(vectors(types, origin), vectors(types, direction), light)
     assert np.all(np.array(geometry.height) == 0)
     low, high = (np.array(x) for x in geometry.lit_segment(types.scalar(0), types.scalar(np.inf)))
     foot = np.array(geometry.foot)
@@ -178,7 +178,7 @@ def test_falloff_near_the_axis_and_the_edge(variant, cutoff, beam):
     direction = (point - origin) / x[:, None]
     high, low = with_low(direction, types)
     at = types.vector(*(float(component) for component in origin))
-    geometry = ray_geometry(at, types.vector(high.T), lamp, low=types.vector(low.T))
+    geometry = ray_geometry(at, vectors(types, high), lamp, low=vectors(types, low))
     x = x.astype(np.float32).astype(np.float64)
     away = origin + x[:, None] * direction - light
     exact = np.arctan2(np.linalg.norm(np.cross(axis, away), axis=1), away @ axis)
@@ -200,7 +200,7 @@ def test_falloff_along_the_axis_and_through_the_light(variant):
     light = Light(types.vector(0.0), types.color(1), **fields)
     origin = np.array([(0.5, 0.0, -2.0), (0.0, 0.0, -2.0), (-1.2, 0.0, -1.6)])
     direction = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, 1.0), (0.6, 0.0, 0.8)])
-    geometry = ray_geometry(types.vector(origin.T), types.vector(direction.T), light)
+    geometry = ray_geometry(vectors(types, origin), vectors(types, direction), light)
     profile = np.array(falloff(geometry, light, types.scalar(3.0)))
     angle = np.array([np.arctan2(0.5, 1.0), 0.0, np.arctan2(0.6, 0.8)])
     np.testing.assert_allclose(profile, np.clip((1 - angle) / 0.75, 0, 1), atol=1e-6)

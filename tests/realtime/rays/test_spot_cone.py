@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpmath import mp
 
-from tests.helpers.kernel_values import opaque
+from tests.helpers.kernel_values import opaque, vectors
 
 # Rounded to float32; their difference is not.
 LIGHT, CAMERA = np.array([[0.237, -0.371, 4.119], [2.253, -5.127, 1.879]], dtype=np.float32).astype(np.float64)
@@ -68,7 +68,7 @@ def ends_of(direction, degrees, precision):
     light = opaque(Light(types.vector(*(float(x) for x in LIGHT)), types.color(1), **fields))
     high, low = with_low(direction, types)
     origin = opaque(types.vector(*(float(x) for x in CAMERA)))
-    geometry = ray_geometry(origin, types.vector(high.T), light, low=types.vector(low.T))
+    geometry = ray_geometry(origin, vectors(types, high), light, low=vectors(types, low))
     ends = np.array([np.array(geometry.enter, dtype=np.float64), np.array(geometry.leave, dtype=np.float64)])
     enter, leave, foot, height = np.array([exact_interval(ray, angle) for ray in direction]).T
     return ends, np.array([enter, leave]), foot, height
@@ -91,7 +91,7 @@ def largest_error(ends, wanted, foot, height):
 def test_rays_that_graze_the_cone(variant, degrees, precision):
     """Chords that float32 alone would change by up to 1e-3 of the distance, or miss."""
     rng = np.random.default_rng(17)
-    n = 300
+    n = 150
     excess = rng.choice([-1, 1], n) * 10.0 ** rng.uniform(-9, -0.1, n)
     direction = aimed(degrees, excess, 10.0 ** rng.uniform(-1, 1, n), rng)
     ends, wanted, foot, height = ends_of(direction, degrees, precision)
@@ -112,12 +112,12 @@ def test_all_sorts_of_rays(variant, degrees, precision):
     """Rays along all directions, past the light at 1e-5 to 1 m, about the axis, and nearly along lines on the cone."""
     rng = np.random.default_rng(23)
     spread = np.deg2rad(degrees)
-    every, other = rng.normal(size=(2, 200, 3))
-    near = LIGHT - CAMERA + 10.0 ** rng.uniform(-5, 0, (200, 1)) * other
-    within = LIGHT - CAMERA + rng.uniform(0, 9, (200, 1)) * (AXIS + 0.1 * spread * every)
+    every, other = rng.normal(size=(2, 80, 3))
+    near = LIGHT - CAMERA + 10.0 ** rng.uniform(-5, 0, (80, 1)) * other
+    within = LIGHT - CAMERA + rng.uniform(0, 9, (80, 1)) * (AXIS + 0.1 * spread * every)
     across = np.cross(AXIS, other)
     across /= np.linalg.norm(across, axis=1, keepdims=True)
-    along = np.cos(spread) * AXIS + np.sin(spread) * across + 10.0 ** rng.uniform(-7, -3, (200, 1)) * every
+    along = np.cos(spread) * AXIS + np.sin(spread) * across + 10.0 ** rng.uniform(-7, -3, (80, 1)) * every
     direction = np.concatenate([every, near, within, along, -along])
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     ends, wanted, foot, height = ends_of(direction, degrees, precision)
@@ -131,4 +131,4 @@ def test_all_sorts_of_rays(variant, degrees, precision):
         across = np.cross(LIGHT - CAMERA, direction) @ AXIS
         error *= np.sqrt(np.clip(np.sin(spread) ** 2 - (across / height) ** 2, 0, 1))
     assert np.max(error[hit.all(axis=0)]) < 4 * np.finfo(np.float32 if precision == "single" else np.float64).eps
-    assert np.sum(np.isfinite(wanted)) > 300
+    assert np.sum(np.isfinite(wanted)) > 120
