@@ -82,12 +82,6 @@ def test_plain_channels_are_compared_with_all_light(scene, truth, write):
     assert "airlight + surface, at pixel centres" in verdict.summary()
 
 
-def test_one_kind_of_light_alone_is_recognised(scene, truth, write):
-    for name in ("airlight", "surface"):
-        (words,) = compare_scene(scene, write(total=getattr(truth, name))).hints.words
-        assert words.startswith(f"the image is the {name} alone")
-
-
 @pytest.mark.claim("engine-margin")
 def test_margin_decides_without_standard_errors(scene, truth, write):
     file = write(airlight=1.01 * truth.airlight)

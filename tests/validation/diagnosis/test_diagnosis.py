@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The diagnosis of images: each hypothesis names the fault that is planted, alone, with another, or none."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,17 +8,16 @@ import pytest
 
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_truth
-from reference.storage.exr import Image, write_exr
+from reference.storage.exr import Image
 from tests.helpers.aside import write_scenes
 from tests.helpers.planted_faults import PAIRS, PLANTED
 from validation.comparison.whole_image import to_srgb
-from validation.diagnosis.diagnose import HYPOTHESES, diagnose_file, diagnose_image
+from validation.diagnosis.diagnose import diagnose_image
 from validation.diagnosis.diagnosis_text import diagnosis_lines
 from validation.diagnosis.encoding import gamma, srgb_in_8_bits
-from validation.diagnosis.prediction import Guess, SceneLight, Scenery, changed_scene
+from validation.diagnosis.prediction import Guess, Scenery, changed_scene
 from validation.diagnosis.search import Explanation
 from validation.diagnosis.verdict import correlation, is_noise
-from validation.fit.image_model import Task
 from validation.fog_model.build import scattering_paths
 from validation.fog_model.fog import scene_fog
 from validation.fog_model.radiance import as_array, fog_total, on_device
@@ -121,31 +119,6 @@ def test_planted_lights_shine_on_surfaces_too(truth, words):
     assert np.quantile(np.abs(predicted - image) / image.mean(), 0.99) < 1e-5
 
 
-def test_paths_are_kept_up_to_some_nodes(truth):
-    task = Task(truth, np.ones((SIZE[0] * SIZE[1], 3)), "total", np.ones(SIZE[0] * SIZE[1], bool), False)
-    light = SceneLight(truth)
-    first = light.model(task, Scenery()).paths
-    assert light.model(task, Scenery()).paths is first
-    light.model(task, Scenery(shadows=False))
-    assert light.model(task, Scenery()).paths is first
-    light.most = 1
-    light.model(task, Scenery(zoom=1.1))
-    assert light.model(task, Scenery()).paths is not first
-
-
-def test_images_are_kept_up_to_some_values(truth):
-    task = Task(truth, np.ones((SIZE[0] * SIZE[1], 3)), "total", np.ones(SIZE[0] * SIZE[1], bool), False)
-    light, fog = SceneLight(truth), scene_fog(truth)
-    first = light.radiance(task, Scenery(), fog)
-    assert light.radiance(task, Scenery(), replace(fog, exposure=(2.0, 2.0, 2.0))) == pytest.approx(2 * first)
-    light.radiance(task, Scenery(), replace(fog, camera_leg=0.0))
-    assert len(light._images) == 2  # a brighter image is one that is known
-    light.most_values = 2 * first.size
-    light.radiance(task, Scenery(shadows=False), fog)
-    assert next(iter(light._images))[1].camera_leg == 0.0
-    assert light.radiance(task, Scenery(), fog) == pytest.approx(first, rel=1e-12)
-
-
 def test_errors_of_few_pixels_are_no_noise():
     """Most pixels were right to rounding, and the signs of that decided what was noise."""
     generator = np.random.default_rng(1)
@@ -243,27 +216,6 @@ def test_what_nothing_explains_is_said(truth):
     diagnosis = diagnosed(total(other))
     assert diagnosis.first == "unexplained"
     assert "Nothing here explains it" in "\n".join(diagnosis_lines(diagnosis))
-
-
-@pytest.mark.slow
-def test_json_and_lines(truth, tmp_path):
-    path = tmp_path / "engine.exr"
-    write_exr(path, Image({"total": 2 * total(truth)}))
-    diagnosis = diagnose_file(path, "sphere-spot", layer="total", pixel="centre")
-    numbers = diagnosis.to_json()["diagnosis"]
-    assert numbers["first"] == "factor"
-    assert {"name", "parameter", "residual", "evidence"} <= set(numbers["ranked"][0])
-    assert numbers["ranked"][0]["parameter"] == pytest.approx(2.0, rel=1e-4)
-    assert "2 times as bright" in "\n".join(diagnosis_lines(diagnosis))
-
-
-def test_every_hypothesis_has_a_name_a_kind_and_words_for_its_numbers():
-    for hypothesis in HYPOTHESES:
-        assert re.fullmatch(r"[a-z-]+", hypothesis.name)
-        assert hypothesis.words.format(*(1.0 for _ in hypothesis.parameters))
-        assert hypothesis.words.count("{") == len(hypothesis.parameters)
-        for parameter in hypothesis.parameters:
-            assert all(parameter.low <= start <= parameter.high for start in parameter.starts)
 
 
 def test_encodings_are_what_their_standards_say():

@@ -144,14 +144,6 @@ def test_albedo_and_intensity_are_not_told_apart_in_the_airlight_but_with_surfac
     assert [each.value for each in whole.parameters] == pytest.approx([0.31, 0.83, 1.0], rel=1e-3)
 
 
-@pytest.mark.slow
-def test_what_does_nothing_is_said(variant, tmp_path):
-    scene = scene_file(tmp_path)
-    (group,) = fitted(image_of(scene), scene, ["albedo", "sigma_t"], layer="surface", holds="surface").confounded
-    assert (group.parameters, group.products) == (("albedo",), ())
-    assert "nothing" in group.way_out
-
-
 @pytest.mark.claim("fit-robust")
 def test_pixels_that_disagree_are_left_out(variant, tmp_path):
     scene = scene_file(tmp_path, albedo="0.83")
@@ -289,19 +281,3 @@ def test_mistakes_have_one_line(variant, tmp_path, names, how, words):
     image = Image({"airlight": np.random.default_rng(1).random((36, 48, 3))})
     with pytest.raises(InputError, match=re.escape(words)):
         fit_image(image, load_scene(scene), names, **how)
-
-
-@pytest.mark.slow
-def test_a_light_has_the_points_that_its_shadows_need(variant):
-    """Each point has shadows of its own: a window before pillars needs more than a lamp above one edge."""
-    from reference.scene.read import read_truth
-    from validation.fit.image_model import needed_points
-    from validation.scenes.loading import load_scene
-
-    needed = {
-        name: needed_points(read_truth(load_scene(name, (16, 12)).scene))
-        for name in ("open-fog", "penumbra-plane", "soft-hall")
-    }
-    assert needed["open-fog"] == 16
-    assert needed["penumbra-plane"] <= 32
-    assert needed["soft-hall"] == 128

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
 from dataclasses import asdict, replace
-from types import SimpleNamespace
 
 import mitsuba as mi
 import pytest
@@ -8,7 +7,7 @@ import pytest
 from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
-from validation.configurations.methods import STANDARD, Configuration, configuration, prepared
+from validation.configurations.methods import STANDARD, Configuration, configuration
 from validation.frames.benchmark import configurations_for, measure
 from validation.scenes.loading import LoadedScene
 
@@ -52,12 +51,6 @@ def test_method_without_shadows_is_too_bright_by_what_shadows_take_away(measured
     error = measured[UNSHADOWED].error
     assert error.relative_bias > 0.003
     assert error.relative_rmse > 3 * measured[MARCH].error.relative_rmse
-
-
-def test_surface_is_compared_too(measured):
-    # A pixel at the rim of the sphere may see it with one method's rays and the floor with the other's.
-    assert measured[MARCH].surface_error.p50 < 1e-4
-    assert measured[MARCH].surface_error.relative_bias == pytest.approx(0, abs=0.02)
 
 
 @pytest.mark.slow
@@ -107,21 +100,6 @@ def test_variants_of_shadows_are_left_out_where_nothing_casts_one():
     assert 0 < len(left) < len(STANDARD)
     assert all(not {"shadow", "map"} & set(dict(configuration.parameters)) for configuration in left)
     assert {configuration.method for configuration in left} == {configuration.method for configuration in STANDARD}
-
-
-@pytest.mark.slow
-def test_slow_configurations_are_not_timed_at_a_larger_size(variant, loaded, monkeypatch):
-    from validation.estimates.quadrature import truth_image
-    from validation.frames import benchmark as module
-
-    truth = truth_image(loaded.scene)
-    scene = read_scene(loaded.scene)
-    timed = read_scene(mi.load_dict(tiny_scene(size=(32, 24))))
-    assert measure(scene, MARCH, truth=truth, timed=timed, seconds=0.01).note is None
-    monkeypatch.setattr(module, "_LONG", 0.0)
-    slow = measure(scene, MARCH, truth=truth, timed=timed, seconds=0.01)
-    assert "16 x 12" in slow.note
-    assert slow.times is not None
 
 
 def test_a_method_of_ones_own_that_is_not_frozen_has_a_note(tmp_path, variant):
@@ -176,42 +154,6 @@ def test_what_would_take_too_long_is_left_out_with_what_it_would_take(loaded, mo
     assert "more than the limit of 0.3 s" in measurement.refused
 
 
-@pytest.mark.slow
-def test_what_prepares_for_too_long_is_left_out_and_its_pixels_are_not_counted_as_preparation(loaded, monkeypatch):
-    """Rationale: what a frame prepares is the same for a small image, and does not grow with its pixels."""
-    from realtime.frame.renderer import FrameRenderer
-
-    clock, found = Clock(), FrameRenderer.__getattribute__
-
-    def slowed(self, name):
-        if name != "prepare":
-            return found(self, name)
-        clock.now += 0.3
-        return found(self, name)
-
-    monkeypatch.setattr(FrameRenderer, "__getattribute__", slowed)
-    given = {"seconds": 0, "clock": clock}
-    assert "what a frame prepares takes 0.3" in probed(loaded, monkeypatch, MARCH, limit=0.2, **given).refused
-    # Four times the small frame would be above the limit; its pixels alone are not.
-    assert probed(loaded, monkeypatch, MARCH, limit=1.1, **given).refused is None
-
-
-def test_groups_of_lights_that_are_prepared_within_the_frame_count_as_those_before_it(monkeypatch):
-    """Rationale: the states of only so many groups of lights are kept; a frame makes the others."""
-    from validation.frames import benchmark as module
-
-    clock = Clock()
-
-    def prepare(scene):
-        clock.now += 0.1
-        return ("state", "state", *6 * [None])
-
-    monkeypatch.setattr(module, "time", clock)
-    renderer = SimpleNamespace(prepare=prepare, scene=None, groups="of lights")
-    assert "what a frame prepares takes 0.4 s" in module._too_long(renderer, None, MARCH, 0.3)
-    assert module._too_long(renderer, None, MARCH, 0.9) is None
-
-
 @pytest.mark.parametrize(("seconds", "frames"), [(0.1, 2), (3.0, 1)])
 def test_a_first_frame_that_takes_long_is_not_rendered_twice_for_its_memory(loaded, monkeypatch, seconds, frames):
     """Rationale: the recording of a short frame takes a part of its time and memory, that of a long one nothing."""
@@ -243,27 +185,3 @@ def test_what_takes_less_than_the_limit_is_measured(loaded, monkeypatch):
     assert not measurement.left_out
     assert measurement.refused is None
     assert measurement.error.relative_rmse < 0.02
-
-
-@pytest.mark.slow
-def test_a_quick_preparation_asks_for_no_small_frame(loaded, measured, monkeypatch):
-    from validation.estimates.quadrature import truth_image
-    from validation.frames import benchmark as module
-
-    def never():
-        raise AssertionError("no doubt about this one")
-
-    monkeypatch.setattr(module, "_DOUBTFUL", 1e6)
-    scene, truth = read_scene(loaded.scene), truth_image(loaded.scene)
-    assert measure(scene, MARCH, truth=truth, seconds=0.01, limit=1.0, probe=never).refused is None
-    # Nor does one that is long the first time alone, when kernels are compiled.
-    clock = Clock()
-
-    def compiled(*given):
-        clock.now += 1.5
-        return prepared(*given)
-
-    monkeypatch.setattr(module, "time", clock)
-    monkeypatch.setattr(module, "_DOUBTFUL", 0.1)
-    monkeypatch.setattr(module, "prepared", compiled)
-    assert measure(scene, MARCH, truth=truth, seconds=0.01, limit=10.0, probe=never).refused is None

@@ -5,14 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from validation.configurations.methods import QUICK, STANDARD, Configuration
+from validation.configurations.methods import QUICK, Configuration
 from validation.frames import scene_study as study
 from validation.frames.benchmark import Measurement
-from validation.frames.scene_study import EFFORTS, Effort, open_study, wants_flip, with_flips
+from validation.frames.scene_study import EFFORTS, Effort, open_study, with_flips
 from validation.scenes.registry import FOG_SCENES
 
 TINY = Effort("tiny", (16, 12), (16, 12), (8, 6), {"volpath": 0.5}, {"volpath": 8}, 0.01)
-OWN = Configuration("mine.py:fog")
 
 
 def test_scenes_lit_by_lights_with_extent_are_compared_at_half_the_width(variant):
@@ -31,14 +30,6 @@ def test_scenes_lit_by_lights_with_extent_are_compared_at_half_the_width(variant
             assert narrow.checked == (width // 2, height // 2)
             paths = np.prod(narrow.checked) * narrow.samples["volpath"]
             assert paths == np.prod(effort.checked) * effort.samples["volpath"]
-
-
-@pytest.mark.parametrize(
-    ("flip", "count"), [("none", 0), ("kinds", len(QUICK) + 1), ("all", len({*QUICK, *STANDARD}) + 1)]
-)
-def test_flip_is_asked_for_by_kind(flip, count):
-    effort = replace(TINY, flip=flip)
-    assert sum(wants_flip(effort, configuration) for configuration in {*QUICK, *STANDARD, OWN}) == count
 
 
 def test_flip_is_computed_where_it_is_asked_for_and_there_is_a_frame(monkeypatch):
@@ -60,23 +51,10 @@ def test_flip_is_computed_where_it_is_asked_for_and_there_is_a_frame(monkeypatch
     assert asked == [(5.0, 3.0)]
 
 
-def test_images_from_elsewhere_set_the_size_of_everything(variant):
-    studied = open_study("open-fog", replace(TINY, timed=(32, 24)).at((20, 10)))
-    assert studied.effort.image == studied.effort.timed == (20, 10)
-    assert (studied.scene.camera.width, studied.scene.camera.height) == (20, 10)
-    assert studied.timed is None
-
-
 def test_frames_are_timed_at_their_own_size(variant):
     studied = open_study("open-fog", replace(TINY, timed=(32, 24)))
     assert (studied.scene.camera.width, studied.timed.camera.width, studied.probe.camera.width) == (16, 32, 64)
     assert studied.scene is studied.scene  # read once
-
-
-def test_the_digest_is_that_of_the_content(variant):
-    open_fog, sphere_spot = (open_study(name, TINY).digest for name in ("open-fog", "sphere-spot"))
-    assert open_fog != sphere_spot
-    assert open_fog == open_study("open-fog", TINY).digest
 
 
 @pytest.mark.slow

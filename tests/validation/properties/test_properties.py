@@ -70,13 +70,6 @@ def test_none_depends_on_the_unit_of_length(variant):
         assert inches[name] == pytest.approx(value, rel=2e-3, abs=2e-3), name
 
 
-def test_a_light_in_view_is_seen(variant):
-    properties = scene_properties(_scene(lamp=(0.0, 3.0, 0.3)))
-    assert properties["lights_seen"] == 1
-    assert properties["light_ray"] < 0.03
-    assert 0.1 < properties["light_nearest"] < 1
-
-
 def test_extent_and_bounds_are_read(variant):
     lamp = area_lamp("sphere", (0.0, 0.3, 3.0), (0, 0, 0), 0.5, (1.0, 1.0, 1.0))
     properties = scene_properties(_scene(extra={"wide": lamp}))

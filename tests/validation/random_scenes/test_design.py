@@ -39,14 +39,6 @@ def test_a_seed_has_one_point_and_parts_have_streams_of_their_own():
     assert max(numbers) < 1
 
 
-def test_counts_reach_both_ends():
-    draws = Draws(3).of("counts")
-    for count in (draws.count, draws.few):
-        counts = [count(1, 8) for _ in range(2000)]
-        assert {min(counts), max(counts)} == {1, 8}
-    assert draws.count(3, 3) == 3
-
-
 def test_a_choice_follows_its_weights():
     draws = Draws(3).of("choices")
     words = [draws.pick({"never": 0, "often": 3, "seldom": 1}) for _ in range(4000)]

@@ -7,18 +7,6 @@ import pytest
 from analytic.errors import InputError
 
 
-def ball():
-    from validation.scenes.solids import icosphere
-
-    return icosphere(1)
-
-
-def open_edges(faces):
-    """Return how many edges have no neighbour."""
-    sides = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    return int(np.sum(np.unique(sides, axis=0, return_counts=True)[1] != 2))
-
-
 def test_the_map_of_space_is_one_to_one():
     """Its derivative less the identity is below 1 everywhere, so that no mesh crosses itself or another."""
     from validation.scaling.subdivision import bumpy
@@ -54,25 +42,3 @@ def test_a_scene_keeps_what_has_no_triangles_to_cut(variant):
     assert (after.camera.width, after.camera.height) == (before.camera.width, before.camera.height)
     with pytest.raises(InputError, match="no opaque meshes"):
         subdivided(mi.load_dict(tiny_scene(floor=None)), 1)
-
-
-@pytest.mark.slow
-def test_finer_meshes_have_more_silhouettes():
-    """About twice as many with four times the triangles: what the exponent 1/2 of shadow planes is of."""
-    from validation.scaling.subdivision import bumpy
-    from validation.scenes.solids import divided
-
-    light, counts = np.array([0.9, 0.7, 4.9]), []
-    vertices, faces = ball()
-    for _ in range(5):
-        vertices, faces = divided((vertices, faces))
-        unit = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
-        moved = bumpy(unit, np.full(3, -1.0), 2 * 3**0.5)
-        a, b, c = (moved[faces[:, k]] for k in range(3))
-        normals = np.cross(b - a, c - a)
-        lit = np.einsum("ij,ij->i", normals, light - a) > 0
-        sides = np.sort(np.stack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]], axis=1), axis=2).reshape(-1, 2)
-        _, number = np.unique(sides, axis=0, return_inverse=True)
-        count = np.bincount(number.ravel(), weights=np.repeat(lit, 3))
-        counts.append(int(np.sum(count == 1)))
-    assert 1.5 < counts[-1] / counts[-2] < 2.6

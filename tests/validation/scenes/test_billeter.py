@@ -10,7 +10,7 @@ from realtime.scene.mesh_adjacency import make_casters
 from tests.helpers.meshes import areas, volume
 from validation.scenes.omni_box import SCENE as OMNI_BOX
 from validation.scenes.omni_box import _bars, _room, _standing
-from validation.scenes.tangle import _MIDDLE, _TUBES, _WAVES, _bent, _tubes
+from validation.scenes.tangle import _TUBES, _WAVES, _bent, _tubes
 from validation.scenes.tangle import SCENE as TANGLE
 
 RECORDS = {record.name: record for record in (OMNI_BOX, TANGLE)}
@@ -37,15 +37,6 @@ def scene_of(name, size):
     from validation.scenes.loading import load_scene
 
     return read_scene(load_scene(name, size).scene)
-
-
-@cache
-def map_of(name, size):
-    """Return the distances of a shadow map of the scene's one light, (faces, size + 1, size + 1)."""
-    from realtime.shadow_maps.shadow_map import cast_shadow_map
-
-    scene = scene_of(name, (8, 6))
-    return np.array(cast_shadow_map(scene.geometry, scene.lights[0], size).distance).reshape(-1, size + 1, size + 1)
 
 
 @pytest.mark.slow
@@ -79,17 +70,6 @@ def test_room_turns_its_inside_to_the_lamp():
     assert np.all(np.einsum("ij,ij->i", np.cross(b - a, c - a), np.array(_LAMP) - a) > 0)
 
 
-def test_boxes_of_the_room_stand_in_it_and_keep_clear_of_the_lamp():
-    from validation.scenes.omni_box import _LAMP
-
-    for mesh, lowest in [(mesh, 0.1) for mesh in _bars()] + [(mesh, -0.1) for mesh in _standing()]:
-        vertices, _ = mesh
-        assert vertices[:, 2].min() > lowest
-        # Without a gap: a box that stands sinks into the floor a little.
-        assert lowest > 0 or vertices[:, 2].min() < 0
-        assert np.linalg.norm(vertices - np.array(_LAMP), axis=1).min() > 0.4
-
-
 def test_tangle_is_bent_without_folding_space():
     """Two points move against each other by less than they are apart: the waves' Lipschitz bounds add to below 1."""
     assert sum(np.linalg.norm(displacement) * np.linalg.norm(wave) for displacement, wave, _ in _WAVES) < 1
@@ -99,48 +79,6 @@ def test_tangle_is_bent_without_folding_space():
     determinants = np.linalg.det(np.stack(columns, axis=2))
     assert determinants.min() > 0
     assert determinants.max() / determinants.min() > 2  # and yet it is bent
-
-
-def test_tubes_are_uneven():
-    """Irregular: the thinnest section of each tube is less than half as thick as the thickest."""
-    vertices, _ = _tubes()
-    first = 0
-    for tube in _TUBES:
-        rings, sides = tube.cells
-        points = vertices[first : first + rings * sides].reshape(rings, sides, 3)
-        first += rings * sides
-        thickness = np.linalg.norm(points - points.mean(axis=1, keepdims=True), axis=2).mean(axis=1)
-        assert thickness.min() < 0.5 * thickness.max()
-
-
-def test_tangle_lies_in_the_cone_of_its_spot(variant):
-    vertices, _ = _tubes()
-    light = scene_of("tangle", (8, 6)).lights[0]
-    lamp = np.array(light.position).reshape(3)
-    towards = np.array(_MIDDLE) - lamp
-    from_lamp = vertices - lamp
-    cosine = from_lamp @ towards / np.linalg.norm(from_lamp, axis=1) / np.linalg.norm(towards)
-    assert np.arccos(cosine.min()) < float(light.cutoff[0])
-
-
-@pytest.mark.slow
-def test_every_face_of_the_lamps_map_sees_a_box_before_a_wall(variant):
-    """The floor, nearest of what is open, is 1.57 m below the lamp: what is nearer is a box, and some rays go on."""
-    for number, face in enumerate(map_of("omni-box", 32)):
-        assert face.min() < 1.2, number
-        assert face.max() > 1.57, number
-
-
-@pytest.mark.slow
-def test_map_of_the_tangle_has_edges_all_over(variant):
-    """Many small holes: what is nearest changes often along each row of the map; some rays leave the scene."""
-    (face,) = map_of("tangle", 256)
-    assert np.isinf(face).any()
-    assert face.min() > 2.5
-    # A ray that falls at an angle e to a floor 4.2 m below has the inverse distance sin(e) / 4.2 m, so from texel to
-    # texel, 2 tan(26.3 degrees) / 256 apart at most, it changes by 1e-3 [1/m]. A row meets the floor's border twice.
-    jumps = np.count_nonzero(np.abs(np.diff(1 / face, axis=1)) > 0.01, axis=1)
-    assert np.median(jumps) > 12  # 20; one sphere before the floor has 4 at most
 
 
 def frame_of(name, method, *, kernel=None, **parameters):

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from validation.scenes.loading import load_scene, nearest, parse_size
-from validation.scenes.registry import SCENES
+from validation.scenes.loading import load_scene, parse_size
 
 SMALL = """<scene version="3.0.0">
     <medium type="homogeneous" id="fog">
@@ -45,14 +44,6 @@ def refused(text):
 def test_unknown_name_is_refused_with_the_nearest(variant, given, meant):
     with refused(f"did you mean '{meant}'?"):
         load_scene(given)
-
-
-def test_unknown_name_without_a_likeness_lists_what_there_is(variant):
-    with pytest.raises(InputError) as caught:
-        load_scene("qqqq")
-    assert "did you mean" not in str(caught.value)
-    assert all(name in str(caught.value) for name in SCENES)
-    assert "\n" not in str(caught.value)
 
 
 def test_folder_is_refused(variant, tmp_path):
@@ -139,11 +130,6 @@ def test_resized_scene_has_the_rays_of_one_built_at_that_size(variant, small_fil
         # The projections are derived by the same code in float32.
         np.testing.assert_allclose(np.array(rays[0].d), np.array(rays[1].d), rtol=0, atol=1e-6)
         np.testing.assert_allclose(np.array(rays[0].o), np.array(rays[1].o), rtol=0, atol=1e-6)
-
-
-def test_nearest_says_nothing_rather_than_nonsense():
-    assert nearest("quadratur", ["taylor", "quadrature"]) == "; did you mean 'quadrature'?"
-    assert nearest("zzz", ["taylor", "quadrature"]) == ""
 
 
 @pytest.mark.parametrize("side", ["width", "height"])

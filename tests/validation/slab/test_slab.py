@@ -10,7 +10,7 @@ from analytic.errors import InputError
 from analytic.phase import PhaseFunction, hg_draine_moments
 from validation.slab.light import slab_numbers
 from validation.slab.phases import phase_pair, read_phase_file
-from validation.slab.request import SETS, order_range, slab_request
+from validation.slab.request import slab_request
 
 
 def paired(first, second, errors):
@@ -123,14 +123,6 @@ def test_every_number_has_its_error_in_its_place():
     assert flat
     assert all(error <= 1e-4 * abs(value) + 1e-12 for value, _, error in flat)
     assert numbers["orders"][0]["reflected_mean"] == pytest.approx(0, abs=1e-12)  # nothing is forward at noon
-
-
-def test_names_of_orders():
-    assert slab_request(1, 0).orders == SETS
-    assert slab_request(1, 0, orders="1, 2,sets,all").orders == (*SETS, "all")
-    assert slab_request(1, 0, orders=[4, "5-6"]).orders == ("4", "5-6")
-    assert order_range("31-inf") == (31, math.inf)
-    assert order_range("all") == (1, math.inf)
 
 
 @pytest.mark.parametrize(
