@@ -47,7 +47,7 @@ def own_method(name: str) -> Method:
     InputError
         For what cannot be imported, is not there or is no function, and a function that no frame can call.
     """
-    named_object = _find(name)
+    named_object = user_object(name, "method")
     if isinstance(named_object, Method):
         return replace(
             named_object,
@@ -98,19 +98,26 @@ def _is_file(module_name: str) -> bool:
     return module_name.endswith(".py") or os.sep in module_name
 
 
-def _find(name: str) -> Any:
-    """Import the module or the file, and return the object in it."""
+def user_object(name: str, kind: str) -> Any:
+    """Import a module or a file of the user's, and return the object in it; `kind` says in messages what it is.
+
+    Raises
+    ------
+    InputError
+        For what cannot be imported, or is not there.
+    """
     module_name, _, path = name.rpartition(":")
     if not module_name or not all(part.isidentifier() for part in path.split(".")):
-        raise InputError(f"method: got {name!r}, {_WANTED}")
-    with _own_errors(f"method {name}"):
-        module = _from_file(Path(module_name), name) if _is_file(module_name) else _from_path(module_name, name)
+        raise InputError(f"{kind}: got {name!r}, {_WANTED}")
+    what = f"{kind} {name}"
+    with own_errors(what):
+        module = _from_file(Path(module_name), what) if _is_file(module_name) else _from_path(module_name, what)
     named_object: Any = module
     for part in path.split("."):
         if not hasattr(named_object, part):
             there = [key for key, value in vars(module).items() if _is_candidate(value, module)]
             known = f"it has {', '.join(there)}" if there else "it has no functions of its own"
-            raise InputError(f"method {name}: {module_name} has no {path!r}; {known}")
+            raise InputError(f"{what}: {module_name} has no {path!r}; {known}")
         named_object = getattr(named_object, part)
     return named_object
 
@@ -121,10 +128,10 @@ def _is_candidate(value: Any, module: ModuleType) -> bool:
     return inspect.isfunction(value) and value.__module__ == module.__name__ and not value.__name__.startswith("_")
 
 
-def _from_path(module_name: str, name: str) -> ModuleType:
+def _from_path(module_name: str, what: str) -> ModuleType:
     """Import a module, the current folder first on the path: the console script's own folder stands there otherwise."""
     if not all(part.isidentifier() for part in module_name.split(".")):
-        raise InputError(f"method {name}: no module can have the name {module_name!r}; {_WANTED}")
+        raise InputError(f"{what}: no module can have the name {module_name!r}; {_WANTED}")
     folder = os.getcwd()
     sys.path.insert(0, folder)
     try:
@@ -133,18 +140,16 @@ def _from_path(module_name: str, name: str) -> ModuleType:
     except ModuleNotFoundError as error:
         missing = error.name or ""
         if missing and f"{module_name}.".startswith(f"{missing}."):
-            raise InputError(
-                f"method {name}: there is no module {missing!r} in {folder} or installed; {_WANTED}"
-            ) from None
+            raise InputError(f"{what}: there is no module {missing!r} in {folder} or installed; {_WANTED}") from None
         raise
     finally:
         sys.path.remove(folder)
 
 
-def _from_file(path: Path, name: str) -> ModuleType:
+def _from_file(path: Path, what: str) -> ModuleType:
     """Import a file under a name of its own, again where it was changed since: in a notebook it will be."""
     if not path.is_file():
-        raise InputError(f"method {name}: there is no file {path}; {_WANTED}")
+        raise InputError(f"{what}: there is no file {path}; {_WANTED}")
     place = path.resolve()
     status = place.stat()
     stamp = (status.st_mtime_ns, status.st_size)
@@ -154,7 +159,7 @@ def _from_file(path: Path, name: str) -> ModuleType:
         return known
     spec = importlib.util.spec_from_file_location(key, place)
     if spec is None or spec.loader is None:
-        raise InputError(f"method {name}: {path} is not a Python file; {_WANTED}")
+        raise InputError(f"{what}: {path} is not a Python file; {_WANTED}")
     module = importlib.util.module_from_spec(spec)
     module.__dict__["__airlight_stamp__"] = stamp
     sys.modules[key] = module
@@ -202,7 +207,7 @@ def _guarded(
     def render(view, state, lists, *, kernel, parameters):
         given = {key: value for key, value in values(parameters).items() if key in takes}
         given |= {"kernel": kernel} if takes_kernel else {}
-        with _own_errors(f"method {name}", _file(function)):
+        with own_errors(f"method {name}", _file(function)):
             returned = function(replace(view, prepared=state), **given)
         return Layers(checked_radiance(returned, view, name))
 
@@ -215,7 +220,7 @@ def _guarded_render(
     """Return what renders a record of the user's own, with its errors named and its result checked."""
 
     def render(view, state, lists, *, kernel, parameters):
-        with _own_errors(f"method {name}", _file(function)):
+        with own_errors(f"method {name}", _file(function)):
             returned = function(view, state, lists, kernel=kernel, parameters=parameters)
         return checked_layers(returned, view, name, visibility=provides_visibility(parameters))
 
@@ -230,7 +235,7 @@ def _guarded_prepare(prepare: Any, name: str) -> Callable[..., Any] | None:
         raise InputError(f"method {name}: its `prepare` is a {type(prepare).__name__}; wanted a function of the scene")
 
     def ready(scene, parameters):
-        with _own_errors(f"method {name}", _file(prepare)):
+        with own_errors(f"method {name}", _file(prepare)):
             made = prepare(scene, **values(parameters))
         if not callable(made):
             raise InputError(
@@ -238,7 +243,7 @@ def _guarded_prepare(prepare: Any, name: str) -> Callable[..., Any] | None:
             )
 
         def run(moved):
-            with _own_errors(f"method {name}", _file(prepare)):
+            with own_errors(f"method {name}", _file(prepare)):
                 return made(moved)
 
         return run
@@ -247,7 +252,7 @@ def _guarded_prepare(prepare: Any, name: str) -> Callable[..., Any] | None:
 
 
 @contextmanager
-def _own_errors(what: str, file: str | None = None) -> Iterator[None]:
+def own_errors(what: str, file: str | None = None) -> Iterator[None]:
     """Turn any exception of the user's code into an `InputError` that says where it came from."""
     try:
         yield

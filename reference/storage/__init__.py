@@ -3,10 +3,9 @@
 
 Read in this order:
 
-- `stopping.py`: what a process that a signal ends removes and says;
 - `files.py`: writes a file whole or not at all;
 - `exr.py`: reads and writes layered OpenEXR images;
-- `scene_digest.py`: a digest of everything that decides the numbers of a reference;
-- `cache.py`: keeps finished references on disk;
-- `cache_size.py`: the size of the cache, its limit, and what is dropped.
+- `cache.py`: keeps arrays on disk, within a limit;
+- `kept.py`: keys of results, by arguments and source code;
+- `scene_digest.py`: a digest of everything in a scene.
 """

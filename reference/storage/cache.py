@@ -1,96 +1,163 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Arrays on disk under a name, written whole or not at all.
+"""Arrays on disk under a key: whole or not there, and together no larger than a limit.
 
-A killed run loses nothing that was finished and leaves nothing half-written. Each file holds a digest of its own
-content and name: one that was damaged, edited or renamed counts as none. `reference.storage.scene_digest` names
-references by what decides their numbers, `reference.storage.cache_size` keeps the cache from growing without bound.
+A killed run loses nothing that was finished and leaves nothing half-written. Each file holds a digest of its content
+and its key: a file that was damaged, edited or renamed counts as missing. `reference.storage.kept` says which key
+arrays have.
+
+Only files `KIND-DIGEST.npz`, and those in a folder `KIND-DIGEST`, are ever removed: a folder given by mistake loses
+nothing.
 """
 
 import hashlib
 import os
-import time
+import re
 import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from reference.storage.files import write_bytes
+from analytic.errors import InputError
+from reference.storage.files import sweep_hidden, write_bytes
 
-#: Raise this when the meaning or the accuracy of a cached number changes.
-GENERATION = 4
+DEFAULT_LIMIT = 4 * 2**30  #: bytes
 
 _DIGEST = "digest"  # the name of the digest among the arrays
-_STALE = 3600.0  # seconds after which a half-written file belongs to nobody
+_KIND = re.compile(r"([a-z]+(?:-[a-z]+)*)-[0-9a-f]{32}")
+_SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*([kmgt]?)(i?)b?", flags=re.IGNORECASE)
+_written = 0  # bytes that this process has added since it last looked at the size of the cache
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One file of the cache."""
+
+    path: Path
+    kind: str  #: "quadrature", "volpath", ..: the words before the digest
+    size: int  #: [bytes]
+    used: float  #: when it was last written or read [s since 1970]
 
 
 def cache_folder() -> Path:
     """Return the folder of the cache: AIRLIGHT_CACHE_DIR, or `airlight` in the user's cache folder."""
-    own = os.environ.get("AIRLIGHT_CACHE_DIR")
-    if own:
-        return Path(own)
+    chosen = os.environ.get("AIRLIGHT_CACHE_DIR")
+    if chosen:
+        return Path(chosen)
     base = os.environ.get("XDG_CACHE_HOME")
     return (Path(base) if base else Path.home() / ".cache") / "airlight"
 
 
-def load_arrays(key: str) -> dict[str, Any] | None:
-    """Return the arrays kept under a key, or None where there are none or the file is damaged."""
-    arrays = _read(key)
-    written = arrays.pop(_DIGEST, None)
-    if written is None or str(written) != _content_digest(key, arrays):
-        return None
-    # What was used longest ago is dropped first; in a folder that cannot be written nothing is dropped at all.
-    with suppress(OSError):
-        os.utime(_path(key))
-    return arrays
+def cache_limit() -> int:
+    """Return how large the cache may become [bytes]: `AIRLIGHT_CACHE_SIZE`, or `DEFAULT_LIMIT`.
+
+    Raises
+    ------
+    InputError
+        If the variable holds no size.
+    """
+    text = os.environ.get("AIRLIGHT_CACHE_SIZE", "").strip()
+    if not text:
+        return DEFAULT_LIMIT
+    size = _SIZE.fullmatch(text)
+    if size is None:
+        raise InputError(f"AIRLIGHT_CACHE_SIZE: got {text!r}, wanted a size such as 500MB, 4GiB or a number of bytes")
+    number, prefix, binary = size.groups()
+    return int(float(number) * (1024 if binary else 1000) ** " kmgt".index(prefix.lower() or " "))
 
 
-def peek_array(key: str, name: str) -> Any | None:
-    """Return one array kept under a key, read alone and unchecked; None where there is none or it cannot be read."""
-    return _read(key, (name,)).get(name)
+def load_arrays(key: str, names: Sequence[str] | None = None) -> dict[str, Any] | None:
+    """Return the arrays under a key, or None if the file is missing or damaged.
 
-
-def _read(key: str, names: Sequence[str] | None = None) -> dict[str, Any]:
-    """Return some arrays of a file, all by default; none where it is not ours or cut short by a full disk."""
+    With `names` it returns these arrays alone, without a check of the digest: to look at a small part of a large file.
+    """
     try:
         # Opened here, since `np.load` leaves a file that it cannot read open.
         with open(_path(key), "rb") as file, np.load(file, allow_pickle=False) as stored:
-            return {name: stored[name] for name in (stored.files if names is None else names)}
+            arrays = {name: stored[name] for name in (names or stored.files)}
     except (OSError, ValueError, KeyError, EOFError, AttributeError, TypeError, zipfile.BadZipFile, zlib.error):
-        return {}
-
-
-def is_kept(key: str) -> bool:
-    """Return whether there is a file under a key, damaged or not."""
-    return _path(key).exists()
+        return None
+    if names:
+        return arrays
+    written = arrays.pop(_DIGEST, None)
+    if written is None or str(written) != _content_digest(key, arrays):
+        return None
+    with suppress(OSError):  # in a folder that cannot be written nothing is removed either
+        os.utime(_path(key))  # files that were used longest ago are removed first
+    return arrays
 
 
 def store_arrays(key: str, arrays: Mapping[str, Any]) -> None:
-    """Keep arrays under a key, replacing what is there; a key may name a folder, as in 'volpath-0a1b/000017'."""
+    """Write arrays under a key, replacing what is there; a key may name a folder, as in 'volpath-0a1b/000017'.
+
+    Then the files that were used longest ago are removed until the cache is no larger than its limit. A process looks
+    at the size of the cache when it has added a hundredth of the limit.
+    """
+    global _written
+    limit = cache_limit()
     content: dict[str, Any] = {name: np.asarray(value) for name, value in arrays.items()}
     buffer = BytesIO()
     np.savez(buffer, **(content | {_DIGEST: np.asarray(_content_digest(key, content))}))
     try:
         write_bytes(_path(key), buffer.getvalue())
-    except FileNotFoundError:  # the folder was empty, and another process has just dropped it
+    except FileNotFoundError:  # the folder was empty, and another process has just removed it
         write_bytes(_path(key), buffer.getvalue())
+    _written += len(buffer.getvalue())
+    if _written > limit / 100:
+        _written = 0
+        remove_oldest(limit)
+
+
+def is_stored(key: str) -> bool:
+    """Return whether there is a file under a key, damaged or not."""
+    return _path(key).exists()
 
 
 def drop_arrays(key: str) -> None:
-    """Forget what is kept under a key."""
+    """Remove the file of a key."""
     _path(key).unlink(missing_ok=True)
 
 
-def sweep(folder: Path) -> None:
-    """Remove what a killed run left half-written in a folder: hidden files older than an hour."""
-    for path in folder.glob(".*.npz"):
-        with suppress(OSError):  # another run may have removed it
-            if time.time() - path.stat().st_mtime > _STALE:
-                path.unlink()
+def cache_entries() -> list[Entry]:
+    """Return the files of the cache, the least recently used first."""
+    root, entries = cache_folder(), []
+    for path in (*root.glob("[!.]*.npz"), *root.glob("*/[!.]*.npz")):
+        owner = path.parent if path.parent != root else path
+        kind = _KIND.fullmatch(owner.name.removesuffix(".npz"))
+        if kind is None or owner.is_symlink():
+            continue
+        with suppress(OSError):  # another process has just removed it
+            state = path.stat()
+            entries.append(Entry(path, kind[1], state.st_size, state.st_mtime))
+    return sorted(entries, key=lambda entry: (entry.used, entry.path))
+
+
+def remove_oldest(limit: int) -> tuple[int, int]:
+    """Remove the files that were used longest ago until the others take `limit` bytes; return how many, and bytes."""
+    entries = cache_entries()
+    excess, files, freed = sum(entry.size for entry in entries) - limit, 0, 0
+    for entry in entries:
+        if freed >= excess:
+            break
+        with suppress(OSError):  # what another process has removed, or nobody can
+            entry.path.unlink()
+            files, freed = files + 1, freed + entry.size
+        if entry.path.parent != cache_folder():
+            with suppress(OSError):  # it holds other files
+                entry.path.parent.rmdir()
+    return files, freed
+
+
+def clear_cache() -> tuple[int, int]:
+    """Remove every file; return how many there were, and their bytes."""
+    for folder in {cache_folder(), *(entry.path.parent for entry in cache_entries())}:
+        sweep_hidden(folder)
+    return remove_oldest(0)
 
 
 def _path(key: str) -> Path:
@@ -98,7 +165,7 @@ def _path(key: str) -> Path:
 
 
 def _content_digest(key: str, arrays: Mapping[str, Any]) -> str:
-    """Return a digest of the name and of every array: its name, kind, shape and bytes."""
+    """Return a digest of the key and of every array: its name, type, shape and bytes."""
     digest = hashlib.blake2b(key.encode(), digest_size=16)
     for name in sorted(arrays):
         value = np.ascontiguousarray(arrays[name])

@@ -3,24 +3,29 @@
 
 A file is first written under a hidden name in the folder where it belongs, flushed to the disk, and then moved over its
 final name, which POSIX and Windows both do in one step. A process that is killed half-way leaves the old file as it
-was.
+was, and the hidden file beside it, which is removed when it is an hour old and something is written there again.
 """
 
 import errno
 import os
+import re
 import shutil
 import stat
 import tempfile
+import time
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from analytic.errors import InputError
-from reference.storage.stopping import cleaned_up
 
 #: What the system says when a disk is full, a quota used up, or a file larger than allowed.
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+_HIDDEN = re.compile(r"\..*-[0-9a-f]{32}(\.\w+)?")  # the names of unfinished files
+_FOLDER = ".airlight-unfinished-"  # the first letters of temporary folders
+_STALE = 3600.0  # seconds after which an unfinished file belongs to nobody
 
 
 def ensure_folder(path: str | os.PathLike[str]) -> Path:
@@ -115,13 +120,13 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     ...     temporary.write_text("x,y\n")
     """
     target = ensure_writable(path)
+    sweep_hidden(target.parent)
     # Not tempfile's: its files are readable by their owner alone and would stay so.
     temporary = target.with_name(f".{target.stem[:100]}-{uuid.uuid4().hex}{target.suffix}")
     try:
-        with cleaned_up(lambda: temporary.unlink(missing_ok=True)):
-            yield temporary
-            _flush(temporary)
-            os.replace(temporary, target)
+        yield temporary
+        _flush(temporary)
+        os.replace(temporary, target)
     except BaseException as error:
         with suppress(OSError):
             temporary.unlink()
@@ -133,10 +138,27 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 @contextmanager
 def temporary_folder() -> Iterator[Path]:
-    """Give a folder that is removed when the block ends, or a signal the process."""
-    folder = tempfile.TemporaryDirectory(prefix="airlight-")
-    with folder as name, cleaned_up(lambda: shutil.rmtree(name, ignore_errors=True)):
+    """Give a folder that is removed when the block ends; folders that killed processes left a day ago go first."""
+    for left in Path(tempfile.gettempdir()).glob(f"{_FOLDER}*"):
+        if _age(left) > 24 * _STALE:
+            shutil.rmtree(left, ignore_errors=True)
+    with tempfile.TemporaryDirectory(prefix=_FOLDER) as name:
         yield Path(name)
+
+
+def sweep_hidden(folder: Path) -> None:
+    """Remove the unfinished files that killed processes left in a folder an hour ago."""
+    for path in folder.glob(".*"):
+        if _HIDDEN.fullmatch(path.name) and _age(path) > _STALE:
+            with suppress(OSError):  # another process has just removed it
+                path.unlink()
+
+
+def _age(path: Path) -> float:
+    try:
+        return time.time() - path.lstat().st_mtime
+    except OSError:  # another process has just removed it
+        return 0.0
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:

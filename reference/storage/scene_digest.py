@@ -1,20 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Names for finished references: a digest of everything that decides their numbers.
-
-That is the scene as Mitsuba holds it (every parameter of every plugin, every vertex), the estimator and its settings,
-and the versions of what computes them.
-"""
+"""A digest of a scene as Mitsuba holds it: every parameter of every plugin, every vertex."""
 
 import hashlib
-import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
-
-from reference.storage.cache import GENERATION
 
 #: Plugins without an id are named by their address, which differs from run to run.
 _ADDRESS = re.compile(r"object_\d+|0x[0-9a-f]+")
@@ -56,17 +49,3 @@ def _value_bytes(value: Any) -> bytes:
         return np.array(matrix, dtype=np.float64).tobytes()
     except (TypeError, ValueError):
         return repr(value).encode()
-
-
-def cache_key(scene, estimator: str, settings: Mapping[str, Any]) -> str:
-    """Return the name under which a result of an estimator is kept."""
-    from importlib.metadata import version
-
-    content = {
-        "scene": scene_digest(scene),
-        "estimator": estimator,
-        "settings": dict(settings),
-        "versions": {name: version(name) for name in ("mitsuba", "drjit")},
-        "generation": GENERATION,
-    }
-    return f"{estimator}-" + hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]

@@ -62,7 +62,6 @@ def report(
     from reference.storage.files import ensure_folder
     from reports.api.tables import Report
     from reports.machine.environment import activate
-    from reports.machine.progress import Interrupted
     from reports.report.asked import notes_on, scenes_of_images
     from reports.report.measure import write_report
     from validation.configurations.methods import QUICK, chosen_configurations
@@ -77,18 +76,15 @@ def report(
     asked = None if scenes is None else [os.fspath(path) for path in several(scenes)]
     names, shown = scenes_of_images(asked, images, EFFORTS[effort].scenes)
     notes_on(names)  # refuses a scene that cannot be read, before the work; the notes stand in report.json
-    try:
-        with telling(progress, "report") as callback:
-            data = write_report(
-                target,
-                scenes=names,
-                effort=EFFORTS[effort],
-                configurations=chosen,
-                images=shown,
-                command=f"airlight.report({os.fspath(folder)!r}, ..)",
-                fresh=fresh,
-                progress=callback,
-            )
-    except Interrupted as stop:
-        raise KeyboardInterrupt(str(stop)) from None
+    with telling(progress, "report") as callback:
+        data = write_report(
+            target,
+            scenes=names,
+            effort=EFFORTS[effort],
+            configurations=chosen,
+            images=shown,
+            command=f"airlight.report({os.fspath(folder)!r}, ..)",
+            fresh=fresh,
+            progress=callback,
+        )
     return Report(folder=target, data=data)

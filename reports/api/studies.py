@@ -240,18 +240,19 @@ def paper(
     InputError
         For an unknown paper.
     """
+    import time
+
     from analytic.errors import nearest
+    from reference.storage.kept import fresh_results
     from reports.api.tables import PaperClaims
-    from reports.machine.environment import activate, describe_environment
+    from reports.machine.environment import activate
     from reports.report.claims import measure_claims
-    from reports.report.kept import report_cache
     from validation.papers.claims import claims, papers
 
     if name is not None and name not in papers():
         raise InputError(f"paper: got {name!r}, wanted one of {', '.join(papers())}" + nearest(name, papers()))
     chosen = [claim for claim in claims() if name in (None, claim.paper)]
     activate()
-    cache = report_cache(describe_environment(), fresh=fresh)
-    with telling(progress, "paper") as step:
-        rows = measure_claims(chosen, cache, quick=quick, progress=step)
+    with telling(progress, "paper") as step, fresh_results(time.time() if fresh else None):
+        rows = measure_claims(chosen, quick=quick, progress=step)
     return PaperClaims(tuple(rows), left_out=len(chosen) - len(rows))

@@ -24,7 +24,7 @@ from reports.machine.quick_compilation import in_full
 from reports.plotting.pictures import error_map, exposure, tone_mapped
 from validation.properties.properties import scene_properties
 from validation.scenes.loading import LoadedScene
-from validation.sweep.keys import Made, cell_key, source_digest
+from validation.sweep.keys import Made, cell_key, row_source
 from validation.sweep.row import NO_TRUTH
 from validation.sweep.rows import RowStore
 from validation.sweep.study import Cell, Study
@@ -116,7 +116,7 @@ def row_without_numbers(cell: Cell, key: str, outcome: Outcome) -> dict[str, Any
         "status": outcome.status,
         "reason": outcome.reason,
         "airlight": __version__,
-        "source": source_digest()[:12],
+        "source": row_source()[:12],
     }
 
 
@@ -147,7 +147,7 @@ def _machine() -> dict[str, Any]:
         "host": platform.node(),
         "device": processor(),
         "airlight": __version__,
-        "source": source_digest()[:12],
+        "source": row_source()[:12],
         "mitsuba": version("mitsuba"),
         "drjit": version("drjit"),
         "python": platform.python_version(),

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from reference.monte_carlo.batches import Batches
 from reference.quadrature.ray_values import TruthImage
+from reference.storage.kept import Spent, fresh_results, fresh_since, stopwatch
 from reports import __version__
 from reports.cluster.connect import Cluster
 from reports.cluster.run import Group, Task, run_groups
@@ -69,12 +70,13 @@ def bring_truths(
     """
     lacking = [picture for picture in pictures if not has_truth(picture.load(), pixel=pixel)]
     named = {f"truth {number}": picture for number, picture in enumerate(lacking)}
-    groups = [Group((Task(name, _truth, (picture, pixel), _LIMIT),)) for name, picture in named.items()]
+    given = pixel, fresh_since()
+    groups = [Group((Task(name, _truth, (picture, *given), _LIMIT),)) for name, picture in named.items()]
     for number, outcome in enumerate(run_groups(cluster, groups, made=_made()), 1):
         if outcome.status == "refused":
             raise InputError(outcome.reason or "")
         if outcome.status == "done":
-            keep_truth(named[outcome.task.name].load(), outcome.value, pixel=pixel)
+            keep_truth(named[outcome.task.name].load(), *outcome.value, pixel=pixel)
         told(number, len(named))
 
 
@@ -102,7 +104,7 @@ def tracing(
     by_pixel = None if counts is None else (counts.shape, counts.astype(np.int64).tobytes())
     kind = _Kind(picture, estimator, samples, orders, by_pixel)
 
-    def bring(seeds: list[int]) -> Iterator[Batches]:
+    def bring(seeds: list[int]) -> Iterator[tuple[Batches, Spent]]:
         # One task in a group: what is sent at once then depends on the workers alone.
         groups = (Group((Task(f"batch {seed}", _batch, (kind, seed), _LIMIT),)) for seed in seeds)
         for outcome in run_groups(cluster, groups, made=_made()):
@@ -120,8 +122,10 @@ def spread(cluster: Cluster, picture: Picture) -> Spread:
     return lambda estimator, samples, counts: tracing(cluster, picture, estimator, samples=samples, counts=counts)
 
 
-def _truth(picture: Picture, pixel: str) -> TruthImage:
-    return truth_image(picture.load(), pixel=pixel)
+def _truth(picture: Picture, pixel: str, since: float | None) -> tuple[TruthImage, Spent]:
+    scene, spent = picture.load(), stopwatch()
+    with fresh_results(since):
+        return truth_image(scene, pixel=pixel), spent()
 
 
 @dataclass(frozen=True)
@@ -135,8 +139,9 @@ class _Kind:
     counts: tuple[tuple[int, ...], bytes] | None  #: shape and content, int64
 
 
-def _batch(kind: _Kind, seed: int) -> Batches:
-    return _tracer(kind)(seed)
+def _batch(kind: _Kind, seed: int) -> tuple[Batches, Spent]:
+    trace, spent = _tracer(kind), stopwatch()
+    return trace(seed), spent()
 
 
 @lru_cache(maxsize=1)

@@ -9,7 +9,7 @@ import typer
 
 def cache(
     clear: Annotated[
-        bool, typer.Option("--clear", help="Remove every entry; what is needed is computed again.")
+        bool, typer.Option("--clear", help="Remove every file; what is needed is computed again.")
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON.")] = False,
 ) -> None:
@@ -17,11 +17,10 @@ def cache(
 
     Finished references and results lie in `~/.cache/airlight` (`$XDG_CACHE_HOME/airlight` where that is set).
     `AIRLIGHT_CACHE_DIR` names another folder, `AIRLIGHT_CACHE_SIZE` another limit than 4 GiB (500MB, 20GiB; 0 keeps
-    nothing): above it the entries that were used longest ago are dropped. Exit status 1 if some could not be removed.
+    nothing): above it the files that were used longest ago are removed. Exit status 1 if some could not be removed.
     """
     from analytic.errors import InputError
-    from reference.storage.cache import cache_folder
-    from reference.storage.cache_size import cache_entries, cache_limit, clear_cache
+    from reference.storage.cache import cache_entries, cache_folder, cache_limit, clear_cache
     from reports.tables.table import Column, table
     from reports.tables.terminal import print_json, print_table
 
@@ -35,16 +34,16 @@ def cache(
     kinds = {name: [entry for entry in entries if entry.kind == name] for name in names}
     if json:
         counted = {
-            kind: {"entries": len(of_kind), "bytes": sum(entry.size for entry in of_kind)}
+            kind: {"files": len(of_kind), "bytes": sum(entry.size for entry in of_kind)}
             for kind, of_kind in kinds.items()
         }
-        known = {"folder": str(folder), "limit": limit, "entries": len(entries), "bytes": size, "kinds": counted}
+        known = {"folder": str(folder), "limit": limit, "files": len(entries), "bytes": size, "kinds": counted}
         print_json(known | ({"removed": removed, "freed": freed} if clear else {}))
     else:
         if clear:
-            print(f"{folder}: {removed} entries removed, {_size(freed)} freed")
+            print(f"{folder}: {removed} files removed, {_size(freed)} freed")
         if entries or not clear:
-            print(f"{folder}: {len(entries)} entries, {_size(size)} of at most {_size(limit)}")
+            print(f"{folder}: {len(entries)} files, {_size(size)} of at most {_size(limit)}")
         if entries:
             rows = [
                 (
@@ -57,7 +56,7 @@ def cache(
             ]
             columns = [
                 Column("kind", "kind", words=True),
-                Column("entries", "entries"),
+                Column("files", "files"),
                 Column("size", "size"),
                 Column("last_used", "last used"),
             ]

@@ -48,10 +48,9 @@ from reports.machine.environment import (
     install_line,
     missing_packages,
 )
-from reports.machine.progress import Interrupted
 from reports.tables.terminal import colours_wanted
 
-DONE, FAILED, WRONG_INPUT, MISSING, INTERRUPTED = 0, 1, 2, 3, 130
+DONE, FAILED, WRONG_INPUT, MISSING = 0, 1, 2, 3
 
 #: The panels of --help, by what one wants to do, and their commands in its order.
 _PANELS: dict[str, tuple[Callable[..., None], ...]] = {
@@ -136,11 +135,6 @@ def run(arguments: Sequence[str]) -> int:
         sys.stdout.flush()
     except BrokenPipeError:  # the reader of the pipe has left
         return _drop_output(FAILED)
-    except KeyboardInterrupt:
-        status = INTERRUPTED
-    except Interrupted as stop:
-        print(f"interrupted: {stop}", file=sys.stderr)
-        return INTERRUPTED
     except MissingError as error:
         return _fail(str(error), MISSING)
     except OSError as error:
@@ -159,8 +153,6 @@ def run(arguments: Sequence[str]) -> int:
         if not hasattr(error, "format_message"):
             raise
         return _usage(error)
-    if status == INTERRUPTED:
-        print("interrupted", file=sys.stderr)
     if not arguments:
         return WRONG_INPUT
     return status if isinstance(status, int) else DONE

@@ -28,7 +28,7 @@ def checked_configuration(
     from validation.configurations.methods import configuration
 
     check_limit(limit)
-    if ":" not in method:
+    if ":" not in method and ":" not in (kernel or ""):
         return configuration(method, kernel, settings)
     return in_own_process(configuration, method, kernel, settings, name=method, limit=limit)
 

@@ -204,7 +204,6 @@ def _compute(
     changes: Any = None,
 ) -> "tuple[Image, MonteCarloReference | None]":
     """Return the reference, and how it was sampled; with a cluster its workers do what is not in the cache."""
-    from reports.machine.progress import Interrupted
     from validation.estimates.budget import batch_plan
     from validation.estimates.images import monte_carlo_reference, quadrature_reference
 
@@ -222,14 +221,9 @@ def _compute(
             elsewhere = tracing(cluster, picture, estimator.value, samples=samples, batches=known, orders=orders)
     if budget is None:
         return quadrature_reference(loaded, pixel=pixel.value, progress=progress), None
-    try:
-        estimate = monte_carlo_reference(
-            loaded, estimator.value, budget=budget, seed=seed, orders=orders, progress=progress, elsewhere=elsewhere
-        )
-    except KeyboardInterrupt as stop:
-        if not stop.args:
-            raise
-        raise Interrupted(str(stop)) from None
+    estimate = monte_carlo_reference(
+        loaded, estimator.value, budget=budget, seed=seed, orders=orders, progress=progress, elsewhere=elsewhere
+    )
     return estimate.image, estimate
 
 

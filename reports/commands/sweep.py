@@ -179,7 +179,6 @@ def _part(
     import time
     from collections import Counter
 
-    from reference.storage.stopping import hint_when_stopped
     from reports.cluster.connect import connected
     from reports.cluster.run import run_groups
     from reports.machine.progress import progress_bar
@@ -197,16 +196,9 @@ def _part(
             open_cells.update(cells)
             yield group
 
-    def hint() -> str:
-        return f"{len(store)} rows are kept in {store.folder}; run the same command again to go on"
-
     if not missing:
         return {"counts": counts, "problems": problems, "refused_workers": refused, "left": 0, "missing": 0}
-    with (
-        hint_when_stopped(hint),
-        connected(place, quick=quick) as cluster,
-        progress_bar(f"sweep {study.name}") as progress,
-    ):
+    with connected(place, quick=quick) as cluster, progress_bar(f"sweep {study.name}") as progress:
         for outcome in run_groups(cluster, groups(), made=made, retries=study.retries, refused=refused.append):
             key = outcome.task.name
             cell = open_cells.pop(key, None)

@@ -53,22 +53,20 @@ def view(
     pixels = parse_size(size)
     variant = activate()
 
-    from reference.storage.stopping import cleaned_up, hint_when_stopped
     from reports.view.session import Session
     from reports.view.state import ViewState
 
     session = Session(ViewState(scene, pixels, chosen, changes), variant)
-    with cleaned_up(session.truth.end), hint_when_stopped(session.command):
-        try:
-            server = _listening(session, host, port)
-            print(f"{server.address}\nCtrl-C ends the view.", flush=True)
-            if open_:
-                import webbrowser
+    try:
+        server = _listening(session, host, port)
+        print(f"{server.address}\nCtrl-C ends the view.", flush=True)
+        if open_:
+            import webbrowser
 
-                webbrowser.open(server.address)
-            session.run()
-        finally:
-            session.truth.end()
+            webbrowser.open(server.address)
+        session.run()
+    finally:
+        session.truth.end()
 
 
 def _listening(session, host: str, port: int):

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from reports.machine.progress import Interrupted, Progress
+from reports.machine.progress import Progress
 
 STAGES = (
     "surface",
@@ -55,37 +55,25 @@ def write_frames(
         The paths that were asked for, as 'exr' and 'png'; frames get their number before the suffix.
     progress
         Called with the share done and what was written last.
-
-    Raises
-    ------
-    Interrupted
-        At Ctrl-C, with the frames that are finished.
     """
     import numpy as np
 
-    from reference.storage.stopping import hint_when_stopped
     from validation.configurations.timing import timed_image
     from validation.scenes.animation import animate, moved_parts
 
     cost: list[tuple[float, float]] = []
     kept = None
     curve = None  # all frames share that of the first, so that a lamp that fades looks it
-    done = 0
-    try:
-        with hint_when_stopped(lambda: _kept(outputs, done, frames)):
-            start = time.perf_counter()
-            for number, scene in enumerate(animate(renderer.scene, animation, frames), 1):
-                moved = 1e3 * (time.perf_counter() - start)
-                frame, kept, render_ms = timed_image(renderer, scene, kept, **moved_parts(animation))
-                cost.append((moved, render_ms))
-                numbers = {kind: path and numbered(path, number, frames) for kind, path in outputs.items()}
-                curve = write_frame(name, chosen, frame, outputs=numbers, curve=curve)
-                del frame  # the next one needs its room
-                done = number
-                progress(number / frames, f"frame {number} of {frames}")
-                start = time.perf_counter()
-    except KeyboardInterrupt:
-        raise Interrupted(_kept(outputs, done, frames)) from None
+    start = time.perf_counter()
+    for number, scene in enumerate(animate(renderer.scene, animation, frames), 1):
+        moved = 1e3 * (time.perf_counter() - start)
+        frame, kept, render_ms = timed_image(renderer, scene, kept, **moved_parts(animation))
+        cost.append((moved, render_ms))
+        numbers = {kind: path and numbered(path, number, frames) for kind, path in outputs.items()}
+        curve = write_frame(name, chosen, frame, outputs=numbers, curve=curve)
+        del frame  # the next one needs its room
+        progress(number / frames, f"frame {number} of {frames}")
+        start = time.perf_counter()
     later = np.array(cost[1:] or cost)
     moved, rendered = (float(value) for value in np.median(later, axis=0))
     return {
@@ -135,10 +123,3 @@ def write_frame(name: str, chosen, frame, *, outputs: dict[str, Path | None], cu
 def _files(outputs: dict[str, Path | None], frames: int) -> Sequence[Path]:
     paths = [path for path in outputs.values() if path is not None]
     return [numbered(path, number, frames) for path in paths for number in range(1, frames + 1)]
-
-
-def _kept(outputs: dict[str, Path | None], done: int, frames: int) -> str:
-    if not done:
-        return f"none of {frames} frames is finished"
-    last = ", ".join(str(numbered(path, done, frames)) for path in outputs.values() if path is not None)
-    return f"{done} of {frames} frames are finished and kept, the last is {last}"

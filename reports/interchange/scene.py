@@ -13,7 +13,7 @@ from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import TruthLight, TruthMedium, TruthScene, read_truth
 from reports.interchange.cycles import cycles_properties
 from reports.interchange.recipes import recipes
-from validation.scenes.loading import LoadedScene
+from validation.scenes.loading import LoadedScene, scene_stem
 from validation.scenes.random_scene import drawn_values, is_random
 
 Array = NDArray[np.float64]
@@ -78,7 +78,7 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
         "surfaces": [surface(shape) for shape in truth.occluders.shapes() if not shape.is_emitter()],
         "radiance": CONVENTION,
         "file": {
-            "name": f"{loaded.name.partition(':meshes=')[0].partition(':ranges=')[0]}.exr",
+            "name": f"{scene_stem(str(loaded.path or loaded.name))}.exr",
             "format": "OpenEXR, one part of scan lines, half or float",
             "layers": {
                 "airlight": "airlight.R, airlight.G, airlight.B: the in-scattered light alone, if the engine has it",

@@ -252,6 +252,12 @@ def describe_environment() -> dict[str, object]:
     return environment
 
 
+def machine() -> dict[str, str]:
+    """Return what times depend on, for the keys of results that hold some."""
+    environment = describe_environment()
+    return {name: str(environment.get(name)) for name in ("processor", "threads", "variant", "llvm", "device")}
+
+
 def machine_in_words(environment: Mapping[str, Any]) -> str:
     """Return what stands beside times in tables, from `describe_environment`: the GPU first, where there is one."""
     device = f"{environment['device']}, " if environment.get("device") else ""

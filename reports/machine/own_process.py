@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A function run in a process of its own: the user's own code, which may end the process or never return, and work of
-ours whose kernels are to compile quickly.
+"""A function run in a process of its own: the user's code, which may end the process or never return, and work of ours
+whose kernels are to compile quickly.
 
 The caller sends the name of one of our functions with arguments that name scenes and methods; the process imports the
-user's code. What it returns comes back as a file. What it prints goes to the error stream, so that the output is the
-command's own. The process is the leader of a group: Ctrl-C reaches its caller alone, which ends the whole group.
+user's code and sends back what the function returns. What it prints goes to the error stream, so that the output is the
+command's own. The process leads a group, so that all that the user's code started ends with it; it ends with its
+caller, however that ends.
 """
 
 import os
@@ -13,6 +14,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -24,7 +26,6 @@ from reports.machine.environment import VARIANT_VARIABLE
 
 _POSIX = os.name == "posix"
 LIMIT = 300.0  #: seconds that a user's method may take for one scene, or one command
-_FAREWELL = 2.0  # seconds in which a process that is to end may remove what it has half-written
 
 
 class EndedError(InputError):
@@ -65,60 +66,36 @@ def in_own_process(
     MissingError
         As the function.
     """
-    from reference.storage.files import temporary_folder, write_bytes
-    from reference.storage.stopping import cleaned_up
-
-    with temporary_folder() as folder:
-        write_bytes(folder / "task", pickle.dumps((list(sys.argv), function, arguments)))
-        alive, held = os.pipe()  # its end is closed when this process ends, however it does
+    # -P: modules of ours come before those of the user's folder.
+    with subprocess.Popen(
+        [sys.executable, "-P", "-m", "reports.machine.own_process", str(os.getpid())],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env=_environment() | (quick_compilation.settings() if quick else {}),
+        start_new_session=_POSIX,
+    ) as process:
         try:
-            process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "reports.machine.own_process", str(folder), str(alive)],
-                stdin=subprocess.DEVNULL,
-                stdout=_error_stream(),
-                env=_environment() | (quick_compilation.settings() if quick else {}),
-                **_kept_open(alive),
-            )
-            with cleaned_up(lambda: _end(process)):
-                try:
-                    status = process.wait(limit)
-                except subprocess.TimeoutExpired:
-                    raise EndedError(
-                        f"{what} {name}: did not end within {limit:g} s and was stopped; --method-limit allows more"
-                    ) from None
-                finally:
-                    _end(process)
+            answer, _ = process.communicate(pickle.dumps((sys.argv, function, arguments)), limit)
+        except subprocess.TimeoutExpired:
+            hint = f"did not end within {limit:g} s and was stopped; --method-limit allows more"
+            raise EndedError(f"{what} {name}: {hint}") from None
         finally:
-            os.close(alive)
-            os.close(held)
-        try:
-            answer = (folder / "answer").read_bytes()
-        except FileNotFoundError:
-            raise EndedError(
-                f"{what} {name}: ended its process, {_how(status)}; wanted a result or an exception"
-            ) from None
-    returned, value = pickle.loads(answer)
+            _end(process)
+    if not answer:
+        how = _how(process.returncode)
+        raise EndedError(f"{what} {name}: ended its process, {how}; wanted a result or an exception")
+    returned, value, loaded = pickle.loads(answer)
     if not returned:
         raise value
+    if loaded is not None:
+        from reference.storage.kept import add_spent
+
+        add_spent(loaded)
     return value
 
 
-def _kept_open(alive: int) -> dict[str, Any]:
-    """Return the options of a process that notices the end of this one, and leads a group; Windows has neither."""
-    return {"pass_fds": (alive,), "start_new_session": True} if _POSIX else {}
-
-
-def _error_stream() -> int:
-    """Return the error stream of this process, or nothing's where it has none."""
-    try:
-        os.fstat(2)
-    except OSError:
-        return subprocess.DEVNULL
-    return 2
-
-
 def _environment() -> dict[str, str]:
-    """Return the environment of the process: our modules before those of the user's folder, the variant as it is."""
+    """Return the environment of the process: our modules, those of PYTHONPATH, the variant as it is."""
     root = str(Path(__file__).resolve().parents[2])
     paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
     mitsuba = sys.modules.get("mitsuba")
@@ -128,14 +105,9 @@ def _environment() -> dict[str, str]:
 
 
 def _end(process: subprocess.Popen) -> None:
-    """End a process and all that it started: it may clean up first."""
-    if process.poll() is None:
-        process.terminate()
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(_FAREWELL)
-    if not _POSIX:
-        process.kill()
-    else:
+    """End a process and all that it started."""
+    process.kill()
+    if _POSIX:
         # macOS denies it for a group of which only a zombie is left.
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(process.pid, signal.SIGKILL)
@@ -153,36 +125,42 @@ def _how(status: int) -> str:
 
 
 def main() -> None:
-    """Do the task of the folder that the command line names."""
-    from reference.storage.stopping import stop_on_signals
-
-    stop_on_signals(quiet=True)
-    folder, alive = Path(sys.argv[1]), int(sys.argv[2])
+    """Do the task that the input holds, and write the answer to the output."""
     if _POSIX:
-        threading.Thread(target=_follow, args=(alive,), daemon=True).start()
+        threading.Thread(target=_follow, args=(int(sys.argv[1]),), daemon=True).start()
+    output = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what is printed
+    task = sys.stdin.buffer.read()
     from reports.machine.environment import MissingError, activate
 
     activate()
     from realtime.errors import InputError as MethodError
-    from reference.storage.files import write_bytes
+    from reference.storage.kept import loaded_spent
 
     # The user's module sees the command line of the command.
-    sys.argv, function, arguments = pickle.loads((folder / "task").read_bytes())
-    answer: tuple[bool, Any]
+    sys.argv, function, arguments = pickle.loads(task)
+    answer: tuple[bool, Any, Any]
     try:
-        answer = True, function(*arguments)
+        answer = True, function(*arguments), loaded_spent()
     except (InputError, MethodError, MissingError) as error:
-        answer = False, type(error)(str(error))  # its cause may not be one that can be sent
-    write_bytes(folder / "answer", pickle.dumps(answer))
+        answer = False, type(error)(str(error)), None  # its cause may not be one that can be sent
     sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(0)  # not waiting for threads that the user's code has started
+    output.write(pickle.dumps(answer))
+    output.close()
+    _end_group()  # not waiting for what the user's code has started
 
 
-def _follow(alive: int) -> None:
+def _end_group() -> None:
+    if _POSIX:
+        os.killpg(0, signal.SIGKILL)
+    os._exit(0)
+
+
+def _follow(parent: int) -> None:
     """End with the process that started this one."""
-    os.read(alive, 1)
-    os.killpg(os.getpid(), signal.SIGKILL)
+    while os.getppid() == parent:
+        time.sleep(0.5)
+    _end_group()
 
 
 if __name__ == "__main__":

@@ -10,10 +10,6 @@ Progress = Callable[[float, str], None]
 Steps = Callable[[int, int, str], None]  # (done, total, what)
 
 
-class Interrupted(Exception):
-    """Ctrl-C in a command that can say what is kept of the work."""
-
-
 _PATIENCE = 2.0  # seconds before anything is shown
 _PLAIN_EVERY = 10.0  # seconds between the lines of a plain stream
 
@@ -86,6 +82,7 @@ def _rich_bar(title: str) -> Iterator[Progress]:
         if not shown and elapsed > _PATIENCE:
             shown = True
             bar.start()
+            console.show_cursor(True)  # Rich hides it, and Ctrl-C ends the process before it would show it again
         # Rich's own column considers the last half minute alone, so that one long part makes the estimate jump.
         left = seconds_left(elapsed, share)
         bar.update(task, completed=share, what=what, left="" if left is None else f"about {_clock(left)} left")

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Packed images kept between runs: a page drawn again from the same files need not code them again.
 
-A name in the cache stands for the bytes of the files, for what of report.json goes into the index, and for the code
-that packs; so nothing is ever out of date, and a damaged entry is made again.
+Their key is of the bytes of the files, of what of report.json goes into the index, and of the code that packs.
 """
 
 import hashlib
@@ -15,10 +14,8 @@ from typing import Any
 import numpy as np
 
 from analytic.errors import InputError
-from reference.storage.cache import load_arrays, store_arrays
+from reference.storage.kept import key_of, load, stopwatch, store
 from reports.page.image_index import LADDER, SceneImages, packed_scene, read_images
-
-_CODE = ("image_codec.py", "image_index.py")
 
 
 def page_images(scenes: Sequence[Mapping[str, Any]], folder: Path, limit: int) -> list[SceneImages]:
@@ -40,9 +37,9 @@ def page_images(scenes: Sequence[Mapping[str, Any]], folder: Path, limit: int) -
     InputError
         If a file is missing or cannot be read, its size is not that of the reference, or nothing of `LADDER` fits.
     """
-    names = [_name(scene, folder) for scene in scenes]
+    contents = [_contents(scene, folder) for scene in scenes]
     rungs = [0] * len(scenes)
-    packed = [_scene_images(scene, folder, name, 0) for scene, name in zip(scenes, names)]
+    packed = [_scene_images(scene, folder, files, 0) for scene, files in zip(scenes, contents)]
     while (total := sum(len(images.data) for images in packed)) > limit:
         coarser = [place for place, rung in enumerate(rungs) if rung + 1 < len(LADDER)]
         if not coarser:
@@ -52,47 +49,34 @@ def page_images(scenes: Sequence[Mapping[str, Any]], folder: Path, limit: int) -
             )
         largest = max(coarser, key=lambda place: len(packed[place].data))
         rungs[largest] += 1
-        packed[largest] = _scene_images(scenes[largest], folder, names[largest], rungs[largest])
+        packed[largest] = _scene_images(scenes[largest], folder, contents[largest], rungs[largest])
     return packed
 
 
-def _scene_images(scene: Mapping[str, Any], folder: Path, name: str, rung: int) -> SceneImages:
-    """Return the images of a scene at a rung of the ladder, kept or packed now."""
-    precision, stride = LADDER[rung]
-    kept = f"{name}-{precision.k:g}-{stride}"
-    images = _load(kept)
-    if images is None:
-        images = packed_scene(scene, read_images(scene, folder), precision, stride)
-        _keep(kept, images)
-    return images
-
-
-def _name(scene: Mapping[str, Any], folder: Path) -> str:
-    """Return what the packed images of a scene are kept under, without the rung of the ladder."""
-    shown = [method for method in scene["methods"] if method["files"]]
-    digest = hashlib.blake2b(digest_size=16)
-    digest.update(json.dumps([scene["name"], scene["exposure"], [method["label"] for method in shown]]).encode())
-    for path in (Path(__file__).with_name(name) for name in _CODE):
-        digest.update(path.read_bytes())
-    for entry in (scene, *shown):
-        path = folder / entry["files"]["exr"]
-        try:
-            content = path.read_bytes()
-        except OSError as error:
-            raise InputError(f"cannot read {path}: {error.strerror}; it is named by report.json") from error
-        digest.update(f"|{len(content)}|".encode() + content)
-    return f"page-{digest.hexdigest()}"
-
-
-def _load(name: str) -> SceneImages | None:
-    arrays = load_arrays(name)
-    if arrays is None:
-        return None
-    return SceneImages(json.loads(str(arrays["index"])), arrays["data"].tobytes().decode("ascii"))
-
-
-def _keep(name: str, images: SceneImages) -> None:
+def _scene_images(scene: Mapping[str, Any], folder: Path, contents: Sequence[str], rung: int) -> SceneImages:
+    """Return the images of a scene at a rung of the ladder, kept or packed now; `contents` are those of its files."""
+    labels = [method["label"] for method in scene["methods"] if method["files"]]
+    asked = {"name": scene["name"], "exposure": scene["exposure"], "labels": labels, "files": contents, "rung": rung}
+    key = key_of("page", packed_scene, read_images, **asked)
+    kept = load(key)
+    if kept is not None:
+        return SceneImages(json.loads(str(kept.arrays["index"])), kept.arrays["data"].tobytes().decode("ascii"))
+    spent = stopwatch()
+    images = packed_scene(scene, read_images(scene, folder), *LADDER[rung])
     # On a full or read-only disk nothing can be kept, but the page can still be drawn.
     with suppress(OSError):
         data = np.frombuffer(images.data.encode("ascii"), np.uint8)
-        store_arrays(name, {"index": np.array(json.dumps(images.index)), "data": data})
+        store(key, {"index": np.array(json.dumps(images.index)), "data": data}, spent())
+    return images
+
+
+def _contents(scene: Mapping[str, Any], folder: Path) -> list[str]:
+    """Return digests of the files of a scene's images."""
+    digests = []
+    for entry in (scene, *(method for method in scene["methods"] if method["files"])):
+        path = folder / entry["files"]["exr"]
+        try:
+            digests.append(hashlib.sha256(path.read_bytes()).hexdigest())
+        except OSError as error:
+            raise InputError(f"cannot read {path}: {error.strerror}; it is named by report.json") from error
+    return digests

@@ -6,9 +6,9 @@ Read in this order:
 - `asked.py`: the scenes and images that a report is asked for
 - `staging.py`: a folder out of sight until it is whole
 - `expected.py`: how long the parts will take
+- `computed.py`: the results of a scene, data and files, as they are kept
 - `scene.py`: one scene: truth, its checks, every method
 - `papers.py`: what belongs to no scene: stability, growth
 - `claims.py`: the experiments behind the claims of papers
-- `kept.py`: what the results of every report have in common
 - `measure.py`: all of these, report.json and the page
 """

@@ -3,12 +3,11 @@
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
 
 from analytic.errors import InputError
 from realtime.scene.read_scene import read_scene
 from validation.comparison.engine_images import EngineImage, find_images
-from validation.scenes.loading import load_scene
+from validation.scenes.loading import load_scene, scene_stem
 from validation.scenes.registry import SCENES
 
 
@@ -35,9 +34,9 @@ def scenes_of_images(
         raise InputError(f"scenes: got none, wanted some of {', '.join(SCENES)}, or the paths of Mitsuba XML files")
     if images is None:
         return list(usual if asked is None else asked), {}
-    shown = find_images(images, {Path(name).stem: name for name in [*SCENES, *(asked or ())]})
+    shown = find_images(images, {scene_stem(name): name for name in [*SCENES, *(asked or ())]})
     names = list(shown if asked is None else asked)
-    wanted = {Path(name).stem for name in names}
+    wanted = {scene_stem(name) for name in names}
     if not wanted & set(shown):
         raise InputError(f"--images: {images} has no image of {', '.join(sorted(wanted))}, only of {', '.join(shown)}")
     return names, {name: several for name, several in shown.items() if name in wanted}

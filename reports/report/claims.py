@@ -5,27 +5,22 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
+from reference.storage.kept import is_kept, key_of
+from reports.machine.environment import machine
 from reports.machine.progress import Progress, part_of
 from reports.report.expected import shares
 from reports.report.papers import OtherPart
-from validation.frames.result_cache import (
-    CachedResult,
-    Computed,
-    ResultCache,
-    cache_entry,
-    cached_result,
-    expected_seconds,
-)
+from validation.frames.result_cache import CachedResult, Computed, cached_result
 from validation.frames.scene_study import Effort
 from validation.papers.claims import Claim, claims, judged
 from validation.papers.experiments import EFFORTS, EXPERIMENTS
 
 
-def paper_parts(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[OtherPart]:
+def paper_parts(effort: Effort, scenes: Sequence[str]) -> list[OtherPart]:
     """Return the experiments of a report, nothing where only some of the scenes of its effort are studied."""
     if not effort.scenes or not set(effort.scenes) <= set(scenes):
         return []
-    return [_part(name, cache) for name in experiments_of(claims(), effort.name)]
+    return [_part(name) for name in experiments_of(claims(), effort.name)]
 
 
 def experiments_of(chosen: Sequence[Claim], effort: str = EFFORTS[-1]) -> list[str]:
@@ -35,12 +30,13 @@ def experiments_of(chosen: Sequence[Claim], effort: str = EFFORTS[-1]) -> list[s
     return [name for name, each in EXPERIMENTS.items() if name in needed and EFFORTS.index(each.effort) <= most]
 
 
-def _part(name: str, cache: ResultCache) -> OtherPart:
+def _part(name: str) -> OtherPart:
     def compute(progress: Progress) -> Computed:
         progress(0.0, "claims of papers")
         return {"experiment": name, "figures": EXPERIMENTS[name].run()}, {}
 
-    return OtherPart("papers", name, cache_entry(cache, "papers", identity={"experiment": name}), compute)
+    module = f"validation.papers.{EXPERIMENTS[name].function.partition(':')[0]}"
+    return OtherPart("papers", name, key_of("report-paper", module, experiment=name, machine=machine()), compute)
 
 
 def paper_rows(results: Mapping[str, Sequence[CachedResult]]) -> list[dict[str, Any]]:
@@ -59,7 +55,7 @@ def decided(chosen: Sequence[Claim], figures: Mapping[str, Mapping[str, Any]]) -
 
 
 def measure_claims(
-    chosen: Sequence[Claim], cache: ResultCache, *, quick: bool = False, progress: Progress | None = None
+    chosen: Sequence[Claim], *, quick: bool = False, progress: Progress | None = None
 ) -> list[dict[str, Any]]:
     """Measure what claims need and is not cached, and return those that are decided.
 
@@ -67,19 +63,16 @@ def measure_claims(
     ----------
     chosen
         Of `validation.papers.claims.claims`.
-    cache
-        Of the run.
     quick
         Leave out what needs images.
     progress
         Called with (share done, what) now and then.
     """
     names = experiments_of(chosen, "quick" if quick else EFFORTS[-1])
-    parts = {name: _part(name, cache) for name in names}
-    seconds = {name: expected_seconds(part.entry) for name, part in parts.items()}
-    usual = {name: EXPERIMENTS[name].seconds if last is None else last for name, last in seconds.items()}
+    parts = {name: _part(name) for name in names}
+    seconds = {name: 0.0 if is_kept(part.key) else EXPERIMENTS[name].seconds for name, part in parts.items()}
     figures = {}
-    for (name, part), share in zip(parts.items(), shares(usual).values()):
+    for (name, part), share in zip(parts.items(), shares(seconds).values()):
         step = part_of(progress, *share, before=f"{name}, ")
-        figures[name] = cached_result(part.entry, partial(part.compute, step)).data["figures"]
+        figures[name] = cached_result(part.key, partial(part.compute, step)).data["figures"]
     return decided(chosen, figures)

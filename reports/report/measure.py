@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The error report: studies written down as EXR files, pictures, report.json and one page of HTML.
 
-Every result is kept on disk as soon as it is there (`validation.frames.result_cache`), so a report that was
-interrupted goes on where it stopped and one in which nothing changed measures nothing. The files of a report appear
-when it is whole.
+Every result is kept on disk as soon as it is there (`validation.frames.result_cache`): a report that was killed goes on
+where it stopped, and one in which nothing changed measures nothing. The files of a report appear when it is whole.
 """
 
 import sys
@@ -21,7 +20,7 @@ from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
 from realtime.frame.renderer import render_frame
 from reference.storage.files import ensure_folder
-from reference.storage.stopping import hint_when_stopped
+from reference.storage.kept import fresh_results
 from reports.cluster.connect import Cluster
 from reports.cluster.references import Picture, bring_truths, spread
 from reports.data.claims import claims, growth_claims, unstudied
@@ -29,20 +28,20 @@ from reports.data.own_faults import own_fault
 from reports.data.reader import SCHEMA, report_text
 from reports.machine.environment import describe_environment
 from reports.machine.own_process import EndedError, in_own_process
-from reports.machine.progress import Interrupted, Progress, part_of
+from reports.machine.progress import Progress, part_of
 from reports.page.render import render_page
 from reports.report.claims import paper_parts, paper_rows
-from reports.report.expected import PAGE_SECONDS, SceneEntries, other_seconds, scene_seconds, shares
-from reports.report.kept import report_cache
+from reports.report.expected import PAGE_SECONDS, other_seconds, scene_seconds, shares
 from reports.report.papers import OtherPart, other_parts
-from reports.report.scene import OwnMethods, scene_report
+from reports.report.scene import OwnMethods, SceneKeys, folder_of, scene_report
 from reports.report.staging import staged
 from validation.comparison.engine_images import EngineImage, images_size
 from validation.configurations.methods import STANDARD, Configuration, prepared
 from validation.frames.benchmark import Apart, render_by_name
-from validation.frames.result_cache import CachedResult, ResultCache, cached_result, now, sweep_results
+from validation.frames.result_cache import CachedResult, cached_result, now
 from validation.frames.scene_study import Effort, SceneStudy, open_study
 from validation.metrics.errors import plain
+from validation.scenes.loading import scene_stem
 from validation.scenes.random_scene import is_random
 from validation.scenes.registry import FOG_SCENES, SCENES
 
@@ -77,7 +76,7 @@ def write_report(
     command
         The command line that the page names under "how to reproduce".
     fresh
-        Measure again what was kept from earlier runs.
+        Compute everything again, references, batches and rays too.
     method_limit
         Methods of the user's own run in processes of their own, so long at most in each scene [s], and what is at fault
         there stands in their rows (`own_faults`). None: they run in this process, and a fault ends the report.
@@ -96,77 +95,71 @@ def write_report(
     InputError
         If the folder cannot be written, a scene or an image cannot be used, or a method of one's own that runs in
         this process is at fault; nothing that was there before is damaged.
-    Interrupted
-        At Ctrl-C, with what is kept.
     """
     _refuse_twins(scenes)
     shown = dict(images or {})
     sizes = {name: images_size(tuple(several)) for name, several in shown.items()}
     target = ensure_folder(folder)
     environment = describe_environment()
-    sweep_results()
     results: list[CachedResult] = []
     start = time.monotonic()
-    cache = report_cache(environment, fresh=fresh)
-    efforts = {name: effort.of(name).at(sizes.get(Path(name).stem)) for name in scenes}
-    others = [*other_parts(effort, scenes, cache), *paper_parts(effort, scenes, cache)]
-    steps = _steps(progress, cache, efforts, configurations, others)
+    efforts = {name: effort.of(name).at(sizes.get(scene_stem(name))) for name in scenes}
     apart = None if method_limit is None else partial(in_own_process, limit=method_limit)
     ended: dict[Configuration, str] = {}
     seconds = dict.fromkeys(("scenes", "stability", "scaling", "papers"), 0.0)
-    try:
-        with hint_when_stopped(lambda: _kept_words(results, "")), staged(target) as hidden:
-            if cluster is not None:
-                with _timed(seconds, "scenes"):
-                    bring_truths(cluster, [_picture(name, each.image) for name, each in efforts.items()])
-            studied = []
+    with fresh_results(time.time() if fresh else None), staged(target) as hidden:
+        keys = {name: SceneKeys.of(name, each) for name, each in efforts.items()}
+        others = [*other_parts(effort, scenes), *paper_parts(effort, scenes)]
+        steps = _steps(progress, keys, configurations, others)
+        if cluster is not None:
             with _timed(seconds, "scenes"):
-                for number, (name, sized_effort) in enumerate(efforts.items()):
-                    study = open_study(name, sized_effort)
-                    if number == 0:
-                        ended = _try_own(study, configurations, apart)
-                    studied.append(
-                        scene_report(
-                            study,
-                            configurations=configurations,
-                            images=shown.get(Path(name).stem, ()),
-                            cache=cache,
-                            folder=hidden,
-                            results=results,
-                            own=OwnMethods(apart, ended),
-                            progress=steps[name],
-                            spread=None if cluster is None else spread(cluster, _picture(name, sized_effort.checked)),
-                        )
+                bring_truths(cluster, [_picture(name, each.image) for name, each in efforts.items()])
+        studied = []
+        with _timed(seconds, "scenes"):
+            for number, (name, sized_effort) in enumerate(efforts.items()):
+                study = open_study(name, sized_effort)
+                if number == 0:
+                    ended = _try_own(study, configurations, apart)
+                studied.append(
+                    scene_report(
+                        study,
+                        configurations=configurations,
+                        images=shown.get(scene_stem(name), ()),
+                        keys=keys[name],
+                        folder=hidden,
+                        results=results,
+                        own=OwnMethods(apart, ended),
+                        progress=steps[name],
+                        spread=None if cluster is None else spread(cluster, _picture(name, sized_effort.checked)),
                     )
-            by_kind: dict[str, list[CachedResult]] = {}
-            for number, part in enumerate(others):
-                step = part_of(steps[str(number)], 0.0, 1.0, before=f"{part.title}, ")
-                with _timed(seconds, part.kind):
-                    results.append(cached_result(part.entry, partial(part.compute, step)))
-                by_kind.setdefault(part.kind, []).append(results[-1])
-            stability = by_kind.get("stability")
-            scaling = [record for result in by_kind.get("scaling", ()) for record in result.data["scaling"]]
-            data = {
-                "schema": SCHEMA,
-                "created": now(),
-                "command": command,
-                "seconds": round(time.monotonic() - start, 1),
-                "parts": seconds,
-                **_counts(results),
-                "settings": plain(asdict(effort)),
-                "environment": environment,
-                "claims": claims(studied)
-                + growth_claims(scaling)
-                + (unstudied(scenes, list(FOG_SCENES)) if tuple(scenes) == effort.scenes else []),
-                "scenes": studied,
-                "stability": stability[-1].data["kernels"] if stability else [],
-                "scaling": scaling,
-                "papers": paper_rows(by_kind),
-            }
-            steps["page"](0.0, "the page")
-            write_page(data, images=hidden, folder=hidden)
-    except KeyboardInterrupt as stop:
-        raise Interrupted(_kept_words(results, str(stop))) from None
+                )
+        by_kind: dict[str, list[CachedResult]] = {}
+        for number, part in enumerate(others):
+            step = part_of(steps[str(number)], 0.0, 1.0, before=f"{part.title}, ")
+            with _timed(seconds, part.kind):
+                results.append(cached_result(part.key, partial(part.compute, step)))
+            by_kind.setdefault(part.kind, []).append(results[-1])
+        stability = by_kind.get("stability")
+        scaling = [record for result in by_kind.get("scaling", ()) for record in result.data["scaling"]]
+        data = {
+            "schema": SCHEMA,
+            "created": now(),
+            "command": command,
+            "seconds": round(time.monotonic() - start, 1),
+            "parts": seconds,
+            **_counts(results),
+            "settings": plain(asdict(effort)),
+            "environment": environment,
+            "claims": claims(studied)
+            + growth_claims(scaling)
+            + (unstudied(scenes, list(FOG_SCENES)) if tuple(scenes) == effort.scenes else []),
+            "scenes": studied,
+            "stability": stability[-1].data["kernels"] if stability else [],
+            "scaling": scaling,
+            "papers": paper_rows(by_kind),
+        }
+        steps["page"](0.0, "the page")
+        write_page(data, images=hidden, folder=hidden)
     steps["page"](1.0, "done")
     return data
 
@@ -179,19 +172,18 @@ def write_page(data: Mapping[str, Any], *, images: Path, folder: Path) -> None:
 
 def _steps(
     progress: Progress | None,
-    cache: ResultCache,
-    efforts: Mapping[str, Effort],
+    keys: Mapping[str, SceneKeys],
     configurations: Sequence[Configuration],
     others: Sequence[OtherPart],
 ) -> dict[str, Progress]:
     """Return the progress of each part: a scene by its name, another part by its number, and the 'page'."""
     seconds = {
-        name: sum(scene_seconds(SceneEntries.of(cache, name, effort), configurations).values())
-        for name, effort in efforts.items()
+        name: sum(scene_seconds(scene_stem(name), of_scene.effort.image, of_scene.named(configurations)).values())
+        for name, of_scene in keys.items()
     }
-    seconds |= {str(number): other_seconds(part.entry, part.kind) for number, part in enumerate(others)}
-    seconds["page"] = PAGE_SECONDS * len(efforts)
-    names = {name: f"{Path(name).stem}: " for name in efforts}
+    seconds |= {str(number): other_seconds(part.key, part.kind) for number, part in enumerate(others)}
+    seconds["page"] = PAGE_SECONDS * len(keys)
+    names = {name: f"{scene_stem(name)}: " for name in keys}
     return {name: part_of(progress, *share, before=names.get(name, "")) for name, share in shares(seconds).items()}
 
 
@@ -215,11 +207,6 @@ def _counts(results: Sequence[CachedResult]) -> dict[str, Any]:
     order = sorted(times, key=lambda text: datetime.strptime(text, "%Y-%m-%d %H:%M:%S %z"))
     measured = {"first": order[0], "last": order[-1]} if order else None
     return {"kept": kept, "computed": len(results) - kept, "measured": measured}
-
-
-def _kept_words(results: Sequence[CachedResult], more: str) -> str:
-    words = f"{len(results)} results are kept" if results else "no result was finished yet"
-    return f"{words}{f' ({more})' if more else ''}; nothing was written; run the same command again to go on"
 
 
 def _try_own(
@@ -253,6 +240,6 @@ def _try_own(
 
 def _refuse_twins(scenes: Sequence[str]) -> None:
     """Refuse scenes whose images would lie in one folder."""
-    for name, count in Counter(Path(scene).stem for scene in scenes).items():
+    for name, count in Counter(folder_of(scene) for scene in scenes).items():
         if count > 1:
             raise InputError(f"scenes: two scenes are called {name}; give each once, or rename one of the files")

@@ -8,10 +8,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from reference.storage.kept import key_of
 from reports.data.serialize import scaling_data
+from reports.machine.environment import machine
 from reports.machine.own_process import in_own_process
 from reports.machine.progress import Progress, counted
-from validation.frames.result_cache import CacheEntry, Computed, ResultCache, cache_entry
+from validation.frames.result_cache import Computed
 from validation.frames.scene_study import Effort
 from validation.metrics.errors import plain
 
@@ -25,18 +27,20 @@ class OtherPart:
 
     kind: str  #: 'stability', 'scaling' or 'papers'
     title: str  #: shown as the progress
-    entry: CacheEntry
+    key: str  #: of its result
     compute: Callable[[Progress], Computed]
 
 
-def other_parts(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[OtherPart]:
+def other_parts(effort: Effort, scenes: Sequence[str]) -> list[OtherPart]:
     """Return the parts that an effort asks for."""
     parts = []
     if effort.rays:
-        entry = cache_entry(cache, "stability", identity={"rays": effort.rays})
-        parts.append(OtherPart("stability", "stability", entry, lambda progress: _stability(effort.rays, progress)))
+        from validation.kernels.stability import stability
+
+        key = key_of("report-stability", stability, rays=effort.rays)
+        parts.append(OtherPart("stability", "stability", key, lambda progress: _stability(effort.rays, progress)))
     if _GROWING in scenes:
-        parts += [_scaling(kind, effort.seconds, cache) for kind in effort.scaling]
+        parts += [_scaling(kind, effort.seconds) for kind in effort.scaling]
     return parts
 
 
@@ -57,16 +61,16 @@ def known_kernels(rays: int) -> list[dict[str, Any]]:
     return plain(stability(count=rays))
 
 
-def _scaling(kind: str, seconds: float, cache: ResultCache) -> OtherPart:
+def _scaling(kind: str, seconds: float) -> OtherPart:
     """Return how times grow with one kind of work."""
+    from validation.scaling.ladders import ladder
+    from validation.scaling.study import METHODS, study_scaling
 
     def compute(progress: Progress) -> Computed:
-        from validation.scaling.ladders import ladder
-        from validation.scaling.study import METHODS, study_scaling
-
         steps = ladder(kind, _GROWING, _GROWING_SIZE)
         found = study_scaling(kind, steps, METHODS, seconds=seconds, progress=counted(progress))
         return {"scaling": [scaling_data(_GROWING, _GROWING_SIZE, each) for each in found]}, {}
 
     identity = {"scene": _GROWING, "size": _GROWING_SIZE, "kind": kind, "seconds": seconds}
-    return OtherPart("scaling", "how times grow", cache_entry(cache, "scaling", identity=identity), compute)
+    key = key_of("report-scaling", study_scaling, ladder, scaling_data, machine=machine(), **identity)
+    return OtherPart("scaling", "how times grow", key, compute)

@@ -1,40 +1,36 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a report says of one scene: every part kept on disk, or computed and then kept."""
 
-import time
+import hashlib
+import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from analytic.errors import InputError
-from realtime.methods.user_method import method_file
-from reference.storage.exr import Image, write_exr
-from reference.storage.files import temporary_folder
+from reference.storage.kept import Spent, is_kept, key_of, stopwatch
 from reports.data.own_faults import own_fault
-from reports.data.serialize import image_data, measurement_data, scene_facts, truth_data
-from reports.machine.environment import stamped, threads
+from reports.data.serialize import scene_facts
+from reports.machine.environment import machine, threads
 from reports.machine.progress import Progress, part_of
-from reports.plotting.pictures import error_map, exposure, png_bytes, tone_mapped
-from reports.report.expected import SceneEntries, scene_seconds, shares
-from validation.comparison.engine_images import EngineImage, ImageMeasurement, image_flip, measure_image
+from reports.report.computed import judged_result, measured_result, truth_result
+from reports.report.expected import scene_seconds, shares
+from validation.comparison.engine_images import EngineImage
 from validation.configurations.methods import Configuration
-from validation.estimates.images import layered_frame, layered_truth
+from validation.configurations.user_code import user_code
 from validation.estimates.monte_carlo import Spread
 from validation.frames.benchmark import Apart, Measurement, configurations_for
 from validation.frames.result_cache import (
     CachedResult,
     Computed,
-    ResultCache,
     cached_result,
     load_result,
     now,
-    source_digest,
     store_result,
 )
 from validation.frames.scene_study import (
+    Effort,
     SceneStudy,
     check_truth,
     study_configuration,
@@ -43,7 +39,8 @@ from validation.frames.scene_study import (
     with_flips,
 )
 from validation.metrics.errors import plain
-from validation.metrics.flip import Flip
+from validation.scenes.identity import scene_identity
+from validation.scenes.loading import scene_stem
 
 #: Files of a report by what they are.
 SUFFIXES = {"exr": ".exr", "picture": ".png", "airlight": "-airlight.png", "error": "-error.png"}
@@ -79,7 +76,7 @@ def scene_report(
     *,
     configurations: Sequence[Configuration],
     images: Sequence[EngineImage],
-    cache: ResultCache,
+    keys: "SceneKeys",
     folder: Path,
     results: list[CachedResult],
     own: OwnMethods,
@@ -96,8 +93,8 @@ def scene_report(
         What to measure; variants that the scene has no use for are left out.
     images
         From elsewhere, to judge.
-    cache
-        Of the run.
+    keys
+        Of its results.
     folder
         Of the report; the files go into a folder in it that has the scene's name.
     results
@@ -110,12 +107,11 @@ def scene_report(
         Lets other processes trace the batches that check the truth.
     """
     chosen = configurations_for(study.scene.features, configurations)
-    entries = SceneEntries(cache, study.loaded.name, study.loaded.path, study.effort)
-    seconds_of = scene_seconds(entries, chosen, complete=True)
+    seconds_of = scene_seconds(scene_stem(study.name), study.effort.image, keys.named(chosen), complete=True)
     steps = {name: part_of(progress, *share) for name, share in shares(seconds_of).items()}
-    parts = _Parts(study, entries, folder, results)
+    parts = _Parts(study, keys, folder, results)
     steps["truth"](0.0, "the quadrature truth")
-    truth = parts.result("truth", lambda: _truth(study), stem=_REFERENCE)
+    truth = parts.result("truth", lambda: truth_result(study), stem=_REFERENCE)
     factor = truth.data["exposure"]
     steps["agreement"](0.0, "checks of the truth")
     checks = parts.result(
@@ -138,16 +134,60 @@ def scene_report(
     }
 
 
-class _Parts:
-    """The parts of a scene's report: where they are kept and where their files are written."""
+@dataclass(frozen=True)
+class SceneKeys:
+    """The keys of all results of a scene, which need not be loaded at its size for this."""
 
-    def __init__(self, study: SceneStudy, entries: SceneEntries, folder: Path, results: list[CachedResult]) -> None:
-        self._study, self._entries, self._folder, self._results = study, entries, folder, results
-        self._made_from = {"scene": study.digest}
+    scene: str  #: from `scene_identity`
+    effort: Effort
+    machine: Mapping[str, str]  #: times hang on it
+
+    @classmethod
+    def of(cls, name_or_path: str, effort: Effort) -> "SceneKeys":
+        """Return the keys of a scene as it is named on the command line."""
+        return cls(scene_identity(name_or_path), effort, machine())
+
+    def part(self, kind: str) -> str:
+        """Return the key of the 'truth', of its checks ('agreement'), or of 'multiple' scattering."""
+        parts: dict[str, tuple[Callable[..., Any], tuple[str, ...]]] = {
+            "truth": (truth_result, ("image",)),
+            "agreement": (check_truth, ("checked", "margins", "samples", "batches", "patience")),
+            "multiple": (study_multiple, ("multiple",)),
+        }
+        function, settings = parts[kind]
+        return self._key(f"report-{kind}", function, *settings)
+
+    def method(self, chosen: Configuration) -> str:
+        """Return the key of a configuration, with the source of the user's own method and kernel."""
+        asked = {"chosen": chosen, "code": user_code(chosen), "wants_flip": wants_flip(self.effort, chosen)}
+        settings = ("image", "timed", "seconds", "slow", "limit")
+        return self._key("report-method", measured_result, *settings, **asked, **_flip_version())
+
+    def image(self, shown: EngineImage) -> str:
+        """Return the key of an image from elsewhere."""
+        digest = hashlib.sha256(shown.path.read_bytes()).hexdigest()
+        asked = {"label": shown.label, "file": digest, "wants_flip": self.effort.flip}
+        return self._key("report-image", judged_result, "image", **asked, **_flip_version())
+
+    def named(self, configurations: Sequence[Configuration]) -> dict[str, str]:
+        """Return the keys of all parts and of configurations, by the names of the parts and by labels."""
+        parts = {kind: self.part(kind) for kind in ("truth", "agreement", "multiple")}
+        return parts | {chosen.label: self.method(chosen) for chosen in configurations}
+
+    def _key(self, kind: str, function: Callable[..., Any], *settings: str, **asked: Any) -> str:
+        asked |= {name: getattr(self.effort, name) for name in settings}
+        return key_of(kind, function, scene=self.scene, machine=self.machine, **asked)
+
+
+class _Parts:
+    """The parts of a scene's report: their keys and where their files are written."""
+
+    def __init__(self, study: SceneStudy, keys: SceneKeys, folder: Path, results: list[CachedResult]) -> None:
+        self._study, self._keys, self._folder, self._results = study, keys, folder, results
 
     def result(self, kind: str, compute: Callable[[], Computed], *, stem: str = "") -> CachedResult:
         """Return a part, with its files written."""
-        return self.done(cached_result(self._entries.part(kind, self._made_from), compute), stem)
+        return self.done(cached_result(self._keys.part(kind), compute), stem)
 
     def done(self, result: CachedResult, stem: str) -> CachedResult:
         """Note that a part is there, and write its files."""
@@ -160,7 +200,8 @@ class _Parts:
 
     def names(self, stem: str, files: Mapping[str, bytes]) -> dict[str, str]:
         """Return the names of a part's files in the folder of the report."""
-        return {name: f"{self._study.name}/{stem}{SUFFIXES[name]}" for name in files}
+        folder = folder_of(str(self._study.loaded.path or self._study.name))
+        return {name: f"{folder}/{stem}{SUFFIXES[name]}" for name in files}
 
     def written(self, result: CachedResult, stem: str) -> dict[str, Any]:
         """Return what the report says of a method or an image, with its files written."""
@@ -178,34 +219,36 @@ class _Parts:
         steps: Mapping[str, Progress],
     ) -> list[dict[str, Any]]:
         """Return what the report says of all configurations."""
-        entries = [self._entries.method(each, self._made_from | _own_source(each)) for each in chosen]
+        keys = [self._keys.method(each) for each in chosen]
+        if not all(map(is_kept, keys)):
+            _ = self._study.truth  # loaded or computed now: it is no part of the time of a method
         workers = threads()
         written: dict[int, dict[str, Any]] = {}
 
-        def keep(done: Sequence[tuple[int, Measurement, float]]) -> None:
+        def keep(done: Sequence[tuple[int, Measurement, Spent]]) -> None:
             """Keep what was measured, with its HDR-FLIP."""
-            start = time.monotonic()
+            spent = stopwatch()
             measured = with_flips(self._study, [each for _, each, _ in done], workers=workers)
-            flip = (time.monotonic() - start) / max(1, len(done))
+            flip = Spent(*(value / max(1, len(done)) for value in spent()))
             for (number, _, took), measurement in zip(done, measured, strict=True):
-                computed = _measured(self._study, measurement, factor)
-                if own_fault(measurement.configuration.method, measurement.refused):  # it may have gone by the next run
-                    result = CachedResult(*computed, seconds=took, measured=now(), cached=False)
+                computed = measured_result(self._study, measurement, factor)
+                if measurement.configuration.own and measurement.refused:  # a fault may have gone by the next run
+                    result = CachedResult(*computed, seconds=took.seconds, measured=now(), cached=False)
                 else:
-                    result = store_result(entries[number], computed, took + flip)
+                    result = store_result(keys[number], computed, Spent(*map(sum, zip(took, flip))))
                 written[number] = self.written(result, stems[number])
 
         # HDR-FLIP of as many configurations at once as there are processors; Ctrl-C loses those that wait for it.
-        waiting: list[tuple[int, Measurement, float]] = []
+        waiting: list[tuple[int, Measurement, Spent]] = []
         for number, configuration in enumerate(chosen):
-            known = load_result(entries[number])
+            known = load_result(keys[number])
             if known is not None:
                 written[number] = self.written(known, stems[number])
                 continue
             steps[configuration.label](0.0, configuration.label)
-            start = time.monotonic()
+            spent = stopwatch()
             measurement = own.measured(self._study, configuration)
-            done = number, measurement, time.monotonic() - start
+            done = number, measurement, spent()
             if measurement.frame is None or not wants_flip(self._study.effort, configuration):
                 keep([done])
                 continue
@@ -218,9 +261,13 @@ class _Parts:
 
     def image(self, shown: EngineImage, stem: str, factor: float) -> dict[str, Any]:
         """Return what the report says of an image from elsewhere."""
-        made_from = self._made_from | {"file": source_digest([shown.path])} | _flip_version()
-        entry = self._entries.image(shown.label, made_from)
-        return self.written(cached_result(entry, lambda: _judged(self._study, shown, factor)), stem)
+        computed = cached_result(self._keys.image(shown), lambda: judged_result(self._study, shown, factor))
+        return self.written(computed, stem)
+
+
+def folder_of(name_or_path: str) -> str:
+    """Return the name of a scene's folder in a report, safe in file systems and in addresses."""
+    return re.sub(r"[^\w.-]+", "-", scene_stem(name_or_path)).strip("-.") or "scene"
 
 
 def file_stems(labels: Sequence[str]) -> list[str]:
@@ -239,75 +286,6 @@ def file_stems(labels: Sequence[str]) -> list[str]:
         taken |= files(stem)
         stems.append(stem)
     return stems
-
-
-def _truth(study: SceneStudy) -> Computed:
-    truth = study.truth
-    light = truth.airlight + truth.surface
-    factor = exposure(light)
-    files = {
-        "exr": _exr_bytes(layered_truth(study.name, truth)),
-        "picture": png_bytes(tone_mapped(light, factor)),
-        "airlight": png_bytes(tone_mapped(truth.airlight, factor)),
-    }
-    return {"truth": truth_data(truth), "exposure": factor}, files
-
-
-def _measured(study: SceneStudy, measured: Measurement, factor: float) -> Computed:
-    data, frame = measurement_data(measured), measured.frame
-    if frame is None:
-        return data, {}
-    image = layered_frame(study.name, measured.configuration, frame)
-    airlight = np.asarray(frame.airlight, dtype=np.float64)
-    files = {
-        "exr": _exr_bytes(_with_flip(image, measured.flip)),
-        "picture": png_bytes(tone_mapped(airlight + frame.surface, factor)),
-        "error": png_bytes(error_map(study.truth.airlight, airlight)),
-    }
-    return data, files
-
-
-def _judged(study: SceneStudy, shown: EngineImage, factor: float) -> Computed:
-    measured = measure_image(shown, study.truth_of, surfaces=study.scene.features.surfaces)
-    if study.effort.flip != "none":
-        measured = replace(measured, flip=image_flip(measured))
-    test = np.asarray(measured.image.layers[measured.layer], dtype=np.float64)
-    files = {
-        "exr": _exr_bytes(_with_flip(_named(study, measured), measured.flip)),
-        "picture": png_bytes(tone_mapped(measured.light, factor)),
-        "error": png_bytes(error_map(measured.expected, test)),
-    }
-    return image_data(measured), files
-
-
-def _named(study: SceneStudy, measured: ImageMeasurement) -> Image:
-    attributes = {"airlight:scene": study.name, "airlight:image": measured.shown.path.name}
-    return replace(measured.image, attributes=attributes)
-
-
-def _with_flip(image: Image, flip: Flip | None) -> Image:
-    """Return an image with its map of HDR-FLIP as a grey layer."""
-    if flip is None or flip.error_map is None:
-        return image
-    return replace(image, layers=dict(image.layers) | {"flip": np.repeat(flip.error_map[:, :, None], 3, axis=2)})
-
-
-def _exr_bytes(image: Image) -> bytes:
-    """Return the file of an image: OpenEXR writes to a path alone."""
-    with temporary_folder() as folder:
-        path = folder / "image.exr"
-        write_exr(path, stamped(image), finite=False)  # somebody's, which the report judges
-        return path.read_bytes()
-
-
-def _own_source(chosen: Configuration) -> dict[str, Any]:
-    """Return what else the numbers of a method depend on: its source where it is the user's own, HDR-FLIP."""
-    if not chosen.own:
-        return _flip_version()
-    file = method_file(chosen.method)
-    # A function typed into a notebook has no file, so its results cannot be kept.
-    source = file.read_bytes().hex() if file else f"no file, {time.time_ns()}"
-    return _flip_version() | {"own": source}
 
 
 def _flip_version() -> dict[str, str]:

@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from reference.storage.files import NO_SPACE
-from reference.storage.stopping import cleaned_up
 
 _PREFIX = ".airlight-report-"
 _STALE = 86400.0  # seconds after which the remains of a killed run are removed
@@ -38,13 +37,12 @@ def staged(target: Path) -> Iterator[Path]:
             shutil.rmtree(left, ignore_errors=True)
     hidden = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=target))
     try:
-        with cleaned_up(lambda: shutil.rmtree(hidden, ignore_errors=True)):
-            yield hidden
-            files = [path for path in hidden.rglob("*") if path.is_file()]
-            for path in sorted(files, key=lambda file: (file.parent == hidden, file)):
-                place = target / path.relative_to(hidden)
-                place.parent.mkdir(parents=True, exist_ok=True)
-                os.replace(path, place)
+        yield hidden
+        files = [path for path in hidden.rglob("*") if path.is_file()]
+        for path in sorted(files, key=lambda file: (file.parent == hidden, file)):
+            place = target / path.relative_to(hidden)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(path, place)
     except OSError as error:
         if error.errno in NO_SPACE:  # what was being written is a name that nobody knows
             raise OSError(error.errno, error.strerror, str(target)) from error

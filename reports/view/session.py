@@ -100,10 +100,6 @@ class Session:
             self._news = True
             self._condition.notify()
 
-    def command(self) -> str:
-        """Say how to see again what is shown."""
-        return f"the same view again: {self._state().command('view')}"
-
     # The loop ---------------------------------------------------------------------------------------------------------
 
     def run(self) -> None:

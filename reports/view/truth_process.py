@@ -129,10 +129,10 @@ def _read(given: BinaryIO, tasks: "queue.Queue[Task | None]") -> None:
 
 def main() -> None:
     """Serve the process that started this one."""
-    from reference.storage.stopping import stop_on_signals
     from reports.machine.environment import activate
+    from reports.machine.signals import default_signals
 
-    stop_on_signals(quiet=True)
+    default_signals()
     given = os.fdopen(os.dup(0), "rb")
     output = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what is printed does not come between answers

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Kernels by name: 'quadrature', 'quadrature-32', or a user's own as 'module:function'."""
+"""Kernels by name: 'quadrature', 'quadrature-32', or a user's own as 'module:function' or 'file.py:function'."""
 
-import importlib
 from collections.abc import Callable
-from functools import partial
+from functools import partial, wraps
 from typing import Any
 
 from analytic.errors import InputError, nearest
+from realtime.errors import InputError as MethodError
 from realtime.kernels.registry import KERNELS, Kernel
+from realtime.methods.user_method import own_errors, user_object
 
 
 def find_kernel(name: str) -> Callable[..., Any]:
@@ -17,13 +18,14 @@ def find_kernel(name: str) -> Callable[..., Any]:
     ----------
     name
         A name of `realtime.kernels.registry.KERNELS`, 'name-N' for the same kernel with its first parameter set to the
-        whole number N, or 'module:function'.
+        whole number N, or a user's own: 'module:function', 'path/to/file.py:function'
+        (`realtime.methods.user_method`).
 
     Raises
     ------
     InputError
-        For an unknown name (the message suggests the nearest), a number for a kernel without parameters, and a
-        'module:function' that cannot be imported or called.
+        For an unknown name (the message suggests the nearest), a number for a kernel without parameters, and what
+        cannot be imported or called.
     """
     if ":" in name:
         return _imported(name)
@@ -61,11 +63,16 @@ def sized(name: str, size: int | None) -> str:
 
 
 def _imported(name: str) -> Callable[..., Any]:
-    module, _, function = name.partition(":")
     try:
-        kernel = getattr(importlib.import_module(module), function)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise InputError(f"kernel: cannot load {name!r}: {error}; wanted an importable 'module:function'") from error
+        kernel = user_object(name, "kernel")
+    except MethodError as error:
+        raise InputError(str(error)) from error
     if not callable(kernel):
-        raise InputError(f"kernel: {name!r} is a {type(kernel).__name__}; wanted an importable 'module:function'")
-    return kernel
+        raise InputError(f"kernel {name}: it is a {type(kernel).__name__}; wanted a function")
+
+    @wraps(kernel)
+    def guarded(*arguments: Any, **parameters: Any) -> Any:
+        with own_errors(f"kernel {name}"):
+            return kernel(*arguments, **parameters)
+
+    return guarded

@@ -33,8 +33,8 @@ class Configuration:
 
     @property
     def own(self) -> bool:
-        """Whether the method is the user's own, named 'module:function'."""
-        return ":" in self.method
+        """Whether the method or its kernel is the user's own, named 'module:function'."""
+        return ":" in self.method or ":" in (self.kernel or "")
 
 
 #: The tolerance of adaptive sampling in tables: with it, 99 % of the pixels are within 1e-3.

@@ -9,7 +9,6 @@ within a block are traced again).
 """
 
 import errno
-import hashlib
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -29,11 +28,10 @@ from reference.monte_carlo.volpath.orders import volpath_orders_batch
 from reference.quadrature.surface import surface_hits
 from reference.scene.clouds import read_clouds
 from reference.scene.read import read_truth
-from reference.storage.cache import cache_folder, drop_arrays, is_kept, load_arrays, store_arrays, sweep
-from reference.storage.cache_size import make_room
+from reference.storage.cache import cache_folder, drop_arrays
 from reference.storage.files import NO_SPACE
-from reference.storage.scene_digest import cache_key
-from reference.storage.stopping import hint_when_stopped
+from reference.storage.kept import Spent, add_spent, is_damaged, is_kept, key_of, load, stopwatch, store
+from reference.storage.scene_digest import scene_digest
 from validation.estimates.light_on_ray import check_camera, check_rays
 from validation.slab.request import order_range
 
@@ -42,7 +40,6 @@ Trace = Callable[[int], Batches]  # from the seed
 
 ESTIMATORS = ("single-scatter", "volpath", "cloud-paths")
 BLOCK = 8  #: batches in a block
-_REVISIONS = {"volpath": {"revision": 2}}  # raised when the same seed gives other numbers than it did
 
 
 @dataclass(frozen=True)
@@ -58,7 +55,8 @@ class Run:
 class Elsewhere:
     """Batches that are traced in other processes."""
 
-    bring: Callable[[list[int]], Iterator[Batches]]  #: from seeds to their batches; what is missing is traced here
+    #: from seeds to their batches, and what these took; what is missing is traced here
+    bring: Callable[[list[int]], Iterator[tuple[Batches, Spent]]]
     at_once: int  #: how many seeds are asked for at once
 
 
@@ -116,8 +114,6 @@ def monte_carlo_batches(
     ------
     InputError
         If a seed would be out of range, if a ray meets a light, and for samples that are not finite.
-    KeyboardInterrupt
-        With a word on how many batches are kept.
     OSError
         If the disk of the cache is full, with a word on how many batches are kept.
     """
@@ -132,13 +128,10 @@ def monte_carlo_batches(
         raise InputError(
             f"seed: got {first_seed} for {batches} batches, which count up; wanted 0 to {LARGEST_SEED - batches}"
         )
-    settings: dict[str, Any] = {"samples": samples} | ({"max_depth": max_depth} if max_depth != 2 else {})
-    settings |= _REVISIONS.get(estimator, {})
-    settings |= {} if orders is None else {"orders": list(orders)}
-    settings |= {} if counts is None else {"counts": hashlib.sha256(counts.astype("<u4").tobytes()).hexdigest()}
-    folder = cache_key(scene, estimator, settings)
-    make_room()
-    sweep(cache_folder() / folder)
+    settings = {"samples": samples, "max_depth": max_depth, "orders": orders, "counts": counts}
+    function = {"single-scatter": single_scatter_batch, "cloud-paths": cloud_paths_batch}.get(estimator, volpath_batch)
+    function = volpath_orders_batch if estimator == "volpath" and orders is not None else function
+    folder = key_of(estimator, function, scene=scene_digest(scene), **settings)
     layers, trace = batch_tracer(scene, estimator, samples=samples, max_depth=max_depth, counts=counts, orders=orders)
     tally: Counter[str] = Counter()
 
@@ -147,32 +140,33 @@ def monte_carlo_batches(
         if batch is None:
             if go_on is not None and tally["done"] >= 2 and not go_on(tally["done"]):
                 return None
+            spent = stopwatch()
             batch = trace(seed)
-            _store(folder, batch)
+            _store(folder, batch, spent())
             if progress is not None:
                 progress(tally["done"] + 1, batches, estimator)
         tally["done"] += 1
         return batch
 
     try:
-        with hint_when_stopped(lambda: _go_on(tally)):
-            done, asked = None, first_seed
-            for seeds in _blocks(first_seed, batches):
-                if elsewhere is not None and seeds[-1] >= asked:
-                    asked = seeds[0] + max(elsewhere.at_once, len(seeds))
-                    wanted = range(seeds[0], min(first_seed + batches, asked))
-                    for batch in elsewhere.bring([seed for seed in wanted if not _has(folder, seed)]):
-                        _store(folder, batch)
-                        tally["brought"] += 1
-                        if progress is not None:
-                            progress(seeds[0] - first_seed + tally["brought"], batches, estimator)
-                block, whole = _block(folder, seeds, samples, layers, tally=tally, batch_of=kept_or_traced)
-                if block is not None:
-                    done = block if done is None else merged(done, block)
-                if not whole or (enough is not None and 2 <= tally["done"] < batches and enough(_all(done))):
-                    break
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(_go_on(tally)) from None
+        done, asked = None, first_seed
+        for seeds in _blocks(first_seed, batches):
+            if elsewhere is not None and seeds[-1] >= asked:
+                asked = seeds[0] + max(elsewhere.at_once, len(seeds))
+                wanted = range(seeds[0], min(first_seed + batches, asked))
+                waited = stopwatch()
+                for batch, spent in elsewhere.bring([seed for seed in wanted if not _has(folder, seed)]):
+                    _store(folder, batch, spent)
+                    tally["brought"] += 1
+                    if progress is not None:
+                        progress(seeds[0] - first_seed + tally["brought"], batches, estimator)
+                took = waited()
+                add_spent(Spent(-took.seconds, -took.processor))  # what they spent counts, when their batches are read
+            block, whole = _block(folder, seeds, samples, layers, tally=tally, batch_of=kept_or_traced)
+            if block is not None:
+                done = block if done is None else merged(done, block)
+            if not whole or (enough is not None and 2 <= tally["done"] < batches and enough(_all(done))):
+                break
     except OSError as error:
         if error.errno not in NO_SPACE:
             raise
@@ -250,7 +244,7 @@ def _block(
     batch_of: Callable[[int], Batches | None],
 ) -> tuple[Batches | None, bool]:
     """Return the batches of some seeds added up, and whether they are all there."""
-    full = len(seeds) == BLOCK
+    full, spent = len(seeds) == BLOCK, stopwatch()
     block = _load(folder, seeds, samples, layers, tally) if full else None
     if block is not None:
         tally["done"] += BLOCK
@@ -261,7 +255,7 @@ def _block(
             return block, False
         block = batch if block is None else merged(block, batch)
     if full and block is not None:
-        _store(folder, block)
+        _store(folder, block, spent())
         for seed in seeds:
             drop_arrays(_name(folder, range(seed, seed + 1)))
     return block, True
@@ -271,22 +265,20 @@ def _name(folder: str, seeds: range) -> str:
     return f"{folder}/{seeds[0]:06d}" + (f"-{seeds[-1]:06d}" if len(seeds) > 1 else "")
 
 
-def _store(folder: str, batches: Batches) -> None:
+def _store(folder: str, batches: Batches, spent: Spent) -> None:
     arrays: dict[str, Any] = {"mean": batches.mean, "totals": batches.totals}
     # One batch has no spread.
     arrays |= {"squares": batches.squares} if len(batches.seeds) > 1 else {}
-    store_arrays(_name(folder, range(batches.seeds[0], batches.seeds[-1] + 1)), arrays)
+    store(_name(folder, range(batches.seeds[0], batches.seeds[-1] + 1)), arrays, spent)
 
 
 def _load(folder: str, seeds: range, samples: int, layers: tuple[str, ...], tally: Counter[str]) -> Batches | None:
     name = _name(folder, seeds)
-    stored = load_arrays(name)
-    if stored is None:
-        tally["damaged"] += is_kept(name)
+    kept = load(name)
+    if kept is None:
+        tally["damaged"] += is_damaged(name)
         return None
-    if not np.isfinite(stored["mean"]).all():  # kept by a version that did not look
-        tally["damaged"] += 1
-        return None
+    stored = kept.arrays
     tally["cached"] += len(seeds)
     squares = stored["squares"] if len(seeds) > 1 else np.zeros_like(stored["mean"])
     return Batches(tuple(seeds), samples, stored["mean"], squares, stored["totals"], layers)
@@ -294,7 +286,3 @@ def _load(folder: str, seeds: range, samples: int, layers: tuple[str, ...], tall
 
 def _kept(tally: Counter[str]) -> str:
     return f"{tally['done']} finished batches are kept" if tally["done"] else "nothing was finished yet"
-
-
-def _go_on(tally: Counter[str]) -> str:
-    return f"{_kept(tally)}; run again to go on"

@@ -13,9 +13,9 @@ from reference.quadrature.image import quadrature_image
 from reference.quadrature.ray_values import TruthImage
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import TruthScene, read_truth
-from reference.storage.cache import drop_arrays, is_kept, load_arrays, store_arrays
-from reference.storage.cache_size import make_room
-from reference.storage.scene_digest import cache_key
+from reference.storage.cache import drop_arrays
+from reference.storage.kept import Spent, is_kept, kept, key_of, load, stopwatch, store
+from reference.storage.scene_digest import scene_digest
 from validation.estimates.light_on_ray import check_camera, check_rays, check_values
 
 Progress = Callable[[int, int, str], None]
@@ -46,17 +46,16 @@ def truth_image(
         For a scene that cannot be read, and for radiance that is not finite, see `validation.estimates.light_on_ray`.
     """
     settings: dict[str, Any] = {"samples": samples, "shadow_scale": shadow_scale, "pixel": pixel}
-    key = _key(scene, settings)
-    stored = load_arrays(key)
-    if stored is not None and _needed(False) <= set(stored) <= _needed(True):
-        return TruthImage(**{field.name: _as_kept(field, stored[field.name]) for field in _fields(set(stored))})
-    make_room()
+    key, spent = _key(scene, settings), stopwatch()
+    stored = load(key)
+    if stored is not None:
+        return TruthImage(**{each.name: _as_kept(each, stored.arrays.get(each.name)) for each in fields(TruthImage)})
     truth = read_truth(scene)
     parts = _Parts(key)
     # Only lights with extent take so long that a run is worth going on with.
     keep = parts if truth.area and pixel == "centre" else None
     image = _checked_image(truth, settings, keep=keep, progress=progress)
-    _store(key, image)
+    _store(key, image, spent())
     parts.drop()
     return image
 
@@ -97,10 +96,9 @@ def _checked_image(
     return image
 
 
-def keep_truth(scene, image: TruthImage, *, pixel: str = "centre") -> None:
-    """Keep a truth that another process computed by `truth_image`, so that this one finds it."""
-    make_room()
-    _store(_key(scene, _USUAL | {"pixel": pixel}), image)
+def keep_truth(scene, image: TruthImage, spent: Spent, *, pixel: str = "centre") -> None:
+    """Keep a truth that another process computed by `truth_image`, and what it took, so that this one finds it."""
+    _store(_key(scene, _USUAL | {"pixel": pixel}), image, spent)
 
 
 def has_truth(scene, *, pixel: str = "centre") -> bool:
@@ -109,17 +107,12 @@ def has_truth(scene, *, pixel: str = "centre") -> bool:
 
 
 def _key(scene, settings: Mapping[str, Any]) -> str:
-    """Return the name of a truth; it holds only what differs from the usual, so that older images are found."""
-    named = {name: settings[name] for name in ("samples", "shadow_scale")}
-    named |= {} if settings["pixel"] == "centre" else {"pixel": settings["pixel"]}
-    # What a renderer's own shadow rays see also depends on where they start.
-    named |= {} if settings["shadow_scale"] == 1 else {"shadow_start": True}
-    return cache_key(scene, "quadrature", named)
+    return key_of("quadrature", quadrature_image, scene=scene_digest(scene), **settings)
 
 
-def _store(key: str, image: TruthImage) -> None:
-    values = {field.name: getattr(image, field.name) for field in fields(TruthImage)}
-    store_arrays(key, {name: value for name, value in values.items() if value is not None})
+def _store(key: str, image: TruthImage, spent: Spent) -> None:
+    values = {each.name: getattr(image, each.name) for each in fields(TruthImage)}
+    store(key, {name: value for name, value in values.items() if value is not None}, spent)
 
 
 class _Parts:
@@ -129,26 +122,13 @@ class _Parts:
         self._key, self._names = key, list[str]()
 
     def __call__(self, name: str, work: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
-        self._names.append(f"{self._key}-parts/{name}")
-        stored = load_arrays(self._names[-1])
-        if stored is None:
-            stored = dict(work())
-            store_arrays(self._names[-1], stored)
-        return stored
+        self._names.append(f"{self._key}/{name}")
+        return kept(self._names[-1], work).arrays
 
     def drop(self) -> None:
         """Forget all parts."""
         for name in self._names:
             drop_arrays(name)
-
-
-def _needed(every: bool) -> set[str]:
-    """Return the names of the layers that a kept truth must have, or of `every` one that it may have."""
-    return {field.name for field in fields(TruthImage) if every or field.default is not None}
-
-
-def _fields(names: set[str]) -> list[Field]:
-    return [field for field in fields(TruthImage) if field.name in names]
 
 
 def _as_kept(field: Field, value: Any) -> Any:

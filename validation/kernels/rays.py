@@ -14,7 +14,6 @@ Three sets, each the same on every machine:
   J(c lengths, sigma_t / c) = J / c.
 """
 
-import hashlib
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +23,7 @@ from scipy.stats import qmc
 from analytic.cases import Cases
 from analytic.panels import airlight_segments
 from analytic.phase import PHASE_NAMES, PhaseFunction, phase_from_words
-from reference.storage.cache import GENERATION, load_arrays, store_arrays
+from reference.storage.kept import kept, key_of
 from validation.kernels.values import TABLE
 
 Array = NDArray[np.float64]
@@ -126,15 +125,8 @@ def table(phase, g, *, foot: Array, height: Array, x0: Array, x1: Array, sigma_t
 def with_truth(cases: Cases) -> Cases:
     """Return cases with J to about 1e-12, from the cache where it was computed before."""
     columns = (cases.g, cases.foot, cases.height, cases.x0, cases.x1, cases.sigma_t)
-    digest = hashlib.sha256(repr((GENERATION, TABLE, cases.phase)).encode())
-    for column in columns:
-        digest.update(np.ascontiguousarray(column).tobytes())
-    key = f"kernel-rays-{digest.hexdigest()[:32]}"
-    stored = load_arrays(key)
-    if stored is None or set(stored) != {"value"} or stored["value"].shape != cases.x0.shape:
-        stored = {"value": _truth(cases)}
-        store_arrays(key, stored)
-    return replace(cases, value=stored["value"])
+    key = key_of("kernel-rays", _truth, columns=columns, phases=cases.phase)
+    return replace(cases, value=kept(key, lambda: {"value": _truth(cases)}).arrays["value"])
 
 
 def case_row(cases: Cases, k: int) -> str:

@@ -38,5 +38,6 @@ Read in this order:
 - `changes.py`: camera, lights and media of a scene changed by name;
 - `lobes.py`: isotropic media given a mean cosine;
 - `loading.py`: a scene by its name or from a Mitsuba XML file;
+- `identity.py`: what a scene is, in keys of results;
 - `animation.py`: the scenes of the frames of an animation.
 """

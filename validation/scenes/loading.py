@@ -17,7 +17,7 @@ from analytic.errors import InputError, nearest
 from validation.scenes.changes import change_scene, isotropic_media
 from validation.scenes.lobes import scene_with_lobes
 from validation.scenes.numbers import check_numbers
-from validation.scenes.random_scene import is_random, random_record
+from validation.scenes.random_scene import PREFIX, is_random, random_parts, random_record
 from validation.scenes.record import Animation, SceneRecord
 from validation.scenes.registry import SCENES
 
@@ -91,6 +91,13 @@ def find_record(name: str) -> SceneRecord | None:
         For a random scene that cannot be drawn.
     """
     return random_record(name) if is_random(name) else SCENES.get(name)
+
+
+def scene_stem(name_or_path: str) -> str:
+    """Return what files of a scene are called: its name, the stem of its path, or 'random-7'."""
+    if is_random(name_or_path):
+        return f"{PREFIX[:-1]}-{random_parts(name_or_path)[0]}"
+    return Path(name_or_path).stem
 
 
 def parse_size(text: str) -> tuple[int, int]:

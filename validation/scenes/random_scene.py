@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Random scenes: `random:SEED`, drawn from the seed alone, and built as a Mitsuba scene.
 
-A name may go on: `random:7:meshes=FOLDER` takes .obj and .ply files as casters too, `random:7:ranges=FILE.toml` draws
-from other ranges. What is drawn where too little light reaches what the camera sees is drawn again.
+A name may go on: `random:7,meshes=FOLDER` takes .obj and .ply files as casters too, `random:7,ranges=FILE.toml` draws
+from other ranges; commas and per cent signs of a path are written as in a URL. What is drawn where too little light
+reaches what the camera sees is drawn again.
 """
 
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote, unquote
 
 import mitsuba as mi
 import numpy as np
@@ -43,6 +45,7 @@ from validation.scenes.windows import pierced_slab
 Array = NDArray[np.float64]
 
 PREFIX = "random:"
+_SAFE = "/:\\"  # what stands in a path as it is, besides letters, digits, '_', '.', '-' and '~'
 _ATTEMPTS = 17
 _TABLE = 513  # values of a tabulated phase function
 
@@ -61,12 +64,34 @@ def random_name(name: str, meshes: Path | None = None, ranges: Path | None = Non
         If the scene is no random one and one of them is given.
     """
     given = {"meshes": meshes, "ranges": ranges}
-    words = [f"{option}={path.resolve()}" for option, path in given.items() if path is not None]
+    words = [f"{option}={quote(str(path.resolve()), safe=_SAFE)}" for option, path in given.items() if path is not None]
     if words and not is_random(name):
         option = words[0].partition("=")[0]
         given_scene = f"{name} is no random scene" if name else "got no scene"
         raise InputError(f"--{option}: {given_scene}; wanted a scene such as {PREFIX}7, or no --{option}")
-    return ":".join([name, *words])
+    return ",".join([name, *words])
+
+
+def random_parts(name: str) -> tuple[int, dict[str, Path]]:
+    """Return the seed in a name, and the paths of `meshes` and `ranges` that it goes on with.
+
+    Raises
+    ------
+    InputError
+        For a name of another form.
+    """
+    seed, *options = name.removeprefix(PREFIX).split(",")
+    if not (seed.isascii() and seed.isdecimal()):
+        raise InputError(f"scene: got {name!r}, wanted {PREFIX}SEED, a whole number, for example {PREFIX}7")
+    given: dict[str, Path] = {}
+    for option in options:
+        key, _, value = option.partition("=")
+        if key not in ("meshes", "ranges") or not value or key in given:
+            raise InputError(
+                f"scene: got {option!r} in {name!r}, wanted meshes=FOLDER or ranges=FILE.toml after the seed, each once"
+            )
+        given[key] = Path(unquote(value))
+    return int(seed), given
 
 
 def random_record(name: str) -> SceneRecord:
@@ -94,23 +119,13 @@ def drawn_values(name: str) -> dict[str, Any]:
 
 
 def _parse(name: str) -> tuple[int, Ranges]:
-    words, *options = name.removeprefix(PREFIX).split(":")
-    if not words.isdecimal():
-        raise InputError(f"scene: got {name!r}, wanted {PREFIX}SEED, a whole number, for example {PREFIX}7")
+    seed, given = random_parts(name)
     ranges = Ranges()
-    given: dict[str, str] = {}
-    for option in options:
-        key, _, value = option.partition("=")
-        if key not in ("meshes", "ranges") or not value or key in given:
-            raise InputError(
-                f"scene: got {option!r} in {name!r}, wanted meshes=FOLDER or ranges=FILE.toml after the seed, each once"
-            )
-        given[key] = value
     if "ranges" in given:
-        ranges = read_ranges(Path(given["ranges"]))
+        ranges = read_ranges(given["ranges"])
     if "meshes" in given:
-        ranges = ranges_from({"meshes": given["meshes"]} | _changed(ranges), name)
-    return int(words), ranges
+        ranges = ranges_from({"meshes": str(given["meshes"])} | _changed(ranges), name)
+    return seed, ranges
 
 
 def _changed(ranges: Ranges) -> dict[str, Any]:

@@ -7,9 +7,10 @@ Read in this order:
 
 - `row.py`: the columns of a row, their types and units: the one place;
 - `study.py`: a study from its TOML file, and its cells;
-- `keys.py`: what decides the numbers of a row, as a digest;
+- `sampled_truth.py`: the truth of some pixels under lights with extent;
 - `truth.py`: the truth that the cells of an image share;
 - `bounds.py`: the errors that methods state for themselves;
 - `work.py`: a cell becomes a row;
+- `keys.py`: what decides the numbers of a row, as a digest;
 - `rows.py`: finished rows on disk, and their Parquet.
 """

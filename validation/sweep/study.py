@@ -281,7 +281,7 @@ def _of_method(
 
 def seed_of(scene: str) -> int | None:
     """Return the seed of a random scene; None for others."""
-    seed = scene.removeprefix(PREFIX).partition(":")[0]
+    seed = scene.removeprefix(PREFIX).partition(",")[0]
     return int(seed) if is_random(scene) and seed.isascii() and seed.isdigit() else None
 
 

@@ -1,45 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The truth of the cells of one image, computed once, with its own error.
 
-It is the quadrature at pixel centres. A light with extent needs many points, each as dear as a point light: here it has
-fewer than in `airlight reference`, and their standard error is part of the truth's bound. Of an image that such a light
-lights, a sixteenth of the pixels has a truth, chosen by chance once for all: quantiles of errors need no more.
+It is the quadrature at pixel centres, under lights with extent that of some pixels (`validation.sweep.sampled_truth`).
 """
 
-import time
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
-from reference.quadrature.light_points import PointPlan
-from reference.quadrature.ray_values import TruthImage, ray_values
-from reference.quadrature.replicates import standard_error
-from reference.quadrature.surface import surface_hits
-from reference.scene.read import read_truth
-from reference.storage.cache import load_arrays, store_arrays
-from reference.storage.cache_size import make_room
-from reference.storage.scene_digest import cache_key
-from validation.estimates.light_on_ray import check_camera, check_rays
+from reference.quadrature.ray_values import TruthImage
+from reference.storage.kept import Spent, kept, key_of, stopwatch
+from reference.storage.scene_digest import scene_digest
 from validation.estimates.quadrature import truth_image
 from validation.scenes.changes import parse_changes
 from validation.scenes.loading import LoadedScene, load_scene
+from validation.sweep.sampled_truth import sampled_truth
 from validation.sweep.study import Cell
 
 Array = NDArray[np.float64]
-
-#: Points of lights with extent: a ray has enough at a standard error of 2 %, and has never more than 8 times 4. Each
-#: point takes as long as a point light does, and surfaces take as long again: these are left out.
-AREA_PLAN = PointPlan(error=2e-2, first=2, most=4, surfaces=False)
-
-SHARE = 16  #: one pixel in so many has a truth where lights have an extent
-
-_LEAST = 64  # pixels that have one
-_SEED = 20261123  # of their choice
-_STANDARD_ERRORS = 3.0  # that a bound has of a light with extent
 
 
 @dataclass(frozen=True)
@@ -75,43 +56,17 @@ def cell_truth(loaded: LoadedScene) -> CellTruth:
     InputError
         As of `validation.estimates.quadrature.truth_image`.
     """
-    plain = not any(emitter.get_shape() is not None for emitter in loaded.scene.emitters())
-    key = cache_key(loaded.scene, "sweep-truth", {"plan": repr(AREA_PLAN), "share": SHARE})
-    kept = load_arrays(key)
-    if kept is not None and (plain or "airlight" in kept):
-        cost = float(kept["seconds"]), float(kept["processor"])
-        return _of_all(truth_image(loaded.scene), cost) if plain else _of_some(kept, cost)
-    begin, spent = time.perf_counter(), time.process_time()
-    image = truth_image(loaded.scene) if plain else None
-    values = {} if plain else _sampled(loaded)
-    cost = time.perf_counter() - begin, time.process_time() - spent
-    make_room()
-    store_arrays(key, {**values, "seconds": cost[0], "processor": cost[1]})
-    return _of_some(values, cost) if image is None else _of_all(image, cost)
+    if not any(emitter.get_shape() is not None for emitter in loaded.scene.emitters()):
+        spent = stopwatch()
+        return _of_all(truth_image(loaded.scene), spent())
+    key = key_of("sweep-truth", sampled_truth, scene=scene_digest(loaded.scene))
+    result = kept(key, lambda: sampled_truth(loaded.scene))
+    return _of_some(result.arrays, result.spent)
 
 
-def _of_all(image: TruthImage, cost: tuple[float, float]) -> CellTruth:
+def _of_all(image: TruthImage, cost: Spent) -> CellTruth:
     return CellTruth("quadrature", image.airlight, image.airlight_bound, image.surface, None, image.transitions, *cost)
 
 
-def _of_some(values: Mapping[str, Any], cost: tuple[float, float]) -> CellTruth:
+def _of_some(values: Mapping[str, Any], cost: Spent) -> CellTruth:
     return CellTruth("quadrature", values["airlight"], values["bound"], None, values["mask"], None, *cost)
-
-
-def _sampled(loaded: LoadedScene) -> dict[str, Array]:
-    """Return airlight, its bound and the mask of the pixels that have one."""
-    truth = read_truth(loaded.scene)
-    check_camera(truth)
-    count = truth.height * truth.width
-    mask = np.zeros(count, dtype=bool)
-    mask[np.random.default_rng(_SEED).permutation(count)[: max(_LEAST, count // SHARE)]] = True
-    some = replace(truth, direction=truth.direction[mask])
-    check_rays(some, surface_hits(some).distance)
-    rays = ray_values(some, plan=AREA_PLAN)
-    airlight, bound = np.zeros((count, 3)), np.zeros((count, 3))
-    airlight[mask] = rays.airlight
-    bound[mask] = rays.bound + _STANDARD_ERRORS * standard_error(rays.replicates)[:, :3]
-    if not (np.isfinite(airlight).all() and np.isfinite(bound).all()):
-        raise InputError("the truth is not finite in some pixels: a light may lie on a ray; move it")
-    shape = truth.height, truth.width
-    return {"airlight": airlight.reshape(*shape, 3), "bound": bound.reshape(*shape, 3), "mask": mask.reshape(shape)}

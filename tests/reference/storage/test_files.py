@@ -3,11 +3,19 @@ import os
 import resource
 import subprocess
 import sys
+import tempfile
 
 import pytest
 
 from analytic.errors import InputError
-from reference.storage.files import atomic_path, ensure_folder, ensure_writable, write_bytes, write_text
+from reference.storage.files import (
+    atomic_path,
+    ensure_folder,
+    ensure_writable,
+    temporary_folder,
+    write_bytes,
+    write_text,
+)
 
 
 def test_writes_text_and_bytes(tmp_path):
@@ -46,7 +54,7 @@ def test_an_exception_leaves_the_old_file_and_nothing_else(tmp_path, kind):
 
 
 @pytest.mark.claim("files-whole-or-not-at-all")
-def test_a_killed_process_leaves_the_old_file(tmp_path):
+def test_a_killed_process_leaves_the_old_file_and_what_it_left_is_swept(tmp_path):
     path = tmp_path / "old.txt"
     write_text(path, "old")
     script = (
@@ -59,6 +67,15 @@ def test_a_killed_process_leaves_the_old_file(tmp_path):
     done = subprocess.run([sys.executable, "-c", script, str(path)], check=False)
     assert done.returncode != 0
     assert path.read_text() == "old"
+    (half,) = (each for each in tmp_path.iterdir() if each != path)
+    mine = tmp_path / ".mine-0123.txt"
+    mine.write_text("")
+    os.utime(mine, (1, 1))
+    write_text(path, "new")
+    assert half.exists()  # another process may be writing it
+    os.utime(half, (1, 1))
+    write_text(path, "newer")
+    assert sorted(tmp_path.iterdir()) == [mine, path]
 
 
 def test_a_block_that_writes_nothing_fails(tmp_path):
@@ -135,3 +152,15 @@ def test_a_full_disk_names_the_file_and_leaves_it(tmp_path):
     assert caught.value.filename == str(tmp_path / "a.bin")
     assert [path.name for path in tmp_path.iterdir()] == ["a.bin"]
     assert (tmp_path / "a.bin").read_bytes() == b"old"
+
+
+def test_temporary_folders_of_killed_processes_are_removed_after_a_day(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    (tmp_path / "airlight-report").mkdir()
+    with temporary_folder() as first:
+        os.utime(first, (1, 1))
+        os.utime(tmp_path / "airlight-report", (1, 1))
+        with temporary_folder() as second:
+            assert [first.exists(), second.exists()] == [False, True]
+        first.mkdir()  # its own block removes it too
+    assert [path.name for path in tmp_path.iterdir()] == ["airlight-report"]

@@ -13,7 +13,7 @@ from reports.commands.main import run
 
 @pytest.fixture
 def filled(own_cache):
-    for kind in ("quadrature", "report/truth", "report/method"):
+    for kind in ("quadrature", "report-truth", "report-method"):
         for number in range(2):
             store_arrays(f"{kind}-{number:032x}", {"a": np.zeros(2000)})
     return own_cache
@@ -27,24 +27,24 @@ def printed(capsys, *arguments, status=0):
 def test_place_size_and_kinds_are_shown(filled, capsys, monkeypatch):
     monkeypatch.setenv("AIRLIGHT_CACHE_SIZE", "1GiB")
     words = printed(capsys).out
-    assert f"{filled}: 6 entries" in words
+    assert f"{filled}: 6 files" in words
     assert "of at most 1 GiB" in words
     size = sum(path.stat().st_size for path in filled.rglob("*.npz"))
     numbers = json.loads(printed(capsys, "--json").out)
     assert (numbers["folder"], numbers["limit"], numbers["bytes"]) == (str(filled), 2**30, size)
-    assert {kind: counts["entries"] for kind, counts in numbers["kinds"].items()} == {
-        "method": 2,
+    assert {kind: counts["files"] for kind, counts in numbers["kinds"].items()} == {
         "quadrature": 2,
-        "truth": 2,
+        "report-method": 2,
+        "report-truth": 2,
     }
 
 
 def test_clear_says_what_it_freed(filled, capsys):
     size = sum(path.stat().st_size for path in filled.rglob("*.npz"))
     numbers = json.loads(printed(capsys, "--clear", "--json").out)
-    assert (numbers["removed"], numbers["freed"], numbers["entries"]) == (6, size, 0)
+    assert (numbers["removed"], numbers["freed"], numbers["files"]) == (6, size, 0)
     assert not list(filled.rglob("*.npz"))
-    assert "0 entries removed, 0 bytes freed" in printed(capsys, "--clear").out
+    assert "0 files removed, 0 bytes freed" in printed(capsys, "--clear").out
 
 
 def test_clear_fails_where_something_stays(filled, capsys, monkeypatch):
@@ -53,8 +53,8 @@ def test_clear_fails_where_something_stays(filled, capsys, monkeypatch):
 
     monkeypatch.setattr(Path, "unlink", refuse)
     words = printed(capsys, "--clear", status=1).out
-    assert "0 entries removed" in words
-    assert "6 entries" in words
+    assert "0 files removed" in words
+    assert "6 files" in words
 
 
 @pytest.mark.parametrize(("variable", "value"), [("AIRLIGHT_CACHE_SIZE", "much"), ("AIRLIGHT_CACHE_DIR", __file__)])

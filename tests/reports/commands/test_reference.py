@@ -2,18 +2,15 @@
 """`airlight reference` and `airlight merge`: what is kept, what is said of it, and what a stopped run leaves.
 
 Random numbers stand in the place of the tracer, as everything here is about files; `tests/reference` traces. The slow
-tests at the end run the command in a process of its own, with the tracer.
+test at the end runs the command in a process of its own, with the tracer.
 """
 
 import json
 import os
-import shutil
-import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -95,10 +92,7 @@ def test_a_stopped_run_goes_on_and_a_damaged_block_is_traced_again(traced, tmp_p
     (tmp_path / "a.exr").write_text("an older file")
     traced.append(13)
     run(tmp_path / "a.exr", "--spp", "64", status=130)
-    captured = capfd.readouterr()
-    # Before it, on a busy machine, lines of progress.
-    assert captured.err.splitlines()[-1] == "interrupted: 13 finished batches are kept; run again to go on"
-    assert captured.out == ""
+    assert capfd.readouterr().out == ""
     assert (tmp_path / "a.exr").read_text() == "an older file"
     traced.clear()
     run(tmp_path / "a.exr", "--spp", "64")
@@ -134,37 +128,18 @@ def test_merged_files_of_two_machines(traced, tmp_path, monkeypatch, capfd):
     assert not (tmp_path / "no.exr").exists()
 
 
-# In a process, with the tracer
-
-
-def start(output, *arguments, before=""):
-    """Run the command in a process of its own; `before` is Python to run in it first."""
-    command = ["reference", *SCENE, "--estimator", "volpath", "-o", str(output), *arguments]
-    code = f"import sys\n{before}\nfrom reports.commands.main import run\nsys.exit(run({command!r}))"
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    return subprocess.Popen([sys.executable, "-c", code], env=environment, cwd=ROOT, text=True, **pipes)
-
-
-def wait_for_batches(process, cache, number):
-    for _ in range(2400):
-        if len(list(cache.glob("volpath-*/0*.npz"))) >= number or process.poll() is not None:
-            return
-        time.sleep(0.05)
-    pytest.fail("no batches after two minutes")
-
-
 @pytest.mark.claim("runs-go-on")
 @pytest.mark.slow
-@pytest.mark.parametrize("sign", [signal.SIGKILL, signal.SIGINT])
-def test_a_run_that_is_stopped_from_outside_loses_nothing(variant, tmp_path, capfd, own_cache, sign):
+def test_a_run_that_is_killed_loses_nothing(variant, tmp_path, capfd, own_cache):
+    """The real tracer in a process, killed when the cache has three of its batches."""
     (tmp_path / "a.exr").write_text("an older file")
-    process = start(tmp_path / "a.exr", "--spp", "400000")
-    wait_for_batches(process, own_cache, 3)
-    process.send_signal(sign)
-    out, _ = process.communicate(timeout=60)
-    assert out == ""
-    assert process.returncode == (130 if sign is signal.SIGINT else -signal.SIGKILL)
+    command = ["reference", *SCENE, "--estimator", "volpath", "-o", str(tmp_path / "a.exr"), "--spp", "400000"]
+    code = f"import sys\nfrom reports.commands.main import run\nsys.exit(run({command!r}))"
+    process = subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": str(ROOT)}, cwd=ROOT)
+    while len(list(own_cache.glob("volpath-*/0*.npz"))) < 3 and process.poll() is None:
+        time.sleep(0.05)
+    process.kill()
+    assert process.wait() == -9
     assert (tmp_path / "a.exr").read_text() == "an older file"
     # Every file that has its final name is whole.
     names = [str(path.relative_to(own_cache).with_suffix("")) for path in own_cache.glob("volpath-*/0*.npz")]
@@ -173,21 +148,3 @@ def test_a_run_that_is_stopped_from_outside_loses_nothing(variant, tmp_path, cap
     resumed = summary(tmp_path / "b.exr", capfd, "--spp", "2048")
     assert resumed["cached"] >= 3
     assert resumed["damaged"] == 0
-
-
-@pytest.mark.slow
-def test_a_full_disk_is_one_line(variant, tmp_path, own_cache):
-    """A limit on the size of a file stands for the disk: the blocks of eight batches do not fit, single ones do."""
-    # Once without the limit, so that Dr.Jit need not write the kernels of a fresh machine, which do not fit either.
-    out, err = start(tmp_path / "a.exr", "--spp", "64").communicate(timeout=300)
-    shutil.rmtree(own_cache)
-    (tmp_path / "a.exr").unlink()
-    before = "import resource, signal\nsignal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-    before += "resource.setrlimit(resource.RLIMIT_FSIZE, (6000, 6000))"
-    process = start(tmp_path / "a.exr", "--spp", "64", before=before)
-    out, err = process.communicate(timeout=300)
-    assert (process.returncode, out) == (2, "")
-    assert err.count("\n") == 1
-    assert f"{own_cache}: File too large; 8 finished batches are kept; make room" in err
-    assert sorted(path.stem for path in own_cache.glob("volpath-*/*")) == [f"{seed:06d}" for seed in range(8)]
-    assert not (tmp_path / "a.exr").exists()

@@ -67,23 +67,6 @@ def test_what_was_written_is_said_and_times_are_measured_only_if_asked(variant, 
     assert "nothing written: --preview NAME.png writes a picture, --output NAME.exr the layers\n" in printed
 
 
-def test_ctrl_c_keeps_the_finished_frames_and_says_so(variant, tmp_path, capfd, monkeypatch):
-    import reports.interchange.frames
-
-    write, calls = reports.interchange.frames.write_frame, []
-
-    def interrupted(*args, **kwargs):
-        calls.append(1)
-        if len(calls) == 3:
-            raise KeyboardInterrupt
-        return write(*args, **kwargs)
-
-    monkeypatch.setattr(reports.interchange.frames, "write_frame", interrupted)
-    run("open-fog", *SMALL, "--frames", "5", "-o", str(tmp_path / "fog.exr"), status=cli.INTERRUPTED)
-    assert "2 of 5 frames are finished and kept" in capfd.readouterr().err
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["fog-0001.exr", "fog-0002.exr"]
-
-
 @pytest.mark.claim("flawed-meshes-warn")
 def test_plan_counts_casters_and_warns_of_open_ones(variant, capfd):
     run("sphere-spot", *SMALL, "--method", "shadow-planes", "--plan", "--json")

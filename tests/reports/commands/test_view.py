@@ -55,10 +55,8 @@ def _children(parent):
 
 @pytest.mark.slow
 @pytest.mark.claim("view-ends")
-@pytest.mark.parametrize(
-    ("number", "status", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
-)
-def test_ctrl_c_ends_it_with_one_line_and_no_traceback(number, status, word):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_ends_it_and_its_processes_without_a_word(number):
     process = subprocess.Popen(
         [sys.executable, str(ROOT / "airlight.py"), "view", "sphere-spot", *SMALL, "--set", "tolerance=0.01"],
         stdout=subprocess.PIPE,
@@ -76,10 +74,8 @@ def test_ctrl_c_ends_it_with_one_line_and_no_traceback(number, status, word):
     children = _children(process.pid) if sys.platform == "linux" else []
     assert len(children) == (1 if sys.platform == "linux" else 0)  # the truth
     process.send_signal(number)
-    out, err = process.communicate(timeout=30)
-    assert (process.returncode, out) == (status, "")
-    line = f"{word}: the same view again: airlight view sphere-spot --method shadow-planes --kernel exact"
-    assert err == f"{line} --set tolerance=0.01 --size 16x12\n"
+    assert process.communicate(timeout=30) == ("", "")
+    assert process.returncode == -number  # 130 and 143 for a shell
     stop = time.monotonic() + 10
     while any(os.path.exists(f"/proc/{child}") for child in children):
         assert time.monotonic() < stop, "what it started goes on"

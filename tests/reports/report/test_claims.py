@@ -4,19 +4,18 @@
 from dataclasses import replace
 
 from reports.report.claims import paper_parts, paper_rows
-from validation.frames.result_cache import CachedResult, result_cache
+from validation.frames.result_cache import CachedResult
 from validation.frames.scene_study import EFFORTS
 from validation.papers.claims import claims
 
 
 def test_a_larger_effort_measures_more_and_part_of_its_scenes_none(own_cache):
-    cache = result_cache({"processor": "abacus"})
     efforts = [EFFORTS[name] for name in ("quick", "default", "full")]
-    quick, default, full = ([part.title for part in paper_parts(each, each.scenes, cache)] for each in efforts)
+    quick, default, full = ([part.title for part in paper_parts(each, each.scenes)] for each in efforts)
     assert quick == ["formulas", "stencil"]  # no image
     assert set(quick) < set(default) < set(full)
-    assert paper_parts(efforts[1], ["open-fog"], cache) == []
-    assert paper_parts(replace(efforts[0], scenes=()), ["my-scene.xml"], cache) == []
+    assert paper_parts(efforts[1], ["open-fog"]) == []
+    assert paper_parts(replace(efforts[0], scenes=()), ["my-scene.xml"]) == []
 
 
 def test_rows_follow_the_results_of_a_run():

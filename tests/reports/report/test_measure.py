@@ -2,19 +2,21 @@
 import json
 import re
 from dataclasses import replace
+from functools import wraps
 from types import SimpleNamespace
 
+import mitsuba as mi
 import pytest
 
 from analytic.errors import InputError
 from reports.data.reader import SCHEMA_FILE, named_files
-from reports.machine.progress import Interrupted
 from reports.page.filters import number, percent
 from reports.report.measure import write_report
-from reports.report.scene import file_stems
+from reports.report.scene import file_stems, folder_of
 from tests.helpers.reports import checked
 from validation.configurations.methods import STANDARD, Configuration
 from validation.frames.scene_study import Effort
+from validation.scenes.random_scene import random_name
 
 SCENE = """<scene version="3.0.0">
     <medium type="homogeneous" id="fog">
@@ -182,10 +184,28 @@ def test_a_second_report_is_kept_in_full(written, variant, tmp_path):
 
 
 @pytest.mark.claim("report-kept")
-def test_fresh_measures_again_and_finds_the_same_errors(written, variant, tmp_path):
+def test_fresh_computes_truths_and_batches_again_too(written, variant, tmp_path, monkeypatch):
+    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+    from reference.quadrature.image import quadrature_image
+
+    calls = []
+
+    def counted(function):
+        @wraps(function)
+        def call(*arguments, **options):
+            calls.append(function)
+            return function(*arguments, **options)
+
+        return call
+
+    monkeypatch.setattr("validation.estimates.quadrature.quadrature_image", counted(quadrature_image))
+    monkeypatch.setattr("validation.estimates.monte_carlo.single_scatter_batch", counted(single_scatter_batch))
+    repeated = again(written, tmp_path, configurations=CHOSEN[1:])
+    assert (repeated["kept"], calls) == (3 + len(CHOSEN) - 1, [])
     repeated = again(written, tmp_path, fresh=True, configurations=CHOSEN[1:])
     assert (repeated["kept"], repeated["computed"]) == (0, 3 + len(CHOSEN) - 1)
-    # From the same truth and the same frames: all but the times.
+    assert set(calls) == {quadrature_image, single_scatter_batch}
+    # The same numbers, but for the times.
     for before, after in zip(written.data["scenes"][0]["methods"][1:], repeated["scenes"][0]["methods"], strict=True):
         assert before["error"] == after["error"]
         assert before["times"] != after["times"]
@@ -208,20 +228,25 @@ def test_a_changed_scene_is_measured_again(written, variant, tmp_path, monkeypat
     assert measured["scenes"][0]["truth"]["mean"] != written.data["scenes"][0]["truth"]["mean"]
 
 
-@pytest.mark.claim("report-interrupted")
-def test_ctrl_c_leaves_nothing_half_written_and_says_what_is_kept(written, variant, tmp_path, monkeypatch):
-    def stopped(*args, **kwargs):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("reports.report.scene.study_configuration", stopped)
-    target = tmp_path / "again"
-    target.mkdir()
-    (target / "report.html").write_text("the one before")
-    changed = (Configuration("unshadowed", "exact"),)
-    with pytest.raises(Interrupted, match="3 results are kept; nothing was written; run the same command again"):
-        again(written, tmp_path, configurations=changed)
-    assert [path.name for path in target.rglob("*")] == ["report.html"]
-    assert (target / "report.html").read_text() == "the one before"
+def test_a_random_scene_with_meshes_on_any_path_has_a_safe_folder(written, variant, tmp_path, monkeypatch, own_cache):
+    multiple = written.data["scenes"][0]["multiple"]
+    monkeypatch.setattr("reports.report.scene.check_truth", lambda study, progress, spread: {})
+    monkeypatch.setattr("reports.report.scene.study_multiple", lambda study: multiple)
+    folder = tmp_path / "C:my, 5% meshes"
+    folder.mkdir()
+    mi.load_dict({"type": "cube"}).write_ply(str(folder / "a.ply"))
+    name = random_name("random:1", meshes=folder)
+    data = again(written, tmp_path, scenes=[name], configurations=CHOSEN[1:2])
+    assert data["scenes"][0]["name"] == name
+    files = named_files(data)
+    assert all(re.fullmatch(r"random-1/[a-z-]+(\.exr|\.png)", file) for file in files)
+    assert all((tmp_path / "again" / file).exists() for file in files)
+    assert [folder_of(each) for each in ("hall", "a/my <fog> #2.xml", "a/..xml", "random:7")] == [
+        "hall",
+        "my-fog-2",
+        "scene",
+        "random-7",
+    ]
 
 
 @pytest.mark.claim("report-schema")

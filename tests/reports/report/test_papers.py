@@ -6,7 +6,6 @@ from dataclasses import replace
 from realtime.kernels.registry import KERNELS
 from reports.report import papers
 from reports.report.papers import known_kernels, other_parts
-from validation.frames.result_cache import result_cache
 from validation.frames.scene_study import EFFORTS
 
 
@@ -25,7 +24,7 @@ def test_kernels_are_studied_in_a_process_that_compiles_quickly_and_added_ones_h
     airlight_kernels = list(KERNELS)
     monkeypatch.setattr("validation.kernels.stability.stability", studied)
     monkeypatch.setattr(papers, "in_own_process", elsewhere)
-    (part,) = other_parts(replace(EFFORTS["quick"], rays=64), [], result_cache({"processor": "abacus"}))
+    (part,) = other_parts(replace(EFFORTS["quick"], rays=64), [])
     expected = [{"kernel": name} for name in airlight_kernels]
     assert part.compute(lambda share, what: None) == ({"kernels": expected}, {})
     assert named == [(known_kernels, 64, True)]

@@ -8,7 +8,6 @@ from analytic.errors import InputError
 from realtime.kernels.registry import KERNELS
 from realtime.methods.registry import FOG_METHODS
 from tests.helpers.scenes import tiny_scene
-from validation.configurations.kernel_names import find_kernel
 from validation.configurations.methods import (
     QUICK,
     STANDARD,
@@ -105,20 +104,6 @@ def test_kernels_of_ones_own_come_through_the_same_door(variant):
         for kernel in ("realtime.kernels.taylor:taylor", "taylor")
     )
     np.testing.assert_array_equal(own.airlight, built_in.airlight)
-
-
-@pytest.mark.parametrize(
-    "name", ["gone:function", "realtime.kernels:gone", "realtime.kernels.:x", ":x", "realtime.kernels:"]
-)
-def test_kernel_that_cannot_be_imported_is_refused(name):
-    with refused("wanted an importable 'module:function'") as caught:
-        find_kernel(name)
-    assert name in str(caught.value)
-
-
-def test_kernel_of_ones_own_that_is_no_function_is_refused():
-    with refused("wanted an importable 'module:function'"):
-        find_kernel("math:pi")
 
 
 @pytest.mark.parametrize(("word", "value"), [("yes", True), ("False", False), (True, True), ("0", False)])

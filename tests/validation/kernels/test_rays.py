@@ -68,10 +68,10 @@ def test_truth_is_kept_and_found_again(monkeypatch, tmp_path):
     monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path))  # other tests ask for other truths
     first = wide_rays(64)
 
-    def fail(cases):
+    def fail(*columns, **options):
         raise AssertionError("computed again")
 
-    monkeypatch.setattr(kernel_rays, "_truth", fail)
+    monkeypatch.setattr(kernel_rays, "airlight_segments", fail)
     np.testing.assert_array_equal(wide_rays(64).value, first.value)
     with pytest.raises(AssertionError, match="computed again"):
         wide_rays(64, "rayleigh")  # another phase function is another truth

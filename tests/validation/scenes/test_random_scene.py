@@ -68,7 +68,7 @@ def test_the_truth_is_finite_and_not_black(variant):
 
 
 def test_a_name_that_is_no_seed_is_refused():
-    for name in ("random:", "random:seven", "random:-1", "random:7:mesh=.", "random:7:meshes=", "random:1:2"):
+    for name in ("random:", "random:seven", "random:-1", "random:7,mesh=.", "random:7,meshes=", "random:1:2"):
         with pytest.raises(InputError, match=r"wanted random:SEED|wanted meshes=FOLDER or ranges=FILE"):
             load_scene(name)
     with pytest.raises(InputError, match="wanted a whole number from 0"):
@@ -81,7 +81,7 @@ def test_meshes_of_a_folder_are_casters(variant, tmp_path):
     folder = tmp_path / "meshes"
     folder.mkdir()
     with pytest.raises(InputError, match=r"holds no \.obj or \.ply file"):
-        load_scene(f"random:2:meshes={folder}")
+        load_scene(f"random:2,meshes={folder}")
     vertices, faces = joined([scaled(icosphere(1), 7.3), box((23.1, 1.7, 1.3))])
     mesh = mi.Mesh("one", len(vertices), len(faces))
     parameters = mi.traverse(mesh)
@@ -105,7 +105,7 @@ def test_meshes_of_a_folder_are_casters(variant, tmp_path):
     assert "mesh" in kinds
     (folder / "one.ply").write_text("ply, and not quite")
     with pytest.raises(InputError, match=r"meshes: .*one\.ply"):
-        load_scene(f"random:{first}:meshes={folder}", (8, 6))
+        load_scene(f"random:{first},meshes={folder}", (8, 6))
 
 
 def test_options_are_refused_beside_other_scenes(tmp_path):

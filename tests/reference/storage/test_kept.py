@@ -1,0 +1,286 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: what is kept is found again until its arguments or the code that computes it change, and no longer."""
+
+import ast
+import inspect
+import os
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from reference.storage import kept as module
+from reference.storage.kept import (
+    Spent,
+    add_spent,
+    code_digest,
+    fresh_results,
+    fresh_since,
+    is_damaged,
+    is_kept,
+    kept,
+    key_of,
+    load,
+    source_digest,
+    stopwatch,
+    store,
+)
+
+pytestmark = pytest.mark.usefixtures("own_cache")
+
+
+def counted(calls, value=1.0):
+    def compute():
+        calls.append(value)
+        return {"a": np.full(3, value)}
+
+    return compute
+
+
+@pytest.mark.claim("report-kept")
+def test_what_was_computed_is_found_again_and_fresh_results_are_not_older_than_the_run():
+    calls: list[float] = []
+    first, second = (kept("page-a", counted(calls)) for _ in range(2))
+    assert (len(calls), first.loaded, second.loaded) == (1, False, True)
+    assert (first.spent, first.made) == (second.spent, second.made)
+    np.testing.assert_array_equal(first.arrays["a"], second.arrays["a"])
+    assert second.arrays.keys() == {"a"}
+    with fresh_results(time.time()):
+        assert (is_kept("page-a"), load("page-a")) == (False, None)
+        assert not kept("page-a", counted(calls, 2.0)).loaded
+        assert kept("page-a", counted(calls)).loaded  # computed in this run
+        # Another process of the run does the same.
+        code = "from reference.storage.kept import *\nprint(is_kept('page-a'), fresh_since())"
+        ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=_with_root())
+        assert ran.stdout.split() == ["True", repr(fresh_since())]
+    assert fresh_since() is None
+    assert kept("page-a", counted(calls)).arrays["a"][0] == 2.0
+    assert len(calls) == 2
+
+
+def _with_root():
+    return os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[3])}
+
+
+def test_what_fails_is_not_kept_and_damage_is_found(own_cache):
+    with pytest.raises(ZeroDivisionError):
+        kept("page-a", lambda: {"a": 1 // 0})
+    assert not is_kept("page-a")
+    store("page-a", {"a": np.arange(1000.0)}, Spent(1.0, 2.0))
+    assert not is_damaged("page-a")
+    path = own_cache / "page-a.npz"
+    path.write_bytes(path.read_bytes()[:-2000])
+    assert is_damaged("page-a")
+    assert kept("page-a", counted([])).arrays["a"].tolist() == [1.0] * 3
+
+
+def test_times_are_those_of_computing_and_never_of_loading():
+    """What is made from kept results took as long as they once did."""
+    store("truth-a", {"a": 1}, Spent(100.0, 150.0))
+
+    def from_the_truth():
+        load("truth-a")
+        add_spent(Spent(1000.0, 0.0))  # in another process
+        return {"b": 2}
+
+    made = kept("method-a", from_the_truth)
+    assert made.spent.seconds == pytest.approx(1100.0, abs=5.0)
+    assert made.spent.processor == pytest.approx(150.0, abs=5.0)
+    spent = stopwatch()
+    assert kept("method-a", counted([])).spent == made.spent
+    assert spent().seconds == pytest.approx(made.spent.seconds, abs=5.0)
+
+
+@dataclass(frozen=True)
+class Settings:
+    nodes: int
+    name: str = "x"
+
+
+def test_a_key_has_every_argument_in_it():
+    keys = [
+        key_of("page", kept, **arguments)
+        for arguments in (
+            {"a": 1},
+            {"a": 2},
+            {"b": 1},
+            {"a": "1"},
+            {"a": 1, "b": None},
+            {"a": Settings(1)},
+            {"a": Settings(2)},
+            {"a": np.zeros(3)},
+            {"a": np.zeros((3, 1))},
+            {"a": np.zeros(3, np.float32)},
+            {"a": {"x": (1, 2.5)}},
+            {"a": Path("x")},
+        )
+    ]
+    assert len(set(keys)) == len(keys)
+    assert key_of("page", kept, a=1) != key_of("row", kept, a=1) != key_of("row", a=1)
+    assert key_of("page", kept, a=1, b=(2,)) == key_of("page", kept, b=[2], a=1)
+
+
+# --- source code -----------------------------------------------------------------------------------------------------
+
+CODE = '''
+"""Doc."""
+import os, helper as h  # neighbours
+from inner import part
+
+def f(x):
+    """Doc."""
+    from late import g
+    return h.double(x) + g(x)
+'''
+
+
+@pytest.fixture
+def folder(tmp_path):
+    files = {
+        "mine.py": CODE,
+        "helper.py": "from deep import two\n\ndef double(x):\n    return two * x\n",
+        "deep.py": "two = 2\n",
+        "late.py": "def g(x):\n    return x\n",
+        "inner/__init__.py": "",
+        "inner/part.py": "from .beside import one\n",
+        "inner/beside.py": "one = 1\n",
+        "unrelated.py": "zero = 0\n",
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def test_a_users_file_counts_with_the_modules_beside_it_that_it_imports(folder):
+    digests = [code_digest([folder / "mine.py"])]
+
+    def write(name, text):
+        (folder / name).write_text(text)
+        digests.append(code_digest([folder / "mine.py"]))
+
+    for name in ("helper.py", "deep.py", "late.py", "inner/part.py", "inner/beside.py"):
+        write(name, (folder / name).read_text() + "\nthree = 3\n")
+    assert len(set(digests)) == 6
+    write("unrelated.py", "zero = 1\n")
+    write("deep.py", "# A comment.\n\n\n" + (folder / "deep.py").read_text())
+    write("mine.py", (folder / "mine.py").read_text().replace("Doc.", "Other words."))
+    assert digests[-3:] == [digests[5]] * 3
+    write("mine.py", "no Python")
+    assert digests[-1] != digests[-2]
+
+
+def test_code_is_the_same_wherever_it_lies_and_in_every_process(folder, tmp_path_factory):
+    other = tmp_path_factory.mktemp("other")
+    for path in folder.rglob("*.py"):
+        (other / path.relative_to(folder)).parent.mkdir(exist_ok=True)
+        (other / path.relative_to(folder)).write_text(path.read_text())
+    code = "import sys\nfrom pathlib import Path\nfrom reference.storage.kept import *\n"
+    code += "print(code_digest([Path(sys.argv[1])]), source_digest(key_of))"
+    command = [sys.executable, "-c", code, str(other / "mine.py")]
+    ran = subprocess.run(
+        command, capture_output=True, text=True, check=True, env=_with_root() | {"PYTHONHASHSEED": "7"}
+    )
+    assert ran.stdout.split() == [code_digest([folder / "mine.py"]), source_digest(key_of)]
+
+
+def test_versions_are_in_the_digest(monkeypatch):
+    before = source_digest(kept)
+    module._digest_of.cache_clear()
+    monkeypatch.setattr("importlib.metadata.version", lambda name: "99" if name == "scipy" else "1")
+    other = source_digest(kept)
+    module._digest_of.cache_clear()
+    assert other != before
+
+
+def functions():
+    """What computes each kind of what is kept, and a module of which it takes numbers."""
+    from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch
+    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+    from reference.monte_carlo.volpath.integrator import volpath_batch
+    from reference.quadrature.image import quadrature_image
+    from reports.page.image_index import packed_scene
+    from reports.report.computed import judged_result, measured_result, truth_result
+    from validation.frames.scene_study import check_truth, study_multiple
+    from validation.kernels.rays import _truth
+    from validation.kernels.stability import stability
+    from validation.sweep.sampled_truth import sampled_truth
+    from validation.sweep.work import cell_row
+
+    quadrature = "reference.quadrature.segments"
+    return {
+        "quadrature": (quadrature_image, quadrature),
+        "single-scatter": (single_scatter_batch, "reference.monte_carlo.single_scatter.distance_sampling"),
+        "volpath": (volpath_batch, "reference.scene.read"),
+        "cloud-paths": (cloud_paths_batch, "reference.monte_carlo.cloud_paths.walk"),
+        "kernel-rays": (_truth, "analytic.panels"),
+        "sweep-truth": (sampled_truth, quadrature),
+        "row": (cell_row, "realtime.methods.ray_march"),
+        "page": (packed_scene, "reports.page.image_codec"),
+        "report-truth": (truth_result, quadrature),
+        "report-agreement": (check_truth, "validation.statistics.relative_bias"),
+        "report-multiple": (study_multiple, "reference.monte_carlo.volpath.integrator"),
+        "report-method": (measured_result, "realtime.methods.ray_march"),
+        "report-image": (judged_result, "validation.metrics.errors"),
+        "report-stability": (stability, "realtime.kernels.exact"),
+    }
+
+
+def closure(function):
+    """The names of all modules whose code is in the digest of a function."""
+    seen, waiting = set(), [Path(inspect.getfile(inspect.unwrap(function)))]
+    while waiting:
+        path = waiting.pop().resolve()
+        if path not in seen:
+            seen.add(path)
+            waiting += module._imported(path, module._compiled(path, path.stat().st_mtime_ns)[1])
+    return {".".join(path.relative_to(module._ROOT).with_suffix("").parts) for path in seen}
+
+
+@pytest.mark.claim("report-kept")
+def test_every_kind_hangs_on_the_code_that_computes_it_and_not_on_claims_of_papers():
+    for kind, (function, needed) in functions().items():
+        names = closure(function)
+        assert needed in names, kind
+        apart = ("validation.papers", "reports.commands", "reports.papers", "reports.tables")
+        assert not [name for name in names if name.startswith(apart)], kind
+
+
+def test_imports_are_found_wherever_they_stand():
+    """All that the syntax trees name, imports within functions among them."""
+    names = closure(functions()["report-stability"][0])
+    ours = module._modules()
+    for name in names:
+        for node in ast.walk(ast.parse(ours[name.removesuffix(".__init__")].read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom):
+                wanted = {node.module, *(f"{node.module}.{each.name}" for each in node.names)}
+                assert {each for each in wanted & ours.keys() if ours[each].name != "__init__.py"} <= names
+
+
+@pytest.mark.claim("report-kept")
+@pytest.mark.parametrize("kind", ["quadrature", "row"])
+def test_a_change_of_the_code_throws_results_away_and_a_comment_does_not(monkeypatch, kind):
+    function, needed = functions()[kind]
+    file = module._ROOT.joinpath(*needed.split(".")).with_suffix(".py")
+    compiled, source = module._compiled, module._source
+    before = key_of(kind, function)
+
+    def key_with(change):
+        monkeypatch.setattr(module, "_source", lambda path: source(path) + change if path == file else source(path))
+        monkeypatch.setattr(
+            module,
+            "_compiled",
+            lambda path, at: (compiled.__wrapped__ if path == file else compiled)(path, at),
+        )
+        module._digest_of.cache_clear()
+        key = key_of(kind, partial(function))
+        module._digest_of.cache_clear()
+        return key
+
+    assert key_with(b"\n# A comment.\n") == before
+    assert key_with(b"\n_MORE = 1e-3\n") != before

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: a digest changes with every change of a scene, and with nothing else."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from reference.storage.scene_digest import scene_digest
+from tests.helpers.scenes import spot, tiny_scene
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def load(**changes):
+    import mitsuba as mi
+
+    return mi.load_dict(tiny_scene(size=(5, 4), **changes))
+
+
+def changed(name, **entries):
+    """The scene with other values in one of its entries."""
+    return load(**{name: tiny_scene()[name] | entries})
+
+
+def rgb(*values):
+    return {"type": "rgb", "value": list(values)}
+
+
+CHANGES = {
+    "extinction": lambda: changed("fog", sigma_t=0.3100001),
+    "scale of the extinction": lambda: changed("fog", scale=1.1),
+    "red albedo": lambda: changed("fog", albedo=rgb(0.91, 0.8, 0.7)),
+    "blue albedo": lambda: changed("fog", albedo=rgb(0.9, 0.8, 0.71)),
+    "Rayleigh phase function": lambda: changed("fog", phase={"type": "rayleigh"}),
+    "HG phase function": lambda: changed("fog", phase={"type": "hg", "g": 0.3}),
+    "HG phase function, g": lambda: changed("fog", phase={"type": "hg", "g": 0.31}),
+    "light's position": lambda: changed("lamp", position=[0.9, 0.7, 1.91]),
+    "light's green intensity": lambda: changed("lamp", intensity=rgb(5.0, 4.1, 3.0)),
+    "spot": lambda: load(lamp=spot()),
+    "spot's beam": lambda: load(lamp=spot(beam=17.0)),
+    "spot's cutoff": lambda: load(lamp=spot(cutoff=34.0)),
+    "radius": lambda: changed("ball", radius=0.411),
+    "centre": lambda: changed("ball", center=[0.1, 0.1, 0.71]),
+    "blue reflectance": lambda: changed("ball", bsdf={"type": "diffuse", "reflectance": rgb(0.6, 0.5, 0.31)}),
+    "both sides": lambda: changed("ball", bsdf={"type": "twosided", "bsdf": tiny_scene()["ball"]["bsdf"]}),
+    "turned inside out": lambda: changed("ball", flip_normals=True),
+    "without the sphere": lambda: load(ball=None),
+    "field of view": lambda: changed("sensor", fov=49.5),
+    "size": lambda: changed("sensor", film=tiny_scene(size=(6, 4))["sensor"]["film"]),
+    "nothing": load,
+}
+
+
+def test_every_change_of_a_scene_changes_its_digest(variant):
+    """A key that does not change would answer with the truth of another scene."""
+    digests = {name: scene_digest(make()) for name, make in CHANGES.items()}
+    assert len(set(digests.values())) == len(CHANGES)
+    assert digests["nothing"] == scene_digest(load())
+
+
+def test_one_vertex_changes_the_digest(variant):
+    import mitsuba as mi
+
+    from validation.scenes.loading import load_scene
+
+    scene = load_scene("colonnade", (5, 4)).scene
+    before = scene_digest(scene)
+    parameters = mi.traverse(scene)
+    vertices = np.array(parameters["columns.vertex_positions"])
+    vertices[-1] = np.nextafter(vertices[-1], np.float32(np.inf))
+    parameters["columns.vertex_positions"] = vertices
+    parameters.update()
+    assert scene_digest(scene) != before
+
+
+UNNAMED = """<scene version="3.0.0">
+    <medium type="homogeneous" id="fog"><float name="sigma_t" value="0.31"/></medium>
+    <emitter type="point"><rgb name="intensity" value="5, 4, 3"/></emitter>
+    <sensor type="perspective"><ref name="medium" id="fog"/></sensor>
+    <shape type="sphere"><bsdf type="conductor"/></shape>
+    <shape type="sphere"><bsdf type="twosided"><bsdf type="diffuse"/></bsdf></shape>
+</scene>"""
+
+
+def test_digest_is_the_same_at_every_load_and_in_another_process(variant):
+    """Names by address, hash seeds and set order must not enter."""
+    import mitsuba as mi
+
+    first = mi.load_string(UNNAMED)
+    keep = [mi.load_dict({"type": "sphere"}) for _ in range(7)]  # so that the next scene lies elsewhere in memory
+    second = mi.load_string(UNNAMED)
+    assert len(keep) == 7
+    assert scene_digest(first) == scene_digest(second)
+    script = (
+        "import sys, mitsuba as mi; mi.set_variant(sys.argv[1])\n"
+        "from reference.storage.scene_digest import scene_digest\n"
+        "print(scene_digest(mi.load_string(sys.argv[2])))"
+    )
+    environment = os.environ | {"PYTHONHASHSEED": "4711", "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-c", script, variant, UNNAMED]
+    process = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert process.stdout.split()[-1] == scene_digest(first)
