@@ -96,7 +96,7 @@ def test_packed_images_are_kept_until_a_file_changes_or_the_entry_is_damaged(sce
     write_files(tmp_path)
     first = scene_images(scene, tmp_path, 10**8)
     with monkeypatch.context() as patched:
-        patched.setattr("reports.page.image_cache.packed_scene", None)
+        patched.setattr("reports.page.image_cache.store", None)
         assert scene_images(scene, tmp_path, 10**8) == first  # not packed again
     (kept,) = own_cache.glob("page-*.npz")
     kept.write_bytes(kept.read_bytes()[:-9])
