@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Small scenes under a directional light that tests share, and their airlight by the plainest of sums."""
+"""Small scenes with a box and a sphere of fog, under a directional light or a lamp, and their airlight by a sum."""
 
 from typing import Any
 
 import numpy as np
 
+from tests.helpers import airlight_sum
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 
 TOWARDS = np.array([-0.37, 0.23, 0.81]) / np.linalg.norm([-0.37, 0.23, 0.81])
@@ -52,40 +53,14 @@ def ball_over_floor() -> dict[str, Any]:
     return {name: tiny_scene()[name] for name in ("ball", "floor")}
 
 
-def chord(name: str, origin, direction) -> tuple[Any, Any]:
-    """Return where lines enter and leave the brick or the pearl; 0, 0 where they miss it."""
-    if name == "pearl":
-        offset = origin - PEARL[0]
-        b, c = np.sum(offset * direction, axis=-1), np.sum(offset**2, axis=-1) - PEARL[1] ** 2
-        root = np.sqrt(np.maximum(b * b - c, 0))
-        return np.where(b * b > c, -b - root, 0), np.where(b * b > c, -b + root, 0)
-    with np.errstate(divide="ignore"):
-        low_sides, high_sides = ((BRICK[0] + sign * BRICK[1] - origin) / direction for sign in (-1, 1))
-    low, high = np.minimum(low_sides, high_sides).max(axis=-1), np.maximum(low_sides, high_sides).min(axis=-1)
-    return np.where(high > low, low, 0), np.where(high > low, high, 0)
+CHORDS = {"brick": airlight_sum.box(*BRICK), "pearl": airlight_sum.ball(*PEARL)}
 
 
-def midpoint_airlight(truth, number: int, pixel: int, *, steps=200_000, lit=None):
-    """Return the airlight that a directional light sends along a pixel's ray, by the midpoint rule in each medium.
-
-    `lit` tells of points whether the light reaches them; all by default.
-    """
-    light, direction = truth.directional[number], truth.direction[pixel]
-    total = np.zeros(3)
-    for medium in truth.media:
-        near, far = (float(end) for end in chord(medium.name, truth.origin, direction))
-        near = max(near, 0.0)
-        if far <= near:
-            continue
-        x = near + (far - near) * (np.arange(steps) + 0.5) / steps
-        point = truth.origin + x[:, None] * direction
-        tau = np.zeros((steps, 3))
-        for other in truth.media:
-            low, high = (float(end) for end in chord(other.name, truth.origin, direction))
-            tau += np.maximum(np.minimum(x, high) - max(low, 0.0), 0)[:, None] * other.sigma_t
-            low, high = chord(other.name, point, np.broadcast_to(-light.direction, point.shape))
-            tau += np.maximum(high - np.maximum(low, 0), 0)[:, None] * other.sigma_t
-        f = np.exp(-tau) if lit is None else np.exp(-tau) * lit(point)[:, None]
-        p = medium.phase(np.array(-light.direction @ direction))
-        total += f.sum(axis=0) * (far - near) / steps * medium.sigma_t * medium.albedo * p
-    return total * light.irradiance / (4 * np.pi)
+def plain_airlight(truth, pixel: int, **how: Any):
+    """Return the airlight along a pixel's ray from the only light of a scene with brick and pearl, by a plain sum."""
+    if truth.lights:
+        light = airlight_sum.Light(truth.lights[0].position, 1.0, truth.lights[0].intensity)
+    else:
+        light = airlight_sum.Light(-truth.directional[0].direction, 0.0, truth.directional[0].irradiance)
+    bodies, around = airlight_sum.bodies_of(truth, CHORDS)
+    return airlight_sum.airlight_sum(truth.origin, truth.direction[pixel], light, bodies, around=around, **how)

@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from tests.helpers import airlight_sum
 from tests.helpers.scenes import spot, tiny_scene
 
 _BATCHES = 32
@@ -186,47 +187,28 @@ _CENTRE, _RADIUS, _SPHERE_SIGMA = np.array([2.6, 0.2, 0.0]), 0.7, 0.5
 _LAMPS = {"in clear air": np.array([1.7, 0.4, 1.5]), "in the box": np.array([0.31, 0.23, 0.11])}
 
 
-def _box_crossing(start, step):
-    """Return at which shares of a leg the box begins and ends."""
-    with np.errstate(divide="ignore"):
-        low_sides, high_sides = (-_HALF - start) / step, (_HALF - start) / step
-    begin = np.clip(np.minimum(low_sides, high_sides).max(axis=-1), 0, 1)
-    return begin, np.maximum(np.clip(np.maximum(low_sides, high_sides).min(axis=-1), 0, 1), begin)
+_BODIES = [
+    airlight_sum.Body(airlight_sum.box((0, 0, 0), _HALF), _BOX_SIGMA, 0.8, airlight_sum.henyey_greenstein(0.5)),
+    airlight_sum.Body(
+        airlight_sum.ball(_CENTRE, _RADIUS), np.full(3, _SPHERE_SIGMA), 0.6, airlight_sum.henyey_greenstein(0.0)
+    ),
+]
 
 
-def _sphere_crossing(start, step):
-    """Return at which shares of a leg the sphere begins and ends."""
-    length2 = np.sum(step * step, axis=-1)
-    middle = -np.sum((start - _CENTRE) * step, axis=-1) / length2
-    off = np.sum((start - _CENTRE) ** 2, axis=-1) - length2 * middle**2
-    half = np.sqrt(np.maximum(_RADIUS**2 - off, 0) / length2)
-    return np.clip(middle - half, 0, 1), np.clip(middle + half, 0, 1)
+def _plain_airlight(lamp, origin, direction):
+    light = airlight_sum.Light(lamp, 1.0, np.full(3, 5.0))
+    return airlight_sum.airlight_sum(origin, direction, light, _BODIES, steps=4000)
 
 
 def _optical_depth(start, end):
-    step = end - start
-    length = np.linalg.norm(step, axis=-1)
-    box, sphere = _box_crossing(start, step), _sphere_crossing(start, step)
-    in_box, in_sphere = length * (box[1] - box[0]), length * (sphere[1] - sphere[0])
-    return in_box[..., None] * _BOX_SIGMA + in_sphere[..., None] * _SPHERE_SIGMA
-
-
-def _brute_force(lamp, origin, direction, steps=4000):
-    """Sum the airlight of one ray by the midpoint rule in either medium."""
-    total, reach = np.zeros(3), 12.0
-    media = ((_box_crossing, _BOX_SIGMA * 0.8, 0.5), (_sphere_crossing, np.full(3, _SPHERE_SIGMA * 0.6), 0.0))
-    for crossing, sigma_s, g in media:
-        begin, end = (float(share) * reach for share in crossing(origin, direction * reach))
-        x = begin + (end - begin) * (np.arange(steps) + 0.5) / steps
-        point = origin + x[:, None] * direction
-        away = point - lamp
-        r = np.linalg.norm(away, axis=1)
-        # Light goes from the lamp to the point, then back along the camera ray.
-        cosine = -(away @ direction) / r
-        phase = (1 - g * g) / (1 + g * g - 2 * g * cosine) ** 1.5 / (4 * np.pi)
-        depth = _optical_depth(np.broadcast_to(origin, point.shape), point) + _optical_depth(lamp, point)
-        total += sigma_s * 5.0 * np.sum(np.exp(-depth) * (phase / r**2)[:, None], axis=0) * (end - begin) / steps
-    return total
+    """Return the optical depth between points, (rays, 3)."""
+    way = end - start
+    length = np.linalg.norm(way, axis=-1)
+    depth = np.zeros((len(way), 3))
+    for body in _BODIES:
+        near, far = body.chord(start, way / length[:, None])
+        depth += np.maximum(np.minimum(far, length) - np.maximum(near, 0), 0)[:, None] * body.sigma_t
+    return depth
 
 
 @pytest.mark.claim("bounded-media", tolerance="family level 1e-4, errors below 1e-3")
@@ -243,7 +225,7 @@ def test_bounded_media_against_a_plain_sum(variant, place):
     origin = np.array([-4.0, -1.0, 0.6])
     direction = rng.uniform([-1, -0.8, -0.7], [3, 0.8, 0.7], (40, 3)) - origin
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    expected = np.array([_brute_force(lamp, origin, towards) for towards in direction])
+    expected = np.array([_plain_airlight(lamp, origin, towards) for towards in direction])
     mean, error = _mean_and_error(scene, origin, direction, batches=16, samples=128)
     assert np.count_nonzero(expected[:, 0]) > 30
     _assert_agrees(mean, error, expected, batches=16, largest_error=1e-3)
@@ -273,7 +255,7 @@ def test_rays_that_graze_a_boundary(variant):
     slope = np.array([1.0, 0.1, -0.002])
     direction = np.broadcast_to(slope / np.linalg.norm(slope), begin.shape)
     origin = begin - 1.3 * direction
-    expected = np.array([_brute_force(lamp, *ray) for ray in zip(origin, direction)])
+    expected = np.array([_plain_airlight(lamp, *ray) for ray in zip(origin, direction)])
     mean, error = _mean_and_error(_box_and_sphere(lamp), origin, direction, samples=128)
     assert np.all(np.abs(mean - expected) < 4.5 * error + 1e-3 * expected)
     assert np.median(error / expected) < 1e-3
