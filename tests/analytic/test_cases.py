@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from analytic.cases import integrate_cases, read_cases
+from analytic.cases import read_cases
 from analytic.errors import InputError
 
 HEAD = "phase,g,t,h,x0,x1,sigma_t\n"
@@ -30,17 +30,6 @@ def test_both_files(data_folder):
     assert rays.origin.shape == rays.direction.shape == rays.light.shape == (1002, 3)
     assert rays.tag is None
     assert (rays.height >= 0).all()
-
-
-def test_optional_columns_order_and_extra_columns(table):
-    path = table("name,x1,x0,h,t,sigma_t,phase\na,inf,0,1,0,0,Isotropic\n\nb,2,1,0.5,1.5,0.1,hazy\n")
-    cases = read_cases(path)
-    assert cases.value is None
-    assert cases.phase == ("isotropic", "hazy")
-    assert cases.rows[1][0] == "b"
-    value, error = integrate_cases(cases)
-    assert value[0] == pytest.approx(np.pi / 2, rel=1e-10)
-    assert (error < 1e-9 * value).all()
 
 
 @pytest.mark.parametrize(

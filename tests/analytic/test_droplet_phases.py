@@ -10,7 +10,7 @@ from mpmath import workdps
 from analytic.cases import integrate_cases, read_cases
 from analytic.droplets import moments
 from analytic.errors import InputError
-from analytic.phase import PhaseFunction, hg_draine_fit, hg_draine_moments, phase_from_words
+from analytic.phase import PhaseFunction, hg_draine_moments, phase_from_words
 from analytic.series import taylor_coefficients
 from tests.evidence.certified.airlight_integral_droplets import value
 
@@ -24,14 +24,6 @@ def test_hg_draine_has_mean_one_and_its_moments(diameter):
     expected = moments(phase, 8, breaks=(1.0, 10.0), degree=2000)
     assert expected[0] == pytest.approx(1, abs=1e-8)
     assert hg_draine_moments(diameter, 8) == pytest.approx(expected, abs=1e-8)
-
-
-def test_hg_draine_without_its_rise_is_two_lobes(monkeypatch):
-    fit = hg_draine_fit(12)
-    weights = np.array([1 - fit.weight, fit.weight])
-    two = weights @ [PhaseFunction("hg", g=g)(np.array([-0.4, 0.9])) for g in (fit.g_hg, fit.g_d)]
-    monkeypatch.setattr("analytic.phase.hg_draine_fit", lambda _: type(fit)(fit.g_hg, fit.g_d, 0.0, fit.weight))
-    assert PhaseFunction("hg-draine")(np.array([-0.4, 0.9])) == pytest.approx(two)
 
 
 @pytest.mark.parametrize("words", ["hg-draine:5", "hg-draine:50", "mie:2:8", "mie-modified:2:8"])
@@ -94,10 +86,3 @@ def test_the_phase_of_a_table_can_be_replaced(tmp_path):
 def test_wrong_words_are_refused(words, message):
     with pytest.raises(InputError, match=message):
         phase_from_words(words)
-
-
-def test_numbers_of_others_are_refused():
-    with pytest.raises(InputError, match="droplets"):
-        PhaseFunction("hg", droplets=phase_from_words("mie").droplets)
-    with pytest.raises(InputError, match="diameter"):
-        PhaseFunction("mie", diameter=12)

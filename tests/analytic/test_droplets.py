@@ -3,7 +3,6 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 from scipy.special import roots_legendre
 
 from analytic.droplets import Droplets, Modified, moments, optics
@@ -52,18 +51,6 @@ def test_the_phase_function_has_mean_one_and_its_moments():
     assert found.moments(2000)[-1] == 0
 
 
-def test_shares_are_integrals():
-    found = optics(_SMALL)
-    share = quad(lambda angle: 0.5 * float(found(np.cos(angle))) * np.sin(angle), 0, np.deg2rad(20), epsabs=1e-11)[0]
-    assert found.share(0, 20) == pytest.approx(share, abs=1e-9)
-    assert found.share(0, 180) == pytest.approx(1, abs=1e-12)
-
-
-def test_absorption_lowers_the_albedo():
-    assert optics(_SMALL, 1.6, index=1.317 + 8.5e-5j, sizes=200).albedo == pytest.approx(0.999, abs=2e-4)
-    assert optics(_SMALL).albedo == pytest.approx(1, abs=1e-10)
-
-
 @pytest.mark.claim("droplets-modified", tolerance="1e-9: what is cut is what the density loses")
 @pytest.mark.parametrize("cut", ["zero", "flat"])
 def test_what_is_cut_is_what_the_density_loses(cut):
@@ -103,16 +90,3 @@ def test_what_is_cut_is_what_the_density_loses(cut):
 def test_impossible_droplets_are_refused(arguments, words):
     with pytest.raises(InputError, match=words):
         Droplets(**arguments)
-
-
-def test_wrong_light_is_refused():
-    with pytest.raises(InputError, match="refractive index of water"):
-        optics(_SMALL, 0.5)
-    with pytest.raises(InputError, match="wavelength"):
-        optics(_SMALL, 5.0, index=1.3)
-    with pytest.raises(InputError, match="cut"):
-        Modified(optics(_SMALL), cut="soft")
-    with pytest.raises(InputError, match="share"):
-        Modified(optics(_SMALL), share="guessed")
-    with pytest.raises(InputError, match="angle"):
-        Modified(optics(_SMALL), angle=0)

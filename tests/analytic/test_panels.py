@@ -202,16 +202,6 @@ def test_corners():
     assert np.isfinite(error).all()
 
 
-def test_chunks_do_not_show():
-    rng = np.random.default_rng(5)
-    n = 20_000
-    columns = (rng.uniform(-3, 30, n), 10 ** rng.uniform(-3, 1, n), rng.uniform(0, 5, n), rng.uniform(5, 40, n))
-    value, _ = airlight_segments(*columns, 0.13, ISOTROPIC)
-    pick = rng.integers(0, n, 50)
-    alone = [airlight_segments(*(c[i] for c in columns), 0.13, ISOTROPIC)[0][0] for i in pick]
-    np.testing.assert_allclose(value[pick], alone, rtol=1e-14)
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [

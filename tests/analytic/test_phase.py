@@ -76,12 +76,6 @@ def test_half_angle_form_keeps_the_digits_of_a_sharp_lobe():
     assert float(phase.from_half(down, 1 - down)) == pytest.approx(expected, rel=1e-14)
 
 
-def test_shape_is_kept():
-    cosines = np.linspace(-1, 1, 12).reshape(3, 4)
-    assert all(phase(cosines).shape == (3, 4) for phase in ALL)
-    assert float(PhaseFunction("hazy")(1.0)) == pytest.approx(5.0)
-
-
 @pytest.fixture
 def scalar_mitsuba():
     import mitsuba as mi

@@ -4,7 +4,6 @@
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
 from analytic.phase import PhaseFunction
 from analytic.series import taylor_coefficients
 
@@ -64,12 +63,3 @@ def test_the_series_converges_to_the_integrand():
     errors = [abs(np.polyval(taylor_coefficients(a, phase, n)[::-1], theta) / exact - 1) for n in (4, 8, 16)]
     assert errors[0] > errors[1] > errors[2]
     assert errors[2] < 1e-8
-
-
-def test_refusals():
-    with pytest.raises(InputError, match="no power series"):
-        taylor_coefficients(1.0, PhaseFunction("tabulated", table=[1, 2]))
-    with pytest.raises(InputError, match="degree is -1"):
-        taylor_coefficients(1.0, PhaseFunction("hazy"), -1)
-    with pytest.raises(InputError, match="wanted optical thicknesses"):
-        taylor_coefficients([1.0, np.nan], PhaseFunction("hazy"))

@@ -179,19 +179,6 @@ def test_surfaces_are_those_of_mitsubas_direct_integrator(variant, kind):
     assert np.all(np.abs(mean - expected) < 4 * together)
 
 
-@pytest.mark.parametrize("kind", ["rectangle", "disk"])
-def test_the_back_of_a_light_is_dark(variant, kind):
-    """Rationale: only the side of the normal shines, and no sample of another side may leak."""
-    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-    from reference.monte_carlo.volpath.integrator import volpath_batch
-    from reference.scene.read import read_truth
-
-    # The camera looks along z, and nothing that it sees lies before the light, whose normal points away from it.
-    scene = lit_scene(lamp=lamp(kind, to_world=_at((0.3, 0.2, -0.7), (0.3, 0.3, -9.0), 0.5)))
-    for batch in (single_scatter_batch, volpath_batch):
-        assert not batch(read_truth(scene), 0, 32).mean.any()
-
-
 def test_black_lights_end_camera_rays_in_volpath_and_null_ones_do_not(variant):
     """Rationale: `hide_emitters` hides the light that is seen directly, in Mitsuba 3.9.1 not the shape.
 

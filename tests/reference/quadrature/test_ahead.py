@@ -48,6 +48,7 @@ def test_a_caller_that_stops_leaves_no_thread():
     assert threading.active_count() == before
 
 
+@pytest.mark.slow
 def test_surfaces_lit_by_lights_with_extent_do_not_depend_on_threads(variant):
     import drjit as dr
     import numpy as np

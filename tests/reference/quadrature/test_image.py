@@ -69,18 +69,6 @@ def test_shadow_of_a_sphere_against_its_closed_form(variant):
     assert image.transitions > 0
 
 
-@pytest.mark.claim("cast-shadows")
-@pytest.mark.parametrize("lamp", [None, {"lamp": spot}], ids=["point", "spot"])
-def test_more_samples_change_nothing_but_missed_shadows(variant, lamp):
-    changes = {} if lamp is None else {"lamp": spot(beam=20.0)}
-    _, coarse = truth_of(samples=128, **changes)
-    _, fine = truth_of(samples=1024, **changes)
-    difference = np.abs(coarse.airlight - fine.airlight)
-    bound = coarse.airlight_bound + fine.airlight_bound
-    assert np.mean(difference > bound) < 0.02  # pixels where the coarse samples step over a sliver of shadow
-    assert np.abs(coarse.airlight.mean() / fine.airlight.mean() - 1) < 1e-4
-
-
 @pytest.mark.claim("corrected-for-the-epsilon")
 def test_scaled_shadow_leg_brightens_by_the_optical_depth(variant):
     import mitsuba as mi

@@ -4,7 +4,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
 from tests.helpers.polygons import box_scene
 from tests.helpers.scenes import tiny_scene
 
@@ -123,28 +122,6 @@ def test_a_light_in_the_middle_of_a_pixel_has_a_finite_mean(variant):
     # Around the light the airlight is c/rho: the sub-pixel that holds it leaves about a 32nd of the mean open.
     assert area.airlight[1, 1] == pytest.approx(expected[1, 1], rel=0.05)
     assert np.all(area.airlight_bound[1, 1] < 0.1 * area.airlight[1, 1])
-
-
-def test_another_word_is_refused(variant):
-    from reference.quadrature.image import quadrature_image
-
-    with pytest.raises(InputError, match="pixel is 'middle'; wanted 'centre' or 'area'"):
-        quadrature_image(truth_of(tiny_scene()), pixel="middle")
-
-
-def test_a_light_on_the_corner_of_four_pixels_has_a_finite_mean(variant):
-    """An image with an even number of pixels whose camera aims at the light: a point of the grid meets it."""
-    from reference.quadrature.image import quadrature_image
-    from reference.scene.camera import film_directions
-
-    truth = truth_of(tiny_scene(ball=None, floor=None, size=(2, 2)))
-    (aim,) = film_directions(truth.scene.sensors()[0], np.array([[1.0, 1.0]]), (2, 2))
-    truth = replace(truth, lights=(replace(truth.lights[0], position=truth.origin + 2.7 * aim),))
-    image = quadrature_image(truth, pixel="area")
-    expected, *_ = brute_force(truth, 48, regular=True)
-    # Of c/rho the cell next to the light has a 48th, and its middle gives sqrt(2), not 1.76 times its side: 0.4 %.
-    assert image.airlight == pytest.approx(expected, rel=6e-3)
-    assert np.all(image.airlight_bound < 0.05 * image.airlight)
 
 
 def test_smooth_pixels_take_few_rays(variant, monkeypatch):

@@ -120,36 +120,3 @@ def test_between_its_kinks_the_chord_of_the_leg_is_smooth(variant):
             assert chord.max() > 0.1
             assert bend[~near].max() < 5e-6  # that of a kink at which the slope changes by 0.025
             assert bend.max() > 5e-5
-
-
-def test_the_digest_of_a_scene_tells_its_media_apart(variant):
-    """A cached truth must not stand in for that of another medium inside, or of other surroundings."""
-    import mitsuba as mi
-
-    from reference.storage.scene_digest import scene_digest
-
-    def digest(**changes):
-        return scene_digest(mi.load_dict(clear_scene(size=(3, 2), **(shapes() | changes))))
-
-    def pearl(sigma_t, **medium):
-        return {
-            "pearl": bounded_medium(
-                {"type": "sphere", "center": [0.6, 0.2, 0.6], "radius": 0.43}, sigma_t, (0.2, 0.5, 0.8), **medium
-            )
-        }
-
-    air = {key: entry for key, entry in FOG.items() if key != "id"}
-    surroundings = {name: shape | {"exterior": air} for name, shape in shapes().items()}
-    variants = [
-        digest(**change)
-        for change in (
-            {},
-            pearl(1.3001),
-            pearl(1.3, phase={"type": "rayleigh"}),
-            pearl(1.3, phase={"type": "hg", "g": 0.1}),
-            {"pearl": None},
-            surroundings,
-        )
-    ]
-    assert len(set(variants)) == len(variants)
-    assert digest() == variants[0]

@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from tests.helpers.polygons import lit_lengths, rays_of
+from tests.helpers.polygons import rays_of
 from tests.helpers.scenes import tiny_scene
 
 
@@ -68,35 +68,6 @@ def test_in_the_plane_of_the_centre():
     assert high == pytest.approx(np.arctan2([0.5 + chord], 0.75), rel=1e-14)
     for hidden_from in (np.array([0.6]), np.array([0.699])):
         assert not len(sphere_shadows((centre, np.array([0.3])), direction, normal, hidden_from)[0])
-
-
-def test_a_sphere_against_a_mesh_of_it(variant):
-    """A sphere and a fine mesh within it differ by what the mesh lacks: 1 - cos of half the angle of an edge."""
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
-    from reference.scene.shapes import Shapes
-    from reference.visibility.triangles import geometric_intervals
-
-    truth = read_truth(mi.load_dict(tiny_scene(ball=None, floor=None)))
-    light, rays, ends = rays_of(truth)
-    steps = 128
-    polar, azimuth = np.meshgrid(np.linspace(0, np.pi, steps // 2 + 1), np.linspace(0, 2 * np.pi, steps + 1))
-    points = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], axis=-1)
-    points = np.array([0.1, 0.1, 0.7]) + 0.41 * points
-    a, b, c, d = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
-    mesh = np.concatenate([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)]).reshape(-1, 3, 3)
-    sphere = Shapes(np.empty((0, 3, 3)), np.array([[0.1, 0.1, 0.7]]), np.array([0.41]))
-    lit = []
-    for shapes in (sphere, Shapes(mesh)):
-        intervals = geometric_intervals(truth, light, rays, ends=ends, shapes=shapes)
-        lit.append(lit_lengths(intervals, ends))
-    assert np.sum(lit[0] < ends[1] - ends[0]) > 20
-    assert np.all(lit[0] <= lit[1] + 1e-12)
-    # Both triangles of a quad are at most 2 (1 - cos(pi/128)) R inside; a shadow that just touches loses its root.
-    inside = 2 * (1 - np.cos(np.pi / steps))
-    assert np.median(lit[1] - lit[0]) < 2 * inside
-    assert np.max(lit[1] - lit[0]) < 2 * np.sqrt(2 * inside) * 0.41 / 0.8
 
 
 @pytest.mark.claim("shadow-ray-certificate")

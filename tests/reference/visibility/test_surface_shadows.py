@@ -55,14 +55,6 @@ def test_a_wrong_interval_is_not_excused(variant):
     assert corrected.tolist() == [False, True]
 
 
-def test_what_agrees_stays(variant):
-    scene = half_covered_floor()
-    interaction = on_the_floor(scene, np.linspace(-1.7, 1.3, 40))
-    reached = np.linspace(-1.7, 1.3, 40) > -0.5
-    corrected = reached_by_shadow_rays(interaction, LIGHT, reached, scene=scene, shapes=read_shapes(scene))
-    assert np.array_equal(corrected, reached)
-
-
 def test_segments_are_blocked_as_rays_are(variant):
     """Against Mitsuba's rays, among triangles and spheres of all sizes; float32 errs on edges, one in a million."""
     import mitsuba as mi
@@ -101,27 +93,6 @@ def test_triangles_that_are_left_out_block_nothing(monkeypatch):
     monkeypatch.setattr(module, "_SLACK", np.inf)
     assert np.array_equal(blocked, segments_blocked(start, end, shapes))
     assert 0.2 < blocked.mean() < 0.8
-
-
-def test_no_segments_are_no_trouble():
-    shapes = Shapes(np.ones((2, 3, 3)), np.empty((0, 3)), np.empty(0))
-    assert len(segments_blocked(np.empty((0, 3)), np.empty((0, 3)), shapes)) == 0
-
-
-@pytest.mark.parametrize(
-    ("start", "end", "blocked"),
-    [
-        ((0, 0, -2), (0, 0, 2), True),  # through the sphere
-        ((0, 0, 0), (0, 0, 2), True),  # out of it
-        ((0, 0, 0), (0, 0, 0.9), False),  # within
-        ((0, 0, -2), (0, 0, -1.1), False),  # before it
-        ((1.1, 0, -2), (1.1, 0, 2), False),  # past it
-    ],
-)
-def test_spheres(start, end, blocked):
-    sphere = Shapes(np.empty((0, 3, 3)), np.zeros((1, 3)), np.ones(1))
-    hit = segments_blocked(np.array([start], dtype=float), np.array([end], dtype=float), sphere)
-    assert hit.tolist() == [blocked]
 
 
 @pytest.mark.claim("shadow-rays-start-off-the-surface")

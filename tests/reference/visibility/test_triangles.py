@@ -132,32 +132,6 @@ def test_one_triangle_against_its_closed_form(variant):
         assert intervals.high == pytest.approx([ends[1][0]])
 
 
-def test_order_of_triangles_and_rays_does_not_matter(variant):
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
-    from reference.scene.shapes import Shapes, read_shapes
-    from reference.visibility.triangles import geometric_intervals
-
-    truth = read_truth(mi.load_dict(box_scene()))
-    light, rays, ends = rays_of(truth)
-    triangles = read_shapes(truth.occluders).triangles
-    generator = np.random.default_rng(5)
-    plain = geometric_intervals(truth, light, rays, ends=ends, shapes=Shapes(triangles))
-    mixed = geometric_intervals(truth, light, rays, ends=ends, shapes=Shapes(generator.permutation(triangles)[:, ::-1]))
-    assert np.array_equal(plain.ray, mixed.ray)
-    assert plain.low == pytest.approx(mixed.low, abs=1e-13)
-    turned = generator.permutation(len(ends[0]))
-    other = geometric_intervals(
-        truth,
-        light,
-        tuple(part[turned] for part in rays),
-        ends=(ends[0][turned], ends[1][turned]),
-        shapes=Shapes(triangles),
-    )
-    assert lit_lengths(other, ends) == pytest.approx(lit_lengths(plain, ends)[turned], abs=1e-13)
-
-
 def test_pairs_of_rays_and_triangles_are_those_of_asking_each():
     from reference.visibility.triangles import SLACK, Reaches, near_pairs
 

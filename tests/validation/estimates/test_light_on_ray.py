@@ -131,10 +131,3 @@ def test_samples_that_are_not_finite_are_refused_and_not_kept(variant, own_cache
     for _ in range(2):
         with pytest.raises(InputError, match="samples of 1 of 12 pixels are not finite, first of pixel 7"):
             module.monte_carlo_batches(scene, "single-scatter", batches=2, samples=1)
-
-
-def test_more_samples_than_there_are_seeds_are_refused_in_plain_numbers(variant):
-    from validation.estimates.monte_carlo import monte_carlo_batches
-
-    with pytest.raises(InputError, match=r"samples: got 100000000000 a pixel, .* wanted at most 67108864"):
-        monte_carlo_batches(scene_with([1.0, 0.0, 1.0]), "volpath", batches=10**11 // 64, samples=64)

@@ -75,23 +75,6 @@ def test_moments_are_those_of_all_batches(scene, traced):
     np.testing.assert_array_equal(pooled.totals, means.mean(axis=2))
 
 
-def test_full_blocks_are_kept_as_one_file(scene, traced):
-    volpath(scene, batches=2 * BLOCK + 3)
-    (folder,) = cache_folder().iterdir()
-    names = sorted(path.stem for path in folder.iterdir())
-    assert names == ["000000-000007", "000008-000015", "000016", "000017", "000018"]
-
-
-def test_fewer_batches_than_are_kept_trace_at_most_a_part_of_a_block(scene, traced):
-    whole = volpath(scene, batches=3 * BLOCK)
-    traced.clear()
-    few = volpath(scene, batches=BLOCK + 2)
-    assert traced == [BLOCK, BLOCK + 1]
-    assert few.batches.seeds == tuple(range(BLOCK + 2))
-    assert_same(volpath(scene, batches=3 * BLOCK).batches, whole.batches)
-    assert len(traced) == 2
-
-
 @pytest.mark.claim("runs-go-on")
 @pytest.mark.parametrize("stop", [1, 8, 13])
 def test_an_interrupted_run_goes_on_where_it_stopped(scene, traced, stop):
@@ -175,13 +158,6 @@ def test_enough_is_asked_at_the_end_of_blocks_and_sees_the_same_from_the_cache(s
     assert_same(first.batches, second.batches)
 
 
-def test_enough_needs_two_batches(scene, traced):
-    """A first seed of 7 makes a first block of one batch, which has no standard error."""
-    asked = []
-    volpath(scene, batches=20, first_seed=7, enough=lambda batches: asked.append(len(batches.seeds)))
-    assert asked == [9, 17]
-
-
 def test_go_on_is_asked_before_tracing_but_not_for_what_is_kept(scene, traced):
     asked = []
 
@@ -212,13 +188,6 @@ def test_a_fresh_run_traces_again_what_is_older_than_it(scene, traced):
 def test_seeds_out_of_range_are_refused(scene, traced, seed):
     with pytest.raises(InputError, match=rf"seed: got {seed} for 2 batches"):
         volpath(scene, batches=2, first_seed=seed)
-
-
-def test_unknown_estimators_are_refused(scene, own_cache):
-    with pytest.raises(ValueError, match="wanted one of single-scatter, volpath"):
-        monte_carlo_batches(scene, "pathtracer", batches=2, samples=4)
-    with pytest.raises(ValueError, match="max_depth 3"):
-        monte_carlo_batches(scene, "single-scatter", batches=2, samples=4, max_depth=3)
 
 
 def test_single_scatter_goes_the_same_way(scene, own_cache):

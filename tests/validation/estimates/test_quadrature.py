@@ -6,7 +6,6 @@ import pytest
 
 from reference.storage.cache import cache_folder
 from tests.helpers.scenes import tiny_scene
-from validation.estimates.monte_carlo import monte_carlo_batches
 from validation.estimates.quadrature import truth_image, truth_of_pixels
 
 
@@ -47,24 +46,6 @@ def test_second_call_reads_the_same_numbers(scene, own_cache, computed):
     assert np.isfinite(first.airlight).all()
 
 
-def test_same_scene_loaded_again_is_found(scene, own_cache, computed):
-    import mitsuba as mi
-
-    truth_image(scene, samples=32)
-    truth_image(mi.load_dict(tiny_scene(size=(8, 6))), samples=32)
-    assert len(computed) == 1
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [{"samples": 33}, {"samples": 32, "shadow_scale": 0.99}],
-)
-def test_other_settings_are_computed(scene, own_cache, computed, changes):
-    truth_image(scene, samples=32)
-    truth_image(scene, **changes)
-    assert len(computed) == 2
-
-
 def test_other_phase_function_has_another_truth(scene, own_cache, computed):
     """The phase function has no parameters that a key could see; an isotropic truth would pass for it."""
     import mitsuba as mi
@@ -102,12 +83,6 @@ def test_the_truth_of_some_pixels_is_that_of_the_image(scene, own_cache):
     for layer in ("airlight", "surface", "distance", "light_angle"):
         values = getattr(whole, layer)
         np.testing.assert_array_equal(getattr(some, layer)[0], values.reshape(-1, *values.shape[2:])[pixels])
-
-
-def test_progress_is_told(scene, own_cache):
-    told = []
-    truth_image(scene, samples=16, progress=lambda *args: told.append(args))
-    assert told == [(1, 1, "quadrature")]
 
 
 @pytest.fixture
@@ -165,39 +140,6 @@ def test_quadrature_reference_is_the_truth_in_layers(loaded, own_cache):
     assert told[-1] == (1.0, "quadrature")
 
 
-def test_volpath_reference_has_layers_with_standard_errors(loaded, own_cache):
-    from validation.estimates.images import volpath_reference
-
-    image = volpath_reference(loaded, samples=3, seed=5)
-    batches = monte_carlo_batches(loaded.scene, "volpath", batches=3, samples=1, first_seed=5).batches
-    assert set(image.layers) == {"airlight", "airlight_se", "surface", "surface_se"}
-    np.testing.assert_array_equal(image.layers["surface"].reshape(-1, 3), batches.mean[1])
-    np.testing.assert_array_equal(image.layers["airlight_se"].reshape(-1, 3), batches.standard_error[0])
-    attributes = image.attributes
-    assert [attributes[f"airlight:{name}"] for name in ("estimator", "spp", "batches", "seed")] == ["volpath", 3, 3, 5]
-    np.testing.assert_array_equal(image.depth, truth_image(loaded.scene, samples=16).distance)
-
-
-@pytest.mark.parametrize("samples", [1, 2, 31, 64, 100, 8192, 8193, 100_000])
-def test_samples_are_split_into_batches_that_have_at_least_as_many(loaded, monkeypatch, samples):
-    import validation.estimates.images
-
-    asked = {}
-
-    def split(scene, estimator, **kwargs):
-        asked.update(kwargs)
-        raise KeyboardInterrupt  # the split is all that this test wants
-
-    monkeypatch.setattr(validation.estimates.images, "monte_carlo_batches", split)
-    with pytest.raises(KeyboardInterrupt):
-        validation.estimates.images.volpath_reference(loaded, samples=samples)
-    batches, each = asked["batches"], asked["samples"]
-    assert batches >= min(32, max(2, samples))  # 32 give a standard error that is known to 13 %
-    assert 1 <= each <= 256
-    # Never less than asked for, and not a whole batch more, but for the two that a standard error needs.
-    assert samples <= batches * each < samples + max(each, 2)
-
-
 @pytest.mark.statistical
 def test_volpath_reference_compares_with_the_quadrature_by_its_standard_errors(loaded, own_cache):
     """The two references go through the comparison of image files as a user's would."""
@@ -206,6 +148,7 @@ def test_volpath_reference_compares_with_the_quadrature_by_its_standard_errors(l
 
     comparison = compare_images(quadrature_reference(loaded), volpath_reference(loaded, samples=512), layer="surface")
     assert comparison.statistics is not None
-    # 32 batches: the standard deviation of z is sqrt(31/29) = 1.03; some 60 values, so +-0.1.
-    assert comparison.statistics.z_std == pytest.approx(1.03, abs=0.35)
+    # 32 batches: the deviation of z is sqrt(31/29) = 1.03. Of the 144 values those of a pixel share paths: some 48 are
+    # independent and know it to 1.03/sqrt(96) = 0.105: three of these.
+    assert comparison.statistics.z_std == pytest.approx(1.03, abs=0.32)
     assert comparison.statistics.rejected == 0

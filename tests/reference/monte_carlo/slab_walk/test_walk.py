@@ -12,7 +12,6 @@ import pytest
 
 from reference.monte_carlo.slab_walk.estimates import BATCH, slab_estimate
 from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein, Tabulated, turned
-from reference.monte_carlo.slab_walk.step_cloud import step_cloud_reflectance
 from reference.monte_carlo.slab_walk.walk import Slab, walk
 
 DATA = Path(__file__).parents[3] / "data"
@@ -88,25 +87,3 @@ def test_the_same_seed_is_the_same_whatever_the_workers():
     assert slab_estimate(slab, [ALL], photons=3000, seed=8) != one
     assert one.sets[0].fluence[0].value.value > one.up[0].value / math.pi  # passages over |mu|
     assert BATCH >= 10_000
-
-
-def test_the_error_of_the_step_cloud_is_its_spread_and_as_many_photons_walk_as_were_asked():
-    runs = [step_cloud_reflectance(30, photons=700, seed=seed) for seed in range(60)]
-    values, errors = (np.array(column) for column in zip(*runs, strict=True))
-    assert np.unique(np.rint(values * 700 / 32)).size > 5
-    assert values * 700 / 32 == pytest.approx(np.rint(values * 700 / 32), abs=1e-9)
-    # 60 runs of 32 columns know a variance to sqrt(2/(60 32)) = 3.2 %: four of these.
-    assert values.var(axis=0, ddof=1).mean() == pytest.approx((errors**2).mean(), rel=0.13)
-
-
-@pytest.mark.statistical
-@pytest.mark.slow
-@pytest.mark.claim("step-cloud", tolerance="0.0005 of the mean, 0.003 RMS over columns; 4 million photons")
-@pytest.mark.parametrize("sun", [0, 60])
-def test_the_step_cloud_is_that_of_i3rc(sun):
-    table = np.genfromtxt(DATA / "i3rc_step_cloud.csv", delimiter=",", names=True, skip_header=2)
-    expected = table[f"sun_{sun}"]
-    reflectance, error = step_cloud_reflectance(sun, photons=4_000_000)
-    assert reflectance.mean() == pytest.approx(expected.mean(), abs=5e-4)
-    assert math.sqrt(((reflectance - expected) ** 2).mean()) <= 3e-3
-    assert error.max() < 3e-3

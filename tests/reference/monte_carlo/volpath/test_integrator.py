@@ -29,15 +29,6 @@ def test_batches_merge_to_the_plain_mean_and_error(truth):
     assert together.totals.shape == (5, 2, 3)
 
 
-def test_same_batch_twice_is_refused(truth):
-    from reference.monte_carlo.batches import merged
-    from reference.monte_carlo.volpath.integrator import volpath_batch
-
-    batch = volpath_batch(truth, 3, 4)
-    with pytest.raises(ValueError, match="different seeds"):
-        merged(batch, batch)
-
-
 def test_materials_come_back(truth):
     """Black surfaces are put on for the airlight only."""
     from reference.monte_carlo.volpath.integrator import volpath_batch
@@ -45,26 +36,6 @@ def test_materials_come_back(truth):
     before = [shape.bsdf() for shape in truth.scene.shapes()]
     volpath_batch(truth, 0, 4)
     assert [shape.bsdf() for shape in truth.scene.shapes()] == before
-
-
-def test_layers_hold_what_they_say(truth):
-    from reference.monte_carlo.volpath.integrator import volpath_batch
-
-    batch = volpath_batch(truth, 1, 64)
-    hit = np.isfinite(_distance(truth))
-    airlight, surface = batch.mean
-    assert np.all(surface[~hit] == 0)
-    assert airlight.mean() > 0
-    assert surface[hit].mean() > 0
-
-
-def test_paths_are_traced_once_for_all_channels(truth):
-    """Rationale: an array that is read channel by channel is computed as often, and its kernel compiled as often.
-
-    Setup: a grey medium, so that one path serves all channels; the kernels of more than a thousand operations.
-    Expected: two launches, one with black surfaces and one in a medium that does not scatter.
-    """
-    assert len(_large_kernels(truth, samples=4)) == 2
 
 
 def test_one_kernel_serves_any_number_of_samples(truth):
@@ -83,12 +54,6 @@ def _large_kernels(truth, *, samples, seed=0):
         dr.kernel_history_clear()
         volpath_batch(truth, seed, samples)
         return [each["hash"] for each in dr.kernel_history((dr.KernelType.JIT,)) if each["operation_count"] > 1000]
-
-
-def _distance(truth):
-    from reference.quadrature.surface import surface_hits
-
-    return surface_hits(truth).distance
 
 
 @pytest.mark.claim("volpath-agrees")
