@@ -56,8 +56,9 @@ def lit_surface(
         The scene and what its rays hit.
     reached
         By light whether it reaches the surface at the end of each ray, as its lit intervals say. Where that is not
-        known, None, a shadow ray is cast; Mitsuba starts it 1e-4 off the surface, so that it can graze what the point
-        itself is clear of.
+        known, None, in bounded media and under directional lights, a shadow ray is cast in single precision. Mitsuba
+        starts it d = 1e-4 (1 + the largest coordinate) off the surface, so that the edges of shadows are off by at most
+        d tan(angle between normal and light) there: a point that is nearer to an edge may be lit or dark wrongly.
     shadow_scale
         See `reference.quadrature.ray_values`.
     """

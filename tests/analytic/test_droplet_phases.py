@@ -18,7 +18,7 @@ CERTIFIED = Path(__file__).parents[1] / "data" / "airlight_integral_droplets.csv
 
 
 @pytest.mark.claim("hg-draine", tolerance="1e-8: quadrature across a peak of g = 0.99")
-@pytest.mark.parametrize("diameter", [5, 12, 23.5])
+@pytest.mark.parametrize("diameter", [12, *(pytest.param(d, marks=pytest.mark.slow) for d in (5, 23.5))])
 def test_hg_draine_has_mean_one_and_its_moments(diameter):
     phase = PhaseFunction("hg-draine", diameter=diameter)
     expected = moments(phase, 8, breaks=(1.0, 10.0), degree=2000)

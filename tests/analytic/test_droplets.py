@@ -52,7 +52,7 @@ def test_the_phase_function_has_mean_one_and_its_moments():
 
 
 @pytest.mark.claim("droplets-modified", tolerance="1e-9: what is cut is what the density loses")
-@pytest.mark.parametrize("cut", ["zero", "flat"])
+@pytest.mark.parametrize("cut", ["zero", pytest.param("flat", marks=pytest.mark.slow)])
 def test_what_is_cut_is_what_the_density_loses(cut):
     full = optics()
     matched = Modified(full, cut=cut)

@@ -59,8 +59,10 @@ def _pooled(batches, layer):
 
 
 @pytest.mark.claim("area-lights-by-samples", tolerance="four standard errors, which are below 0.25 %")
-@pytest.mark.parametrize("bsdf", [BLACK, NULL], ids=["black", "null"])
-@pytest.mark.parametrize("sphere", SPHERES)
+@pytest.mark.parametrize("bsdf", [BLACK, pytest.param(NULL, marks=pytest.mark.statistical)], ids=["black", "null"])
+@pytest.mark.parametrize(
+    "sphere", [pytest.param(s, marks=[] if s in SPHERES[1::3] else pytest.mark.statistical) for s in SPHERES]
+)
 def test_sphere_light_has_the_certified_airlight(variant, sphere, bsdf):
     """Rationale: the one shape whose airlight without occluder is known to 13 digits; a black one must not hide itself.
 
@@ -102,7 +104,7 @@ _CASES = {
     for bsdf in (BLACK, NULL)
     for in_view in (False, True)
 }
-_FAST = ("rectangle, black, in view", "sphere, null, in view")
+_FAST = ("rectangle, black, in view",)
 
 
 @pytest.mark.claim("area-lights-by-samples", tolerance="four standard errors, which are below 1 %")
@@ -152,7 +154,9 @@ def test_both_estimators_agree_where_the_light_crosses_the_bounds_of_a_medium(va
 
 
 @pytest.mark.claim("area-lights-by-samples", tolerance="four standard errors, which are below 0.2 %")
-@pytest.mark.parametrize("kind", ["rectangle", "disk", "sphere"])
+@pytest.mark.parametrize(
+    "kind", ["rectangle", *(pytest.param(k, marks=pytest.mark.statistical) for k in ("disk", "sphere"))]
+)
 def test_surfaces_are_those_of_mitsubas_direct_integrator(variant, kind):
     """Rationale: without fog, Mitsuba's `direct` is a third way to the light on surfaces."""
     import drjit as dr
@@ -179,6 +183,7 @@ def test_surfaces_are_those_of_mitsubas_direct_integrator(variant, kind):
     assert np.all(np.abs(mean - expected) < 4 * together)
 
 
+@pytest.mark.slow
 def test_black_lights_end_camera_rays_in_volpath_and_null_ones_do_not(variant):
     """Rationale: `hide_emitters` hides the light that is seen directly, in Mitsuba 3.9.1 not the shape.
 
@@ -197,7 +202,7 @@ def test_black_lights_end_camera_rays_in_volpath_and_null_ones_do_not(variant):
     assert surfaces[1].mean() == pytest.approx(plain.mean(), rel=0.05)
 
 
-@pytest.mark.parametrize("kind", ["rectangle", "disk", "sphere"])
+@pytest.mark.parametrize("kind", ["sphere", *(pytest.param(k, marks=pytest.mark.slow) for k in ("rectangle", "disk"))])
 def test_density_of_points_on_a_light(variant, kind):
     """Rationale: an importance density that is wrong anywhere is a bias.
 

