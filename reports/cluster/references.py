@@ -21,7 +21,7 @@ from reports import __version__
 from reports.cluster.connect import Cluster
 from reports.cluster.run import Group, Task, run_groups
 from reports.machine.environment import activate
-from validation.estimates.monte_carlo import Elsewhere, Spread, Trace, batch_tracer
+from validation.estimates.monte_carlo import Elsewhere, ElsewhereFor, Trace, batch_tracer
 from validation.estimates.quadrature import has_truth, keep_truth, truth_image
 from validation.scenes.loading import load_scene
 from validation.sweep.keys import Made, made_here
@@ -117,7 +117,7 @@ def tracing(
     return Elsewhere(bring, batches or _WAVE * max(1, workers))
 
 
-def spread(cluster: Cluster, picture: Picture) -> Spread:
+def spread(cluster: Cluster, picture: Picture) -> ElsewhereFor:
     """Return what lets workers trace the batches that check a truth."""
     return lambda estimator, samples, counts: tracing(cluster, picture, estimator, samples=samples, counts=counts)
 

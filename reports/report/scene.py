@@ -19,7 +19,7 @@ from reports.report.expected import scene_seconds, shares
 from validation.comparison.engine_images import EngineImage
 from validation.configurations.methods import Configuration
 from validation.configurations.user_code import user_code
-from validation.estimates.monte_carlo import Spread
+from validation.estimates.monte_carlo import ElsewhereFor
 from validation.frames.benchmark import Apart, Measurement, configurations_for
 from validation.frames.result_cache import (
     CachedResult,
@@ -81,7 +81,7 @@ def scene_report(
     results: list[CachedResult],
     own: OwnMethods,
     progress: Progress,
-    spread: Spread | None = None,
+    spread: ElsewhereFor | None = None,
 ) -> dict[str, Any]:
     """Return what the report says of a scene, and write its files.
 

@@ -31,7 +31,7 @@ from reference.quadrature.light_points import REPLICATES
 from reference.quadrature.ray_values import TruthImage
 from reference.scene.read import TruthScene, read_truth
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
-from validation.estimates.monte_carlo import Spread, monte_carlo_batches
+from validation.estimates.monte_carlo import ElsewhereFor, monte_carlo_batches
 from validation.estimates.quadrature import truth_image
 from validation.estimates.reference_layers import reference_error, reference_layer
 from validation.statistics.comparison import Estimate, Statistics, compare_statistics
@@ -76,7 +76,7 @@ def agreement(
     samples: int = _SAMPLES,
     seconds: float | None = None,
     progress: Progress | None = None,
-    spread: Spread | None = None,
+    spread: ElsewhereFor | None = None,
 ) -> dict[str, Agreement]:
     """Compare an estimator with the quadrature image of a Mitsuba scene at its own size.
 
@@ -178,7 +178,7 @@ def agreements(
     samples: Mapping[str, int] | None = None,
     seconds: float | None = None,
     progress: Callable[[float, str], None] | None = None,
-    spread: Spread | None = None,
+    spread: ElsewhereFor | None = None,
 ) -> dict[str, Agreement]:
     """Compare several estimators with the quadrature image.
 

@@ -61,7 +61,7 @@ class Elsewhere:
 
 
 #: Estimator, samples a batch, and their counts by pixel or None -> who traces such batches.
-Spread = Callable[[str, int, NDArray[np.integer] | None], Elsewhere]
+ElsewhereFor = Callable[[str, int, NDArray[np.integer] | None], Elsewhere]
 
 
 def monte_carlo_batches(

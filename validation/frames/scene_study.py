@@ -15,7 +15,7 @@ from reference.quadrature.ray_values import TruthImage
 from reference.storage.scene_digest import scene_digest
 from validation.configurations.methods import QUICK, Configuration
 from validation.estimates.agreement import Agreement, agreements
-from validation.estimates.monte_carlo import Spread
+from validation.estimates.monte_carlo import ElsewhereFor
 from validation.estimates.multiple_scattering import MultipleScattering, multiple_scattering_share
 from validation.estimates.quadrature import truth_image
 from validation.frames.benchmark import Apart, Measurement, measure, render_and_time_by_name
@@ -182,7 +182,7 @@ def open_study(name_or_path: str, effort: Effort) -> SceneStudy:
 
 
 def check_truth(
-    study: SceneStudy, *, progress: Progress | None = None, spread: Spread | None = None
+    study: SceneStudy, *, progress: Progress | None = None, spread: ElsewhereFor | None = None
 ) -> dict[str, Agreement]:
     """Compare the truth with the Monte Carlo estimators, with the size, margins and patience of the effort.
 

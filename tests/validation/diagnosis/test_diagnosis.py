@@ -65,6 +65,15 @@ def test_a_planted_fault_comes_first(truth, planted):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("words", ["the extinction 1.4 times", "upside down", "filmic", "half a pixel", "sRGB"])
+def test_a_planted_fault_comes_first_in_noise_and_pixels_of_a_kind_that_nobody_tells(truth, words):
+    """The images of the test above have no noise, and it says that their pixels are centres: an engine says neither."""
+    (planted,) = (each for each in PLANTED if each.words == words)
+    noise = 1 + 0.01 * np.random.default_rng(6).standard_normal((SIZE[1], SIZE[0], 1))
+    assert diagnosed(planted.image(truth) * noise, pixel=None).first == planted.name
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["g-sign", "camera-leg", "near-plane", "distance-law", "light-radius"])
 def test_faults_of_fog_with_a_lobe_are_named(variant, tmp_path, name):
     path = tmp_path / "fog.xml"
