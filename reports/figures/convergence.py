@@ -7,6 +7,7 @@ pixel; without a bias it falls with the order 1/2. For volpath the image is that
 """
 
 from pathlib import Path
+from typing import Any
 
 from reference.storage.files import ensure_folder
 from reports.figures.files import name_sizes, new_figure, read_data, values, write_data
@@ -20,7 +21,7 @@ SCENE = "open-fog"
 ESTIMATORS = ("single-scatter", "volpath")
 _SAMPLES = 16  # samples a pixel in each batch
 _HEADER = ("name", "samples", "error", "measured")
-_STYLES = {
+_STYLES: dict[str, dict[str, Any]] = {
     "single-scatter": {"color": COLOURS["blue"], "marker": "o"},
     "volpath": {"color": COLOURS["vermillion"], "marker": "s"},
 }
