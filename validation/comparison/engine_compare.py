@@ -136,8 +136,6 @@ def compare_scene(
     ----------
     scene
         A built-in scene or a Mitsuba XML file.
-    path
-        The EXR file.
     layer, holds
         The layer to judge and what it holds, see `validation.comparison.engine_layers.judged_layer`.
     pixel
@@ -146,8 +144,6 @@ def compare_scene(
         See `validation.comparison.images.compare_files`.
     margin
         Largest relative bias [1] that counts as agreement; with standard errors, what they can show counts.
-    progress
-        Called with (share done, what) while a truth is computed.
 
     Raises
     ------

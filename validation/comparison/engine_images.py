@@ -107,8 +107,6 @@ def measure_image(shown: EngineImage, truth_of: TruthOf, *, surfaces: bool) -> I
 
     Parameters
     ----------
-    shown
-        The image.
     truth_of
         Computes the quadrature truth for 'centre' or 'area'.
     surfaces

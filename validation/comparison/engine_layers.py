@@ -42,8 +42,6 @@ def judged_layer(
 
     Parameters
     ----------
-    image, path
-        The image and its file.
     name
         The layer: by default 'airlight' where there is one, else the plain channels, else the only layer, else the only
         one that Blender calls Combined.

@@ -58,8 +58,6 @@ def fit_pixel(image: JudgedLayer, truth_of: TruthOf, pixel: str | None = None) -
 
     Parameters
     ----------
-    image
-        The layer that is judged.
     truth_of
         Computes a truth; asked for the means only if the image does not fit the centres to `EXACT`.
     pixel

@@ -158,8 +158,6 @@ def compare_files(
 
     Parameters
     ----------
-    reference, test
-        The EXR files.
     layer
         The layer to compare, (height, width, 3) [W/(m^2 sr)].
     mask

@@ -89,8 +89,6 @@ def time_in_turns(
         Functions without arguments that evaluate their results.
     seconds
         Stop after about this long [s], but not before `least` turns.
-    least, most
-        Bounds of the number of turns.
 
     Returns
     -------
@@ -205,8 +203,6 @@ def time_frame(
 
     Parameters
     ----------
-    renderer
-        Of the frame.
     seconds
         Time to spend on each of the first three, and half of it on each of the others.
     slow

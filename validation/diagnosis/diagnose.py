@@ -136,16 +136,12 @@ def diagnose_image(
     ----------
     image, loaded
         The layers, and the scene at their size.
-    path
-        What to call the image.
     layer, holds
         Which layer, and what it holds: 'airlight', 'surface' or 'total'.
     pixel
         'centre' or 'area'; by default what the image says of itself, or what fits better.
     light
         Of this scene, as other images of it have found it.
-    progress
-        Called with (share done, what).
 
     Raises
     ------

@@ -64,8 +64,6 @@ def explain(
 
     Parameters
     ----------
-    predictor
-        The image and its scene.
     hypotheses
         In the order in which they change the guess.
     near

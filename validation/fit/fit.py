@@ -136,8 +136,6 @@ def fit_file(
 
     Parameters
     ----------
-    path
-        The EXR file.
     scene
         A built-in scene or a Mitsuba XML file: geometry, camera and lights are taken from it, and so is what is not
         looked for.
@@ -179,22 +177,16 @@ def fit_image(
 
     Parameters
     ----------
-    image
-        The layers.
     loaded
         The scene, at the size of the image.
     parameters, layer, holds
         See `fit_file`; what the layer holds is 'airlight', 'surface' or 'total'.
-    path
-        What to call the image.
     pixel
         'centre' or 'area'; by default what the image says of itself, or what fits better.
     mask
         Which pixels may take part, (height, width); all by default.
     starts
         Values to begin with, by name; the scene's own by default.
-    progress
-        Called with (share done, what).
 
     Raises
     ------

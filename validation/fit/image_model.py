@@ -110,16 +110,10 @@ def image_model(
 
     Parameters
     ----------
-    task
-        The image.
-    most
-        Rays at most.
     apart
         Where not all pixels take part, they are chosen as pairs so far apart in a row; 0: each by itself [pixels].
     seed
         Of the choice of pixels, and of the places of rays in them.
-    progress
-        Called with (share done, what).
     how
         More for `validation.fog_model.build.scattering_paths`.
     """

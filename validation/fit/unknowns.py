@@ -94,8 +94,6 @@ def read_unknowns(
 
     Parameters
     ----------
-    names
-        Words as above.
     truth, fog
         The scene, and what it says of the fog.
     starts

@@ -52,8 +52,6 @@ def scattering_paths(
 
     Parameters
     ----------
-    truth
-        The scene.
     pixels
         Numbers of the pixels, row by row; all by default.
     rays_per_side
@@ -71,14 +69,10 @@ def scattering_paths(
         Distance along the camera's axis before which point and spot lights have no nodes [m].
     shadows
         False where surfaces hide nothing from the lights.
-    airlight, surface
-        Which paths are wanted.
     points
         How many points stand for a light with extent.
     seed
         Of the points on lights with extent.
-    progress
-        Called with (share done, what).
     """
     size = truth.width, truth.height
     pixels = np.arange(size[0] * size[1]) if pixels is None else np.unique(pixels)

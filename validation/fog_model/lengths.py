@@ -25,8 +25,6 @@ def lengths(truth: TruthScene, origin: Array, direction: Array, low: Array, high
 
     Parameters
     ----------
-    truth
-        The scene.
     origin, direction
         Of the lines, (n, 3), either also (3,) for all [m].
     low, high

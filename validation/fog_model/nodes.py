@@ -31,8 +31,6 @@ def panel_nodes(
     ----------
     start, width
         Of the intervals, (n,), in any variable.
-    most
-        Widest panel.
     short
         Widest interval that few nodes serve.
     orders

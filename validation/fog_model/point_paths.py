@@ -33,8 +33,6 @@ def point_nodes(
 
     Parameters
     ----------
-    truth
-        The scene, with any rays.
     light
         The light; its intensity is left out.
     distance

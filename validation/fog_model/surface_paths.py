@@ -29,8 +29,6 @@ def surface_points(
     ----------
     truth, light
         The scene and one of its lights, or a point of a light with extent.
-    hits
-        What the rays hit.
     shadows
         False where other surfaces hide nothing.
     """

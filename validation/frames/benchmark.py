@@ -97,8 +97,6 @@ def measure(
     ----------
     scene
         From `realtime.scene.read_scene.read_scene`, at the size of the truth.
-    chosen
-        The configuration.
     truth
         The quadrature truth of the same scene.
     timed, seconds, slow, limit, probe
@@ -156,12 +154,8 @@ def render_and_time(
     ----------
     scene
         From `realtime.scene.read_scene.read_scene`.
-    chosen
-        The configuration.
     timed
         The scene at the size of the timed frames; None if that is the size of the scene.
-    seconds
-        Time to spend on each timing.
     slow
         See `validation.configurations.timing.time_frame` [s].
     limit, probe

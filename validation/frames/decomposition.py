@@ -79,10 +79,6 @@ def decompose(
 
     Parameters
     ----------
-    scene
-        The scene.
-    chosen
-        The configuration.
     truth
         Airlight at pixel centres, (height, width, 3) [W/(m^2 sr)].
     render

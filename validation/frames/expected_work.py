@@ -65,10 +65,6 @@ def check_work(what: str, works: Iterable[Work], *, force: bool) -> None:
     ----------
     what
         What is asked for, as the message begins.
-    works
-        One after the other.
-    force
-        The user has answered.
 
     Raises
     ------

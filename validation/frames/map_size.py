@@ -131,8 +131,6 @@ def map_errors(
         other errors, such as that of the steps of a marcher, must be well below the error of the largest map.
     sizes
         Of the shadow map [texels].
-    progress
-        Callback with the number done, the total and a description, before every size, or None.
 
     Raises
     ------

@@ -108,8 +108,6 @@ def flip_hdr(
         images, black where that cannot be shown, so that they add nothing to their neighbours either.
     exposure
         A single exposure [stops] instead of the range of `exposure_range`.
-    pixels_per_degree
-        Of visual angle.
     timeout
         Seconds after which the child is ended.
 

@@ -48,8 +48,6 @@ def unit_airlight(media: list[PlacedMedium], seen: Ways, light: Array, *, direct
 
     Parameters
     ----------
-    media, seen
-        Of the scene.
     light
         Where it is, or with `directional` a point very far away from which it comes, (3,).
     directional

@@ -63,10 +63,6 @@ def draw_casters(
 
     Parameters
     ----------
-    draws, ranges
-        Of the scene.
-    camera, lights
-        What was drawn before.
     in_shadow
         Whether a plate keeps the first light from the camera.
     """

@@ -53,10 +53,6 @@ def draw_lights(
 
     Parameters
     ----------
-    draws, ranges
-        Of the scene.
-    media, camera
-        What was drawn before.
     seen
         Rays of the camera, for the brightness.
     """

@@ -156,8 +156,6 @@ def ranges_from(table: Mapping[str, Any], where: str = "ranges") -> Ranges:
     ----------
     table
         Ranges as pairs and weights as tables, by the names of `Ranges`.
-    where
-        Where they stand, for messages.
 
     Raises
     ------

@@ -33,8 +33,6 @@ def reach(drawn: DrawnScene, triangles: Sequence[Array], aspect: float = 0.75) -
 
     Parameters
     ----------
-    drawn
-        The scene.
     triangles
         The corners of every caster, in their order, (n, 3, 3) [m].
     aspect

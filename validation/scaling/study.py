@@ -101,12 +101,6 @@ def study_scaling(
         Of `validation.scaling.ladders.KINDS`.
     steps
         Of `validation.scaling.ladders.ladder`.
-    configurations
-        What is measured.
-    seconds
-        Time to spend on each timing.
-    progress
-        Called after each step with how many are done, how many there are, and a name.
     """
     costs: dict[Configuration, list[Cost]] = {chosen: [] for chosen in configurations}
     refused: dict[Configuration, str] = {}
@@ -150,8 +144,6 @@ def growth(kind: str, name: str, costs: Sequence[Cost]) -> Growth:
 
     Parameters
     ----------
-    kind
-        Of the work.
     name
         Of `TIMES`.
     costs

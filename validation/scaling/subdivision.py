@@ -40,8 +40,6 @@ def subdivided(scene, levels: int) -> Any:
 
     Parameters
     ----------
-    scene
-        The Mitsuba scene.
     levels
         How often each triangle is cut into four.
 

@@ -73,10 +73,6 @@ def animate(scene: Scene, animation: Animation, frames: int) -> Iterator[Scene]:
     ----------
     scene
         As `realtime.scene.read_scene.read_scene` returns it.
-    animation
-        What moves.
-    frames
-        How many scenes to yield.
 
     Raises
     ------

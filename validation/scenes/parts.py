@@ -23,8 +23,6 @@ def lathe(radius: ArrayLike, height: ArrayLike, sides: int) -> Mesh:
     ----------
     radius, height
         The profile from bottom to top, (n,) each [m]. Every radius is positive; fans close the ends.
-    sides
-        Number of corners of each ring.
     """
     radius, height = np.asarray(radius, dtype=np.float64), np.asarray(height, dtype=np.float64)
     angle = 2 * np.pi * np.arange(sides) / sides
@@ -124,8 +122,6 @@ def medium_boundary(name: str, mesh: Mesh, medium: Any, around: Any = None):
 
     Parameters
     ----------
-    name, mesh
-        Of the shape.
     medium, around
         What is inside of it, and outside where that is no clear air: dictionaries or media of Mitsuba.
     """
@@ -156,8 +152,6 @@ def fog(
     ----------
     sigma_t
         Extinction, grey or RGB [1/m].
-    albedo
-        Single-scattering albedo, RGB.
     phase
         Dictionary of the phase function; isotropic by default.
     """

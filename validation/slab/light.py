@@ -25,14 +25,8 @@ def slab_numbers(
 
     Parameters
     ----------
-    request
-        What is asked for.
     photons
         How many photons check the numbers; none by default.
-    seed
-        Of the photons.
-    progress
-        Called with (share done, what).
 
     Returns
     -------

@@ -27,10 +27,6 @@ class SlabRequest:
         Thickness [mean free paths].
     sun
         Zenith angle of the sun [degrees].
-    phase
-        The phase function.
-    albedo
-        Single-scattering albedo.
     orders
         Names of the sets of orders: '3', '3-4', '31-inf', 'all'.
     depths

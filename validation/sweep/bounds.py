@@ -84,8 +84,6 @@ def worth_of_ends(scene: Any, pixels: NDArray[np.int64]) -> Array:
     ----------
     scene
         The `mi.Scene`.
-    pixels
-        Numbers of pixels, row by row.
 
     Notes
     -----

@@ -90,18 +90,8 @@ def cell_row(
 
     Parameters
     ----------
-    cell
-        The cell.
-    scene
-        Of the cell, as methods read it.
-    truth
-        Of the cell's image.
     whole
         The `mi.Scene` that both were read of.
-    properties
-        Of the scene.
-    paint
-        Makes the picture of the row.
 
     Notes
     -----

@@ -55,10 +55,6 @@ def octaves(points: Array, size: float, count: int, seed: int) -> Array:
         Where [m].
     size
         Of the cells of the first octave [m]; each one's are half as large, and count half as much, as the last one's.
-    count
-        How many octaves.
-    seed
-        Of the first; the others follow.
     """
     weights = 0.5 ** np.arange(count)
     total = np.zeros(len(points))
