@@ -27,9 +27,9 @@ from reference.scene import read
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
 from tests.evidence.injected import injected
 from tests.evidence.mutations import Mutation
+from tests.helpers.probes import PROBES, WIDE_PROBES
 from validation.estimates.agreement import batch_estimate, layer_masks, truth_estimate, width_to_reach
 from validation.scenes.loading import load_scene, resize
-from validation.scenes.probes import PROBES, WIDE_PROBES
 from validation.statistics.comparison import compare_statistics
 
 #: Of the relative bias of quadrature against single-scatter, by stage [1]; each fault there but one is larger.

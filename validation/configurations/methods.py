@@ -37,9 +37,6 @@ class Configuration:
         return ":" in self.method or ":" in (self.kernel or "")
 
 
-#: The tolerance of adaptive sampling in tables: with it, 99 % of the pixels are within 1e-3.
-TOLERANCE = 0.005
-
 #: What `soft-shafts` does beyond Ali 2016: the pixels of a tile share sixteen light points and their steps.
 SHARED_POINTS: tuple[tuple[str, int | float | str], ...] = (
     ("points", 16),

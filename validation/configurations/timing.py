@@ -113,14 +113,6 @@ def time_in_turns(
     return [Timing(float(median), float(low), float(high), len(times)) for low, median, high in quartiles]
 
 
-def timed_frame(renderer: FrameRenderer, scene: Scene, cache: FrameCache | None, **moved: bool):
-    """Render the next frame by `realtime.frame.incremental.next_frame`, and also return its time [ms] as the last."""
-    begin = time.perf_counter()
-    stages, cache = next_frame(renderer, scene, cache, **moved)
-    dr.sync_thread()
-    return stages, cache, 1e3 * (time.perf_counter() - begin)
-
-
 def timed_image(renderer: FrameRenderer, scene: Scene, caches: tuple[FrameCache, ...] | None, **moved: bool):
     """Render the next frame by `realtime.frame.incremental.next_parts`.
 

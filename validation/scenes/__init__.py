@@ -33,7 +33,6 @@ Read in this order:
 - `ring.py`: a ring of cloud;
 - `two_lobes.py`: a cloud of two lobes;
 - `random_scene.py`: scenes drawn from a seed;
-- `probes.py`: small scenes for what the built-in ones lack, used by checks of the checks;
 - `numbers.py`: refuses numbers of which no finite image can come;
 - `changes.py`: camera, lights and media of a scene changed by name;
 - `lobes.py`: isotropic media given a mean cosine;

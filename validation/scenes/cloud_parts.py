@@ -35,18 +35,6 @@ def droplets() -> dict[str, Any]:
     return tabulated_phase("mie", 20001)
 
 
-def without_peak(share: float) -> dict[str, Any]:
-    """Return a cloud of droplets without the peak of their phase function below 5 degrees.
-
-    Parameters
-    ----------
-    share
-        Of the light, in the peak: the density loses as much (Bouthors et al. 2008, appendix A).
-    """
-    left = 1 - _ALBEDO * share
-    return fog(EXTINCTION * left, (_ALBEDO * (1 - share) / left,) * 3, tabulated_phase("mie-modified", 20001))
-
-
 def sun(travels: Sequence[float], irradiance: Sequence[float]) -> dict[str, Any]:
     """Return a directional light.
 

@@ -9,10 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tests.helpers import probes
 from tests.helpers.frames import frame, read, relative_rmse, truth
 from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 from tests.helpers.suns import brick, pearl, sunny
-from validation.scenes import probes
 
 COARSE = {"width": 5, "height": 4, "slices": 7, "near": 0.6, "far": 7.3}
 
