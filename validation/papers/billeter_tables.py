@@ -39,6 +39,7 @@ Array = NDArray[np.float64]
 
 SIZE = (1024, 1024)  #: of the published images [pixels]
 MAPS = (1024, 2048, 4096)  #: of Table 1 [texels]
+PASSES = ("laplacian", "edge map", "tessellate", "vertices")  #: of the adaptive tessellation
 _SECONDS = 0.1  # for each timing [s]
 _MESH: dict[str, Any] = {"evaluation": "mesh"}
 _MARCH: dict[str, Any] = {"sum": "transitions", "spacing": "uniform", "shadow": "map"}
@@ -147,9 +148,9 @@ def _view(scene: Scene, view: str, texels: int, tessellation: str) -> dict[str, 
             return found | {f"{view} triangles": sum(len(mesh.triangles) for mesh in ready)}
         return found | {f"{named} {name}": time for name, time in _passes(scene, texels).items()}
 
-    passes = ("volume",) if tessellation == "static" else ("volume", "laplacian", "edge map", "tessellate", "vertices")
-    names = (f"{named} fps", f"{view} triangles", *(f"{named} {name}" for name in passes))
-    return attempted(names, measured)
+    names = (f"{named} fps", f"{named} volume")
+    more = (f"{view} triangles",) if tessellation == "static" else tuple(f"{named} {name}" for name in PASSES)
+    return attempted((*names, *more), measured)
 
 
 def _passes(scene: Scene, texels: int) -> dict[str, float]:

@@ -6,7 +6,7 @@ import pytest
 
 from tests.validation.papers.test_claims import JUDGED, key, measured
 from validation.configurations.timing import Timing
-from validation.papers.claims import taken, verdict
+from validation.papers.claims import claims, taken, verdict
 from validation.papers.experiments import EXPERIMENTS
 
 
@@ -104,3 +104,23 @@ def test_experiments_have_the_recorded_verdicts(variant, name):
             assert not isinstance(figure, str), figure
             if not each.ours:
                 assert verdict(each, figure) == verdict(each, measured(each)), key(each)
+
+
+def asked(name):
+    """Return the names of the figures that claims take from an experiment."""
+    return {part for each in claims() if each.experiment == name for part in each.figure.split(" / ")}
+
+
+@pytest.mark.slow
+def test_small_tables_have_every_figure_that_claims_ask_for(variant, monkeypatch):
+    """Tables take minutes at the published sizes; here each is as small as it can be, and no rate is looked at."""
+    from validation.papers import billeter_tables, biri_tables, soft_shafts
+
+    assert asked("biri tables") <= set(biri_tables.biri_tables(scale=0.04, seconds=0.0))
+    assert asked("soft shafts") <= set(soft_shafts.soft_shafts((40, 32), seconds=0.0))
+    monkeypatch.setattr(billeter_tables, "_SECONDS", 0.0)
+    small = billeter_tables.billeter_tables((16, 12), maps=(16, 32, 64))
+    maps = {"16": "1024", "32": "2048", "64": "4096"}
+    found = {" ".join(maps.get(word, word) for word in name.split()) for name in small}
+    assert asked("billeter tables") <= found
+    assert small["colonnade 32 triangles"] == 2 * 32**2 + 4 * 32  # the texels, and the sides up to the light
