@@ -19,7 +19,6 @@ Read in this order:
 - `map_size.py`: error and flicker against the size of the shadow map
 - `scaling.py`: what methods cost as their work grows, and exponents
 - `slab.py`: a slab by order of scattering
-- `diagnosis.py`: planted faults and the answers
 - `fit.py`: parameters that explain an image
 - `clouds.py`: tables of canonical transport and their errors
 - `checks.py`: the light that single scattering leaves out

@@ -21,15 +21,10 @@ def gone(view):
 
 
 @pytest.mark.claim("help-is-light")
-def test_the_import_is_light_and_the_variant_is_chosen_on_first_use():
-    code = (
-        "import sys, airlight\n"
-        "assert not {'numpy', 'mitsuba', 'reports.api.images'} & set(sys.modules)\n"
-        "frame = airlight.render('open-fog', 'unshadowed', size=(8, 6))\n"
-        "import mitsuba; assert mitsuba.variant() == airlight.activate(); print(frame)\n"
-    )
+def test_the_import_is_light():
+    code = "import sys, airlight\nassert not {'numpy', 'mitsuba', 'reports.api.images'} & set(sys.modules)\n"
     ran = subprocess.run([sys.executable, "-W", "error", "-c", code], cwd=ROOT, capture_output=True, text=True)
-    assert ran.stdout == "Rendering(open-fog by unshadowed (exact), 8 x 6)\n", ran.stderr
+    assert (ran.returncode, ran.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("module", ["airlight", "reports.api.images", "reports.api.reference"])
