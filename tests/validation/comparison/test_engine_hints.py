@@ -98,14 +98,6 @@ def test_values_that_are_not_finite_are_left_out(truth):
     assert len(hints.words) == 1
 
 
-def test_black_images_raise_no_suspicion(truth):
-    assert find_hints(0 * truth, truth).words == ()
-    black = find_hints(truth, 0 * truth)
-    assert black.words == ()
-    assert math.isnan(black.factor)
-    assert find_hints(truth, np.full_like(truth, np.nan)).words == ()
-
-
 @pytest.mark.parametrize(
     ("change", "reason"),
     [

@@ -11,10 +11,8 @@ from reference.scene.read import read_truth
 from reference.storage.exr import Image
 from tests.helpers.aside import write_scenes
 from tests.helpers.planted_faults import PAIRS, PLANTED
-from validation.comparison.whole_image import to_srgb
 from validation.diagnosis.diagnose import diagnose_image
 from validation.diagnosis.diagnosis_text import diagnosis_lines
-from validation.diagnosis.encoding import gamma, srgb_in_8_bits
 from validation.diagnosis.prediction import Guess, Scenery, changed_scene
 from validation.diagnosis.search import Explanation
 from validation.diagnosis.verdict import correlation, is_noise
@@ -138,12 +136,6 @@ def test_errors_of_few_pixels_are_no_noise():
     assert correlation(0.01 * generator.standard_normal((400, 3)), pairs) < 0.25
 
 
-def test_neighbours_are_compared_by_channel():
-    """Red too bright and blue too dark by as much is no noise."""
-    errors = np.tile([0.1, 0.0, -0.1], (400, 1))
-    assert correlation(errors, (np.arange(399), np.arange(1, 400))) == pytest.approx(1.0)
-
-
 def test_noise_is_of_one_size_all_over_the_image(truth):
     generator = np.random.default_rng(2)
     errors, pairs = 0.02 * generator.standard_normal((400, 3)), (np.arange(399), np.arange(1, 400))
@@ -163,14 +155,6 @@ def test_one_of_several_minima_is_found(variant, tmp_path):
     diagnosis = diagnosed(planted.image(read_truth(load_scene(path, SIZE).scene)), path)
     assert (diagnosis.first, diagnosis.ranked[0].together) == ("g", ())
     assert diagnosis.ranked[0].parameter == pytest.approx(0.14, abs=1e-3)
-
-
-@pytest.mark.slow
-def test_half_a_pixel_is_named_where_edges_are_sharp(variant):
-    """A search by slopes alone found nothing in the shafts of this scene."""
-    own = read_truth(load_scene("windows", SIZE).scene)
-    (planted,) = (each for each in PLANTED if each.name == "shift")
-    assert diagnosed(planted.image(own), "windows").first == "shift"
 
 
 @pytest.mark.slow
@@ -225,13 +209,6 @@ def test_what_nothing_explains_is_said(truth):
     diagnosis = diagnosed(total(other))
     assert diagnosis.first == "unexplained"
     assert "Nothing here explains it" in "\n".join(diagnosis_lines(diagnosis))
-
-
-def test_encodings_are_what_their_standards_say():
-    values = np.array([[0.0, 0.0031308, 0.18]])
-    assert to_srgb(values) == pytest.approx(np.array([[0.0, 0.04045, 0.461356]]), abs=1e-5)
-    assert srgb_in_8_bits(values) * 255 == pytest.approx(np.array([[0, 10, 118]]))
-    assert gamma(np.array([[0.25]]), 2.0) == pytest.approx(np.array([[0.5]]))
 
 
 def test_a_scenery_changes_lights(truth):

@@ -7,7 +7,7 @@ import pytest
 from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
-from validation.configurations.methods import STANDARD, Configuration, configuration
+from validation.configurations.methods import STANDARD, Configuration
 from validation.frames.benchmark import configurations_for, measure
 from validation.scenes.loading import LoadedScene
 
@@ -100,19 +100,6 @@ def test_variants_of_shadows_are_left_out_where_nothing_casts_one():
     assert 0 < len(left) < len(STANDARD)
     assert all(not {"shadow", "map"} & set(dict(configuration.parameters)) for configuration in left)
     assert {configuration.method for configuration in left} == {configuration.method for configuration in STANDARD}
-
-
-def test_a_method_of_ones_own_that_is_not_frozen_has_a_note(tmp_path, variant):
-    from validation.estimates.quadrature import truth_image
-
-    path = tmp_path / "own_bench_for_tests.py"
-    path.write_text("def f(view):\n    return 1\n\n\ndef g(view):\n    return 1\n\n\ng.frozen = True\n")
-    loaded = mi.load_dict(tiny_scene())
-    truth = truth_image(loaded)
-    notes = [
-        measure(read_scene(loaded), configuration(f"{path}:{name}"), truth=truth, seconds=0.01).note for name in "fg"
-    ]
-    assert notes == ["not frozen: its Python runs again for every frame", None]
 
 
 class Clock:

@@ -56,13 +56,6 @@ def test_errors_of_the_height_field_are_of_first_order(variant):
 
 
 @pytest.mark.slow
-def test_too_few_steps_hide_the_order(variant):
-    """Sixteen steps leave an error of their own, which no map mends."""
-    study = map_errors(small_scene(), "ray-march", parameters=MARCH | {"steps": 16}, sizes=(64, 128, 256))
-    assert study.slope.order < 0.5
-
-
-@pytest.mark.slow
 @pytest.mark.claim("flicker", tolerance="order 1/2 within 0.2")
 @pytest.mark.parametrize("lamp", ["point", "spot"])
 def test_flicker_of_fractions_of_a_texel_is_of_order_one_half(variant, lamp):
@@ -83,16 +76,6 @@ def test_flicker_over_texels_is_that_of_independent_frames(variant):
     assert min(study.texels) > 3
     for flicker, error in zip(study.flicker, study.errors, strict=True):
         assert 0.8 * math.sqrt(2) < flicker / error < 1.1 * math.sqrt(2)
-
-
-@pytest.mark.slow
-def test_no_shadow_no_flicker(variant):
-    """Without occluders the image changes as the truth does, but for the float32 sum of the steps."""
-    scene = small_scene(ball=None, floor=None)
-    study = map_flicker(scene, "ray-march", parameters=MARCH, sizes=(32,), frames=3, step=1e-2)
-    assert study.flicker[0] < 1e-5
-    assert study.truth_change > 0.01
-    assert math.isnan(study.slope.order)
 
 
 def test_what_cannot_be_studied_is_refused(variant):

@@ -7,7 +7,7 @@ import pytest
 from analytic.errors import InputError
 from realtime.frame.incremental import next_frame
 from realtime.methods.registry import FOG_METHODS
-from validation.scenes.animation import animate, middle, moved_parts, parse_moves, vertical
+from validation.scenes.animation import animate, moved_parts, parse_moves
 from validation.scenes.record import Animation
 
 
@@ -50,16 +50,6 @@ def test_medium_swings_between_half_and_one_and_a_half(variant):
         float(moved.medium.sigma_t[0][0]) / base for moved in animate(scene, Animation(("medium",), (0, 0, 0)), 4)
     ]
     assert factors == pytest.approx([1, 1.5, 1, 0.5], rel=1e-6)
-
-
-def test_axis_of_a_scene_without_one(variant):
-    scene, _ = read("sphere-spot")
-    np.testing.assert_array_equal(vertical(scene), [0, 0, 1])
-    # The floor spans x -9.1..9.1, y -6.3..9.4.
-    np.testing.assert_allclose(middle(scene)[:2], [0, 1.55], atol=1e-5)
-    fog, _ = read("open-fog")
-    towards = middle(fog) - host(fog.camera.origin)
-    np.testing.assert_allclose(np.cross(towards, host(fog.camera.forward)), 0, atol=1e-4)
 
 
 def test_nothing_closed_cannot_turn(variant):
@@ -106,20 +96,6 @@ def test_frames_record_nothing_and_compile_nothing(variant, name, moves, method)
             assert not compiled
     assert renderer.render.n_recordings == 1
     assert all(getattr(stage, "n_recordings", 1) == 1 for stage in (renderer.surface, renderer.shade, renderer.cull))
-
-
-@pytest.mark.slow
-def test_turning_objects_record_the_surface_once_more_at_most(variant):
-    """It casts rays, so it is given Mitsuba's scene, part of which Mitsuba makes anew: Dr.Jit may notice that once."""
-    from validation.configurations.methods import configuration, prepared
-
-    scene, animation = read("two-pens")
-    renderer = prepared(scene, configuration("shadow-planes"))
-    kept = None
-    for moved in animate(scene, animation, 5):
-        _, kept = next_frame(renderer, moved, kept, **moved_parts(animation))
-    assert renderer.render.n_recordings == 1
-    assert renderer.surface.n_recordings <= 2
 
 
 def test_shapes_keep_their_names_beside_bounded_media(variant):

@@ -6,16 +6,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.helpers.meshes import areas, directed_edges, is_closed, normals_by_area, volume
+from tests.helpers.meshes import areas, directed_edges, is_closed, volume
 from validation.scenes.clutter import SCENE as CLUTTER
 from validation.scenes.hall import SCENE as HALL
 from validation.scenes.solids import (
     arch,
     box,
-    gable,
     gem,
     icosphere,
-    pierced,
     prism,
     star,
     tetrahedron,
@@ -82,25 +80,6 @@ def test_volumes_of_solids_by_their_formulas():
     # Pappus, with both circles as polygons, in the limit: the corners of the polygons leave out less than 1e-3.
     assert volume(*torus(0.9, 0.3, (300, 200))) == pytest.approx(2 * np.pi**2 * 0.9 * 0.3**2, rel=1e-3)
     assert volume(*icosphere(5)) == pytest.approx(4 * np.pi / 3, rel=2e-3)
-
-
-def test_walls_cover_what_they_should_and_face_across_times_up():
-    vertices, faces = gable((1.0, 2.0, 3.0), (4.0, 0, 0), (0, 0, 2.0), (7, 3))
-    normal = normals_by_area(vertices, faces)
-    assert len(faces) == 2 * 7 * 3 + 7
-    # The rectangle, and half of one half as high.
-    np.testing.assert_allclose(normal.sum(axis=0), [0, -(4 * 2 + 0.5 * 4 * 1), 0], atol=1e-12)
-    assert np.all(normal[:, 1] < 0)
-    vertices, faces = pierced((1.0, 2.0, 3.0), (4.0, 0, 0), (0, 0, 2.0), hole=(0.41, 0.53, 0.61), cells=(24, 3))
-    normal = normals_by_area(vertices, faces)
-    assert len(faces) == 2 * 24 * 3
-    # The hole is a polygon of 24 corners.
-    np.testing.assert_allclose(normal.sum(axis=0), [0, -(4 * 2 - 12 * 0.61**2 * np.sin(np.pi / 12)), 0], atol=1e-12)
-    assert np.all(normal[:, 1] < 0)
-    np.testing.assert_allclose([vertices.min(axis=0), vertices.max(axis=0)], [[1, 2, 3], [5, 2, 5]], atol=1e-12)
-    edges = directed_edges(faces)
-    borders = [edge for edge in edges if (edge[1], edge[0]) not in edges]
-    assert len(borders) == 2 * 24
 
 
 @pytest.mark.slow

@@ -148,8 +148,3 @@ def test_an_isotropic_medium_gets_a_lobe_for_methods_and_truth(tmp_path, as_file
 def test_a_medium_without_a_description_of_its_own_keeps_its_phase_function():
     with pytest.raises(InputError, match="medium 'red-medium': its g cannot be changed"):
         load_scene("three-media", (16, 12), {"medium.g": (0.3,)})
-
-
-def test_two_values_of_one_name_are_refused():
-    with pytest.raises(InputError, match=r"medium\.g=0\.1 and medium\.g=0\.2, wanted one of them"):
-        parse_changes(["medium.g=0.1", "medium.g=0.2"])

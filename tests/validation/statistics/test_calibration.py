@@ -28,20 +28,6 @@ def relative_spread(deviation):
 
 
 @pytest.mark.claim("rates-of-the-statistics")
-def test_under_the_null_the_rates_are_the_levels():
-    assert calibrate(Experiment(runs=150, seed=21)).problems() == ()
-
-
-@pytest.mark.claim("detectable-bias")
-@pytest.mark.parametrize("bias", BIASES)
-def test_injected_biases_are_found_with_the_printed_power(bias):
-    check = check_power(bias, Experiment(runs=150, seed=round(bias * 1e4)))
-    assert check.agrees, check
-    # The spread is chosen for 90 %; 16 batches of 576 pixels know their standard error to 1 %.
-    assert check.predicted == pytest.approx(0.90, abs=0.01)
-    assert bias < check.detectable < 1.2 * bias  # by the wider interval, that of 16 batch means
-
-
 @pytest.mark.parametrize(("batches", "noisy_reference"), [(4, False), (16, False), (16, True)])
 def test_many_null_comparisons(batches, noisy_reference):
     calibration = calibrate(Experiment(runs=1000, batches=batches, noisy_reference=noisy_reference, seed=30 + batches))
@@ -58,6 +44,7 @@ def test_two_images_of_few_batches_are_judged_too_mildly():
     assert low <= calibration.coverage_batches <= high
 
 
+@pytest.mark.claim("detectable-bias")
 @pytest.mark.parametrize("bias", BIASES)
 @pytest.mark.parametrize("wider", [0.6, 1.0, 1.5, 3.0])
 def test_the_printed_power_is_the_share_that_finds_a_bias(bias, wider):
