@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Phase functions of droplets by their names: means, moments, words, the same in mpmath, certified values, refusals."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from mpmath import workdps
@@ -12,9 +10,7 @@ from analytic.droplets import moments
 from analytic.errors import InputError
 from analytic.phase import PhaseFunction, hg_draine_moments, phase_from_words
 from analytic.series import taylor_coefficients
-from tests.evidence.certified.airlight_integral_droplets import value
-
-CERTIFIED = Path(__file__).parents[1] / "data" / "airlight_integral_droplets.csv"
+from tests.evidence.certified.airlight_integral_droplets import FILE, value
 
 
 @pytest.mark.claim("hg-draine", tolerance="1e-8: quadrature across a peak of g = 0.99")
@@ -44,7 +40,7 @@ def test_the_series_of_hg_draine_is_the_function():
 
 @pytest.mark.claim("droplets-certified", tolerance="3e-8 relative: of the spline through Mie's series")
 def test_certified_values():
-    cases = read_cases(CERTIFIED)
+    cases = read_cases(FILE)
     found, _ = integrate_cases(cases)
     assert found == pytest.approx(cases.value, rel=3e-8)
     lobes = np.array([name.startswith("hg-draine") for name in cases.phase])
@@ -54,7 +50,7 @@ def test_certified_values():
 @pytest.mark.claim("droplets-certified")
 @pytest.mark.parametrize("number", [3, pytest.param(50, marks=pytest.mark.slow)])
 def test_a_certified_value_is_certified_again(number):
-    header, *lines = CERTIFIED.read_text().splitlines()
+    header, *lines = FILE.read_text().splitlines()
     row = dict(zip(header.split(","), lines[number].split(",")))
     assert value(row) == row["value"]
 
