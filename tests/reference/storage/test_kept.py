@@ -4,6 +4,7 @@
 import ast
 import inspect
 import os
+import re
 import subprocess
 import sys
 import time
@@ -209,6 +210,7 @@ def functions():
     from validation.frames.scene_study import check_truth, study_multiple
     from validation.kernels.rays import _truth
     from validation.kernels.stability import stability
+    from validation.scaling.study import study_scaling
     from validation.sweep.sampled_truth import sampled_truth
     from validation.sweep.work import cell_row
 
@@ -228,6 +230,7 @@ def functions():
         "report-method": (measured_result, "realtime.methods.ray_march"),
         "report-image": (judged_result, "validation.metrics.errors"),
         "report-stability": (stability, "realtime.kernels.exact"),
+        "report-scaling": (study_scaling, "realtime.methods.ray_march"),
     }
 
 
@@ -260,6 +263,14 @@ def test_imports_are_found_wherever_they_stand():
             if isinstance(node, ast.ImportFrom):
                 wanted = {node.module, *(f"{node.module}.{each.name}" for each in node.names)}
                 assert {each for each in wanted & ours.keys() if ours[each].name != "__init__.py"} <= names
+
+
+def test_every_kind_that_is_kept_is_in_the_table():
+    """But the experiments of papers, each of which hangs on its module."""
+    text = "".join(path.read_text(encoding="utf-8") for path in module._modules().values())
+    kinds = set(re.findall(r'key_of\(\s*"([a-z-]+)"', text)) | set(re.findall(r'_key\(\s*"([a-z-]+)"', text))
+    assert kinds - {"report-paper"} <= functions().keys()
+    assert {"quadrature", "kernel-rays", "sweep-truth", "row", "page", "report-method", "report-scaling"} <= kinds
 
 
 @pytest.mark.claim("report-kept")

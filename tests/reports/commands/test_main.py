@@ -53,7 +53,6 @@ def command_that_raises(monkeypatch):
         (MissingError("no libLLVM"), 3, "airlight: error: no libLLVM"),
         (FileNotFoundError(2, "No such file or directory", "a.exr"), 2, "error: a.exr: No such file or directory"),
         (PermissionError(13, "Permission denied", "out"), 2, "error: out: Permission denied"),
-        (KeyboardInterrupt(), 130, "interrupted"),
     ],
     ids=lambda value: type(value).__name__,
 )
