@@ -169,15 +169,6 @@ def test_emission_is_seen_through_fog_and_not_from_behind(variant):
     assert quadrature_image(behind, plan=fixed(2)).emitted.max() == 0
 
 
-def test_a_scene_without_extent_has_no_such_layers(variant):
-    import mitsuba as mi
-
-    from tests.helpers.scenes import tiny_scene
-
-    image = quadrature_image(read_truth(mi.load_dict(tiny_scene(size=(2, 2)))))
-    assert (image.emitted, image.airlight_se, image.surface_se) == (None, None, None)
-
-
 def test_bounded_media_that_fill_everything_are_as_no_bounds(variant):
     import mitsuba as mi
 

@@ -21,7 +21,7 @@ STUDENT = 2.3646  #: standard errors to either side that hold 95 % with seven de
 
 
 def test_intervals_of_independent_points_hold():
-    """Were the pilot counted, or the points doubled until their own error is small, 91 to 93 % would hold."""
+    """Were points doubled until their own error is small, 94.1 % would hold of the channel that decides: too few."""
     rays = 40_000
     spread = np.geomspace(1e-3, 0.1, rays)[:, None, None] * [[[1.0], [0.7], [0.4]]]
     random = np.random.default_rng(5)

@@ -15,11 +15,6 @@ def test_equals_mitsubas_constant(variant):
 
 
 @pytest.mark.claim("shadow-ray-epsilon")
-def test_is_fifteen_thousand_roundings_in_single_precision(variant):
-    assert measure_shadow_epsilon() == pytest.approx(15000 * 2.0**-24, rel=1e-4)
-
-
-@pytest.mark.claim("shadow-ray-epsilon")
 def test_is_relative_to_the_distance(variant):
     import drjit as dr
     import mitsuba as mi

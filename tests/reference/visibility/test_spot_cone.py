@@ -27,18 +27,6 @@ def test_interval_against_sampling(degrees):
     assert inside.any()
 
 
-def test_normals_point_from_the_light_to_the_foot():
-    from reference.scene.read import TruthLight
-    from reference.visibility.spot_cone import perpendicular
-
-    light = TruthLight(np.array([0.0, 0.0, 2.0]), np.ones(3))
-    direction = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    normal = perpendicular(np.zeros(3), direction, light)
-    assert normal[0] == pytest.approx([0, 0, -1])
-    assert np.linalg.norm(normal[1]) == pytest.approx(1)  # the ray meets the light: any normal will do
-    assert abs(normal[1] @ direction[1]) < 1e-15
-
-
 @pytest.mark.claim("spot-falloff", tolerance="2e-5: acos of a float32 cosine")
 def test_profile_is_that_of_mitsuba(variant):
     import drjit as dr

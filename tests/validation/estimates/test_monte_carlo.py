@@ -64,6 +64,7 @@ def test_the_cache_never_changes_what_is_returned(scene, traced, monkeypatch, tm
     assert fresh.batches.seeds == tuple(range(first, first + count))
 
 
+@pytest.mark.claim("standard-errors")
 def test_moments_are_those_of_all_batches(scene, traced):
     pooled = volpath(scene, batches=21, first_seed=5).batches
     means = np.stack(

@@ -287,12 +287,6 @@ def test_enclosed_light_gives_exactly_zero(variant):
     assert np.all(batches.mean == 0)
 
 
-def test_light_without_fog_leaves_the_surface(variant):
-    batches = _run(_load(fog=FOG | {"sigma_t": 0.0}), batches=2, samples=4)
-    assert np.all(batches.mean[0] == 0)
-    assert batches.mean[1].max() > 0
-
-
 def test_seeds_decide(variant):
     """Rationale: a batch is a function of its seed, and batches of different seeds are not correlated."""
     from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
@@ -309,6 +303,7 @@ def test_seeds_decide(variant):
     assert np.abs(correlation).max() < 5 / np.sqrt(192)
 
 
+@pytest.mark.statistical
 def test_one_sample_is_unbiased(variant):
     """Rationale: stratification must not hide a bias; with one distance a ray there is none to hide behind."""
     few, many = _run(_load(), samples=1, batches=64, first_seed=1000), _run(_load())
@@ -343,11 +338,3 @@ def test_unsupported_scenes_are_refused_by_name(variant, changes, words):
 
     with pytest.raises(InputError, match=words):
         read_task(_load(**changes), None, 1)
-
-
-def test_batch_size_is_checked(variant):
-    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-    from reference.scene.read import read_truth
-
-    with pytest.raises(ValueError, match="samples: got 257, wanted 1 to 256"):
-        single_scatter_batch(read_truth(_load()), 0, 257)

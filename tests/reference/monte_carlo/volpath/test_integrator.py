@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: BSD-3-Clause
-import numpy as np
 import pytest
 
 from tests.helpers.scenes import tiny_scene
@@ -13,20 +12,6 @@ def truth(variant):
     from reference.scene.read import read_truth
 
     return read_truth(mi.load_dict(tiny_scene()))
-
-
-@pytest.mark.claim("standard-errors")
-def test_batches_merge_to_the_plain_mean_and_error(truth):
-    from reference.monte_carlo.batches import merged
-    from reference.monte_carlo.volpath.integrator import volpath_batch
-
-    batches = [volpath_batch(truth, seed, 8) for seed in range(5)]
-    means = np.stack([batch.mean for batch in batches])
-    together = merged(merged(batches[0], batches[1]), merged(merged(batches[2], batches[3]), batches[4]))
-    assert together.mean == pytest.approx(means.mean(axis=0), rel=1e-12)
-    assert together.standard_error == pytest.approx(means.std(axis=0, ddof=1) / np.sqrt(5), rel=1e-9, abs=1e-300)
-    assert together.seeds == (0, 1, 2, 3, 4)
-    assert together.totals.shape == (5, 2, 3)
 
 
 def test_materials_come_back(truth):
