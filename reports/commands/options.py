@@ -66,7 +66,8 @@ ClusterPlace = Annotated[
     typer.Option(
         "--cluster",
         metavar="WHERE",
-        help="Let workers compute: local[:N] processes, tcp://HOST:PORT of a Dask scheduler, or its scheduler file.",
+        help="Let workers compute: local[:N] processes, tcp://HOST:PORT of a Dask scheduler, or its scheduler file. A "
+        "scheduler authenticates nobody and its workers run what they are sent: only on a network that you trust.",
         show_default=False,
     ),
 ]

@@ -3,7 +3,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
 from analytic.errors import InputError
@@ -60,7 +60,8 @@ def load_report(path: Path | str) -> tuple[dict[str, Any], Path]:
     """
     data, file = read_report(path), _report_file(path)
     for name in named_files(data):
-        if Path(name).is_absolute() or ".." in Path(name).parts:
+        # `C:name` is relative to the folder of another drive.
+        if Path(name).is_absolute() or PureWindowsPath(name).drive or ".." in Path(name).parts:
             raise InputError(f"{file} names {name}, which is not in its folder; make the report again")
         if not (file.parent / name).is_file():
             raise InputError(f"{file} names {name}, which is not beside it; move a report with its whole folder")
