@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""Claim: the certified scenes of fog are what their program gives, and what quadrature and single-scatter compute."""
+
 import json
 import re
 import subprocess
@@ -9,11 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from analytic.errors import InputError
 from tests.evidence.certified.fog import SCHEMA, certify_pixel, directions, scene_data, to_json
 from tests.evidence.certified.model import FogBox, FogScreen, load_fog, mitsuba_dict
 from tests.evidence.certified.scenes import fog_scenes
+from validation.certified.files import FILES, FOLDER, certified_data
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[2]
 NAMES = [scene.name for scene in fog_scenes()]
 SCENES = {scene.name: scene for scene in fog_scenes()}
 # One ray of each kind: endless, near a light, ended by a sphere, among needles, in the fading part of a spot, dark.
@@ -56,6 +60,14 @@ def truth_of(scene):
     for light, given in zip(truth.lights, scene["lights"], strict=True):
         assert np.array_equal(light.intensity, np.array(given["intensity"], dtype=float))
     return truth
+
+
+def test_every_file_is_there_and_another_name_is_refused():
+    """Also where airlight is installed: the files lie in the package."""
+    assert all(certified_data(name).is_file() for name in FILES)
+    assert {path.name for path in FOLDER.iterdir() if path.suffix in (".csv", ".json")} == set(FILES)
+    with pytest.raises(InputError, match=r"did you mean 'certified_fog.json'"):
+        certified_data("certified_fog.jsn")
 
 
 @pytest.mark.claim("certified-fog")
@@ -179,6 +191,7 @@ def test_single_scatter_agrees_within_its_noise(variant, certified, name):
 
 
 @pytest.mark.claim("certified-fog-snippet")
+@pytest.mark.slow
 def test_the_page_tells_of_every_scene_and_its_snippet_runs(variant):
     page = (ROOT / "docs" / "certified-fog.md").read_text()
     assert all(f"`{name}`" in page for name in NAMES)

@@ -18,9 +18,9 @@ from tests.evidence.injected import Rewrite, injected, replacements, rewritten
 from tests.evidence.mutations import BELOW_THE_MARGIN, MUTATIONS, SHARED
 from validation.certified.files import certified_data
 
-#: Faults of single-scatter that the default tier tries: each takes 32 batches and kernels of its own.
-QUICK = ("no-weights", "traced-bright-shadow-leg", "traced-shadow-epsilon")
-QUICK_STAGES = ("many-lights", "two-pens", "sun")
+#: What the default tier tries beside the faults of the quadrature on its stages: 32 batches and kernels of their own.
+QUICK = ("traced-shadow-epsilon",)
+QUICK_STAGES = ("many-lights", "two-pens")
 ESTIMATORS = ("quadrature", "single-scatter")
 NAMES = [mutation.name for mutation in MUTATIONS]
 
@@ -96,6 +96,7 @@ def test_volpath_finds_gross_faults_and_no_others(stage_of):
         assert not all(sighting.agrees for sighting in stages.volpath_seen(by_name[name], stage, 32)), name
 
 
+@pytest.mark.slow
 def test_agreement_is_blind_to_what_all_share(stage_of):
     stage = stage_of("many-lights")
     mutation = next(mutation for mutation in SHARED if mutation.name == "camera-mirrored")
