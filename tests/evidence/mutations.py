@@ -776,7 +776,17 @@ BELOW_THE_MARGIN = Mutation(
     (_brighter(1.0001),),
 )
 
-MUTATIONS = (*_FOG, *_MESHES, *_RAYLEIGH, *_SUN, *_WIDE, *_TRACED_FOG, *_TRACED_MESHES, *_TRACED_SUN, *_TRACED_WIDE)
+MUTATIONS = (
+    *_FOG,
+    *_MESHES,
+    *_RAYLEIGH,
+    *_SUN,
+    *_WIDE,
+    *_TRACED_FOG,
+    *_TRACED_MESHES,
+    *_TRACED_SUN,
+    *_TRACED_WIDE,
+)
 
 #: Faults of what all estimators share: they agree all the same, and the certified scenes must find the fault.
 SHARED = _all(
