@@ -135,7 +135,8 @@ def penumbra(renderer: FrameRenderer) -> NDArray[np.bool_]:
     """Return where the visible surface gets a part of the light, with and without occluders from the same points."""
     surface = render_frame(renderer).surface
     _, by_light = run_cast_and_shade(renderer)
-    lanes = np.array(sum(by_light[0]), dtype=np.float64).T
+    # The method has a light for each point: all of them together are the area light.
+    lanes = np.sum([np.array(colour, dtype=np.float64).T for light in by_light for colour in light], axis=0)
     unshadowed = np.empty_like(lanes)
     unshadowed[np.array(renderer.pixel)] = lanes
     unshadowed = unshadowed.reshape(surface.shape)[..., 1]
