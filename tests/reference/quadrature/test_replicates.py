@@ -48,19 +48,19 @@ def test_intervals_of_independent_points_hold():
 
 
 def test_points_follow_the_error_that_is_asked_for():
-    """Replicates that differ by c/N have a standard error of c/(N sqrt 8): points are doubled until it is met."""
+    """Replicates that differ by c N^-3/2 have that over sqrt 8 for their error: points are doubled until it is met."""
     place = np.linspace(-1, 1, REPLICATES)
     place = place / place.std(ddof=1)
 
     def sums(part, plan, active, numbers):
-        sum_to = [10.0 * number + 0.9 * scale[active] * place * (number > 0) for number in numbers]
+        sum_to = [10.0 * number + 0.9 * scale[active] * place * (number and number**-0.5) for number in numbers]
         return np.repeat((sum_to[1] - sum_to[0])[:, None], 3, axis=1)
 
-    scale = np.array([[1e-3], [1.0], [8.0], [1e4]])
+    scale = np.array([[1e-3], [8.0], [110.0], [1e6]])
     for error, first in ((1e-3, 16), (2e-3, 4)):
         plan = PointPlan(error=error, first=first, most=256)
         means, counts = replicate_means(4, np.zeros((4, 3)), plan, sums)
-        wanted = 0.09 * scale[:, 0] / np.sqrt(8) / error
+        wanted = (0.09 * scale[:, 0] / np.sqrt(8) / error) ** (2 / 3)
         powers = 2.0 ** np.ceil(np.log2(wanted))
         assert counts.tolist() == np.clip(powers, first, 256).astype(int).tolist()
         assert (standard_error(means)[:3] <= error * means.mean(axis=2)[:3]).all()
