@@ -33,13 +33,13 @@ from validation.scenes.loading import load_scene, resize
 from validation.statistics.comparison import compare_statistics
 
 #: Of the relative bias of quadrature against single-scatter, by stage: of airlight and surface [1]. Each fault that is
-#: found there is larger in one of them.
+#: found there leaves it in one of them.
 MARGINS = {
     "many-lights": (5e-4, 5e-4),
     "two-pens": (5e-4, 5e-4),
     "rayleigh": (5e-4, 5e-4),
     "sun": (2e-3, 2e-3),  # its media have bounds that batches feel as noise
-    "wide-lights": (0.022, 0.005),  # samples of area lights are noise: 64 batches reach 0.9 %
+    "wide-lights": (0.03, 0.005),  # 8 x 32 points, which all pixels share, leave the quadrature 1.2 %
 }
 VOLPATH_MARGIN = 0.01
 #: Points of each of eight replicates under area lights.
