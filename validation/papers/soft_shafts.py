@@ -9,7 +9,7 @@ The source prints no equation, no scene and no table of errors; the method is re
 
 Errors are those of airlight plus surface, as root mean square over the mean, against the quadrature, and in the
 *penumbra*: where the visible surface gets more than 0.02 and less than 0.98 of the light that it would get without
-occluders. Both lights of this fraction are sums over the same `POINTS` points of the area light, so that a surface that
+occluders. Both lights of this fraction are sums over the same sixteen points of the area light, so that a surface that
 sees all of the light has the fraction 1. The interval of a ratio of two errors is that of a jackknife over vertical
 strips of the image.
 
@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.frame.renderer import FrameRenderer, render_frame, run_cast_and_shade
+from realtime.frame.renderer import render_frame, run_cast_and_shade
 from realtime.scene.read_scene import Scene, read_scene
 from validation.configurations.methods import SHARED_POINTS, Configuration, prepared
 from validation.configurations.timing import Timing, moved_light, time_in_turns
@@ -39,6 +39,7 @@ Array = NDArray[np.float64]
 
 SCENE, SIZE = "fence", (200, 152)  #: of the frames [pixels]; the source prints none
 POINTS = 64
+_FEW = 16  # points of the penumbra, the same with and without occluders
 STEPS, MANY = 32, 150
 TAPS = (4, 8, 16, 32)
 _FRAMES, _TRAVEL = 5, 0.02  # of the flicker: frames, and how far the light goes from one to the next [m]
@@ -126,28 +127,27 @@ def shafts_reference(size: tuple[int, int]) -> Reference:
     """Return the quadrature of the scene and its penumbra."""
     loaded = load_scene(SCENE, size).scene
     truth = truth_image(loaded)
-    renderer = prepared(read_scene(loaded), _exact())
     image = np.asarray(truth.airlight + truth.surface, dtype=np.float64)
-    return Reference(image, penumbra(renderer))
+    return Reference(image, penumbra(read_scene(loaded)))
 
 
-def penumbra(renderer: FrameRenderer) -> NDArray[np.bool_]:
+def penumbra(scene: Scene) -> NDArray[np.bool_]:
     """Return where the visible surface gets a part of the light, with and without occluders from the same points."""
-    surface = render_frame(renderer).surface
-    _, by_light = run_cast_and_shade(renderer)
-    # The method has a light for each point: all of them together are the area light.
-    lanes = np.sum([np.array(colour, dtype=np.float64).T for light in by_light for colour in light], axis=0)
+    surface = render_frame(prepared(scene, _exact(_FEW))).surface
+    lit = prepared(scene, Configuration("soft-shafts", None, (("points", _FEW), ("pattern", "sobol"), ("map", 4))))
+    _, by_light = run_cast_and_shade(lit)  # the lit surface before shadows, of each point
+    lanes = np.array(sum(by_light[0]), dtype=np.float64).T
     unshadowed = np.empty_like(lanes)
-    unshadowed[np.array(renderer.pixel)] = lanes
+    unshadowed[np.array(lit.pixel)] = lanes
     unshadowed = unshadowed.reshape(surface.shape)[..., 1]
     reached = unshadowed > 0
     fraction = np.where(reached, surface[..., 1], 0) / np.where(reached, unshadowed, 1)
     return (fraction > 0.02) & (fraction < 0.98)
 
 
-def _exact() -> Configuration:
+def _exact(points: int = POINTS) -> Configuration:
     # Sobol's sequence: the columns of a grid would fall together behind upright bars.
-    return Configuration("shadow-planes", "exact", (("points", POINTS), ("pattern", "sobol")))
+    return Configuration("shadow-planes", "exact", (("points", points), ("pattern", "sobol")))
 
 
 def _configuration(values: Mapping[str, Any]) -> Configuration:
