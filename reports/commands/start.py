@@ -11,10 +11,6 @@ def main() -> None:
     """Run the command line, and end the process with its status."""
     default_signals()
     usable_streams()
-    if sys.flags.no_site:  # as the launcher starts it
-        import site
-
-        site.main()
     from reports.commands.main import run
 
     sys.exit(run(sys.argv[1:]))

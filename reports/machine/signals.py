@@ -10,10 +10,7 @@ import signal
 
 def default_signals() -> None:
     """Let SIGINT and SIGTERM end this process, which a shell reports as the status 130 and 143; for main programs."""
-    stops = (signal.SIGINT, signal.SIGTERM)
-    for number in stops:
+    for number in (signal.SIGINT, signal.SIGTERM):
         # What the parent ignores stays ignored, as by nohup and for jobs in the background.
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.SIG_DFL)
-    if hasattr(signal, "pthread_sigmask"):  # the launcher blocks them while Python starts
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, stops)
