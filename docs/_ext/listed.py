@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parts of pages that list what the program has: modules, names, commands, methods, kernels."""
 
+import importlib
 import inspect
 import re
 from collections.abc import Callable, Sequence
@@ -14,8 +15,6 @@ from reports.tables.lists import kernel_list, method_list
 from reports.tables.table import Name, Row, Table
 
 ROOT = Path(__file__).resolve().parents[2]
-#: Pages of methods whose name is not that of the method.
-PAGES: dict[str, str] = {}
 #: Words in the help of parameters, and the pages that they link to.
 LINKS = {"between the corners of tiles": "methods.md#between-the-corners-of-tiles"}
 
@@ -84,9 +83,9 @@ def _cell(words: str) -> str:
 
 
 def methods() -> str:
-    """Return the methods with links to their pages."""
+    """Return the methods with links to their sections."""
     shown = method_list().only("name", "what", "kernel", "shadows", "source")
-    return markdown(_named(shown, lambda name: f"{PAGES.get(name, name)}.md"))
+    return markdown(_named(shown, lambda name: f"methods.md#{name}"))
 
 
 def _named(shown: Table, address: Callable[[str], str] = lambda name: "") -> Table:
@@ -133,6 +132,26 @@ def _parameter(item: Any) -> tuple[str, str]:
 def kernels() -> str:
     """Return the kernels."""
     return markdown(_named(kernel_list()))
+
+
+def figures() -> str:
+    """Return the figures with what each shows and where its data come from."""
+    from reports.commands.figures import FIGURES
+
+    rows = []
+    for name, (module, given) in FIGURES.items():
+        summary = importlib.import_module(f"reports.figures.{module}").SUMMARY
+        source = "a report" if "report" in given else "a report, or measured" if "published" in given else "measured"
+        rows.append((f"`{name}`", _cell(summary), source))
+    return table(("figure", "shows", "data from"), rows, 3)
+
+
+def sweep_columns() -> str:
+    """Return the columns of a sweep's rows."""
+    from validation.sweep.row import COLUMNS
+
+    rows = [(f"`{each.name}`", each.unit, _cell(each.meaning)) for each in COLUMNS]
+    return table(("column", "unit", "meaning"), rows, 3)
 
 
 def keys() -> str:

@@ -37,7 +37,7 @@ def provenance() -> str:
         f"{report['variant']}, mitsuba {versions['mitsuba']}, drjit {versions['drjit']}, by "
         f"`{command}`. Times are medians of whole frames of {timed} pixels, kernels compiled before, the "
         "geometry static; `light moved`: a frame after it moved. Errors are those of the airlight of images of "
-        f"{' and '.join(sizes)} pixels against the `quadrature` truth: relative RMSE and bias over the mean, and "
+        f"{' and '.join(sizes)} pixels against the `quadrature` reference: relative RMSE and bias over the mean, and "
         "quantiles of |test - ref| / max(ref, 0.001 mean(ref)).*"
     )
 
@@ -73,9 +73,9 @@ def method(name: str) -> str:
         *list(COLUMNS.values())[1:],
     )
     shown = Table("", columns, tuple(rows)).only("scene", "label", *_METHOD)
-    parts = [markdown(shown), provenance()]
+    parts = [markdown(shown)]
     if notes:
-        parts.append("What was refused or left out:\n\n" + "\n".join(notes))
+        parts.append("Refused or left out:\n\n" + "\n".join(notes))
     return "\n\n".join(part for part in parts if part)
 
 
@@ -100,7 +100,7 @@ def kernel_costs(phase: str) -> str:
 
 
 def left_out() -> str:
-    """Return for every scene the share of light that single scattering leaves out."""
+    """Return for every scene the fraction of light that single scattering leaves out."""
     shares = left_out_table(data()["scenes"], code=True)
     keys = ("scene", "medium", "medium_interval", "everything", "everything_interval")
     return markdown(replace(shares.only(*keys), title=""))
@@ -130,7 +130,7 @@ def _scene(record: Any, kept: dict[str, Any] | None) -> str:
         truth = kept["truth"]
         if truth["relative_bound"] is not None:
             bound = number(truth["relative_bound"], 2)
-            words.append(f"- The truth: mean airlight {number(truth['mean'])} W/(m^2 sr), bound of its error {bound}.")
+            words.append(f"- Reference: mean airlight {number(truth['mean'])} W/(m^2 sr), relative bound {bound}.")
         if kept["multiple"]:
             words.append(f"- Single scattering leaves out {_share(kept['multiple']['medium'])} of the airlight.")
     return "\n".join([*words, ""])
@@ -147,7 +147,7 @@ def cycles() -> str:
         f"{sum(row['right'] for row in right)} of {len(right)} right images are called right ({record['measured']}, "
         f"Blender {record['blender']}, 160 x 120 pixels).",
         "",
-        "| scene | what was set wrong | should be named | first | what it says | off | left |",
+        "| scene | injected fault | expected name | named first | words | error | left |",
         "| --- | --- | --- | --- | --- | ---: | ---: |",
     ]
     for row in rows:

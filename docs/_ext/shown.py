@@ -58,41 +58,7 @@ def _caption(present: dict[str, dict[str, Any]]) -> str:
     return f"{how} Beside it {text}"
 
 
-def gallery_scenes() -> str:
-    """Return all scenes, each with its command."""
-    from validation.scenes.registry import SCENES
-
-    cards = []
-    for name, record in SCENES.items():
-        entry = kept().get(f"scene-{name}")
-        if entry:
-            link = f"[**{name}**](scenes.md#{name}): {record.purpose}"
-            cards.append(_card(entry, f"The scene {name}", link))
-    return "\n".join(cards)
-
-
-def gallery_methods() -> str:
-    """Return what each method renders, its error and how it works, each with its command."""
-    from realtime.methods.registry import METHODS
-
-    parts = []
-    for name, method in METHODS.items():
-        cards = [
-            _card(entry, f"{name}: {what}", what)
-            for kind, what in (("sketch", "how it works"), ("method", "what it renders"), ("error", "its error"))
-            if (entry := _of_method(name, kind))
-        ]
-        if cards:
-            parts += [f"### [{name}]({name}.md)", "", f"{method.summary[0].upper()}{method.summary[1:]}.", "", *cards]
-    return "\n".join(parts)
-
-
 def scene_picture(name: str) -> str:
     """Return the picture of a scene with its command; nothing where it has none."""
     entry = kept().get(f"scene-{name}")
     return "" if entry is None else f"![The scene {name}](gallery/{entry['file']})\n\n```sh\n{entry['command']}\n```\n"
-
-
-def _card(entry: dict[str, Any], alt: str, words: str) -> str:
-    command = f"`{entry['command']}`" if entry["command"] else ""
-    return f"```{{container}} card\n![{alt}](gallery/{entry['file']})\n\n{words}\n\n{command}\n```\n"

@@ -3,7 +3,7 @@
 
 `python docs/tools/cycles_round_trips.py --python PYTHON --images FOLDER` describes scenes, lets an interpreter with
 `bpy` render them with faults by `cycles_faults.py`, diagnoses what is in the folder and writes the answers into the
-record, from which docs/diagnosis.md is built. Images that are there are not rendered again.
+record, from which docs/your-engine.md is built. Images that are there are not rendered again.
 """
 
 import argparse

@@ -76,7 +76,7 @@ _VIEWS = {
         ("camera.origin=517,-491,1911", "camera.target=-594,19,590", "camera.fov=97"),
     ),
 }
-TUTORIAL = "gate.xml"  #: the scene of docs/tutorial.md, in which it stands
+TUTORIAL = "gate.xml"  #: the scene of docs/scene-to-figure.md, in which it stands
 STRIP = ("hall", "clutter", "three-media", "windows")  #: at the top of the README
 
 
@@ -216,8 +216,8 @@ def _rendered(picture: Picture, size: tuple[int, int]) -> Pixels:
 
 
 def _tutorial_scene() -> str:
-    """Return the scene that stands in docs/tutorial.md."""
-    page = (DOCS / "tutorial.md").read_text(encoding="utf-8")
+    """Return the scene that stands in docs/scene-to-figure.md."""
+    page = (DOCS / "scene-to-figure.md").read_text(encoding="utf-8")
     return page.partition("```xml\n")[2].partition("```")[0]
 
 

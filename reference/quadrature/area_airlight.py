@@ -8,7 +8,7 @@ With the points y on the surface of a light of radiance Le the radiance along a 
 
 The inner integral is that of a point light with the cosine in its integrand: a half space a + b x > 0, one interval of
 the angle at the light like the cone of a spot, and a weight like that of a soft spot. It is continuous in y where the
-light's visibility from a surface is not, so that few points do; the table in docs/ground-truth.md shows how few. Eight
+light's visibility from a surface is not, so that few points do. Eight
 independent scramblings (`reference.quadrature.light_points`) each give a mean, and their spread the standard error.
 `reference.quadrature.replicates` says how many points a ray gets.
 """

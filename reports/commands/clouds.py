@@ -24,7 +24,7 @@ def clouds(
     """Make the tables that methods for clouds look up.
 
     They hold light scattered in a slab by sets of orders, with where it entered: T, c and sigma. They are kept in the
-    cache, so that each phase function and albedo takes its minutes once. See docs/canonical-transport.md.
+    cache, so that each phase function and albedo takes its minutes once. See docs/the-reference.md.
     """
     from analytic.errors import InputError
     from reports.machine.environment import activate

@@ -83,7 +83,7 @@ def compare(
     the margin.
 
     --diagnose predicts the image that each of some sixty faults would make, of medium, lights, camera and encoding, and
-    ranks them by evidence: what is wrong, by how much, and what is left over. See docs/diagnosis.md.
+    ranks them by evidence: what is wrong, by how much, and what is left over. See docs/your-engine.md.
     """
     from analytic.errors import InputError
     from reports.interchange.difference import check_difference, write_difference

@@ -54,7 +54,7 @@ def fit(
 
     Each comes with its 95 % interval: parameters of media, lights and exposure. Pixels that disagree with what
     explains the others are left out. What the image cannot tell apart, such as albedo and intensity in the
-    airlight, is said, with a way out. See docs/diagnosis.md.
+    airlight, is said, with a way out. See docs/your-engine.md.
     """
     from analytic.errors import named_values
     from reference.storage.exr import read_exr

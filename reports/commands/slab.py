@@ -51,7 +51,7 @@ def slab(
     That is what it reflects and transmits, and where that light leaves it.
 
     Order n is light that was scattered n times. The numbers come from a deterministic computation with an estimate of
-    its error; --photons puts a random walk with standard errors beside them. See docs/slab.md.
+    its error; --photons puts a random walk with standard errors beside them. See docs/the-reference.md.
     """
     from analytic.errors import InputError
     from reports.machine.progress import progress_bar

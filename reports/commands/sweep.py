@@ -23,7 +23,7 @@ _EVERY = 300.0  # between two times that the Parquet is written while rows come 
 def sweep(
     study: Annotated[
         Path | None,
-        typer.Argument(metavar="STUDY.toml", help="What to sweep over, see docs/sweeps.md.", show_default=False),
+        typer.Argument(metavar="STUDY.toml", help="What to sweep over, see docs/many-scenes.md.", show_default=False),
     ] = None,
     random: Annotated[
         int | None,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The data of a report: plain numbers and words, ready for JSON.
 
-docs/report-schema.md explains every key of the schema "airlight-report/2". NaN becomes null.
+docs/formats.md explains every key of the schema "airlight-report/2". NaN becomes null.
 """
 
 from pathlib import Path

@@ -88,7 +88,7 @@ def write_report(
     Returns
     -------
     dict
-        The content of `report.json`, see docs/report-schema.md.
+        The content of `report.json`, see docs/formats.md.
 
     Raises
     ------

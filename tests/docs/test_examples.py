@@ -23,8 +23,8 @@ DOCS = ROOT / "docs"
 RENDERERS = {"cycles": ("bpy", "AIRLIGHT_CYCLES_PYTHON"), "luxcore": ("pyluxcore", "AIRLIGHT_LUXCORE_PYTHON")}
 
 
-def blocks(page, language):
-    text = page.read_text(encoding="utf-8")
+def blocks(page, language, after=""):
+    text = page.read_text(encoding="utf-8").partition(after)[2] if after else page.read_text(encoding="utf-8")
     return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
 
 
@@ -38,23 +38,43 @@ def test_python_of_the_readme(tmp_path):
         assert float(printed[2]) > 0
 
 
-@pytest.mark.claim("tutorial", "own-scene")
-@pytest.mark.slow
-def test_the_tutorial_ends_with_a_figure(variant, tmp_path, monkeypatch, capfd):
-    """Every command of the page, in its order. Exit status 1 is a check of the truth that --quick had no time for."""
-    monkeypatch.chdir(tmp_path)
-    page = DOCS / "tutorial.md"
-    (tmp_path / "gate.xml").write_text(blocks(page, "xml")[0], encoding="utf-8")
+def run_commands(page, capfd):
+    """Run every command of a page in its order; status 1 is a check of the reference that --quick had no time for."""
     for line in "".join(blocks(page, "sh")).splitlines():
         program, *words = shlex.split(line)
         assert program == "airlight"
         status = run(words)
         assert status in ((0, 1) if words[0] == "report" else (0,)), (line, capfd.readouterr().err)
+
+
+@pytest.mark.claim("tutorial", "own-scene")
+@pytest.mark.slow
+def test_the_tutorial_ends_with_a_figure(variant, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    page = DOCS / "scene-to-figure.md"
+    (tmp_path / "gate.xml").write_text(blocks(page, "xml")[0], encoding="utf-8")
+    run_commands(page, capfd)
     for name in ("gate.png", "truth.exr", "gate-report/report.html", "figures/strip.pdf"):
         assert (tmp_path / name).stat().st_size > 1000, name
     # Several per cent with 32 steps, as the page says.
     (relative,) = re.findall(r"^rmse .* relative ([\d.]+) %$", capfd.readouterr().out, flags=re.MULTILINE)
     assert 1 < float(relative) < 10
+
+
+@pytest.mark.claim("own-method", "engine-pixels")
+@pytest.mark.slow
+def test_a_method_and_an_image_are_validated_as_the_page_says(variant, tmp_path, monkeypatch, capfd):
+    """Both end in a report and a chart: the function with its point, the image without a time."""
+    monkeypatch.chdir(tmp_path)
+    page = DOCS / "validate-your-method.md"
+    (tmp_path / "fog.py").write_text(blocks(page, "python")[0], encoding="utf-8")
+    run_commands(page, capfd)
+    chart = (tmp_path / "figures/frame-speed.csv").read_text(encoding="utf-8")
+    assert "fog.py:marched" in chart
+    measured = json.loads((tmp_path / "engine/report.json").read_text(encoding="utf-8"))["scenes"][0]["methods"]
+    (image,) = (entry for entry in measured if entry["kind"] == "image")
+    assert image["error"]["relative_rmse"] > 0
+    assert image["times"] is None
 
 
 @pytest.mark.claim("notebook-cells")
@@ -66,7 +86,7 @@ def test_the_cells_of_the_notebook_page_run_and_display(variant, tmp_path, monke
     plt.switch_backend("agg")
     space: dict = {}
     displayed = []
-    for cell in blocks(DOCS / "notebooks.md", "python"):
+    for cell in blocks(DOCS / "python.md", "python", after="## In a notebook"):
         exec(compile(cell, "cell", "exec"), space)
         last = cell.strip().splitlines()[-1]
         if last.isidentifier():
@@ -79,8 +99,8 @@ def test_the_cells_of_the_notebook_page_run_and_display(variant, tmp_path, monke
 
 @pytest.fixture
 def fog(tmp_path):
-    """The examples of docs/own-method.md as files; the first one's path."""
-    for name, block in zip(("fog", "plain"), blocks(DOCS / "own-method.md", "python"), strict=True):
+    """The examples of docs/your-method.md as files; the first one's path."""
+    for name, block in zip(("fog", "plain", "kernel"), blocks(DOCS / "your-method.md", "python"), strict=True):
         (tmp_path / f"{name}.py").write_text(block, encoding="utf-8")
     return tmp_path / "fog.py"
 
@@ -125,12 +145,12 @@ def test_the_plain_method_returns_what_the_page_says(fog, variant):
 
 @pytest.mark.claim("kernel-of-the-page")
 @pytest.mark.slow
-def test_the_kernel_of_the_page_on_extending(variant, tmp_path, monkeypatch):
+def test_the_kernel_of_the_page(variant, tmp_path, monkeypatch):
     """The snippet is what it says: `equiangular` with twelve steps."""
     from analytic.cases import read_cases
     from validation.kernels.cases import integrate_cases
 
-    (code,) = blocks(DOCS / "extending.md", "python")
+    code = blocks(DOCS / "your-method.md", "python")[2]
     (tmp_path / "twelve_steps_of_a_page.py").write_text(code)
     monkeypatch.syspath_prepend(str(tmp_path))
     cases = read_cases(ROOT / "tests/data/airlight_integral.csv")

@@ -113,7 +113,7 @@ def test_the_derived_coefficients_of_the_errata_are_those_of_the_program():
     from analytic.series import taylor_coefficients
 
     means = {"isotropic": 1, "rayleigh": 1, "hazy": 2, "murky": 83 / 33}
-    text = (DOCS / "errata.md").read_text(encoding="utf-8")
+    text = (DOCS / "papers.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (\w+) \$c_(\d)\$ \| \$(.*?)\$ \| (.*?) \|$", text, flags=re.MULTILINE)
     assert len(rows) == 7
     for name, index, printed, derived in rows:

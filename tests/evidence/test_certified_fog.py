@@ -192,9 +192,9 @@ def test_single_scatter_agrees_within_its_noise(variant, certified, name):
 
 @pytest.mark.claim("certified-fog-snippet")
 @pytest.mark.slow
-def test_the_page_tells_of_every_scene_and_its_snippet_runs(variant):
-    page = (ROOT / "docs" / "certified-fog.md").read_text()
-    assert all(f"`{name}`" in page for name in NAMES)
+def test_the_pages_tell_of_every_scene_and_the_snippet_runs(variant):
+    formats, page = ((ROOT / "docs" / name).read_text() for name in ("formats.md", "your-engine.md"))
+    assert all(f"`{name}`" in formats for name in NAMES)
     (code,) = re.findall(r"^```python\n(.*?)^```", page, flags=re.DOTALL | re.MULTILINE)
     code = code.replace("llvm_ad_rgb", variant)
     ran = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=300)

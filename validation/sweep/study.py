@@ -165,7 +165,7 @@ def read_study(path: Path, *, count: int | None = None) -> Study:
         text = path.read_text(encoding="utf-8")
         data = tomllib.loads(text)
     except FileNotFoundError:
-        raise InputError(f"study: there is no file {path}; wanted a TOML file, see docs/sweeps.md") from None
+        raise InputError(f"study: there is no file {path}; wanted a TOML file, see docs/many-scenes.md") from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"study {path}: it cannot be read: {error}") from error
     try:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Soft shafts (Ali 2016): few points of a light, visibility in few levels, and filters that smooth it.
 
-The source prints no equation; what is built here is reconstructed from captions (docs/soft-shafts.md).
+The source prints no equation; what is built here is reconstructed from captions (docs/papers.md).
 
 Read in this order:
 

@@ -31,7 +31,7 @@ READ = "realtime/numerics/host_numbers.py: _in_one_transfer"
 SIDES = "realtime/methods/light_volumes/jump_search.py: _jumping_sides"
 
 #: By method the moves after which a frame waits for the host, where, and how often in each of the scenes below. There
-#: is no other wait. docs/gpu.md says why these are there.
+#: is no other wait.
 WAITS: dict[str, tuple[tuple[str, ...], str, dict[str, int]]] = {
     "shadow-planes": (
         ("camera", "light", "objects"),

@@ -183,7 +183,7 @@ def test_a_report_from_python(variant, tmp_path):
 @pytest.mark.claim("python-tutorial")
 def test_the_tutorial_runs(tmp_path):
     """Every snippet of docs/python.md, one after the other as in a notebook, prints what the page says."""
-    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8").partition("## In a notebook")[0]
     blocks = re.findall(r"^```python\n(.*?)^```(?:\n\n```text\n(.*?)^```)?", page, flags=re.DOTALL | re.MULTILINE)
     assert len(blocks) >= 8
     assert {name for name in FUNCTIONS if any(f"airlight.{name}(" in code for code, _ in blocks)} == set(FUNCTIONS)
