@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reading a light with extent from a Mitsuba shape with an `area` emitter.
 
-The shape is a `rectangle`, `disk` or `sphere` of constant radiance. Its material is black, as Mitsuba's is for an
-emitter that has none, or `null`. Light that a lamp reflects would be scattered twice, which no truth here knows.
+The shape is a `rectangle`, `disk` or `sphere` of constant radiance. Its material is opaque (black as Mitsuba's is for
+an emitter that has none, else the shape is a surface like others too) or `null`.
 """
 
 from typing import Any
@@ -49,7 +49,7 @@ def read_area_light(shape: Any, camera: Array) -> AreaLight:
             "'area' emitter"
         )
     radiance = _read_radiance(shape.emitter(), name)
-    opaque = _read_material(shape, name)
+    opaque = shape.bsdf().class_name() != "Null"
     if shape.interior_medium() is not None or shape.exterior_medium() is not None:
         raise InputError(f"light '{name}': its shape bounds a medium; wanted a light apart from the bounds of media")
     matrix = np.array(mi.traverse(shape)["to_world"].matrix, dtype=np.float64).reshape(4, 4)
@@ -89,17 +89,3 @@ def _read_radiance(emitter, name: str) -> Array:
             f"light '{name}': its radiance is {value.tolist()}; wanted finite values of 0 or more [W/(m^2 sr)]"
         )
     return value
-
-
-def _read_material(shape, name: str) -> bool:
-    """Return whether the material is opaque; refuse one that is neither black nor `null`."""
-    bsdf = shape.bsdf()
-    if bsdf.class_name() == "Null":
-        return False
-    parameters = mi.traverse(bsdf)
-    black = "reflectance.value" in parameters and not np.any(np.array(parameters["reflectance.value"]))
-    if bsdf.class_name() != "SmoothDiffuse" or not black:
-        raise InputError(
-            f"light '{name}': its material reflects light; wanted a 'diffuse' material of reflectance 0, or 'null'"
-        )
-    return True

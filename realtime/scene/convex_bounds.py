@@ -19,6 +19,7 @@ from realtime.scene.mesh_adjacency import mesh_triangles
 
 Array = NDArray[np.float64]
 
+_OUTWARDS = "normals that point outwards: change flip_normals, which a mirrored to_world of a mesh asks for too"
 _FLAT = 1e-5  # relative to the size of the body
 _SOME = 64  # triangles by which most shapes that are not convex are told at once
 _SAMPLES = 1 << 16  # pairs of points for the mean distance: its standard error is 0.2 %
@@ -64,7 +65,7 @@ def read_bounds(shape) -> tuple[Bounds | None, ClosedMesh | None]:
     name = shape.id()
     if shape.class_name() == "Sphere":
         return _read_sphere(shape), None
-    if not shape.is_mesh():
+    if not shape.is_mesh() or shape.class_name() == "Rectangle":
         raise _refusal(name, f"is a {shape.class_name()}", "a sphere, a cube or a closed mesh")
     vertices, faces = mesh_triangles(shape)
     faces = faces[:, ::-1] if shape.has_flipped_normals() else faces
@@ -115,7 +116,7 @@ def mesh_bounds(name: str, vertices: Array, faces: NDArray[Any], mesh: ClosedMes
         raise _refusal(name, "has no volume", "a closed mesh around a body")
     if volume < 0:
         flaw = f"is inside out, at {mesh.edge_words(*mesh.faces[0, :2])}"
-        raise _refusal(name, flaw, "faces that run counter-clockwise seen from outside")
+        raise _refusal(name, flaw, _OUTWARDS)
     sound = twice > _FLAT * size * longest
     normals = area[sound] / twice[sound, None]
     offsets = np.mean(np.sum(corners[sound] * normals[:, None], axis=2), axis=1)
@@ -165,6 +166,15 @@ def holds(bounds: Bounds, point: Array) -> bool:
     if bounds.is_sphere:
         return bool(np.linalg.norm(point - bounds.centre) < bounds.radius)
     return bool(np.all(bounds.normals @ point < bounds.offsets))
+
+
+def touches(bounds: Bounds, point: Array) -> bool:
+    """Return whether a point lies in the boundary [m], (3,), to what float32 knows of it."""
+    margin = 1e-6 * (bounds.radius + float(np.abs(point).max()))
+    if bounds.is_sphere:
+        return bool(abs(np.linalg.norm(point - bounds.centre) - bounds.radius) < margin)
+    beyond = float((bounds.normals @ point - bounds.offsets).max())
+    return abs(beyond) < margin
 
 
 def overlap(first: Bounds, second: Bounds) -> bool:

@@ -18,7 +18,7 @@ from realtime.errors import InputError
 from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import ArrayTypes
 from realtime.scene.closed_mesh import ClosedMesh, check_bodies, encloses
-from realtime.scene.convex_bounds import Bounds, holds, mean_distance, overlap, plane_neighbours, read_bounds
+from realtime.scene.convex_bounds import Bounds, holds, mean_distance, overlap, plane_neighbours, read_bounds, touches
 from realtime.scene.density import DensityGrid, density_on_device, read_density
 from realtime.scene.medium import BoundedMedium, Clouds, Medium
 from realtime.scene.named_shapes import scene_of
@@ -49,8 +49,8 @@ def sort_shapes(scene):
         if bsdf.class_name() != "Null":
             if bounds:
                 raise InputError(
-                    f"shape '{name}' bounds a medium and is opaque; wanted the material 'null' on it, and no medium on "
-                    "opaque shapes"
+                    f"shape '{name}' bounds a medium and has a {bsdf.class_name()} material; wanted the material "
+                    "'null' on it, and no media on other shapes"
                 )
             if mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null):
                 raise InputError(f"shape '{name}' is partly transparent; wanted opaque surfaces or material 'null'")
@@ -190,6 +190,10 @@ def _surrounding(sensor, boundaries, bounds: Sequence[Bounds | ClosedMesh]):
     camera = np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)[:3, 3]
     around = sensor.get_medium()
     for shape, own_bounds in zip(boundaries, bounds):
+        if isinstance(own_bounds, Bounds) and touches(own_bounds, camera):
+            raise InputError(
+                f"the camera is in the surface of shape '{own_bounds.name}'; move it off, inside or outside"
+            )
         inside = encloses(own_bounds, camera) if isinstance(own_bounds, ClosedMesh) else holds(own_bounds, camera)
         if inside:
             if sensor.get_medium() != shape.interior_medium():
@@ -212,7 +216,8 @@ def _check_disjoint(bounds: list[Bounds]) -> None:
         for earlier in bounds[:number]:
             if overlap(later, earlier):
                 raise InputError(
-                    f"the media of shapes '{earlier.name}' and '{later.name}' overlap; wanted disjoint bounds"
+                    f"the media of shapes '{earlier.name}' and '{later.name}' overlap or one holds the other; wanted "
+                    "disjoint bounds"
                 )
 
 
@@ -250,12 +255,22 @@ def _filling(medium, grid: DensityGrid | None, types: ArrayTypes) -> Medium:
     """Return the medium of a boundary, one with a grid by its largest extinction."""
     if grid is None:
         return _homogeneous(medium, types)
+    _require_constant(medium, "albedo")
     albedo = np.array(mi.traverse(medium)["albedo.value.value"], dtype=np.float64).reshape(-1)
     albedo = np.broadcast_to(albedo, 3)
     _check_albedo(albedo)
     color = types.color(*(float(value) for value in albedo))
     dr.make_opaque(color)
     return Medium((dr.opaque(types.scalar, grid.largest),), color, _read_phase(medium.phase_function(), types))
+
+
+def _require_constant(medium, *coefficients: str) -> None:
+    """Refuse coefficients that are not the same everywhere: Mitsuba calls a medium homogeneous by its extinction."""
+    for name in coefficients:
+        if not any(key.startswith(f"{name}.value.") for key in mi.traverse(medium).keys()):  # noqa: SIM118 - of pairs
+            raise InputError(
+                f"medium '{medium.id()}': its {name} differs from place to place; wanted one number or one 'rgb'"
+            )
 
 
 def _check_albedo(albedo) -> None:
@@ -266,6 +281,7 @@ def _check_albedo(albedo) -> None:
 def _homogeneous(medium, types: ArrayTypes) -> Medium:
     if not medium.is_homogeneous():
         raise InputError(f"the medium is a {medium.class_name()}; wanted a medium of type 'homogeneous'")
+    _require_constant(medium, "sigma_t", "albedo")
     sigma_s, _, sigma_t = medium.get_scattering_coefficients(dr.zeros(mi.MediumInteraction3f))
     scattering = np.array(sigma_s, dtype=np.float64).reshape(-1)
     extinction = np.array(sigma_t, dtype=np.float64).reshape(-1)

@@ -97,6 +97,7 @@ def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
             "the scene has no light; wanted at least one emitter of type 'point', 'spot', 'directional' or 'area'"
         )
     bodies = _Bodies(medium, meshes, opaque)
+    behind = _backgrounds(scene)
     lights = tuple(
         _read_directional(emitter, bodies, types)
         if emitter.class_name() == "DirectionalEmitter"
@@ -104,7 +105,7 @@ def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
         if emitter.class_name() == "ConstantBackgroundEmitter" and medium.clouds is not None
         else _read_light(emitter, types)
         for emitter in scene.emitters()
-        if not is_area_light(emitter)
+        if not is_area_light(emitter) and emitter not in behind
     )
     here = np.array(camera.origin, dtype=np.float64).ravel()
     area_lights = tuple(read_area_light(shape, here) for shape in scene.shapes() if shape.is_emitter())
@@ -162,13 +163,16 @@ def _read_camera(scene, types: ArrayTypes):
 def _read_light(emitter, types: ArrayTypes) -> Light:
     kind = {"PointLight": "point", "SpotLight": "spot"}.get(emitter.class_name())
     if kind is None:
+        word = {"ConstantBackgroundEmitter": "constant", "EnvironmentMapEmitter": "envmap"}
         raise InputError(
-            f"the scene has an emitter of class {emitter.class_name()}; wanted emitters of type 'point', 'spot', "
-            "'directional' or 'area' only: replace it or remove it"
+            f"light '{emitter.id()}' of type '{word.get(emitter.class_name(), emitter.class_name())}' lights no fog; "
+            "wanted lights of type 'point', 'spot', 'directional' or 'area'"
         )
     parameters = mi.traverse(emitter)
     if "intensity.value" not in parameters or (kind == "spot" and "texture.value" not in parameters):
-        raise InputError(f"the {kind} light has a textured or spectral intensity; wanted a constant 'rgb' intensity")
+        raise InputError(
+            f"light '{emitter.id()}' of type '{kind}' has a texture or a spectrum as intensity; wanted one 'rgb' value"
+        )
     intensity = _read_colour(parameters["intensity.value"], f"the {kind} light's intensity", "W/sr")
     matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
     position = np.array(parameters["position"], dtype=np.float64).reshape(-1) if kind == "point" else matrix[:3, 3]
@@ -181,6 +185,17 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
         arrays |= spot_fields(matrix[:3, 2] / np.linalg.norm(matrix[:3, 2]), cutoff, beam, types)
     dr.make_opaque(*arrays.values())
     return Light(**arrays)
+
+
+def _backgrounds(scene) -> list[Any]:
+    """Return what is seen behind a scene that lights in it light: an environment, or a sky that is no light of clouds.
+
+    A constant emitter beside directional lights alone lights clouds (`_read_sky`).
+    """
+    around = {"EnvironmentMapEmitter", "ConstantBackgroundEmitter"}
+    lights = {emitter.class_name() for emitter in scene.emitters()} - around
+    around -= {"ConstantBackgroundEmitter"} if lights <= {"DirectionalEmitter"} else set()
+    return [emitter for emitter in scene.emitters() if lights and emitter.class_name() in around]
 
 
 def _read_directional(emitter, bodies: _Bodies, types: ArrayTypes) -> Light:
@@ -264,6 +279,10 @@ def _scene_features(
 ) -> SceneFeatures:
     medium, opaque = bodies.medium, bodies.opaque
     notes = camera_notes(scene)
+    notes += [
+        f"light '{emitter.id()}' around the scene is seen behind it; light of it that is scattered is left out"
+        for emitter in _backgrounds(scene)
+    ]
     for shape in opaque:
         flags = shape.bsdf().flags()
         if flags & ~int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide) & 0x3FF:

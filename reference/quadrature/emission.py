@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lights with extent as the camera sees them: their own radiance through the medium, a layer of its own."""
+"""Lights with extent, and the background, as the camera sees them: their own radiance through the medium, a layer."""
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,10 +14,13 @@ from reference.visibility.line_crossings import half_chord
 Array = NDArray[np.float64]
 
 _OWN = 1e-4  # relative: a surface this close to a light is the light's own, or touches it
+_FAR = 1e30  # beyond all bounds of media [m]
 
 
 def emitted_light(truth: TruthScene, distance: Array) -> Array:
-    """Return the radiance of lights with extent that rays meet before the visible surface, (rays, 3) [W/(m^2 sr)].
+    """Return the radiance of lights with extent before the visible surface, and of the background where there is none.
+
+    In W/(m^2 sr), (rays, 3).
 
     Parameters
     ----------
@@ -34,6 +39,12 @@ def emitted_light(truth: TruthScene, distance: Array) -> Array:
         rows = np.flatnonzero(at <= distance * (1 + _OWN))
         depth = optical_depth(truth, truth.origin, truth.direction[rows], np.zeros(len(rows)), at[rows])
         total[rows] += light.radiance * np.exp(-depth)
+    if truth.background is not None and not np.any(truth.medium.sigma_t > 0):  # else nothing of it arrives
+        rows = np.flatnonzero(np.isinf(distance))
+        depth = optical_depth(truth, truth.origin, truth.direction[rows], np.zeros(len(rows)), np.full(len(rows), _FAR))
+        interaction = dr.zeros(mi.SurfaceInteraction3f, len(rows))
+        interaction.wi = mi.Vector3f(-truth.direction[rows].T)
+        total[rows] += np.array(truth.background.eval(interaction), dtype=np.float64).reshape(3, -1).T * np.exp(-depth)
     return total
 
 

@@ -59,7 +59,7 @@ class TruthImage:
     disagreements: int = 0  #: of these, how many contradicted them
     refined: int = 0  #: contradictions that were settled, by mending the intervals or by a float64 test
     left: int = 0  #: contradictions that were not: their worth is in the bound
-    emitted: Array | None = None  #: lights with extent seen directly [W/(m^2 sr)]; None where the scene has none
+    emitted: Array | None = None  #: lights with extent, or the background, seen directly [W/(m^2 sr)]; None without any
     airlight_se: Array | None = None  #: standard error of the airlight of such lights [W/(m^2 sr)]
     surface_se: Array | None = None  #: of the surface that they light [W/(m^2 sr)]
     #: means over the image of what area lights add to airlight and surface, by replicate of their points, which all
@@ -108,9 +108,11 @@ def image_of(
     shape, known = (truth.height, truth.width), centre.random_checks
     airlight, bound, surface = (layer.reshape(*shape, 3) for layer in layers)
     extra: dict[str, Array] = {}
+    if wide[0].size:
+        extra = {"emitted": wide[0].reshape(*shape, 3)}
     if truth.area:
         errors = standard_error(wide[1]).reshape(*shape, 6)
-        extra = {"emitted": wide[0].reshape(*shape, 3), "airlight_se": errors[..., :3], "surface_se": errors[..., 3:]}
+        extra |= {"airlight_se": errors[..., :3], "surface_se": errors[..., 3:]}
         extra["replicate_means"] = wide[1].mean(axis=0).reshape(2, 3, -1).swapaxes(1, 2)
     return TruthImage(
         airlight,
@@ -192,6 +194,8 @@ def ray_values(
             progress(number + 1, total, "quadrature")
     surface = lit_surface(truth, hits, reached=reached, shadow_scale=shadow_scale)
     wide: dict[str, Any] = {}
+    if truth.area or truth.background is not None:
+        wide = {"emitted": emitted_light(truth, hits.distance)}
     if truth.area:
         plan, done = plan or PointPlan(), total - 2 * _STEPS
         tell = partial(_tell, progress, total)
@@ -205,7 +209,7 @@ def ray_values(
         mean = replicates.mean(axis=2)
         airlight, surface, bound = airlight + mean[:, :3], surface + mean[:, 3:], bound + scattered.bound
         checks.append(scattered.random_checks)
-        wide = {"emitted": emitted_light(truth, hits.distance), "replicates": replicates}
+        wide["replicates"] = replicates
     checked = RandomChecks.of_all(checks)
     return RayValues(airlight, bound, surface, cast, light_angle, intervals, transitions, checked, **wide)
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lights with extent: Mitsuba's `area` emitters of constant radiance on rectangles, disks and spheres.
 
-A rectangle and a disk emit from the side of their normal, a sphere outwards. The material is black (the shape is
-opaque, and shows as a black surface) or `null` (the shape is nothing but its emission).
+A rectangle and a disk emit from the side of their normal, a sphere outwards. The material is opaque (the shape is a
+surface like others, most often a black one) or `null` (the shape is nothing but its emission).
 """
 
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class TruthAreaLight:
     frame: Array  #: unit vectors as rows, (3, 3): along both sides, and the normal of the side that emits
     half: Array  #: half of both sides, (2,) [m]; of a disk and a sphere twice the radius
     radiance: Array  #: [W/(m^2 sr)], RGB
-    black: bool  #: whether the shape is opaque; else it is `null`, and neither shadows nor ends rays
+    opaque: bool  #: whether the shape is a surface too; else it is `null`, and neither shadows nor ends rays
     shape: Any  #: Mitsuba's shape
 
     @property
@@ -78,9 +78,8 @@ def read_area_light(emitter: Any, camera: Array) -> TruthAreaLight:
     Raises
     ------
     InputError
-        By the name of the shape: for other shapes, textures, materials that are neither black nor null, shapes without
-        area or with different scales, a sphere that is inside out or holds the camera, and a light that bounds a
-        medium.
+        By the name of the shape: for other shapes, textures, shapes without area or with different scales, a sphere
+        that is inside out or holds the camera, and a light that bounds a medium.
     """
     shape = emitter.get_shape()
     kind = _KINDS.get(shape.class_name())
@@ -95,23 +94,11 @@ def read_area_light(emitter: Any, camera: Array) -> TruthAreaLight:
     flat = np.array(parameters["radiance.value"], dtype=np.float64).reshape(-1)
     matrix = np.array(mi.traverse(shape)["to_world"].matrix, dtype=np.float64).reshape(4, 4)
     frame, half = _sides(shape, kind, matrix)
-    light = TruthAreaLight(kind, matrix[:3, 3], frame, half, np.resize(flat, 3), _is_black(shape), shape)
+    opaque = shape.bsdf().class_name() != "Null"
+    light = TruthAreaLight(kind, matrix[:3, 3], frame, half, np.resize(flat, 3), opaque, shape)
     if kind == "sphere" and np.linalg.norm(camera - light.centre) <= light.radius * (1 + _SQUARE):
         raise _refusal(shape, "holds the camera", "a camera outside of lights: move it, or make the sphere smaller")
     return light
-
-
-def _is_black(shape: Any) -> bool:
-    """Return whether the material is black; refuse what is neither black nor null."""
-    material = shape.bsdf()
-    if material.class_name() == "Null":
-        return False
-    parameters = mi.traverse(material)
-    black = material.class_name() == "SmoothDiffuse" and "reflectance.value" in parameters
-    if not black or np.any(np.array(parameters["reflectance.value"]) != 0):
-        wanted = "the material 'diffuse' with reflectance 0, or 'null': it would reflect light"
-        raise _refusal(shape, f"has a {material.class_name()} material that is not black", wanted)
-    return True
 
 
 def _sides(shape: Any, kind: str, matrix: Array) -> tuple[Array, Array]:

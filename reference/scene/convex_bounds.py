@@ -90,7 +90,11 @@ def _read_polyhedron(shape: Any, vertices: Array, faces: Index) -> Polyhedron:
     edges, sides = _edges(shape, faces)
     normal = area / np.maximum(twice_area, np.finfo(float).tiny)[:, None]
     if np.sum(corner[:, 0] * area) * (-1 if shape.has_flipped_normals() else 1) < 0:
-        raise _refusal(shape, "is inside out", "faces that run counter-clockwise seen from outside")
+        raise _refusal(
+            shape,
+            "is inside out",
+            "normals that point outwards: change flip_normals, which a mirrored to_world of a mesh asks for too",
+        )
     if shape.has_flipped_normals():
         normal = -normal
     offset = np.mean(np.sum(corner * normal[:, None], axis=2), axis=1)
@@ -134,6 +138,15 @@ def holds(bounds: Bounds, point: Array) -> bool:
     if isinstance(bounds, Sphere):
         return bool(np.linalg.norm(point - bounds.centre) < bounds.radius)
     return bool(np.all(bounds.normal @ point < bounds.offset))
+
+
+def in_surface(bounds: Bounds, point: Array) -> bool:
+    """Return whether a point, (3,) [m], lies in the surface of bounds, as far as float32 can tell."""
+    margin = 1e-6 * float(np.abs(point).max())
+    if isinstance(bounds, Sphere):
+        return bool(abs(np.linalg.norm(point - bounds.centre) - bounds.radius) < margin + 1e-6 * bounds.radius)
+    furthest = float(np.max(bounds.normal @ point - bounds.offset))
+    return abs(furthest) < margin + 1e-6 * float(np.ptp(bounds.offset))
 
 
 def normals_at(bounds: Bounds, points: Array) -> Array:

@@ -18,10 +18,12 @@ from analytic.errors import InputError
 from analytic.phase import PhaseFunction
 from reference.scene.area_light import TruthAreaLight, is_area, read_area_light
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
-from reference.scene.convex_bounds import Bounds, holds, overlap, read_bounds
+from reference.scene.convex_bounds import Bounds, holds, in_surface, overlap, read_bounds
 from reference.scene.directional_light import DirectionalLight, endless_medium, is_directional, read_directional
 
 Array = NDArray[np.float64]
+
+_AROUND = ("ConstantBackgroundEmitter", "EnvironmentMapEmitter")
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,7 @@ class TruthScene:
     media: tuple[BoundedMedium, ...] = ()  #: the media with bounds, disjoint
     directional: tuple[DirectionalLight, ...] = ()  #: directional lights; all media then have bounds
     area: tuple[TruthAreaLight, ...] = ()  #: lights with extent
+    background: Any = None  #: Mitsuba's emitter around the scene, seen behind it and lighting nothing; not in `scene`
 
 
 def read_truth(scene) -> TruthScene:
@@ -91,9 +94,11 @@ def read_truth(scene) -> TruthScene:
         raise InputError("the scene has no camera; wanted a sensor of type 'perspective'")
     sensor = scene.sensors()[0]
     width, height = (int(n) for n in sensor.film().size())
-    far = tuple(emitter for emitter in scene.emitters() if is_directional(emitter))
-    wide = tuple(emitter for emitter in scene.emitters() if is_area(emitter))
-    near = tuple(emitter for emitter in scene.emitters() if not is_directional(emitter) and not is_area(emitter))
+    background = _background(scene)
+    emitters = [emitter for emitter in scene.emitters() if emitter != background]
+    far = tuple(emitter for emitter in emitters if is_directional(emitter))
+    wide = tuple(emitter for emitter in emitters if is_area(emitter))
+    near = tuple(emitter for emitter in emitters if not is_directional(emitter) and not is_area(emitter))
     if not far + near + wide:
         raise InputError(
             "the scene has no light; wanted at least one emitter of type 'point', 'spot', 'directional' or 'area'"
@@ -108,7 +113,7 @@ def read_truth(scene) -> TruthScene:
     if far and np.any(medium.sigma_t > 0):
         raise InputError(endless_medium(far[0]))
     return TruthScene(
-        scene=scene,
+        scene=scene if background is None else _without(scene, background),
         occluders=scene_of(opaque, scene),
         width=width,
         height=height,
@@ -119,7 +124,31 @@ def read_truth(scene) -> TruthScene:
         media=media,
         directional=tuple(read_directional(emitter) for emitter in far),
         area=area,
+        background=background,
     )
+
+
+def _background(scene):
+    """Return the emitter around a scene that is its background alone, since there are lights in it; None without one.
+
+    A constant one beside directional lights alone lights clouds: it is no background.
+    """
+    around = [emitter for emitter in scene.emitters() if emitter.class_name() in _AROUND]
+    lights = {emitter.class_name() for emitter in scene.emitters()} - set(_AROUND)
+    if not around or not lights or (around[0].class_name() == _AROUND[0] and lights == {"DirectionalEmitter"}):
+        return None
+    return around[0]
+
+
+def _without(scene, background):
+    """Return a scene without its background; all parts keep their names."""
+    emitters = [each for each in scene.emitters() if not is_area(each) and each != background]
+    parts = [*scene.sensors(), *emitters, *scene.shapes()]
+    names = [part.id() for part in parts]
+    built = mi.load_dict({"type": "scene"} | {f"part{number}": part for number, part in enumerate(parts)})
+    for part, name in zip(parts, names, strict=True):
+        part.set_id(name)
+    return built
 
 
 def sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
@@ -133,7 +162,7 @@ def sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
         if not null and (inside is not None or outside is not None):
             raise InputError(
                 f"shape '{shape.id()}' bounds a medium and has a {shape.bsdf().class_name()} material; wanted the "
-                "material 'null' on it, and no media on opaque shapes"
+                "material 'null' on it, and no media on other shapes"
             )
         if not null:
             opaque.append(shape)
@@ -174,6 +203,8 @@ def _read_ambient(sensor, origin: Array, media: tuple[BoundedMedium, ...], bound
     own = sensor.get_medium()
     ambient = own
     for medium, shape in zip(media, boundaries, strict=True):
+        if in_surface(medium.bounds, origin):
+            raise InputError(f"the camera is in the surface of shape '{medium.name}'; move it off, inside or outside")
         if holds(medium.bounds, origin):
             if own != medium.plugin:
                 raise InputError(
@@ -206,13 +237,21 @@ def read_medium(medium, name: str) -> TruthMedium:
     if not medium.is_homogeneous():
         raise InputError(f"{name} is a {medium.class_name()}; wanted a medium of type 'homogeneous'")
     parameters = mi.traverse(medium)
+    _require_constant(parameters, "sigma_t", name)
     sigma_t = _rgb(parameters["sigma_t.value.value"]) * float(parameters["scale"])
     return TruthMedium(sigma_t, *read_scattering(medium), medium)
 
 
 def read_scattering(medium) -> tuple[Array, PhaseFunction]:
     """Return the albedo of a medium, RGB, one number or colour everywhere, and its phase function."""
-    return _rgb(mi.traverse(medium)["albedo.value.value"]), _read_phase(medium.phase_function())
+    parameters = mi.traverse(medium)
+    _require_constant(parameters, "albedo", f"medium '{medium.id()}'")
+    return _rgb(parameters["albedo.value.value"]), _read_phase(medium.phase_function())
+
+
+def _require_constant(parameters, coefficient: str, name: str) -> None:
+    if f"{coefficient}.value.value" not in parameters:
+        raise InputError(f"{name}: its {coefficient} differs from place to place; wanted one number or one 'rgb'")
 
 
 def _read_phase(phase) -> PhaseFunction:
@@ -232,9 +271,11 @@ def _read_phase(phase) -> PhaseFunction:
 def _read_light(emitter) -> TruthLight:
     name = emitter.class_name()
     if name not in ("PointLight", "SpotLight"):
+        word = {"ConstantBackgroundEmitter": "constant", "EnvironmentMapEmitter": "envmap"}.get(name, name)
         raise InputError(
-            f"the scene has an emitter of class {name}; wanted emitters of type 'point', 'spot', 'directional' or "
-            "'area' only; for clouds before a constant sky take the estimator cloud-paths"
+            f"light '{emitter.id()}' of type '{word}' is the scene's only light beside the sun, if any; wanted lights "
+            "of type 'point', 'spot', 'directional' or 'area'; for clouds before a constant sky take the estimator "
+            "cloud-paths"
         )
     parameters = mi.traverse(emitter)
     matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)

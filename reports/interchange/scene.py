@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from realtime.scene.read_scene import read_scene
 from reference.scene.area_light import TruthAreaLight
 from reference.scene.camera import camera_matrix
 from reference.scene.directional_light import DirectionalLight
@@ -54,13 +55,14 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
         `scene`, `source`, `purpose`, `up`, `handedness`, `camera`, `medium`, `bounded_media`, `lights`, `surfaces`,
         `radiance`, `file`, `recipes`, and `properties`, the scene as `reports.interchange.cycles.cycles_properties`
         returns it; of a random scene also `drawn`. Lengths in metres, angles in degrees, extinction in 1/m, intensity
-        in W/sr, power in W. The shapes of lights with extent are among the lights, not the surfaces.
+        in W/sr, power in W. Black shapes of lights with extent are among the lights, not the surfaces.
 
     Raises
     ------
     InputError
         For a scene without a truth, with the name of what is in the way.
     """
+    read_scene(loaded.scene)  # refuses what `render` refuses, in its words
     truth = read_truth(loaded.scene)
     camera = _camera(loaded.scene.sensors()[0], truth)
     described = {
@@ -75,7 +77,9 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
             {"name": medium.name, **(_medium(medium) or {}), "bounds": _bounds(medium.bounds)} for medium in truth.media
         ],
         "lights": [*map(_light, truth.lights), *map(_directional, truth.directional), *map(_area, truth.area)],
-        "surfaces": [surface(shape) for shape in truth.occluders.shapes() if not shape.is_emitter()],
+        "surfaces": [
+            surface(shape) for shape in truth.occluders.shapes() if not shape.is_emitter() or _reflects(shape)
+        ],
         "radiance": CONVENTION,
         "file": {
             "name": f"{scene_stem(str(loaded.path or loaded.name))}.exr",
@@ -227,7 +231,7 @@ def _area(light: TruthAreaLight) -> dict[str, Any]:
         "kind": "area",
         "shape": light.kind,
         "name": light.name,
-        "material": "black" if light.black else "null",
+        "material": ("opaque" if _reflects(light.shape) else "black") if light.opaque else "null",
         "position": _numbers(light.centre),
         "area": light.area,
         "radiance": radiance.tolist(),
@@ -253,6 +257,10 @@ def luminous_flux(power: Array) -> float:
     from colour.models import RGB_COLOURSPACE_sRGB
 
     return EFFICACY * float(RGB_COLOURSPACE_sRGB.matrix_RGB_to_XYZ[1] @ power)
+
+
+def _reflects(shape: Any) -> bool:
+    return any(_reflectance(shape)[0])
 
 
 def _reflectance(shape: Any) -> tuple[list[float], bool]:

@@ -9,6 +9,7 @@ Read in this order:
 - `llvm.py`: finds a libLLVM that works
 - `quick_compilation.py`: a hack, kernels that compile quickly and run slowly
 - `gpu.py`: whether CUDA and OptiX work, and why not
+- `mitsuba_log.py`: Mitsuba's warnings on the error stream, each once
 - `environment.py`: chooses the variant; versions and processor
 - `probe.py`: one kernel in a process of its own
 - `own_process.py`: the user's own code, and kernels that compile quickly, in a process of their own

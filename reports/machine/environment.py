@@ -133,6 +133,9 @@ def activate(variant: str | None = None) -> str:
         mi.set_variant(chosen.variant)
     except ImportError as error:  # the library exists but cannot be loaded
         raise MissingError(f"{chosen.variant} does not start ({error}); see `airlight doctor`") from error
+    from reports.machine.mitsuba_log import log_to_error_stream
+
+    log_to_error_stream()
     return chosen.variant
 
 

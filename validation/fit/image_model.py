@@ -189,7 +189,7 @@ def without_lights(truth: TruthScene, judged: JudgedLayer) -> Bools:
 
     Neither a fit nor a diagnosis explains the light itself, whose radiance no fog makes.
     """
-    if not truth.area or judged.holds != TOTAL or not judged.emitted:
+    if not (truth.area or truth.background is not None) or judged.holds != TOTAL or not judged.emitted:
         return np.ones(truth.width * truth.height, dtype=bool)
     lit = emitted_light(truth, surface_hits(truth).distance).any(axis=1).reshape(truth.height, truth.width)
     return ~binary_dilation(lit, np.ones((3, 3), dtype=bool)).ravel()

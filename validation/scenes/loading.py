@@ -15,6 +15,7 @@ import mitsuba as mi
 
 from analytic.errors import InputError, nearest
 from validation.scenes.changes import change_scene, isotropic_media
+from validation.scenes.files.read import read_file
 from validation.scenes.lobes import scene_with_lobes
 from validation.scenes.numbers import check_numbers
 from validation.scenes.random_scene import PREFIX, is_random, random_parts, random_record
@@ -62,16 +63,17 @@ def load_scene(
         `reference.scene.read.read_truth` do.
     """
     record = find_record(name_or_path)
+    path = Path()
     if record is not None:
-        built = mi.load_dict(record.build())
+        built = mi.load_dict(record.build(), optimize=False)
         loaded = LoadedScene(record.name, built, record.purpose, record.published, animation=record.animation)
     else:
         path = _existing(name_or_path)
-        loaded = LoadedScene(path.stem, _parse(path), f"The user's own scene, {path.name}.", "", path)
+        loaded = LoadedScene(path.stem, _read(path), f"The user's own scene, {path.name}.", "", path)
     isotropic = isotropic_media(loaded.scene) if changes else {}
     lobes = {isotropic[name]: value[0] for name, value in changes.items() if name in isotropic and any(value)}
     if lobes:
-        scene = scene_with_lobes(name_or_path if record is None else record.build(), lobes)
+        scene = scene_with_lobes(record.build(), lobes) if record is not None else _read(path, lobes)
         name_shapes(scene)
         loaded = replace(loaded, scene=scene)
     if size is not None:
@@ -149,13 +151,9 @@ def _check_films(loaded: LoadedScene) -> None:
             )
 
 
-def _parse(path: Path):
+def _read(path: Path, lobes: Mapping[str, float] = MappingProxyType({})):
     _check_depth(path)
-    try:
-        scene = mi.load_file(str(path))
-    except Exception as error:  # Mitsuba raises RuntimeError for all bad input; Python plugins raise anything
-        reason = re.sub(r"^\[[^\]]*\]\s*", "", " ".join(str(error).split()))
-        raise InputError(f"scene {path}: Mitsuba cannot read it: {reason}") from error
+    scene = read_file(path, lobes)
     if not isinstance(scene, mi.Scene):
         raise InputError(f"scene {path}: the file holds a single {type(scene).__name__}; wanted a whole <scene>")
     name_shapes(scene)
@@ -214,6 +212,7 @@ def resize(scene, size: tuple[int, int]) -> None:
         parameters = mi.traverse(sensor)
         parameters["film.size"] = list(size)
         parameters["film.crop_size"] = list(size)
+        parameters["film.crop_offset"] = [0, 0]
         if "x_fov" in parameters:
             # The sensor recomputes its projection only when one of its own parameters is set.
             parameters["x_fov"] = parameters["x_fov"]

@@ -13,13 +13,23 @@ import mitsuba as mi
 from analytic.errors import InputError
 
 
-def scene_with_lobes(description: Any, lobes: Mapping[str, float]):
-    """Return a Mitsuba scene in which isotropic media have Henyey-Greenstein phase functions.
+def scene_with_lobes(description: dict[str, Any], lobes: Mapping[str, float]):
+    """Return the Mitsuba scene of a dictionary, see `give_lobes`."""
+    config = mi.parser.ParserConfig(mi.variant())
+    config.merge_meshes = False
+    state = mi.parser.parse_dict(config, description)
+    give_lobes(state, lobes)
+    mi.parser.transform_all(config, state)
+    return mi.parser.instantiate(config, state)
+
+
+def give_lobes(state: Any, lobes: Mapping[str, float]) -> None:
+    """Give isotropic media of a parsed scene Henyey-Greenstein phase functions.
 
     Parameters
     ----------
-    description
-        A dictionary for `mi.load_dict`, or the path of an XML file.
+    state
+        As Mitsuba's parser returns it.
     lobes
         Mean cosine by the id of the medium.
 
@@ -28,17 +38,12 @@ def scene_with_lobes(description: Any, lobes: Mapping[str, float]):
     InputError
         If a medium has no description of its own: it is part of a shape that was built before.
     """
-    config = mi.parser.ParserConfig(mi.variant())
-    parse = mi.parser.parse_dict if isinstance(description, dict) else mi.parser.parse_file
-    state = parse(config, description)
     for name, g in lobes.items():
         phase = _isotropic_phase(state, name)
         if phase is None:
             raise InputError(f"medium '{name}': its g cannot be changed: give it a phase function of type 'hg'")
         phase.set_plugin_name("hg")
         phase["g"] = g
-    mi.parser.transform_all(config, state)
-    return mi.parser.instantiate(config, state)
 
 
 def _isotropic_phase(state: Any, name: str) -> Any:

@@ -84,10 +84,12 @@ def require_homogeneous(medium) -> None:
     Raises
     ------
     InputError
-        For such a medium, with its class.
+        For such a medium.
     """
     if not medium.is_homogeneous():
         raise InputError(f"single-scatter: got a {medium.class_name()}; wanted media of type 'homogeneous'")
+    if "albedo.value.value" not in mi.traverse(medium):
+        raise InputError(f"single-scatter: the albedo of medium '{medium.id()}' differs from place to place")
 
 
 def coefficients(medium, active) -> tuple[Any, Any]:

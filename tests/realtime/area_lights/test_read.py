@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from tests.helpers.area_lamps import BLACK, area_lamp
+from tests.helpers.area_lamps import area_lamp
 from tests.helpers.scenes import tiny_scene
 
 
@@ -79,8 +79,6 @@ def _flat():
         (lambda: area_lamp("disk") | {"to_world": _sheared()}, "light 'lamp': the disk is s"),
         (lambda: area_lamp("disk", size=(0.3, 0.2)), "light 'lamp': the disk is scaled by 0.3 x 0.2"),
         (lambda: area_lamp("rectangle") | {"to_world": _flat()}, "light 'lamp': the rectangle has no area"),
-        (lambda: area_lamp("disk", material=BLACK | {"reflectance": 0.5}), "light 'lamp': its material reflects"),
-        (lambda: area_lamp("disk", material={"type": "dielectric"}), "light 'lamp': its material reflects"),
         (lambda: area_lamp("sphere", size=0.3, flip_normals=True), "light 'lamp': the sphere shines inwards"),
         (lambda: area_lamp("sphere", size=9.0), "light 'lamp': the camera is inside of the sphere"),
         (

@@ -97,7 +97,10 @@ def in_sun_and_sky(turn: float, colour: list[float]):
         "sun": {"type": "directional", "to_world": world([0, 0, 0], [0.7, -0.3, -0.6]), "irradiance": rgb()},
         "sky": {"type": "constant", "radiance": rgb()},
     }
-    return read_scene(mi.load_dict(cloud_scene(ring=cloud("ring", ring()), **lights))).lights
+    # A sky beside a lamp is a background, which lights nothing.
+    scenes = [{name: lights[name] for name in names} for names in (("point", "soft"), ("sun", "sky"))]
+    built = [mi.load_dict(cloud_scene(ring=cloud("ring", ring()), **each)) for each in scenes]
+    return [light for scene in built for light in read_scene(scene).lights]
 
 
 def test_moved_lights_of_every_kind_are_those_of_the_scene_read_anew(variant):

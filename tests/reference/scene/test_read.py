@@ -48,7 +48,7 @@ def test_rays_are_those_of_mitsuba(variant):
 @pytest.mark.claim("scenes-refused-by-name")
 @pytest.mark.parametrize(
     ("changes", "message"),
-    [({"lamp": None}, "no light"), ({"sky": {"type": "constant"}}, "ConstantBackgroundEmitter")],
+    [({"lamp": None}, "no light"), ({"lamp": None, "sky": {"type": "constant"}}, "light 'sky' of type 'constant'")],
 )
 def test_refusals(variant, changes, message):
     import mitsuba as mi

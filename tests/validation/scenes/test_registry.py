@@ -118,7 +118,7 @@ def _check_lights(scene, truth):
     if truth.area:
         assert scene.lights == truth.lights == truth.directional == ()
         (wide,), (counterpart,) = scene.area_lights, truth.area
-        assert (wide.name, wide.kind, wide.opaque) == (counterpart.name, counterpart.kind, counterpart.black)
+        assert (wide.name, wide.kind, wide.opaque) == (counterpart.name, counterpart.kind, counterpart.opaque)
         np.testing.assert_allclose(wide.middle, counterpart.centre, rtol=3e-7)
         np.testing.assert_allclose(wide.radiance, counterpart.radiance, rtol=3e-7)
         np.testing.assert_allclose(wide.power, counterpart.power, rtol=1e-6)

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Scene files as people write them are taken with the right image, or refused by the name of what is in the way."""
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from validation.scenes.loading import load_scene
+
+COEFFICIENTS = '<float name="sigma_t" value="0.23"/><float name="albedo" value="0.83"/>'
+FOG = f'<medium type="homogeneous" id="fog">{COEFFICIENTS}</medium>'
+INSIDE = '<ref name="medium" id="fog"/>'
+LOOK = '<transform name="to_world"><lookat origin="0.2, -4.1, 1.3" target="0.1, 0, 0.6" up="0, 0, 1"/></transform>'
+CAMERA = f"""<sensor type="perspective" id="eye"><float name="fov" value="41.7"/>{LOOK}{{}}
+<film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="6"/></film></sensor>"""
+FOGGY = CAMERA.format(INSIDE)
+LAMP = """<emitter type="point" id="lamp"><point name="position" value="0.7, 0.3, 1.9"/>
+<rgb name="intensity" value="5, 4, 3"/></emitter>"""
+NULL = '<bsdf type="null"/>'
+GREY = '<bsdf type="twosided"><bsdf type="diffuse"/></bsdf>'
+GLOW = '<emitter type="area"><rgb name="radiance" value="3, 2, 1"/></emitter>'
+
+
+def shape(plugin, inside="", *, name="thing", at=(0.1, 0.1, 0.7), size=0.41):
+    place = f'<scale value="{size}"/><rotate z="1" angle="17"/><translate x="{at[0]}" y="{at[1]}" z="{at[2]}"/>'
+    return f'<shape type="{plugin}" id="{name}"><transform name="to_world">{place}</transform>{inside}</shape>'
+
+
+@pytest.fixture
+def load(variant, tmp_path):
+    """Write a file of these parts and load it."""
+
+    def loaded(*parts, camera=FOGGY, media=FOG, version="3.0.0"):
+        path = tmp_path / "own.xml"
+        path.write_text(f'<scene version="{version}">{media}{camera}{"".join(parts)}</scene>')
+        return load_scene(str(path)).scene
+
+    return loaded
+
+
+def image(scene):
+    from reference.quadrature.image import quadrature_image
+    from reference.scene.read import read_truth
+
+    truth = quadrature_image(read_truth(scene))
+    return np.stack([truth.airlight, truth.surface])
+
+
+def test_references_to_the_medium_that_is_there_change_nothing(load):
+    """Walls and lamps of Mitsuba 0.6 say in which medium they stand; volpath and both readers see the plain scene."""
+    fog = '<ref name="exterior" id="fog"/>'
+    ball, lamp = shape("sphere", GREY + fog), shape("rectangle", fog + GLOW, name="glow", at=(-0.6, 0.2, 1.6), size=0.1)
+    said = load(LAMP, ball, lamp)
+    assert all(each.exterior_medium() is None for each in said.shapes())
+    plain = load(LAMP, ball.replace(fog, ""), lamp.replace(fog, ""))
+    np.testing.assert_array_equal(image(said), image(plain))
+
+
+def test_a_wall_in_a_box_of_fog_may_name_it(load):
+    box = shape("cube", NULL + '<ref name="interior" id="fog"/>', name="box", size=1.1)
+    ball = shape("sphere", GREY + '<ref name="exterior" id="fog"/>', size=0.3)
+    assert all(each.exterior_medium() is None for each in load(LAMP, box, ball, camera=CAMERA.format("")).shapes())
+    with pytest.raises(
+        InputError, match=r"'thing' is opaque and references medium 'fog' as exterior, where there is no medium"
+    ):
+        load(LAMP, box, ball.replace('x="0.1"', 'x="2.1"'), camera=CAMERA.format(""))
+
+
+def test_shapes_keep_their_names_and_are_not_merged(load):
+    boxes = [shape("cube", GREY, name=name, at=(x, 0.2, 0.6), size=0.2) for name, x in (("a", -0.4), ("b", 0.5))]
+    assert [each.id() for each in load(LAMP, *boxes).shapes()] == ["a", "b"]
+
+
+def test_instances_give_the_image_of_shapes_written_out(load):
+    post = '<shape type="{}" id="{}"><transform name="to_world"><scale x="0.1" y="0.2" z="0.4"/></transform>{}</shape>'
+    places = [(f"post-{number}", f'<translate x="{0.5 * number}" y="0.3" z="0.4"/>') for number in (-1, 0, 1)]
+    group = f'<shape type="shapegroup" id="posts">{post.format("cube", "post", GREY)}</shape>'
+    instances = [
+        f'<shape type="instance" id="{name}"><ref id="posts"/><transform name="to_world">{place}</transform></shape>'
+        for name, place in places
+    ]
+    flat = [post.format("cube", name, GREY).replace("</transform>", place + "</transform>") for name, place in places]
+    scene = load(LAMP, group, *instances)
+    assert [each.id() for each in scene.shapes()] == ["post--1", "post-0", "post-1"]
+    np.testing.assert_allclose(image(scene), image(load(LAMP, *flat)), rtol=1e-5)  # transforms are float32 numbers
+
+
+@pytest.mark.parametrize("turn", ["", '<boolean name="flip_normals" value="true"/>'])
+def test_a_lamp_on_a_quad_of_two_triangles_is_the_rectangle(load, tmp_path, turn):
+    """The corners run round the quad, as modelling programs write them; the side that shines is the mesh's."""
+    from reference.scene.read import read_truth
+
+    (tmp_path / "quad.obj").write_text("v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3\nf 1 3 4\n")
+    mesh = '<string name="filename" value="quad.obj"/>' + turn + GLOW
+    quad, rectangle = (load(shape(plugin, inside)) for plugin, inside in (("obj", mesh), ("rectangle", turn + GLOW)))
+    lights = [read_truth(scene).area[0] for scene in (quad, rectangle)]
+    for name in ("centre", "normal", "area", "power"):
+        np.testing.assert_allclose(*(getattr(light, name) for light in lights), rtol=1e-5, atol=1e-6)
+
+
+def test_a_lamp_that_reflects_is_lit_like_any_surface(load):
+    """What it sends out changes nothing of what it reflects; it lights what is before it as a black one does."""
+    rgb = '<bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="{}"/></bsdf></bsdf>'
+    turned = shape("rectangle", "{}", at=(0.1, 0.9, 0.7)).replace("<rotate", '<rotate x="1" angle="90"/><rotate')
+    plain = image(load(LAMP, turned.format(rgb.format("0.5, 0.4, 0.3"))))
+    black = image(load(LAMP, turned.format(rgb.format("0, 0, 0") + GLOW)))
+    glowing = image(load(LAMP, turned.format(rgb.format("0.5, 0.4, 0.3") + GLOW)))
+    np.testing.assert_allclose(glowing[0], black[0], rtol=1e-6)
+    assert plain[1].max() > 0.01
+    np.testing.assert_allclose(glowing[1], plain[1], rtol=1e-5)
+
+
+def test_a_background_is_seen_through_the_fog_and_lights_nothing(load):
+    from reference.quadrature.image import quadrature_image
+    from reference.scene.read import read_truth
+
+    box = shape("cube", NULL + '<ref name="interior" id="fog"/>', name="box", size=1.1)
+    sky = '<emitter type="constant" id="sky"><rgb name="radiance" value="0.2, 0.3, 0.4"/></emitter>'
+    scene = load(LAMP, box, sky, camera=CAMERA.format(""))
+    with_sky = quadrature_image(read_truth(scene))
+    np.testing.assert_array_equal(image(scene), image(load(LAMP, box, camera=CAMERA.format(""))))
+    through = -np.log(with_sky.emitted / [0.2, 0.3, 0.4]) / 0.23  # Beer's law gives how much fog a ray has met [m]
+    assert through.max() == pytest.approx(2.2 / np.cos(np.deg2rad(17)), rel=0.1)
+    assert through.min() == pytest.approx(0, abs=1e-6)
+    np.testing.assert_allclose(through[..., 0], through[..., 1], atol=1e-6)
+
+
+@pytest.mark.parametrize("version", ["0.5.0", "0.6.0", "3.0.0"])
+def test_scattering_and_absorption_become_extinction_and_albedo(load, capfd, version):
+    from reference.scene.read import read_truth
+
+    media = """<medium type="homogeneous" id="fog-{2}"><rgb name="sigma{0}" value="0.15, 1.5, 0.14"/>
+    <rgb name="sigma{1}" value="0.02, 0.5, 0.03"/><float name="scale" value="0.5"/></medium>"""
+    old = version < "3"
+    camera = CAMERA.format(INSIDE.replace("fog", f"fog-{version}"))
+    camera = camera.replace("to_world", "toWorld").replace("<lookat", "<lookAt") if old else camera
+    medium = read_truth(
+        load(LAMP, camera=camera, media=media.format(*("SA" if old else ("_s", "_a")), version), version=version)
+    )
+    np.testing.assert_allclose(medium.medium.sigma_t, [0.085, 1.0, 0.085], rtol=1e-6)
+    np.testing.assert_allclose(medium.medium.albedo, [0.15 / 0.17, 0.75, 0.14 / 0.17], rtol=1e-6)
+    said = capfd.readouterr()
+    assert not said.out
+    assert "sigma_t 0.17, 2, 0.17 and albedo 0.882353, 0.75, 0.823529" in said.err
+
+
+def medium(inside):
+    return f'<medium type="homogeneous" id="fog">{inside}</medium>'
+
+
+GRID = """<volume type="gridvolume" name="{}"><string name="filename" value="{}"/></volume>"""
+REFUSED = {
+    "medium 'fog' names the material 'skimmilk'.*sigma_t.*0.7014, 1.2225, 1.9142.*albedo": (
+        {"media": medium('<string name="material" value="skimmilk"/>')},
+    ),
+    "medium 'fog' has a density.*sigma_t": ({"media": medium('<float name="density" value="2"/>')},),
+    "light 'slide' is of type 'projector'": ({}, '<emitter type="projector" id="slide"/>'),
+    "light 'gobo', of type 'spot', has a texture": (
+        {},
+        '<emitter type="spot" id="gobo"><texture type="checkerboard" name="texture"/></emitter>',
+    ),
+    "light 'sun' is of type 'sunsky'": ({}, '<emitter type="sunsky" id="sun"/>'),
+    'write another up, for example up="0, 1, 0"': ({"camera": FOGGY.replace("0.1, 0, 0.6", "0.2, -4.1, 0")},),
+    "camera 'eye' is of type 'orthographic'": (
+        {
+            "camera": CAMERA.format(INSIDE)
+            .replace("perspective", "orthographic")
+            .replace('<float name="fov" value="41.7"/>', "")
+        },
+    ),
+    "camera 'eye' is of type 'thinlens'": (
+        {
+            "camera": CAMERA.format(INSIDE + '<float name="aperture_radius" value="0.1"/>').replace(
+                "perspective", "thinlens"
+            )
+        },
+    ),
+    "camera 'eye' has principal_point_offset_x": (
+        {"camera": CAMERA.format(INSIDE + '<float name="principal_point_offset_x" value="0.1"/>')},
+    ),
+    "a phase function of the scene is of type 'sggx'|phase function .* is of type 'sggx'": (
+        {"media": FOG.replace("</medium>", '<phase type="sggx"/></medium>')},
+    ),
+    "references medium 'smoke' as exterior, where there is medium 'fog'": (
+        {"media": FOG + FOG.replace("fog", "smoke")},
+        shape("sphere", GREY + '<ref name="exterior" id="smoke"/>'),
+    ),
+}
+
+
+@pytest.mark.parametrize("words", REFUSED)
+def test_what_no_command_takes_is_refused_by_its_name(load, words):
+    settings, *parts = REFUSED[words]
+    with pytest.raises(InputError, match=words) as caught:
+        load(LAMP, *parts, **settings)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("coefficient", ["albedo", "sigma_t"])
+def test_a_coefficient_on_a_grid_is_refused_by_both_readers(load, tmp_path, coefficient):
+    """Mitsuba calls a medium homogeneous whose albedo differs from place to place."""
+    import mitsuba as mi
+
+    from realtime.errors import InputError as RealtimeInputError
+    from realtime.scene.read_scene import read_scene
+    from reference.scene.read import read_truth
+
+    mi.VolumeGrid(np.linspace(0.1, 0.9, 8, dtype=np.float32).reshape(2, 2, 2, 1)).write(str(tmp_path / "grid.vol"))
+    other = {"albedo": "sigma_t", "sigma_t": "albedo"}[coefficient]
+    scene = load(LAMP, media=medium(GRID.format(coefficient, "grid.vol") + f'<float name="{other}" value="0.4"/>'))
+    for read in (read_truth, read_scene):
+        with pytest.raises((InputError, RealtimeInputError), match=f"{coefficient} differs from place to place"):
+            read(scene)

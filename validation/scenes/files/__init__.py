@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Scene files as people write them, made into what both readers take, once for every command.
+
+Mitsuba's parser gives nodes before anything is built. Here old media get extinction and albedo, instances are written
+out, lamps on flat quads become rectangles, and references to media that say what is so anyway are left out; what no
+command can take is refused in Mitsuba's own words. What was changed is said in notes, as warnings in Mitsuba's log.
+
+Read in this order:
+
+- `nodes.py`: the nodes of a parsed file;
+- `kinds.py`: plugins that no command takes, refused by name;
+- `media.py`: extinction and albedo from what old files have;
+- `shapes.py`: instances written out, lamps on quads as rectangles;
+- `references.py`: media that opaque shapes reference;
+- `read.py`: a file made into a scene.
+"""

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Coefficients of media as files have them, made into extinction and albedo.
+
+Files of Mitsuba 0.5 and 0.6, and of its descendants, give scattering and absorption, of which
+
+    sigma_t = sigma_s + sigma_a,        albedo = sigma_s / sigma_t,
+
+or the name of a material. The scale, which multiplies both, stays as it is.
+"""
+
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from validation.scenes.files.nodes import of_kind, properties
+
+Array = NDArray[np.float64]
+
+_OLD = ("sigma_s", "sigma_a")
+# Reduced scattering and absorption [1/mm] of Jensen, Marschner, Levoy, Hanrahan 2001, table in figure 5.
+_MATERIALS = {
+    "apple": ((2.29, 2.39, 1.97), (0.0030, 0.0034, 0.046)),
+    "chicken1": ((0.15, 0.21, 0.38), (0.015, 0.077, 0.19)),
+    "chicken2": ((0.19, 0.25, 0.32), (0.018, 0.088, 0.20)),
+    "cream": ((7.38, 5.47, 3.15), (0.0002, 0.0028, 0.0163)),
+    "ketchup": ((0.18, 0.07, 0.03), (0.061, 0.97, 1.45)),
+    "marble": ((2.19, 2.62, 3.00), (0.0021, 0.0041, 0.0071)),
+    "potato": ((0.68, 0.70, 0.55), (0.0024, 0.0090, 0.12)),
+    "skimmilk": ((0.70, 1.22, 1.90), (0.0014, 0.0025, 0.0142)),
+    "skin1": ((0.74, 0.88, 1.01), (0.032, 0.17, 0.48)),
+    "skin2": ((1.09, 1.59, 1.79), (0.013, 0.070, 0.145)),
+    "spectralon": ((11.6, 20.4, 14.9), (0.00, 0.00, 0.00)),
+    "wholemilk": ((2.55, 3.21, 3.77), (0.0011, 0.0024, 0.014)),
+}
+
+
+def give_extinction(state: Any) -> list[str]:
+    """Give homogeneous media extinction and albedo in place of scattering and absorption; return what was changed.
+
+    Raises
+    ------
+    InputError
+        For the name of a material, a density, and coefficients that are no numbers, with what to write instead.
+    """
+    notes = []
+    for index in of_kind(state, "Medium"):
+        props = properties(state, index)
+        if props.plugin_name() != "homogeneous":
+            continue
+        _refuse_names(props)
+        given = [key for key in _OLD if key in props]
+        if not given:
+            continue
+        sigma_t, albedo = _extinction(props)
+        for key in given:
+            del props[key]
+        # Mitsuba takes colours of a medium for reflectances, from 0 to 1: what is above goes into the scale.
+        above = max(1.0, float(sigma_t.max()))
+        props["scale"] = float(props.get("scale", 1.0)) * above
+        for key, values in (("sigma_t", sigma_t / above), ("albedo", albedo)):
+            props[key] = mi.ScalarColor3d(*(float(value) for value in values))
+        notes.append(
+            f"medium '{props.id()}': {' and '.join(given)} are read as sigma_t {_words(sigma_t)} and albedo "
+            f"{_words(albedo)}"
+        )
+    return notes
+
+
+def _refuse_names(props: Any) -> None:
+    name = f"medium '{props.id()}'"
+    if "density" in props:
+        raise InputError(
+            f"{name} has a density, which a homogeneous medium has not; wanted sigma_t [1/m] and albedo: multiply "
+            "sigma_t by the density and remove it"
+        )
+    if "material" not in props:
+        return
+    material = str(props["material"])
+    known = _MATERIALS.get(material.lower().replace(" ", "").replace("_", ""))
+    remedy = "its sigma_t [1/m] and albedo in numbers"
+    if known is not None:
+        scattering, absorption = map(np.array, known)
+        sigma_t = scattering + absorption
+        remedy = (
+            f'<rgb name="sigma_t" value="{_words(sigma_t)}"/> and <rgb name="albedo" '
+            f'value="{_words(scattering / sigma_t)}"/> (per mm; the scale multiplies it)'
+        )
+    raise InputError(f"{name} names the material '{material}' of Mitsuba 0.6; wanted {remedy} in its place")
+
+
+def _extinction(props: Any) -> tuple[Array, Array]:
+    """Return extinction and albedo of which two of scattering, absorption and extinction are given."""
+    known = {key: values for key in (*_OLD, "sigma_t") if (values := _numbers(props, key)) is not None}
+    if "albedo" in props or len(known) != 2:
+        given = ", ".join(key for key in (*_OLD, "sigma_t", "albedo") if key in props)
+        raise InputError(f"medium '{props.id()}' has {given}; wanted sigma_t and albedo, or sigma_s and sigma_a")
+    extinction = known["sigma_t"] if "sigma_t" in known else known["sigma_s"] + known["sigma_a"]
+    scattering = known["sigma_s"] if "sigma_s" in known else extinction - known["sigma_a"]
+    return extinction, np.divide(scattering, extinction, out=np.zeros(3), where=extinction > 0)
+
+
+def _numbers(props: Any, key: str) -> Array | None:
+    """Return three values of a coefficient, None where it is not given."""
+    if key not in props:
+        return None
+    value = props[key]
+    if isinstance(value, mi.Spectrum) and value.is_uniform():
+        value = value.values()
+    try:
+        numbers = np.array(value, dtype=np.float64).reshape(-1)
+    except (TypeError, ValueError):
+        numbers = np.zeros(0)
+    if numbers.size not in (1, 3):
+        raise InputError(
+            f"medium '{props.id()}': {key} is no number and no 'rgb'; wanted sigma_t = sigma_s + sigma_a [1/m] and "
+            "albedo = sigma_s / sigma_t in numbers"
+        )
+    return np.array(np.broadcast_to(numbers, 3))
+
+
+def _words(values: Array) -> str:
+    values = values[:1] if np.ptp(values) <= 1e-6 * np.abs(values).max() else values
+    return ", ".join(f"{value:.6g}" for value in values)

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A scene file made into Mitsuba's scene: parsed, mended, built."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import mitsuba as mi
+
+from analytic.errors import InputError
+from validation.scenes.files.kinds import check_kinds
+from validation.scenes.files.media import give_extinction
+from validation.scenes.files.nodes import kind, name_nodes, properties, references
+from validation.scenes.files.references import leave_out_media
+from validation.scenes.files.shapes import lamps_as_rectangles, write_out_instances
+from validation.scenes.lobes import give_lobes
+
+_FILM = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y")
+
+
+def read_file(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> Any:
+    """Read a scene file with what Mitsuba has in place of a scene where it holds none.
+
+    Parameters
+    ----------
+    path
+        Of the XML file.
+    lobes
+        Mean cosines by the ids of isotropic media that shall have them.
+
+    Raises
+    ------
+    InputError
+        For a file that Mitsuba cannot read, and for what no command can take.
+    """
+    config = mi.parser.ParserConfig(mi.variant())
+    config.merge_meshes = False  # shapes keep their names, and two media stay two
+    resolver = mi.file_resolver()
+    try:
+        mi.set_file_resolver(mi.FileResolver(resolver))
+        mi.file_resolver().prepend(str(path.parent))
+        return _built(config, _parsed(config, path), lobes)
+    except InputError:
+        raise
+    except Exception as error:  # Mitsuba raises RuntimeError for all bad input; Python plugins raise anything
+        reason = re.sub(r"^\[[^\]]*\]\s*", "", " ".join(str(error).split()))
+        if "invalid lookat" in reason:
+            reason += ': it looks along its own up; write another up, for example up="0, 1, 0"'
+        raise InputError(f"scene {path}: Mitsuba cannot read it: {reason}") from error
+    finally:
+        mi.set_file_resolver(resolver)
+
+
+def _parsed(config: Any, path: Path) -> Any:
+    """Return the nodes of a file, with the names that Mitsuba 3 gives to everything, and references as numbers."""
+    text = path.read_text(encoding="utf-8", errors="replace")
+    if "<lookAt" in text:  # of version 0.5, which Mitsuba's own upgrade leaves out
+        state = mi.parser.parse_string(config, re.sub(r"(</?)lookAt\b", r"\1lookat", text))
+    else:
+        state = mi.parser.parse_file(config, str(path))
+    mi.parser.transform_upgrade(config, state)
+    mi.parser.transform_resolve(config, state)
+    return state
+
+
+def _built(config: Any, state: Any, lobes: Mapping[str, float]) -> Any:
+    if kind(state, 0) != "Scene":
+        return mi.parser.instantiate(config, state)
+    _mend(state)
+    give_lobes(state, lobes)
+    scene = mi.parser.instantiate(config, mi.parser.ParserState(state))  # which takes the nodes apart
+    changed = [lamps_as_rectangles(state, scene.shapes()), leave_out_media(state, scene)]
+    return mi.parser.instantiate(config, state) if any(changed) else scene
+
+
+def _mend(state: Any) -> None:
+    """Change what a file says into what both readers take, and say so."""
+    _leave_out_rendering(state)
+    name_nodes(state)
+    check_kinds(state)
+    for note in give_extinction(state):
+        mi.Log(mi.LogLevel.Warn, note)
+    write_out_instances(state)
+
+
+def _leave_out_rendering(state: Any) -> None:
+    """Leave out integrators, samplers and filters: no method uses them, and old files name some that are no more."""
+    for node in state.nodes:
+        for key, at in references(node.props):
+            if kind(state, at) in ("Integrator", "Sampler"):
+                del node.props[key]
+            elif kind(state, at) == "Film":
+                film = properties(state, at)
+                kept = mi.Properties("hdrfilm")
+                for name in _FILM:
+                    if name in film:
+                        kept[name] = film[name]
+                state.nodes[at].props = kept

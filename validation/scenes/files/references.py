@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""References of opaque shapes to media: left out where they say what is so anyway, refused where they contradict.
+
+Mitsuba asks for the media on both sides of every shape, and old manuals did so for walls and lamps. What fills space is
+known from the camera and from the bounds of media; a wall or a lamp adds nothing to it.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from analytic.errors import InputError
+from realtime.scene.named_shapes import scene_of
+from validation.scenes.files.nodes import child, kind, of_kind, properties, references
+
+_POINTS = 16  # of a shape, at which its references are held against what is there
+_OFF = 1e-4  # of a shape's size: how far beside it
+_OPEN = ("Rectangle", "Disk", "Cylinder")  # which bound no medium: readers say so
+
+
+def leave_out_media(state: Any, scene: Any) -> bool:
+    """Leave out the media of opaque shapes and of lamps; return whether there were any.
+
+    Parameters
+    ----------
+    state
+        The parsed file.
+    scene
+        Mitsuba's scene of it.
+
+    Raises
+    ------
+    InputError
+        For a reference that contradicts, with the shape, the medium and what is there.
+    """
+    nodes = {properties(state, index).id(): index for index in of_kind(state, "Shape")}
+    shapes = [
+        shape
+        for shape in scene.shapes()
+        if shape.id() in nodes and _media(shape) and (shape.is_emitter() or _is_opaque(shape))
+    ]
+    if not shapes or not scene.sensors():
+        return False
+    others = [shape for shape in scene.shapes() if all(shape.id() != each.id() for each in shapes)]
+    bounds = [shape for shape in others if shape.interior_medium() is not None and not _is_opaque(shape)]
+    if not any(shape.class_name() in _OPEN for shape in bounds):
+        space = _Space(scene.sensors()[0], bounds)
+        for shape in shapes:
+            space.check(shape)
+    for shape in shapes:
+        props = properties(state, nodes[shape.id()])
+        for key, at in references(props):
+            if kind(state, at) == "Medium":
+                del props[key]
+        # Without a medium Mitsuba would take away nothing; a lamp without a material is black as before.
+        assert child(state, nodes[shape.id()], "Medium") is None
+    return True
+
+
+def _media(shape: Any) -> list[tuple[str, Any, int]]:
+    """Return the media that a shape references: which side, Mitsuba's medium, and the sign of the normal there."""
+    sides = (("interior", shape.interior_medium(), -1), ("exterior", shape.exterior_medium(), 1))
+    return [side for side in sides if side[1] is not None]
+
+
+def _is_opaque(shape: Any) -> bool:
+    return not int(shape.bsdf().flags()) & int(mi.BSDFFlags.Null | mi.BSDFFlags.Transmission)
+
+
+class _Space:
+    """What fills space: the camera's medium, or what surrounds all bounds, and what is within them."""
+
+    def __init__(self, sensor: Any, bounds: Sequence[Any]) -> None:
+        self._bounds = scene_of(bounds) if bounds else None
+        self._around = sensor.get_medium()
+        if self._bounds is not None:
+            camera = np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)[:3, 3]
+            self._around = self._at(camera[None] + np.array([[1e6, 2e6, 3e6]]), camera[None])[0]
+
+    def _at(self, start: Any, towards: Any) -> list[Any]:
+        """Return the media at points, as the nearest boundary on the way to others says."""
+        if self._bounds is None:
+            return [self._around] * len(start)
+        way = np.broadcast_to(towards, start.shape) - start
+        way /= np.linalg.norm(way, axis=1, keepdims=True)
+        rays = mi.Ray3f(mi.Point3f(start.T), mi.Vector3f(way.T))
+        hit = self._bounds.ray_intersect(rays)
+        media = hit.target_medium(-rays.d)
+        dr.eval(media, hit)
+        met = np.array(hit.is_valid())
+        return [media[number] if met[number] else self._around for number in range(len(start))]
+
+    def check(self, shape: Any) -> None:
+        """Refuse a shape that references another medium than is there, on either side."""
+        number = np.arange(_POINTS)
+        place = mi.Point2f((number + 0.5) / _POINTS, number * 0.6180339887 % 1)
+        sample = shape.sample_position(0.0, place)
+        points, normals = (np.array(value, dtype=np.float64).reshape(3, -1).T for value in (sample.p, sample.n))
+        box = shape.bbox()
+        size = float(np.linalg.norm(np.ptp([np.ravel(box.min), np.ravel(box.max)], axis=0)))
+        for side, medium, sign in _media(shape):
+            beside = points + sign * _OFF * size * normals
+            for there in self._at(beside, beside + np.array([0.3, 0.5, 0.8])):
+                if there != medium:
+                    found = f"medium '{there.id()}'" if there is not None else "no medium"
+                    raise InputError(
+                        f"shape '{shape.id()}' is opaque and references medium '{medium.id()}' as {side}, where there "
+                        f"is {found}; wanted no medium on it, or the one that it stands in"
+                    )
