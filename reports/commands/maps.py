@@ -39,7 +39,7 @@ def maps(
 ) -> None:
     """Measure error and flicker against the size of the shadow map.
 
-    The error is against the ray-traced truth. Also prints the slope of the relative RMSE, fitted to the logarithms.
+    The error is against the quadrature reference. Also prints the slope of the relative RMSE, fitted to the logarithms.
     With --flicker the light circles slowly, and the change of the image from frame to frame is measured, less that
     of the truth.
     """

@@ -27,7 +27,7 @@ def report(
         list[str] | None,
         typer.Argument(
             metavar="SCENE",
-            help="Built-in scenes, random:SEED and Mitsuba XML files; four with --quick, all with --full.",
+            help="Built-in scenes, random:SEED and Mitsuba XML files; four with --quick, eleven by default.",
             show_default=False,
             autocompletion=completion.scenes,
         ),

@@ -54,7 +54,7 @@ def test_the_tutorial_ends_with_a_figure(variant, tmp_path, monkeypatch, capfd):
     page = DOCS / "scene-to-figure.md"
     (tmp_path / "gate.xml").write_text(blocks(page, "xml")[0], encoding="utf-8")
     run_commands(page, capfd)
-    for name in ("gate.png", "truth.exr", "gate-report/report.html", "figures/strip.pdf"):
+    for name in ("gate.png", "reference.exr", "gate-report/report.html", "figures/strip.pdf"):
         assert (tmp_path / name).stat().st_size > 1000, name
     # Several per cent with 32 steps, as the page says.
     (relative,) = re.findall(r"^rmse .* relative ([\d.]+) %$", capfd.readouterr().out, flags=re.MULTILINE)
@@ -153,7 +153,7 @@ def test_the_kernel_of_the_page(variant, tmp_path, monkeypatch):
     code = blocks(DOCS / "your-method.md", "python")[2]
     (tmp_path / "twelve_steps_of_a_page.py").write_text(code)
     monkeypatch.syspath_prepend(str(tmp_path))
-    cases = read_cases(ROOT / "tests/data/airlight_integral.csv")
+    cases = read_cases(ROOT / "validation/certified/airlight_integral.csv")
     kernels = ("twelve_steps_of_a_page:midpoint", "equiangular-12")
     own, expected = (integrate_cases(cases, kernel, "double") for kernel in kernels)
     both = np.isfinite(own) & np.isfinite(expected)

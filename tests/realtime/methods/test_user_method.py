@@ -43,6 +43,10 @@ def divides(view):
     'Divide by zero.'
     return 1 / (NUMBER - 3)
 
+def refuses(view):
+    import airlight
+    raise airlight.InputError("refuses: wanted less")
+
 def loops(view):
     def body(i):
         raise ValueError("in the\\nloop")
@@ -175,6 +179,13 @@ def test_an_exception_names_file_and_line(render, own):
         with refused(f"method {own}:{name}: {own}, line {number}: {kind}") as caught:
             render(name)
         assert caught.value.__cause__ is not None
+
+
+@pytest.mark.claim("own-method-faults")
+def test_what_a_method_refuses_is_no_fault(render):
+    """Its words stand alone, whichever of the two classes it raises: a fault would have file and line before them."""
+    with pytest.raises(InputError, match=r"^refuses: wanted less$"):
+        render("refuses")
 
 
 @pytest.mark.claim("own-method-parameters")
