@@ -50,7 +50,7 @@ def reference(
         "reference.exr"
     ),
     estimator: Annotated[
-        Estimator, typer.Option(metavar="NAME", help="How to compute it: quadrature, single-scatter, volpath or cloud-paths.")
+        Estimator, typer.Option(metavar="NAME", help="quadrature, single-scatter, volpath or cloud-paths.")
     ] = Estimator.quadrature,
     spp: Annotated[
         int | None,
