@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parts of pages that are made from the program and from a report.
 
-A line `<!-- generated: NAME WORDS -->` of a page is replaced by Markdown that a function of `listed` or `measured`
-returns, before the page is read. So the pages read well in a plain viewer too, and nothing on them is copied by hand.
+A line `<!-- generated: NAME WORDS -->` of a page is replaced by Markdown that a function of `listed`, `measured`,
+`shown` or `tested` returns, before the page is read, so that nothing on the pages is copied by hand. In a plain viewer
+the marks are invisible: `.venv/bin/python -m sphinx -W --keep-going docs airlight-docs` builds the pages.
 Links to Python files of the project, which have no pages, become the names of the files.
 """
 

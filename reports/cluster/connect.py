@@ -79,7 +79,7 @@ def check_library() -> None:
     except ImportError:
         raise MissingError(
             "work on several processes or machines needs the packages dask and distributed: install them with "
-            "`pip install 'airlight[sweep]'`"
+            "`pip install '.[sweep]'` in a clone"
         ) from None
 
 

@@ -15,7 +15,8 @@ def clouds(
     phase: Annotated[
         str,
         typer.Option(
-            metavar="NAME", help="isotropic, hg:G, mie, mie-modified, or a CSV file of angles [degrees] and values."
+            metavar="NAME",
+            help="isotropic, hg:G, hg-draine:D, mie, mie-modified, or a CSV file of angles and values.",
         ),
     ] = "mie-modified",
     albedo: Annotated[float, typer.Option(metavar="A", help="Single-scattering albedo.")] = 1.0,

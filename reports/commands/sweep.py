@@ -121,7 +121,9 @@ def _check_parquet() -> None:
     try:
         import pyarrow  # noqa: F401 - asked for here, before any work
     except ImportError:
-        raise MissingError("sweeps need the package pyarrow: install it with `pip install 'airlight[sweep]'`") from None
+        raise MissingError(
+            "sweeps need the package pyarrow: install it with `pip install '.[sweep]'` in a clone"
+        ) from None
 
 
 def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, again: bool) -> dict[str, Any]:

@@ -37,7 +37,7 @@ def check_library() -> None:
         import websockets.sync.server  # noqa: F401 - asked for here, before any work
     except ImportError:
         raise MissingError(
-            "the live view needs the package websockets: install it with `pip install 'airlight[view]'`"
+            "the live view needs the package websockets: install it with `pip install '.[view]'` in a clone"
         ) from None
 
 

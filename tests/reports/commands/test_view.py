@@ -37,7 +37,8 @@ def test_without_the_extra_one_line_says_what_to_type(monkeypatch, capfd):
     run("sphere-spot", status=3)
     said = capfd.readouterr()
     assert said.err == (
-        "airlight: error: the live view needs the package websockets: install it with `pip install 'airlight[view]'`\n"
+        "airlight: error: the live view needs the package websockets: "
+        "install it with `pip install '.[view]'` in a clone\n"
     )
 
 
