@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from analytic.area_light import disk_share, polygon_in_disk, polygon_overlap, sphere_airlight, sphere_fluence
-from analytic.errors import InputError
 
 #: Foot at 0, from -2 to 3, attenuation from -2 on; computed twice in mpmath, over directions and over the cap.
 CERTIFIED = [
@@ -27,11 +26,6 @@ def test_a_sphere_in_clear_air_fills_its_cone():
     distance = np.array([1.0001, 1.5, 7.0, 1e4])
     cone = np.pi / distance**2 * 2 / (1 + np.sqrt((1 - 1 / distance) * (1 + 1 / distance)))
     assert sphere_fluence(0.0, distance, 1.0) == pytest.approx(cone, rel=1e-12)
-
-
-def test_a_ray_into_the_sphere_is_refused():
-    with pytest.raises(InputError, match="passes beside"):
-        sphere_airlight(0.2, 0.3, 0.3, foot=2.0, x0=0.0, x1=5.0)
 
 
 def test_shares_of_a_disk():

@@ -62,8 +62,3 @@ def test_both_files(data_folder):
 def test_refusals(table, text, message):
     with pytest.raises(InputError, match=message):
         read_cases(table(text))
-
-
-def test_a_file_that_is_not_there(tmp_path):
-    with pytest.raises(InputError, match="cannot be read as a CSV file"):
-        read_cases(tmp_path / "none.csv")

@@ -9,7 +9,6 @@ from analytic.cases import integrate_cases, read_cases
 from analytic.droplets import moments
 from analytic.errors import InputError
 from analytic.phase import PhaseFunction, hg_draine_moments, phase_from_words
-from analytic.series import taylor_coefficients
 from tests.evidence.certified.airlight_integral_droplets import FILE, value
 
 
@@ -31,13 +30,6 @@ def test_mpmath_twin_agrees(words):
     assert phase(cosines) == pytest.approx(expected, rel=2e-8, abs=1e-14)
 
 
-def test_the_series_of_hg_draine_is_the_function():
-    phase, theta = PhaseFunction("hg-draine"), 0.03
-    series = phase.series(14)
-    assert sum(c * theta**k for k, c in enumerate(series)) == pytest.approx(float(phase(-np.sin(theta))), rel=1e-12)
-    assert taylor_coefficients(np.array([0.5]), phase, 2).shape == (1, 3)
-
-
 @pytest.mark.claim("droplets-certified", tolerance="3e-8 relative: of the spline through Mie's series")
 def test_certified_values():
     cases = read_cases(FILE)
@@ -53,16 +45,6 @@ def test_a_certified_value_is_certified_again(number):
     header, *lines = FILE.read_text().splitlines()
     row = dict(zip(header.split(","), lines[number].split(",")))
     assert value(row) == row["value"]
-
-
-def test_the_phase_of_a_table_can_be_replaced(tmp_path):
-    path = tmp_path / "rays.csv"
-    path.write_text("t,h,x0,x1,sigma_t,value\n1,0.5,0,3,0.2,7\n")
-    cases = read_cases(path, phase="mie:2:8")
-    assert cases.phase == ("mie:2:8",)
-    assert cases.value is None
-    with pytest.raises(InputError, match="no column 'phase'"):
-        read_cases(path)
 
 
 @pytest.mark.claim("droplets-refused")

@@ -24,13 +24,6 @@ def test_the_droplets_of_clouds_at_055_um():
     assert green.printed_extinction == pytest.approx(0.0452, abs=1e-4)
 
 
-def test_the_sizes_have_their_moments():
-    droplets = Droplets(7.0, 3.0)
-    radius, weight = droplets.nodes(4000)  # an average weighted by r^2, without the smallest droplets
-    assert 1 / (weight @ radius**-2) == pytest.approx(droplets.mean_square_radius, rel=2e-5)
-    assert weight @ radius == pytest.approx(droplets.effective_radius, rel=1e-6)
-
-
 def test_an_average_is_over_single_spheres():
     found = optics(_SMALL, sizes=50)
     radius, weight = _SMALL.nodes(50)

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from analytic.cases import integrate_cases, read_cases
 from analytic.errors import InputError
-from analytic.kronrod import NARROW, WIDE
 from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction
 from tests.helpers.integral_forms import integrate_distance
@@ -113,20 +112,6 @@ def test_in_a_vacuum_a_ray_run_backwards_swaps_forward_and_backward(segment, g):
     assert close(forward, backward, relative=1e-9)
 
 
-@settings(deadline=None)
-@given(segments)
-def test_vacuum_limit_is_the_angle_at_the_light(segment):
-    foot, height, x0, length, _, _ = segment
-    s0, s1 = x0 - foot, x0 + length - foot
-    angle = np.arctan2(height * length, height**2 + s0 * s1)  # the subtended angle, without cancellation
-    vacuum, _ = airlight_segments(foot, height, x0, x0 + length, 0.0, ISOTROPIC)
-    assert close(vacuum, angle / height, relative=1e-11)
-    # first order in sigma_t: J changes by less than sigma_t times the longest path
-    thin, _ = airlight_segments(foot, height, x0, x0 + length, 1e-9, ISOTROPIC)
-    path = x0 + length + max(np.hypot(height, s0), np.hypot(height, s1))
-    assert (1 - 1e-9 * path) * vacuum * (1 - 1e-10) <= thin <= vacuum * (1 + 1e-10)
-
-
 @pytest.mark.parametrize("phase", PHASES, ids=lambda p: f"{p.name}{p.g or ''}")
 @pytest.mark.parametrize("shadow_scale", [0.0, 0.999, 1.0])
 def test_shadow_scale_and_weight_against_plain_quadrature(phase, shadow_scale):
@@ -172,15 +157,6 @@ def test_weight_gets_the_rows_of_the_input():
     np.testing.assert_allclose(value[[2, 4]] / value[0], [3.0, 7.0], rtol=1e-14)
 
 
-def test_a_kink_in_the_weight_is_found_by_halving():
-    value, error = airlight_segments(
-        2.0, 1.0, 0.0, 5.0, 0.0, ISOTROPIC, weight=lambda x, index: (x > 3.3).astype(float)
-    )
-    expected = np.arctan(3.0) - np.arctan(1.3)
-    assert abs(value[0] - expected) <= error[0]
-    assert error[0] <= 1e-9 * expected  # a jump is located to the last of the halvings
-
-
 def test_corners():
     through_light = {"foot": 5.0, "height": 0.0}
     empty, _ = airlight_segments(5.0, 0.0, 5.0, 5.0, 0.3, ISOTROPIC)
@@ -220,12 +196,3 @@ def test_refusals(change, message):
     arguments = {"foot": 1.0, "height": 1.0, "x0": 0.0, "x1": 2.0, "sigma_t": 0.1, "phase": ISOTROPIC}
     with pytest.raises(InputError, match=message):
         airlight_segments(**(arguments | change))
-
-
-@pytest.mark.parametrize(("pair", "exact_to"), [(WIDE, (31, 19)), (NARROW, (11, 5))])
-def test_pairs_of_rules_are_exact_for_polynomials(pair, exact_to):
-    for rule, last in zip(pair.weights.T, exact_to, strict=True):
-        for degree in range(0, last + 1, 2):
-            assert pair.nodes**degree @ rule == pytest.approx(2 / (degree + 1), rel=1e-14)
-        beyond = pair.nodes ** (last + 1) @ rule
-        assert abs(beyond - 2 / (last + 2)) > 1e-12  # the rules are of these degrees and no others

@@ -54,12 +54,3 @@ def test_derived_forms_of_what_is_printed_wrong(name, mean, order, derived):
     ours = taylor_coefficients(A, PhaseFunction(name)) * mean
     assert ours.shape == (3, 5)
     np.testing.assert_allclose(ours[:, order], derived, rtol=1e-14, atol=1e-15)
-
-
-def test_the_series_converges_to_the_integrand():
-    theta, a = 0.3, 0.8
-    phase = PhaseFunction("hazy")
-    exact = np.exp(a - a * np.tan(theta / 2 + np.pi / 4)) * phase(-np.sin(theta))
-    errors = [abs(np.polyval(taylor_coefficients(a, phase, n)[::-1], theta) / exact - 1) for n in (4, 8, 16)]
-    assert errors[0] > errors[1] > errors[2]
-    assert errors[2] < 1e-8

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What work may use is the least of the machine's memory and its containers' limits, and with CUDA the GPU's."""
 
-import ctypes
 import os
 
 import pytest
@@ -48,40 +47,9 @@ def test_the_least_limit_counts(limits, own, files, least):
     assert usable_memory() == Memory(least, "this machine has" if least == MACHINE else "this container may use")
 
 
-def test_a_system_without_control_groups(limits):
-    assert usable_memory() == Memory(MACHINE, "this machine has")
-
-
 def test_the_message_names_the_container(limits):
     limits("0::/\n", {"memory.max": "2000000000"})
     check_memory("map: 9", 2 * 10**9, "use a smaller map")
     message = r"^map: 9: needs 3 GB of memory, this container may use 2 GB; use a smaller map$"
     with pytest.raises(InputError, match=message):
         check_memory("map: 9", 3 * 10**9, "use a smaller map")
-
-
-class Driver:
-    """Stands for libcuda."""
-
-    def __init__(self, size):
-        self.size = size
-
-    def cuInit(self, flags):
-        return 0 if self.size else 100
-
-    def cuDeviceGet(self, device, number):
-        return 0
-
-    def cuDeviceTotalMem_v2(self, size, device):
-        ctypes.cast(size, ctypes.POINTER(ctypes.c_size_t))[0] = self.size
-        return 0
-
-
-def test_with_cuda_the_memory_of_the_gpu_counts(limits, monkeypatch):
-    limits("0::/\n", {"memory.max": "1000000"})
-    monkeypatch.setattr(realtime.memory.mi, "variant", lambda: "cuda_ad_rgb")
-    monkeypatch.setattr(realtime.memory.ctypes, "CDLL", lambda name: Driver(80 * 10**9))
-    assert str(usable_memory()) == "the GPU has 80 GB"
-    monkeypatch.setattr(realtime.memory.ctypes, "CDLL", lambda name: Driver(0))
-    assert usable_memory() is None
-    check_memory("map: 9", 10**15, "use a smaller map")

@@ -2,14 +2,12 @@
 """Parameters say once what they are: conversion, checks and messages follow from their fields."""
 
 import re
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
-import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from realtime.methods.registry import METHODS
-from realtime.parameters import Parameters, defaults, limits_of, parameter, read_parameters, values, wanted_values
+from realtime.parameters import Parameters, defaults, parameter, read_parameters, values
 
 
 @dataclass(frozen=True)
@@ -60,27 +58,3 @@ def test_words_become_values():
     )
     assert values(parameters) == {"steps": 0, "share": 0.25, "word": "uneven", "on": False, "free": -1.0}
     assert values(read_parameters("fog", Fog, {})) == defaults(Fog)
-
-
-@pytest.mark.parametrize(
-    ("name", "wanted", "values"),
-    [
-        ("steps", "a whole number from 1 to 64", (1.5, "16", True, None)),
-        ("share", "a finite number above 0 up to, but not, 1 [1/m]", ("0.5", True, None)),
-        ("word", "one of even, uneven", (1, True, None)),
-        ("on", "true or false", (1, "yes", None)),
-    ],
-)
-def test_a_record_that_is_made_in_python_takes_values_of_its_kinds_alone(name, wanted, values):
-    for value in values:
-        with refused(f"{name}: got {value!r}, wanted {wanted}"):
-            Fog(**{name: value})
-    assert Fog(steps=np.uint8(3), share=np.float32(0.25)).steps == 3
-
-
-@pytest.mark.parametrize("name", METHODS)
-def test_every_parameter_of_a_method_says_what_it_does_and_what_it_wants(name):
-    for item in fields(METHODS[name].parameters):
-        assert limits_of(item).help, item.name
-        assert wanted_values(item), item.name
-        assert type(item.default) is item.type, item.name

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from realtime.area_lights.patterns import PATTERNS, square
+from realtime.area_lights.patterns import PATTERNS
 from realtime.area_lights.points import place_points
 from realtime.area_lights.shape import AreaLight, turned_area_light
 from realtime.errors import InputError
@@ -70,32 +70,6 @@ def test_a_sphere_shines_alike_in_all_directions(pattern):
     directions = np.concatenate([np.eye(3), -np.eye(3), AXES, rotation((1, 2, 3), 71)])
     sums = np.maximum(placed.normals @ directions.T, 0).sum(axis=0) * placed.intensity[0]
     np.testing.assert_allclose(sums, 5.3 * np.pi * light.radius**2, rtol=2e-3)
-
-
-def test_sobol_points_fill_every_elementary_interval():
-    """Of 2^m points of a (0, 2)-sequence one lies in every box of sides 2^-a and 2^-b, a + b = m."""
-    places = square("sobol", 64)
-    for a in range(7):
-        boxes = np.floor(places * (2**a, 2 ** (6 - a))).astype(int)
-        assert len(np.unique(boxes, axis=0)) == 64
-
-
-def test_interleaved_is_the_grid_in_another_order():
-    grid, other = square("grid", 16), square("interleaved", 16)
-    assert sorted(grid.tolist()) == sorted(other.tolist())
-    steps, far = (np.linalg.norm(np.diff(places, axis=0), axis=1).mean() for places in (grid, other))
-    assert far > 1.3 * steps
-
-
-def test_rows_of_a_grid_stand_for_equal_areas():
-    for points in (2, 3, 5, 7, 11):
-        places = square("grid", points)
-        rows, counts = np.unique(places[:, 1], return_counts=True)
-        top = 0.0
-        for middle, count in zip(rows, counts, strict=True):
-            assert middle == pytest.approx(top + 0.5 * count / points)
-            top += count / points
-        assert top == pytest.approx(1)
 
 
 def test_a_turned_light_turns_its_points():

@@ -52,12 +52,6 @@ def test_a_lamp_of_null_is_nothing_but_light(variant):
     assert "lamp" in [shape.id() for shape in read(lamp=area_lamp("disk", size=0.29)).geometry.shapes()]
 
 
-def test_a_light_alone_casts_no_shadow(variant):
-    alone = {"ball": None, "floor": None}
-    assert not read(lamp=area_lamp("disk", size=0.29), **alone).features.shadows
-    assert read(window=area_lamp("disk", size=0.29), **alone).features.shadows  # in the light of the lamp
-
-
 def _sheared():
     import mitsuba as mi
 

@@ -70,33 +70,3 @@ def test_a_walk_along_a_ray_finds_what_a_search_finds(variant, kind, seed):
         envelopes, x, changes = change.envelopes(opaque(until)), max(until, at), changes + 1
         assert changes < 3 * COUNT
     assert changes >= (COUNT // 2 if kind == "tangents" else 1)
-
-
-def test_lanes_that_are_not_active_never_change(variant):
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.bounded_media.envelopes import Lines, envelopes_at, next_change
-
-    Float = mi.Float
-    columns = Float([1, 2]), Float([-1, -2]), mi.Bool([True, True])
-    active = mi.Bool([True, False])
-
-    def line(number):
-        return tuple(dr.gather(type(column), column, number) for column in columns)
-
-    lines = Lines(line, 2, active)
-    envelopes = envelopes_at(lines, Float([0, 0]))
-    assert list(envelopes.least[0]) == [1, np.inf]
-    assert list(next_change(lines, envelopes, Float([0, 0])).next) == [1, np.inf]
-
-
-def test_where_the_lines_cross_levels_and_one_another(variant):
-    import mitsuba as mi
-
-    from realtime.bounded_media.envelopes import Envelopes
-
-    Float = mi.Float
-    least, largest = (Float(3), Float(-1)), (Float(-1), Float(1))  # cross at 2; 1 at 2 and 2; 0 at 3 and 1
-    envelopes = Envelopes(least, largest)
-    assert [float(envelopes.crossing(Float(x), 0)[0]) for x in (0, 1.5, 2.5, 4)] == [1, 2, 3, np.inf]

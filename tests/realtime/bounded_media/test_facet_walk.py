@@ -101,14 +101,6 @@ def test_a_walk_meets_the_least_of_all_planes_everywhere(variant, name, light, p
     assert bends > 10
 
 
-def test_a_light_in_the_medium_has_no_plane_to_enter_by(variant):
-    from realtime.bounded_media.facet_walk import entry_planes
-
-    assert entry_planes(seen_medium("gem", CENTRE + 0.1)[0]).within[0]
-    assert not entry_planes(seen_medium("gem", CENTRE + 3.0)[0]).within[0]
-    assert entry_planes(seen_medium("gem", CENTRE + 3.0)[0]).sides == 3
-
-
 @pytest.mark.parametrize("name", SOLIDS)
 def test_no_leg_to_a_segment_that_is_called_clear_meets_the_medium(variant, name):
     from realtime.bounded_media.facet_walk import clear_of, entry_planes, exit_planes
@@ -130,35 +122,3 @@ def test_no_leg_to_a_segment_that_is_called_clear_meets_the_medium(variant, name
     assert not np.any(clear & meets)
     # Most that pass are found to.
     assert np.mean(clear[~meets]) > 0.9
-
-
-@pytest.mark.parametrize("light", [(1.7, 0.4, 2.9), (0.15, 0.1, 0.4)])
-@pytest.mark.parametrize("name", SOLIDS)
-def test_lines_enter_and_leave_by_the_planes_that_all_planes_name(variant, name, light):
-    """From outside and from within the medium, towards it, past it and away from it."""
-    from realtime.bounded_media.facet_walk import entry_planes, exit_planes, line_crossings
-
-    light = np.array(light)
-    seen, types = seen_medium(name, light)
-    v = CENTRE - light + np.random.default_rng(3).normal(size=(3000, 3)) * 1.3
-    inverses = line_crossings((entry_planes(seen), exit_planes(seen)), vectors(types, v))
-    enter, leave = (np.array(inverse) for inverse in inverses)
-    first, last = least_of_all(name, light, v)
-    hits = (first > 0) & (first > last)
-    assert hits.sum() > 0
-    assert np.array_equal(enter > 0, hits)
-    assert leave[hits] == pytest.approx(last[hits], rel=1e-9)
-    assert enter[hits] == pytest.approx(first[hits], rel=1e-9)
-
-
-def test_neighbours_share_an_edge():
-    from realtime.scene.convex_bounds import plane_neighbours
-
-    table = plane_neighbours(bounds_of("box"))
-    normals = bounds_of("box").normals
-    assert table.shape == (6, 4)
-    # All but the plane itself and the one opposite.
-    assert np.abs(np.einsum("kc,kjc->kj", normals, normals[table])).max() < 1e-6
-    column = plane_neighbours(bounds_of("column"))
-    assert column.shape == (14, 12)
-    assert sorted((row != k).sum() for k, row in enumerate(column)) == [4] * 12 + [12] * 2

@@ -7,9 +7,7 @@ import pytest
 
 from realtime.numerics.aligned import aligned_array
 from tests.helpers.kernel_values import opaque, phase_of
-from tests.realtime.bounded_media.test_facet_walk import CENTRE, lines_in, seen_medium
-
-PHASES = [("isotropic", 0.0), ("hg", -0.95), *(pytest.param(("murky", 0.0), marks=pytest.mark.slow),)]
+from tests.realtime.bounded_media.test_facet_walk import lines_in, seen_medium
 
 
 def segments(name, light, phase, *, sigma_t, precision="double"):
@@ -50,26 +48,6 @@ def integral(segment, x0, x1):
     return np.array(medium_integral(segment, x0, x1).x, dtype=np.float64)
 
 
-@pytest.mark.parametrize("phase", PHASES)
-@pytest.mark.parametrize("away", [0.1, 3.3, 30.0])
-@pytest.mark.parametrize("name", ["icosphere", "box"])
-def test_panels_of_three_nodes_leave_little(variant, monkeypatch, name, away, phase):
-    """Lights within, at and far from the medium; optical depths of it from 0.3 to 15."""
-    from realtime.bounded_media import panels as media_panels
-
-    light = CENTRE + away * np.array([0.36, 0.48, 0.8])
-    for sigma_t in (0.2, 9.0):
-        segment, x0, x1 = segments(name, light, phase, sigma_t=sigma_t)
-        monkeypatch.setattr(media_panels, "_NODES_DOUBLE", 12)
-        truth = integral(segment, x0, x1)
-        monkeypatch.setattr(media_panels, "_NODES_DOUBLE", 3)
-        three_nodes = integral(segment, x0, x1)
-        assert np.all(truth > 0)
-        seen = truth > 1e-6 * truth.max()
-        # Rounding left aside: 2e-5 where the light is close to a facet and dense fog about it, else 5e-6.
-        assert np.abs(three_nodes / truth - 1)[seen].max() < 3e-5
-
-
 @pytest.mark.parametrize("name", ["gem", "column"])
 def test_panels_against_a_sum_over_small_steps(variant, name):
     """What the leg leaves before the medium by the least of all planes; midpoints of 8000 steps."""
@@ -91,25 +69,3 @@ def test_panels_against_a_sum_over_small_steps(variant, name):
             phase = (1 - 0.36) / (1.36 - 1.2 * cosine) ** 1.5
             expected = sigma_t * np.mean(phase * np.exp(-depth) / r**2) * (end[ray] - begin[ray])
             assert panels[ray] == pytest.approx(expected, rel=close)
-
-
-def test_a_sphere_is_cut_where_legs_graze_it(variant):
-    """From light to shade along the sphere the part of the leg within rises like a root."""
-    import mitsuba as mi
-
-    from realtime.bounded_media import panels as media_panels
-    from realtime.scene.read_scene import read_scene
-    from tests.helpers.scenes import clear_scene
-    from tests.realtime.bounded_media.test_airlight import fog_sphere, relative_rmse, render
-
-    scene = clear_scene(size=(64, 48), ball=fog_sphere(sigma_t=1.9))
-    assert read_scene(mi.load_dict(scene)).medium.bounded_media[0].neighbours is None
-    single = render(scene, precision="single").airlight
-    saved = media_panels._STEEP, media_panels._LEAST
-    try:
-        media_panels._STEEP, media_panels._LEAST = 0.05, 1e-5
-        fine = render(scene, precision="double").airlight
-    finally:
-        media_panels._STEEP, media_panels._LEAST = saved
-    # With panels of a share of 0.5 it is 2.3e-4.
-    assert relative_rmse(single, fine) < 5e-5

@@ -146,21 +146,3 @@ def test_the_search_ends_at_the_fixed_point_whatever_the_slope_of_the_map(varian
     settled = _search(light_map, transport, point, [0.0, 0.0, 1.0], iterations=99, settled=0.05)
     assert float(settled.missed[0]) <= 0.05
     assert int(settled.steps[0]) < 99
-
-
-def test_no_step_is_longer_than_sigma(variant):
-    import mitsuba as mi
-
-    normal = SLAB_TURN[:, 2]
-    light_map = _map(-normal)
-
-    def transport(number, t, d, *angles):
-        return t, 0 * t + 30.0, 0 * t, 0 * t + 0.25
-
-    point = MIDDLE + 0.4 * normal
-    ends = [
-        np.array(_search(light_map, transport, point, normal, iterations=n).collector.centre).ravel() for n in (1, 2, 3)
-    ]
-    for number, end in enumerate(ends, 1):
-        np.testing.assert_allclose(np.linalg.norm(end - point), number * 0.25 / EXTINCTION, rtol=5e-3)
-    assert isinstance(light_map.texel, mi.Float)

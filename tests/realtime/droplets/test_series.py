@@ -7,7 +7,7 @@ import pytest
 from analytic.droplets import Droplets, Modified, optics
 from analytic.mie import coefficients
 from realtime.droplets.series import droplet_series
-from realtime.droplets.spheres import angular_factors, phase_shift_coefficients
+from realtime.droplets.spheres import phase_shift_coefficients
 from realtime.droplets.table import droplet_table, share_cut
 from realtime.errors import InputError
 
@@ -17,13 +17,6 @@ def test_coefficients_by_phase_shifts_are_those_by_complex_recurrences():
     theirs = [part.T for part in coefficients(size, 1.333)]
     for ours, expected in zip(phase_shift_coefficients(size, 1.333), theirs):
         assert ours == pytest.approx(expected, abs=1e-11)
-
-
-def test_angular_factors_have_their_known_ends():
-    # pi_n(1) = tau_n(1) = n (n + 1)/2
-    plus, minus = angular_factors(np.array([1.0]), 5)
-    assert plus[:, 0] == pytest.approx(2 * np.arange(1, 6) + 1)
-    assert minus[:, 0] == pytest.approx(0)
 
 
 @pytest.mark.claim("droplets-two-sides", tolerance="1e-7 relative: series of Mie's theory leave out terms of 1e-8")

@@ -92,25 +92,3 @@ def test_intervals_that_are_added_at_once(variant, layers, places, gains):
         intervals, over = add_waiting(intervals, integral), behind
     intervals = close_interval(intervals, columns[-1], over <= 0)
     check(add_waiting(intervals, integral).total, layers, places, gains)
-
-
-@pytest.mark.claim("sum-over-lit-intervals")
-@settings(deadline=None, max_examples=20)
-@given(lit=arrays(np.bool_, RAYS), active=arrays(np.bool_, RAYS))
-def test_nothing_is_integrated_where_nothing_waits(variant, lit, active):
-    """An integral that is no number where no interval is does no harm."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.intervals.lit_intervals import add_waiting, close_interval, no_intervals, sum_at_end
-
-    def integral(a, b):
-        return (b - a) / dr.select(b > a, 1, 0)
-
-    zero, unit = dr.zeros(mi.Float, RAYS), dr.full(mi.Float, 1, RAYS)
-    in_light, traced = aligned_array(mi.Bool, lit), aligned_array(mi.Bool, active)
-    intervals = close_interval(no_intervals(zero, zero), unit, in_light)
-    np.testing.assert_array_equal(np.array(add_waiting(intervals, integral, traced).total), lit & active)
-    ends = {"opened": +zero, "lit": in_light, "active": traced}
-    total = sum_at_end(no_intervals(zero, zero), integral, unit, **ends)
-    np.testing.assert_array_equal(np.array(total), lit & active)

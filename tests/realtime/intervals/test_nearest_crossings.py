@@ -57,22 +57,6 @@ def test_the_nearest_are_kept_in_order_and_the_others_come_out(variant, larger, 
 
 
 @pytest.mark.claim("nearest-crossings-in-order", tolerance="none: the same bits")
-@settings(deadline=None, max_examples=50)
-@given(keys=KEYS)
-def test_a_queue_without_gains_holds_the_same_keys(variant, keys):
-    import mitsuba as mi
-
-    from realtime.intervals.nearest_crossings import filled, insert
-
-    queue = filled(np.inf, PLACES, mi.Float, RAYS, gains=False)
-    for key in columns(keys):
-        queue, farthest, _ = insert(queue, key, larger_is_nearer=False)
-        assert not np.isnan(np.array(farthest)).any()
-    np.testing.assert_array_equal(rows(queue.key), np.sort(keys, axis=1)[:, :PLACES])
-    assert queue.gain == []
-
-
-@pytest.mark.claim("nearest-crossings-in-order", tolerance="none: the same bits")
 @LARGER
 @settings(deadline=None, max_examples=50)
 @given(keys=KEYS, shift=arrays(np.int64, (RAYS, COUNT), elements=st.integers(0, PLACES)))
@@ -91,22 +75,3 @@ def test_exchange_mends_an_order_that_is_wrong_by_no_more_than_its_places(varian
         queue, nearest, _ = exchange(queue, key, mi.Float(0), larger_is_nearer=larger)
         out.append(nearest)
     np.testing.assert_array_equal(rows(out[PLACES:]), keys)
-
-
-@pytest.mark.claim("nearest-crossings-in-order", tolerance="none: the same bits")
-@settings(deadline=None, max_examples=20)
-@given(keys=KEYS, active=arrays(np.bool_, RAYS))
-def test_pop_takes_the_nearest_out_where_it_is_told_to(variant, keys, active):
-    import mitsuba as mi
-
-    from realtime.intervals.nearest_crossings import filled, insert, pop
-
-    queue = filled(0.0, PLACES, mi.Float, RAYS)
-    for number, key in enumerate(columns(keys)):
-        queue, *_ = insert(queue, key, mi.Float(number), larger_is_nearer=True)
-    before, gains = rows(queue.key), rows(queue.gain)
-    queue, key, gain = pop(queue, 0.0, aligned_array(mi.Bool, active))
-    np.testing.assert_array_equal(np.array(key), before[:, 0])
-    np.testing.assert_array_equal(np.array(gain), gains[:, 0])
-    behind = np.concatenate([before[:, 1:], np.zeros((RAYS, 1))], axis=1)
-    np.testing.assert_array_equal(rows(queue.key), np.where(active[:, None], behind, before))

@@ -7,11 +7,8 @@ Protects the claim that both forms of the equation are runnable by the polynomia
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.special import factorial
 
-from realtime.errors import InputError
-from realtime.kernels.bounded import tangent_series
-from tests.helpers.scenes import bounded_medium, clear_scene, spot
+from tests.helpers.scenes import bounded_medium, clear_scene
 
 CENTRE, RADIUS, SIGMA, MEAN = np.array([-0.2, 0.4, 0.7]), 0.6, 0.7, 1.2 * 0.6
 
@@ -74,16 +71,6 @@ def relative_rmse(values, expected):
     return np.sqrt(np.mean((values - expected) ** 2)) / np.mean(expected)
 
 
-def test_series_of_the_tangent_is_that_of_its_derivatives():
-    """exp(-a tan theta) by differences of high order about 0."""
-    a = 0.73
-    nodes = 0.3 * np.cos(np.pi * (np.arange(24) + 0.5) / 24)
-    fit = np.polynomial.polynomial.polyfit(nodes, np.exp(-a * np.tan(nodes)), 15)
-    assert np.array(tangent_series(a, 5)) == pytest.approx(fit[:6], rel=1e-6)
-    assert tangent_series(a, 4) == pytest.approx([1, -a, a * a / 2, -(a**3) / 6 - a / 3, a**4 / 24 + a * a / 3])
-    assert factorial(3) * tangent_series(a, 3)[3] == pytest.approx(-(a**3) - 2 * a)
-
-
 @pytest.mark.claim("polynomial-of-bounded-media", tolerance="relative RMSE 1e-4 of nodes and of degree 25")
 @pytest.mark.parametrize(("form", "exponent"), [("paper", meant), ("printed", printed)])
 @pytest.mark.parametrize("phase", [pytest.param("isotropic", marks=pytest.mark.slow), "rayleigh"])
@@ -112,18 +99,3 @@ def test_a_polynomial_kernel_is_asked_in_bounded_media_and_no_other(variant):
     wrong = render(scene, "taylor-printed", media="printed")
     # c_2 of the isotropic function is misprinted: a^2 - a for half of it.
     assert relative_rmse(wrong, render(scene, "taylor", media="printed")) > 1e-3
-
-
-@pytest.mark.claim("polynomial-of-bounded-media", tolerance="relative RMSE 1e-3")
-def test_a_soft_spot_weighs_the_polynomial(variant):
-    scene = clear_scene(lamp=spot(cutoff=41.0, beam=23.0), ball=ball())
-    nodes, series = render(scene, "exact", media="paper"), render(scene, "taylor-25", media="paper")
-    assert relative_rmse(series, nodes) < 1e-3
-
-
-def test_what_has_no_polynomial_is_refused(variant):
-    with pytest.raises(InputError, match="no coefficients for the exponent"):
-        render(clear_scene(ball=ball()), "taylor-printed", media="paper")
-    hg = ball(phase={"type": "hg", "g": 0.3})
-    with pytest.raises(InputError, match="phase function 'hg'"):
-        render(clear_scene(ball=hg), "taylor-printed", media="printed")

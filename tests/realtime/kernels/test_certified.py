@@ -6,9 +6,8 @@ import pytest
 
 from analytic.cases import read_cases
 from tests.helpers.kernel_values import relative_error
-from validation.configurations.kernel_names import find_kernel
 from validation.kernels.cases import integrate_cases
-from validation.kernels.values import evaluate_cases, take
+from validation.kernels.values import take
 
 FEET, RAYS, DROPLETS = (f"airlight_integral{name}.csv" for name in ("", "_rays", "_droplets"))
 LOBES = ("rayleigh", "hazy", "murky", "hg")
@@ -70,24 +69,8 @@ def test_quadrature(variant, feet, kernel, precision, phases, bound):
     assert errors(of_phases(feet, *phases), kernel, precision).max() < bound
 
 
-@pytest.mark.claim("quadrature-kernel")
-def test_quadrature_on_rays_computes_their_geometry_in_its_precision(variant, data_folder):
-    rays = of_phases(read_cases(data_folder / RAYS), "isotropic")
-    single, double = (errors(rays, "quadrature", precision) for precision in ("single", "double"))
-    # Rounding of float32, 3 units in the median; half of the cases are exact to rounding in double.
-    assert np.percentile(single, 99) < 3e-5
-    assert 3e-8 < np.median(single) < 5e-7
-    assert np.median(double) < 1e-14
-
-
 @pytest.mark.claim("droplets-kernels", tolerance="1e-5 in float32, 1e-7 in float64")
 @pytest.mark.parametrize(("precision", "allowed"), [("single", 1e-5), ("double", 1e-7)])
 def test_exact_in_fog_of_droplets(variant, data_folder, precision, allowed):
     cases = read_cases(data_folder / DROPLETS)
     assert integrate_cases(cases, "exact", precision) == pytest.approx(cases.value, rel=allowed)
-
-
-def test_taylor_takes_hg_draine_and_refuses_droplets(variant, data_folder):
-    refused = evaluate_cases(read_cases(data_folder / DROPLETS), find_kernel("taylor"), "single").refused
-    assert {name.partition(":")[0] for name in refused} == {"mie"}
-    assert "mie" in next(iter(refused.values()))

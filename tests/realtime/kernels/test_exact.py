@@ -9,14 +9,13 @@ import pytest
 from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction
 from realtime.kernels.exact import exact
-from realtime.kernels.registry import KERNELS, airlight_integral, gamma
+from realtime.kernels.registry import KERNELS, airlight_integral
 from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import array_types
 from realtime.rays.ray_light import RayGeometry, ray_geometry
 from realtime.scene.lights import Light, spot_fields
 from realtime.scene.medium import Medium
 from tests.helpers.kernel_values import (
-    RAY,
     kernel_values,
     opaque,
     phase_of,
@@ -24,8 +23,6 @@ from tests.helpers.kernel_values import (
     single_precision,
     true_values,
 )
-from validation.kernels.rays import wide_rays
-from validation.kernels.values import evaluate_cases
 
 pytestmark = pytest.mark.usefixtures("variant")
 
@@ -63,23 +60,6 @@ def test_rays_of_every_magnitude(name):
     assert relative_error(kernel_values(exact, rays, name, g, precision="double"), expected).max() < 1e-10
 
 
-@pytest.mark.claim("droplets-kernels", tolerance="droplets of 6 um 1e-4")
-@pytest.mark.parametrize(
-    ("words", "single", "double"),
-    [
-        ("hg-draine:12", 1e-5, 1e-10),
-        pytest.param("mie:2:8", 1e-5, 1e-7, marks=pytest.mark.slow),
-        pytest.param("mie", 1e-4, 2e-7, marks=pytest.mark.slow),
-    ],
-)
-def test_many_rays_in_fog_of_droplets(words, single, double):
-    rays = wide_rays(1024, words)
-    bright = rays.value > 1e-30
-    for precision, allowed in (("single", single), ("double", double)):
-        value = evaluate_cases(rays, exact, precision).J
-        assert np.max(np.abs(value[bright] / rays.value[bright] - 1)) < allowed
-
-
 @pytest.mark.parametrize("name", ["rayleigh", "hg"])
 def test_limits(name):
     """Zero length, vacuum, endless rays, the light beside the segment at height 0; lobes that begin at large E."""
@@ -104,17 +84,6 @@ def test_rays_that_meet_the_light_are_infinite(name):
     value = kernel_values(exact, ([1.0, 0.0, 2.0, 3.0], 0.0, 0.0, 2.0, 0.5), name)
     assert np.isinf(value[:3]).all()  # on it, camera at the light, surface at the light
     assert np.isfinite(value[3])
-
-
-def test_gamma_is_the_integral_from_the_camera():
-    types = array_types("double")
-    foot, height, x0, x1, sigma_t = (types.scalar(number) for number in RAY)
-    medium = Medium((sigma_t,), types.color(1), phase_of("rayleigh", 0, types.scalar))
-    rays = opaque(RayGeometry(foot, height, None, None))
-    light = Light(None, None)
-    near, far = (float(gamma(exact, rays, x, medium=medium, light=light)[0]) for x in (x0, x1))
-    direct = airlight_integral(exact, rays, x0, x1, medium=medium, light=light)
-    assert far - near == pytest.approx(float(direct[0]), rel=1e-12)
 
 
 @pytest.mark.parametrize("name", ["isotropic", "hg"])

@@ -7,12 +7,11 @@ import pytest
 
 from realtime.kernels import short_segments
 from realtime.kernels.exact import _double_mean, exact
-from realtime.kernels.panels import panel_count, panels_mean
+from realtime.kernels.panels import panels_mean
 from realtime.kernels.quadrature import path_interval
 from realtime.kernels.short_segments import extent, serves, short_segment
 from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import array_types
-from realtime.numerics.fast_exp import WIDEST
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.phase import PHASES
 from tests.helpers.kernel_values import kernel_values, phase_of, single_precision, true_values
@@ -23,13 +22,6 @@ pytestmark = pytest.mark.usefixtures("variant")
 #: Rounding left aside, the rule leaves 5e-7, 8e-7 of cos^64; it was tuned on other rays.
 LEFT = 1e-6
 RULES = ("FEW", "MORE")
-
-
-def counts(name, g, widths, depths):
-    types = array_types("single")
-    phase = phase_of(name, g, types.scalar)
-    columns = (aligned_array(types.scalar, np.array(column, dtype=float)) for column in (widths, depths))
-    return np.array(panel_count(phase, *columns))
 
 
 @pytest.mark.claim("exact-panels")
@@ -65,22 +57,6 @@ def test_no_seam_where_a_segment_takes_another_panel(name):
         error = kernel_values(exact, rays, name, 0.5) / true_values(rays, name, 0.5) - 1
         of_eight = np.convolve(error, np.full(8, 1 / 8), mode="valid")
         assert np.abs(of_eight[8:] - of_eight[:-8]).max() < 2e-6
-
-
-@pytest.mark.claim("exact-panels")
-@pytest.mark.parametrize("name", NAMES)
-def test_the_number_of_panels_grows_with_width_and_depth(name):
-    for g in (-0.95, 0.0, 0.95) if name == "hg" else (0.0,):
-        of_width = counts(name, g, np.linspace(0, 20, 200), np.zeros(200))
-        assert of_width[0] == 0  # nothing to integrate costs nothing
-        assert of_width[1] == 1
-        assert np.all(np.diff(of_width.astype(int)) >= 0)
-        assert np.array_equal(counts(name, g, np.full(3, 0.1), [0.0, 10.0, 20.0]), [1, 1, 2])
-        # Ends, whatever comes.
-        assert counts(name, g, [np.nan, np.inf, 1.0, 1.0, 1.0], [1.0, 1.0, np.nan, np.inf, 1e30]).max() <= 160
-        # `sinh_bounded` holds half a panel.
-        widths = np.linspace(1e-3, 25, 5000)
-        assert np.max(0.5 * widths / counts(name, g, widths, np.zeros(5000))) < WIDEST
 
 
 def short_rays(name, rule, *, seed=3, count=1500):
@@ -119,30 +95,3 @@ def test_what_few_nodes_leave_without_rounding(name, rule):
     value, served = of_rule(rays, name, rule, "double")
     assert 0.2 < served.mean() < 0.95  # both sides of the limits
     assert np.abs(value[served] / true_values(rays, name, g_of(name, 1500))[served] - 1).max() < LEFT
-
-
-@pytest.mark.parametrize("name", ["isotropic", "hg"])
-def test_few_nodes_in_float32(name):
-    """Rounding: the exponent's, 6e-8 of an optical depth; what is deeper than 20 is e^-20 of what is seen."""
-    rule = short_segments.MORE
-    rays = single_precision(*short_rays(name, rule, seed=4))
-    foot, height, x0, x1, sigma_t = rays
-    # Close to the light a segment is as long as float32 holds the difference of its ends.
-    resolved = (x1 - x0 > 1e-2 * x1) & (sigma_t * (x0 + np.hypot(x0 - foot, height)) < 20)
-    value, served = of_rule(rays, name, rule, "single")
-    used = served & resolved
-    assert used.sum() > 200
-    assert np.abs(value[used] / true_values(rays, name, g_of(name, 1500))[used] - 1).max() < 5e-6
-
-
-def test_no_rule_serves_at_the_light_or_for_endless_segments():
-    rays = [np.array(column) for column in ([2.0, 2.0, 2.0], [0.0, 0.0, 1.0], [2.0, 1.9, 0.0], [2.0, 2.1, np.inf])]
-    for rule in RULES:
-        _, served = of_rule([*rays, np.full(3, 0.1)], "isotropic", getattr(short_segments, rule), "single")
-        assert not served.any()
-
-
-def test_segments_without_length_are_zero():
-    value, served = of_rule([np.array([x]) for x in (2.0, 0.5, 1.0, 1.0, 0.3)], "hg", short_segments.FEW, "single")
-    assert served.all()
-    assert value == 0

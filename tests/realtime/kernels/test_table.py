@@ -1,19 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: a table's entries are its integrals; the published form is good near the light alone, the tails everywhere."""
 
-import subprocess
-import sys
 from functools import partial
 
 import drjit as dr
 import numpy as np
 import pytest
 from mpmath import exp, inf, mpf, pi, quad, tan
-from scipy.integrate import quad as scipy_quad
-from scipy.special import sici
 
 from analytic.cases import read_cases
-from realtime.errors import InputError
 from realtime.kernels.preparation import prepare_kernel, with_tables
 from realtime.kernels.table import table, table_records
 from realtime.numerics.aligned import aligned_array
@@ -58,14 +53,6 @@ def test_entries_are_the_integrals(size):
             assert values[i, j] == pytest.approx(float(expected), rel=1e-12)
 
 
-def test_last_column_of_the_published_table():
-    """Endless rays: the auxiliary function Ci(u) sin u + (pi/2 - Si(u)) cos u."""
-    u = np.linspace(0, 10, 64)[1:-1]
-    si, ci = sici(u)
-    column = table_records("sun", 64)[:, 1].reshape(63, 63)[1:, -1]
-    assert column == pytest.approx(ci * np.sin(u) + (np.pi / 2 - si) * np.cos(u), rel=1e-12)
-
-
 @pytest.mark.claim("table-edge")
 @pytest.mark.parametrize("precision", ["single", "double"])
 def test_tail_form_on_certified_cases(variant, cases, precision):
@@ -75,16 +62,6 @@ def test_tail_form_on_certified_cases(variant, cases, precision):
     assert np.median(error) < 5e-5
     # A difference of nearly equal reads: interpolation errs by 1/63 of the slope, and float32 adds its rounding.
     assert error[sliver].max() < (0.2 if precision == "single" else 3e-3)
-
-
-@pytest.mark.claim("declared-orders")
-def test_tail_form_converges_as_declared(variant, cases):
-    """Like log(size)/size^2: alpha log alpha = 2 b^2 log b has an unbounded second derivative at b = 0."""
-    sizes = np.array([16, 32, 64, 128, 256])
-    keep = np.array(cases.tag) != "sliver"
-    found = [np.sqrt(np.mean(errors(cases, "double", form="tail", size=int(n))[keep] ** 2)) for n in sizes]
-    slope = np.polyfit(np.log(sizes), np.log(found / np.log(sizes)), 1)[0]
-    assert slope == pytest.approx(-2, abs=0.1)
 
 
 def test_published_form_is_good_near_the_light_only(variant, cases):
@@ -110,35 +87,6 @@ def test_published_form_reads_the_edge_beyond_its_table(variant):
     assert not 0.1 < outside / truth < 10
 
 
-@pytest.mark.parametrize("precision", ["single", "double"])
-def test_tail_form_at_height_zero(variant, precision):
-    rays = [
-        (4.0, 0.0, 0.2, 3.1, 0.43),
-        (-0.5, 0.0, 0.2, 3.1, 0.43),
-        (-0.5, 0.0, 0.2, np.inf, 0.43),
-        (4, 0, 0.2, 3.1, 0),
-    ]
-    through = (1.3, 0.0, 0.2, 3.1, 0.43)
-    values = kernel_values(table, np.array([*rays, through]).T, precision=precision, form="tail", size=256)
-    for (t, _, x0, x1, s), value in zip(rays, values):
-        expected, _ = scipy_quad(lambda x, t=t, s=s: np.exp(-s * (x + abs(x - t))) / (x - t) ** 2, x0, x1)
-        assert value == pytest.approx(expected, rel=1e-4)  # a table of 256 entries errs by 1e-5
-    assert values[-1] == np.inf
-    assert np.isnan(kernel_values(table, rays[0], precision=precision)[0])  # the published form divides by h
-
-
-@pytest.mark.claim("refused-phase-functions")
-def test_what_it_cannot_do_is_refused(variant):
-    with pytest.raises(InputError, match="kernel table: phase function 'rayleigh' is not tabulated"):
-        kernel_values(table, RAY, "rayleigh")
-
-    def in_soft_spot(geometry, x0, x1, medium, light):
-        return table(geometry, x0, x1, medium, Light(None, None, cone=1, beam=1))
-
-    with pytest.raises(InputError, match="kernel table: a spot that falls off"):
-        kernel_values(in_soft_spot, RAY)
-
-
 @pytest.mark.parametrize("form", ["sun", "tail"])
 def test_frozen_and_in_colour(variant, form):
     """Recorded once, right after another medium and another number of rays; three extinctions give three values."""
@@ -158,27 +106,3 @@ def test_frozen_and_in_colour(variant, form):
             # Recorded code may fuse differently: roundings, of reads of which half cancels.
             assert row == pytest.approx(kernel_values(sized, (*columns, sigma_t)), rel=1e-5)
     assert frozen.n_recordings == 1
-
-
-@pytest.mark.slow
-def test_a_table_that_is_not_on_the_device_is_named():
-    """In a process of its own: what a frozen function raises while it records spoils later recordings."""
-    code = """
-import drjit as dr
-from reports.machine.environment import activate
-activate()
-import mitsuba as mi
-from realtime.kernels.table import upload_table
-@dr.freeze
-def function(x):
-    upload_table(type(x), form="sun", size=17)
-    return x + 1
-try:
-    function(dr.opaque(mi.Float, 1, 3))
-except RuntimeError as error:
-    print(error.__cause__)
-"""
-    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert "table is not on the device; call realtime.kernels.preparation.prepare_kernel before" in process.stdout, (
-        process.stderr
-    )

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from analytic.phase import PhaseFunction
-from analytic.series import taylor_coefficients
-from realtime.errors import InputError
 from realtime.kernels.exact import exact
 from realtime.kernels.taylor import taylor
-from realtime.kernels.taylor_printed import PRINTED_PHASES, printed_coefficients
-from tests.helpers.kernel_values import RAY, kernel_values
+from realtime.kernels.taylor_printed import PRINTED_PHASES
+from tests.helpers.kernel_values import kernel_values
 
 pytestmark = pytest.mark.usefixtures("variant")
 
@@ -71,18 +69,6 @@ def test_it_converges_to_the_integral_near_the_foot():
     assert abs(degree_4 / true - 1) > 0.1
 
 
-@pytest.mark.claim("errata-of-biri", tolerance="1e-12 relative")
-@pytest.mark.parametrize("name", PRINTED_PHASES)
-def test_printed_coefficients_are_the_derived_ones_and_the_misprints(name):
-    a = np.array([0.0, 1e-3, 0.13, 0.7, 2.9])
-    printed, derived = printed_coefficients(a, name), taylor_coefficients(a, PhaseFunction(name), 4)
-    assert len(printed) == (5 if name == "isotropic" else 3)
-    for n, column in enumerate(printed):
-        excess = EXCESS.get((name, n), np.zeros_like)(a) / MEANS[name]
-        # rounding of sums of terms up to a^4 = 71
-        np.testing.assert_allclose(column - derived[:, n], excess, rtol=1e-12, atol=1e-13)
-
-
 @pytest.mark.parametrize("name", PRINTED_PHASES)
 def test_it_differs_from_taylor_by_the_integral_of_the_misprints(name):
     rays = foot, height, x0, x1, sigma_t = rays_near_the_foot()
@@ -93,15 +79,3 @@ def test_it_differs_from_taylor_by_the_integral_of_the_misprints(name):
     # differences of numbers of order 1, whose rounding is 1e-16
     np.testing.assert_allclose(printed - derived, expected, rtol=1e-11, atol=1e-14)
     assert np.max(np.abs(printed - derived)) > 1e-2
-
-
-@pytest.mark.claim("refused-phase-functions")
-def test_what_they_do_not_have_is_refused():
-    with pytest.raises(InputError, match="no Taylor series"):
-        kernel_values(taylor, RAY, "tabulated")
-    for name in ("hg", "tabulated"):
-        with pytest.raises(InputError, match=f"prints no coefficients for the phase function '{name}'.*'taylor'"):
-            kernel_values(taylor_printed, RAY, name)
-    for kernel, degree in ((taylor, -1), (taylor_printed, -1), (taylor_printed, 5)):
-        with pytest.raises(InputError, match="degree: got"):
-            kernel_values(kernel, RAY, degree=degree)

@@ -5,19 +5,6 @@ import numpy as np
 import pytest
 
 
-def test_difference_of_products_is_exact_to_rounding(variant):
-    import mitsuba as mi
-
-    from realtime.numerics.error_free import difference_of_products
-
-    rng = np.random.default_rng(3)
-    a, b = rng.normal(size=(2, 20000)).astype(np.float32)
-    c, d = a * np.float32(1 + 1e-6), b * np.float32(1 - 1e-6)  # a b - c d nearly cancels
-    value = np.array(difference_of_products(*(mi.Float(v) for v in (a, b, c, d))), dtype=np.float64)
-    exact = a.astype(np.float64) * b - c.astype(np.float64) * d
-    assert np.all(np.abs(value - exact) <= 1.5 * np.spacing(np.abs(exact).astype(np.float32)))
-
-
 def exact(values):
     return [Fraction(float(x)) for x in values]
 

@@ -23,18 +23,6 @@ def test_extremes(variant):
     assert value[3] == 1
 
 
-def test_coefficients_are_those_of_the_fit():
-    """Fit 2^f again, by Chebyshev interpolation: near-minimax, so the coefficients agree to the size of the error."""
-    from realtime.numerics.fast_exp import _EXP2
-
-    degree = len(_EXP2) - 1
-    node = 0.5 * np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
-    fit = np.polyfit(node, np.exp2(node), degree)
-    f = np.linspace(-0.5, 0.5, 1001)
-    assert np.max(np.abs(np.polyval(fit, f) / np.polyval(_EXP2, f) - 1)) < 3e-8  # half a float32 rounding
-    assert np.max(np.abs(np.polyval(_EXP2, f) / np.exp2(f) - 1)) < 3e-8
-
-
 def test_power_of_two_over_the_stated_range(variant):
     import mitsuba as mi
 

@@ -34,31 +34,6 @@ def test_nothing_is_collected_during_a_call(variant, collecting):
     assert seen
 
 
-def test_an_error_lets_the_collector_go_on(variant, collecting):
-    import mitsuba as mi
-
-    from realtime.numerics.recorded import Frozen
-
-    def refused(x):
-        raise ValueError("no")
-
-    with pytest.raises(RuntimeError):
-        Frozen(refused)(mi.Float(1.0, 2.0))
-
-
-def test_a_collector_that_was_off_stays_off(variant):
-    import mitsuba as mi
-
-    from realtime.numerics.recorded import Frozen
-
-    gc.disable()
-    try:
-        Frozen(lambda x: x + 1)(mi.Float(1.0, 2.0))
-        assert not gc.isenabled()
-    finally:
-        gc.enable()
-
-
 def test_a_frame_whose_objects_move_is_recorded_at_most_twice(variant):
     """Dr.Jit records anew where the memory of an array is aligned in another way, and NumPy's is by chance.
 

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The airlight of a light point, with the cosine at its normal, against adaptive quadrature that shares nothing."""
 
-import drjit as dr
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
 from realtime.kernels.registry import KERNELS, airlight_integral
 from realtime.numerics.array_types import array_types
-from realtime.rays.ray_light import falloff, ray_geometry
+from realtime.rays.ray_light import ray_geometry
 from realtime.scene.lights import Facing, Light, with_low
 from realtime.scene.medium import Medium
 from realtime.scene.phase import HenyeyGreenstein, Isotropic
@@ -97,20 +96,3 @@ def test_exact_integrates_the_cosine(variant, rays, isotropic):
     # What remains of a segment next to the plane is known as badly as its ends.
     assert np.median(error) < 3e-7
     assert np.quantile(error, 0.9) < 2e-6
-
-
-def test_rays_along_the_plane_are_before_it_or_behind(variant):
-    types = array_types("single")
-    light = Light(
-        types.vector(0, 0, 1), types.color(1), facing=Facing(types.vector(0, 0, -1), types.vector(0), None, None)
-    )
-    origin = types.vector([-2, -2, -2], [0.1, 0.1, 0.1], [0.5, 1, 1.5])
-    geometry = ray_geometry(origin, types.vector(1, 0, 0), light)
-    begin, end = geometry.lit_segment(types.scalar(0), dr.full(types.scalar, dr.inf, 3))
-    lengths = np.array(end - begin)
-    assert lengths[0] == np.inf
-    assert lengths[1] == lengths[2] == 0
-    # Above the foot the cosine is that of the height over the distance.
-    np.testing.assert_allclose(
-        np.array(falloff(geometry, light, geometry.foot))[0], 0.5 / np.hypot(0.5, 0.1), rtol=1e-6
-    )

@@ -22,31 +22,6 @@ def spot_light(types, position, axis, degrees):
 
 
 @pytest.mark.parametrize("kind", ["point", "spot"])
-def test_height_of_rays_that_nearly_meet_the_light(variant, kind):
-    """Rays towards the light, off by 1e-6 to 1: the textbook form has no correct digit at the small end."""
-    import mitsuba as mi
-
-    from realtime.numerics.array_types import array_types
-    from realtime.rays.ray_light import ray_geometry
-
-    rng = np.random.default_rng(7)
-    light = np.array([1.25, -2.5, 3.75])  # exact in float32, as is light - origin below
-    direction = (light + 10.0 ** rng.uniform(-6, 0, (4000, 1)) * rng.normal(size=(4000, 3))).astype(np.float32)
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    types = array_types()
-    axis = np.array([0.6, 0.0, -0.8])
-    lamp = point_light(types, light) if kind == "point" else spot_light(types, light, axis, 40.0)
-    geometry = ray_geometry(mi.Vector3f(0), vectors(types, direction), lamp)
-    exact = direction.astype(np.float64)
-    height = np.linalg.norm(np.cross(light, exact), axis=1)
-    # 1.5 units in the last place for each component, and one for each step of the norm.
-    assert np.max(np.abs(np.array(geometry.height) / height - 1)) < 3e-7
-    assert np.max(np.abs(np.array(geometry.foot) - exact @ light)) < 4 * np.finfo(np.float32).eps * np.linalg.norm(
-        light
-    )
-
-
-@pytest.mark.parametrize("kind", ["point", "spot"])
 def test_rounding_of_light_and_direction_is_no_height(variant, kind):
     """Where light - origin and direction are rounded, their low parts make up for it: 1e-7 m of a height of 1e-4 m."""
     from realtime.numerics.array_types import array_types
@@ -95,20 +70,6 @@ def test_cone_clip_against_sampling(variant, precision):
         inside = (x > low[:, None]) & (x < high[:, None])
         assert np.array_equal(inside[clear], (cosine > np.cos(np.deg2rad(degrees)))[clear]), degrees
         assert inside.any()
-
-
-def test_endless_rays_are_clipped_to_half_lines(variant):
-    from realtime.numerics.array_types import array_types
-    from realtime.rays.ray_light import ray_geometry
-
-    types = array_types()
-    light = spot_light(types, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 30.0)
-    along = ray_geometry(types.vector(0.5, 0.0, -3.0), types.vector(0.0, 0.0, 1.0), light)
-    low, high = along.lit_segment(types.scalar(0), types.scalar(np.inf))
-    assert np.array(low)[0] == pytest.approx(3 + 0.5 / np.tan(np.deg2rad(30)), rel=1e-6)
-    assert np.isinf(np.array(high)[0])
-    against = ray_geometry(types.vector(0.5, 0.0, 3.0), types.vector(0.0, 0.0, 1.0), light)
-    assert np.array(against.lit_segment(types.scalar(0), types.scalar(np.inf))[0])[0] == 0
 
 
 @pytest.mark.parametrize("degrees", [40.0, 50.0])
@@ -187,20 +148,3 @@ def test_falloff_near_the_axis_and_the_edge(variant, cutoff, beam):
     # Distances of up to 10 m, rounded, over a distance from the light of 0.5 m or more; measured 9e-7.
     assert np.max(np.abs(profile - wanted)) * (angle - np.deg2rad(beam)) < 2e-6
     assert np.mean((wanted > 0) & (wanted < 1)) > 0.05
-
-
-def test_falloff_along_the_axis_and_through_the_light(variant):
-    """A ray parallel to the axis, at 0.5 m and at none, and one through the light, aslant: no product is left of it."""
-    from realtime.numerics.array_types import array_types
-    from realtime.rays.ray_light import falloff, ray_geometry
-    from realtime.scene.lights import Light, spot_fields
-
-    types = array_types()
-    fields = spot_fields((0.0, 0.0, 1.0), 1.0, 0.25, types)
-    light = Light(types.vector(0.0), types.color(1), **fields)
-    origin = np.array([(0.5, 0.0, -2.0), (0.0, 0.0, -2.0), (-1.2, 0.0, -1.6)])
-    direction = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, 1.0), (0.6, 0.0, 0.8)])
-    geometry = ray_geometry(vectors(types, origin), vectors(types, direction), light)
-    profile = np.array(falloff(geometry, light, types.scalar(3.0)))
-    angle = np.array([np.arctan2(0.5, 1.0), 0.0, np.arctan2(0.6, 0.8)])
-    np.testing.assert_allclose(profile, np.clip((1 - angle) / 0.75, 0, 1), atol=1e-6)

@@ -9,11 +9,10 @@ from realtime.scene.animate import (
     closed_shapes,
     coloured_light,
     read_objects,
-    thicker_medium,
     turned_light,
     turned_objects,
 )
-from realtime.scene.mesh_adjacency import Placement, read_casters, with_placements, with_positions
+from realtime.scene.mesh_adjacency import read_casters, with_placements, with_positions
 from tests.helpers.scenes import spot, tiny_scene
 from validation.scenes.parts import rotation
 
@@ -43,21 +42,6 @@ def with_places(casters, scene):
     """The casters with the vertices of all shapes that moved, moved one by one."""
     places = {name: placement.positions() for name, placement in scene.placements.items()}
     return with_positions(casters, {**scene.positions, **places})
-
-
-def test_a_spot_turns_with_its_axis_and_keeps_all_else(scene):
-    light = scene.lights[0]
-    turned = turned_light(light, np.array([0.1, 0.1, 0.4]), rotation((0, 0, 1), 90))
-    # (0.7, -0.3) - (0.1, 0.1) = (0.6, -0.4) becomes (0.4, 0.6); float32.
-    np.testing.assert_allclose(host(turned.position), [0.5, 0.7, 2.6], rtol=1e-6)
-    x, y, z = host(light.axis)
-    np.testing.assert_allclose(host(turned.axis), [-y, x, z], rtol=1e-5, atol=1e-7)
-    whole, before = (host(spot.axis) + host(spot.axis_low) for spot in (turned, light))
-    x, y, z = before
-    np.testing.assert_allclose(whole, [-y, x, z], rtol=0, atol=1e-14)  # twice the digits of float32
-    assert turned.kind == light.kind
-    np.testing.assert_array_equal(host(turned.intensity), host(light.intensity))
-    assert type(turned.position) is type(light.position)
 
 
 def leaves(light) -> dict[str, np.ndarray]:
@@ -121,39 +105,6 @@ def test_moved_lights_of_every_kind_are_those_of_the_scene_read_anew(variant):
                     )
 
 
-def test_colours_keep_their_sum(scene):
-    light = scene.lights[0]
-    whole = host(light.intensity)
-    for share in (0, 0.1, 0.47, 0.93):
-        colour = host(coloured_light(light, share).intensity)
-        assert colour.sum() == pytest.approx(whole.sum(), rel=1e-6)
-        assert colour.min() >= whole.min() * (1 - 1e-6)
-
-
-def test_a_thicker_medium_keeps_its_albedo(scene):
-    medium = thicker_medium(scene.medium, 1.5)
-    assert [float(value[0]) for value in medium.sigma_t] == pytest.approx(
-        [1.5 * float(value[0]) for value in scene.medium.sigma_t], rel=1e-6
-    )
-    np.testing.assert_array_equal(host(medium.albedo), host(scene.medium.albedo))
-    with pytest.raises(InputError, match="factor of the extinction"):
-        thicker_medium(scene.medium, -0.1)
-
-
-def test_turned_objects_are_where_rays_meet_them_and_where_casters_are(pens):
-    """Mitsuba's own vertices, and the casters read anew from them, tell where the objects should be."""
-    casters = read_casters(pens.geometry)
-    objects = read_objects(pens, ["pens"])
-    moved = turned_objects(pens, objects, rotation((0, 0, 1), 37.0))
-    again = read_casters(moved.geometry)
-    here = with_places(casters, moved)
-    assert np.abs(here.vertices - casters.vertices).max() > 0.1
-    # The vertices come in another order, the triangles may begin at another corner: compare what has no order.
-    for turned, reread in ((here.vertices, again.vertices), (here.boxes[:, 0], again.boxes[:, 0])):
-        np.testing.assert_array_equal(np.unique(turned, axis=0), np.unique(reread, axis=0))
-    np.testing.assert_allclose(np.sort(here.offsets), np.sort(again.offsets), rtol=0, atol=1e-15)
-
-
 def silhouette_in(casters, light):
     """The ends of the silhouette edges with what they gain, as numbers to compare: one row each, in their order."""
     from realtime.methods.shadow_planes.silhouettes import silhouette
@@ -184,32 +135,6 @@ def test_shapes_that_turn_as_a_whole_keep_their_planes(pens, w):
             assert len(set(counted)) == 1
     assert np.all(whole.boxes[:, 0] <= one_by_one.boxes[:, 0])
     assert np.all(whole.boxes[:, 1] >= one_by_one.boxes[:, 1])
-
-
-def test_shapes_that_moved_otherwise_are_moved_one_by_one(pens):
-    """Without a placement, or with one that starts from other vertices than were read."""
-    casters = read_casters(pens.geometry)
-    moved = turned_objects(pens, read_objects(pens, ["pens", "flag"]), rotation((0, 0, 1), 37.0))
-    places = {name: placement.positions() for name, placement in moved.placements.items()}
-    there = with_positions(casters, places)
-    started_there = Placement(np.eye(3), np.zeros(3), places["pens"].astype(np.float32))
-    for positions, placements in ((places, {}), ({"flag": places["flag"]}, {"pens": started_there})):
-        here = with_placements(casters, positions, placements)
-        assert not here.placed
-        for name in ("vertices", "normals", "offsets", "boxes"):
-            np.testing.assert_array_equal(getattr(here, name), getattr(there, name))
-    mixed = with_placements(casters, {"pens": places["pens"]}, {"flag": moved.placements["flag"]})
-    light = np.array([1.3, -0.7, 2.9])
-    assert len(mixed.placed) == 1
-    np.testing.assert_array_equal(silhouette_in(mixed, light), silhouette_in(there, light))
-
-
-def test_a_whole_turn_ends_where_it_began(pens):
-    objects = read_objects(pens, ["pens", "flag"])
-    turned_objects(pens, objects, rotation((0, 0, 1), 180.0))
-    back = turned_objects(pens, objects, np.eye(3))
-    for name, vertices in objects.vertices.items():
-        np.testing.assert_array_equal(back.placements[name].positions(), vertices)
 
 
 def test_moved_objects_render_as_a_scene_read_anew(pens):

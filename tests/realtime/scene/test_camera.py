@@ -58,16 +58,6 @@ def test_aim_is_kept_to_twice_the_digits(variant):
     assert kept.max() < 1e-13
 
 
-@pytest.mark.parametrize("size", [(8, 8), (800, 600), (37, 53), (1, 5)])
-def test_tiles_hold_every_pixel_once(size):
-    from realtime.scene.camera import tiled_pixels
-
-    pixels = tiled_pixels(*size)
-    assert np.array_equal(np.sort(pixels), np.arange(size[0] * size[1]))
-    if size == (8, 8):
-        assert pixels[:16].tolist() == [row * 8 + column for row in range(4) for column in range(4)]
-
-
 @pytest.mark.parametrize("width", [1, 3, 641, 65535, 1 << 20, (1 << 31) - 1])
 def test_rows_and_columns_are_those_of_a_division(variant, width):
     """Rationale: the division is a product with a rounded reciprocal, and wrong by one row where that does not do.

@@ -57,15 +57,6 @@ def test_meshes_that_bound_no_body_are_refused_with_an_edge(parts, message):
         read_scene(loaded(sun=SUN, **named))
 
 
-@pytest.mark.parametrize("parts", [[pulled(ring(), 0, (-180.0, 10.0, 5.0))], [ring(), ring((90.3, 20.1, 4.7))]])
-def test_a_crossing_is_found_after_however_many_triangles_along_the_edge(parts, monkeypatch):
-    """Without any cast: what is tried in its place finds all crossings by itself."""
-    monkeypatch.setattr("realtime.scene.closed_mesh._HITS", 0)
-    named = {str(number): cloud(str(number), mesh) for number, mesh in enumerate(parts)}
-    with pytest.raises(InputError, match="passes through triangle"):
-        read_scene(loaded(sun=SUN, **named))
-
-
 def test_a_hollow_cloud_and_a_cloud_in_its_hollow_are_taken():
     shell = joined(
         [placed(torus(101.0, 41.0, (23, 17)), (0, 0, 0)), placed(flipped(torus(101.0, 17.0, (23, 17))), (0, 0, 0))]
@@ -86,24 +77,6 @@ def test_a_point_lies_within_as_its_ray_says():
     assert 0 < sum(expected) < 200
 
 
-def test_equal_phase_functions_are_one_and_others_are_not():
-    other = DROPLETS | {"phase": {"type": "isotropic"}}
-    clouds = {
-        name: cloud(name, placed(ring(), (0, 0, height)), medium)
-        for name, height, medium in (("low", -300.0, DROPLETS), ("middle", 0.0, other), ("high", 300.0, DROPLETS))
-    }
-    medium = read_scene(loaded(sun=SUN, **clouds)).medium
-    assert medium.bounded_media == ()
-    assert [phase.name for phase in medium.clouds.phases] == ["hg", "isotropic"]
-    assert np.array(medium.clouds.phase).tolist() == [0, 1, 0]
-
-
-def test_convex_media_beside_a_concave_one_are_clouds_all():
-    read = read_scene(loaded(sun=SUN, ring=cloud("ring", ring()), box=cloud("box", placed(box((9.0, 8.0, 7.0)), FAR))))
-    assert read.features.concave == ("ring", "box")
-    assert len(np.array(read.medium.clouds.phase)) == 2
-
-
 def test_a_camera_in_a_cloud_references_it():
     with pytest.raises(InputError, match="the camera is inside of shape 'ring'"):
         read_scene(mi.load_dict(cloud_scene(origin=tuple(WITHIN))))
@@ -111,9 +84,3 @@ def test_a_camera_in_a_cloud_references_it():
     scene = cloud_scene(origin=tuple(WITHIN), sun=SUN, ring=cloud_of("ring", ring(), medium))
     scene["sensor"]["medium"] = medium
     assert read_scene(mi.load_dict(scene)).features.concave == ("ring",)
-
-
-def test_a_sphere_beside_a_concave_cloud_is_refused():
-    ball = {"type": "sphere", "radius": 2.0, "center": list(FAR), "bsdf": {"type": "null"}, "interior": DROPLETS}
-    with pytest.raises(InputError, match="'ball' is a sphere, and shape 'ring' is not convex"):
-        read_scene(loaded(sun=SUN, ring=cloud("ring", ring()), ball=ball))

@@ -41,20 +41,6 @@ def test_a_grid_is_linear_between_its_voxels(precision):
     np.testing.assert_allclose(density_at(values, (points - LOW) / (HIGH - LOW)), expected, atol=1e-6)
 
 
-def test_the_largest_extinction_stands_for_the_cloud_and_a_homogeneous_one_is_even():
-    apart = placed(box((50.0, 60.0, 70.0)), (413.0, 17.0, 9.0))
-    medium = dense(7.3 * ROUGH, LOW, HIGH, sigma_t=0.017)
-    scene = mi.load_dict(cloud_scene(sun=SUN, ring=cloud("ring", ring(), medium), box=cloud("box", apart)))
-    read = read_scene(scene)
-    clouds = read.medium.clouds
-    np.testing.assert_allclose(clouds.sigma_t[0], [0.017 * 7.3 * ROUGH.max(), 0.0363], rtol=1e-5)
-    places = mi.Point3f([413.0, 3.71], [17.0, -0.13], [9.0, 2.03])
-    even = np.array(clouds.density.at(places, mi.UInt32([1, 1])))
-    np.testing.assert_array_equal(even, 1)
-    assert np.isinf(np.array(clouds.density.voxel)[1])
-    assert read.features.uneven == 1
-
-
 def test_a_turned_grid_far_away():
     """The transform comes from words of six digits and a box: right to a share of the grid, wherever that is."""
     middle = np.array([71_903.0, -51_307.0, 31_711.0])
@@ -128,18 +114,3 @@ def test_methods_for_fog_refuse_a_density_and_name_those_for_clouds(name):
     with pytest.raises(InputError, match=r"HeterogeneousMedium.*cloud-collectors or cloud-octaves") as refusal:
         frame_renderer(read, METHODS[name], **kernel)
     assert "\n" not in str(refusal.value)
-
-
-def test_a_density_lies_in_a_mesh_in_clear_air():
-    ball = {"type": "sphere", "radius": 90.0, "bsdf": {"type": "null"}, "interior": dense(ROUGH, LOW, HIGH)}
-    with pytest.raises(InputError, match="is a sphere, and shape 'ball' bounds a HeterogeneousMedium"):
-        read_scene(mi.load_dict(cloud_scene(sun=SUN, ball=ball)))
-    open_mesh = ring()[0], ring()[1][1:]
-    with pytest.raises(InputError, match="not a closed surface: edge"):
-        read_scene(mi.load_dict(cloud_scene(sun=SUN, ring=cloud("ring", open_mesh, dense(ROUGH, LOW, HIGH)))))
-
-
-def test_the_mean_above_a_threshold():
-    density = read_scene(grid_scene()).medium.clouds.density
-    rho = ROUGH / ROUGH.max()
-    assert density.mean_above(0, 0.4) == pytest.approx(rho[rho > 0.4].mean(), rel=1e-6)

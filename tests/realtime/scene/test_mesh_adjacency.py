@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from realtime.scene.mesh_adjacency import make_casters, moved, read_casters
-from tests.helpers.casters import ALL, AWKWARD, SOUND, boxes_sharing_an_edge, closed_box, closed_sphere, open_grid
+from realtime.scene.mesh_adjacency import make_casters, read_casters
+from tests.helpers.casters import ALL, AWKWARD, SOUND, closed_sphere
 from tests.helpers.scenes import tiny_scene
 
 
@@ -83,28 +83,6 @@ def test_flaws_are_named(name, closed, words):
         assert any(words in warning and "'mesh 0'" in warning for warning in casters.warnings)
 
 
-def test_border_of_a_sheet_has_one_triangle_an_edge():
-    casters = casters_of(open_grid())
-    assert int(np.sum(casters.right == casters.none)) == 18
-
-
-def test_edge_of_four_triangles_is_two_entries():
-    casters = casters_of(boxes_sharing_an_edge())
-    entries = Counter(map(tuple, np.sort(casters.edges, axis=1).tolist()))
-    assert sorted(entries.values())[-2:] == [1, 2]
-    assert len(casters.closed) == 1
-
-
-def test_components_are_connected():
-    casters = casters_of(SOUND["nested spheres"](), closed_box(), open_grid())
-    assert np.bincount(casters.component).tolist() == [320, 320, 12, 40]
-    assert casters.closed.tolist() == [True, True, True, False]
-    for component, (low, high) in enumerate(casters.boxes):
-        corners = casters.vertices[casters.triangles[casters.component == component]]
-        assert np.array_equal(low, corners.min(axis=(0, 1)))
-        assert np.array_equal(high, corners.max(axis=(0, 1)))
-
-
 def test_seams_are_closed_and_shapes_kept_apart():
     """Every triangle has vertices of its own, as where texture coordinates differ."""
     vertices, faces = closed_sphere(1)
@@ -114,37 +92,6 @@ def test_seams_are_closed_and_shapes_kept_apart():
     assert len(casters.vertices) == 2 * len(vertices)
     assert np.all(casters.triangles[: len(faces)] < len(vertices))
     assert np.all(casters.triangles[len(faces) :] >= len(vertices))
-
-
-@pytest.mark.parametrize("name", ["torus", "open cylinder", "mixed winding"])
-def test_moved_casters_are_those_of_moved_meshes(name):
-    vertices, faces = ALL[name]()
-    turn = np.array([[0.36, -0.48, 0.8], [0.8, 0.6, 0.0], [-0.48, 0.64, 0.6]])
-    casters = casters_of((vertices, faces))
-    there = moved(casters, casters.vertices @ turn.T + (3.1, -0.7, 0.2))
-    corners = there.vertices[there.triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    assert there.normals == pytest.approx(normal)
-    assert there.offsets == pytest.approx(np.sum(normal * corners[:, 2], axis=1))
-    assert there.boxes[:, 0].min(axis=0) == pytest.approx(there.vertices.min(axis=0))
-    assert there.edges is casters.edges
-
-
-def test_no_meshes_are_no_casters():
-    casters = make_casters([])
-    assert (casters.none, len(casters.edges), len(casters.closed), casters.warnings) == (0, 0, 0, ())
-
-
-def test_triangles_of_mitsuba_shapes(variant):
-    """A cube has 24 vertices, three at every corner; a rectangle two triangles."""
-    import mitsuba as mi
-
-    cube = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0.1, 0.2, 0.7]).scale([0.3, 0.4, 0.5])}
-    casters = read_casters(mi.load_dict(tiny_scene(ball=None, cube=cube)))
-    assert sorted(np.bincount(casters.component).tolist()) == [2, 12]
-    assert len(casters.vertices) == 8 + 4
-    box = casters.boxes[int(np.argmax(casters.closed))]
-    assert box == pytest.approx(np.array([[-0.2, -0.2, 0.2], [0.4, 0.6, 1.2]]), abs=1e-6)
 
 
 @pytest.mark.claim("shapes-without-edges-refused")

@@ -66,28 +66,3 @@ def test_droplets_are_those_of_the_analytic_side(variant, words):
         value = np.array(phase.evaluate_half(Float(rounded), Float(up)), dtype=np.float64)
         expected = phase_from_words(words).from_half(rounded, up)
         assert value == pytest.approx(expected, rel=tolerance, abs=1e-12)
-
-
-WRONG = (
-    "fog",
-    "",
-    "::",
-    "hg:x",
-    "hg:",
-    "hg:nan",
-    "hg:1",
-    "hg:0.1:0.2",
-    "mie:6:2:0.55:1",
-    "mie:51",
-    "hg-draine:4.9",
-    "hazy:1",
-)
-
-
-@pytest.mark.parametrize("words", WRONG)
-def test_words_that_name_no_phase_function_are_refused_as_a_mistake_of_the_user(variant, words):
-    from realtime.errors import InputError
-    from realtime.scene.phase import named_phase
-
-    with pytest.raises(InputError):
-        named_phase(words)

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from realtime.errors import InputError
 from realtime.scene.animate import MANY, read_objects, turned_objects
 from tests.helpers.scenes import tiny_scene
 from validation.scenes.parts import rotation
@@ -131,37 +130,3 @@ def test_frames_of_a_moving_object_are_recorded_at_most_twice(variant):
         render_frame(replace(renderer, scene=turned_objects(scene, objects, rotation((0, 0, 1), angle))))
     assert renderer.surface.n_recordings <= 2
     assert renderer.render.n_recordings == 1
-
-
-def test_shapes_and_box_of_a_scene_in_parts(variant):
-    scene = read()
-    names = {shape.id() for shape in scene.geometry.shapes()}
-    moved = turned_objects(scene, read_objects(scene, ["ball", "floor"], many=1000), TURN)
-    assert {shape.id() for shape in moved.geometry.shapes()} == names
-    box = moved.geometry.bbox()
-    places = np.concatenate([placement.positions() for placement in moved.placements.values()])
-    # The floor in Mitsuba's own box, the ball in the box about its turned box.
-    assert np.all(np.array(box.min) <= places.min(axis=0) + 1e-6)
-    assert np.all(np.array(box.max) >= places.max(axis=0) - 1e-6)
-    assert np.all(np.array(box.max) <= places.max(axis=0) + 0.3)
-
-
-def test_objects_that_stand_apart_are_read_once(variant):
-    scene = read()
-    moved = turned_objects(scene, read_objects(scene, ["ball"], many=1), TURN)
-    with pytest.raises(InputError, match="have moved before: wanted the scene as it was read"):
-        read_objects(moved, ["ball"])
-
-
-def test_surfaces_that_mitsuba_shades_move_by_their_vertices(variant):
-    """Without a table of triangles, interactions are Mitsuba's: of a scene in parts they would be of another space."""
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-
-    parts = {"sphere": {"type": "sphere", "radius": 0.1}, "ball": bumpy_ball(normals=False), "floor": floor()}
-    scene = read_scene(mi.load_dict(tiny_scene(**parts)))
-    assert scene.facets is None
-    objects = read_objects(scene, ["ball"], many=1)
-    assert objects.apart == ()
-    assert turned_objects(scene, objects, TURN).geometry is scene.geometry

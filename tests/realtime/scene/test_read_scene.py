@@ -61,18 +61,6 @@ def test_plan_names_only_what_is_needed(variant):
     assert not read(spot=spot()).features.soft_spots
 
 
-def test_coloured_extinction_asks_for_three_integrals(variant):
-    medium = tiny_scene()["fog"] | {
-        "sigma_t": {"type": "rgb", "value": [0.1, 0.2, 0.4]},
-        "has_spectral_extinction": True,
-    }
-    assert read(fog=medium).features.extinctions == 3
-
-
-def test_vacuum_and_black_media_are_read(variant):
-    assert read(fog=tiny_scene()["fog"] | {"sigma_t": 0.0}).features.vacuum
-
-
 @pytest.mark.claim("scenes-refused-by-name")
 @pytest.mark.parametrize(
     ("changes", "message"),

@@ -74,29 +74,3 @@ def test_what_a_table_cannot_say_is_left_to_mitsuba(variant):
     textured = mesh_scene()
     textured["floor"]["bsdf"] = {"type": "diffuse", "reflectance": {"type": "checkerboard"}}
     assert read_scene(mi.load_dict(textured)).facets is None
-
-
-def test_moved_objects_have_moved_normals(variant):
-    import mitsuba as mi
-
-    from realtime.scene.animate import read_objects, turned_objects
-    from realtime.scene.read_scene import read_scene
-    from realtime.scene.triangle_table import facet_at
-
-    vertices = np.array([[0.0, 0, 1], [1, 0, 1], [0, 1, 1]])
-    mesh = mi.Mesh("flake", 3, 1)
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = vertices.ravel()
-    parameters["faces"] = [0, 1, 2]
-    parameters.update()
-    scene = read_scene(mi.load_dict(tiny_scene(ball=None, floor=None, flake=mesh)))
-    assert np.array(scene.facets.normals)[:3] == pytest.approx([0, 0, 1], abs=1e-6)
-    turn = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])  # z to x
-    objects = read_objects(scene, ["flake"])
-    there = turned_objects(scene, objects, turn)
-    unit, _, _ = facet_at(there.facets, mi.UInt32(0), None, True)
-    assert [float(part[0]) for part in unit] == pytest.approx([1, 0, 0], abs=1e-6)
-    assert there.facets.normals.index == objects.facets.normals.index  # they stay as they were read
-    again = turned_objects(scene, read_objects(scene, ["flake"]), turn)  # from where the flake is now: x to -z
-    unit, _, _ = facet_at(again.facets, mi.UInt32(0), None, True)
-    assert [float(part[0]) for part in unit] == pytest.approx([0, 0, -1], abs=1e-6)

@@ -10,9 +10,7 @@ from realtime.clouds.bounds.crossings import next_crossing, optical_depths
 from realtime.clouds.bounds.surfaces import cloud_surfaces
 from realtime.numerics.aligned import aligned_array
 from realtime.scene.read_scene import read_scene
-from tests.helpers.clouds import SUN, cloud, length_inside, loaded, ring
-from validation.scenes.parts import placed
-from validation.scenes.solids import box
+from tests.helpers.clouds import SUN, length_inside, loaded, ring
 
 pytestmark = pytest.mark.usefixtures("variant")
 
@@ -43,19 +41,6 @@ def test_depths_in_a_ring_are_those_of_all_its_triangles(precision, end):
     expected = [SIGMA * length_inside(ring(), *ray, end) for ray in zip(origin, direction)]
     assert np.count_nonzero(expected) > 50
     assert depth == pytest.approx(np.array(expected), abs=SIGMA * 5e-4)
-
-
-def test_clouds_of_two_extinctions_add_up():
-    coloured = {"type": "homogeneous", "sigma_t": {"type": "rgb", "value": [0.01, 0.02, 0.04]}}
-    slab = placed(box((220.3, 190.7, 31.1)), (3.1, 1.7, -190.9))
-    scene = loaded(sun=SUN, ring=cloud("ring", ring()), slab=cloud("slab", slab, coloured))
-    origin, direction = random_rays(300, seed=5, spread=250.0)
-    depths = depths_of(scene, origin, direction, np.inf)
-    for depth, sigma in zip(depths, (0.01, 0.02, 0.04), strict=True):
-        expected = [
-            SIGMA * length_inside(ring(), *ray) + sigma * length_inside(slab, *ray) for ray in zip(origin, direction)
-        ]
-        assert depth == pytest.approx(np.array(expected), abs=1e-4)
 
 
 def test_a_sphere_is_a_cloud_too():

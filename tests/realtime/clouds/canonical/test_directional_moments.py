@@ -106,12 +106,3 @@ def test_bins_of_directions_are_those_of_photons():
         off = ((found[:, 0] - expected) / np.maximum(error[:, 0], 1e-300))[:, bins]
         assert np.abs(off).max() < 4.5
         assert math.sqrt(np.mean(off**2)) < 1.35
-
-
-@pytest.mark.slow
-def test_suns_shine_alone_and_directions_keep_their_order():
-    slabs = DirectionalMoments(HG, 1.0, [0.5, -0.3, 0.1])
-    both, one = slabs(1.0, [0.9, 0.3], [0.4]), slabs(1.0, [0.3], [0.4])
-    np.testing.assert_allclose(both[:, :, :, 1], one[:, :, :, 0], rtol=1e-3, atol=1e-9)
-    other = DirectionalMoments(HG, 1.0, [-0.3, 0.1, 0.5])(1.0, [0.3], [0.4])
-    np.testing.assert_allclose(one[..., [1, 2, 0]], other, rtol=1e-4, atol=1e-9)

@@ -5,16 +5,14 @@ import drjit as dr
 import numpy as np
 import pytest
 
-import realtime.clouds.canonical.fit as fit_module
 import realtime.clouds.canonical.tables as tables_module
 import tests.helpers.canonical_errors as errors_module
 from realtime.clouds.canonical import coordinates
-from realtime.clouds.canonical.fit import FittedSet, fit_on_device, fit_tables, fitted_functions
+from realtime.clouds.canonical.fit import fit_on_device, fit_tables
 from realtime.clouds.canonical.look_up import on_device
 from realtime.clouds.canonical.sets import SETS, set_name
-from realtime.clouds.canonical.tables import RANKS, Grid, canonical_tables
+from realtime.clouds.canonical.tables import Grid, canonical_tables
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
-from realtime.errors import InputError
 from realtime.numerics.array_types import array_types
 from tests.helpers.canonical_errors import look_up_errors, looked_up_points, random_points, transport_at
 
@@ -74,16 +72,6 @@ def test_at_entries_look_ups_are_the_computation(look_up):
 
 
 @pytest.mark.slow
-def test_between_entries_they_are_close_to_it_all_over_the_domain(look_up):
-    """Half of the entries along each coordinate."""
-    rows = look_up_errors(look_up, array_types(), random_points(PHASE, ALBEDO, 320, seed=4))
-    assert sum(row["points"] for row in rows) > 1200
-    for row in rows:
-        assert row["T"]["p50"] < 0.03
-        assert row["c"]["p50"] < 0.02
-
-
-@pytest.mark.slow
 @pytest.mark.claim("clouds-tables-figure", tolerance="1 % of T and 2 % of sigma in c at 95 % of 2000 points, each set")
 def test_whole_tables_keep_to_their_figure(variant):
     from validation.slab.phases import phase_pair
@@ -95,19 +83,6 @@ def test_whole_tables_keep_to_their_figure(variant):
     for row in look_up_errors(on_device(tables, types), types, random_points(phase, 1.0, 2000)):
         assert row["T"]["p95"] <= 0.01
         assert row["c"]["p95"] <= 0.02
-
-
-def test_both_faces_and_grazing_directions_are_finite_and_dark_where_no_light_comes_from(look_up):
-    d, mu = np.array(
-        [(0, -0.5), (0, -1), (3, 0.5), (3, 0), (3, 1), (0, 0), (0, 1), (3, -1), (1, 0), (1, -1e-4), (1, 1e-4)]
-    ).T
-    for number in (0, 7):
-        T, c_x, c_y, sigma = values(look_up, number, 3.0, d, mu, 1.0, 0.5)
-        assert np.isfinite([T, c_x, c_y, sigma]).all()
-        assert (sigma > 0).all()
-        assert (T[:5] == 0).all()
-        assert (T[5:] > 0).all()
-        assert T[-1] == pytest.approx(T[-2], rel=1e-2)
 
 
 @pytest.mark.claim("clouds-outside")
@@ -144,11 +119,6 @@ def test_outside_the_tables_what_happens_is_what_the_page_says(look_up):
         np.testing.assert_allclose(night, [0, *low[1:]], rtol=1e-4)
 
 
-def test_the_azimuth_turns_the_collector_and_not_the_light(look_up):
-    there, mirrored = values(look_up, 7, 2.0, 1.0, 0.4, np.array([0.8, -0.8]), 0.5).T
-    np.testing.assert_allclose(mirrored, there * [1, 1, -1, 1], rtol=1e-5)
-
-
 def test_tables_are_kept_and_damaged_ones_are_made_again(coarse, tmp_path, monkeypatch):
     monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path))
     made = []
@@ -167,57 +137,6 @@ def test_tables_are_kept_and_damaged_ones_are_made_again(coarse, tmp_path, monke
     path.write_bytes(data)
     canonical_tables(HenyeyGreensteinPhase(0.0), 0.5, grid=SMALL, progress=tell)
     assert len(made) == 2 * count
-
-
-def test_media_that_differ_by_single_precision_share_tables_and_others_do_not(tmp_path, monkeypatch):
-    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(tables_module, "make_tables", lambda phase, albedo, grid, progress: made(phase, albedo))
-    media = []
-
-    def made(phase, albedo):
-        media.append((phase.g, albedo))
-        empty = tuple(np.zeros(1) for _ in SETS)
-        return tables_module.CanonicalTables(SMALL, np.zeros(1), empty, empty, np.zeros(1), 1.0)
-
-    for g, albedo in ((0.5, 0.9), (0.500005, 0.9), (0.5, 0.9000005), (0.5001, 0.9), (0.5, 0.90001)):
-        canonical_tables(HenyeyGreensteinPhase(g), albedo, grid=SMALL)
-    assert media == [(0.5, 0.9), (0.5001, 0.9), (0.5, 0.90001)]
-
-
-def test_functions_are_fitted_once_for_a_medium(variant, tmp_path, monkeypatch):
-    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path))
-    fits = []
-
-    def fit(look_up, types, *, progress):
-        fits.append(look_up)
-        shapes = ((3,), (2, 3, 4), (2, 3, 2), (3, 9), (3, 3), (5,))
-        return tuple(FittedSet(*(np.full(shape, number + 0.1) for shape in shapes)) for number in range(len(SETS)))
-
-    monkeypatch.setattr(fit_module, "fit_tables", fit)
-    empty = tuple(np.zeros(1) for _ in SETS)
-    tables = tables_module.CanonicalTables(SMALL, np.zeros(1), empty, empty, np.zeros(1), 1.0)
-    first, again, other = (
-        fitted_functions(HenyeyGreensteinPhase(g), 0.9, tables, g, array_types()) for g in (0.5, 0.5, 0.4)
-    )
-    assert fits == [0.5, 0.4]
-    assert len(first) == len(again) == len(other) == len(SETS)
-    for one, kept in zip(first, again):
-        for name in ("p", "of_directions", "of_suns", "collector", "n", "spread"):
-            np.testing.assert_array_equal(getattr(one, name), getattr(kept, name))
-
-
-def test_full_tables_are_at_most_32_megabytes():
-    grid = Grid()
-    places = grid.thicknesses * grid.depths * grid.suns
-    products, directions = sum(map(sum, RANKS)), grid.directions * grid.azimuths
-    assert 2 * places * products + 4 * directions * products + 4 * len(SETS) * (2 * places + 1025) <= 32e6
-    assert all(rank % 4 == 0 for ranks in RANKS for rank in ranks)
-
-
-def test_an_albedo_without_scattering_is_refused():
-    for albedo in (0.0, 1.5, float("nan")):
-        with pytest.raises(InputError, match="albedo"):
-            canonical_tables(PHASE, albedo)
 
 
 @pytest.mark.slow

@@ -14,16 +14,12 @@ import pytest
 
 from realtime.clouds.bounds.surfaces import cloud_surfaces
 from realtime.clouds.hypertexture.light_depths import light_depths, marched_leg
-from realtime.clouds.hypertexture.lit_surface import dense_surface, lit_dense_surface
+from realtime.clouds.hypertexture.lit_surface import dense_surface
 from realtime.clouds.hypertexture.march import marched_depths
-from realtime.clouds.light_maps.surfaces import cast_surfaces
 from realtime.frame.renderer import frame_renderer, render_frame
-from realtime.methods.cloud_collectors import CollectorParameters, prepare_collectors
 from realtime.methods.registry import METHODS
 from realtime.numerics.aligned import aligned_array
 from realtime.scene.camera import ray_directions
-from realtime.scene.density import Density
-from realtime.scene.named_shapes import scene_of
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import SUN, TURN, cloud, cloud_scene, crossings, dense, linear_between, ring
 from validation.scenes.parts import placed
@@ -146,17 +142,6 @@ def test_an_even_grid_is_a_homogeneous_cloud(name, precision):
         assert np.sqrt(np.mean((other - light) ** 2)) < 0.05 * mean, layer
 
 
-@pytest.mark.parametrize("name", ["cloud-octaves", "cloud-collectors"])
-def test_the_printed_equations_run_on_grids(name):
-    even, homogeneous = even_and_homogeneous()
-    printed = {"single": "printed", "opacity": "printed"}
-    grid, plain = (rendered(scene, name, **printed) for scene in (even, homogeneous))
-    # Printed, a stretch is cut where the steps are: its sum telescopes for even extinction.
-    np.testing.assert_allclose(grid.extra["opacity"], plain.extra["opacity"], atol=2e-3)
-    assert np.mean(grid.extra["airlight_1"]) == pytest.approx(np.mean(plain.extra["airlight_1"]), rel=0.02)
-    assert np.mean(grid.extra["airlight_1"]) < 0
-
-
 @pytest.mark.claim("hypertexture-converges", tolerance="none: errors that shrink at least by half")
 @pytest.mark.parametrize("name", ["cloud-octaves", pytest.param("cloud-collectors", marks=pytest.mark.slow)])
 def test_finer_grids_of_a_smooth_field_converge(name):
@@ -187,13 +172,6 @@ def test_the_map_of_a_sun_holds_the_depths_of_legs():
     assert found.mean() == pytest.approx(expected.mean(), rel=0.02)
 
 
-def test_legs_by_samples_are_those_of_a_march():
-    few, many = (rendered(uneven(), "cloud-octaves", light_steps=steps) for steps in (24, 384))
-    marched = rendered(uneven(), "cloud-octaves")
-    assert np.mean(many.airlight) == pytest.approx(np.mean(marched.airlight), rel=0.01)
-    assert np.mean(few.airlight) == pytest.approx(np.mean(marched.airlight), rel=0.1)
-
-
 def test_the_surface_is_where_the_density_passes_the_threshold():
     values = waves(13)
     read, direction = rays_of(uneven(values), "double")
@@ -209,26 +187,3 @@ def test_the_surface_is_where_the_density_passes_the_threshold():
     np.testing.assert_allclose(rho[passes], 0.5, atol=5e-3)
     assert np.all(rho[there & hull] > 0.5)
     assert (~there).any()
-
-
-def test_the_light_map_of_an_even_grid_is_that_of_the_mesh():
-    read = read_scene(uneven(np.ones((2, 2, 2))))
-    surfaces, clouds, light = cloud_surfaces(read), read.medium.clouds, read.lights[0]
-    own = lit_dense_surface(surfaces, clouds, light, 64, cloud=0, body=mi.Float(1), threshold=0.5, stride=mi.Float(1))
-    cast = cast_surfaces(scene_of(read.boundaries), light, 64)
-    np.testing.assert_array_equal(own.there, cast.there)
-    np.testing.assert_allclose(own.front, cast.front, atol=0.01)
-    np.testing.assert_allclose(np.array(own.normal), np.array(cast.normal), atol=1e-5)
-    # What lies between two limbs is no cloud here; the mesh alone takes it for one.
-    thickness, filled = np.array(own.front) - np.array(own.back), np.array(cast.front) - np.array(cast.back)
-    assert np.all(thickness <= filled + 0.02)
-    assert thickness.sum() < 0.9 * filled.sum()
-
-
-def test_a_light_that_moves_computes_its_map_without_the_mean_densities(monkeypatch):
-    """They are sums over all voxels, which wait for the device; they belong to the cloud and are made once."""
-    read = read_scene(uneven(np.ones((2, 2, 2))))
-    state = prepare_collectors(read, CollectorParameters(map=32))
-    before = state(read)
-    monkeypatch.setattr(Density, "mean_above", None)
-    assert state(read).body is before.body

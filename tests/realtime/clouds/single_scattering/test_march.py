@@ -7,14 +7,11 @@ import numpy as np
 import pytest
 
 from realtime.clouds.bounds.surfaces import cloud_surfaces
-from realtime.clouds.single_scattering.march import Beam, _step, cloud_rays, exact_leg, scattered
-from realtime.clouds.single_scattering.opacity import opacity, opacity_of, printed_opacity
-from realtime.clouds.single_scattering.spacing import node_depth, node_share
+from realtime.clouds.single_scattering.march import Beam, cloud_rays, exact_leg, scattered
+from realtime.clouds.single_scattering.opacity import opacity, printed_opacity
 from realtime.numerics.aligned import aligned_array
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import SUN, cloud, crossings, length_inside, loaded, ring
-from validation.scenes.parts import placed
-from validation.scenes.solids import box
 
 pytestmark = pytest.mark.usefixtures("variant")
 
@@ -118,27 +115,6 @@ def test_stretches_that_are_not_kept_are_found_again(monkeypatch):
     np.testing.assert_array_equal(*images)
 
 
-def test_octaves_have_their_own_legs(few):
-    origin, direction, expected = few
-    scene = loaded(sun=SUN, ring=cloud("ring", ring(), COLOURED))
-    first, second = marched(scene, origin[:20], direction[:20], steps=64, scales=(1.0, 0.3))
-    assert np.sqrt(np.mean((first - expected[:20]) ** 2)) < 0.005 * expected[:20].mean()
-    weaker = np.array([summed_up(*ray, scale=0.3) for ray in zip(origin[:20], direction[:20])])
-    assert np.sqrt(np.mean((second - weaker) ** 2)) < 0.005 * weaker.mean()
-
-
-def test_a_slab_seen_from_above_is_exact_with_one_step():
-    """Legs are linear in a slab, so steps leave no error: mu0/(mu0 + mu) (1 - exp(-tau (1/mu + 1/mu0)))."""
-    slab = cloud("slab", placed(box((4000.0, 4000.0, 37.0)), (0, 0, -18.5)), COLOURED)
-    direction = np.array([[0.3, 0.2, -0.8], [-0.1, 0.5, -0.3], [0.0, 0.0, -1.0]])
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    origin = -60 * direction
-    (radiance,) = marched(loaded(sun=SUN, slab=slab), origin, direction, steps=1)
-    mu, mu0 = -direction[:, 2:], -TRAVELS[2]
-    expected = ALBEDO / (4 * np.pi) * mu0 / (mu0 + mu) * (1 - np.exp(-SIGMA * 37 * (1 / mu + 1 / mu0)))
-    assert radiance == pytest.approx(expected, rel=2e-5)
-
-
 @pytest.mark.claim("cloud-opacity", tolerance="0.1 %")
 def test_opacity_is_one_less_the_transmittance():
     origin, direction = rays(300)
@@ -148,11 +124,6 @@ def test_opacity_is_one_less_the_transmittance():
     length = np.array([length_inside(ring(), *ray, 470.0) for ray in zip(origin, direction)])
     share = np.array(found).T
     assert share == pytest.approx(1 - np.exp(-SIGMA * length[:, None]), rel=1e-3, abs=1e-5)
-
-
-def test_opacity_of_next_to_nothing_keeps_its_digits():
-    (shallow, *_) = opacity_of((mi.Float([1e-7, 3e-5, 0.05, 3.0]),) * 3, mi.Color3f)
-    assert np.array(shallow) == pytest.approx(-np.expm1(-np.array([1e-7, 3e-5, 0.05, 3.0])), rel=1e-6)
 
 
 @pytest.mark.claim("cloud-printed-equations")
@@ -170,25 +141,3 @@ def test_equations_as_printed_have_the_wrong_sign(few):
     one_stretch = [len(crossings(ring(), *ray)[0]) <= 2 for ray in zip(origin, direction)]
     share = np.array(opacity(surfaces, read.medium.clouds, *path)).T
     assert length[one_stretch] == pytest.approx(-share[one_stretch] / SIGMA, rel=1e-4, abs=1e-4)
-
-
-def test_steps_against_the_integral_for_all_signs_of_the_leg():
-    """Also where the leg falls as fast as the eye's depth grows, dl = -kappa dx: kappa dx e."""
-    depth = np.array([1e-6, 0.3, 0.3, 0.3, 2.0, 7.0])
-    change = np.array([0.0, -0.3, 0.4, -0.2999, -9.0, 30.0])
-    first = np.full(6, 10.0)
-    eye = mi.Float(np.zeros(6)), mi.Float(depth)
-    leg = mi.Float(first), mi.Float(first + change)
-    u = depth + change
-    share = np.where(np.abs(u) > 1e-12, -np.expm1(-u) / np.where(u == 0, 1, u), 1.0)
-    assert np.array(_step(mi.Float(depth), eye, leg, printed=False)) == pytest.approx(
-        depth * np.exp(-first) * share, rel=3e-4
-    )
-
-
-def test_nodes_end_where_the_ray_does():
-    total = mi.Float([1e-3, 1.0, 50.0])
-    nodes = np.array([np.array(node_depth(mi.UInt32(number), 8, node_share(total, 8))) for number in range(1, 9)])
-    assert np.all(np.diff(nodes[:-1], axis=0) > 0)
-    assert np.all(nodes[:-1] < np.array(total))
-    assert np.all(np.isinf(nodes[-1]))
