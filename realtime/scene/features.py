@@ -3,6 +3,7 @@
 
 from collections import Counter
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -27,10 +28,26 @@ class SceneFeatures:
     notes: tuple[str, ...] = ()  #: what the user should know of this scene
 
 
-def camera_notes(scene) -> list[str]:
-    """Return what the user should know of the cameras of a Mitsuba scene: a line where there are several."""
+def backgrounds(scene) -> list[Any]:
+    """Return what is seen behind a scene that lights in it light: an environment, or a sky that is no light of clouds.
+
+    A constant emitter beside directional lights alone lights clouds (`realtime.scene.read_scene`).
+    """
+    around = {"EnvironmentMapEmitter", "ConstantBackgroundEmitter"}
+    lights = {emitter.class_name() for emitter in scene.emitters()} - around
+    around -= {"ConstantBackgroundEmitter"} if lights <= {"DirectionalEmitter"} else set()
+    return [emitter for emitter in scene.emitters() if lights and emitter.class_name() in around]
+
+
+def scene_notes(scene) -> list[str]:
+    """Return what the user should know of the cameras and the lights of a Mitsuba scene, a line each."""
     cameras = len(scene.sensors())
-    return [f"the scene has {cameras} cameras: the first is used, the others are left out"] if cameras > 1 else []
+    notes = [f"the scene has {cameras} cameras: the first is used, the others are left out"] if cameras > 1 else []
+    notes += [
+        f"light '{emitter.id()}' around the scene is seen behind it; light of it that is scattered is left out"
+        for emitter in backgrounds(scene)
+    ]
+    return notes
 
 
 def describe(features: SceneFeatures) -> dict[str, str]:

@@ -21,7 +21,7 @@ from realtime.numerics.array_types import ArrayTypes, array_types, is_single, ty
 from realtime.scene.camera import Camera, pixel_grid
 from realtime.scene.closed_mesh import ClosedMesh
 from realtime.scene.directional_extent import directional_fields, distance_before, media_spheres, mesh_spheres
-from realtime.scene.features import SceneFeatures, camera_notes
+from realtime.scene.features import SceneFeatures, backgrounds, scene_notes
 from realtime.scene.lights import Light, spot_fields
 from realtime.scene.medium import Medium
 from realtime.scene.mesh_adjacency import Placement
@@ -97,7 +97,7 @@ def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
             "the scene has no light; wanted at least one emitter of type 'point', 'spot', 'directional' or 'area'"
         )
     bodies = _Bodies(medium, meshes, opaque)
-    behind = _backgrounds(scene)
+    behind = backgrounds(scene)
     lights = tuple(
         _read_directional(emitter, bodies, types)
         if emitter.class_name() == "DirectionalEmitter"
@@ -187,17 +187,6 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
     return Light(**arrays)
 
 
-def _backgrounds(scene) -> list[Any]:
-    """Return what is seen behind a scene that lights in it light: an environment, or a sky that is no light of clouds.
-
-    A constant emitter beside directional lights alone lights clouds (`_read_sky`).
-    """
-    around = {"EnvironmentMapEmitter", "ConstantBackgroundEmitter"}
-    lights = {emitter.class_name() for emitter in scene.emitters()} - around
-    around -= {"ConstantBackgroundEmitter"} if lights <= {"DirectionalEmitter"} else set()
-    return [emitter for emitter in scene.emitters() if lights and emitter.class_name() in around]
-
-
 def _read_directional(emitter, bodies: _Bodies, types: ArrayTypes) -> Light:
     medium = bodies.medium
     if not (medium.clear and medium.clouds):
@@ -278,11 +267,7 @@ def _scene_features(
     scene, bodies: _Bodies, lights: tuple[Light, ...], area_lights: tuple[AreaLight, ...]
 ) -> SceneFeatures:
     medium, opaque = bodies.medium, bodies.opaque
-    notes = camera_notes(scene)
-    notes += [
-        f"light '{emitter.id()}' around the scene is seen behind it; light of it that is scattered is left out"
-        for emitter in _backgrounds(scene)
-    ]
+    notes = scene_notes(scene)
     for shape in opaque:
         flags = shape.bsdf().flags()
         if flags & ~int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide) & 0x3FF:

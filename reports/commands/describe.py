@@ -31,6 +31,7 @@ def describe(
     from reports.interchange.gltf import write_gltf
     from reports.interchange.scene import describe_scene
     from reports.machine.environment import activate
+    from reports.machine.printing import print_notes
     from reports.tables.scene import description_text
     from reports.tables.terminal import print_json, terminal_width
     from validation.scenes.loading import load_scene, parse_size
@@ -45,6 +46,7 @@ def describe(
     loaded = load_scene(scene, pixels)
     described = describe_scene(loaded)
     written = None if gltf is None else write_gltf(gltf, loaded)
+    print_notes(described["notes"])
     if json:
         print_json(described | ({} if written is None else {"gltf": written}))
         return

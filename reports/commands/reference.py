@@ -114,7 +114,7 @@ def reference(
     Exit status 1 if the target error was not reached.
     """
     from analytic.errors import InputError
-    from realtime.scene.features import camera_notes
+    from realtime.scene.features import scene_notes
     from reference.storage.exr import write_exr
     from reference.storage.files import ensure_writable
     from reports.interchange.frames import check_ending
@@ -142,7 +142,7 @@ def reference(
     activate()
     (scene,) = drawn_from([scene], meshes, ranges)
     loaded = load_scene(scene, parse_size(size) if size else None, changes)
-    print_notes(camera_notes(loaded.scene))
+    print_notes(scene_notes(loaded.scene))
     pixels = loaded.scene.sensors()[0].film().size() if loaded.scene.sensors() else (1, 1)
     if budget is None:
         area = 16 if pixel is Pixel.area else 1  # rays in a pixel

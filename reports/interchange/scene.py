@@ -53,16 +53,17 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
     -------
     dict
         `scene`, `source`, `purpose`, `up`, `handedness`, `camera`, `medium`, `bounded_media`, `lights`, `surfaces`,
-        `radiance`, `file`, `recipes`, and `properties`, the scene as `reports.interchange.cycles.cycles_properties`
-        returns it; of a random scene also `drawn`. Lengths in metres, angles in degrees, extinction in 1/m, intensity
-        in W/sr, power in W. Black shapes of lights with extent are among the lights, not the surfaces.
+        `radiance`, `notes`, `file`, `recipes`, and `properties`, the scene as
+        `reports.interchange.cycles.cycles_properties` returns it; of a random scene also `drawn`. Lengths in metres,
+        angles in degrees, extinction in 1/m, intensity in W/sr, power in W. Black shapes of lights with extent are
+        among the lights, not the surfaces.
 
     Raises
     ------
     InputError
         For a scene without a truth, with the name of what is in the way.
     """
-    read_scene(loaded.scene)  # refuses what `render` refuses, in its words
+    notes = read_scene(loaded.scene).features.notes  # it refuses what `render` refuses, in its words
     truth = read_truth(loaded.scene)
     camera = _camera(loaded.scene.sensors()[0], truth)
     described = {
@@ -81,6 +82,7 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
             surface(shape) for shape in truth.occluders.shapes() if not shape.is_emitter() or _reflects(shape)
         ],
         "radiance": CONVENTION,
+        "notes": list(notes),
         "file": {
             "name": f"{scene_stem(str(loaded.path or loaded.name))}.exr",
             "format": "OpenEXR, one part of scan lines, half or float",

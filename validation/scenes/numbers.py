@@ -42,7 +42,7 @@ def check_numbers(scene: Any) -> None:
     for name, plugin in _plugins(scene):
         parameters = mi.traverse(plugin)
         for key in parameters.keys():  # noqa: SIM118 - SceneParameters iterates over items
-            values = _numbers(parameters[key])
+            values = _numbers(_parameter(parameters, key))
             if values is not None:
                 _check(name, key, values)
         if "faces" in parameters:
@@ -65,8 +65,18 @@ def _name(kind: str, plugin: Any, number: int) -> str:
     return f"{kind} '{plugin.id()}'" if plugin.id() else f"{kind} {number}"
 
 
+def _parameter(parameters: Any, key: str) -> Any:
+    """Return a parameter, None where a plugin has none in its place, at which Mitsuba's own look-up fails."""
+    try:
+        return parameters[key]
+    except TypeError:
+        return None
+
+
 def _numbers(value: Any) -> NDArray[np.float64] | None:
     """Return the numbers of a parameter, None where it has none."""
+    if value is None:
+        return None
     # By the name of the type: a colour has a `matrix` too, a swizzle that holds its first channel six times.
     matrix = value.matrix if "Transform" in type(value).__name__ else value
     try:

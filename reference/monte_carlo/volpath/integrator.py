@@ -32,6 +32,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.errors import InputError
 from reference.monte_carlo.batches import Batches, check_samples, single_batch
 from reference.scene.read import TruthMedium, TruthScene
 
@@ -63,6 +64,8 @@ def volpath_batch(
 
     Raises
     ------
+    InputError
+        For a scene of which Mitsuba does not know how large it is, under a directional light.
     ValueError
         If `samples` or `max_depth` is out of range, or `counts` come with another `max_depth` than 2.
 
@@ -77,6 +80,8 @@ def volpath_batch(
     if counts is not None and max_depth != 2:
         raise ValueError("counts: got some with multiple scattering, whose layers are traced along the same paths")
     in_air, on_surface = np.full((2, truth.width * truth.height), samples) if counts is None else counts
+    if truth.directional and not truth.scene.bbox().valid():  # of rectangles alone, merged, in Mitsuba 3.9.1
+        raise InputError("volpath: the scene's bounding box is not valid, so its directional lights start within it")
     hidden = {"hide_emitters": True} if truth.area else {}
     integrator = mi.load_dict({"type": "volpath", "max_depth": max_depth, "rr_depth": 1000} | hidden)
     with black_surfaces(truth.occluders):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scene files as people write them are taken with the right image, or refused by the name of what is in the way."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -93,9 +95,20 @@ def test_a_lamp_on_a_quad_of_two_triangles_is_the_rectangle(load, tmp_path, turn
     (tmp_path / "quad.obj").write_text("v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3\nf 1 3 4\n")
     mesh = '<string name="filename" value="quad.obj"/>' + turn + GLOW
     quad, rectangle = (load(shape(plugin, inside)) for plugin, inside in (("obj", mesh), ("rectangle", turn + GLOW)))
-    lights = [read_truth(scene).area[0] for scene in (quad, rectangle)]
+    found, wanted = (read_truth(scene).area[0] for scene in (quad, rectangle))
     for name in ("centre", "normal", "area", "power"):
-        np.testing.assert_allclose(*(getattr(light, name) for light in lights), rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(getattr(found, name), getattr(wanted, name), rtol=1e-5, atol=1e-6)
+
+
+def test_a_lamp_on_a_box_is_its_six_sides(load):
+    """Each of them a light with extent of its own, shining outwards; together they send what the box sends."""
+    from reference.scene.read import read_truth
+
+    lights = read_truth(load(shape("cube", GLOW, size=0.3))).area
+    assert sorted(light.name for light in lights) == [f"thing-{number}" for number in range(1, 7)]
+    outwards = [light.normal @ (light.centre - (0.1, 0.1, 0.7)) for light in lights]
+    np.testing.assert_allclose(outwards, 0.3, rtol=1e-5)
+    np.testing.assert_allclose(sum(light.power for light in lights), np.pi * 6 * 0.36 * np.array([3, 2, 1]), rtol=1e-5)
 
 
 def test_a_lamp_that_reflects_is_lit_like_any_surface(load):
@@ -119,6 +132,7 @@ def test_a_background_is_seen_through_the_fog_and_lights_nothing(load):
     scene = load(LAMP, box, sky, camera=CAMERA.format(""))
     with_sky = quadrature_image(read_truth(scene))
     np.testing.assert_array_equal(image(scene), image(load(LAMP, box, camera=CAMERA.format(""))))
+    assert with_sky.emitted is not None
     through = -np.log(with_sky.emitted / [0.2, 0.3, 0.4]) / 0.23  # Beer's law gives how much fog a ray has met [m]
     assert through.max() == pytest.approx(2.2 / np.cos(np.deg2rad(17)), rel=0.1)
     assert through.min() == pytest.approx(0, abs=1e-6)
@@ -149,7 +163,7 @@ def medium(inside):
 
 
 GRID = """<volume type="gridvolume" name="{}"><string name="filename" value="{}"/></volume>"""
-REFUSED = {
+REFUSED: dict[str, tuple[Any, ...]] = {
     "medium 'fog' names the material 'skimmilk'.*sigma_t.*0.7014, 1.2225, 1.9142.*albedo": (
         {"media": medium('<string name="material" value="skimmilk"/>')},
     ),
@@ -211,3 +225,50 @@ def test_a_coefficient_on_a_grid_is_refused_by_both_readers(load, tmp_path, coef
     for read in (read_truth, read_scene):
         with pytest.raises((InputError, RealtimeInputError), match=f"{coefficient} differs from place to place"):
             read(scene)
+
+
+def written(plugin, kind):
+    """Return the settings of a file and what it holds to try a plugin."""
+    tag = {"PhaseFunction": "phase"}.get(kind, kind.lower())
+    nested = '<bsdf type="diffuse"/>' if plugin in ("twosided", "mask", "blendbsdf", "bumpmap", "normalmap") else ""
+    element = f'<{tag} type="{plugin}" id="tried">{{}}</{tag}>'
+    inside = {"Sensor": INSIDE + LOOK, "Medium": COEFFICIENTS}.get(kind, nested)
+    tried = element.format(inside)
+    if kind == "Sensor":
+        return {"camera": tried}, ""
+    if kind == "Medium":
+        return {"media": tried.replace("tried", "fog")}, ""
+    if kind == "PhaseFunction":
+        return {"media": FOG.replace("</medium>", tried + "</medium>")}, ""
+    return {}, shape("sphere", tried) if kind == "BSDF" else tried
+
+
+@pytest.mark.slow
+def test_every_plugin_of_mitsuba_is_taken_or_refused_in_one_line(load):
+    """By all readers, one plugin at a time, with Mitsuba's defaults where it has some."""
+    from pathlib import Path
+
+    import mitsuba as mi
+
+    from realtime.errors import InputError as RealtimeInputError
+    from reports.interchange.scene import describe_scene
+    from validation.scenes.loading import LoadedScene
+
+    kinds = ("Sensor", "Emitter", "Shape", "BSDF", "Medium", "PhaseFunction")
+    folder = Path(mi.__file__).parent / "plugins"
+    plugins = sorted({path.name.partition(".")[0] for path in folder.iterdir()})
+    tried = {plugin: str(mi.PluginManager.instance().plugin_type(plugin)).rpartition(".")[2] for plugin in plugins}
+    said = {}
+    for plugin, kind in tried.items():
+        if kind in kinds:
+            settings, part = written(plugin, kind)
+            try:
+                scene = load(LAMP if kind != "Emitter" else "", part, **settings)
+                said[plugin] = describe_scene(LoadedScene("own", scene, "", ""))["scene"]
+            except (InputError, RealtimeInputError) as refusal:
+                said[plugin] = str(refusal)
+    assert all("\n" not in words for words in said.values())
+    assert {"perspective", "point", "sphere", "diffuse", "plastic", "homogeneous", "hg", "rayleigh", "isotropic"} <= {
+        plugin for plugin, words in said.items() if words == "own"
+    }
+    assert "'projector'" in said["projector"]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from validation.scenes.files.nodes import of_kind, properties
+from validation.scenes.files.nodes import kind, of_kind, properties, references
 
 Array = NDArray[np.float64]
 
@@ -48,6 +48,7 @@ def give_extinction(state: Any) -> list[str]:
     notes = []
     for index in of_kind(state, "Medium"):
         props = properties(state, index)
+        _make_homogeneous(state, props)
         if props.plugin_name() != "homogeneous":
             continue
         _refuse_names(props)
@@ -67,6 +68,28 @@ def give_extinction(state: Any) -> list[str]:
             f"{_words(albedo)}"
         )
     return notes
+
+
+def _make_homogeneous(state: Any, props: Any) -> None:
+    """Make a heterogeneous medium whose extinction is the same everywhere homogeneous."""
+    volumes = [properties(state, at).plugin_name() for key, at in references(props) if key == "sigma_t"]
+    if props.plugin_name() == "heterogeneous" and volumes in ([], ["constvolume"]):
+        props.set_plugin_name("homogeneous")
+        for key in ("majorant_resolution_factor", "majorant_grid", "majorant_factor"):
+            if key in props:
+                del props[key]
+
+
+def pass_where_no_material(state: Any) -> None:
+    """Give shapes of files before version 2 that bound a medium and have no material the material `null`."""
+    for index in of_kind(state, "Shape"):
+        node = state.nodes[index]
+        kinds = {kind(state, at) for _, at in references(node.props)}
+        if "Medium" in kinds and not kinds & {"BSDF", "Emitter"} and state.versions[node.file_index].major_version < 2:
+            null = mi.parser.SceneNode()
+            null.type, null.props, null.file_index = mi.ObjectType.BSDF, mi.Properties("null"), node.file_index
+            node.props["no_material"] = mi.Properties.ResolvedReference(len(state.nodes))
+            state.nodes.append(null)
 
 
 def _refuse_names(props: Any) -> None:
@@ -108,7 +131,7 @@ def _numbers(props: Any, key: str) -> Array | None:
         return None
     value = props[key]
     if isinstance(value, mi.Spectrum) and value.is_uniform():
-        value = value.values()
+        value = value.values
     try:
         numbers = np.array(value, dtype=np.float64).reshape(-1)
     except (TypeError, ValueError):

@@ -11,7 +11,7 @@ import mitsuba as mi
 
 from analytic.errors import InputError
 from validation.scenes.files.kinds import check_kinds
-from validation.scenes.files.media import give_extinction
+from validation.scenes.files.media import give_extinction, pass_where_no_material
 from validation.scenes.files.nodes import kind, name_nodes, properties, references
 from validation.scenes.files.references import leave_out_media
 from validation.scenes.files.shapes import lamps_as_rectangles, write_out_instances
@@ -82,6 +82,7 @@ def _mend(state: Any) -> None:
     check_kinds(state)
     for note in give_extinction(state):
         mi.Log(mi.LogLevel.Warn, note)
+    pass_where_no_material(state)
     write_out_instances(state)
 
 

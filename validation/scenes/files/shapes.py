@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shapes of files made into shapes that both readers know: instances written out, lamps on flat quads as rectangles."""
+"""Shapes of files made into shapes that both readers know: instances written out, lamps on boxes as rectangles."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -13,11 +13,13 @@ from validation.scenes.files.nodes import kind, of_kind, properties, references
 
 Array = NDArray[np.float64]
 
-_FLAT = 1e-5  #: of a quad's size: corners beyond a plane, sides that are no parallelogram, sides off a right angle
+_FLAT = 1e-5  # of a quad's size: corners beyond a plane, sides that are no parallelogram, sides off a right angle
+_MOST = 64  # rectangles of a lamp
+_POINTS = 16  # on a lamp, at which its normals are looked at
 
 
 def write_out_instances(state: Any) -> None:
-    """Put shapes in the place of instances of shape groups: the same image, with shapes that all know.
+    """Put shapes in the place of instances of shape groups, and of merged ones: the same image, with shapes all know.
 
     A group of one shape gives a shape with the name of the instance, others add the names of the group's shapes.
     """
@@ -26,15 +28,19 @@ def write_out_instances(state: Any) -> None:
         state.nodes.append(node)
     scene = properties(state, 0)
     for key, index in references(scene):
-        if properties(state, index).plugin_name() in ("shapegroup", "instance"):
+        if properties(state, index).plugin_name() in ("shapegroup", "instance", "merge"):
             del scene[key]
     for number in range(len(state.nodes) - len(written), len(state.nodes)):
         scene[f"_written_out_{number}"] = mi.Properties.ResolvedReference(number)
 
 
 def _copies(state: Any, index: int) -> Iterator[Any]:
-    """Yield the shapes of an instance as nodes of their own; none of what is no instance."""
+    """Yield the shapes of an instance, or of a merge, as nodes of their own; none of other shapes."""
     instance = properties(state, index)
+    if instance.plugin_name() == "merge":
+        yield from (
+            mi.parser.SceneNode(state.nodes[at]) for _, at in references(instance) if kind(state, at) == "Shape"
+        )
     if instance.plugin_name() != "instance":
         return
     group = next((at for _, at in references(instance) if properties(state, at).plugin_name() == "shapegroup"), None)
@@ -50,7 +56,9 @@ def _copies(state: Any, index: int) -> Iterator[Any]:
 
 
 def lamps_as_rectangles(state: Any, shapes: Iterable[Any]) -> bool:
-    """Make lamps on meshes of two triangles rectangles, where they are; return whether there were any.
+    """Make lamps on meshes rectangles where their triangles are halves of some; return whether there were any.
+
+    A lamp of one rectangle keeps its name; to others a number is added.
 
     Parameters
     ----------
@@ -60,53 +68,81 @@ def lamps_as_rectangles(state: Any, shapes: Iterable[Any]) -> bool:
         Its shapes as Mitsuba built them.
     """
     nodes = {properties(state, index).id(): index for index in of_kind(state, "Shape")}
-    changed = False
-    for shape in shapes:
-        if not (shape.is_emitter() and shape.id() in nodes):
-            continue
-        matrix = _rectangle(shape)
-        if matrix is None:
-            continue
-        node = state.nodes[nodes[shape.id()]]
-        rectangle = mi.Properties("rectangle")
-        rectangle.set_id(shape.id())
-        for key, at in references(node.props):
-            rectangle[key] = mi.Properties.ResolvedReference(at)
-        rectangle["to_world"] = mi.ScalarAffineTransform4d(matrix)
-        node.props = rectangle
-        changed = True
-    return changed
+    lamps = [shape for shape in shapes if shape.is_emitter() and shape.id() in nodes]
+    placed = {nodes[shape.id()]: matrices for shape in lamps if (matrices := _rectangles(shape))}
+    for index, matrices in placed.items():
+        _write_rectangles(state, index, matrices)
+    return bool(placed)
 
 
-def _rectangle(shape: Any) -> Array | None:
-    """Return the transform that makes Mitsuba's rectangle a mesh of two triangles, None where none does."""
+def _rectangles(shape: Any) -> list[Array]:
+    """Return the transforms that make Mitsuba's rectangles the mesh of a lamp; none where its triangles are others."""
     parameters = mi.traverse(shape)
     if "faces" not in parameters:
-        return None
+        return []
     corners = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
     faces = np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
-    used, faces = np.unique(corners[faces.ravel()], axis=0, return_inverse=True)
-    faces = faces.reshape(-1, 3)
-    if len(faces) != 2 or len(used) != 4:
+    used, same = np.unique(corners[faces.ravel()], axis=0, return_inverse=True)
+    halves: dict[tuple[int, int], list[list[int]]] = {}
+    for face in same.reshape(-1, 3).tolist():
+        # The side that both halves of a rectangle share is the longest of each; last is the corner across from it.
+        sides = [(face[i], face[(i + 1) % 3], face[(i + 2) % 3]) for i in range(3)]
+        first, second, last = max(sides, key=lambda side: float(np.linalg.norm(used[side[0]] - used[side[1]])))
+        halves.setdefault((min(first, second), max(first, second)), []).append([first, second, last])
+    side = -1.0 if shape.has_flipped_normals() else 1.0
+    matrices = [_rectangle(used, pair, side) for pair in halves.values()]
+    found = [matrix for matrix in matrices if matrix is not None]
+    if len(found) < len(matrices) or len(found) > _MOST or not _shine_alike(shape, found):
+        return []
+    return found
+
+
+def _rectangle(corners: Array, pair: list[list[int]], side: float) -> Array | None:
+    """Return the transform of the rectangle of two triangles, None where they make none."""
+    if len(pair) != 2:
         return None
-    shared = np.intersect1d(*faces)
-    if len(shared) != 2:
+    first, second, start = corners[pair[0]]
+    across, up = 0.5 * (first - start), 0.5 * (second - start)  # counter-clockwise from the side of the normal
+    size = float(np.linalg.norm(first - second))
+    closes = np.linalg.norm(first + second - start - corners[pair[1][2]]) <= _FLAT * size
+    if not closes or abs(across @ up) > _FLAT * size**2 or pair[0][:2] != pair[1][1::-1]:
         return None
-    # From a corner that one triangle has alone, the ends of the common side are the ends of both sides.
-    alone = [int(np.setdiff1d(face, shared)[0]) for face in faces]
-    start, first, second = used[alone[0]], used[shared[0]], used[shared[1]]
-    across, up = 0.5 * (first - start), 0.5 * (second - start)
-    size = float(np.linalg.norm(used[alone[1]] - start))
-    closes = np.linalg.norm(start + 2 * (across + up) - used[alone[1]]) <= _FLAT * size
-    if not closes or abs(across @ up) > _FLAT * np.linalg.norm(across) * np.linalg.norm(up):
-        return None
+    across, up = (across, up) if side > 0 else (up, across)
     normal = np.cross(across, up)
-    normal /= np.linalg.norm(normal)
-    towards = np.array(shape.sample_position(0.0, mi.Point2f(0.31, 0.47)).n, dtype=np.float64).ravel()
-    if abs(normal @ towards) < 1 - 1e-4:
-        return None  # normals of its vertices say otherwise
-    if normal @ towards < 0:
-        across, up, normal = up, across, -normal
     matrix = np.eye(4)
-    matrix[:3] = np.column_stack([across, up, normal, 0.5 * (first + second)])
+    matrix[:3] = np.column_stack([across, up, normal / np.linalg.norm(normal), 0.5 * (first + second)])
     return matrix
+
+
+def _shine_alike(shape: Any, matrices: list[Array]) -> bool:
+    """Return whether points that Mitsuba samples on a lamp lie on rectangles, with the normals of these."""
+    number = np.arange(_POINTS)
+    place = mi.Point2f((number + 0.5) / _POINTS, number * 0.6180339887 % 1)
+    sample = shape.sample_position(0.0, place)
+    points, normals = (np.array(value, dtype=np.float64).reshape(3, -1).T for value in (sample.p, sample.n))
+    size = max(float(np.linalg.norm(matrix[:3, :2])) for matrix in matrices)
+    found = np.zeros(_POINTS, dtype=bool)
+    for matrix in matrices:
+        local = np.linalg.solve(matrix[:3, :3], (points - matrix[:3, 3]).T)
+        inside = (np.abs(local[:2]) < 1 + 1e-3).all(axis=0) & (np.abs(local[2]) < 1e-3 * size)
+        found |= inside & (normals @ matrix[:3, 2] > 1 - 1e-4)
+    return bool(found.all())
+
+
+def _write_rectangles(state: Any, index: int, matrices: list[Array]) -> None:
+    """Put rectangles in the place of a lamp: the first in its node, each with an emitter of its own."""
+    name = properties(state, index).id()
+    parts = list(references(properties(state, index)))
+    for number, matrix in enumerate(matrices):
+        rectangle = mi.Properties("rectangle")
+        rectangle.set_id(f"{name}-{number + 1}" if len(matrices) > 1 else name)
+        rectangle["to_world"] = mi.ScalarAffineTransform4d(matrix)
+        for key, at in parts:
+            if number and kind(state, at) == "Emitter":
+                state.nodes.append(mi.parser.SceneNode(state.nodes[at]))
+                at = len(state.nodes) - 1
+            rectangle[key] = mi.Properties.ResolvedReference(at)
+        if number:
+            state.nodes.append(mi.parser.SceneNode(state.nodes[index]))
+            properties(state, 0)[f"{name}_{number}"] = mi.Properties.ResolvedReference(len(state.nodes) - 1)
+        state.nodes[len(state.nodes) - 1 if number else index].props = rectangle

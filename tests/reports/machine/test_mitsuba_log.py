@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: `--json` prints JSON and nothing else; what Mitsuba says of a scene reaches the error stream, once."""
+
+import json
+
+import pytest
+
+SCENE = """<scene version="3.0.0"><medium type="homogeneous" id="fog"><float name="sigma_t" value="0.17"/></medium>
+<sensor type="perspective"><float name="fov" value="49"/><transform name="to_world">
+<lookat origin="0.3, -5.1, 1.4" target="0, 0.4, 0.8" up="0, 0, 1"/></transform><ref name="medium" id="fog"/>
+<film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="6"/></film></sensor>
+<emitter type="point"><point name="position" value="-0.8, 0.3, 2.1"/><rgb name="intensity" value="6.3"/></emitter>
+<shape type="ply"><string name="filename" value="{0}.ply"/></shape>
+<shape type="ply"><string name="filename" value="{0}.ply"/></shape></scene>"""
+HEAD = """ply
+format ascii 1.0
+element vertex {}
+property float x
+property float y
+property float z
+element face 2
+property list uchar int vertex_indices
+end_header
+"""
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        ["describe"],
+        ["render", "--method", "unshadowed", "-o", "frame.exr"],
+        ["reference", "-o", "truth.exr"],
+        ["reference", "-o", "sampled.exr", "--estimator", "single-scatter", "--spp", "64"],
+        ["compare", "truth.exr"],
+    ],
+    ids=lambda order: "-".join(order[:1] + order[-1:]),
+)
+def test_json_is_all_that_is_printed(variant, tmp_path, monkeypatch, capfd, order):
+    """The mesh is ASCII and long enough that Mitsuba warns of it; it has an isolated vertex and an empty triangle."""
+    from reports.commands.main import run
+
+    monkeypatch.chdir(tmp_path)
+    name = f"{order[0]}-{len(order)}"  # each message is said once a process
+    vertices = [f"{number * 1e-4:.12f} {number % 7 * 1e-3:.12f} 0.400000000001\n" for number in range(3000)]
+    (tmp_path / f"{name}.ply").write_text(HEAD.format(3000) + "".join(vertices) + "3 0 1 2\n3 0 0 1\n")
+    (tmp_path / "own.xml").write_text(SCENE.format(name))
+    if order[0] == "compare":
+        assert run(["reference", "own.xml", "-o", "truth.exr"]) == 0
+        capfd.readouterr()
+    status = run([order[0], "own.xml", *order[1:], "--json"])
+    printed = capfd.readouterr()
+    assert status == 0, printed.err
+    assert json.loads(printed.out)
+    assert printed.err.count("uses the ASCII PLY format") == (0 if order[0] == "compare" else 1)
