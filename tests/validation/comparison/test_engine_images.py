@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: BSD-3-Clause
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,7 +6,7 @@ import pytest
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
-from validation.comparison.engine_images import EngineImage, find_images, image_flip, images_size, measure_image
+from validation.comparison.engine_images import EngineImage, find_images, images_size, measure_image
 
 SCENES = {"open-fog": "open-fog", "hall": "hall", "hall.small": "hall.small", "mine": "folder/mine.xml"}
 SHAPE = (4, 6, 3)
@@ -66,24 +65,6 @@ def test_a_layer_of_airlight_is_judged_as_such(tmp_path):
     assert measure_image(shown(path), truth_of, surfaces=False).surface_error is None
 
 
-def test_plain_channels_are_judged_against_all_light(tmp_path):
-    path = write(tmp_path, "hall.exr", total=0.9 * (AIRLIGHT + SURFACE))
-    judged = measure_image(shown(path), truth_of, surfaces=True)
-    assert (judged.layer, judged.surface_error) == ("total", None)
-    assert judged.error.relative_bias == pytest.approx(-0.1, abs=1e-7)
-
-
-def test_what_the_reader_left_out_is_noted(tmp_path):
-    import OpenEXR
-
-    channels = {name: np.ones((4, 6), dtype=np.float16) for name in ("R", "G", "B", "A")}
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    OpenEXR.File(header, channels).write(str(tmp_path / "hall.exr"))
-    note = measure_image(shown(tmp_path / "hall.exr"), truth_of, surfaces=True).note
-    assert "half floats" in note
-    assert "A" in note
-
-
 def test_a_file_without_any_light_is_refused(tmp_path):
     path = write(tmp_path, "hall.exr", beauty=np.ones(SHAPE), matte=np.ones(SHAPE))
     for refused in (lambda: measure_image(shown(path), truth_of, surfaces=True), lambda: images_size((shown(path),))):
@@ -110,22 +91,3 @@ def test_the_truth_that_fits_is_taken(tmp_path):
         assert (judged.pixel, "means over the areas" in (judged.note or "")) == (pixel, pixel == "area")
         assert judged.error.relative_bias == pytest.approx(-0.001, abs=1e-6)
         np.testing.assert_array_equal(judged.truth.airlight, truth.airlight)
-
-
-def test_layers_of_blender_are_judged_by_their_names(tmp_path):
-    """Combined among others is all light, Volume Direct alone the airlight."""
-    layers = {"View.Combined": AIRLIGHT + SURFACE, "View.Diffuse": SURFACE}
-    judged = measure_image(shown(write(tmp_path, "hall.exr", **layers)), truth_of, surfaces=True)
-    assert (judged.layer, judged.error.relative_rmse < 1e-6) == ("total", True)
-    judged = measure_image(
-        shown(write(tmp_path, "hall.exr", **{"View.Volume Direct": AIRLIGHT})), truth_of, surfaces=True
-    )
-    assert (judged.layer, judged.error.relative_rmse < 1e-6) == ("airlight", True)
-
-
-def test_there_is_no_flip_where_the_surface_is_missing(tmp_path):
-    path = write(tmp_path, "hall.exr", airlight=AIRLIGHT)
-    judged = measure_image(shown(path), truth_of, surfaces=True)
-    assert image_flip(judged) is None
-    dark = SimpleNamespace(airlight=AIRLIGHT, surface=np.zeros(SHAPE), emitted=None)
-    assert image_flip(replace(judged, surface_error=None, truth=dark)) is not None

@@ -91,26 +91,6 @@ def test_planted_faults_are_not_called_right(traced, fault):
     assert judged.summary().splitlines()[-1].startswith("verdict          not right: ")
 
 
-@pytest.mark.claim("engine-verdict")
-def test_shadows_that_are_missing_are_not_called_right(traced, variant):
-    scene, truth, _, _ = traced
-    if scene == "open-fog":
-        pytest.skip("a scene without shadows")
-    from reports.api.images import render
-
-    open_fog = render(scene, "unshadowed", "exact", size=SIZE).airlight
-    assert not compared(traced, truth.surface + open_fog).verdict.right
-
-
-@pytest.mark.claim("engine-verdict")
-def test_a_dim_image_of_fog_alone_is_not_called_its_surface(traced):
-    """In a scene without a surface, an image of nearly nothing is as near to it as to nothing else."""
-    image = traced[2]
-    words = compared(traced, 1e-3 * image).hints.words
-    assert not any("alone" in sentence for sentence in words)
-    assert any("times as bright as it should be" in sentence for sentence in words)
-
-
 @pytest.mark.claim("engine-verdict", tolerance="1e-12 relative")
 def test_the_place_of_the_error_is_that_of_the_worst_pixels():
     truth = np.ones((20, 30, 3))

@@ -19,15 +19,3 @@ def test_the_peak_is_that_of_what_was_held_together(variant):
     # The kernel counts pages in batches, and the allocator takes some.
     assert 94 < peak_memory(lambda: work(96)) < 104
     assert peak_memory(lambda: None) < 4
-
-
-def test_a_system_that_does_not_say_gives_none(variant, monkeypatch):
-    from pathlib import Path
-
-    from validation.configurations.memory import peak_memory
-
-    def refuse(self, text):
-        raise FileNotFoundError(self)
-
-    monkeypatch.setattr(Path, "write_text", refuse)
-    assert peak_memory(lambda: pytest.fail("not called")) is None

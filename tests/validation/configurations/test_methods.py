@@ -45,11 +45,6 @@ def test_words_become_values_of_the_type_of_the_default():
     assert configuration("ray-march", None, {"steps": np.int64(17)}).parameters == (("steps", 17),)
 
 
-def test_method_that_calls_a_kernel_has_the_exact_one_by_default():
-    assert configuration("unshadowed") == Configuration("unshadowed", "exact")
-    assert configuration("ray-march") == Configuration("ray-march")
-
-
 def test_standard_configurations_are_valid_and_tell_apart():
     assert [
         configuration(standard.method, standard.kernel, dict(standard.parameters)) for standard in STANDARD
@@ -80,12 +75,6 @@ def test_settings_are_read():
     assert parse_settings([]) == {}
 
 
-@pytest.mark.parametrize("word", ["steps", "steps=", "=100", "", "steps 100"])
-def test_setting_that_is_no_pair_is_refused(word):
-    with refused(f"got {word!r}, wanted NAME=VALUE"):
-        parse_settings([word])
-
-
 def test_a_setting_given_twice_is_refused_unless_both_say_the_same():
     with refused("--set: got points=3 and points=5, wanted one of them"):
         parse_settings(["points=3", "pattern=grid", "points=5"])
@@ -106,11 +95,6 @@ def test_kernels_of_ones_own_come_through_the_same_door(variant):
     np.testing.assert_array_equal(own.airlight, built_in.airlight)
 
 
-@pytest.mark.parametrize(("word", "value"), [("yes", True), ("False", False), (True, True), ("0", False)])
-def test_truth_values_of_ones_own_method_are_read(own_module, word, value):
-    assert configuration(f"{own_module}:f", None, {"on": word}).parameters == (("on", value),)
-
-
 def test_method_of_ones_own_has_no_kernel_unless_it_takes_one(own_module):
     assert configuration(f"{own_module}:f") == Configuration(f"{own_module}:f")
     assert configuration(f"{own_module}:g") == Configuration(f"{own_module}:g", "exact")
@@ -123,39 +107,9 @@ def test_method_of_ones_own_has_no_kernel_unless_it_takes_one(own_module):
         configuration(f"{own_module}:h")
 
 
-def test_function_itself_is_taken_by_its_name(own_module, monkeypatch):
-    import importlib
-    import sys
-
-    monkeypatch.setattr(sys, "path", [str(own_module.parent), *sys.path])
-    module = importlib.import_module(own_module.stem)
-    assert configuration(module.f).method == f"{own_module.stem}:f"
-    with refused("wanted a name or a function at the top of a module"):
-        configuration(lambda view: 1)
-    with refused("wanted a name or a function"):
-        configuration(7)
-
-
 @pytest.fixture
 def own_module(tmp_path):
     """The path of a file with two methods of one's own."""
     path = tmp_path / "own_configuration_for_tests.py"
     path.write_text("def f(view, on=True):\n    return 1\n\n\ndef g(view, *, kernel):\n    return 1\n")
     return path
-
-
-def test_prepared_renderer_has_the_parameters(variant):
-    """More steps are nearer to the integral: the parameter arrives."""
-    import mitsuba as mi
-
-    from realtime.frame.renderer import render_frame
-    from realtime.scene.read_scene import read_scene
-
-    scene = read_scene(mi.load_dict(tiny_scene(ball=None)))
-    integral = render_frame(prepared(scene, configuration("unshadowed"))).airlight
-    errors = [
-        np.abs(render_frame(prepared(scene, configuration("ray-march", None, {"steps": steps}))).airlight - integral)
-        for steps in (4, 64)
-    ]
-    # Midpoint steps converge with the square of their number: 256 times, where rounding of 1e-6 does not end it.
-    assert errors[1].mean() < 0.05 * errors[0].mean()

@@ -79,34 +79,6 @@ def test_every_stage_of_a_frame_is_timed(renderer):
         assert timing.repetitions >= 3
 
 
-@pytest.mark.slow
-def test_moved_builds_the_acceleration_structure_again_and_rebuild_does_not(variant, monkeypatch):
-    """What moves when only the light does must not cost what objects cost."""
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-    from validation.configurations import timing
-    from validation.configurations.methods import configuration, prepared
-    from validation.scenes.loading import load_scene
-
-    renderer = prepared(read_scene(load_scene("sphere-spot", (8, 6)).scene), configuration("shadow-planes"))
-    updates = []
-    update = mi.SceneParameters.update
-    monkeypatch.setattr(mi.SceneParameters, "update", lambda self, *args: updates.append(1) or update(self, *args))
-    measured = {}
-
-    def counted(work, **_):
-        before = len(updates)
-        work()
-        measured[len(measured)] = len(updates) - before
-        return timing.Timing(1.0, 1.0, 1.0, 1)
-
-    monkeypatch.setattr(timing, "time_repeated", counted)
-    time_frame(renderer)
-    # frame, surface, airlight, light_moved, moved, light_moved_camera_kept, colours_changed
-    assert list(measured.values()) == [0, 0, 0, 0, 1, 0, 0]
-
-
 @pytest.mark.parametrize(("spent", "turns"), [(0.0, 1), (1e6, 5)])
 def test_a_slow_frame_is_timed_a_few_times(variant, monkeypatch, spent, turns):
     """A frame that takes minutes must not be rendered thirty times."""

@@ -2,7 +2,6 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from reference.scene.read import read_truth
@@ -114,38 +113,6 @@ def test_pixels_near_a_light_are_left_out(scene):
     assert verdicts["surface"].masked == 0
 
 
-def test_pixel_angle_is_that_of_the_middle(scene):
-    # 49 degrees over 24 pixels; the tangent is linear to 1e-3 at the centre.
-    assert pixel_angle(read_truth(scene)) == pytest.approx(2 * np.tan(np.deg2rad(24.5)) / 24, rel=2e-3)
-
-
-def test_scene_without_surfaces_has_the_airlight_alone(variant):
-    import mitsuba as mi
-
-    verdicts = agreement(mi.load_dict(tiny_scene(size=(12, 9), ball=None, floor=None)), margin=0.5, samples=4)
-    assert set(verdicts) == {"airlight"}
-    # A margin that wide is met at once: the least number of batches is what it takes.
-    assert verdicts["airlight"].batches == 32
-
-
-def test_progress_is_told(variant):
-    import mitsuba as mi
-
-    told = []
-    agreement(
-        mi.load_dict(tiny_scene(size=(4, 3))),
-        margin=1e-9,
-        batches=33,
-        samples=1,
-        progress=lambda *args: told.append(args),
-    )
-    # The least number is expected to do until eight batches show that it will not.
-    expected = [(number, 32, "volpath") for number in range(1, 9)] + [
-        (number, 33, "volpath") for number in range(9, 34)
-    ]
-    assert told == expected
-
-
 def test_out_of_time_is_said_and_is_no_verdict(scene, own_cache):
     """Two batches are traced whatever the time; they do not decide about a bias of one in ten million."""
     verdicts = agreement(scene, estimator="single-scatter", margin=1e-7, batches=40, samples=4, seconds=0.0)
@@ -168,10 +135,3 @@ def test_the_time_of_the_pilot_does_not_count(scene, own_cache, monkeypatch):
     verdicts = agreement(scene, margin=1e-7, batches=9, samples=4, seconds=50.0)
     assert now == 100.0
     assert {verdict.batches for verdict in verdicts.values()} == {9}
-
-
-def test_what_became_narrow_enough_is_finished(scene):
-    assert all(verdict.finished for verdict in agreement(scene, **BUDGET).values())
-    # Out of batches, not of time, before the interval was narrow: the same.
-    short = agreement(scene, margin=1e-6, batches=3, samples=4)
-    assert not short["airlight"].finished

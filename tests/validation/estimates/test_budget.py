@@ -38,13 +38,6 @@ def test_samples_are_split_into_batches_that_have_at_least_as_many(samples):
     assert samples <= batches * each < samples + max(each, 2)
 
 
-@pytest.mark.parametrize(("pixels", "samples"), [(100, 64), (65536, 64), (65537, 32), (480_000, 8), (2**23, 1)])
-def test_batches_of_open_runs_are_short(pixels, samples):
-    """At most four million samples: so that a run overshoots its time or target by little."""
-    assert batch_plan(Budget(seconds=1.0), pixels)[1] == samples
-    assert batch_plan(Budget(error=0.1), pixels)[1] == samples
-
-
 def batches(mean, error, count=4):
     mean, error = np.asarray(mean, float), np.asarray(error, float)
     return Batches(tuple(range(count)), 1, mean, error**2 * count * (count - 1), np.zeros((count, 2, 3)))
@@ -63,21 +56,6 @@ def test_errors_by_hand():
     # Without the first pixel of the airlight: 0.4/3 pooled and worst.
     errors = relative_errors(traced, np.array([True, False]))
     assert (errors.pooled, errors.worst) == pytest.approx((0.4 / 3, 0.4 / 3), rel=1e-12)
-
-
-def test_a_dim_pixel_counts_against_a_thousandth_of_the_mean():
-    mean = np.full((2, 1000, 3), 1.0)
-    mean[:, 0] = 1e-9
-    error = np.zeros_like(mean)
-    error[0, 0] = 1e-6
-    errors = relative_errors(batches(mean, error), np.zeros(1000, dtype=bool))
-    assert errors.worst == pytest.approx(1e-6 / (1e-3 * 0.999), rel=1e-6)
-
-
-@pytest.mark.parametrize("near", [[False, False], [True, True]])
-def test_no_light_has_no_error(near):
-    errors = relative_errors(batches(np.zeros((2, 2, 3)), np.zeros((2, 2, 3))), np.array(near))
-    assert (errors.pooled, errors.worst) == (0.0, 0.0)
 
 
 @pytest.mark.claim("pixels-beside-a-light")

@@ -50,35 +50,6 @@ def test_ratio_of_known_estimators(clock):
     assert "times faster (airlight, 600 pixels)" in efficiency_lines(measured)[-1]
 
 
-def test_mask_leaves_pixels_out():
-    expected = EXPECTED.copy()
-    expected[3] = 0.0
-    mask = np.ones((20, 30), dtype=bool)
-    mask[5, :7] = False
-    measured = efficiency(_Truth(), {"a": (_noise(0.01), 8), "b": (_noise(0.1), 8)}, expected, mask=mask, batches=4)
-    assert (measured.pixels, measured.masked) == (600 - 30 - 7, 7)
-    assert "7 next to a light left out" in efficiency_lines(measured)[-1]
-
-
-def test_bad_arguments_are_refused():
-    estimator = (_noise(0.1), 1)
-    with pytest.raises(ValueError, match="got 1, wanted two"):
-        efficiency(_Truth(), {"one": estimator}, EXPECTED)
-    with pytest.raises(ValueError, match="batches: got 3, wanted at least 4"):
-        efficiency(_Truth(), {"one": estimator, "two": estimator}, EXPECTED, batches=3)
-    with pytest.raises(ValueError, match="'airlight' of the scene is black"):
-        efficiency(_Truth(), {"one": estimator, "two": estimator}, 0 * EXPECTED)
-
-
-def test_thin_fog_has_the_optical_depth_that_it_names(variant):
-    from reference.scene.read import read_truth
-
-    truth = read_truth(thin_fog((16, 12)))
-    distance = np.linalg.norm(truth.lights[0].position - truth.origin)
-    assert (truth.width, truth.height) == (16, 12)
-    assert truth.medium.sigma_t * distance == pytest.approx(0.2, rel=1e-6)
-
-
 @pytest.mark.statistical
 def test_single_scatter_is_a_hundred_times_faster_in_thin_fog(variant):
     """Rationale: it was 20 000 times faster at 160 x 120; an eightieth of that leaves room for launches of kernels."""

@@ -79,14 +79,3 @@ def test_time_budget_never_starts_a_batch_that_would_end_too_late(loaded):
     # What is kept costs no time.
     assert (again.cached, again.image.attributes["airlight:batches"]) == (10, 13)
     assert len(told) == 3
-
-
-def test_two_batches_are_traced_however_short_the_time(loaded):
-    reference, _ = run(loaded, Budget(seconds=0.1))
-    assert reference.image.attributes["airlight:batches"] == 2
-
-
-def test_given_samples_count_up_to_one(loaded):
-    _, told = run(loaded, Budget(samples=64))
-    assert [share for share, _ in told] == [n / 32 for n in range(1, 33)]
-    assert told[-1][1] == "volpath, 32 batches"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from tests.helpers.scenes import bounded_medium, spot, tiny_scene
+from tests.helpers.scenes import spot, tiny_scene
 
 
 def scene_with(position, *, size=(9, 9), **changes):
@@ -46,14 +46,6 @@ def test_a_light_on_the_line_of_a_ray_but_not_on_it_has_a_truth(variant, positio
         assert np.isfinite(truth()).all()
 
 
-def test_a_light_behind_a_surface_is_on_no_ray(variant):
-    import mitsuba as mi
-
-    wall = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0, -1, 1]).scale(0.5)}
-    for truth in truths(scene_with([0.0, 0.0, 1.0], wall=wall)):
-        assert np.isfinite(truth()).all()
-
-
 def test_a_spot_on_a_ray_is_refused_where_the_ray_is_in_its_cone(variant):
     import mitsuba as mi
 
@@ -67,27 +59,6 @@ def test_a_spot_on_a_ray_is_refused_where_the_ray_is_in_its_cone(variant):
     for target in ([0, 9, 1], [0.5, -4, 1]):
         with pytest.raises(InputError, match="light 1"):
             truth_image(scene_with(None, lamp=lamp(target)))
-
-
-def test_beside_a_bounded_medium_the_airlight_of_a_light_on_a_ray_is_finite(variant):
-    from validation.estimates.quadrature import truth_image
-
-    def bounded(x):
-        ball = {"type": "sphere", "center": [x, 2.0, 1.0], "radius": 0.7}
-        scene = scene_with(
-            [0.0, 0.0, 1.0], cloud=bounded_medium(ball, 0.7, (0.9, 0.8, 0.7)), fog=None, sensor=_bare_sensor()
-        )
-        return truth_image(scene).airlight
-
-    assert np.isfinite(bounded(0.0)).all()
-
-
-def _bare_sensor():
-    import mitsuba as mi
-
-    sensor = tiny_scene(size=(9, 9))["sensor"]
-    del sensor["medium"]
-    return sensor | {"to_world": mi.ScalarTransform4f().look_at([0, -5, 1], [0, 0, 1], [0, 0, 1])}
 
 
 def test_the_mean_over_pixels_is_finite_where_a_centre_meets_a_light(variant):
@@ -115,19 +86,3 @@ def test_a_truth_that_is_not_finite_is_refused_and_not_kept(variant, own_cache, 
     for _ in range(2):
         with pytest.raises(InputError, match="1 of 12 pixels whose surface is not finite, first in column 2 of row 1"):
             module.truth_image(scene)
-
-
-def test_samples_that_are_not_finite_are_refused_and_not_kept(variant, own_cache, monkeypatch):
-    import validation.estimates.monte_carlo as module
-    from reference.monte_carlo.batches import single_batch
-
-    def traced(truth, seed, samples):
-        mean = np.ones((2, 12, 3))
-        mean[0, 7, 1] = np.inf
-        return single_batch(seed, samples, mean)
-
-    monkeypatch.setattr(module, "single_scatter_batch", traced)
-    scene = scene_with([1.0, 0.0, 1.0], size=(4, 3))
-    for _ in range(2):
-        with pytest.raises(InputError, match="samples of 1 of 12 pixels are not finite, first of pixel 7"):
-            module.monte_carlo_batches(scene, "single-scatter", batches=2, samples=1)

@@ -10,7 +10,7 @@ import pytest
 
 import validation.estimates.monte_carlo
 from analytic.errors import InputError
-from reference.monte_carlo.batches import LARGEST_SEED, Batches, merged, single_batch
+from reference.monte_carlo.batches import LARGEST_SEED, Batches, single_batch
 from reference.scene.read import read_truth
 from reference.storage.cache import cache_folder
 from reference.storage.kept import fresh_results
@@ -94,15 +94,6 @@ def test_an_interrupted_run_goes_on_where_it_stopped(scene, traced, stop):
     assert_same(resumed.batches, volpath(scene, batches=14).batches)
 
 
-def test_settings_are_kept_apart(scene, traced):
-    plain = volpath(scene, batches=2)
-    deep = volpath(scene, batches=2, max_depth=9)
-    fine = volpath(scene, batches=2, samples=8)
-    assert traced == [0, 1] * 3
-    assert not np.array_equal(plain.batches.mean, deep.batches.mean)
-    assert not np.array_equal(plain.batches.mean, fine.batches.mean)
-
-
 @pytest.mark.claim("damaged-cache")
 @pytest.mark.parametrize("damage", ["flipped byte", "truncated", "empty", "of another seed"])
 @pytest.mark.parametrize("name", ["000000-000007", "000009"])
@@ -159,21 +150,6 @@ def test_enough_is_asked_at_the_end_of_blocks_and_sees_the_same_from_the_cache(s
     assert_same(first.batches, second.batches)
 
 
-def test_go_on_is_asked_before_tracing_but_not_for_what_is_kept(scene, traced):
-    asked = []
-
-    def go_on(done):
-        asked.append(done)
-        return done < 5
-
-    assert len(volpath(scene, batches=40, go_on=go_on).batches.seeds) == 5
-    assert asked == [2, 3, 4, 5]
-    volpath(scene, batches=12)
-    asked.clear()
-    assert len(volpath(scene, batches=40, go_on=go_on).batches.seeds) == 12
-    assert asked == [12]
-
-
 @pytest.mark.claim("report-kept")
 def test_a_fresh_run_traces_again_what_is_older_than_it(scene, traced):
     volpath(scene, batches=BLOCK + 1)
@@ -189,13 +165,3 @@ def test_a_fresh_run_traces_again_what_is_older_than_it(scene, traced):
 def test_seeds_out_of_range_are_refused(scene, traced, seed):
     with pytest.raises(InputError, match=rf"seed: got {seed} for 2 batches"):
         volpath(scene, batches=2, first_seed=seed)
-
-
-def test_single_scatter_goes_the_same_way(scene, own_cache):
-    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-
-    truth = read_truth(scene)
-    pooled = monte_carlo_batches(scene, "single-scatter", batches=3, samples=4, first_seed=2)
-    batches = [single_scatter_batch(truth, seed, 4) for seed in (2, 3, 4)]
-    assert_same(pooled.batches, merged(merged(batches[0], batches[1]), batches[2]))
-    assert next(cache_folder().iterdir()).name.startswith("single-scatter-")

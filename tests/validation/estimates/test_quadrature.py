@@ -4,7 +4,6 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from reference.storage.cache import cache_folder
 from tests.helpers.scenes import tiny_scene
 from validation.estimates.quadrature import truth_image, truth_of_pixels
 
@@ -57,26 +56,6 @@ def test_other_phase_function_has_another_truth(scene, own_cache, computed):
     assert np.abs(rayleigh.airlight / plain.airlight - 1).max() > 0.05
 
 
-@pytest.mark.parametrize("damage", ["truncated", "bit flipped", "other arrays"])
-def test_damaged_file_is_recomputed(scene, own_cache, computed, damage):
-    from reference.storage.cache import store_arrays
-
-    first = truth_image(scene, samples=32)
-    (path,) = cache_folder().glob("quadrature-*.npz")
-    content = bytearray(path.read_bytes())
-    if damage == "truncated":
-        path.write_bytes(content[: len(content) // 2])
-    elif damage == "bit flipped":
-        content[content.index(first.surface.tobytes()) + 9] ^= 4
-        path.write_bytes(content)
-    else:
-        store_arrays(path.stem, {"airlight": first.airlight})
-    assert_same(truth_image(scene, samples=32), first)
-    assert len(computed) == 2
-    truth_image(scene, samples=32)
-    assert len(computed) == 2  # and what was damaged has been replaced
-
-
 def test_the_truth_of_some_pixels_is_that_of_the_image(scene, own_cache):
     pixels = np.array([3, 4, 40, 7])
     some, whole = truth_of_pixels(scene, pixels), truth_image(scene)
@@ -124,31 +103,3 @@ def test_truth_of_an_area_light_goes_on_where_it_was_interrupted(own_cache, monk
     image = layered_truth("lamp", again)
     assert {"emitted", "airlight_se", "surface_se", "airlight_bound"} <= set(image.layers)
     assert image.attributes["airlight:batches"] == 8
-
-
-def test_quadrature_reference_is_the_truth_in_layers(loaded, own_cache):
-    from validation.estimates.images import quadrature_reference
-
-    told = []
-    image = quadrature_reference(loaded, progress=lambda *args: told.append(args))
-    truth = truth_image(loaded.scene)
-    assert set(image.layers) == {"airlight", "airlight_bound", "surface"}
-    for name, layer in image.layers.items():
-        np.testing.assert_array_equal(layer, getattr(truth, name))
-    np.testing.assert_array_equal(image.depth, truth.distance)
-    assert image.attributes["airlight:estimator"] == "quadrature"
-    assert told[-1] == (1.0, "quadrature")
-
-
-@pytest.mark.statistical
-def test_volpath_reference_compares_with_the_quadrature_by_its_standard_errors(loaded, own_cache):
-    """The two references go through the comparison of image files as a user's would."""
-    from validation.comparison.images import compare_images
-    from validation.estimates.images import quadrature_reference, volpath_reference
-
-    comparison = compare_images(quadrature_reference(loaded), volpath_reference(loaded, samples=512), layer="surface")
-    assert comparison.statistics is not None
-    # 32 batches: the deviation of z is sqrt(31/29) = 1.03. Of the 144 values those of a pixel share paths: some 48 are
-    # independent and know it to 1.03/sqrt(96) = 0.105: three of these.
-    assert comparison.statistics.z_std == pytest.approx(1.03, abs=0.32)
-    assert comparison.statistics.rejected == 0

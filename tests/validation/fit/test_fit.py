@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_truth
 from reference.storage.exr import Image
-from tests.helpers.aside import write_scenes
 from validation.estimates.quadrature import truth_image
 from validation.fit.confounding import confounded_groups
-from validation.fit.fit import fit_image, said_pixel
+from validation.fit.fit import fit_image
 from validation.fit.image_model import Task, image_model, usable_pixels
 from validation.fit.intervals import interval_ends
 from validation.fit.least_squares import best_start, robust_fit, weighted_fit
@@ -72,32 +70,6 @@ def test_another_fog_is_found_from_any_start(variant, tmp_path, start):
     assert fit.confounded == ()
     assert fit.residual < 1e-5
     assert fit.explained > 0.999999
-
-
-@pytest.mark.slow
-def test_a_fog_with_three_extinctions_has_a_list_of_three(variant, tmp_path):
-    image = image_of(scene_file(tmp_path, sigma_t="0.2, 0.33, 0.47"))
-    scene = scene_file(tmp_path, sigma_t="0.5, 0.4, 0.3")
-    numbers = fitted(image, scene, ["sigma_t", "albedo"], layer="airlight").to_json()["parameters"]
-    assert numbers["sigma_t"]["value"] == pytest.approx([0.2, 0.33, 0.47], rel=1e-4)
-    assert numbers["albedo"]["value"] == pytest.approx(0.83, rel=1e-4)
-    by_channel = fitted(image, scene, ["sigma_t.g"], layer="airlight").to_json()["parameters"]
-    assert list(by_channel) == ["sigma_t.g"]
-
-
-@pytest.mark.slow
-def test_channels_that_begin_decades_apart_find_their_extinctions(variant, tmp_path):
-    """From these starts themselves a search ends where the residual is five times the noise."""
-    (scene,) = (str(path) for path in write_scenes(tmp_path) if path.stem == "two-lamps")
-    loaded = load_scene(scene, (80, 60))
-    truth = read_truth(loaded.scene)
-    sigma_t = truth.medium.sigma_t * np.array([1.3, 1.1, 0.8])
-    airlight = quadrature_image(replace(truth, medium=replace(truth.medium, sigma_t=sigma_t)), samples=16).airlight
-    noisy = airlight * (1 + 0.01 * np.random.default_rng(2).standard_normal(airlight.shape))
-    starts = {"sigma_t.r": 2.0, "sigma_t.g": 0.01, "sigma_t.b": 1.0, "phase.g": -0.7}
-    names = ["sigma_t", "phase.g", "intensity"]
-    fit = fit_image(Image({"airlight": noisy}), loaded, names, pixel="centre", starts=starts)
-    assert [each.value for each in fit.parameters] == pytest.approx([*sigma_t, 0.37, 1.0, 1.0], rel=5e-3)
 
 
 @pytest.mark.slow
@@ -164,20 +136,6 @@ def test_pixels_that_disagree_are_left_out(variant, tmp_path):
     assert fitted(Image({"airlight": spoiled}), scene, ["sigma_t"], mask=mask).left_out < 20
 
 
-@pytest.mark.slow
-def test_means_over_pixels_are_told_from_centres(variant, tmp_path):
-    scene = scene_file(tmp_path)
-    loaded = load_scene(scene, (24, 18))
-    means = truth_image(loaded.scene, pixel="area")
-    fit = fit_image(Image({"airlight": means.airlight}), loaded, ["sigma_t", "albedo"])
-    assert fit.pixel == "area"
-    assert [each.value for each in fit.parameters] == pytest.approx([0.31, 0.83], rel=1e-3)
-    assert fit_image(image_of(scene), load_scene(scene), ["sigma_t"], layer="airlight").pixel == "centre"
-    assert said_pixel(Image({}, attributes={"airlight:method": "ray-march"})) == "centre"
-    assert said_pixel(Image({}, attributes={"airlight:pixel": "area"})) == "area"
-    assert said_pixel(Image({})) is None
-
-
 @pytest.mark.statistical
 @pytest.mark.claim("fit-coverage")
 @pytest.mark.parametrize("noise", ["relative", "absolute", "skewed"])
@@ -203,30 +161,6 @@ def test_intervals_cover_the_truth_as_often_as_they_say(variant, tmp_path, noise
     # Of 200 trials 190 should cover; the binomial distribution with 0.95 gives fewer than 177 once in 16 000, of which
     # nine are looked at.
     assert (covered >= 177).all(), covered / trials
-
-
-@pytest.mark.slow
-def test_ends_are_those_of_the_profile_where_an_image_is_not_linear(variant, tmp_path):
-    """With 20 % of noise the extinction is known to a factor of two: the ellipse of the covariance is wrong there."""
-    truth = read_truth(load_scene(scene_file(tmp_path), (32, 24)).scene)
-    fog, count = scene_fog(truth), 32 * 24
-    unknowns = read_unknowns(["sigma_t", "intensity"], truth, fog, {})
-    model = image_model(Task(truth, np.zeros((count, 3)), "airlight", np.ones(count, bool), False))
-    noise = np.random.default_rng(5).gamma(25.0, 0.04, (count, 1))
-    seen = replace(model, task=replace(model.task, values=model.radiance(fog) * noise))
-    solution = weighted_fit(seen, unknowns, [unknown.scale.inward(unknown.scene) for unknown in unknowns])
-    ends = interval_ends(seen, unknowns, solution)
-    reach = 1.959964 * np.sqrt(np.diag(solution.covariance))
-    assert np.abs((ends - solution.inner[:, None]) / reach[:, None] - [-1, 1]).max() > 0.05
-    squares = np.sum((solution.residual * solution.weights)[solution.kept] ** 2)
-    for sigma_t in ends[0]:
-        # Of the intensity the image is a multiple: the best one is known.
-        radiance = seen.values(unknowns, [sigma_t, 0.0]) * solution.weights
-        image = seen.image * solution.weights
-        best = np.sum(image[solution.kept] * radiance[solution.kept]) / np.sum(radiance[solution.kept] ** 2)
-        left = np.sum((image - best * radiance)[solution.kept] ** 2)
-        errors = np.sqrt((left - squares) / solution.stretch[0])
-        assert errors == pytest.approx(1.959964, rel=0.03)
 
 
 def test_noise_is_found_by_its_two_parts():

@@ -10,10 +10,8 @@ import pytest
 
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_truth
-from reference.visibility.line_crossings import crossings
 from validation.fog_model.build import scattering_paths
 from validation.fog_model.fog import scene_fog
-from validation.fog_model.lengths import lengths
 from validation.fog_model.nodes import panel_nodes
 from validation.fog_model.radiance import as_array, fog_airlight, fog_surface, fog_total, on_device
 from validation.scenes.loading import load_scene
@@ -48,41 +46,6 @@ def test_radiance_is_that_of_the_truth(variant, name):
         # Surfaces are cast in float32; a pixel whose shadow ray grazes an edge may differ.
         error = relative(as_array(fog_surface(paths, fog)), image.surface.reshape(-1, 3))
         assert np.quantile(error, 0.99) < 1e-5
-
-
-@pytest.mark.slow
-def test_means_over_pixels_are_those_of_the_truth(variant):
-    truth = read_truth(load_scene("sphere-spot", (12, 9)).scene)
-    paths, fog = scattering_paths(truth, rays_per_side=6), scene_fog(truth)
-    means = as_array(fog_airlight(on_device(paths), fog))
-    image = quadrature_image(truth, pixel="area").airlight.reshape(-1, 3)
-    # 36 rays, one in each cell of a grid: cells on an edge are wrong by up to a half, all together by 0.5 % at most.
-    assert means.sum() == pytest.approx(image.sum(), rel=5e-3)
-    assert np.median(relative(means, image)) < 5e-3
-
-
-@pytest.mark.slow
-def test_a_sphere_that_shines_does_not_shadow_its_own_points(variant):
-    """It did, and the airlight was 30 % too low: a point on a sphere is in it or out of it by rounding."""
-    truth = read_truth(load_scene("overlap", (12, 9)).scene)
-    image = quadrature_image(truth, samples=16).airlight.reshape(-1, 3)
-    error = relative(as_array(fog_airlight(on_device(scattering_paths(truth, surface=False)), scene_fog(truth))), image)
-    # Sixteen points leave 0.26 % in the mean, and 1.2 % where only what the sphere sends far away counts.
-    assert error.mean() < 5e-3
-
-
-@pytest.mark.slow
-def test_other_fog_is_that_of_another_scene(variant):
-    name = "three-media"
-    loaded = load_scene(name, SIZE)
-    truth = read_truth(loaded.scene)
-    fog = scene_fog(truth)
-    denser = replace(fog, sigma_t=tuple(tuple(1.7 * value for value in colour) for colour in fog.sigma_t))
-    media = tuple(replace(medium, sigma_t=1.7 * medium.sigma_t) for medium in truth.media)
-    changed = replace(truth, media=media, medium=replace(truth.medium, sigma_t=1.7 * truth.medium.sigma_t))
-    wanted = quadrature_image(changed).airlight.reshape(-1, 3)
-    error = relative(as_array(fog_airlight(on_device(scattering_paths(truth)), denser)), wanted)
-    assert np.quantile(error, 0.99) < 1e-5
 
 
 def test_laws_can_be_changed_one_by_one(variant):
@@ -144,38 +107,3 @@ def test_nodes_integrate_what_they_should():
     owner, place, weight = panel_nodes(start, width, orders=(4, 2))
     assert np.bincount(owner, weight / np.cosh(place)) == pytest.approx(wanted, rel=1e-3)
     assert len(owner) == 4 * 3 + 2 + 4
-
-
-def test_an_image_has_only_the_pixels_that_are_asked_for(variant):
-    truth = read_truth(load_scene("sphere-spot", SIZE).scene)
-    fog = scene_fog(truth)
-    some = np.array([200, 31, 31, 77])
-    whole = as_array(fog_total(on_device(scattering_paths(truth)), fog))
-    part = scattering_paths(truth, pixels=some)
-    assert list(part.pixels) == [31, 77, 200]
-    assert as_array(fog_total(on_device(part), fog)) == pytest.approx(whole[part.pixels], rel=1e-12)
-
-
-def test_lengths_of_lines_that_share_a_place_or_a_way_are_those_of_any(variant):
-    truth = read_truth(load_scene("three-media", SIZE).scene)
-    generator = np.random.default_rng(5)
-    direction = generator.normal(size=(300, 3))
-    direction /= np.linalg.norm(direction, axis=1)[:, None]
-    origin, far, nothing = generator.uniform(-6, 6, (300, 3)), generator.uniform(0, 20, 300), np.zeros(300)
-    for places, ways in ((origin[0], direction), (origin, direction[0])):
-        measured = lengths(truth, places, ways, nothing, far)
-        for number, medium in enumerate(truth.media, 1):
-            all_places, all_ways = (np.broadcast_to(each, (300, 3)) for each in (places, ways))
-            enter, leave = crossings(medium.bounds, all_places, all_ways)
-            wanted = np.maximum(np.minimum(leave, far) - np.maximum(enter, 0), 0)
-            assert wanted.any()
-            np.testing.assert_allclose(measured[:, number], wanted, atol=1e-12)
-
-
-@pytest.mark.slow
-def test_few_points_on_a_sphere_send_what_the_sphere_sends(variant):
-    """Far from a point light a sphere of its intensity looks like it; sixteen points as they are would be 3 % off."""
-    truth = read_truth(load_scene("open-fog", SIZE).scene)
-    fog = scene_fog(truth)
-    point, sphere = (as_array(fog_airlight(on_device(scattering_paths(truth, radius=r)), fog)) for r in (0.0, 0.01))
-    assert np.median(relative(sphere, point)) < 2e-3

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import mitsuba as mi
 import pytest
@@ -51,21 +51,6 @@ def test_method_without_shadows_is_too_bright_by_what_shadows_take_away(measured
     error = measured[UNSHADOWED].error
     assert error.relative_bias > 0.003
     assert error.relative_rmse > 3 * measured[MARCH].error.relative_rmse
-
-
-@pytest.mark.slow
-def test_other_size_is_timed_without_changing_what_is_compared(loaded, measured, variant):
-    from validation.estimates.quadrature import truth_image
-
-    large = read_scene(mi.load_dict(tiny_scene(size=(160, 120))))
-    scene, truth = read_scene(loaded.scene), truth_image(loaded.scene)
-    measurement = measure(scene, MARCH, truth=truth, timed=large, seconds=0.02)
-    assert measurement.frame.airlight.shape == (12, 16, 3)
-    # NumPy adds up in another order where an array begins at another address.
-    error, small = asdict(measurement.error), asdict(measured[MARCH].error)
-    assert error == {name: pytest.approx(value, rel=1e-12, abs=1e-18) for name, value in small.items()}
-    # A hundred times the pixels; small frames cost a constant, so that much less than 100 is left of it.
-    assert measurement.times.airlight.median_ms > 2 * measured[MARCH].times.airlight.median_ms
 
 
 @pytest.mark.claim("refusals-stand-in-the-report")
@@ -139,36 +124,3 @@ def test_what_would_take_too_long_is_left_out_with_what_it_would_take(loaded, mo
     assert measurement.frame is measurement.times is measurement.error is None
     assert "by a frame of 8 x 6 pixels" in measurement.refused
     assert "more than the limit of 0.3 s" in measurement.refused
-
-
-@pytest.mark.parametrize(("seconds", "frames"), [(0.1, 2), (3.0, 1)])
-def test_a_first_frame_that_takes_long_is_not_rendered_twice_for_its_memory(loaded, monkeypatch, seconds, frames):
-    """Rationale: the recording of a short frame takes a part of its time and memory, that of a long one nothing."""
-    from validation.frames import benchmark as module
-
-    clock, rendered = Clock(), []
-
-    def slowed(renderer):
-        rendered.append(renderer.scene.camera.width)
-        clock.now += seconds
-        return render(renderer)
-
-    def timed(renderer, *, took, **how):
-        assert took == pytest.approx(seconds)
-        return "times"
-
-    render = module.render_frame
-    monkeypatch.setattr(module, "time", clock)
-    monkeypatch.setattr(module, "render_frame", slowed)
-    monkeypatch.setattr(module, "time_frame", timed)
-    monkeypatch.setattr(module, "peak_memory", lambda work: work() or 7.0)
-    large = read_scene(mi.load_dict(tiny_scene(size=(32, 24))))
-    found = module.render_and_time(read_scene(loaded.scene), MARCH, timed=large)
-    assert (found.times, found.memory, rendered) == ("times", 7.0, [16, *frames * [32]])
-
-
-def test_what_takes_less_than_the_limit_is_measured(loaded, monkeypatch):
-    measurement = probed(loaded, monkeypatch, MARCH, seconds=0.05, limit=60.0)
-    assert not measurement.left_out
-    assert measurement.refused is None
-    assert measurement.error.relative_rmse < 0.02

@@ -63,17 +63,6 @@ def test_a_cause_that_is_gone_takes_its_part_along(variant):
     np.testing.assert_array_equal(coarse.parts[0].image, coarse.image - better.image)
 
 
-@pytest.mark.slow
-def test_froxels_err_by_map_columns_and_slices(variant):
-    whole = split("froxel-fog", width=8, height=6, slices=64, map=1024)
-    assert causes(whole) == [("map", "shadow=ray"), ("resolution", "width=24, height=20"), ("steps", "truth")]
-    resolution, steps = whole.parts[1:]
-    assert resolution.relative_rmse > 2 * steps.relative_rmse
-    few = split("froxel-fog", width=24, height=20, slices=4, map=1024)
-    assert causes(few) == [("map", "shadow=ray"), ("steps", "truth")]
-    assert few.parts[1].share > 0.9
-
-
 def test_a_method_of_ones_own_is_rendered_by_its_caller(variant):
     asked = []
 

@@ -45,25 +45,3 @@ def test_every_command_that_renders_asks(variant, tmp_path, monkeypatch, capsys,
     assert err.count("\n") == 1
     assert "add --force to start it nevertheless" in err
     assert not list(tmp_path.iterdir())
-
-
-def test_usual_work_is_not_asked_about(variant, monkeypatch):
-    """The largest documented commands, on one thread of a small machine."""
-    monkeypatch.setattr(expected_work.dr, "thread_count", lambda: 1)
-    monkeypatch.setattr(expected_work, "usable_memory", lambda: Memory(8 * 10**9, "this machine has"))
-    size = (800, 600)
-    scenes = range(10)  # those lit by points: with extent, sixteen points each, a bench of all takes hours
-    works = [expected_work.truth_work(size) for _ in scenes]
-    works += [expected_work.frame_work(size, steps=100) for _ in scenes for _ in range(17)]
-    commands = {
-        "bench": works,
-        "render": [expected_work.frame_work((3840, 2160), steps=400)],
-        "reference": [expected_work.sampled_work(size, 2048)],
-    }
-    asked = {}
-    for command, usual in commands.items():
-        try:
-            check_work(command, usual, force=False)
-        except InputError as error:
-            asked[command] = str(error)
-    assert asked == {}

@@ -4,12 +4,8 @@ import math
 import pytest
 
 from analytic.errors import InputError
-from reference.scene.read import read_truth
-from tests.evidence.oracles.light_volume import oracle_airlight
 from tests.helpers.scenes import spot, tiny_scene
-from validation.estimates.quadrature import truth_image
 from validation.frames.map_size import fitted_slope, map_errors, map_flicker
-from validation.metrics.errors import error_metrics
 
 # Steps enough that halving them changes no error below by more than 2 %.
 MARCH = {"steps": 1000, "shadow": "map"}
@@ -41,21 +37,6 @@ def test_errors_of_a_map_are_of_first_order(variant, lamp):
 
 
 @pytest.mark.slow
-@pytest.mark.claim("error-by-size-of-the-map", tolerance="order 1 within 0.2")
-def test_errors_of_the_height_field_are_of_first_order(variant):
-    from realtime.scene.read_scene import read_scene
-    from realtime.shadow_maps.shadow_map import cast_shadow_map
-
-    scene = small_scene()
-    known, read, truth = read_truth(scene), read_scene(scene), truth_image(scene).airlight
-    sizes, errors = (16, 32, 64, 128), []
-    for size in sizes:
-        image = oracle_airlight(known, [cast_shadow_map(read.geometry, read.lights[0], size)])
-        errors.append(error_metrics(truth, image).relative_rmse)
-    assert fitted_slope(sizes, errors).order == pytest.approx(1, abs=0.2)
-
-
-@pytest.mark.slow
 @pytest.mark.claim("flicker", tolerance="order 1/2 within 0.2")
 @pytest.mark.parametrize("lamp", ["point", "spot"])
 def test_flicker_of_fractions_of_a_texel_is_of_order_one_half(variant, lamp):
@@ -66,16 +47,6 @@ def test_flicker_of_fractions_of_a_texel_is_of_order_one_half(variant, lamp):
     assert max(study.texels) < 0.3
     assert study.slope.order == pytest.approx(0.5, abs=0.2)
     assert study.nonfinite == 0
-
-
-@pytest.mark.slow
-@pytest.mark.claim("flicker", tolerance="0.8 to 1.1 of sqrt(2)")
-def test_flicker_over_texels_is_that_of_independent_frames(variant):
-    """The difference of two independent errors has sqrt(2) of their RMS; the few frames here have much in common."""
-    study = map_flicker(small_scene(), "ray-march", parameters=MARCH, sizes=(128, 256), frames=7, step=0.05)
-    assert min(study.texels) > 3
-    for flicker, error in zip(study.flicker, study.errors, strict=True):
-        assert 0.8 * math.sqrt(2) < flicker / error < 1.1 * math.sqrt(2)
 
 
 def test_what_cannot_be_studied_is_refused(variant):
@@ -92,12 +63,3 @@ def test_what_cannot_be_studied_is_refused(variant):
         map_flicker(scene, "ray-march", parameters=MARCH, frames=1)
     with pytest.raises(InputError, match="step: got 0, wanted an angle above 0"):
         map_flicker(scene, "ray-march", parameters=MARCH, step=0.0)
-
-
-@pytest.mark.slow
-def test_a_sun_moves_in_the_truth_too(variant):
-    from validation.scenes.loading import load_scene
-
-    study = map_flicker(load_scene("windows", (16, 12)).scene, "ray-march", parameters=MARCH, sizes=(64,), frames=3)
-    assert study.truth_change > 1e-4  # of the mean: the shafts moved
-    assert study.nonfinite == 0

@@ -4,12 +4,10 @@
 import numpy as np
 import pytest
 
-from analytic.cases import read_cases
 from analytic.certified import integrate_certified
 from analytic.phase import PHASE_NAMES, PhaseFunction
-from validation.kernels import rays as kernel_rays
-from validation.kernels.rays import case_row, hard_rays, slivers, wide_rays
-from validation.kernels.values import TABLE, evaluate_cases, take
+from validation.kernels.rays import hard_rays, slivers, wide_rays
+from validation.kernels.values import TABLE
 
 COLUMNS = ("g", "foot", "height", "x0", "x1", "sigma_t")
 
@@ -56,41 +54,3 @@ def test_truth_is_certified(rays):
         columns = (rays.foot, rays.height, rays.x0, rays.x1, rays.sigma_t)
         expected = integrate_certified(*(float(column[k]) for column in columns), phase, digits=16)
         assert rays.value[k] == pytest.approx(float(expected), rel=1e-12), tag
-
-
-def test_table_has_mean_one_and_is_exact_in_float32():
-    values = np.array(TABLE)
-    assert np.trapezoid(values, np.linspace(-1, 1, len(values))) == 2.0
-    np.testing.assert_array_equal(values, values.astype(np.float32))
-
-
-def test_truth_is_kept_and_found_again(monkeypatch, tmp_path):
-    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path))  # other tests ask for other truths
-    first = wide_rays(64)
-
-    def fail(*columns, **options):
-        raise AssertionError("computed again")
-
-    monkeypatch.setattr(kernel_rays, "airlight_segments", fail)
-    np.testing.assert_array_equal(wide_rays(64).value, first.value)
-    with pytest.raises(AssertionError, match="computed again"):
-        wide_rays(64, "rayleigh")  # another phase function is another truth
-
-
-def test_row_of_a_case_can_be_read_and_run_again(rays, tmp_path, variant):
-    from validation.configurations.kernel_names import find_kernel
-
-    k = next(k for k, name in enumerate(rays.phase) if name == "hg" and np.isinf(rays.x1[k]))
-    path = tmp_path / "worst.csv"
-    path.write_text(",".join(rays.header) + "\n" + case_row(rays, k) + "\n")
-    again = read_cases(path)
-    for name in (*COLUMNS, "value"):
-        assert getattr(again, name)[0] == getattr(rays, name)[k]
-    function = find_kernel("quadrature")
-    row = take(rays, np.array([k]))
-    assert evaluate_cases(again, function, "single").J == evaluate_cases(row, function, "single").J
-
-
-def test_row_of_a_file_is_its_text(data_folder):
-    path = data_folder / "airlight_integral.csv"
-    assert case_row(read_cases(path), 3) == path.read_text().splitlines()[4]

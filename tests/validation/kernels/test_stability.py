@@ -8,10 +8,9 @@ import pytest
 
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
-from validation.kernels import stability as module
 from validation.kernels.errors import errors_by_group, groups
 from validation.kernels.rays import hard_rays, slivers, table
-from validation.kernels.stability import GENERATED, gamma_difference, kernel_stability, stability
+from validation.kernels.stability import GENERATED, gamma_difference, kernel_stability
 from validation.kernels.values import Values, evaluate_cases, take
 
 
@@ -62,21 +61,6 @@ def test_what_is_not_finite_is_counted_and_shown_as_the_worst():
     assert (nothing["all"].max, nothing["all"].median, nothing["all"].nan) == (None, None, 4)
 
 
-def test_infinite_where_the_truth_is_infinite_is_right():
-    rays = replace(four_rays(), value=np.array([np.inf, 2.0, 4.0, 8.0]))
-    values = Values(np.array([np.inf, 2.0, 4.0, 8.0]), {}, np.ones(4, dtype=bool))
-    errors = errors_by_group(rays, values, "single", groups(rays))["all"]
-    assert (errors.infinite, errors.max) == (0, 0.0)
-
-
-def test_refused_rays_are_neither_errors_nor_failures():
-    rays = four_rays()
-    values = Values(np.array([1.0, 2.0, 4.0, np.nan]), {"hg": "no"}, np.array([True, True, True, False]))
-    errors = errors_by_group(rays, values, "single", groups(rays))
-    assert (errors["all"].rays, errors["all"].refused, errors["all"].nan) == (3, 1, 0)
-    assert (errors["phase hg"].rays, errors["phase hg"].worst) == (0, None)
-
-
 @pytest.mark.parametrize("error", [InputError, RealtimeInputError])
 def test_refusal_keeps_the_words_of_the_kernel(variant, error):
     def refuses(geometry, x0, x1, medium, light):
@@ -89,14 +73,6 @@ def test_refusal_keeps_the_words_of_the_kernel(variant, error):
     assert values.accepted.tolist() == [True, True, True, False]
     assert np.isnan(values.J[3])
     assert np.isfinite(values.J[:3]).all()
-
-
-def test_faults_of_a_kernel_are_not_refusals(variant):
-    def broken(geometry, x0, x1, medium, light):
-        raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        evaluate_cases(four_rays(), broken, "single")
 
 
 def test_small_relative_mistake_is_found_where_it_is(variant):
@@ -149,20 +125,3 @@ def test_differences_of_gamma_lose_what_theory_says(variant):
     assert loss.direct.max < 1e-4
     assert loss.difference.median > 1e-3
     assert 0.05 < loss.median_rounding < 5
-
-
-def test_study_runs_kernels_by_name(variant, monkeypatch):
-    monkeypatch.setattr(module, "CERTIFIED", ())
-    told = []
-    verdicts = stability(["taylor-2"], count=256, progress=lambda *progress: told.append(progress))
-    assert [verdict.kernel for verdict in verdicts] == ["taylor-2"]
-    assert [rays.name for rays in verdicts[0].sets] == [GENERATED]
-    assert verdicts[0].refused.keys() == {"tabulated"}
-    assert told == [(0, 1, "taylor-2")]
-    assert verdicts[0].sets[0].single["phase tabulated"].rays == 0
-
-
-def test_wrong_name_is_refused_before_any_work(monkeypatch):
-    monkeypatch.setattr(module, "hard_rays", None)
-    with pytest.raises(InputError, match="did you mean 'taylor'"):
-        stability(["exact", "tailor"])

@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: BSD-3-Clause
-import json
 from dataclasses import fields
 
 import numpy as np
@@ -13,13 +12,6 @@ EXACT = 1e-13  # some roundings of double precision
 # r = 0.09, 0.19, 0.99 and t = r + 0.1, r - 0.1, r: every denominator below is a number that a hand can divide by.
 REFERENCE = np.array([[0.09, 0.19, 0.99]])
 TEST = REFERENCE + np.array([[0.1, -0.1, 0.0]])
-
-
-def test_names_are_stable():
-    names = (
-        "unit values nonfinite dark mse rmse mae rae_tev rse_tev mrse_pbrt relmse relmse_trim mape smape mrse_jeri psnr"
-    )
-    assert [f.name for f in fields(PublishedErrors)] == [*names.split(), "relative", "relative_max", "dark_max"]
 
 
 @pytest.mark.parametrize(
@@ -65,13 +57,6 @@ def test_dark_values_are_counted_and_judged_in_absolute_terms():
     assert errors.relative_max == pytest.approx(0.1, rel=EXACT)
 
 
-def test_the_unit_divides_both_images():
-    errors = published_errors(50 * REFERENCE, 50 * TEST, unit=50.0)
-    for name, value in published_errors(REFERENCE, TEST).to_json().items():
-        if name != "unit":
-            assert getattr(errors, name) == pytest.approx(value, rel=1e-12), name
-
-
 @pytest.mark.parametrize("factor", [1e-30, 1e30])
 def test_with_the_mean_as_unit_nothing_has_a_unit(factor):
     rng = np.random.default_rng(3)
@@ -84,15 +69,6 @@ def test_with_the_mean_as_unit_nothing_has_a_unit(factor):
         assert getattr(scaled, field.name) == pytest.approx(getattr(plain, field.name), rel=1e-11), field.name
 
 
-def test_equal_images_have_no_error_and_a_psnr_that_json_cannot_hold():
-    errors = published_errors(REFERENCE, REFERENCE)
-    assert errors.psnr == np.inf
-    as_json = json.loads(json.dumps(errors.to_json(), allow_nan=False))
-    assert as_json["psnr"] is None
-    for name in ("mse", "mae", "relmse", "relmse_trim", "smape", "relative", "relative_max", "dark_max"):
-        assert as_json[name] == 0, name
-
-
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("side", ["reference", "test"])
 def test_nonfinite_pixels_are_left_out_and_counted(bad, side):
@@ -102,25 +78,6 @@ def test_nonfinite_pixels_are_left_out_and_counted(bad, side):
     errors = published_errors(wide["reference"], wide["test"])
     assert (errors.nonfinite, errors.values) == (3, 9)
     assert errors.smape == pytest.approx(published_errors(reference, test).smape, rel=EXACT)
-
-
-def test_black_reference_has_absolute_errors_and_those_with_an_epsilon():
-    errors = published_errors(np.zeros((2, 2)), np.full((2, 2), 0.1))
-    assert (errors.mse, errors.mae) == pytest.approx((0.01, 0.1), rel=EXACT)
-    assert errors.mrse_pbrt == pytest.approx(0.01 / 0.0001, rel=EXACT)
-    assert errors.dark == 4
-    assert np.isnan([errors.psnr, errors.relative, errors.relative_max, errors.dark_max]).all()
-    assert published_errors(np.zeros((2, 2)), np.ones((2, 2)), unit=None).unit == 1
-
-
-def test_negative_values_stay_in_and_are_not_clamped():
-    errors = published_errors(np.array([[1.0, 1.0]]), np.array([[-1.0, 1.0]]))
-    assert errors.mae == 1
-    assert errors.smape == pytest.approx(4 / 2.02 / 2, rel=EXACT)
-    # A reference of exactly -0.01 makes pbrt's and tev's denominators zero: infinite, None in JSON.
-    singular = published_errors(np.array([[-0.01, 1.0]]), np.array([[0.0, 1.0]]))
-    assert singular.mrse_pbrt == np.inf
-    assert singular.to_json()["rae_tev"] is None
 
 
 @pytest.mark.parametrize(

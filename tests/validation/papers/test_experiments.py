@@ -38,12 +38,6 @@ def test_printed_formulas_by_hand():
     assert light["peak"] + light["lobe"] == pytest.approx(light["forward"])
 
 
-def test_where_rising_values_reach_a_level():
-    from validation.papers.slab import crossing
-
-    assert crossing((50.0, 100.0, 400.0), [1e-6, 0.1, 1.6], 0.8) == pytest.approx(100 * 8**0.5)  # grows as x^2
-
-
 def test_fractions_of_stages_have_intervals():
     """Six works of 1, 2, 3, 5, 1 and 13 ms, each 10 % sure: planes take 13 - 3, sorting 5 - 1 + 1 ms of 21."""
     from validation.papers.biri_tables import STAGES, fractions
@@ -91,17 +85,6 @@ def test_what_a_constant_leaves_of_two_noisy_images():
     assert constant == pytest.approx(3, rel=0.01)
     assert left_over(first, second, 2 * fog) == pytest.approx(1 / 3, rel=0.02)  # a third of the light is left
     assert left_over(first, second, 3 * fog) < 0.03  # the noise is not counted
-
-
-def test_the_plain_laplacian_and_its_threshold():
-    from realtime.methods.light_volumes.published.tessellation import divide, triangles
-    from validation.papers.light_volumes import laplacian, plain_edges
-
-    depth = np.fromfunction(lambda face, row, column: 2 + 3 * row + column + row**2, (1, 17, 17))
-    assert laplacian(1 / depth)[0, 1:-1, 1:-1] == pytest.approx(2)  # of row^2 alone
-    heights = 1 + np.random.default_rng(2).random((1, 33, 33))
-    every = len(triangles(divide(plain_edges(heights, 10**9))))
-    assert abs(len(triangles(divide(plain_edges(heights, every // 2)))) - every // 2) < 0.1 * every
 
 
 @pytest.mark.slow

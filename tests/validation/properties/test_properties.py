@@ -10,7 +10,7 @@ import pytest
 from realtime.scene.read_scene import read_scene
 from validation.properties.properties import scene_properties
 from validation.scenes.loading import load_scene
-from validation.scenes.parts import area_lamp, camera, fog, grid, mitsuba_mesh, placed, point_light, scaled
+from validation.scenes.parts import camera, fog, grid, mitsuba_mesh, placed, point_light, scaled
 from validation.scenes.registry import FOG_SCENES
 from validation.scenes.solids import box
 
@@ -52,33 +52,11 @@ def test_they_are_what_the_scene_holds(variant):
     assert properties["pixels"] == 64 * 48
 
 
-def test_optical_depth_grows_with_extinction(variant):
-    thin, thick = (scene_properties(_scene(sigma_t=sigma)) for sigma in (0.1, 1.0))
-    assert thick["optical_depth"] == pytest.approx(10 * thin["optical_depth"], rel=1e-4)
-    assert thick["optical_depth_light"] == pytest.approx(10 * thin["optical_depth_light"], rel=1e-4)
-    assert {name for name in thin if thin[name] != thick[name]} == {
-        "optical_depth",
-        "optical_depth_light",
-        "optical_depth_most",
-    }
-
-
 def test_none_depends_on_the_unit_of_length(variant):
     metres, inches = scene_properties(_scene()), scene_properties(_scene(39.37))
     assert metres.keys() == inches.keys()
     for name, value in metres.items():
         assert inches[name] == pytest.approx(value, rel=2e-3, abs=2e-3), name
-
-
-def test_extent_and_bounds_are_read(variant):
-    lamp = area_lamp("sphere", (0.0, 0.3, 3.0), (0, 0, 0), 0.5, (1.0, 1.0, 1.0))
-    properties = scene_properties(_scene(extra={"wide": lamp}))
-    assert properties["areas"] == 1
-    # Half a metre from about 4.2 m: the middle of the view is near the camera.
-    assert 0.05 < properties["light_size"] < 0.2
-    windows = scene_properties(read_scene(load_scene("windows", (32, 24)).scene))
-    assert (windows["endless"], windows["bounded"], windows["facets"], windows["inside"]) == (0, 1, 6, 0)
-    assert (windows["directionals"], windows["extinctions"]) == (1, 3)
 
 
 @pytest.mark.slow

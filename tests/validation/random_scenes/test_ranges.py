@@ -1,15 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: ranges can be set, and what cannot be drawn is refused by name."""
 
-import re
-from dataclasses import fields
-
 import pytest
 
 from analytic.errors import InputError
 from validation.random_scenes.draw import draw_scene
-from validation.random_scenes.drawn import LIGHT_KINDS
-from validation.random_scenes.ranges import Ranges, ranges_from, read_ranges
+from validation.random_scenes.ranges import ranges_from
 
 
 @pytest.mark.claim("random-ranges", tolerance="none: what is drawn lies within the range")
@@ -22,19 +18,6 @@ def test_what_is_set_is_drawn():
         assert [light.kind for light in drawn.lights] == ["spot", "spot"]
         assert [medium.bounds for medium in drawn.media] == ["endless"]
         assert 0.5 <= drawn.media[0].optical_depth <= 0.7
-
-
-def test_defaults_are_what_the_issue_asks_for():
-    ranges = Ranges()
-    assert ranges.optical_depth == (1e-3, 20.0)
-    assert ranges.lights == (1, 8)
-    assert set(ranges.light_kinds) == set(LIGHT_KINDS)
-    for each in fields(Ranges):
-        if "limits" in each.metadata:
-            # Arbitrary numbers, never round ones, wherever the issue sets none.
-            least, most = each.metadata["limits"]
-            low, high = getattr(ranges, each.name)
-            assert least <= low < high <= most
 
 
 @pytest.mark.parametrize(
@@ -56,14 +39,3 @@ def test_defaults_are_what_the_issue_asks_for():
 def test_what_cannot_be_drawn_is_refused_by_name(table, words):
     with pytest.raises(InputError, match=words):
         ranges_from(table)
-
-
-def test_a_file_that_cannot_be_read_is_refused(tmp_path):
-    with pytest.raises(InputError, match="cannot read"):
-        read_ranges(tmp_path / "none.toml")
-    broken = tmp_path / "broken.toml"
-    broken.write_text("fov = [")
-    with pytest.raises(InputError, match=re.escape(f"{broken} is no TOML")):
-        read_ranges(broken)
-    broken.write_text("fov = [31.7, 41.3]")
-    assert read_ranges(broken).fov == (31.7, 41.3)

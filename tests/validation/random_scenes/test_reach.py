@@ -36,13 +36,6 @@ def test_a_plate_under_the_lamp_keeps_the_light_away():
     assert not found.enough
 
 
-def test_a_wall_before_the_camera_is_near():
-    wall = _plate(0.0, 30.0)[..., [0, 2, 1]] + [0.0, -3.0, 0.0]
-    found = reach(_scene(), [wall])
-    assert found.near == 1.0
-    assert not found.enough
-
-
 def test_a_spot_lights_its_cone_alone():
     narrow = replace(_LAMP, kind="spot", cutoff=3.0)
     assert 0 < reach(_scene(lights=(narrow,)), []).lit < 0.3

@@ -43,46 +43,6 @@ def test_a_jump_is_a_cliff():
 
 
 @pytest.mark.parametrize(
-    ("kind", "scene", "works"),
-    [
-        ("size", "open-fog", [12 * 9, 24 * 18, 48 * 36, 96 * 72]),
-        ("lights", "two-pens", [1, 2, 4, 8]),
-        ("media", "three-media", [1, 2, 3]),
-        ("map", "open-fog", [128, 256, 512, 1024, 2048]),
-    ],
-)
-def test_steps_have_the_work_that_they_say(kind, scene, works, variant):
-    from validation.scaling.ladders import ladder
-
-    steps = ladder(kind, scene, (24, 18))
-    assert [step.work for step in steps] == works
-    for step in steps:
-        made = step.scene()
-        held = {
-            "size": made.camera.width * made.camera.height,
-            "lights": len(made.lights),
-            "media": len(made.medium.bounded_media),
-            "map": step.parameters.get("map"),
-        }
-        assert held[kind] == step.work
-        kinds = made.features
-        assert kinds.point_lights + kinds.spot_lights + kinds.directional_lights == len(made.lights)
-
-
-def test_copies_of_lights_share_the_intensity(variant):
-    from realtime.scene.read_scene import read_scene
-    from validation.scaling.ladders import with_copies
-    from validation.scenes.loading import load_scene
-
-    scene = read_scene(load_scene("windows", (24, 18)).scene)
-    total = sum(np.array(light.intensity).ravel() for light in scene.lights)
-    copied = with_copies(scene, 5)
-    np.testing.assert_allclose(sum(np.array(light.intensity).ravel() for light in copied.lights), total, rtol=1e-6)
-    axes = {tuple(np.array(light.axis).ravel()) for light in copied.lights}
-    assert len(axes) == 5 * len(scene.lights)
-
-
-@pytest.mark.parametrize(
     ("kind", "scene", "why"),
     [
         ("speed", "open-fog", "wanted some of size, triangles"),

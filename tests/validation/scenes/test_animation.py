@@ -4,10 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
 from realtime.frame.incremental import next_frame
 from realtime.methods.registry import FOG_METHODS
-from validation.scenes.animation import animate, moved_parts, parse_moves
+from validation.scenes.animation import animate, moved_parts
 from validation.scenes.record import Animation
 
 
@@ -23,12 +22,6 @@ def read(name):
     return read_scene(loaded.scene), loaded.animation
 
 
-def test_moves_are_named():
-    assert parse_moves("light, colour,light") == ("light", "colour")
-    with pytest.raises(InputError, match="--animate: got 'lamp', wanted some of light, objects, medium, colour"):
-        parse_moves("lamp")
-
-
 @pytest.mark.parametrize("name", ["open-fog", "sphere-spot"])
 def test_lights_circle_at_one_height_and_come_back(variant, name):
     scene, animation = read(name)
@@ -41,21 +34,6 @@ def test_lights_circle_at_one_height_and_come_back(variant, name):
     np.testing.assert_allclose(radius, radius[0], rtol=1e-5)
     steps = np.linalg.norm(places - np.roll(places, 1, axis=0), axis=1)
     np.testing.assert_allclose(steps, steps[0], rtol=1e-4)  # the step from the last to the first included
-
-
-def test_medium_swings_between_half_and_one_and_a_half(variant):
-    scene, _ = read("open-fog")
-    base = float(scene.medium.sigma_t[0][0])
-    factors = [
-        float(moved.medium.sigma_t[0][0]) / base for moved in animate(scene, Animation(("medium",), (0, 0, 0)), 4)
-    ]
-    assert factors == pytest.approx([1, 1.5, 1, 0.5], rel=1e-6)
-
-
-def test_nothing_closed_cannot_turn(variant):
-    scene, _ = read("open-fog")
-    with pytest.raises(InputError, match="no closed mesh that could turn"):
-        next(animate(scene, Animation(("objects",)), 3))
 
 
 @pytest.mark.claim("frames-are-replayed")

@@ -6,10 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from realtime.scene.mesh_adjacency import make_casters
-from tests.helpers.meshes import areas, volume
 from validation.scenes.omni_box import SCENE as OMNI_BOX
-from validation.scenes.omni_box import _bars, _room, _standing
+from validation.scenes.omni_box import _bars, _standing
 from validation.scenes.tangle import _TUBES, _WAVES, _bent, _tubes
 from validation.scenes.tangle import SCENE as TANGLE
 
@@ -37,37 +35,6 @@ def scene_of(name, size):
     from validation.scenes.loading import load_scene
 
     return read_scene(load_scene(name, size).scene)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", RECORDS)
-def test_every_part_is_closed_and_faces_outwards(name):
-    """Shadow planes take closed casters; each part is one connected body, its edges met once each way."""
-    casters = make_casters([(part, *mesh) for part, mesh in parts(name).items()])
-    assert casters.warnings == ()
-    assert casters.closed.tolist() == [True] * len(parts(name))
-    assert not np.any(casters.same_way)
-    for part, (vertices, faces) in parts(name).items():
-        assert volume(vertices - vertices.mean(axis=0), faces) > 0, part
-        # Boxes have Euler's number 2, tubes that close on themselves 0.
-        euler = len(vertices) - 3 * len(faces) // 2 + len(faces)
-        assert euler == (2 if name == "omni-box" else 0), part
-
-
-@pytest.mark.parametrize("name", RECORDS)
-def test_no_face_is_degenerate_in_float32(name):
-    for part, (vertices, faces) in parts(name).items():
-        # The smallest faces, of the tangle's thinnest sections, are of 1e-5 m^2; one without area would be nought but
-        # for rounding: 4 m are held to 2e-7, over an edge of 1 cm that is 2e-9.
-        assert areas(vertices.astype(np.float32).astype(np.float64), faces).min() > 1e-6, part
-
-
-def test_room_turns_its_inside_to_the_lamp():
-    from validation.scenes.omni_box import _LAMP
-
-    vertices, faces = _room()
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    assert np.all(np.einsum("ij,ij->i", np.cross(b - a, c - a), np.array(_LAMP) - a) > 0)
 
 
 def test_tangle_is_bent_without_folding_space():

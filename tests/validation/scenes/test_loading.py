@@ -46,20 +46,6 @@ def test_unknown_name_is_refused_with_the_nearest(variant, given, meant):
         load_scene(given)
 
 
-def test_folder_is_refused(variant, tmp_path):
-    for empty in ("", " "):
-        with refused(f"scene: got {empty!r}, wanted one of open-fog"):
-            load_scene(empty)
-    with refused(f"{tmp_path} is a folder"):
-        load_scene(str(tmp_path))
-
-
-@pytest.mark.parametrize("name", ["gone.xml", "sub/gone"])
-def test_missing_file_is_refused(variant, tmp_path, name):
-    with refused(f"there is no file {tmp_path / name}"):
-        load_scene(str(tmp_path / name))
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -83,23 +69,10 @@ def test_broken_file_is_refused_by_name_and_reason_in_one_line(variant, tmp_path
     assert "\n" not in str(caught.value)
 
 
-def test_file_is_named_by_its_stem(variant, small_file):
-    loaded = load_scene(str(small_file))
-    assert (loaded.name, loaded.path) == ("my fog", small_file)
-    assert small_file.name in loaded.purpose
-    assert list(loaded.scene.sensors()[0].film().size()) == [16, 12]
-
-
 @pytest.mark.parametrize("size", [(0, 0), (0, 5), (5, 0), (16385, 5), (-1, 5)])
 def test_size_that_no_image_has_is_refused(variant, size):
     with refused(f"got {size[0]}x{size[1]}"):
         load_scene("open-fog", size)
-
-
-@pytest.mark.parametrize("text", ["abc", "", "800", "800x", "x600", "-8x6", "8x6x3", "8.5x6", "8 x 6"])
-def test_size_in_other_words_is_refused(text):
-    with refused(f"got {text!r}, wanted WIDTHxHEIGHT"):
-        parse_size(text)
 
 
 def test_size_is_read():
@@ -141,11 +114,3 @@ def test_a_film_that_no_image_has_is_refused_by_its_file(variant, small_file, si
     with refused(f"scene {small_file}: the camera's film has "):
         load_scene(str(small_file))
     assert load_scene(str(small_file), (8, 6)).scene.sensors()[0].film().size()[0] == 8
-
-
-def test_a_cropped_film_is_refused_also_for_the_truth(variant, small_file):
-    crop = '<integer name="crop_width" value="3"/><integer name="crop_height" value="2"/></film>'
-    small_file.write_text(SMALL.replace("</film>", crop))
-    with refused("the camera's film is cropped to 3 x 2 of "):
-        load_scene(str(small_file))
-    load_scene(str(small_file), (8, 6))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from tests.helpers.bad_inputs import cloud, mesh, scene
+from tests.helpers.bad_inputs import cloud, scene
 from validation.scenes.loading import load_scene
 
 BROKEN = {
@@ -31,24 +31,6 @@ def test_an_odd_number_is_refused_by_its_name(variant, tmp_path, place):
         load(tmp_path, scene(**{place: value}))
 
 
-def test_a_sphere_of_no_size_is_refused(variant, tmp_path):
-    with pytest.raises(InputError, match="shape 'ball': to_world scales an axis by 0"):
-        load(tmp_path, scene(radius="0"))
-
-
-@pytest.mark.parametrize(
-    ("corner", "words"), [("nan 1 0", "invalid vertex position data"), ("1e30 1 0", "shape 'mesh': .*1e[+]30")]
-)
-def test_a_vertex_is_refused_by_the_name_of_its_mesh(variant, tmp_path, corner, words):
-    with pytest.raises(InputError, match=words):
-        load(tmp_path, scene(extra=mesh(f"0 0 0\n1 0 0\n{corner}", "3 0 1 2", tmp_path)))
-
-
-def test_a_cloud_is_refused_by_its_name(variant, tmp_path):
-    with pytest.raises(InputError, match=r"sigma_t\.value.value has nan"):
-        load(tmp_path, scene(extra=cloud("nan, 1, 1")))
-
-
 def test_the_python_interface_checks_scenes_that_are_built(variant):
     import mitsuba as mi
 
@@ -57,13 +39,6 @@ def test_the_python_interface_checks_scenes_that_are_built(variant):
     built = mi.load_string(scene(position="0, nan, 0"))
     with pytest.raises(InputError, match="light 'lamp': position has nan"):
         airlight.load_scene(built)
-
-
-def test_shapes_without_an_id_get_a_name_each(variant, tmp_path):
-    loaded = load(tmp_path, scene(extra='<shape type="rectangle"/><shape type="cube"/>'))
-    names = {shape.id() for shape in loaded.shapes()}
-    assert "" not in names
-    assert len(names) == 3
 
 
 def test_overlapping_media_are_named(variant, tmp_path):

@@ -10,7 +10,6 @@ from analytic.errors import InputError
 from realtime.scene.read_scene import read_scene
 from reference.scene.read import read_truth
 from reference.storage.scene_digest import scene_digest
-from validation.estimates.quadrature import truth_image
 from validation.scenes.loading import load_scene
 from validation.scenes.parts import joined, scaled
 from validation.scenes.random_scene import drawn_values, random_name
@@ -36,13 +35,6 @@ def test_both_readers_take_what_was_drawn(variant, seeds):
         assert len(truth.occluders.shapes()) >= len(drawn["casters"])
 
 
-@pytest.mark.slow
-def test_light_reaches_what_the_camera_sees():
-    shares = [drawn_values(f"random:{seed}")["reach"]["lit"] for seed in range(24)]
-    assert min(shares) > 0.01
-    assert np.median(shares) < 1, "shadows in half of the scenes"
-
-
 @pytest.mark.claim("random-same", tolerance="none: the digests of two loads, and of the record kept here, are equal")
 def test_the_same_seed_is_the_same_scene(variant):
     digests = [scene_digest(load_scene(name, (8, 6)).scene) for name in ("random:3", "random:3", "random:4")]
@@ -57,14 +49,6 @@ def test_the_same_seed_is_the_same_scene(variant):
 
 
 KEPT = "626df2435b5b8389"
-
-
-@pytest.mark.slow
-def test_the_truth_is_finite_and_not_black(variant):
-    for seed in (1, 7, 13):  # point and spot lights, of which the truth takes a second
-        truth = truth_image(load_scene(f"random:{seed}", (16, 12)).scene)
-        assert np.isfinite(truth.airlight).all()
-        assert truth.airlight.mean() > 0
 
 
 def test_a_name_that_is_no_seed_is_refused():
@@ -106,15 +90,3 @@ def test_meshes_of_a_folder_are_casters(variant, tmp_path):
     (folder / "one.ply").write_text("ply, and not quite")
     with pytest.raises(InputError, match=r"meshes: .*one\.ply"):
         load_scene(f"random:{first},meshes={folder}", (8, 6))
-
-
-def test_options_are_refused_beside_other_scenes(tmp_path):
-    with pytest.raises(InputError, match="--meshes: hall is no random scene"):
-        random_name("hall", meshes=tmp_path)
-    assert random_name("hall") == "hall"
-
-
-def test_mitsuba_has_no_doubt_about_a_large_sphere(variant, capfd):
-    """A sweep found it: rounding of the turn of a light of 26 m was taken for shear."""
-    load_scene("random:600", (8, 6))
-    assert "WARN" not in "".join(capfd.readouterr())

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from analytic.droplets import optics
-from analytic.errors import InputError
 
 
 def table(words, values):
@@ -28,12 +27,6 @@ def test_a_table_keeps_the_light_of_the_peak(variant):
     assert 0.5 * np.trapezoid(p[peak], fine[peak]) == pytest.approx(full.share(0, 5), abs=2e-3)
     angle = np.deg2rad(np.linspace(10, 30, 200))
     assert np.interp(np.cos(angle), cosine, values) == pytest.approx(full(np.cos(angle)), rel=1e-3)
-
-
-def test_a_straight_function_is_its_own_table(variant):
-    assert table("isotropic", 5) == pytest.approx(1)
-    with pytest.raises(InputError, match="at least 2"):
-        table("mie", 1)
 
 
 def fog_of(phase, size=(8, 6)):
@@ -65,32 +58,6 @@ def test_methods_and_truth_see_the_same_fog_of_droplets(variant):
     truth = quadrature_image(read_truth(scene), samples=16).airlight.reshape(-1)
     frame = np.array(render(scene, "unshadowed").airlight, dtype=np.float64).T.reshape(-1)
     assert np.sort(frame) == pytest.approx(np.sort(truth), rel=2e-3)
-
-
-@pytest.mark.slow
-def test_bounded_fog_of_droplets(variant):
-    import mitsuba as mi
-
-    from reference.quadrature.image import quadrature_image
-    from reference.scene.read import read_truth
-    from tests.helpers.light_frames import render
-    from tests.helpers.scenes import bounded_medium
-    from validation.scenes.parts import camera, point_light, tabulated_phase
-
-    ball = {"type": "sphere", "center": [0.4, 1.0, 0.3], "radius": 0.9}
-    scene = mi.load_dict(
-        {
-            "type": "scene",
-            "cloud": bounded_medium(ball, 0.8, (1.0, 0.9, 0.8), phase=tabulated_phase("mie", 2001)),
-            "light": point_light((0.7, 3.1, 0.4), (5.0, 4.0, 3.0)),
-            "camera": camera((0.1, -2.3, 0.2), (0.6, 1.9, 0.3), fov=47.0, size=(8, 6), in_fog=False),
-        }
-    )
-    truth = np.sort(quadrature_image(read_truth(scene), samples=16).airlight.reshape(-1))
-    frame = np.sort(np.array(render(scene, "unshadowed").airlight, dtype=np.float64).reshape(-1))
-    assert truth.max() > 0.1
-    # Three nodes for each 0.8 degrees.
-    assert frame == pytest.approx(truth, rel=3e-3)
 
 
 @pytest.mark.claim("droplets-in-scenes", tolerance="1 % bias of Mitsuba's sampling, by its own interval")

@@ -2,8 +2,7 @@
 import numpy as np
 import pytest
 
-from tests.helpers.meshes import is_closed, volume
-from validation.scenes.windows import SCENE, pierced_slab
+from validation.scenes.windows import SCENE
 
 
 def loaded(size):
@@ -14,33 +13,6 @@ def loaded(size):
     scene = mi.load_dict(SCENE.build())
     resize(scene, size)
     return scene
-
-
-def test_slab_has_its_holes():
-    """Ten by eight metres less two by three panes, half a metre thick; closed, with normals outwards."""
-    along, up = np.array([0.0, 1.0, 3.0, 5.0, 7.0, 10.0]), np.array([0.0, 2.0, 3.0, 8.0])
-    vertices, faces = pierced_slab(along, up, 0.5, (1.0, -2.0, 0.3))
-    assert is_closed(faces)
-    assert volume(vertices - vertices.mean(axis=0), faces) == pytest.approx(0.5 * (80 - 2 * 2))
-    # 13 solid cells with two sides of two triangles; four sides to each of two holes, sixteen to the border.
-    assert len(faces) == 4 * 13 + 2 * 4 * 2 + 2 * 2 * (5 + 3)
-    assert (vertices.min(axis=0) == [0.5, -2.0, 0.3]).all()
-    assert (vertices.max(axis=0) == [1.0, 8.0, 8.3]).all()
-
-
-def test_it_is_as_it_says(variant):
-    from reference.scene.read import read_truth
-
-    scene = loaded((8, 6))
-    assert sum(shape.face_count() for shape in scene.shapes()) == 1748
-    truth = read_truth(scene)
-    assert (len(truth.directional), len(truth.lights), len(truth.media)) == (1, 0, 1)
-    assert len(set(truth.media[0].sigma_t)) == 3
-    # The fog keeps clear of floor, ceiling and walls, so that no boundary lies in an opaque surface.
-    corners = truth.media[0].bounds.edge.reshape(-1, 3)
-    box = scene.bbox()
-    assert np.all(corners - np.array(box.min).ravel() > 0.03)
-    assert np.all(np.array(box.max).ravel() - corners > 0.03)
 
 
 def test_sun_comes_in_by_the_windows_alone(variant):

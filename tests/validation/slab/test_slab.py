@@ -75,12 +75,6 @@ def test_the_fit_to_droplets_is_the_same_on_both_sides(diameter):
 
 
 @pytest.mark.statistical
-def test_orders_with_the_fit_to_droplets_are_those_of_photons():
-    _, z = compared(2.0, 30.0, "hg-draine:12", 100_000, orders="1,2,3-inf")
-    assert np.abs(z).max() < 4.5
-
-
-@pytest.mark.statistical
 def test_a_table_of_a_function_is_the_function(tmp_path):
     degrees = np.concatenate([np.linspace(0, 20, 401), np.linspace(20.25, 180, 640)])
     g = 0.75
@@ -99,30 +93,6 @@ def test_a_table_of_a_function_is_the_function(tmp_path):
     assert ours == pytest.approx(theirs, rel=1e-4)
     _, z = compared(2.0, 30.0, str(path), 20_000, orders="1,2-inf")
     assert np.abs(z).max() < 4.5
-
-
-@pytest.mark.slow
-def test_the_peak_of_modified_droplets_is_gone_on_both_sides():
-    pair = phase_pair("mie-modified")
-    cosines = np.cos(np.deg2rad([0.0, 4.99, 5.01, 90.0, 180.0]))
-    values = pair.deterministic.values(cosines)
-    assert list(values[:2]) == [0, 0]
-    assert np.all(values[2:] > 0)
-    full = phase_pair("mie").deterministic.values(cosines)
-    assert values[2:] / full[2:] == pytest.approx(np.full(3, 1 / (1 - 0.444)), rel=2e-3)
-    sampled = pair.sampled().cosines(np.random.default_rng(1).random(10_000))
-    assert sampled.max() < math.cos(math.radians(4.99))
-
-
-@pytest.mark.slow
-def test_every_number_has_its_error_in_its_place():
-    numbers = slab_numbers(slab_request(1.0, 0.0, orders="1,31-inf", depths=[0.5], directions=[(1.0, 0.0)]))
-    assert numbers["error"]["orders"][1]["orders"] == "31-inf"
-    assert numbers["error"]["total"]["radiance"][0]["mu"] == 1.0
-    flat = list(paired(numbers, numbers, numbers["error"]))
-    assert flat
-    assert all(error <= 1e-4 * abs(value) + 1e-12 for value, _, error in flat)
-    assert numbers["orders"][0]["reflected_mean"] == pytest.approx(0, abs=1e-12)  # nothing is forward at noon
 
 
 @pytest.mark.parametrize(

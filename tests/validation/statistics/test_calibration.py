@@ -34,16 +34,6 @@ def test_many_null_comparisons(batches, noisy_reference):
     assert calibration.problems() == (), calibration
 
 
-def test_two_images_of_few_batches_are_judged_too_mildly():
-    """Welch's degrees of freedom are estimates too: with 4 batches on either side 0.7 % exceed instead of 1 %."""
-    calibration = calibrate(Experiment(runs=400, batches=4, noisy_reference=True, seed=34))
-    assert 0.005 < calibration.exceeding < 0.008
-    assert calibration.pixel_alarms <= share_interval(0.01, calibration.runs, 1e-4)[1]
-    low, high = share_interval(0.95, calibration.runs, 1e-4)
-    assert low <= calibration.coverage <= high
-    assert low <= calibration.coverage_batches <= high
-
-
 @pytest.mark.claim("detectable-bias")
 @pytest.mark.parametrize("bias", BIASES)
 @pytest.mark.parametrize("wider", [0.6, 1.0, 1.5, 3.0])
@@ -74,12 +64,3 @@ def test_skewed_noise_breaks_the_count_of_pixels_first_and_the_interval_last():
     # It is noticed where the interval is still right, and always where it is not.
     assert mild.exceeding_alarms > 0.4
     assert min(skewed.exceeding_alarms, heavy.exceeding_alarms) > 0.99
-
-
-def test_skewness_of_one_law_on_both_sides_cancels():
-    calibration = calibrate(
-        Experiment(log_normal(0.5), runs=400, noisy_reference=True, seed=41), spread=relative_spread(0.5)
-    )
-    low, high = share_interval(0.95, calibration.runs, 1e-4)
-    assert low <= calibration.coverage <= high
-    assert calibration.exceeding < 0.011  # symmetric errors with heavy tails: too few exceed if anything

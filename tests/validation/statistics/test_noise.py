@@ -6,10 +6,7 @@ from validation.statistics.noise import (
     ERROR_TOLERANCE,
     FLOORS,
     ROUNDING,
-    TIME_TOLERANCE,
-    drift,
     error_band,
-    least_ratio,
     other_power,
     slower_stages,
     spread,
@@ -29,20 +26,6 @@ def test_a_bias_in_which_errors_cancel_has_the_band_of_a_tenth_of_the_rmse():
     assert error_band("relative_rmse", 0.1, rmse=5.0) == error_band("relative_rmse", 0.1)
 
 
-def test_counts_have_bands_of_their_own():
-    assert error_band("nonfinite", 100) == 0
-    assert error_band("negative", 0, pixels=3072) == pytest.approx(3.072)
-    assert error_band("negative", 1000, tolerance=0.05, pixels=3072) == pytest.approx(53.072)
-
-
-def test_floors_let_rounding_pass_and_no_more():
-    # Seen between AVX2 and AVX-512: 8.9e-7 became 2.0e-6 (two-pens, shadow planes), the maximum moved by 1.9e-5.
-    assert abs(2.0e-6 - 8.9e-7) < error_band("relative_rmse", 8.9e-7)
-    assert error_band("max", 2.9e-5) > 1.9e-5
-    # Three times the error of an exact kernel is more than rounding.
-    assert error_band("p99", 1.28e-6) < 3 * 1.28e-6 - 1.28e-6
-
-
 def test_spread_is_the_geometric_mean_of_the_quartiles():
     wide = {"median_ms": 1.0, "low_ms": 1.0, "high_ms": 4.0, "repetitions": 9}
     quiet = {"median_ms": 1.0, "low_ms": 1.0, "high_ms": 1.0, "repetitions": 9}
@@ -52,17 +35,6 @@ def test_spread_is_the_geometric_mean_of_the_quartiles():
     assert spread([]) == 1.0
 
 
-def test_drift_is_the_median_of_all_frames():
-    pairs = [(times(1.0), times(factor)) for factor in (1.1, 1.2, 5.0)]
-    assert drift(pairs) == pytest.approx(1.2)
-    assert drift([]) == 1.0
-
-
-def test_least_ratio_grows_with_the_noise_and_between_machines():
-    assert least_ratio(1.02, same_machine=True) == pytest.approx((1 + TIME_TOLERANCE) * 1.02)
-    assert least_ratio(1.0, same_machine=False, tolerance=0.1) == pytest.approx(1.4)
-
-
 def test_more_work_is_seen_in_all_that_contains_it():
     old, new = times(1.0), times(1.0)
     for stage in ("airlight", "frame", "light_moved", "objects_moved"):
@@ -70,13 +42,6 @@ def test_more_work_is_seen_in_all_that_contains_it():
     assert slower_stages(old, new, least=1.25, scale=1.0) == ["airlight", "frame"]
     assert slower_stages(old, new, least=1.1, scale=1.0) == ["airlight", "frame", "light_moved", "objects_moved"]
     assert slower_stages(new, old, least=1.1, scale=1.0) == []
-
-
-@pytest.mark.parametrize("stage", ["airlight", "frame", "light_moved"])
-def test_a_burst_over_one_timing_has_no_witness(stage):
-    old, new = times(1.0), times(1.0)
-    new[stage] = sampled([3 * old[stage]["median_ms"]] * 20)
-    assert slower_stages(old, new, least=1.25, scale=1.0) == []
 
 
 def test_the_fewer_witnesses_the_more_is_needed():
@@ -89,11 +54,6 @@ def test_the_fewer_witnesses_the_more_is_needed():
     assert slower_stages(old, new, least=1.16, scale=1.0) == ["light_moved"]
     new["light_moved"] |= {"low_ms": 1.3}  # the quartiles overlap
     assert slower_stages(old, new, least=1.16, scale=1.0) == []
-
-
-def test_a_machine_that_is_slower_excuses_as_much():
-    assert slower_stages(times(1.0), times(2.0), least=1.25, scale=1.0) != []
-    assert slower_stages(times(1.0), times(2.0), least=1.25, scale=1.7) == []
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import numpy as np
 import pytest
-from scipy import stats
 
 from validation.statistics.p_values import binomial_p, power, sidak, student_quantile
 
@@ -20,14 +19,6 @@ def test_power_of_the_detectable_effect_is_ninety_percent():
     for freedom, error in ((15.0, 0.02), (1000.0, 3e-4)):
         effect = student_quantile(0.975, freedom) + student_quantile(0.90, freedom)
         assert power(effect, freedom) == pytest.approx(0.9, abs=error)
-
-
-def test_power_is_the_share_of_simulated_tests_that_find_the_effect():
-    rng = np.random.default_rng(1)
-    values = rng.normal(0.8, 1.0, (40000, 8))
-    significant = stats.ttest_1samp(values, 0.0, axis=1).pvalue < 0.05
-    # Standard error of a share of 40000 at most 0.0025; four of them.
-    assert power(0.8 * np.sqrt(8), 7.0) == pytest.approx(significant.mean(), abs=0.01)
 
 
 def test_sidak_and_the_binomial_law_by_hand():

@@ -7,7 +7,7 @@ import mitsuba as mi
 
 from validation.configurations.methods import Configuration
 from validation.scenes.random_scene import random_name, random_parts
-from validation.sweep.keys import Made, cell_key, made_here, row_source, scene_identities
+from validation.sweep.keys import Made, cell_key, scene_identities
 from validation.sweep.study import Cell
 
 CELL = Cell("windows", (32, 24), (), Configuration("ray-march", None, (("steps", 4), ("map", 64))))
@@ -93,10 +93,3 @@ def test_a_users_code_is_in_the_key(tmp_path):
     assert cell_key(replace(CELL, chosen=Configuration("gone:f")), MADE) != cell_key(
         replace(CELL, chosen=Configuration("gone:f")), MADE
     )
-
-
-def test_workers_are_told_apart_by_name():
-    theirs = replace(MADE, airlight="0.9", packages=(("mitsuba", "3.9.0"),), python="3.12.7")
-    assert MADE.differences(theirs) == ["airlight 0.9, not 1.0", "Python 3.12, not 3.11", "mitsuba 3.9.0, not 3.9.1"]
-    assert MADE.differences(replace(MADE, python="3.11.9")) == []
-    assert made_here("1.0", "llvm_ad_rgb").source == row_source()

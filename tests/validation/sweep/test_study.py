@@ -55,21 +55,6 @@ def test_a_file_with_its_own_scenes_and_fewer_random_ones(tmp_path):
     assert list(study.scene_names()) == [str(tmp_path / "hall.xml"), "random:7", "random:3", "random:4"]
 
 
-def test_a_random_scene_that_is_named_too_is_there_once():
-    study = parse_study({"scenes": ["random:4", "windows", "random:9"], "random": {"count": 3, "first": 3}})
-    assert list(study.scene_names()) == ["windows", "random:9", "random:3", "random:4", "random:5"]
-    assert study.scene_count == 5
-
-
-@pytest.mark.parametrize(("times", "expected"), [({"timed": 2}, ["windows", "random:3"]), ({}, None)])
-def test_the_first_scenes_are_timed_alone(times, expected):
-    data = {"scenes": ["windows"], "sizes": ["8x6", "16x12"], "random": {"count": 2, "first": 3}, "times": "alone"}
-    study = parse_study(data | times)
-    timed = [cells[0].scene for cells in study.timed_images()]
-    assert timed == [name for name in expected or study.scene_names() for _ in study.sizes]
-    assert not list(parse_study(data | {"times": "none"}).timed_images())
-
-
 @pytest.mark.claim("sweep-studies", tolerance="none")
 @pytest.mark.parametrize(
     ("data", "message"),
@@ -98,14 +83,3 @@ def test_the_first_scenes_are_timed_alone(times, expected):
 def test_mistakes_are_refused_by_name(data, message):
     with pytest.raises(InputError, match=message):
         parse_study(data)
-
-
-def test_files_that_are_no_study(tmp_path):
-    with pytest.raises(InputError, match="there is no file"):
-        read_study(tmp_path / "none.toml")
-    (tmp_path / "a.toml").write_text("scenes = [")
-    with pytest.raises(InputError, match=r"a\.toml: it cannot be read"):
-        read_study(tmp_path / "a.toml")
-    (tmp_path / "b.toml").write_text("flip = true\n")
-    with pytest.raises(InputError, match="it has no scene"):
-        read_study(tmp_path / "b.toml")

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: a cell becomes a row of finite numbers that are those of the metrics, or says why there are none."""
 
-import shlex
 import weakref
 from dataclasses import replace
 
@@ -54,15 +53,6 @@ def test_a_row_has_the_errors_and_what_they_cost():
     assert row["command"] == "airlight view sphere-spot --method shadow-planes --kernel exact --size 24x18"
 
 
-def test_the_command_of_a_row_is_read_by_a_shell_as_it_was_meant():
-    chosen = configuration("shadow-planes", None, {"order": "none"})
-    cell = Cell("/my scenes/a (b).xml", SIZE, ("medium.sigma_t=0.1, 0.2, 0.3",), chosen)
-    words = shlex.split(work._command(cell))
-    assert words[:5] == ["airlight", "view", "/my scenes/a (b).xml", "--method", "shadow-planes"]
-    assert words[words.index("--change") + 1] == "medium.sigma_t=0.1, 0.2, 0.3"
-    assert words[words.index("--set") + 1] == "order=none"
-
-
 @pytest.mark.usefixtures("variant")
 def test_preparation_is_timed_when_what_was_prepared_before_is_gone(monkeypatch):
     """In `random:20` the maps of 35 lights take a gigabyte: two of these ended the worker."""
@@ -100,25 +90,6 @@ def test_a_refusal_is_a_row():
     assert "lights with a place" in row["reason"]
     assert row["p99"] is None
     assert row["truth_mean"] > 0
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("variant")
-def test_what_is_not_finite_is_counted_and_kept_out_of_the_errors(monkeypatch):
-    made = work.unchecked_frame
-
-    def broken(*given):
-        frame = made(*given)
-        airlight = np.array(frame.airlight)
-        airlight[3, 4, 1] = np.nan
-        airlight[5, 6] = -1.0
-        return replace(frame, airlight=airlight)
-
-    monkeypatch.setattr(work, "unchecked_frame", broken)
-    row = row_of("open-fog", configuration("unshadowed"), times="none")
-    assert (row["status"], row["nonfinite"], row["negative"]) == ("done", 1, 1)
-    assert row["outside_bound"] == 2
-    assert row["max"] > 0.5
 
 
 @pytest.mark.slow
