@@ -97,14 +97,6 @@ def test_sampled_distances_have_their_density(variant):
         assert np.mean(y**2 / density) == pytest.approx(1.7**3 / 3, rel=2e-3)
 
 
-def test_enclosed_scene_is_exactly_dark(variant):
-    import mitsuba as mi
-
-    shell = {"type": "cube", "to_world": mi.ScalarTransform4f().scale(9.0), "bsdf": {"type": "diffuse"}}
-    _, batches = traced(sunny(brick=brick(), shell=shell), 2, samples=8)
-    assert np.all(batches.mean == 0)
-
-
 @pytest.mark.claim("volpath-agrees")
 @pytest.mark.statistical
 @pytest.mark.parametrize("name", ["box and sphere", "thick, light from behind"])
@@ -136,16 +128,3 @@ def test_medium_without_bounds_is_refused(variant, estimator, bounded):
     with pytest.raises(InputError, match=r"light 'sun' is directional: .* give the medium bounds") as refusal:
         read()
     assert "\n" not in str(refusal.value)
-
-
-def test_medium_of_no_extinction_around_bodies_is_clear_air(variant):
-    clear, _ = traced(sunny(brick=brick()), 1, samples=4)
-    scene = sunny(brick=brick() | {"exterior": {"type": "ref", "id": "fog"}})
-    scene["sensor"]["medium"] = {"type": "ref", "id": "fog"}
-    image, batches = traced({"type": "scene", "fog": tiny_scene()["fog"] | {"sigma_t": 0.0}} | scene, 8)
-    assert image.airlight == pytest.approx(clear.airlight, rel=1e-12)
-    total = clear.airlight.sum(axis=(0, 1))
-    error = np.sqrt(np.sum(batches.standard_error[0] ** 2, axis=0))
-    assert np.all(error < 5e-3 * total)
-    # Student's value with seven degrees of freedom that one of 10 000 exceeds, three channels.
-    assert np.all(np.abs(batches.mean[0].sum(axis=0) - total) < 8.6 * error)

@@ -24,12 +24,6 @@ def everywhere():
     return {layer: np.ones(SHAPE, dtype=bool) for layer in LAYERS}
 
 
-def test_pixels_that_spread_alike_get_the_same():
-    counts = allocated(pilot_with(np.full(SHAPE, 0.3)), 64, shape=SHAPE, masks=everywhere())
-    assert counts.shape == (2, PIXELS)
-    assert np.all(counts == 64)
-
-
 @pytest.mark.claim("samples-shared-out")
 def test_more_goes_where_more_spreads_and_the_sum_stays():
     spread = np.full(SHAPE, 0.01)
@@ -38,14 +32,6 @@ def test_more_goes_where_more_spreads_and_the_sum_stays():
     # Away from the border between the halves: a quarter for all, the rest by 9 to 1.
     assert counts[0, 0] / counts[-1, 0] == pytest.approx((EQUAL + 0.75 * 1.8) / (EQUAL + 0.75 * 0.2), rel=0.1)
     assert counts.mean() == pytest.approx(1000, rel=1e-3)  # rounding of 48 counts
-
-
-def test_pixels_that_are_left_out_get_the_equal_share():
-    masks = everywhere()
-    masks["airlight"][0] = False
-    counts = allocated(pilot_with(np.full(SHAPE, 0.3)), 64, shape=SHAPE, masks=masks)
-    assert np.all(counts[0].reshape(SHAPE)[0] == 64 * EQUAL)
-    assert np.all(counts[1] == 64)
 
 
 @pytest.mark.claim("samples-shared-out")
@@ -96,19 +82,3 @@ def test_counts_are_those_of_each_pixel(variant):
     equal = volpath_batch(truth, 5, 8)
     same = volpath_batch(truth, 5, 8, counts=np.full((2, 12), 8, dtype=np.uint32))
     assert np.array_equal(equal.mean, same.mean)
-
-
-def test_counts_are_for_single_scattering(variant):
-    import mitsuba as mi
-
-    truth = read_truth(mi.load_dict(tiny_scene(size=(4, 3))))
-    with pytest.raises(ValueError, match="counts"):
-        volpath_batch(truth, 0, 8, max_depth=3, counts=np.ones((2, 12), dtype=np.uint32))
-
-
-def test_pixels_are_traced_in_parts_of_so_many_paths(monkeypatch):
-    import reference.monte_carlo.volpath.integrator
-
-    monkeypatch.setattr(reference.monte_carlo.volpath.integrator, "_PATHS", 10)
-    parts = reference.monte_carlo.volpath.integrator._parts(np.array([5, 5, 30, 1, 1, 8, 2], dtype=np.uint32))
-    assert [(part.start, part.stop) for part in parts] == [(0, 2), (2, 3), (3, 6), (6, 7)]

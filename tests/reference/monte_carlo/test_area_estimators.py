@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.area_lights import BLACK, NULL, lamp, lit_scene
-from tests.helpers.scenes import bounded_medium, tiny_scene
+from tests.helpers.scenes import tiny_scene
 
 _BATCHES = 24
 #: Extinction, height and radius of a sphere light past a ray from -2 to 3 m of its foot, and the integral K: certified
@@ -128,31 +128,6 @@ def test_both_estimators_agree(variant, name):
         assert np.all(np.abs(mean - other) < 4 * together + 5e-4 * other)
 
 
-@pytest.mark.statistical
-@pytest.mark.claim("area-lights-by-samples", tolerance="four standard errors, which are below 1 %")
-def test_both_estimators_agree_where_the_light_crosses_the_bounds_of_a_medium(variant):
-    """Rationale: each point of the light has a medium of its own.
-
-    Setup: a light of material 'null'. Of a black one volpath loses 5 % here: past a boundary its shadow rays meet the
-    light itself where it is nearer than 0.3 m, since what they start beyond the boundary is more than their epsilon.
-    Expected: four standard errors; single-scatter says the same of a black light.
-    """
-    import mitsuba as mi
-
-    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-    from reference.monte_carlo.volpath.integrator import volpath_batch
-
-    cube = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0.4, 0.3, 1.2]).scale([0.9, 0.8, 0.73])}
-    box = bounded_medium(cube, 0.7, (0.9, 0.8, 0.7))
-    truth, black = (_truth(lamp=_lamp("rectangle", bsdf), box=box, fog=None) for bsdf in (NULL, BLACK))
-    ours, theirs = (_run(batch, truth, 256) for batch in (single_scatter_batch, volpath_batch))
-    (mean, error), (other, other_error) = _pooled(ours, 0), _pooled(theirs, 0)
-    together = np.hypot(error, other_error)
-    assert np.all(together < 0.01 * other)
-    assert np.all(np.abs(mean - other) < 4 * together + 5e-4 * other)
-    assert _pooled(_run(single_scatter_batch, black, 256), 0)[0] == pytest.approx(mean, rel=5e-3)
-
-
 @pytest.mark.claim("area-lights-by-samples", tolerance="four standard errors, which are below 0.2 %")
 @pytest.mark.parametrize(
     "kind", ["rectangle", *(pytest.param(k, marks=pytest.mark.statistical) for k in ("disk", "sphere"))]
@@ -181,25 +156,6 @@ def test_surfaces_are_those_of_mitsubas_direct_integrator(variant, kind):
     together = np.hypot(error, spread)
     assert np.all(together < 2e-3 * expected)
     assert np.all(np.abs(mean - expected) < 4 * together)
-
-
-@pytest.mark.slow
-def test_black_lights_end_camera_rays_in_volpath_and_null_ones_do_not(variant):
-    """Rationale: `hide_emitters` hides the light that is seen directly, in Mitsuba 3.9.1 not the shape.
-
-    Setup: a light that faces away, before a floor that a lamp lights.
-    """
-    from reference.monte_carlo.volpath.integrator import volpath_batch
-
-    away = {"to_world": _at((0.15, -2.9, 1.0), (0.3, 3.0, 0.3), [2.5, 2.5, 1.0])}
-    point = tiny_scene()["lamp"]
-    surfaces = [
-        volpath_batch(_truth(lamp=point, light=lamp(bsdf=bsdf, radiance=(1e-9,) * 3, **away)), 0, 64).mean[1]
-        for bsdf in (BLACK, NULL)
-    ]
-    plain = volpath_batch(_truth(), 0, 64).mean[1]
-    assert surfaces[0].max() < 1e-6
-    assert surfaces[1].mean() == pytest.approx(plain.mean(), rel=0.05)
 
 
 @pytest.mark.parametrize("kind", ["sphere", *(pytest.param(k, marks=pytest.mark.slow) for k in ("rectangle", "disk"))])
@@ -233,25 +189,3 @@ def test_density_of_points_on_a_light(variant, kind):
                 share = float(part(np.array(even.position).T - centre).mean())
                 error = (worth * inside).std() / np.sqrt(count) + 2e-3 * light.area * (share < 1)
                 assert abs((worth * inside).mean() - share * light.area) < 4 * error + 1e-9
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"kind": "cube"}, "is a Cube"),
-        ({"kind": "disk", "scale": [0.5, 0.3, 1.0]}, "sheared or stretched"),
-        ({"kind": "rectangle", "texture": True}, "textured radiance"),
-    ],
-)
-def test_other_lights_are_refused_by_name(variant, change, words):
-    import mitsuba as mi
-
-    from analytic.errors import InputError
-    from reference.monte_carlo.single_scatter.scene_data import read_task
-
-    light = lamp(change["kind"], to_world=_at((0.1, 0.2, 3.0), (0, 0, 0), change.get("scale", [0.5, 0.5, 0.5])))
-    if "texture" in change:
-        bitmap = mi.Bitmap(np.ones((2, 2, 3), dtype=np.float32))
-        light["emitter"] = {"type": "area", "radiance": {"type": "bitmap", "bitmap": bitmap, "raw": True}}
-    with pytest.raises(InputError, match=words):
-        read_task(mi.load_dict({"type": "scene", "lamp": light}), None, 1)

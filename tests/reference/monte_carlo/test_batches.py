@@ -7,14 +7,6 @@ from hypothesis import strategies as st
 from reference.monte_carlo.batches import LARGEST_SEED, combined_moments, parse_seed_ranges, seed_ranges
 
 
-@pytest.mark.parametrize(
-    ("seeds", "words"),
-    [((0,), "0"), (range(64), "0-63"), ((5, 3, 4), "3-5"), ((0, 1, 7, 9, 10), "0-1,7,9-10"), ((), "")],
-)
-def test_seeds_in_words(seeds, words):
-    assert seed_ranges(seeds) == words
-
-
 @given(st.sets(st.integers(0, LARGEST_SEED - 1), min_size=1, max_size=40))
 def test_words_name_the_same_seeds(seeds):
     assert parse_seed_ranges(seed_ranges(seeds)) == tuple(sorted(seeds))

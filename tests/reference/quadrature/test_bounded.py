@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 from tests.helpers.suns import CHORDS, brick, pearl, plain_airlight
 from tests.helpers.volpath import assert_volpath_agrees
 
@@ -78,62 +78,6 @@ def test_airlight_is_the_sum_over_small_steps(variant, case):
         assert airlight[pixel] == pytest.approx(expected, rel=rtol), pixel
     # 1e-9 is asked for; edges of light and shadow, of which there are none here, add 2e-6 of a strip for each end.
     assert np.all(bound[lit] <= 1e-4 * airlight[lit])
-
-
-def test_scaled_leg_leaves_out_what_is_beside_the_lamp(variant):
-    """A renderer with a shadow-ray epsilon does not attenuate over the last part of the leg, whatever is there."""
-    truth, image = truth_and_image(CASES["lamp inside"](), shadow_scale=0.7)
-    airlight = image.airlight.reshape(-1, 3)
-    lit = np.flatnonzero(airlight.max(axis=1) > 0)
-    for pixel in lit[:: max(1, len(lit) // 2)]:
-        expected = plain_airlight(truth, pixel, shadow_scale=0.7)
-        assert airlight[pixel] == pytest.approx(expected, rel=1e-8), pixel
-
-
-def test_huge_box_is_the_unbounded_medium(variant):
-    """Camera and lamp inside of a box of 2000 m: what lies beyond is below exp(-300)."""
-    import mitsuba as mi
-
-    lamps = {"lamp": spot(beam=20.0)}
-    _, expected = truth_and_image(tiny_scene(**lamps))
-    scene = tiny_scene(**lamps)
-    fog = scene.pop("fog")
-    huge = {"type": "cube", "to_world": mi.ScalarTransform4f().scale(1000.0), "bsdf": {"type": "null"}}
-    scene = {"type": "scene", "fog": fog} | scene | {"huge": huge | {"interior": {"type": "ref", "id": "fog"}}}
-    truth, image = truth_and_image(scene)
-    assert len(truth.media) == 1
-    assert not truth.medium.sigma_t.any()
-    assert image.airlight == pytest.approx(expected.airlight, rel=1e-8)  # both meet 1e-9 of each pixel
-    assert image.surface == pytest.approx(expected.surface, rel=1e-6)  # there with a float32 length of the leg
-
-
-def test_a_medium_like_its_surroundings_is_not_there(variant):
-    _, expected = truth_and_image(everywhere())
-    albedo = (0.3, 0.6, 0.9)
-    _, image = truth_and_image(everywhere(brick=in_fog(brick(0.31, albedo)), pearl=in_fog(pearl(0.31, albedo))))
-    assert image.airlight == pytest.approx(expected.airlight, rel=1e-8)
-
-
-def test_no_extinction_no_airlight(variant):
-    _, image = truth_and_image(clear_scene(brick=brick(0.0), pearl=pearl(0.0)))
-    assert not image.airlight.any()
-    assert not image.airlight_bound.any()
-
-
-def test_absorbing_sphere_before_a_wall(variant):
-    """The wall behind a sphere of albedo 0 is darker by exp(-sigma_t chord), and the sphere itself is black."""
-    import mitsuba as mi
-
-    at = mi.ScalarTransform4f().translate([0, 1.9, 0]).rotate([1, 0, 0], 90).scale(9.0)
-    wall = {"type": "rectangle", "to_world": at, "bsdf": {"type": "twosided", "bsdf": {"type": "diffuse"}}}
-    lamp = tiny_scene()["lamp"] | {"position": [1.9, 1.1, 2.9]}  # behind the sphere: its legs to the wall miss it
-    truth, image = truth_and_image(clear_scene(wall=wall, lamp=lamp, pearl=pearl(1.3, (0.0, 0.0, 0.0))))
-    _, clear = truth_and_image(clear_scene(wall=wall, lamp=lamp, pearl=pearl(0.0)))
-    near, far = CHORDS["pearl"](truth.origin, truth.direction)
-    expected = clear.surface.reshape(-1, 3) * np.exp(-1.3 * (far - near))[:, None]
-    assert image.surface.reshape(-1, 3) == pytest.approx(expected, rel=1e-6)  # Mitsuba's 1.3 is a float32
-    assert (far - near).max() > 0.7
-    assert not image.airlight.any()
 
 
 @pytest.mark.claim("lit-surface", tolerance="1e-6 relative")

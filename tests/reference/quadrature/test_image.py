@@ -69,22 +69,6 @@ def test_shadow_of_a_sphere_against_its_closed_form(variant):
     assert image.transitions > 0
 
 
-@pytest.mark.claim("corrected-for-the-epsilon")
-def test_scaled_shadow_leg_brightens_by_the_optical_depth(variant):
-    import mitsuba as mi
-
-    from reference.quadrature.image import quadrature_image
-    from reference.scene.read import read_truth
-
-    truth = read_truth(mi.load_dict(tiny_scene()))
-    plain, short = quadrature_image(truth), quadrature_image(truth, shadow_scale=1 - 1e-3)
-    gain = short.airlight / plain.airlight - 1
-    # The leg from the light is between 0 and about 10 m long, sigma_t 0.31/m.
-    assert np.all((gain > 0) & (gain < 1e-3 * 0.31 * 10))
-    lit = plain.surface > 0
-    assert np.all(short.surface[lit] > plain.surface[lit])
-
-
 @pytest.mark.claim("lit-surface", tolerance="1e-5 relative: float32")
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_surface_is_mitsubas_direct_integrator(variant, kind):

@@ -36,16 +36,6 @@ def brute_force(truth, n, regular=False):
     return values.airlight.reshape(shape).mean(axis=2), surface.mean(axis=2), surface.max()
 
 
-def test_directions_through_the_middles_are_those_of_the_image(variant):
-    from reference.scene.camera import film_directions
-
-    truth = truth_of(tiny_scene())
-    row, column = np.divmod(np.arange(truth.width * truth.height), truth.width)
-    positions = np.stack([column + 0.5, row + 0.5], axis=1)
-    directions = film_directions(truth.scene.sensors()[0], positions, (truth.width, truth.height))
-    assert directions == pytest.approx(truth.direction, abs=1e-15)
-
-
 @pytest.mark.claim("pixel-area", tolerance="1e-4 relative, the tolerance asked for")
 def test_smooth_fog_is_the_integral_over_the_pixel(variant):
     """Gauss's product rule with 12 x 12 points, converged for what is smooth: the light is out of view."""
@@ -92,21 +82,6 @@ def test_edges_against_brute_force(variant, scene):
     assert np.abs(centre.airlight - airlight)[~near].max() > 5 * error.max()  # the centre is another thing
 
 
-@pytest.mark.claim("pixel-area")
-@pytest.mark.slow
-def test_smaller_tolerance_comes_closer(variant):
-    from reference.quadrature.pixel_area import area_image
-
-    truth = truth_of(box_scene(size=(6, 4)))
-    expected, *_ = brute_force(truth, 32)
-    images = [area_image(truth, samples=8, tolerance=tolerance) for tolerance in (0.5, 0.03, 2e-3)]
-    errors = [np.abs(image.airlight - expected).mean() / expected.mean() for image in images]
-    bounds = [image.airlight_bound.mean() / expected.mean() for image in images]
-    assert errors[0] > 2 * errors[1] > 2 * errors[2]
-    assert bounds[0] > 2 * bounds[1] > 2 * bounds[2]
-    assert errors[2] < 3e-3  # 32 x 32 random sub-pixels leave 0.3 % of a jump open
-
-
 def test_a_light_in_the_middle_of_a_pixel_has_a_finite_mean(variant):
     """The ray through the centre meets the light; the mean over the area is what the one over r leaves."""
     from reference.quadrature.image import quadrature_image
@@ -122,21 +97,3 @@ def test_a_light_in_the_middle_of_a_pixel_has_a_finite_mean(variant):
     # Around the light the airlight is c/rho: the sub-pixel that holds it leaves about a 32nd of the mean open.
     assert area.airlight[1, 1] == pytest.approx(expected[1, 1], rel=0.05)
     assert np.all(area.airlight_bound[1, 1] < 0.1 * area.airlight[1, 1])
-
-
-def test_smooth_pixels_take_few_rays(variant, monkeypatch):
-    """A pixel alone in the open: its middle, and shared with its neighbours the corners and sides of its quarters."""
-    import reference.quadrature.pixel_area as pixel_area
-
-    lamp = {"type": "point", "position": [3.9, 0.7, 3.9], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
-    truth = truth_of(tiny_scene(ball=None, floor=None, lamp=lamp, size=(24, 18)))
-    cast, compute = [], pixel_area.ray_values
-
-    def counted(part, **how):
-        cast.append(len(part.direction))
-        return compute(part, **how)
-
-    monkeypatch.setattr(pixel_area, "ray_values", counted)
-    image = pixel_area.area_image(truth, tolerance=1e-3)
-    assert sum(cast) < 9 * 24 * 18
-    assert np.all(image.airlight_bound < 1.001e-3 * image.airlight)

@@ -66,16 +66,6 @@ def test_points_follow_the_error_that_is_asked_for():
         assert (standard_error(means)[:3] <= error * means.mean(axis=2)[:3]).all()
 
 
-def test_a_plan_without_an_error_has_no_pilot():
-    def sums(part, plan, active, numbers):
-        assert part != PILOT
-        return np.full((len(active), 3, REPLICATES), numbers[1] - numbers[0])
-
-    means, counts = replicate_means(5, np.zeros((5, 3)), PointPlan(error=0.0, first=12, most=100), sums)
-    assert (means == 1).all()
-    assert (counts == 100).all()
-
-
 RUNS = 400
 
 

@@ -2,8 +2,7 @@
 import numpy as np
 import pytest
 
-from reference.quadrature.segments import AMBIENT, camera_segments, leg_kinks, optical_depth, scattering_range
-from reference.visibility.line_crossings import crossings
+from reference.quadrature.segments import AMBIENT, camera_segments, optical_depth, scattering_range
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 
 FOG = {"type": "homogeneous", "id": "fog", "sigma_t": 0.11, "albedo": 0.6, "has_spectral_extinction": False}
@@ -88,35 +87,3 @@ def test_segments_cover_what_scatters(variant, ambient):
     low, high = scattering_range(segments)
     assert np.all(low[high > low] >= 0)
     assert np.array_equal(high > low, np.any(covered > 0, axis=1))
-
-
-def test_between_its_kinks_the_chord_of_the_leg_is_smooth(variant):
-    """Rationale: a kink that is not found costs digits. Second differences jump there, and nowhere else.
-
-    The part of the leg inside of a body, for legs to points 2e-4 m apart on rays that pass beyond it: its second
-    differences are 4e-8 m^2 times its curvature, which is below 50/m but beside the tangents of a sphere.
-    """
-    truth = truth_of()
-    light, step = np.array([-0.9, 0.7, 1.4]), 2e-4
-    for medium in truth.media:
-        steep = medium.name == "pearl"
-        direction = np.array([[1.0, 0.2, 0.1], [0.9, -0.3, 0.25]])
-        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-        through = medium.bounds.centre if steep else np.array([-0.5, 0.1, 0.5])
-        offset = through + 0.4 * (through - light) - light
-        foot = offset - np.sum(offset * direction, axis=1, keepdims=True) * direction
-        height = np.linalg.norm(foot, axis=1)
-        ray, kink = leg_kinks(medium.bounds, light, (direction, foot / height[:, None]), height)
-        for number in range(2):
-            s = np.arange(-1.6, 1.6, step)
-            leg = foot[number] + s[:, None] * direction[number]
-            reach = np.linalg.norm(leg, axis=1)
-            enter, leave = crossings(medium.bounds, light, leg / reach[:, None])
-            chord = np.maximum(np.minimum(leave, reach) - np.maximum(enter, 0), 0)
-            bend = np.abs(np.diff(chord, 2))
-            own = np.concatenate([kink[ray == number], s[1:][np.diff((leave > reach) & (enter < reach)) != 0]])
-            near = np.min(np.abs(s[1:-1, None] - own[None, :]), axis=1) < (0.1 if steep else 2 * step)
-            assert len(own) >= 2
-            assert chord.max() > 0.1
-            assert bend[~near].max() < 5e-6  # that of a kink at which the slope changes by 0.025
-            assert bend.max() > 5e-5

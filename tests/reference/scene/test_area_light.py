@@ -56,14 +56,6 @@ def test_disk_and_sphere_have_radius_area_and_power(variant):
     assert sphere.area == pytest.approx(4 * np.pi * 0.49, rel=1e-6)
 
 
-def test_black_lights_are_occluders_and_null_ones_are_not(variant):
-    truth = read_truth(
-        lit_scene(black=lamp("sphere", center=[0, 0, 5.0]), clear=lamp("sphere", center=[4.0, 0, 5.0], bsdf=NULL))
-    )
-    assert [shape.id() for shape in truth.occluders.shapes()] == ["black"]
-    assert [(light.name, light.opaque) for light in truth.area] == [("black", True), ("clear", False)]
-
-
 def refused():
     import mitsuba as mi
 

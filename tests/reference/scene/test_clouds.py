@@ -61,12 +61,6 @@ def test_crossing_and_nested_clouds_are_refused(variant):
         read(a=cloud(ball, "a"), b=cloud(scaled(ball, 0.4), "b"))
 
 
-def test_vertices_that_a_file_doubles_count_as_one(variant):
-    vertices, faces = icosphere(1)
-    doubled = vertices[faces.reshape(-1)], np.arange(faces.size).reshape(-1, 3)
-    assert len(read(puff=cloud(doubled)).clouds) == 1
-
-
 def test_other_lights_and_scenes_without_clouds_are_refused(variant):
     from validation.scenes.cloud_parts import sky
     from validation.scenes.parts import mitsuba_mesh, point_light
@@ -79,25 +73,3 @@ def test_other_lights_and_scenes_without_clouds_are_refused(variant):
     with pytest.raises(InputError, match="no light; wanted"):
         read(puff=cloud(ball), sun=None)
     np.testing.assert_allclose(read(puff=cloud(ball), sky=sky((0.1, 0.2, 0.3))).sky, (0.1, 0.2, 0.3), rtol=1e-6)
-
-
-def test_a_camera_in_a_cloud_must_say_so(variant):
-    with pytest.raises(InputError, match="the camera is inside of shape 'puff', but references another medium"):
-        read(puff=cloud(scaled(icosphere(2), 9.0)))
-
-
-def test_opacity_is_that_of_the_lengths(variant):
-    """Beside a ball of radius 1 along its middle ray: exp(-2 sigma_t); two clouds behind one another multiply."""
-    from reference.monte_carlo.cloud_paths.opacity import seen_clouds
-
-    cube = box((1.7, 1.9, 1.3))
-    clouds = read(a=cloud(cube, "a"), b=cloud(placed(cube, (0.0, 2.9, 0.0)), "b"))
-    from dataclasses import replace
-
-    ways = np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
-    seen = seen_clouds(replace(clouds, direction=ways, origin=np.array([0.2, -7.1, 0.1])))
-    sigma_t = clouds.clouds[0].sigma_t
-    # float32 holds the corners to 6e-8.
-    np.testing.assert_allclose(seen.transmittance[0], np.exp(-2 * 1.9 * sigma_t), rtol=1e-6)
-    np.testing.assert_array_equal(seen.transmittance[1], 1.0)
-    assert list(seen.meets) == [True, False]

@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from reference.scene.convex_bounds import Polyhedron, Sphere, overlap, read_bounds
-from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
+from reference.scene.convex_bounds import Polyhedron, overlap, read_bounds
+from tests.helpers.scenes import bounded_medium, clear_scene
 from tests.helpers.shapes import bounds_of, box, sphere
 
 GREY = (0.7, 0.7, 0.7)
@@ -32,16 +32,6 @@ def test_cube_has_six_planes_and_twelve_edges_that_bend(variant):
         map(tuple, np.vstack([np.eye(3), -np.eye(3)]))
     )
     assert np.all(bounds.normal @ [0.1, 0.2, 0.3] < bounds.offset)
-
-
-def test_sphere_is_read_in_the_world(variant):
-    import mitsuba as mi
-
-    turned = mi.ScalarTransform4f().translate([1.0, 2.0, 3.0]).rotate([0.6, 0.8, 0], 31).scale(0.5)
-    bounds = bounds_of({"type": "sphere", "center": [0.2, 0.0, 0.0], "radius": 0.7, "to_world": turned})
-    assert isinstance(bounds, Sphere)
-    assert bounds.radius == pytest.approx(0.35, rel=1e-6)
-    assert bounds.centre == pytest.approx(np.array(turned @ mi.ScalarPoint3f(0.2, 0, 0)).ravel(), rel=1e-6)
 
 
 OVERLAPS = [
@@ -93,17 +83,6 @@ def test_refused_meshes(variant):
         bounds_of(sphere() | {"flip_normals": True})
 
 
-def test_rounding_of_the_corners_is_not_a_dent(variant):
-    """Two opposite corners of the lid lie one rounding of float32 too high, which makes a valley of the diagonal."""
-    corners, faces = prism([(0, 0), (1, 0), (1, 1), (0, 1)])
-    vertices = np.array(corners, dtype=np.float32) + np.float32(3)
-    for corner in (5, 7):
-        vertices[corner, 2] = np.nextafter(vertices[corner, 2], np.float32(9))
-    bounds = read_bounds(mesh(vertices, faces))
-    assert isinstance(bounds, Polyhedron)
-    assert len(bounds.normal) == 12
-
-
 def glass(shape):
     return bounded_medium(shape, 0.3, GREY) | {"bsdf": {"type": "dielectric"}}
 
@@ -135,13 +114,3 @@ def test_refused_scenes(variant, changes, message):
 
     with pytest.raises(InputError, match=message):
         read_truth(mi.load_dict(clear_scene(size=(4, 3), **changes())))
-
-
-def test_media_on_opaque_shapes_are_refused(variant):
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
-
-    solid = tiny_scene()["ball"] | {"interior": AMBIENT}
-    with pytest.raises(InputError, match="'ball' bounds a medium and has a SmoothDiffuse material"):
-        read_truth(mi.load_dict(tiny_scene(size=(4, 3), ball=solid)))

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
+from tests.helpers.scenes import spot, tiny_scene
 
 
 def test_both_sides_read_the_same_scene(variant):
@@ -57,19 +57,3 @@ def test_refusals(variant, changes, message):
 
     with pytest.raises(InputError, match=message):
         read_truth(mi.load_dict(tiny_scene(**changes)))
-
-
-def test_reading_a_scene_renames_none_of_its_shapes(variant):
-    """Shapes are told by their names, and these count in the digest under which results are kept."""
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
-    from reference.storage.scene_digest import scene_digest
-
-    sphere = bounded_medium({"type": "sphere", "center": [0.2, 0.1, 0.9], "radius": 0.4}, 0.7, (0.5, 0.5, 0.5))
-    scene = mi.load_dict(clear_scene(size=(4, 3), mist=sphere, floor=tiny_scene()["floor"]))
-    before = scene_digest(scene)
-    truth = read_truth(scene)
-    assert [shape.id() for shape in truth.occluders.shapes()] == ["floor"]
-    assert {shape.id() for shape in scene.shapes()} == {"mist", "floor"}
-    assert scene_digest(scene) == before

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: what is kept is found again until its arguments or the code that computes it change, and no longer."""
 
-import ast
 import inspect
 import os
 import re
@@ -22,7 +21,6 @@ from reference.storage.kept import (
     code_digest,
     fresh_results,
     fresh_since,
-    is_damaged,
     is_kept,
     kept,
     key_of,
@@ -66,18 +64,6 @@ def test_what_was_computed_is_found_again_and_fresh_results_are_not_older_than_t
 
 def _with_root():
     return os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[3])}
-
-
-def test_what_fails_is_not_kept_and_damage_is_found(own_cache):
-    with pytest.raises(ZeroDivisionError):
-        kept("page-a", lambda: {"a": 1 // 0})
-    assert not is_kept("page-a")
-    store("page-a", {"a": np.arange(1000.0)}, Spent(1.0, 2.0))
-    assert not is_damaged("page-a")
-    path = own_cache / "page-a.npz"
-    path.write_bytes(path.read_bytes()[:-2000])
-    assert is_damaged("page-a")
-    assert kept("page-a", counted([])).arrays["a"].tolist() == [1.0] * 3
 
 
 def test_times_are_those_of_computing_and_never_of_loading():
@@ -190,15 +176,6 @@ def test_code_is_the_same_wherever_it_lies_and_in_every_process(folder, tmp_path
     assert ran.stdout.split() == [code_digest([folder / "mine.py"]), source_digest(key_of)]
 
 
-def test_versions_are_in_the_digest(monkeypatch):
-    before = source_digest(kept)
-    module._digest_of.cache_clear()
-    monkeypatch.setattr("importlib.metadata.version", lambda name: "99" if name == "scipy" else "1")
-    other = source_digest(kept)
-    module._digest_of.cache_clear()
-    assert other != before
-
-
 def functions():
     """What computes each kind of what is kept, and a module of which it takes numbers."""
     from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch
@@ -252,17 +229,6 @@ def test_every_kind_hangs_on_the_code_that_computes_it_and_not_on_claims_of_pape
         assert needed in names, kind
         apart = ("validation.papers", "reports.commands", "reports.papers", "reports.tables")
         assert not [name for name in names if name.startswith(apart)], kind
-
-
-def test_imports_are_found_wherever_they_stand():
-    """All that the syntax trees name, imports within functions among them."""
-    names = closure(functions()["report-stability"][0])
-    ours = module._modules()
-    for name in names:
-        for node in ast.walk(ast.parse(ours[name.removesuffix(".__init__")].read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom):
-                wanted = {node.module, *(f"{node.module}.{each.name}" for each in node.names)}
-                assert {each for each in wanted & ours.keys() if ours[each].name != "__init__.py"} <= names
 
 
 def test_every_kind_that_is_kept_is_in_the_table():

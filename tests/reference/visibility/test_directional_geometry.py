@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.helpers.polygons import lit_lengths
 from tests.helpers.suns import ball_over_floor, brick, sunny
 
 
@@ -105,26 +104,6 @@ def test_one_triangle_in_closed_form():
         assert len(below.ray) == (1 if ends[0][2] > 0 else 2)
 
 
-@pytest.mark.parametrize("sign", [1, -1], ids=["towards the light", "away from it"])
-def test_rays_along_the_light(sign):
-    """All of such a ray has one leg: what lies behind its end, or behind the camera, hides it all or not at all."""
-    from reference.scene.directional_light import DirectionalLight
-    from reference.scene.shapes import Shapes
-    from reference.visibility.directional_geometry import parallel_intervals
-    from reference.visibility.parallel_rays import parallel_rays
-
-    towards = unit([0.3, 0.4, 0.5])
-    light = DirectionalLight(-towards, np.ones(3), None)
-    rays = parallel_rays(np.zeros(3), sign * towards[None], light, (np.array([0.5]), np.array([2.0])))
-    for distance, count in ((3.0, 0), (-3.0, 1)):  # along the way to the light, from the camera
-        plate = distance * towards + np.array([[1.0, 0.1, -0.3], [-0.7, 0.8, 0.1], [-0.2, -0.9, 0.4]])
-        intervals = parallel_intervals(rays, Shapes(plate[None]))
-        # Looking away from the light, what is before the camera lies behind it as seen from the light.
-        assert len(intervals.ray) == count, (sign, distance)
-        sphere = parallel_intervals(rays, Shapes(np.empty((0, 3, 3)), distance * towards[None], np.array([0.3])))
-        assert len(sphere.ray) == count
-
-
 def scene_of_many(**changes):
     import mitsuba as mi
 
@@ -151,40 +130,6 @@ def rays_and_truth(scene):
     truth = read_truth(mi.load_dict(scene))
     span = scattering_range(camera_segments(truth, surface_hits(truth).distance))
     return truth, parallel_rays(truth.origin, truth.direction, truth.directional[0], span)
-
-
-def test_cast_rays_find_the_edges_of_the_geometry(variant):
-    """Two routes that share no code, edge by edge, and neither is contradicted by random shadow rays."""
-    from reference.visibility.directional_casting import directional_intervals
-
-    truth, rays = rays_and_truth(scene_of_many(size=(64, 48)))
-    exact = directional_intervals(truth, rays, edges="geometry")
-    cast = directional_intervals(truth, rays, edges="rays")
-    assert exact.transitions > 100
-    assert exact.random_checks.checked == 32 * np.sum(rays.last > rays.first)
-    assert exact.random_checks.left == cast.random_checks.left == 0
-    lit = [lit_lengths(intervals, rays.ends) * (rays.last - rays.first) for intervals in (exact, cast)]
-    # Legs and their ends are rounded to 2e-6 of some metres. One shadow is so thin that all samples step over it.
-    assert np.sum(np.abs(lit[0] - lit[1]) > 2e-5) <= 1
-
-
-def test_shapes_of_other_kinds_are_cast_at(variant):
-    """A disk in the place of the square that it fills to pi/4: its shadow by rays, all else by geometry."""
-    import mitsuba as mi
-
-    from reference.visibility.directional_casting import directional_intervals
-
-    disk = {"type": "disk", "to_world": mi.ScalarTransform4f().translate([-0.6, 0.2, 1.3]).scale(0.2)}
-    truth, rays = rays_and_truth(sunny(brick=brick(), disk=disk, **ball_over_floor(), size=(24, 18)))
-    intervals = directional_intervals(truth, rays)
-    towards = -truth.directional[0].direction
-    point, lit, gap = samples(rays, intervals, 50, 3)
-    height = (1.3 - point[..., 2]) / towards[2]
-    on_disk = np.linalg.norm((point + height[..., None] * towards)[..., :2] - [-0.6, 0.2], axis=-1) < 0.2
-    sphere = hits_spheres(point, towards, [(np.array([0.1, 0.1, 0.7]), 0.41)])
-    used = (rays.last > rays.first)[:, None] & (gap > 1e-5)
-    assert intervals.transitions > 10
-    assert not np.any((lit == (on_disk | sphere))[used])
 
 
 def test_wrong_geometry_is_left_in_doubt(variant, monkeypatch):

@@ -44,12 +44,3 @@ def test_distance_to_a_sphere_is_exact(variant, inside):
     assert np.linalg.norm(point - shapes.centre, axis=1) == pytest.approx(shapes.radius.item(), rel=1e-14)
     assert distance[met] == pytest.approx(hits.distance[met], rel=1e-5)
     assert np.isinf(distance[~met]).all()
-
-
-def test_rays_that_touch_a_sphere_keep_the_distance_that_was_cast(variant):
-    from reference.scene.convex_bounds import Sphere
-    from reference.visibility.exact_distance import _to_sphere
-
-    sphere = Sphere(np.array([0.0, 0.0, 5.0]), 1.0)
-    direction = np.array([[np.sin(a), 0.0, np.cos(a)] for a in (0.0, np.arcsin(0.2) + 1e-9)])
-    assert _to_sphere(sphere, np.zeros(3), direction, np.array([4.00001, 4.9])).tolist() == [4.0, 4.9]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from tests.helpers.polygons import box, box_scene, lit_lengths, rays_of
+from tests.helpers.polygons import box_scene, rays_of
 from tests.helpers.scenes import tiny_scene
 
 
@@ -39,60 +39,6 @@ def test_polygons_and_balls_are_exact_and_other_shapes_are_cast(variant):
         lit_intervals(truth, light, rays, ends=ends, edges="geometry")
 
 
-def test_mixed_scenes_keep_needles_exact_beside_shapes_that_are_cast(variant):
-    """A needle that few samples meet, a sphere and a pipe: the intersection is what all three leave, needle and all."""
-    from reference.visibility.lit_intervals import lit_intervals
-    from reference.visibility.triangles import geometric_intervals
-
-    needle = box((0.5, -0.3, 0.9), (2e-4, 2e-4, 8.0))
-    truth, light, rays, ends = setup(tiny_scene(pipe=cylinder(), needle=needle))
-    intervals = lit_intervals(truth, light, rays, ends=ends, samples=32)
-    assert intervals.random_checks.left == 0
-    assert intervals.doubt is None
-    # Cast densely, without the needle, whose shadow is narrower than what edges of cast rays leave open.
-    bare, *_ = setup(tiny_scene(pipe=cylinder()))
-    dense = lit_intervals(bare, light, rays, ends=ends, samples=1024, edges="rays")
-    lost = lit_lengths(dense, ends) - lit_lengths(intervals, ends)
-    assert lost.min() > -2e-5  # 2e-6 of the distance at each of a few edges, some of them grazing
-    alone, *_ = setup(tiny_scene(ball=None, floor=None, needle=needle))
-    of_needle = (ends[1] - ends[0]).clip(0) - lit_lengths(geometric_intervals(alone, light, rays, ends=ends), ends)
-    crossed = of_needle > 1e-5
-    assert crossed.sum() > 30
-    assert np.all(lost[crossed] < of_needle[crossed] + 2e-5)
-    assert np.mean(np.abs(lost - of_needle)[crossed] < 2e-5) > 0.7  # elsewhere the needle stands in a shadow
-    assert np.abs(lost[~crossed]).max() < 4e-5
-
-
-@pytest.mark.claim("cast-shadows")
-def test_only_shapes_that_are_cast(variant):
-    from reference.visibility.lit_intervals import lit_intervals
-
-    truth, light, rays, ends = setup(tiny_scene(ball=None, floor=None, pipe=cylinder()))
-    auto, cast = (lit_intervals(truth, light, rays, ends=ends, edges=edges) for edges in ("auto", "rays"))
-    assert np.array_equal(auto.low, cast.low)
-    assert auto.transitions > 20
-
-
-def test_what_is_lit_in_both(variant):
-    """Two sets of intervals by hand: overlapping, nested, touching, missing; doubt and checks add up."""
-    from reference.visibility.intervals import LitIntervals, RandomChecks, intersected
-
-    ends = np.zeros(5), np.ones(5)
-    ray, low, high = np.array([0, 0, 1, 2, 4]), np.array([0.0, 0.5, 0.2, 0.0, 0.0]), np.array([0.4, 1, 0.8, 0.5, 1])
-    doubt = np.array([1]), np.array([0.3]), np.array([0.01])
-    first = LitIntervals(ray, low, high, 5, edge=1e-11, doubt=doubt)
-    ray, low, high = np.array([0, 1, 1, 2, 3]), np.array([0.3, 0.0, 0.6, 0.5, 0.0]), np.array([0.6, 0.4, 1.0, 1, 1])
-    second = LitIntervals(ray, low, high, 5, random_checks=RandomChecks(7, 2, 1, 1, 0.1))
-    for pair in ((first, second), (second, first)):
-        both = intersected(*pair, ends)
-        assert both.ray.tolist() == [0, 0, 1, 1]
-        assert both.low.tolist() == [0.3, 0.5, 0.2, 0.6]
-        assert both.high.tolist() == [0.4, 0.6, 0.4, 0.8]
-        assert (both.transitions, both.edge) == (8, 2e-6)
-        assert both.random_checks == RandomChecks(7, 2, 1, 1, 0.1)
-        assert [part.tolist() for part in both.doubt] == [[1], [0.3], [0.01]]
-
-
 @pytest.mark.claim("shadow-ray-certificate")
 def test_certificate_of_both_routes_is_clean(variant):
     from reference.visibility.lit_intervals import lit_intervals
@@ -104,29 +50,6 @@ def test_certificate_of_both_routes_is_clean(variant):
         assert known.checked >= 32 * rays_used
         assert known.left == 0
         assert known.missed < 1e-3
-
-
-@pytest.mark.claim("shadow-ray-certificate")
-def test_slivers_that_random_samples_meet_are_mended(variant):
-    """From rays that are taken to be lit from end to end, random samples alone find the shadows of a row of posts."""
-    from reference.visibility.lit_intervals import _bisect
-    from reference.visibility.random_checks import Rounding, Toggles, checked_cast
-    from reference.visibility.triangles import geometric_intervals
-    from tests.helpers.visibility import visibility_test
-
-    posts = {f"post{i}": box((-0.9 + 0.31 * i, 0.1, 0.9), (0.03, 0.03, 3.0)) for i in range(6)}
-    truth, light, rays, ends = setup(tiny_scene(ball=None, size=(24, 18), **posts))
-    exact = geometric_intervals(truth, light, rays, ends=ends)
-    used = np.flatnonzero(ends[1] > ends[0])
-    nothing = Toggles(used, np.ones(len(used), bool), np.empty(0, np.int64), np.empty(0))
-    found_by = Rounding(visibility_test(truth.occluders, light.position, rays), _bisect)
-    mended = checked_cast(nothing, found_by, ends=ends, checks=128)
-    known = mended.random_checks
-    assert known.disagreements > 1000
-    assert known.refined == known.disagreements - known.left
-    assert known.left < 0.05 * known.disagreements  # rays with more slivers than rounds
-    shadow = [(ends[1] - ends[0])[used] - lit_lengths(f, ends)[used] for f in (exact, mended)]
-    assert np.abs(shadow[1] - shadow[0]).sum() < 0.05 * shadow[0].sum()
 
 
 @pytest.mark.claim("shadow-ray-certificate")

@@ -66,14 +66,6 @@ def test_as_for_one_point_after_another(crowded):
     assert (per_pair == 0).any()
 
 
-def test_few_slots_are_made_more(crowded, monkeypatch):
-    plenty = intervals_of(crowded)[0]
-    monkeypatch.setattr("reference.visibility.many_points._SLOTS", 1)
-    few = intervals_of(crowded)[0]
-    assert np.array_equal(few.pair, plenty.pair)
-    assert np.array_equal(few.low, plenty.low)
-
-
 def test_the_shadow_rays_agree_and_notice_a_fault(crowded):
     from dataclasses import replace
 

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.polygons import box, box_scene, lit_lengths, rays_of
-from tests.helpers.scenes import spot, tiny_scene
+from tests.helpers.scenes import tiny_scene
 
 
 def shadow_rays_disagree(truth, lamp, rays, ends, intervals, count=400):
@@ -20,20 +20,6 @@ def shadow_rays_disagree(truth, lamp, rays, ends, intervals, count=400):
         expected[mine] |= (theta[mine] > interval[1]) & (theta[mine] < interval[2])
         near[mine] |= np.minimum(np.abs(theta[mine] - interval[1]), np.abs(theta[mine] - interval[2])) < 1e-5
     return int(np.sum((lit != expected) & ~near))
-
-
-@pytest.mark.parametrize("lamp", [None, {"lamp": spot}], ids=["point", "spot"])
-def test_shadow_rays_agree_with_the_geometry_of_boxes(variant, lamp):
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
-    from reference.visibility.triangles import geometric_intervals
-
-    truth = read_truth(mi.load_dict(box_scene(**({} if lamp is None else {"lamp": spot()}))))
-    light, rays, ends = rays_of(truth)
-    intervals = geometric_intervals(truth, light, rays, ends=ends)
-    assert intervals.transitions > 30
-    assert shadow_rays_disagree(truth, light, rays, ends, intervals) == 0
 
 
 @pytest.mark.claim("exact-shadows")
@@ -130,22 +116,3 @@ def test_one_triangle_against_its_closed_form(variant):
         intervals = geometric_intervals(truth, light, (direction, normal, height), ends=ends, shapes=Shapes(moved))
         assert intervals.low == pytest.approx([ends[0][0]])
         assert intervals.high == pytest.approx([ends[1][0]])
-
-
-def test_pairs_of_rays_and_triangles_are_those_of_asking_each():
-    from reference.visibility.triangles import SLACK, Reaches, near_pairs
-
-    generator = np.random.default_rng(8)
-    for _ in range(20):
-        width = generator.random(90) * generator.choice([1e-9, 0.02, 3.0])
-        begin = generator.uniform(-np.pi, np.pi, 90)
-        # Some rays lie where a triangle begins, or ends, or on each other.
-        ends = np.mod(begin + width + np.pi, 2 * np.pi) - np.pi
-        azimuth = np.sort(np.concatenate([generator.choice(begin, 9), generator.choice(ends, 9), begin[:2], begin[:2]]))
-        cones = Reaches(begin, width, generator.random(90), generator.random(90))
-        reach = generator.random(len(azimuth)) + 0.3, generator.random(len(azimuth)) + 0.3
-        beyond = np.mod(azimuth[0] - begin + SLACK, 2 * np.pi) + (azimuth - azimuth[0])[:, None]
-        beyond -= 2 * np.pi * (beyond >= 2 * np.pi)
-        near = (beyond <= width + 2 * SLACK) & (cones.camera < reach[0][:, None]) & (cones.before < reach[1][:, None])
-        row, triangle = near_pairs(azimuth, reach, cones)
-        assert list(zip(row, triangle, strict=True)) == list(zip(*np.nonzero(near), strict=True))

@@ -69,26 +69,6 @@ def test_an_even_grid_is_a_homogeneous_cloud(variant):
     check_equal(even, homogeneous)
 
 
-@pytest.mark.slow
-@pytest.mark.statistical
-@pytest.mark.claim(
-    "hypertexture-truth", tolerance="4 standard errors of the image mean, one comparison in 16 000 by chance"
-)
-def test_every_order_is_that_of_volpath(variant):
-    """A rough grid beside a homogeneous cloud, over a ground, with a sky."""
-    from reference.monte_carlo.batches import merged
-    from reference.monte_carlo.volpath.orders import volpath_orders_batch
-    from tests.helpers.clouds import DROPLETS, cloud
-    from validation.scenes.parts import grid, mitsuba_mesh, placed
-    from validation.scenes.solids import box
-
-    ground = mitsuba_mesh("ground", grid((-900, -900, -170), (1800, 0, 0), (0, 1800, 0), (1, 1)), (0.7, 0.5, 0.3))
-    other = cloud("other", placed(box((57.0, 61.0, 43.0)), (31.0, 19.0, 137.0)), DROPLETS)
-    clouds, sets = clouds_of(rough(), ground=ground, other=other), [("1", (1, 1)), ("2-inf", (2, math.inf))]
-    theirs = reduce(merged, (volpath_orders_batch(clouds, seed, 256, sets=sets) for seed in range(32)))
-    check_equal(paths(clouds, 32, sets), theirs)
-
-
 def test_opacity_is_the_sum_over_the_grid(variant):
     from reference.monte_carlo.cloud_paths.opacity import seen_clouds
     from tests.helpers.clouds import length_inside, linear_between

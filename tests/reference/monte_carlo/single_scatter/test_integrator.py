@@ -116,35 +116,6 @@ def test_agrees_with_the_quadrature(variant, name):
     assert np.all(batches.standard_error[1] == 0)
 
 
-@pytest.mark.claim("single-scatter-agrees", tolerance="family level 1e-4, errors below 2e-3")
-def test_agrees_with_the_certified_integral_on_random_rays(variant):
-    """Rationale: directly against J of the airlight equation, one ray after the other, without a scene's reading.
-
-    Setup: 60 rays from random places past a light in endless fog, Henyey-Greenstein, light behind or ahead.
-    """
-    import mitsuba as mi
-
-    from analytic.phase import PhaseFunction
-    from tests.helpers.integral_forms import integrate_angle
-
-    rng = np.random.default_rng(3)
-    light, sigma_t, g = np.array([0.4, -0.3, 0.9]), 0.43, 0.35
-    origin = light + rng.normal(size=(60, 3)) * 2
-    direction = rng.normal(size=(60, 3))
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    medium = mi.load_dict(
-        {"type": "homogeneous", "sigma_t": sigma_t, "albedo": 0.8, "phase": {"type": "hg", "g": g}, "scale": 1.0}
-    )
-    scene = mi.load_dict({"type": "scene", "lamp": {"type": "point", "position": list(light), "intensity": 3.0}})
-    mean, error = _mean_and_error(scene, origin, direction, medium=medium)
-    foot = np.sum((light - origin) * direction, axis=1)
-    height = np.linalg.norm(origin + foot[:, None] * direction - light, axis=1)
-    phase = PhaseFunction("hg", g=g)
-    J = [integrate_angle(t, h, 0.0, np.inf, sigma_t, phase).value for t, h in zip(foot, height)]
-    expected = 0.8 * sigma_t * 3.0 * np.array(J)[:, None] / (4 * np.pi) * np.ones(3)
-    _assert_agrees(mean, error, expected, batches=24, largest_error=2e-3)
-
-
 def _box_and_sphere(lamp):
     """Return a scene of two bounded media, coloured fog in a box and grey fog in a sphere, over a wall, with a lamp."""
     import mitsuba as mi
@@ -243,75 +214,11 @@ def test_bounded_media_against_a_plain_sum(variant, place):
     assert np.all(surface[~hit] == 0)
 
 
-def test_rays_that_graze_a_boundary(variant):
-    """Rationale: points just beneath a boundary; a leg that missed it must not count the whole way as fog.
-
-    Setup: rays that dip at most 2 mm into the box, the lamp above.
-    Expected: the plain sum within 4.5 standard errors and 1e-3: where single precision puts the ends of a chord that
-    meets the boundary at 1/500. (Taking the medium at the point for that of a leg without boundaries cost 0.4 %.)
-    """
-    lamp = _LAMPS["in clear air"]
-    begin = np.linspace(-0.7, 0.3, 12)[:, None] * [1.0, 0.3, 0.0] + [0.0, 0.0, _HALF[2]]
-    slope = np.array([1.0, 0.1, -0.002])
-    direction = np.broadcast_to(slope / np.linalg.norm(slope), begin.shape)
-    origin = begin - 1.3 * direction
-    expected = np.array([_plain_airlight(lamp, *ray) for ray in zip(origin, direction)])
-    mean, error = _mean_and_error(_box_and_sphere(lamp), origin, direction, samples=128)
-    assert np.all(np.abs(mean - expected) < 4.5 * error + 1e-3 * expected)
-    assert np.median(error / expected) < 1e-3
-
-
-def test_camera_in_a_bounded_medium_far_from_its_bounds(variant):
-    """Rationale: a box so large that nothing beyond it matters is fog without bounds."""
-    import mitsuba as mi
-
-    medium = mi.load_dict({"type": "homogeneous", "sigma_t": 0.7, "albedo": 0.8})
-    box = {"type": "cube", "to_world": mi.ScalarTransform4f().scale(60.0), "bsdf": {"type": "null"}}
-    lamp = {"type": "point", "position": [0.3, 0.2, 1.4], "intensity": 2.0}
-    direction = np.random.default_rng(2).normal(size=(30, 3))
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    origin = np.array([0.1, -0.4, 0.2])
-    bounded = mi.load_dict({"type": "scene", "box": box | {"interior": medium}, "lamp": lamp})
-    inside = _mean_and_error(bounded, origin, direction, medium=medium)
-    outside = _mean_and_error(mi.load_dict({"type": "scene", "lamp": lamp}), origin, direction, medium=medium)
-    error = np.hypot(inside[1], outside[1])
-    # Another three in a million for rounding; 4.5 standard errors at 24 batches, 90 values.
-    assert np.all(np.abs(inside[0] - outside[0]) < 4.5 * error + 3e-6 * outside[0])
-    assert np.median(error / outside[0]) < 2e-3
-
-
 @pytest.mark.claim("enclosed-light")
 def test_enclosed_light_gives_exactly_zero(variant):
     closed = {"type": "sphere", "center": [0.9, 0.7, 1.9], "radius": 0.21}
     batches = _run(_load(shell=closed), batches=2, samples=16)
     assert np.all(batches.mean == 0)
-
-
-def test_seeds_decide(variant):
-    """Rationale: a batch is a function of its seed, and batches of different seeds are not correlated."""
-    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-    from reference.scene.read import read_truth
-
-    truth = read_truth(_load())
-    first, again = single_scatter_batch(truth, 7, 8), single_scatter_batch(truth, 7, 8)
-    assert np.array_equal(first.mean, again.mean)
-    centre = _run(_load(), first_seed=50).mean[0]
-    signs = [np.sign(single_scatter_batch(truth, seed, 8).mean[0] - centre)[:, 0] for seed in range(20)]
-    correlation = np.corrcoef(signs)[np.triu_indices(20, 1)]
-    # 190 pairs of 192 pixels; coefficients have the standard error 1/sqrt(192), their mean that over sqrt(190).
-    assert abs(correlation.mean()) < 4 / np.sqrt(190 * 192)
-    assert np.abs(correlation).max() < 5 / np.sqrt(192)
-
-
-@pytest.mark.statistical
-def test_one_sample_is_unbiased(variant):
-    """Rationale: stratification must not hide a bias; with one distance a ray there is none to hide behind."""
-    few, many = _run(_load(), samples=1, batches=64, first_seed=1000), _run(_load())
-    for channel in range(3):
-        total = many.mean[0][:, channel].sum()
-        error = np.sqrt(np.sum(few.standard_error[0][:, channel] ** 2)) / total
-        assert error < 0.02
-        assert abs(few.mean[0][:, channel].sum() / total - 1) < 4 * error
 
 
 @pytest.mark.claim("scenes-refused-by-name")

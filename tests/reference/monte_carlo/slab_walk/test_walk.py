@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reference.monte_carlo.slab_walk.estimates import BATCH, slab_estimate
-from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein, Tabulated, turned
+from reference.monte_carlo.slab_walk.estimates import slab_estimate
+from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein, Tabulated
 from reference.monte_carlo.slab_walk.walk import Slab, walk
 
 DATA = Path(__file__).parents[3] / "data"
@@ -35,20 +35,6 @@ def test_a_table_has_the_moments_of_its_function():
     assert legendre == pytest.approx(g ** np.arange(9), abs=2e-5)
     half = Tabulated(np.array([0.0, 1.0, 1.0 + 1e-9, np.pi]), np.array([0.0, 0.0, 1.0, 1.0]))
     assert half.cosines(GRID).max() == pytest.approx(math.cos(1.0), abs=1e-5)
-
-
-def test_turned_directions_make_the_angle_and_go_all_around():
-    random = np.random.default_rng(3)
-    given = random.normal(size=(3, 1000))
-    given /= np.linalg.norm(given, axis=0)
-    given[:, :2] = [[0, 0], [0, 0], [1, -1]]  # the poles
-    cosines = random.uniform(-1, 1, 1000)
-    azimuths = random.uniform(0, 2 * np.pi, 1000)
-    after = np.stack(turned(tuple(given), cosines, azimuths))
-    assert np.linalg.norm(after, axis=0) == pytest.approx(np.ones(1000), rel=1e-14)
-    assert (given * after).sum(0) == pytest.approx(cosines, abs=1e-12)
-    opposite = np.stack(turned(tuple(given), cosines, azimuths + np.pi))
-    assert (after + opposite) / 2 == pytest.approx(cosines * given, abs=1e-12)
 
 
 def test_the_beam_is_exact_and_orders_begin_at_zero():
@@ -78,12 +64,3 @@ def test_nothing_is_lost_and_absorption_is_a_weight():
         whole, half = (estimates[albedo].sets[place].reflected for albedo in (1.0, 0.5))
         assert half.value.value == pytest.approx(whole.value.value * 0.5**order, rel=1e-12)
         assert half.rms.value == pytest.approx(whole.rms.value, rel=1e-12)
-
-
-def test_the_same_seed_is_the_same_whatever_the_workers():
-    slab = Slab(1.0, 0.7, 0.9, HenyeyGreenstein(0.3), [0.0, 1.0])
-    one, two = (slab_estimate(slab, [ALL], photons=3000, seed=7, workers=workers) for workers in (1, 2))
-    assert one == two
-    assert slab_estimate(slab, [ALL], photons=3000, seed=8) != one
-    assert one.sets[0].fluence[0].value.value > one.up[0].value / math.pi  # passages over |mu|
-    assert BATCH >= 10_000

@@ -14,15 +14,6 @@ def truth(variant):
     return read_truth(mi.load_dict(tiny_scene()))
 
 
-def test_materials_come_back(truth):
-    """Black surfaces are put on for the airlight only."""
-    from reference.monte_carlo.volpath.integrator import volpath_batch
-
-    before = [shape.bsdf() for shape in truth.scene.shapes()]
-    volpath_batch(truth, 0, 4)
-    assert [shape.bsdf() for shape in truth.scene.shapes()] == before
-
-
 def test_one_kernel_serves_any_number_of_samples(truth):
     """Rationale: a kernel is compiled anew for how the memory lies that it reads, and NumPy's lies anywhere."""
     kernels = [_large_kernels(truth, samples=samples, seed=samples) for samples in (3, 4, 5, 8)]
