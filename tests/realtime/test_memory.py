@@ -31,15 +31,11 @@ def limits(variant, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("own", "files", "least"),
     [
-        ("0::/\n", {"memory.max": "1000000\n"}, 10**6),
         ("0::/a/b\n", {"a/b/memory.max": "max\n", "a/memory.max": "2000000\n", "memory.max": "max"}, 2 * 10**6),
         # Docker without a namespace of its own: the path is the machine's, and is not there.
         ("0::/docker/0123\n", {"memory.max": "3000000\n"}, 3 * 10**6),
         ("5:cpu:/a\n4:memory:/a\n0::/\n", {"memory/a/memory.limit_in_bytes": "4000000\n"}, 4 * 10**6),
-        ("4:memory,cpu:/b:c\n", {"memory/memory.limit_in_bytes": "5000000\n"}, 5 * 10**6),
-        ("4:memory:/\n", {"memory/memory.limit_in_bytes": "9223372036854771712\n"}, MACHINE),
         ("0::/\n", {"memory.max": "max\n"}, MACHINE),
-        ("0::/\n", {}, MACHINE),
     ],
 )
 def test_the_least_limit_counts(limits, own, files, least):

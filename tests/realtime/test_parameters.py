@@ -33,17 +33,12 @@ def refused(words):
     ("given", "words"),
     [
         ({"steps": -1}, "steps: got -1, wanted a whole number from 1 to 64"),
-        ({"steps": 65}, "steps: got 65, wanted a whole number from 1 to 64"),
         ({"share": 0.0}, "share: got 0.0, wanted a finite number above 0 up to, but not, 1 [1/m]"),
-        ({"share": 1.0}, "share: got 1.0, wanted"),
         ({"share": float("nan")}, "share: got nan, wanted"),
-        ({"share": float("inf")}, "share: got inf, wanted"),
         ({"word": "unevn"}, "word: got 'unevn', wanted one of even, uneven; did you mean 'uneven'?"),
         ({"free": -1.0}, "free: wanted on=false with a value below 0"),
         ({"step": 3}, "method fog: got a parameter 'step', wanted one of: steps, share, word, on, free; did you mean"),
         ({"steps": "1.5"}, "method fog: steps got '1.5', wanted a whole number"),
-        ({"steps": True}, "method fog: steps got True, wanted a whole number"),
-        ({"share": "much"}, "method fog: share got 'much', wanted a number"),
         ({"on": "maybe"}, "method fog: on got 'maybe', wanted true or false"),
     ],
 )

@@ -58,30 +58,18 @@ def _sheared():
     return mi.ScalarTransform4f(np.array([[1, 0.3, 0, 0.5], [0, 1, 0, 0.7], [0, 0, 1, 1.9], [0, 0, 0, 1]]))
 
 
-def _flat():
-    import mitsuba as mi
-
-    return mi.ScalarTransform4f().translate([0.5, 0.7, 1.9]).scale([1e-30, 1e-30, 1.0])
-
-
 @pytest.mark.claim("scenes-refused-by-name")
 @pytest.mark.parametrize(
     ("lamp", "message"),
     [
         (lambda: area_lamp("cube"), "light 'lamp': its shape is a Cube"),
         (lambda: area_lamp("rectangle") | {"to_world": _sheared()}, "light 'lamp': the rectangle is sheared"),
-        (lambda: area_lamp("disk") | {"to_world": _sheared()}, "light 'lamp': the disk is s"),
         (lambda: area_lamp("disk", size=(0.3, 0.2)), "light 'lamp': the disk is scaled by 0.3 x 0.2"),
-        (lambda: area_lamp("rectangle") | {"to_world": _flat()}, "light 'lamp': the rectangle has no area"),
         (lambda: area_lamp("sphere", size=0.3, flip_normals=True), "light 'lamp': the sphere shines inwards"),
         (lambda: area_lamp("sphere", size=9.0), "light 'lamp': the camera is inside of the sphere"),
         (
             lambda: area_lamp("disk", emitter={"type": "area", "radiance": {"type": "rgb", "value": [-1.0, 0.0, 0.0]}}),
             "light 'lamp': its radiance is",
-        ),
-        (
-            lambda: area_lamp("disk", emitter={"type": "area", "radiance": _textured()}),
-            "light 'lamp': its radiance is t",
         ),
         (
             lambda: area_lamp("sphere", material={"type": "null"}, interior={"type": "homogeneous"}),
@@ -92,9 +80,3 @@ def _flat():
 def test_refusals_name_the_light(variant, lamp, message):
     with pytest.raises(InputError, match=message):
         read(lamp=lamp())
-
-
-def _textured():
-    import mitsuba as mi
-
-    return {"type": "bitmap", "bitmap": mi.Bitmap(np.full((2, 2, 3), 0.5, dtype=np.float32)), "raw": True}

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
+from tests.helpers import airlight_sum
 from tests.helpers.scenes import clear_scene, tiny_scene
 from tests.helpers.sunlit import (
     ALONG,
     CUBE_AT,
     SPHERE_AT,
-    Part,
     box_part,
     cube,
     fog_sphere,
@@ -112,7 +112,7 @@ def test_media_of_many_planes_have_nodes(variant):
         return low, np.maximum(np.where(along > 0, at, np.inf).min(axis=-1), low)
 
     scene = clear_scene(size=SMALL, lamp=sun(), many=medium_boundary("many", (vertices, faces), medium))
-    part = Part(chord, np.full(3, 1.3), np.full(3, 0.7), 0.0)
+    part = airlight_sum.Body(chord, np.full(3, 1.3), np.full(3, 0.7), airlight_sum.henyey_greenstein(0.0))
     expected = summed(read(scene), [part], steps=1000)
     assert np.any(expected > 0)
     # Kinks of the leg at 80 facets, between nodes that are spread over the chord.
@@ -152,9 +152,9 @@ def test_surfaces_have_lambert_s_law_and_both_legs(variant):
     seen = np.isfinite(distance)
     point = origin + distance[seen, None] * direction[seen]
     part, axis = sphere_part(), unit(ALONG)
-    near, far = part.chord(np.broadcast_to(origin, point.shape), direction[seen])
+    near, far = np.maximum(part.chord(origin, direction[seen]), 0)
     depth = np.clip(distance[seen] - near, 0, far - near)
-    near, far = part.chord(point, -axis)
+    near, far = np.maximum(part.chord(point, -axis), 0)
     depth = depth + (far - near)
     expected = np.array([0.4, 0.4, 0.5]) * np.array([3.0, 2.0, 1.0]) * (-axis[2] / np.pi)
     expected = expected * np.exp(-depth[:, None] * part.sigma_t)

@@ -1,13 +1,63 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""As few panels as a segment in a medium needs: against many more, smaller ones."""
+"""A walk from facet to facet, with few panels between: against the least over all planes, summed over small steps."""
 
 import drjit as dr
 import numpy as np
 import pytest
 
 from realtime.numerics.aligned import aligned_array
+from realtime.scene.convex_bounds import mesh_bounds
 from tests.helpers.kernel_values import opaque, phase_of
-from tests.realtime.bounded_media.test_facet_walk import lines_in, seen_medium
+from validation.scenes.parts import placed, rotation
+from validation.scenes.solids import gem, prism
+
+TURN = rotation((0.3, 1.0, 0.2), 27.3)
+CENTRE = np.array([0.1, 0.2, 0.3])
+#: Triangles with many at two corners; quads and two faces of twelve edges.
+SOLIDS = {
+    "gem": gem(13, 5),
+    "column": prism(np.array([[np.cos(a), np.sin(a)] for a in np.arange(12) * np.pi / 6]), 1.9),
+}
+
+
+def bounds_of(name):
+    vertices, faces = placed(SOLIDS[name], CENTRE, TURN)
+    return mesh_bounds(name, vertices.astype(np.float32).astype(np.float64), faces)
+
+
+def seen_medium(name, light, precision="double"):
+    from realtime.bounded_media.convex_clip import seen_from
+    from realtime.numerics.array_types import array_types
+    from realtime.scene.medium import Medium
+    from realtime.scene.phase import named_phase
+    from realtime.scene.read_media import make_bounded_medium
+
+    types = array_types(precision)
+    medium = Medium((types.scalar(1.0),), types.color(1.0), named_phase("isotropic"))
+    bounded_medium = make_bounded_medium(medium, bounds_of(name), types)
+    return seen_from(bounded_medium, opaque(types.vector(*(float(c) for c in light)))), types
+
+
+def lines_in(name, light, *, count=400, seed=5):
+    """Return lines from random places through the medium: v_0 and d, and where they are in it, by its planes."""
+    rng = np.random.default_rng(seed)
+    bounds = bounds_of(name)
+    origin = CENTRE + rng.normal(size=(count, 3)) * 3
+    target = CENTRE + rng.uniform(-0.4, 0.4, (count, 3))
+    direction = (target - origin) / np.linalg.norm(target - origin, axis=1)[:, None]
+    along, room = direction @ bounds.normals.T, bounds.offsets - origin @ bounds.normals.T
+    low = np.where(along < 0, room / along, 0).max(axis=1)
+    high = np.where(along > 0, room / along, np.inf).min(axis=1)
+    kept = high > low + 1e-3
+    return origin[kept] - light, direction[kept], low[kept], high[kept]
+
+
+def least_of_all(name, light, v):
+    """Return 1/f of the way in, over all planes that the light is outside of, and of the way out, over the others."""
+    bounds = bounds_of(name)
+    room = bounds.offsets - bounds.normals @ light
+    u = v @ (bounds.normals / room[:, None]).T
+    return u[..., room < 0].min(axis=-1, initial=np.inf), u[..., room > 0].max(axis=-1)
 
 
 def segments(name, light, phase, *, sigma_t, precision="double"):
@@ -51,8 +101,6 @@ def integral(segment, x0, x1):
 @pytest.mark.parametrize("name", ["gem", "column"])
 def test_panels_against_a_sum_over_small_steps(variant, name):
     """What the leg leaves before the medium by the least of all planes; midpoints of 8000 steps."""
-    from tests.realtime.bounded_media.test_facet_walk import least_of_all
-
     light, sigma_t = np.array([1.7, 0.4, 2.9]), 1.3
     for precision, close in (("double", 1e-6), ("single", 2e-5)):
         segment, x0, x1 = segments(name, light, ("hg", 0.6), sigma_t=sigma_t, precision=precision)

@@ -10,7 +10,7 @@ import pytest
 from PythonicDISORT.pydisort import pydisort
 
 from realtime.clouds.slab_orders.moments import SlabOrders, order_sets
-from realtime.clouds.slab_orders.phases import AnglePhase, HenyeyGreensteinPhase, SeriesPhase, tabulated_phase
+from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SeriesPhase
 from realtime.clouds.slab_orders.radiance import slab_radiance
 from realtime.clouds.slab_orders.slab import slab_light
 
@@ -129,13 +129,3 @@ def test_light_is_neither_made_nor_lost(tau, suns):
         light, _ = slab_light(tau, mu0, HG, 1.0, sets=ALL)
         assert light.reflectance + light.transmittance == pytest.approx(1, abs=1e-8)
         assert light.reflectance > 0
-
-
-def test_phases_by_angle_have_the_moments_of_their_series():
-    g = 0.6
-    angles = AnglePhase(lambda angle: 7 * HenyeyGreensteinPhase(g).values(np.cos(angle)), np.array([0.0, np.pi]))
-    assert angles.moments(40) == pytest.approx(g ** np.arange(40), abs=1e-12)
-    assert angles.values([1.0, 0.0, -1.0]) == pytest.approx(HenyeyGreensteinPhase(g).values([1.0, 0.0, -1.0]), rel=1e-7)
-    linear = tabulated_phase(np.array([0.0, np.pi]), np.array([2.0, 0.0]))
-    assert linear.moments(2) == pytest.approx([1.0, 0.25], rel=1e-12)  # <cos> of 1 - angle/pi
-    assert linear.values(0.0) == pytest.approx(1.0, rel=1e-12)

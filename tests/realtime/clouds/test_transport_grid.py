@@ -4,7 +4,6 @@
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
 from realtime.numerics.aligned import aligned_array
 
@@ -59,16 +58,3 @@ def test_the_grid_is_its_look_up_between_entries(variant):
         away = np.hypot(found[1] - exact[1], found[2] - exact[2]) / exact[3]
         assert np.quantile(away, 0.95) < 0.05
         assert np.quantile(np.abs(found[3] / exact[3] - 1), 0.95) < 0.03
-
-
-@pytest.mark.parametrize(("t", "d"), [(1e-4, 5e-5), (5e-3, 0.0), (900.0, 3.0), (900.0, 900.0), (2.0, 7.0)])
-def test_what_lies_outside_is_defined(variant, t, d):
-    """Thinner and thicker slabs, points below the floor, level rays and a level sun, both ends of the angle."""
-    mu = np.array([-1.0, -0.3, 0.0, 0.0, 0.4, 1.0])
-    sun = np.array([1.0, 0.3, 1e-3, 0.0, 1.0, 0.02])
-    same = np.ones_like(mu)
-    for found in _both((t * same, d * same, mu, -same, 0 * same, sun))[1]:
-        assert all(np.isfinite(value).all() for value in found)
-        assert (found[0] >= 0).all()
-        assert (found[3] > 0).all()
-        assert found[0][3] == 0  # a level sun

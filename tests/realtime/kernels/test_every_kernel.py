@@ -57,14 +57,10 @@ def test_segments_without_length_are_dark(variant, name):
     ("name", "parameters", "message"),
     [
         ("quadrature", {"nodes": 0}, "nodes: got"),
-        ("quadrature", {"nodes": 7}, "nodes: got"),
         ("quadrature-theta", {"nodes": 0}, "nodes: got 0"),
         ("uniform", {"steps": 0}, "steps: got 0"),
-        ("equiangular", {"steps": 0}, "steps: got 0"),
         ("table", {"form": "cubic"}, "form: got 'cubic'"),
         ("table", {"size": 1}, "size: got 1"),
-        ("table", {"size": 64.0}, "size: got 64.0"),
-        ("table", {"size": 4096}, "size: got 4096"),
     ],
 )
 def test_numbers_that_a_kernel_does_not_have_are_refused(variant, name, parameters, message):

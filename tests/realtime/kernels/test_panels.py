@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realtime.kernels import short_segments
-from realtime.kernels.exact import _double_mean, exact
+from realtime.kernels.exact import _double_mean
 from realtime.kernels.panels import panels_mean
 from realtime.kernels.quadrature import path_interval
 from realtime.kernels.short_segments import extent, serves, short_segment
@@ -14,7 +14,7 @@ from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import array_types
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.phase import PHASES
-from tests.helpers.kernel_values import kernel_values, phase_of, single_precision, true_values
+from tests.helpers.kernel_values import phase_of, true_values
 from tests.realtime.kernels.test_exact import NAMES, g_of, many_rays
 
 pytestmark = pytest.mark.usefixtures("variant")
@@ -42,21 +42,6 @@ def test_what_the_rule_of_panels_leaves_without_rounding(name):
     rule, truth = np.array(panels_mean(*parts)[0]), np.array(_double_mean(*parts)[0])
     long_enough = np.array(width) > 1e-6  # the difference of two asinh has lost shorter ones
     assert np.abs(rule[long_enough] / truth[long_enough] - 1).max() < LEFT
-
-
-@pytest.mark.parametrize("name", ["isotropic", "murky", "hg"])
-def test_no_seam_where_a_segment_takes_another_panel(name):
-    """The end of a segment moves; where the number of panels changes, J must not jump: an image would show it.
-
-    The truth takes out how J itself grows. Means of eight neighbours take out most of the rounding, which for cos^64 is
-    32 times that of 1/(1 + E^2); a seam stays.
-    """
-    (x1,) = single_precision(np.linspace(0.05, 40, 4000))
-    for height, sigma_t in ((0.01, 0.05), (0.3, 0.3), (2.0, 1.5)):
-        rays = [*single_precision(3.0, height, 0.0), x1, *single_precision(sigma_t)]
-        error = kernel_values(exact, rays, name, 0.5) / true_values(rays, name, 0.5) - 1
-        of_eight = np.convolve(error, np.full(8, 1 / 8), mode="valid")
-        assert np.abs(of_eight[8:] - of_eight[:-8]).max() < 2e-6
 
 
 def short_rays(name, rule, *, seed=3, count=1500):

@@ -46,32 +46,6 @@ def test_rounding_of_light_and_direction_is_no_height(variant, kind):
         assert np.max(np.abs(np.array(geometry.offset) - offset) / height) < 4e-7
 
 
-@pytest.mark.parametrize("precision", ["single", "double"])
-def test_cone_clip_against_sampling(variant, precision):
-    """A sample lies in the clipped segment if and only if it lies in the cone, but for a rounding at its ends."""
-    from realtime.numerics.array_types import array_types
-    from realtime.rays.ray_light import ray_geometry
-
-    types = array_types(precision)
-    rng = np.random.default_rng(11)
-    n, m = 400, 300
-    origin, direction = rng.normal(size=(n, 3)) * 2, rng.normal(size=(n, 3))
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    for degrees in (3.0, 37.0, 71.0, 89.0):
-        light = spot_light(types, (0.3, -0.2, 0.1), (0.4, 0.5, -0.7), degrees)
-        geometry = ray_geometry(vectors(types, origin), vectors(types, direction), light)
-        clipped = geometry.lit_segment(types.scalar(0), types.scalar(9.0))
-        low, high = (np.broadcast_to(np.array(x, dtype=np.float64), n) for x in clipped)
-        x = np.linspace(0.01, 8.99, m)
-        away = origin[:, None] + x[:, None] * direction[:, None] - np.array([0.3, -0.2, 0.1])
-        axis = np.array([0.4, 0.5, -0.7]) / np.linalg.norm([0.4, 0.5, -0.7])
-        cosine = (away @ axis) / np.linalg.norm(away, axis=2)
-        clear = np.abs(cosine - np.cos(np.deg2rad(degrees))) > 1e-4  # of the cone's surface
-        inside = (x > low[:, None]) & (x < high[:, None])
-        assert np.array_equal(inside[clear], (cosine > np.cos(np.deg2rad(degrees)))[clear]), degrees
-        assert inside.any()
-
-
 @pytest.mark.parametrize("degrees", [40.0, 50.0])
 def test_rays_through_the_light(variant, degrees):
     """Height and all products with it are 0; in the cone lies what is beyond the light, before it, or nothing."""

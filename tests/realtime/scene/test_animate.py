@@ -12,7 +12,7 @@ from realtime.scene.animate import (
     turned_light,
     turned_objects,
 )
-from realtime.scene.mesh_adjacency import read_casters, with_placements, with_positions
+from realtime.scene.mesh_adjacency import read_casters
 from tests.helpers.scenes import spot, tiny_scene
 from validation.scenes.parts import rotation
 
@@ -36,12 +36,6 @@ def pens(variant):
     from validation.scenes.loading import load_scene
 
     return read_scene(load_scene("two-pens", (16, 12)).scene)
-
-
-def with_places(casters, scene):
-    """The casters with the vertices of all shapes that moved, moved one by one."""
-    places = {name: placement.positions() for name, placement in scene.placements.items()}
-    return with_positions(casters, {**scene.positions, **places})
 
 
 def leaves(light) -> dict[str, np.ndarray]:
@@ -103,38 +97,6 @@ def test_moved_lights_of_every_kind_are_those_of_the_scene_read_anew(variant):
                     np.testing.assert_allclose(
                         moved[name], values, rtol=1e-5, atol=3e-6 * abs(values).max(), err_msg=name
                     )
-
-
-def silhouette_in(casters, light):
-    """The ends of the silhouette edges with what they gain, as numbers to compare: one row each, in their order."""
-    from realtime.methods.shadow_planes.silhouettes import silhouette
-
-    seen = silhouette(casters, light)
-    return np.concatenate([casters.positions_of(seen.edges).reshape(-1, 6), seen.coefficient[:, None]], axis=1)
-
-
-@pytest.mark.parametrize("w", [1, 0])
-def test_shapes_that_turn_as_a_whole_keep_their_planes(pens, w):
-    """Their triangles stay as they are: silhouettes and layers are those of vertices moved one by one."""
-    from realtime.methods.shadow_planes.plane_table import layers_between, light_basis
-
-    casters = read_casters(pens.geometry)
-    moved = turned_objects(pens, read_objects(pens, ["pens"]), rotation((0.3, -0.2, 1), 37.0))
-    whole = with_placements(casters, moved.positions, moved.placements)
-    one_by_one = with_places(casters, moved)
-    assert whole.normals is casters.normals
-    assert len(whole.placed) == 1
-    middle = one_by_one.vertices.mean(axis=0)
-    for light in ((1.3, -0.7, 2.9), tuple(middle + 0.01), (-3.1, 0.4, 0.8)):
-        position = np.array([*light, w])
-        np.testing.assert_array_equal(silhouette_in(whole, position), silhouette_in(one_by_one, position))
-        for camera in (middle, middle + np.array([2.1, 0.3, 0.2]), np.array([-4.1, 2.7, 1.9])):
-            basis = light_basis(position, camera)
-            used = np.ones(len(casters.closed), dtype=bool)
-            counted = (layers_between(here, position, basis, used=used) for here in (whole, one_by_one))
-            assert len(set(counted)) == 1
-    assert np.all(whole.boxes[:, 0] <= one_by_one.boxes[:, 0])
-    assert np.all(whole.boxes[:, 1] >= one_by_one.boxes[:, 1])
 
 
 def test_moved_objects_render_as_a_scene_read_anew(pens):

@@ -70,17 +70,3 @@ def test_mean_distance_of_a_sphere_is_six_fifths_of_its_radius():
     assert mean_distance(sphere_bounds((1.0, 2.0, 3.0), 0.83)) == pytest.approx(1.2 * 0.83)
     # 1280 facets lie within 0.5 % of the sphere, the sum over random pairs within 0.2 % (one standard error).
     assert mean_distance(bounds(icosphere(3))) == pytest.approx(1.2, rel=0.01)
-
-
-def test_mean_distance_of_a_box_is_that_of_points_drawn_on_its_sides():
-    sides = np.array([0.7, 1.1, 1.9])
-    random = np.random.default_rng(3)
-    count = 200_000
-    area = np.array([sides[1] * sides[2], sides[0] * sides[2], sides[0] * sides[1]])
-    axis = random.choice(3, count, p=area / area.sum())
-    boundary = random.uniform(-0.5, 0.5, (count, 3)) * sides
-    boundary[np.arange(count), axis] = np.sign(boundary[np.arange(count), axis]) * 0.5 * sides[axis]
-    inside = random.uniform(-0.5, 0.5, (count, 3)) * sides
-    expected = np.linalg.norm(boundary - inside, axis=1).mean()
-    # Both are random sums with standard errors of 0.15 % and 0.1 %.
-    assert mean_distance(bounds(placed(box(tuple(sides)), (0.3, 0.2, 5.1), TURN))) == pytest.approx(expected, rel=0.008)

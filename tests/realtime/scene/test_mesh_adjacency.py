@@ -34,21 +34,6 @@ def test_every_half_edge_is_in_one_entry(name):
     assert by_entry == by_triangle
 
 
-@pytest.mark.parametrize("name", ALL)
-def test_opposite_half_edges_are_paired_first(name):
-    """So that of an edge as few entries as possible are a border or run the same way."""
-    casters = casters_of(ALL[name]())
-    lonely: Counter = Counter()
-    for t in casters.triangles.tolist():
-        for k in range(3):
-            a, b = t[k], t[(k + 1) % 3]
-            lonely[min(a, b), max(a, b)] += 1 if a < b else -1
-    unpaired: Counter = Counter()
-    for (a, b), right, same in zip(casters.edges.tolist(), casters.right, casters.same_way):
-        unpaired[min(a, b), max(a, b)] += 1 if right == casters.none else 2 if same else 0
-    assert unpaired == {edge: abs(rest) for edge, rest in lonely.items()}
-
-
 @pytest.mark.parametrize("name", SOUND)
 def test_sound_meshes_are_closed_and_in_silence(name):
     casters = casters_of(SOUND[name]())

@@ -30,17 +30,6 @@ def test_against_the_analytic_side(variant):
         assert np.max(np.abs(value / expected - 1)) < 1e-5, (name, g)
 
 
-def test_tabulated_interpolates_between_its_cosines(variant):
-    import mitsuba as mi
-
-    from realtime.scene.phase import evaluate, named_phase
-
-    values = np.array([0.2, 0.7, 1.9, 0.4])
-    cosine = np.linspace(-1, 1, 101)
-    value = np.array(evaluate(named_phase("tabulated", values=mi.Float64(values)), mi.Float64(cosine)))
-    assert value == pytest.approx(np.interp(cosine, np.linspace(-1, 1, 4), values), rel=1e-12)
-
-
 @pytest.mark.claim("phase-two-sides", tolerance="2e-5 relative in float32, 1e-6 in float64: a table's own error")
 @pytest.mark.parametrize(
     "words",

@@ -5,7 +5,7 @@ import pytest
 from tests.helpers.scenes import tiny_scene
 
 
-def shaded(scene, *, table: bool, precision: str = "single"):
+def shaded(scene, *, table: bool):
     """Render the surfaces of a scene with its table of triangles, or with Mitsuba's interactions."""
     from dataclasses import replace
 
@@ -15,7 +15,7 @@ def shaded(scene, *, table: bool, precision: str = "single"):
     from realtime.methods.registry import METHODS
     from realtime.scene.read_scene import read_scene
 
-    read = read_scene(mi.load_dict(scene), precision)
+    read = read_scene(mi.load_dict(scene))
     return read, render_frame(
         frame_renderer(read if table else replace(read, facets=None), METHODS["ray-march"], steps=1)
     )
@@ -33,10 +33,9 @@ def mesh_scene(**changes):
     return tiny_scene(size=(48, 36), ball=None, floor=floor, box=cube, **changes)
 
 
-@pytest.mark.parametrize("precision", ["single", "double"])
-def test_the_table_shades_as_mitsuba_does(variant, precision):
-    read, by_table = shaded(mesh_scene(), table=True, precision=precision)
-    _, by_mitsuba = shaded(mesh_scene(), table=False, precision=precision)
+def test_the_table_shades_as_mitsuba_does(variant):
+    read, by_table = shaded(mesh_scene(), table=True)
+    _, by_mitsuba = shaded(mesh_scene(), table=False)
     assert read.facets is not None
     assert by_mitsuba.surface.max() > 0
     assert np.array_equal(by_table.distance, by_mitsuba.distance)
@@ -62,15 +61,3 @@ def test_normals_of_corners_are_interpolated(variant, tilt):
     # Normals are of float32, shadow rays at an edge start from a point that differs in the last bit.
     same = np.isclose(by_table.surface, by_mitsuba.surface, rtol=2e-5, atol=0).all(axis=2)
     assert same.mean() > 0.995
-
-
-def test_what_a_table_cannot_say_is_left_to_mitsuba(variant):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-
-    assert read_scene(mi.load_dict(mesh_scene())).facets is not None
-    assert read_scene(mi.load_dict(tiny_scene())).facets is None  # a sphere
-    textured = mesh_scene()
-    textured["floor"]["bsdf"] = {"type": "diffuse", "reflectance": {"type": "checkerboard"}}
-    assert read_scene(mi.load_dict(textured)).facets is None
