@@ -46,7 +46,7 @@ def read_area_light(shape: Any, camera: Array) -> AreaLight:
     if kind is None:
         raise InputError(
             f"light '{name}': its shape is a {shape.class_name()}; wanted a 'rectangle', 'disk' or 'sphere' with an "
-            "'area' emitter"
+            "'area' emitter, or in a file a mesh whose triangles are halves of rectangles"
         )
     radiance = _read_radiance(shape.emitter(), name)
     opaque = shape.bsdf().class_name() != "Null"

@@ -85,7 +85,11 @@ def read_area_light(emitter: Any, camera: Array) -> TruthAreaLight:
     kind = _KINDS.get(shape.class_name())
     if kind is None:
         what = "a mesh" if shape.is_mesh() else f"a {shape.class_name()}"
-        raise _refusal(shape, f"is {what}", "a rectangle, a disk or a sphere: replace it by one")
+        raise _refusal(
+            shape,
+            f"is {what}",
+            "a rectangle, a disk, a sphere, or in a file a mesh whose triangles are halves of rectangles",
+        )
     parameters = mi.traverse(emitter)
     if "radiance.value" not in parameters:
         raise _refusal(shape, "has a texture as radiance", "one radiance: give its mean as 'rgb'")

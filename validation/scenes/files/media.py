@@ -52,6 +52,8 @@ def give_extinction(state: Any) -> list[str]:
         if props.plugin_name() != "homogeneous":
             continue
         _refuse_names(props)
+        if "strategy" in props:  # of sampling, in version 0.6
+            del props["strategy"]
         given = [key for key in _OLD if key in props]
         if not given:
             continue
@@ -71,9 +73,12 @@ def give_extinction(state: Any) -> list[str]:
 
 
 def _make_homogeneous(state: Any, props: Any) -> None:
-    """Make a heterogeneous medium whose extinction is the same everywhere homogeneous."""
+    """Make a heterogeneous medium homogeneous whose extinction is the same everywhere; an old one calls it density."""
+    if props.plugin_name() == "heterogeneous" and "density" in props and "sigma_t" not in props:
+        props["sigma_t"] = props["density"]
+        del props["density"]
     volumes = [properties(state, at).plugin_name() for key, at in references(props) if key == "sigma_t"]
-    if props.plugin_name() == "heterogeneous" and volumes in ([], ["constvolume"]):
+    if props.plugin_name() == "heterogeneous" and "sigma_t" in props and volumes in ([], ["constvolume"]):
         props.set_plugin_name("homogeneous")
         for key in ("majorant_resolution_factor", "majorant_grid", "majorant_factor"):
             if key in props:
@@ -130,7 +135,7 @@ def _numbers(props: Any, key: str) -> Array | None:
     if key not in props:
         return None
     value = props[key]
-    if isinstance(value, mi.Spectrum) and value.is_uniform():
+    if type(value).__name__ == "Spectrum" and value.is_uniform():  # not `mi.Spectrum`, an array of the variant
         value = value.values
     try:
         numbers = np.array(value, dtype=np.float64).reshape(-1)

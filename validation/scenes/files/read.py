@@ -62,6 +62,9 @@ def _parsed(config: Any, path: Path) -> Any:
         state = mi.parser.parse_file(config, str(path))
     mi.parser.transform_upgrade(config, state)
     mi.parser.transform_resolve(config, state)
+    mi.parser.transform_merge_equivalent(
+        config, state
+    )  # a medium written twice is one: its neighbours may reference it
     return state
 
 
