@@ -39,11 +39,11 @@ MARGINS = {
     "two-pens": (5e-4, 5e-4),
     "rayleigh": (5e-4, 5e-4),
     "sun": (2e-3, 2e-3),  # its media have bounds that batches feel as noise
-    "wide-lights": (0.03, 0.005),  # 8 x 32 points, which all pixels share, leave the quadrature 1.2 %
+    "wide-lights": (0.01, 0.005),  # eight times PLAN points, which all pixels share
 }
 VOLPATH_MARGIN = 0.01
 #: Points of each of eight replicates under area lights.
-PLAN = PointPlan(error=0.0, first=32, most=32)
+PLAN = PointPlan(error=0.0, first=128, most=128)
 _DISTANCES, _SAMPLES = 64, 256  # of single-scatter and volpath, a pixel and batch
 _LEAST, _MOST = 32, 1024  # batches
 
@@ -112,7 +112,7 @@ def _statistics(image: TruthImage, batches: Batches, layer: str, mask: Any, marg
 def seen(estimator: str, mutation: Mutation | None, stage: Stage) -> Iterator[Sighting]:
     """Compare an estimator with the other one, changed by a mutation, or not at all."""
     # A fault may divide by zero or overflow: its image shows that.
-    with injected(*(mutation.changes if mutation else ())), np.errstate(all="ignore"), warnings.catch_warnings():
+    with injected(*([mutation.change] if mutation else [])), np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         truth = read.read_truth(stage.scene)
         image, batches = stage.image, stage.batches
@@ -138,6 +138,6 @@ def volpath_seen(mutation: Mutation | None, stage: Stage, batches: int) -> list[
     """Compare a quadrature that may be changed with volpath, over its shortened shadow rays."""
     truth = read.read_truth(stage.scene)
     traced = reduce(merged, (volpath.volpath_batch(truth, seed, _SAMPLES) for seed in range(batches)))
-    with injected(*(mutation.changes if mutation else ())), np.errstate(all="ignore"):
+    with injected(*([mutation.change] if mutation else [])), np.errstate(all="ignore"):
         image = quadrature.quadrature_image(read.read_truth(stage.scene), shadow_scale=1 - measure_shadow_epsilon())
     return [_sighting(image, traced, layer, mask, VOLPATH_MARGIN, "volpath") for layer, mask in stage.masks.items()]

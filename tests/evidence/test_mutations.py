@@ -38,8 +38,8 @@ def stage_of(variant):
 @pytest.mark.parametrize("mutation", [*MUTATIONS, *SHARED, BELOW_THE_MARGIN], ids=lambda mutation: mutation.name)
 def test_what_a_fault_names_is_there(variant, mutation):
     """Whoever moves or rewrites a formula must move its fault: it must not vanish unnoticed."""
-    for change in mutation.changes:
-        assert rewritten(change) if isinstance(change, Rewrite) else replacements(change)
+    change = mutation.change
+    assert rewritten(change) if isinstance(change, Rewrite) else replacements(change)
 
 
 def test_there_are_ninety_faults_and_each_estimator_has_some():
@@ -78,7 +78,7 @@ def test_a_fault_below_the_margin_is_not_found(stage_of):
 def test_a_fault_leaves_nothing_behind(stage_of):
     stage = stage_of("many-lights")
     for mutation in (mutation for mutation in MUTATIONS if mutation.stage == "many-lights"):
-        with injected(*mutation.changes):
+        with injected(mutation.change):
             pass
     image = quadrature.quadrature_image(read.read_truth(stage.scene), plan=stages.PLAN)
     assert np.array_equal(image.airlight, stage.image.airlight)
@@ -100,7 +100,7 @@ def test_volpath_finds_gross_faults_and_no_others(stage_of):
 def test_agreement_is_blind_to_what_all_share(stage_of):
     stage = stage_of("many-lights")
     mutation = next(mutation for mutation in SHARED if mutation.name == "camera-mirrored")
-    with injected(*mutation.changes):
+    with injected(mutation.change):
         changed = stages.stage_of("many-lights")
     assert not np.array_equal(changed.image.airlight, stage.image.airlight)
     assert all(sighting.agrees for sighting in stages.seen("quadrature", mutation, changed))
@@ -126,5 +126,5 @@ def furthest(certified):
 @pytest.mark.parametrize("mutation", SHARED, ids=lambda mutation: mutation.name)
 def test_the_certified_scenes_find_what_all_share(certified, mutation):
     assert furthest(certified) < 1e-9  # the tolerance of the integrals, 1e-10, and twelve digits
-    with injected(*mutation.changes):
+    with injected(mutation.change):
         assert furthest(certified) > 1e-3

@@ -8,35 +8,13 @@ and standard error follow from the batches as a renderer's do. Then
 * without a bias (`calibrate`) each test must reject as often as its level says, the intervals must hold the truth as
   often as they say, and the p-values of many comparisons must be uniform (Kolmogorov and Smirnov);
 * with a bias (`check_power`) the share of comparisons that find it must be the power that each of them predicts from
-  its own standard error;
-* the unit of radiance must change nothing (`unit`).
+  its own standard error.
 
-**How far this holds.** Batch means of path tracers are skewed. 1000 comparisons of 576 pixels with an exact reference,
-no bias, errors of a batch log-normal with the logarithmic deviation s (0: normal), K batches. Shares of values below
-the 1 % level, of comparisons with a pixel alarm and with a block alarm (1 % expected each), with an alarm of
-`exceeding_p` (at most 1 %), and of 95 % intervals of the image that hold the truth, by pixels and by batches:
-
-    s     K   values   pixel   block   exceeding   interval   by batches
-    0     4    1.0 %   0.8 %   1.0 %        1 %     95.4 %       95.8 %
-    0    16    1.0 %   0.9 %   0.8 %        0 %     94.3 %       94.8 %
-    0.5   4    2.3 %   2.9 %   1.2 %       46 %     94.5 %       93.8 %
-    0.5  16    2.6 %    30 %   0.9 %       61 %     95.5 %       96.1 %
-    0.5  64    1.6 %    16 %   1.6 %       10 %     95.4 %       95.2 %
-    1     4    7.7 %    20 %   5.2 %      100 %     93.9 %       94.1 %
-    1    16    7.9 %    99 %   2.9 %      100 %     93.8 %       94.7 %
-    1    64    4.4 %    91 %   2.2 %      100 %     95.3 %       95.0 %
-    2     4     35 %   100 %    42 %      100 %     87.4 %       91.0 %
-    2    16     32 %   100 %    36 %      100 %     86.6 %       87.5 %
-    2    64     22 %   100 %    18 %      100 %     91.9 %       92.4 %
-
-So the count of rejected pixels is the first to break, from a skewness of 1.7 on (s = 0.5), in the far tail of which it
-lives; blocks hold to s = 0.5, and the interval of the image, which decides on equivalence, to s = 1 (a skewness of 6).
-`exceeding_p` notices all of it before it matters. At s = 2, where one value in a thousand is fifty times the mean, no
-interval is what it says with any affordable number of batches.
-
-Two random images with few batches each are judged too mildly: the degrees of freedom of Welch and Satterthwaite are
-estimates themselves, and with 4 normal batches on either side 0.7 % of the values exceed the 1 % level. With 16 they
-do as they should; the interval of the image is right with 4 too.
+**How far this holds.** Batch means of path tracers are skewed. With errors of a batch that are log-normal with the
+logarithmic deviation s, the count of rejected pixels is the first to break, from s = 0.5 on (a skewness of 1.7). Blocks
+hold to s = 0.5, and the interval of the image, which decides on equivalence, to s = 1 (a skewness of 6). `exceeding_p`
+notices all of it before it matters. At s = 2, where one value in a thousand is fifty times the mean, no interval is
+what it says with any affordable number of batches.
 """
 
 from collections.abc import Callable
@@ -46,7 +24,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binom
 
-from analytic.errors import InputError
 from validation.statistics.comparison import Estimate, Statistics, compare_statistics
 from validation.statistics.p_values import power, uniformity_p
 
@@ -76,43 +53,25 @@ class Experiment:
     batches: int = 16  #: of each random image
     size: int = 24  #: pixels along each side of an image
     noisy_reference: bool = False  #: or an exact one; the skewed errors of two random images cancel their skewness
-    unit: float = 1.0  #: factor of all radiances
     seed: int = 1  #: of the random numbers
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """How often the tests of `validation.statistics.comparison` reject images that agree; all shares are of runs but
-    `exceeding`.
-
-    Attributes
-    ----------
-    runs, pixels, batches
-        Comparisons, pixels of each image, batches of each random image.
-    pixel_alarms, block_alarms
-        With a pixel, or a block, rejected at Sidak's level; expected 1 %.
-    exceeding
-        Share of values below the 1 % level; expected 1 %.
-    exceeding_alarms, uniformity_alarms
-        With `exceeding_p` below 1 % (at most 1 % expected, as a number is discrete), and `uniformity_p`.
-    coverage, coverage_batches
-        Whose 95 % interval holds the truth, from the standard errors and from the batch means.
-    bias_uniformity, uniformity_uniformity
-        Kolmogorov and Smirnov's p-value that the runs' `relative_bias_p` are uniform, and their `uniformity_p`.
-    """
+    """How often the tests of `validation.statistics.comparison` reject images that agree: shares of the runs."""
 
     runs: int
     pixels: int
     batches: int
-    pixel_alarms: float
+    pixel_alarms: float  #: with a pixel rejected at Sidak's level
     block_alarms: float
-    exceeding: float
-    exceeding_alarms: float
+    exceeding: float  #: of values, below the 1 % level
+    exceeding_alarms: float  #: with `exceeding_p` below 1 %: at most 1 %, as a number is discrete
     uniformity_alarms: float
-    coverage: float
-    coverage_batches: float
-    bias_uniformity: float
-    uniformity_uniformity: float
+    coverage: float  #: whose 95 % interval holds the truth, from the standard errors
+    coverage_batches: float  #: from the batch means
+    bias_uniformity: float  #: Kolmogorov and Smirnov's p-value that the runs' `relative_bias_p` are uniform
+    uniformity_uniformity: float  #: and their `uniformity_p`
 
     def problems(self, level: float = 1e-4) -> tuple[str, ...]:
         """Name what is not as it should be, each judged by its binomial law at a level; empty if all is well."""
@@ -140,19 +99,7 @@ class Calibration:
 
 @dataclass(frozen=True)
 class PowerCheck:
-    """How often an injected bias was found, and how often the comparisons themselves said that it would be.
-
-    Attributes
-    ----------
-    bias
-        Relative bias put into the test images.
-    detectable
-        Mean of the detectable biases that the comparisons printed.
-    predicted, measured
-        Mean of their predicted powers for this bias at the 5 % level, and the share of them that found one.
-    runs
-        Comparisons.
-    """
+    """How often an injected bias was found, and how often the comparisons themselves said that it would be."""
 
     bias: float
     detectable: float
@@ -168,15 +115,7 @@ class PowerCheck:
 
 
 def calibrate(experiment: Experiment, *, spread: float = 0.3) -> Calibration:
-    """Compare many images that agree, and count.
-
-    Parameters
-    ----------
-    experiment
-        What is compared.
-    spread
-        Relative standard deviation of one batch in one pixel.
-    """
+    """Compare many images that agree, and count."""
     comparisons = _comparisons(experiment, 0.0, spread)
 
     def covered(name: str) -> float:
@@ -198,28 +137,8 @@ def calibrate(experiment: Experiment, *, spread: float = 0.3) -> Calibration:
     )
 
 
-def check_power(bias: float, experiment: Experiment, *, spread: float | None = None) -> PowerCheck:
-    """Inject a bias into many images, and compare the share that finds it with the power that was predicted.
-
-    Parameters
-    ----------
-    bias
-        Relative, such as 0.005.
-    experiment
-        What is compared.
-    spread
-        Relative standard deviation of one batch in one pixel; by default the one at which the bias is found nine times
-        in ten.
-
-    Raises
-    ------
-    InputError
-        If the bias is zero or not above -1, for which no spread can be chosen.
-    """
-    if not bias > -1 or bias == 0:
-        raise InputError(f"bias: got {bias}, wanted a relative bias such as 0.005, not 0 and above -1")
-    if spread is None:
-        spread = spread_to_detect(bias, experiment)
+def check_power(bias: float, experiment: Experiment, *, spread: float) -> PowerCheck:
+    """Inject a bias into many images, and compare the share that finds it with the power that was predicted."""
     comparisons = _comparisons(experiment, bias, spread)
     predicted = [power(bias / s.relative_bias_se, s.relative_bias_freedom) for s in comparisons]
     return PowerCheck(
@@ -252,7 +171,7 @@ def share_interval(probability: float, trials: int, level: float) -> tuple[float
 
 def _comparisons(experiment: Experiment, bias: float, spread: float) -> list[Statistics]:
     rng = np.random.default_rng(experiment.seed)
-    truth = experiment.unit * _profile(experiment.size)
+    truth = _profile(experiment.size)
 
     def estimate(image: Array) -> Estimate:
         """Return what a renderer gives of an image: mean, standard error and batch means."""

@@ -17,17 +17,7 @@ def difference_values(codes: Codes, k: float, s: float) -> Array:
 
 
 def decode_planes(packed: Packed, size: tuple[int, int], bits: int) -> Codes:
-    """Return the codes, (height, width, planes); those of 16 bits with their sign.
-
-    Parameters
-    ----------
-    packed
-        From `pack_planes`.
-    size
-        Width and height.
-    bits
-        As given to `pack_planes`.
-    """
+    """Return the codes, (height, width, planes); those of 16 bits with their sign."""
     width, height = size
     raw = np.frombuffer(zlib.decompress(packed.data), np.uint8).astype(np.int64)
     decoded: list[NDArray[np.int64]] = []

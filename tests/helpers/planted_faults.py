@@ -52,15 +52,7 @@ class Planted:
     values: Callable[[Array], Array | None] | None = None  #: what is done to the image then
 
     def image(self, truth: TruthScene, right: Array | None = None) -> Array | None:
-        """Return the image, (height, width, 3), or None where the scene cannot have the fault.
-
-        Parameters
-        ----------
-        truth
-            The scene.
-        right
-            Its image, if it is known.
-        """
+        """Return the image, (height, width, 3), or None where the scene cannot have the fault."""
         if self.make is None and right is None:
             right = right_image(truth)
         image = right if self.make is None else self.make(truth)
@@ -296,17 +288,3 @@ PLANTED = (
     Planted("vignette", "corners darker by cos^4", _darker_corners),
     Planted("channels", "B, G, R", values=_swapped),
 )
-
-
-def _and_then(name: str, words: str, then: str, change: Callable[[Array], Array | None]) -> Planted:
-    """Return a fault of `PLANTED`, by its words, with another one done to its image."""
-    (first,) = (planted for planted in PLANTED if planted.words == words)
-    return Planted(f"{first.name} and {name}", f"{words}, and {then}", first.make, change)
-
-
-PAIRS = (
-    _and_then("factor", "the extinction 1.4 times", "0.7 times as bright", lambda image: 0.7 * image),
-    _and_then("flip", "another g", "upside down", lambda image: image[::-1]),
-    _and_then("transfer", "the way from the light not attenuated", "sRGB", to_srgb),
-    _and_then("channels", "no absorption", "B, G, R", _swapped),
-)  #: two faults of different kinds: a diagnosis should name both

@@ -15,15 +15,7 @@ from realtime.methods.light_volumes.published.tessellation import (
 
 
 def tessellated_heights(height, divided: list[Any]):
-    """Return the heights of the tessellation at every corner of the texels, to compare with `height`.
-
-    Parameters
-    ----------
-    height
-        Array (faces, N + 1, N + 1) of inverse depths.
-    divided
-        Which nodes are divided (see `divide`).
-    """
+    """Return the heights of the tessellation at every corner of the texels, to compare with `height`."""
     size = 2 ** len(divided)
     flat = np.array(height, dtype=float).ravel()
     result = flat.copy()

@@ -62,16 +62,7 @@ PRECISION = 128  # bits that are carried, of which 20 digits are 67
 
 
 def enclosure(row: Mapping[str, str], *, precision: int = PRECISION) -> arb:
-    """Return a ball that holds J [1/m] of a row of either file, given by the text of its cells.
-
-    Parameters
-    ----------
-    row
-        Cells by the names of their columns: `phase`, `g`, `x0`, `x1`, `sigma_t`, and `t` and `h` or the coordinates of
-        `o`, `d` and `l`.
-    precision
-        Bits that are carried.
-    """
+    """Return a ball that holds J [1/m] of a row of either file, given by the text of its cells."""
     with ctx.workprec(precision):
         foot, height = _foot_and_height(row)
         x0, x1, sigma_t, g = (arb(float(row[name])) for name in ("x0", "x1", "sigma_t", "g"))
@@ -94,13 +85,7 @@ def enclosure(row: Mapping[str, str], *, precision: int = PRECISION) -> arb:
 
 
 def digits(ball: arb, count: int = DIGITS) -> str:
-    """Return the number that a ball encloses in so many digits, rounded to nearest; zeros at the end are left out.
-
-    Raises
-    ------
-    ArithmeticError
-        If the two ends of the ball round to different digits.
-    """
+    """Return the number that a ball encloses in so many digits, rounded to nearest; zeros at the end are left out."""
     with ctx.workprec(8 * PRECISION):  # ends are rounded outwards to the current precision
         words = {_word(end, count) for end in (ball.lower(), ball.upper())}
     if len(words) != 1:

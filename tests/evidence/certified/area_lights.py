@@ -44,13 +44,7 @@ SPHERES: tuple[tuple[float, ...], ...] = (
 
 
 def certified_rows() -> dict[str, Any]:
-    """Return all rows, values with 15 digits as text.
-
-    Raises
-    ------
-    ArithmeticError
-        If two routes disagree.
-    """
+    """Return all rows, values with 15 digits as text."""
     names: tuple[str, ...] = ("sigma_t", "foot", "height", "x0", "x1", "axial", "across", "g")
     points = [dict(zip(names, row, strict=True)) | {"J": _text(point_integral(*row))} for row in POINTS]
     names = ("sigma_t", "height", "radius", "foot", "x0", "x1")

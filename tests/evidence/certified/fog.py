@@ -119,20 +119,6 @@ def directions(scene: FogScene) -> tuple[tuple[float, ...], ...]:
 def certify_pixel(scene: FogScene, direction: Sequence[float]) -> CertifiedPixel:
     """Certify the airlight along one ray from the scene's camera.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-    direction
-        Of the ray; the numbers count as exact, what is left of a length other than 1 is divided out.
-
-    Raises
-    ------
-    ArithmeticError
-        If two quadratures disagree.
-
-    Notes
-    -----
     Valid for cameras and lights outside of all occluders, and rays that do not meet a light. Takes about a third of a
     second for each light and colour of the extinction.
     """

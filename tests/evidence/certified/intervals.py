@@ -90,23 +90,6 @@ def lit_parts(
 ) -> list[tuple[Number, Number, bool]]:
     """Return the lit parts of a ray.
 
-    Parameters
-    ----------
-    origin, direction
-        The ray, its direction of unit length.
-    end
-        Distance at which it ends [m], may be infinite.
-    light, occluders
-        The light and what may hide it.
-
-    Returns
-    -------
-    list
-        Distances at which each lit part begins and ends [m], in order, and whether it lies in the part of a spot that
-        has less than the full intensity. Parts that touch differ in that.
-
-    Notes
-    -----
     Valid for cameras and lights outside of all occluders, and cut-off angles below 90 degrees. The result has nearly
     the working precision, half of it where a ray all but touches a cone.
     """

@@ -37,19 +37,6 @@ def height_field(shadow_map: ShadowMap, walls: NDArray[np.uint32] | None = None)
 
     With k = axis + u across + v up the first surface is at k / s = k distance / |k| from the light, so s = |k| /
     distance, and 0 where the distance is infinite.
-
-    Parameters
-    ----------
-    shadow_map
-        The map, with distances [m].
-    walls
-        Numbers of its texels' walls from `realtime.methods.light_volumes.jump_search`, (faces size size,), if the
-        field has walls.
-
-    Raises
-    ------
-    InputError
-        If a distance is not above 0.
     """
     size = shadow_map.size
     distance = np.array(shadow_map.distance, dtype=np.float64)
@@ -89,20 +76,7 @@ class Path:
 
 
 def by_ray(first: Index, first_angle: Array, second: Index, second_angle: Array) -> tuple[Index, Array]:
-    """Join two lists of angles of rays and sort them by ray and angle.
-
-    Parameters
-    ----------
-    first, second
-        Numbers of rays, (n,) and (m,).
-    first_angle, second_angle
-        Angles at the light, in their order [rad].
-
-    Returns
-    -------
-    ray, angle
-        (n + m,) each, the angle in [rad].
-    """
+    """Join two lists of angles of rays and sort them by ray and angle."""
     ray, angle = np.concatenate([first, second]), np.concatenate([first_angle, second_angle])
     order = np.lexsort((angle, ray))
     return ray[order], angle[order]

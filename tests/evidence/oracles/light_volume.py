@@ -60,14 +60,7 @@ _CHUNK = 1 << 20  # crossings of rays and lines looked at together: 8 MB an arra
 
 
 def traced_walls(scene: Scene, shadow_maps: Sequence[ShadowMap]) -> list[NDArray[np.uint32]]:
-    """Return by light the walls that its rays find between the samples of its map, for `oracle_airlight`.
-
-    Returns
-    -------
-    list
-        For each light the numbers [1] of the walls of its map's texels, (texels,), as
-        `realtime.methods.light_volumes.jump_search` gives them.
-    """
+    """Return by light the walls that its rays find between the samples of its map, for `oracle_airlight`."""
     pairs = zip(shadow_maps, scene.lights, strict=True)
     return [
         np.array(with_walls(inverse_depth_field(shadow_map), scene.geometry, light).walls)
@@ -84,29 +77,6 @@ def oracle_airlight(
 ) -> Array:
     """Return the airlight that shadow maps stand for.
 
-    Parameters
-    ----------
-    truth
-        The scene, in one medium without bounds.
-    shadow_maps
-        One for each light, in the order of `truth.lights`.
-    distance
-        To the visible surface by pixel, infinite where there is none [m]; computed in float64 by default.
-    walls
-        By light, the walls of the texels of its map, see `realtime.methods.light_volumes.jump_search`; none by default.
-
-    Returns
-    -------
-    Array
-        In-scattered radiance, (height, width, 3) [W/(m^2 sr)].
-
-    Raises
-    ------
-    InputError
-        For media with bounds, or another number of shadow maps than of lights.
-
-    Notes
-    -----
     Valid for rays that miss the lights; a ray through one has an infinite airlight, whatever hides the light beyond it.
     """
     if truth.media:
@@ -137,17 +107,7 @@ def _rays_of(truth: TruthScene, light: TruthLight, distance: Array) -> tuple[Ray
 
 
 def volume_intervals(field: HeightField, rays: Rays, ends: tuple[Array, Array]) -> LitIntervals:
-    """Return the lit parts of rays, cut where they go from one face to the next.
-
-    Parameters
-    ----------
-    field
-        The height field.
-    rays
-        Rays in the plane of each and the light.
-    ends
-        Angles at the light between which the rays can be lit, (n,) each [rad]; those of a spot lie within its face.
-    """
+    """Return the lit parts of rays, cut where they go from one face to the next."""
     parts: list[tuple[Index, Array, Array]] = [(np.empty(0, np.int64), np.empty(0), np.empty(0))]
     for face, matrix in enumerate(field.coordinates):
         normal, direction = rays.normal @ matrix.T, rays.direction @ matrix.T

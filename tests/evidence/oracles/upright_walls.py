@@ -35,24 +35,7 @@ class _Texels:
 def walled_parts(
     field: HeightField, face: int, path: Path, ends: tuple[Array, Array], stops: NDArray[np.bool_]
 ) -> tuple[Index, Array, Array]:
-    """Return what is lit between two angles within a face.
-
-    Parameters
-    ----------
-    field, face
-        The height field, and which of its faces.
-    path
-        The rays.
-    ends
-        Angles at the light, (rays,) each [rad].
-    stops
-        Which rays end there, and do not go on in another face, (rays,).
-
-    Returns
-    -------
-    ray, begin, end
-        Number of the ray and the angles at both ends [rad], (intervals,) each.
-    """
+    """Return what is lit between two angles within a face."""
     low, high = ends[0][:, None], ends[1][:, None]
     lines = _borders(field.size).T
     theta = np.clip(zero_angle(path.normal @ lines, path.direction @ lines), low, high)
