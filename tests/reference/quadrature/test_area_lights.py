@@ -20,7 +20,6 @@ from reference.visibility.surface_shadows import segments_blocked
 from tests.helpers.area_lights import (
     GREY,
     NULL,
-    area_airlight_of,
     ball,
     fixed,
     flat,
@@ -39,18 +38,6 @@ def room(light, **changes):
 
 def empty(light, **changes):
     return room(light, empty=True, **changes)
-
-
-@pytest.mark.parametrize("kind", LAMPS)
-def test_open_air_and_lit_intervals_give_the_same(variant, kind, monkeypatch):
-    truth = empty(LAMPS[kind]())
-    distance = np.full(len(truth.direction), np.inf)
-    distance[::3] = 4.2
-    quick = area_airlight_of(truth, fixed(4), distance)
-    monkeypatch.setattr(airlight_module, "_is_open", lambda *_: False)
-    slow = area_airlight_of(truth, fixed(4), distance)
-    assert quick.replicates == pytest.approx(slow.replicates, rel=1e-7)
-    assert np.all(slow.bound < 1e-6 * slow.replicates.mean(axis=2) + 1e-300)
 
 
 def test_one_point_by_plain_quadrature(variant):

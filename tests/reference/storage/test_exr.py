@@ -96,9 +96,7 @@ def test_attributes_keep_their_value(tmp_path):
     [
         ({}, "without layers"),
         ({"airlight": np.ones((2, 2))}, r"shape \(2, 2\); wanted \(height, width, 3\)"),
-        ({"airlight": np.ones((0, 2, 3))}, "none of them zero"),
         ({"airlight": np.ones((2, 2, 3)), "surface": np.ones((2, 3, 3))}, "two sizes: 'airlight'.*'surface'"),
-        ({"airlight": np.full((2, 2, 3), 1e39)}, "12 values of 'airlight' exceed"),
         ({"airlight": np.ones((2, 2, 3)), "total": np.full((2, 2, 3), 1.01)}, "'total' is not airlight"),
     ],
 )
@@ -159,22 +157,6 @@ def test_broken_files_give_one_line_and_nothing_on_the_terminal(tmp_path, capfd)
     assert capfd.readouterr() == ("", "")
 
 
-def test_refuses_tiled_and_deep_files(tmp_path):
-    import OpenEXR
-
-    plane = np.ones((3, 4), np.float32)
-    write_raw(tmp_path / "tiled.exr", {"R": plane}, {"type": OpenEXR.tiledimage, "tiles": OpenEXR.TileDescription()})
-    deep = np.empty((3, 4), object)
-    for index in np.ndindex(deep.shape):
-        deep[index] = np.zeros(2, np.float32)
-    write_raw(
-        tmp_path / "deep.exr", {"Z": deep}, {"type": OpenEXR.deepscanline, "compression": OpenEXR.ZIPS_COMPRESSION}
-    )
-    for kind in ("tiled", "deep"):
-        with pytest.raises(InputError, match=rf"{kind}\.exr is a {kind} EXR file; save it as a single part"):
-            read_exr(tmp_path / f"{kind}.exr")
-
-
 def write_parts(path, parts):
     import OpenEXR
 
@@ -205,19 +187,6 @@ def test_reads_the_parts_of_a_file(tmp_path):
     assert image.attributes == {"owner": "me"}
 
 
-def test_a_part_that_is_cut_off_is_not_left_out_in_silence(tmp_path, capfd):
-    """The binding returns the other parts, with a word on the terminal."""
-    noise = np.random.default_rng(1).random((3, 64, 64)).astype(np.float32)
-    parts = [(name, {}, dict(zip("RGB", noise))) for name in ("rgba", "fog")]
-    write_parts(tmp_path / "good.exr", parts)
-    good = (tmp_path / "good.exr").read_bytes()
-    for cut in (1, len(good) // 4, len(good) * 3 // 4):
-        (tmp_path / "bad.exr").write_bytes(good[:-cut])
-        with pytest.raises(InputError, match=r"bad\.exr is a broken EXR file"):
-            read_exr(tmp_path / "bad.exr")
-    assert capfd.readouterr() == ("", "")
-
-
 def test_refuses_parts_that_do_not_fit(tmp_path):
     import OpenEXR
 
@@ -231,17 +200,6 @@ def test_refuses_parts_that_do_not_fit(tmp_path):
     for name, words in (("a", "another window of pixels"), ("b", "part 'two' that is tiled"), ("c", "'x.R' in two")):
         with pytest.raises(InputError, match=words):
             read_exr(tmp_path / f"{name}.exr")
-
-
-def test_colours_in_integers_are_named(tmp_path):
-    plane = np.ones((3, 4), np.uint32)
-    write_raw(tmp_path / "a.exr", dict.fromkeys("RGB", plane))
-    image = read_exr(tmp_path / "a.exr")
-    assert image.attributes["airlight:read"] == "colours in unsigned integers left out: B, G, R"
-    with pytest.raises(
-        InputError, match=r"no layer of colours at all \(colours in unsigned.*write it in half or float"
-    ):
-        layer(image, "total")
 
 
 def test_a_full_disk_names_the_file_and_leaves_it(tmp_path):

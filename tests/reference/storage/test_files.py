@@ -65,16 +65,6 @@ def test_refuses_a_folder_that_is_a_file(tmp_path):
     assert (tmp_path / "file").read_text() == "x"
 
 
-def test_refuses_a_folder_that_cannot_be_written():
-    # /proc refuses new files whoever asks, the superuser too.
-    if not os.path.isdir("/proc/self"):
-        pytest.skip("needs the /proc of Linux")
-    for folder in ("/proc/self", "/proc/new-folder"):
-        with pytest.raises(InputError, match=r"cannot write into the folder /proc.*; give a folder") as caught:
-            ensure_folder(folder)
-        assert "\n" not in str(caught.value)
-
-
 @pytest.mark.claim("files-whole-or-not-at-all")
 def test_a_full_disk_names_the_file_and_leaves_it(tmp_path):
     """A limit on the size of a file stands for the disk; a failed write does not name a file by itself."""

@@ -175,16 +175,6 @@ def test_layers_that_are_not_there_are_refused(scene, truth, write):
     assert compare_scene(scene, file, layer="B.Combined").comparison.metrics.relative_rmse < 1e-6
 
 
-def test_what_a_layer_holds_can_be_said(scene, truth, write):
-    file = write(Beauty=truth.airlight)
-    compared = compare_scene(scene, file, holds="airlight")
-    assert (compared.expected, compared.verdict.right) == ("airlight", True)
-    (words,) = compare_scene(scene, write(airlight=truth.airlight + truth.surface)).hints.words
-    assert words == "the image is all light: say --as total"
-    with refused("--as fog; wanted one of airlight, surface, total"):
-        compare_scene(scene, file, holds="fog")
-
-
 @pytest.mark.parametrize("size", [(1, 1), (4, 3)])
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, 3e38])
 def test_odd_images_get_a_verdict_and_no_number_that_is_none(tmp_path, variant, size, value):

@@ -35,15 +35,12 @@ def test_the_right_image_raises_no_suspicion(truth):
     [
         (lambda image: image[::-1], ["upside down"]),
         (lambda image: image[:, ::-1], ["mirrored left to right"]),
-        (lambda image: image[::-1, ::-1], ["turned by 180 degrees"]),
         (lambda image: image[..., ::-1], ["channel order B, G, R"]),
         (srgb, ["sRGB curve"]),
         (lambda image: math.pi * image, ["3.142 times as bright as it should be (pi, +1.65 stops)"]),
         (lambda image: image / (4 * math.pi), ["(1/(4 pi), -3.65 stops)"]),
         (lambda image: 683 * image, ["683, lumens a watt"]),
-        (lambda image: image * 2**-2.5, ["0.1768 times as bright as it should be (-2.50 stops)"]),
         (lambda image: 4 * math.pi * image[::-1], ["upside down", "(4 pi, +3.65 stops)"]),
-        (lambda image: srgb(image[..., ::-1]), ["channel order", "sRGB curve"]),
         (lambda image: -image, ["the image is negative"]),
     ],
 )

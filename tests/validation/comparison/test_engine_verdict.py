@@ -68,15 +68,11 @@ FAULTS = {
     "pi": (lambda image, truth: np.pi * image, "(pi, +1.65 stops)"),
     "a factor of 3 %": (lambda image, truth: 1.03 * image, "the best factor is 0.97"),
     "upside down": (lambda image, truth: image[::-1], "upside down"),
-    "mirrored": (lambda image, truth: image[:, ::-1], "mirrored"),
-    "B, G, R": (lambda image, truth: image[..., ::-1], "off"),
     "a gamma": (lambda image, truth: image ** (1 / 2.2), ""),
-    "clipped": (lambda image, truth: np.minimum(image, np.quantile(image, 0.9)), "off"),
     "a pixel too low": (lambda image, truth: moved(image), "off"),
     "a haze of 5 %": (lambda image, truth: image + 0.05 * image.mean(), "off"),
     "fog that ends": (lambda image, truth: image - 0.1 * truth.airlight * (np.arange(SIZE[0]) < 30)[:, None], "off"),
     "black": (lambda image, truth: 0 * image, "the image is black everywhere"),
-    "no number": (lambda image, truth: np.nan * image, "the image has no finite value"),
 }
 
 

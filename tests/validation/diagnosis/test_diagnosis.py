@@ -106,13 +106,6 @@ def test_noise_is_of_one_size_all_over_the_image(truth):
     assert not is_noise(explanation, pairs)
 
 
-@pytest.mark.slow
-def test_missing_shadows_are_named(variant):
-    own = read_truth(load_scene("omni-box", SIZE).scene)
-    (planted,) = (each for each in PLANTED if each.name == "no-shadow")
-    assert diagnosed(planted.image(own), "omni-box").first == "no-shadow"
-
-
 @pytest.mark.claim("diagnosis-right")
 @pytest.mark.parametrize("noise", [0.01, pytest.param(0.2, marks=pytest.mark.slow)])
 def test_no_fault_is_named_for_a_right_image(truth, noise):
@@ -120,13 +113,6 @@ def test_no_fault_is_named_for_a_right_image(truth, noise):
     diagnosis = diagnosed(total(truth) * (1 + noise * generator.standard_normal((SIZE[1], SIZE[0], 1))))
     assert diagnosis.first == "right"
     assert diagnosis.explained
-
-
-@pytest.mark.slow
-def test_means_over_pixels_of_a_right_image_are_right(truth):
-    means = total(truth, pixel="area")
-    diagnosis = diagnosed(means, pixel=None)
-    assert (diagnosis.first, diagnosis.pixel) == ("right", "area")
 
 
 @pytest.mark.slow
@@ -140,11 +126,3 @@ def test_two_faults_of_different_kinds_are_both_named(truth):
     flipped = diagnosed(total(denser)[::-1])
     assert {row.name for row in flipped.ranked[:2]} == {"extinction", "flip"}
     assert "Two faults" in "\n".join(diagnosis_lines(flipped))
-
-
-@pytest.mark.slow
-def test_what_nothing_explains_is_said(truth):
-    other = read_truth(load_scene("open-fog", SIZE).scene)
-    diagnosis = diagnosed(total(other))
-    assert diagnosis.first == "unexplained"
-    assert "Nothing here explains it" in "\n".join(diagnosis_lines(diagnosis))

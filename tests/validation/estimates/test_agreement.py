@@ -77,16 +77,6 @@ def test_truth_that_is_wrong_in_a_corner_is_rejected_there(scene, monkeypatch):
     assert statistics.rejected + statistics.rejected_blocks > 0
 
 
-def test_leg_from_the_light_that_is_too_short_does_not_agree(scene, monkeypatch):
-    """A tenth of the leg left out is exp(0.1 sigma_t r), some 4 % too bright."""
-    import validation.estimates.agreement
-
-    monkeypatch.setattr(validation.estimates.agreement, "measure_shadow_epsilon", lambda: 0.1)
-    verdicts = agreement(scene, **BUDGET)
-    assert not any(verdict.statistics.equivalent for verdict in verdicts.values())
-    assert verdicts["airlight"].epsilon == 0.1
-
-
 @pytest.mark.claim("corrected-for-the-epsilon")
 def test_correction_for_the_epsilon_is_the_difference_of_the_two_biases(scene):
     """A light path that is shorter by a share s is brighter by s sigma_t <r>, <r> its mean length over the light.

@@ -16,11 +16,8 @@ from validation.estimates.budget import Budget, batch_plan, near_light, relative
         ({}, "got none of --spp, --target-error, --time-budget; give one"),
         ({"samples": 64, "error": 0.01}, "got --spp 64 and --target-error 0.01 of"),
         ({"error": 0.01, "seconds": 3.0}, "got --target-error 0.01 and --time-budget 3 of"),
-        ({"samples": 64, "error": 0.01, "seconds": 3.0}, "--spp 64 and --target-error 0.01 and --time-budget 3"),
         ({"error": 0.0}, "--target-error: got 0, wanted a positive number"),
-        ({"error": float("nan")}, "--target-error: got nan"),
         ({"seconds": -1.0}, "--time-budget: got -1"),
-        ({"seconds": float("inf")}, "--time-budget: got inf"),
         ({"error": 1.5}, "--target-error: got 1.5, wanted less than 1; 0.01 is 1 %"),
     ],
 )

@@ -13,7 +13,7 @@ from reference.storage.exr import Image
 from validation.estimates.quadrature import truth_image
 from validation.fit.confounding import confounded_groups
 from validation.fit.fit import fit_image
-from validation.fit.image_model import Task, image_model, usable_pixels
+from validation.fit.image_model import Task, image_model
 from validation.fit.intervals import interval_ends
 from validation.fit.least_squares import best_start, robust_fit, weighted_fit
 from validation.fit.noise import noise_of, outliers
@@ -188,26 +188,14 @@ def test_groups_of_dependent_columns():
     assert (group.members, group.held, group.powers) == ((1,), (1,), {})
 
 
-def test_cut_off_values_say_nothing():
-    values = np.linspace(0, 1, 60).reshape(20, 3)
-    assert usable_pixels(values).all()
-    clipped = np.minimum(values, 0.6)
-    assert usable_pixels(clipped).sum() == (values.max(axis=1) < 0.6).sum()
-    values[3, 1] = np.inf
-    assert not usable_pixels(values)[3]
-
-
 @pytest.mark.parametrize(
     ("names", "how", "words"),
     [
         ([], {}, "wanted some of sigma_t"),
         (["sigma"], {}, "did you mean 'sigma_t'"),
-        (["sigma_t", "sigma_t.r"], {}, "there twice"),
-        (["intensity:3"], {}, "wanted a light of the scene"),
         (["sigma_t"], {"starts": {"albedo": 0.5}}, "is not looked for"),
         (["sigma_t"], {"starts": {"sigma_t": -1.0}}, "a number above 0"),
         (["sigma_t"], {"mask": np.ones((3, 4))}, "the mask is 4 x 3 pixels"),
-        (["sigma_t"], {"pixel": "middle"}, "'centre' or 'area'"),
     ],
 )
 def test_mistakes_have_one_line(variant, tmp_path, names, how, words):

@@ -40,15 +40,6 @@ def test_summary_finds_the_worst_row_of_the_file(tmp_path):
     assert counts["p50"] == pytest.approx(0.15)
 
 
-def test_summary_counts_what_is_not_finite(tmp_path):
-    cases = read_cases(table(tmp_path, SHORT))
-    counts = summary(cases, np.array([np.nan, 1.0, np.inf, 1.5]))
-    assert (counts["rows"], counts["compared"], counts["nonfinite"], counts["worst_row"]) == (4, 2, 2, 5)
-    assert counts["max"] == pytest.approx(0.5)
-    nothing = summary(cases, np.full(4, np.nan))
-    assert (nothing["compared"], nothing["nonfinite"]) == (0, 4)
-
-
 def test_values_below_float32_are_compared_in_absolute_terms(tmp_path):
     cases = read_cases(table(tmp_path, "phase,t,h,x0,x1,sigma_t,value\nisotropic,1,2,0,inf,900,1e-60\n"))
     assert summary(cases, np.array([0.0]))["max"] < 1e-20

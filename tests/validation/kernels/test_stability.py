@@ -49,18 +49,6 @@ def test_errors_are_counted_by_group():
     assert (errors["phase hg"].rays, errors["phase hg"].max) == (1, 0.0)
 
 
-def test_what_is_not_finite_is_counted_and_shown_as_the_worst():
-    rays = four_rays()
-    errors = errors_by_group(
-        rays, Values(np.array([9.0, np.nan, np.inf, 8.0]), {}, np.ones(4, dtype=bool)), "double", groups(rays)
-    )["all"]
-    assert (errors.nan, errors.infinite, errors.negative) == (1, 1, 0)
-    assert errors.max == 8.0
-    assert ",2.0,1.0,2.0" in errors.worst
-    nothing = errors_by_group(rays, Values(np.full(4, np.nan), {}, np.ones(4, dtype=bool)), "single", groups(rays))
-    assert (nothing["all"].max, nothing["all"].median, nothing["all"].nan) == (None, None, 4)
-
-
 @pytest.mark.parametrize("error", [InputError, RealtimeInputError])
 def test_refusal_keeps_the_words_of_the_kernel(variant, error):
     def refuses(geometry, x0, x1, medium, light):

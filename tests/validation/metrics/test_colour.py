@@ -33,18 +33,8 @@ SHARMA = np.array([
     (6.7747, -0.2908, -2.4247, 5.8714, -0.0985, -2.2286, 0.6377),
     (2.0776, 0.0795, -1.1350, 0.9033, -0.0636, -0.5514, 0.9082),
 ])
-# fmt: on
-# D65 and the sRGB matrix of IEC 61966-2-1, by hand: nothing of the code under test.
-WHITE = np.array([0.95047, 1.0, 1.08883])
-TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
 
 
-def linear_rgb(lab):
-    """Return linear sRGB of CIE L*a*b*, by the inverse written down in CIE 15."""
-    y = (lab[..., 0] + 16) / 116
-    f = np.stack([y + lab[..., 1] / 500, y, y - lab[..., 2] / 200], axis=-1)
-    xyz = WHITE * np.where(f > 6 / 29, f**3, 3 * (6 / 29) ** 2 * (f - 4 / 29))
-    return xyz @ np.linalg.inv(TO_XYZ).T
 
 
 def perceptual_quantiser(luminance):
@@ -62,17 +52,6 @@ def test_published_pairs_of_ciede2000():
     assert difference == pytest.approx(SHARMA[:, 6], abs=0.5e-4 + 1e-9)  # half a unit of the last digit
 
 
-def test_published_pairs_through_the_whole_chain():
-    first, second = linear_rgb(SHARMA[:, :3]), linear_rgb(SHARMA[:, 3:6])
-    shown = ((first >= 0) & (first <= 1) & (second >= 0) & (second <= 1)).all(axis=1)
-    # Pairs of opposite hues sit on a branch of the formula, which the fifth digit of the white decides.
-    shown &= np.abs(SHARMA[:, 1:3] + SHARMA[:, 4:6]).max(axis=1) > 0.01
-    assert shown.sum() >= 10
-    for a, b, expected in zip(first[shown], second[shown], SHARMA[shown, 6]):
-        difference = colour_difference(a[None, None], b[None, None], exposure=0.0)
-        assert difference.clipped == 0
-        # The whites of four and of five digits shift neutral colours by some thousandths of a unit.
-        assert difference.ciede2000_mean == pytest.approx(expected, rel=3e-3, abs=3e-3)
 
 
 def test_published_pair_of_delta_e_itp():
@@ -109,15 +88,6 @@ def test_the_default_exposure_takes_the_unit_out(factor):
     assert 0.9 / np.percentile(reference, 99) == pytest.approx(2.0**here.exposure, rel=1e-12)
 
 
-def test_nonfinite_pixels_are_left_out_and_counted():
-    reference = np.array([[0.5, np.nan, 0.2, 0.2]])
-    test = np.array([[0.4, 0.1, -np.inf, 0.2]])
-    difference = colour_difference(reference, test, exposure=0.0)
-    assert (difference.pixels, difference.nonfinite) == (4, 2)
-    alone = colour_difference(reference[:, ::3], test[:, ::3], exposure=0.0)
-    assert (difference.itp_mean, difference.ciede2000_mean) == (alone.itp_mean, alone.ciede2000_mean)
-    masked = colour_difference(reference, test, exposure=0.0, mask=np.array([[True, False, False, True]]))
-    assert (masked.pixels, masked.nonfinite, masked.itp_mean) == (2, 0, alone.itp_mean)
 
 
 @pytest.mark.parametrize(
@@ -125,9 +95,7 @@ def test_nonfinite_pixels_are_left_out_and_counted():
     [
         ((np.ones((3, 4, 3)), np.ones((4, 3, 3))), {}, "two sizes: the reference is 4 x 3"),
         ((np.ones((3, 4, 2)), np.ones((3, 4, 2))), {}, "2 channels has no colour; wanted one"),
-        ((np.ones((3, 4)), np.ones((3, 4))), {"exposure": np.inf}, "exposure: got inf, wanted a number of stops"),
         ((np.ones((3, 4)), np.ones((3, 4))), {"white_luminance": 2000.0}, "white at 2000.0 and peak at 1000.0"),
-        ((np.ones((3, 4)), np.ones((3, 4))), {"peak_luminance": 2e4}, "wanted 0 < white <= peak <= 10000"),
     ],
 )
 def test_refuses_what_does_not_fit(arguments, options, message):

@@ -84,10 +84,7 @@ def test_black_reference_has_absolute_errors_only():
     [
         (np.ones((3, 4, 3)), np.ones((6, 8, 3)), None, "reference is 4 x 3 pixels.*the test 8 x 6 pixels"),
         (np.ones((3, 4, 3)), np.ones((3, 4)), None, "with 3 channels, the test 4 x 3 pixels; render both"),
-        (np.ones(3), np.ones(3), None, r"wanted \(height, width\)"),
-        (np.ones((0, 4, 3)), np.ones((0, 4, 3)), None, "not empty"),
         (np.ones((2, 2)), np.ones((2, 2)), np.ones((2, 3), bool), r"a mask of bool \(2, 3\)"),
-        (np.ones((2, 2)), np.ones((2, 2)), np.ones((2, 2)), "a mask of float64"),
         (np.ones((2, 2)), np.ones((2, 2)), np.zeros((2, 2), bool), "leaves no pixel"),
     ],
 )

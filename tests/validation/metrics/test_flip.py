@@ -3,7 +3,6 @@
 
 import importlib.util
 import os
-import time
 
 import numpy as np
 import pytest
@@ -89,8 +88,6 @@ def test_bad_pixels_are_a_note(pair, side, bad, what):
     ("arguments", "options", "message"),
     [
         ((np.ones((3, 4, 3)), np.ones((3, 4))), {}, "two sizes: the reference is 4 x 3 pixels with 3 channels"),
-        ((np.ones((3, 4, 2)), np.ones((3, 4, 2))), {}, "2 channels has no colour"),
-        ((np.ones((3, 4)), np.ones((3, 4))), {"exposure": np.nan}, "exposure: got nan"),
         ((np.ones((3, 4)), np.ones((3, 4))), {"timeout": 0.0}, "time-out 0.0 s; wanted both above 0"),
         ((np.ones((3, 4)), np.ones((3, 4))), {"mask": np.zeros((3, 4), bool)}, "the mask leaves no pixel"),
     ],
@@ -107,7 +104,6 @@ def test_refuses_what_does_not_fit(arguments, options, message):
     ("body", "note"),
     [
         ("raise ImportError('wrong libgomp')", r"not installed (wrong libgomp)"),
-        ("import os\nos._exit(0)", "died with exit status 0"),
         ("print('Exiting.')\nraise SystemExit(1)", "died with exit status 1: Exiting."),
         (answer("np.zeros((2, 2))"), "no map of errors between 0 and 1"),
         (answer("np.full(r.shape[:2], 7.0)"), "no map of errors between 0 and 1"),
@@ -119,12 +115,3 @@ def test_a_package_that_fails_is_a_note(pair, fake, body, note):
     assert flip.value is None
     assert note in flip.note
     assert "\n" not in flip.note
-
-
-@pytest.mark.slow
-def test_a_package_that_hangs_is_ended(pair, fake):
-    fake("import time\ntime.sleep(600)")
-    began = time.perf_counter()
-    flip = flip_hdr(*pair, timeout=1.0)
-    assert time.perf_counter() - began < 30
-    assert flip.note == "flip-evaluator did not answer within 1 s and was ended"

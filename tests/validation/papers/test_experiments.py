@@ -51,19 +51,6 @@ def test_fractions_of_stages_have_intervals():
     assert found["main cost"][0] == pytest.approx(2)
 
 
-def test_ratios_of_errors_have_the_interval_of_a_jackknife():
-    from validation.papers.soft_shafts import Reference
-
-    random = np.random.default_rng(0)
-    reference = Reference(np.ones((40, 64, 3)), np.ones((40, 64), dtype=bool))
-    noise = random.normal(size=(2, 40, 64, 3))
-    _, low, high = reference.ratio(1 + 0.1 * noise[0], 1 + 0.1 * noise[1])
-    # The logarithm of a root mean square of n normal numbers has the variance 1/(2 n): of the ratio, 1/n.
-    assert (high - low) / 2 == pytest.approx(2 / np.sqrt(noise[0].size), rel=0.5)
-    assert low < 1 < high
-    assert reference.ratio(1 + 0.1 * noise[0], 1 + 0.2 * noise[0]) == pytest.approx([0.5] * 3)
-
-
 def test_the_penumbra_leaves_out_what_sees_all_of_the_light(variant):
     """Fractions are of the same points with and without occluders: where no bar stands between, they are 1 exactly."""
     from realtime.scene.read_scene import read_scene

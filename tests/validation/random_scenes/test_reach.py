@@ -34,10 +34,3 @@ def test_a_plate_under_the_lamp_keeps_the_light_away():
     found = reach(_scene(), [_plate(4.0, 30.0)])
     assert (found.lit, found.camera_lit) == (0.0, False)
     assert not found.enough
-
-
-def test_a_spot_lights_its_cone_alone():
-    narrow = replace(_LAMP, kind="spot", cutoff=3.0)
-    assert 0 < reach(_scene(lights=(narrow,)), []).lit < 0.3
-    behind = replace(_LAMP, kind="disk", target=(0.0, 0.0, 9.0), size=(0.1,))
-    assert reach(_scene(lights=(behind,)), []).lit == 0.0

@@ -48,7 +48,6 @@ def test_a_jump_is_a_cliff():
         ("speed", "open-fog", "wanted some of size, triangles"),
         ("triangles", "open-fog", "has 0 triangles"),
         ("lights", "fence", "lights with extent only"),
-        ("media", "open-fog", "0 bounded media"),
     ],
 )
 def test_what_a_scene_does_not_have_is_refused(kind, scene, why, variant):

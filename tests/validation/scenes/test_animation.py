@@ -7,7 +7,6 @@ import pytest
 from realtime.frame.incremental import next_frame
 from realtime.methods.registry import FOG_METHODS
 from validation.scenes.animation import animate, moved_parts
-from validation.scenes.record import Animation
 
 
 def host(array) -> np.ndarray:
@@ -74,25 +73,6 @@ def test_frames_record_nothing_and_compile_nothing(variant, name, moves, method)
             assert not compiled
     assert renderer.render.n_recordings == 1
     assert all(getattr(stage, "n_recordings", 1) == 1 for stage in (renderer.surface, renderer.shade, renderer.cull))
-
-
-def test_shapes_keep_their_names_beside_bounded_media(variant):
-    """What is opaque is rendered in a Mitsuba scene of its own: warnings and animations speak of its shapes."""
-    scene, _ = read("three-media")
-    names = [shape.id() for shape in scene.geometry.shapes()]
-    assert {"bar", "floor"} <= set(names)
-    assert not {"red", "green", "blue"} & set(names)
-    frames = animate(scene, Animation(("objects", "medium"), objects=("bar",)), 4)
-    base = [float(bounded_medium.medium.sigma_t[0][0]) for bounded_medium in scene.medium.bounded_media]
-    moved = [
-        (
-            step.placements["bar"].positions(),
-            [float(bounded_medium.medium.sigma_t[0][0]) for bounded_medium in step.medium.bounded_media],
-        )
-        for step in frames
-    ]
-    assert np.abs(moved[1][0] - moved[0][0]).max() > 1
-    np.testing.assert_allclose(moved[1][1], 1.5 * np.array(base), rtol=1e-6)
 
 
 @pytest.mark.parametrize(

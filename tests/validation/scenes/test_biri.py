@@ -22,7 +22,6 @@ from validation.scenes.solids import (
 from validation.scenes.three_media import SCENE as THREE_MEDIA
 
 RECORDS = {record.name: record for record in (THREE_MEDIA, CLUTTER, HALL)}
-MEDIA = {"red", "green", "blue"}
 SOLIDS = {
     # name: mesh, triangles, Euler's number
     "box": (box((0.7, 1.3, 0.9)), 12, 2),
@@ -75,24 +74,3 @@ def test_volumes_of_solids_by_their_formulas():
     # Pappus, with both circles as polygons, in the limit: the corners of the polygons leave out less than 1e-3.
     assert volume(*torus(0.9, 0.3, (300, 200))) == pytest.approx(2 * np.pi**2 * 0.9 * 0.3**2, rel=1e-3)
     assert volume(*icosphere(5)) == pytest.approx(4 * np.pi / 3, rel=2e-3)
-
-
-def test_media_are_convex_and_apart(variant):
-    media = {name: mesh for name, mesh in meshes("three-media").items() if name in MEDIA}
-    normals = {}
-    for name, (vertices, faces) in media.items():
-        a, b, c = (vertices[faces[:, k]] for k in range(3))
-        normal = np.cross(b - a, c - a)
-        normal /= np.linalg.norm(normal, axis=1)[:, None]
-        normals[name] = normal
-        height = normal @ vertices.T - np.sum(normal * a, axis=1)[:, None]
-        # Positions of 2 m are rounded to 1e-7 in float32; the box's sides have two coplanar triangles each.
-        assert height.max() < 1e-6, name
-    for medium in MEDIA:
-        for other in MEDIA - {medium}:
-            # Convex bodies are apart where a plane lies between them; here one of the faces' planes, or one across the
-            # line of centres, does.
-            line = media[other][0].mean(axis=0) - media[medium][0].mean(axis=0)
-            axes = np.concatenate([normals[medium], -normals[other], [line / np.linalg.norm(line)]])
-            gap = (axes @ media[other][0].T).min(axis=1) - (axes @ media[medium][0].T).max(axis=1)
-            assert gap.max() > 0.05, (medium, other)

@@ -11,9 +11,7 @@ from realtime.scene.read_scene import read_scene
 from reference.scene.read import read_truth
 from reference.storage.scene_digest import scene_digest
 from validation.scenes.loading import load_scene
-from validation.scenes.parts import joined, scaled
-from validation.scenes.random_scene import drawn_values, random_name
-from validation.scenes.solids import box, icosphere
+from validation.scenes.random_scene import drawn_values
 
 
 @pytest.mark.claim("random-valid", tolerance="none: both readers take seeds 0 to 47, with all that was drawn")
@@ -57,36 +55,3 @@ def test_a_name_that_is_no_seed_is_refused():
             load_scene(name)
     with pytest.raises(InputError, match="wanted a whole number from 0"):
         load_scene("random:1000000001")
-
-
-def test_meshes_of_a_folder_are_casters(variant, tmp_path):
-    import mitsuba as mi
-
-    folder = tmp_path / "meshes"
-    folder.mkdir()
-    with pytest.raises(InputError, match=r"holds no \.obj or \.ply file"):
-        load_scene(f"random:2,meshes={folder}")
-    vertices, faces = joined([scaled(icosphere(1), 7.3), box((23.1, 1.7, 1.3))])
-    mesh = mi.Mesh("one", len(vertices), len(faces))
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"], parameters["faces"] = vertices.astype(np.float32).ravel(), faces.ravel()
-    parameters.update()
-    mesh.write_ply(str(folder / "one.ply"))
-    kinds = []
-    for seed in range(6):
-        name = random_name(f"random:{seed}", meshes=folder)
-        drawn = drawn_values(name)
-        loaded = load_scene(name, (8, 6))
-        shapes = {shape.id(): shape for shape in loaded.scene.shapes()}
-        for caster in drawn["casters"]:
-            kinds.append(caster["kind"])
-            if caster["kind"] == "mesh":
-                first = seed
-                assert shapes[caster["name"]].face_count() == len(faces)
-                box_ = shapes[caster["name"]].bbox()
-                away = np.linalg.norm(np.array(box_.center()).ravel() - caster["position"])
-                assert away < caster["radius"]
-    assert "mesh" in kinds
-    (folder / "one.ply").write_text("ply, and not quite")
-    with pytest.raises(InputError, match=r"meshes: .*one\.ply"):
-        load_scene(f"random:{first},meshes={folder}", (8, 6))

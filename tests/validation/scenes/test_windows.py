@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import numpy as np
-import pytest
 
 from validation.scenes.windows import SCENE
 
@@ -36,18 +35,3 @@ def test_sun_comes_in_by_the_windows_alone(variant):
     at_wall = point + ((_LEFT - point[:, 0]) / towards[0])[:, None] * towards
     along, up = np.searchsorted(_PANES_ALONG, at_wall[:, 1] - _FRONT), np.searchsorted(_PANES_UP, at_wall[:, 2])
     assert np.all((along % 2 == 1) & (up % 2 == 1))
-
-
-@pytest.mark.statistical
-@pytest.mark.parametrize(("estimator", "margin"), [("single-scatter", 0.005), ("volpath", 0.012)])
-def test_estimators_agree(variant, estimator, margin):
-    """Margins for a quick run of one seed; `airlight report` asks for less.
-
-    That of volpath takes some hundred batches: of 32 the noise of single pixels is still skewed, and one was rejected.
-    """
-    from validation.estimates.agreement import agreement
-
-    for layer, verdict in agreement(loaded((24, 18)), estimator=estimator, margin=margin, samples=64).items():
-        assert verdict.statistics.equivalent is True, layer
-        assert verdict.masked == 0
-        assert verdict.statistics.rejected == 0

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: the orders of a slab by the deterministic computation are those of photons; bad input is refused by name."""
 
-import math
 
 import numpy as np
 import pytest
@@ -99,18 +98,12 @@ def test_a_table_of_a_function_is_the_function(tmp_path):
     ("change", "words"),
     [
         ({"tau": 1e9}, "wanted a thickness"),
-        ({"tau": math.nan}, "wanted a finite number"),
         ({"sun": 90}, "at 90 no light enters"),
         ({"albedo": 1.01}, "wanted a share of 0 to 1"),
         ({"orders": "0"}, "was never scattered"),
-        ({"orders": "4-3"}, "write 3-4"),
-        ({"orders": "1001"}, "1000-inf"),
         ({"depths": "0,2.5"}, "wanted depths of 0 to tau"),
         ({"directions": "0:0"}, "not horizontal"),
         ({"phase": "hg:1"}, "wanted -0.98 to 0.98"),
-        ({"phase": "isotopic"}, "did you mean 'isotropic'"),
-        ({"phase": "hg-draine:3"}, "diameter D of 5 to 50 um"),
-        ({"phase": "missing.csv"}, "wanted a CSV file"),
     ],
 )
 def test_what_is_refused(change, words):
@@ -123,12 +116,9 @@ def test_what_is_refused(change, words):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "got 0 rows"),
         ("0,1\n90,1\n", "wanted 0 to 180 degrees"),
-        ("0,1\n90,x\n180,1\n", "line 2"),
         ("0,1\n90,-2\n180,1\n", "line 2: got the value -2"),
         ("angle,p\n0,1\n90,1\n80,1\n180,1\n", "line 4: angles must increase"),
-        ("0,1\n90,0\n180,1\n", "all values are 0"),
     ],
 )
 def test_files_that_are_no_phase_function(text, words, tmp_path):

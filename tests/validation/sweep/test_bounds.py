@@ -94,18 +94,6 @@ def test_a_chord_of_micrometres_errs_by_what_the_rounding_of_its_ends_is_worth()
     assert worth[:, 0] == pytest.approx(1.1 * bounds.END * 0.66 / ACROSS[0] * scattered * kept, rel=2e-3)
 
 
-@pytest.mark.claim("sweep-bounds", tolerance="8 units of float32 of each end; a quarter of the bends of a table")
-def test_a_ray_that_skims_a_face_errs_by_more_as_its_cosine_falls():
-    # random:184 has such pixels: they missed what ends are worth head on by a factor of 13.
-    scene = clipped_edge(SKIMMING, fov=0.3)
-    truth, error = errors(scene, "shadow-planes")
-    lit = np.flatnonzero(truth[:, 0] > 0)
-    worth = bounds.worth_of_ends(scene, lit)
-    assert (error[lit] <= worth).all()
-    head_on = worth[:, 0] * -SKIMMING[1]
-    assert 2 * head_on.min() < error[lit, 0].max()  # so the law is needed
-
-
 def columns(name, size, method="shadow-planes"):
     loaded = load_scene(name, size)
     scene = read_scene(loaded.scene)
