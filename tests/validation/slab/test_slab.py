@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: the orders of a slab by the deterministic computation are those of photons; bad input is refused by name."""
 
-
 import numpy as np
 import pytest
 
