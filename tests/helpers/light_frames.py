@@ -49,31 +49,19 @@ GRID = (33, 25)
 SCENES = {
     "light beside the view": (dict, 64),
     "light in view": (lambda: camera((-2.5, -2.2, 0.3), (0.9, 0.7, 1.9)), 64),
-    "light behind": (lambda: camera((1.7, 1.6, 2.9), (-0.9, -0.7, -0.1)), 64),
     "looking away": (lambda: camera((0.9, -4.7, 1.9), (0.9, -9.7, 1.9)), 64),
     "camera close to the light": (lambda: camera((0.9, 0.7001, 1.9), (0, 0, 0.9)), 64),
     "camera in shadow": (lambda: camera((-0.5, -0.5, 0.1), (2, 1.5, 0.9)), 64),
     "fence": (fence, 256),
-    "spot": (lambda: {"lamp": spot()}, 64),
     "spot in view": (lambda: {"lamp": spot()} | camera((-2.5, -2.2, 0.3), (0.5, 0.0, 1.5)), 64),
     "soft spot": (lambda: {"lamp": spot(cutoff=37.0, beam=19.0)}, 64),
     "colour, HG": (lambda: {"fog": coloured_fog()}, 64),
     "three lights": (lambda: {"second": lamp(-1, 1.4, 0.6), "third": spot(beam=11.0)}, 64),
-    "coarse map": (dict, 4),
-    "fine map": (lambda: camera((0.2, -4.1, 1.3), (0.1, 0.0, 0.6), size=(8, 6)), 1024),
     "along a column of texels": (
         lambda: camera((0, -4, 2), (0, 0, 2), size=GRID) | {"lamp": lamp(0, 0, 2.5)},
         16,
     ),
-    "along the axis of a face": (
-        lambda: camera((0, 0, 0.3), (0, 3, 0.3), size=GRID) | {"lamp": lamp(0, 0, 2.5)},
-        16,
-    ),
     "along diagonals": (lambda: camera((-3, -3, 2), (0, 0, 2), size=GRID) | {"lamp": lamp(0, 0, 2.5)}, 4),
-    "along the border of two faces": (
-        lambda: camera((1, -4, 1.5), (1, 4, 1.5), size=GRID) | {"lamp": lamp(0, 0, 2.5)},
-        8,
-    ),
 }
 
 

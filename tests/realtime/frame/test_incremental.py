@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a frame keeps of the last one: the images are those of frames made afresh, bit by bit."""
 
-from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -101,12 +100,6 @@ CASES = [
         ("light", "medium", "camera", "colour"),
         id="bounded media",
     ),
-    pytest.param(
-        sphere_scene, "light-volumes", {"map": 64}, ("light", "medium", "camera", "colour"), id="surfaces of Mitsuba"
-    ),
-    pytest.param(
-        sphere_scene, "light-volumes", {"map": 64, "evaluation": "mesh"}, ("light", "colour", "camera"), id="mesh"
-    ),
     pytest.param(sphere_scene, "ray-march", {"steps": 8}, ("light", "medium", "camera"), id="shadow rays"),
 ]
 
@@ -125,43 +118,6 @@ def test_images_are_those_of_frames_made_afresh(variant, scene, method, paramete
             np.testing.assert_array_equal(image, wanted[name], err_msg=f"{name} after {moved}")
         assert np.any(images["airlight"] != last["airlight"]), moved  # each step does change the image
         last = images
-
-
-def counting(renderer: FrameRenderer, counts: Counter) -> FrameRenderer:
-    def counted(name):
-        work = getattr(renderer, name)
-
-        def run(*arguments):
-            counts[name] += 1
-            return work(*arguments)
-
-        return run  # without the method `start` of a preparation: the order of the stages is another, nothing else
-
-    return replace(renderer, **{name: counted(name) for name in ("prepare", "surface", "shade", "cull", "render")})
-
-
-@pytest.mark.claim("kept-frames")
-@pytest.mark.parametrize(
-    ("method", "moved", "ran"),
-    [
-        ("shadow-planes", (), ("shade",)),
-        ("shadow-planes", ("light",), ("shade", "prepare", "cull")),
-        ("shadow-planes", ("camera",), ("surface", "prepare", "cull")),
-        ("shadow-planes", ("geometry",), ("surface", "prepare", "cull")),
-        ("light-volumes", (), ("shade",)),
-        ("light-volumes", ("light",), ("shade", "prepare", "cull")),
-        ("light-volumes", ("camera",), ("surface", "cull")),
-        ("light-volumes", ("geometry",), ("surface", "prepare", "cull")),
-    ],
-)
-def test_nothing_runs_that_nothing_asks_for(variant, method, moved, ran):
-    counts: Counter = Counter()
-    renderer = counting(made(built_in("sphere-spot"), method), counts)
-    _, kept = next_frame(renderer, renderer.scene, None, **STILL)
-    assert set(counts.values()) == {1}
-    counts.clear()
-    next_frame(renderer, renderer.scene, kept, **STILL | {f"{what}_moved": True for what in moved})
-    assert counts == Counter((*ran, "render"))
 
 
 def test_what_a_method_of_ones_own_prepares_is_made_anew_unless_it_says_otherwise(variant):

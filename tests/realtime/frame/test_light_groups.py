@@ -13,7 +13,6 @@ from realtime.kernels.registry import KERNELS
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.method import Method
 from realtime.methods.registry import METHODS
-from realtime.numerics.recorded import Frozen
 from realtime.scene.animate import with_area_lights
 from realtime.scene.light_points import with_light_points
 from realtime.scene.read_scene import read_scene
@@ -21,7 +20,6 @@ from tests.helpers.area_lamps import area_lamp, lit_by
 from tests.helpers.frames import relative_rmse
 from tests.helpers.scenes import tiny_scene
 from tests.helpers.sunlit import fog_sphere, shaded
-from validation.scenes.loading import load_scene
 from validation.scenes.parts import rotation
 
 SIZE = (32, 24)
@@ -66,130 +64,34 @@ def test_every_method_renders_the_points_of_a_light(variant, one_by_one, name):
     assert relative_rmse(frame.surface, one_by_one[1]) < (0.1 if name.startswith("light-volumes") else 1e-4)
 
 
-def test_points_of_a_small_light_are_a_point_light(variant):
-    """Beside a cosine: of a small sphere the points together shine like a point light of pi R^2 Le."""
-    import mitsuba as mi
-
-    radius = 0.003
-    place = [0.83, 0.61, 1.97]
-    intensity = [value * np.pi * radius**2 for value in (5.3, 4.1, 2.9)]
-    lamp = {"type": "point", "position": place, "intensity": {"type": "rgb", "value": intensity}}
-    wanted = render_frame(renderer_of(read_scene(mi.load_dict(lit_by() | {"lamp": lamp})), "shadow-planes"))
-    small = scene_of(kind="sphere", size=radius, changes={"size": (16, 12)})
-    frame = render_frame(renderer_of(small, "shadow-planes", points=64, pattern="ring"))
-    # The lamp itself is seen in one pixel at most, where a surface ends the ray.
-    seen = np.isclose(frame.distance, wanted.distance, rtol=1e-4)
-    assert (~seen).sum() <= 2
-    assert relative_rmse(frame.airlight[seen], wanted.airlight[seen]) < 1e-2
-    assert relative_rmse(frame.surface[seen], wanted.surface[seen]) < 1e-2
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["fence", "penumbra-plane"])
-def test_a_larger_number_of_points_converges(variant, name):
-    """In `fence` sixteen points are within 1e-2 and 64 within 2e-3, the bars of the design."""
-    scene = read_scene(load_scene(name, SIZE).scene)
-    wanted = render_frame(renderer_of(scene, "shadow-planes", points=512))
-    frames = [render_frame(renderer_of(scene, "shadow-planes", points=points)) for points in (4, 16, 64)]
-    airlight, surface = (
-        [relative_rmse(getattr(frame, layer), getattr(wanted, layer)) for frame in frames]
-        for layer in ("airlight", "surface")
-    )
-    assert airlight[0] > 2 * airlight[1] > 4 * airlight[2]
-    assert surface[0] > surface[1] > surface[2]
-    assert airlight[1] < (1e-2 if name == "fence" else 2e-2)
-    assert airlight[2] < (2e-3 if name == "fence" else 4e-3)
-
-
-def test_all_points_share_one_recording(variant):
-    """What is recorded, and how often, does not depend on the number of points."""
-    recorded = {}
-    for points in (2, 12):
-        renderer = renderer_of(scene_of(), "shadow-planes", points=points)
-        render_frame(renderer)
-        (group, *_) = light_groups(renderer)
-        stages = [
-            stage for stage in (group.surface, group.shade, group.cull, group.render) if isinstance(stage, Frozen)
-        ]
-        recorded[points] = [stage.n_recordings for stage in stages]
-        assert len(light_groups(renderer)) == points
-    assert recorded[2] == recorded[12] == [1, 1, 1, 1]
-
-
-def test_ordinary_lights_and_several_lamps_add_up(variant):
-    import mitsuba as mi
-
-    def frame_of(**lights):
-        scene = lit_by() | {"lamp": None} | lights
-        read = read_scene(mi.load_dict({name: entry for name, entry in scene.items() if entry is not None}))
-        return render_frame(renderer_of(read, "shadow-planes", points=3, pattern="ring"))
-
-    lamps = {
-        "lamp": tiny_scene()["lamp"],
-        "window": area_lamp("disk", size=0.2, material={"type": "null"}),
-        "other": area_lamp("rectangle", material={"type": "null"}) | {"to_world": _elsewhere()},
-    }
-    each = [frame_of(**{name: lamp}) for name, lamp in lamps.items()]
-    together = frame_of(**lamps)
-    np.testing.assert_allclose(together.airlight, sum(frame.airlight for frame in each), rtol=1e-5)
-    np.testing.assert_allclose(together.surface, sum(frame.surface for frame in each), rtol=1e-5, atol=1e-6)
-
-
-def _many_lights(points, *, media=None):
-    """Return a scene with a hard and a soft spot and so many point lights, in fog or in bounded media."""
+def _two_spots():
+    """Return a scene with a hard and a soft spot in bounded media."""
     import mitsuba as mi
 
     spot = {"type": "spot", "to_world": mi.ScalarTransform4f().look_at([1.3, -0.7, 2.1], [0.1, 0.2, 0.3], [0, 0, 1])}
     bright = {"intensity": {"type": "rgb", "value": [9.1, 7.3, 5.9]}, "cutoff_angle": 37.0}
     lamps = {"hard": spot | bright | {"beam_width": 37.0}, "soft": spot | bright | {"beam_width": 11.0}}
-    for number in range(points):
-        place = [1.7 * np.cos(2.1 * number), 1.9 * np.sin(2.1 * number), 1.3 + 0.17 * number]
-        colour = {"type": "rgb", "value": [3.1, 2.3 + 0.1 * number, 1.7]}
-        lamps[f"point{number}"] = {"type": "point", "position": place, "intensity": colour}
-    if media is None:
-        return read_scene(mi.load_dict(lit_by(changes={"size": SIZE}) | lamps | {"lamp": tiny_scene()["lamp"]}))
     turned = mi.ScalarTransform4f().translate([0.63, 0.47, 1.63]).rotate([1, 2, 3], 37).scale(0.07)
     solid = {"type": "cube", "to_world": turned}
     return read_scene(mi.load_dict(shaded(size=(16, 12), pearl=fog_sphere(), solid=solid, **lamps)))
 
 
-@pytest.mark.parametrize(
-    ("name", "media"),
-    [
-        pytest.param("light-volumes", None, marks=pytest.mark.slow),
-        pytest.param("shadow-planes", None, marks=pytest.mark.slow),
-        pytest.param("shadow-planes adaptive", None, marks=pytest.mark.slow),
-        ("unshadowed", "bounded"),
-        pytest.param("shadow-planes", "bounded", marks=pytest.mark.slow),
-    ],
-)
-def test_many_lights_one_by_one_are_all_at_once(variant, name, media):
+def test_many_lights_one_by_one_are_all_at_once(variant):
     """Each light has code of its own in one kernel, or kernels of their own: the sum is the same to rounding."""
-    word = name.split()[0]
-    parameters = {"tolerance": 0.005} if "adaptive" in name else {}
-    scene = _many_lights(0 if media else 2, media=media)
-    kernel = KERNELS["exact"].function
-    together = replace(METHODS[word], lights_at_once=lambda parameters: True)
-    apart = frame_renderer(scene, METHODS[word], kernel=kernel, **parameters)
-    assert len(light_groups(apart)) == len(scene.lights) > (1 if media else 4)
-    one = frame_renderer(scene, together, kernel=kernel, **parameters)
+    scene = _two_spots()
+    kernel, method = KERNELS["exact"].function, METHODS["unshadowed"]
+    apart = frame_renderer(scene, method, kernel=kernel)
+    assert len(light_groups(apart)) == len(scene.lights) == 2
+    one = frame_renderer(scene, replace(method, lights_at_once=lambda parameters: True), kernel=kernel)
     assert len(light_groups(one)) == 1
     wanted, frame = render_frame(one), render_frame(apart)
-    # Adaptive sampling asks whether the sum of the lights bends, or whether each does.
-    rtol = 0.01 if "adaptive" in name else 1e-5
-    np.testing.assert_allclose(frame.airlight, wanted.airlight, rtol=rtol, atol=rtol * wanted.airlight.mean())
+    np.testing.assert_allclose(frame.airlight, wanted.airlight, rtol=1e-5, atol=1e-5 * wanted.airlight.mean())
     np.testing.assert_allclose(frame.surface, wanted.surface, rtol=1e-5, atol=1e-6)
     still = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
     stages, cache = next_frame(apart, scene, None, **still)
     np.testing.assert_array_equal(image_frame(apart, stages).airlight, frame.airlight)
     stages, _ = next_frame(apart, scene, cache, **still)
     np.testing.assert_array_equal(image_frame(apart, stages).airlight, frame.airlight)
-
-
-def _elsewhere():
-    import mitsuba as mi
-
-    return mi.ScalarTransform4f().look_at([-1.3, -0.4, 1.7], [0.1, 0.1, 0.5], [0, 0, 1]).scale(0.2)
 
 
 def test_a_black_lamp_shadows_others_and_not_itself(variant):
@@ -235,12 +137,7 @@ def test_what_a_method_shows_of_no_light_is_added_once(variant):
 
 @pytest.mark.parametrize(
     ("name", "material"),
-    [
-        ("ray-march", {"type": "null"}),
-        ("shadow-planes", None),
-        ("light-volumes", None),
-        ("light-volumes", {"type": "null"}),
-    ],
+    [("ray-march", {"type": "null"}), ("shadow-planes", None), ("light-volumes", None)],
 )
 def test_the_next_frame_is_that_of_the_moved_light(variant, name, material):
     parameters = {"steps": 20} if name == "ray-march" else {"map": 64} if name == "light-volumes" else {}

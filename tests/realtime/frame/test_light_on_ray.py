@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from realtime.errors import InputError
 from realtime.kernels.exact import exact
 from realtime.methods.registry import FOG_METHODS, METHODS
-from tests.helpers.scenes import spot, tiny_scene
+from tests.helpers.scenes import tiny_scene
 
 
 def render(method, *, position, size=(9, 9), changes=None, **parameters):
@@ -63,28 +63,6 @@ def test_a_ray_straight_away_from_a_light_has_its_airlight(variant, method, para
         found = render(method, position=[away, -9.0, 1.0], **parameters).airlight[4, 4]
         # Both ends of an angle of 1/1024 are rounded to 2^-24: 1.2e-4, and as much for the places of its steps.
         np.testing.assert_allclose(found, wanted, rtol=3e-4)
-
-
-def test_an_even_size_has_no_ray_through_the_middle(variant):
-    assert np.isfinite(render("unshadowed", position=[0.0, 0.0, 1.0], size=(8, 8)).airlight).all()
-
-
-def test_a_spot_that_looks_aside_is_no_reason(variant):
-    """On a ray it lights neither before nor behind itself, the airlight is 0 or finite."""
-    frame = render("ray-march", position=[3.0, 3.0, 3.0], changes={"spot": spot()})
-    assert np.isfinite(frame.airlight).all()
-
-
-def test_the_camera_is_read_once_for_all_lights(variant, monkeypatch):
-    """Each read waits for the device."""
-    import realtime.frame.light_on_ray as module
-
-    reads = []
-    read_camera = module.read_camera
-    monkeypatch.setattr(module, "read_camera", lambda camera: reads.append(camera) or read_camera(camera))
-    lamp = tiny_scene()["lamp"]
-    render("unshadowed", position=[0.9, 0.7, 1.9], changes={"second": lamp | {"position": [0.3, 0.9, 2.9]}})
-    assert len(reads) == 1
 
 
 def test_what_is_not_finite_is_refused_whatever_the_reason():

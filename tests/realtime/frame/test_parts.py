@@ -37,59 +37,12 @@ def renderer(name):
     return frame_renderer(scene(lamp="disk" in name), method, kernel=KERNELS["exact"].function, **METHODS[name])
 
 
-WHOLE = {
-    "soft-shafts, shared": {
-        "points": 16,
-        "interleave": True,
-        "surfaces": "ray",
-        "guide": "depth",
-        "hd": "auto",
-        "narrow": 16.0,
-        "history": 0.5,
-        "map": 64,
-    },
-}
 STILL = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
 
 
 def same(frame, other):
     for layer in ("airlight", "surface", "distance"):
         np.testing.assert_array_equal(getattr(frame, layer), getattr(other, layer))
-
-
-@pytest.mark.parametrize("name", WHOLE)
-def test_a_large_image_that_is_not_divided_is_the_same_without_a_recording(name, variant, monkeypatch):
-    """A replay would keep every image that a filter makes on its way until its end."""
-    import realtime.frame.renderer as module
-    from realtime.frame.incremental import next_frame
-    from realtime.kernels.registry import KERNELS
-    from realtime.methods.registry import METHODS as REGISTRY
-    from realtime.numerics.recorded import Frozen
-    from validation.configurations.timing import timed_image
-
-    read = scene(lamp="soft" in name)
-
-    def made():
-        method = REGISTRY[name.partition(",")[0]]
-        kernel = KERNELS["exact"].function if method.uses_kernel.__name__ != "never" else None
-        return module.frame_renderer(read, method, kernel=kernel, **WHOLE[name])
-
-    recorded = made()
-    (stages, cache), usual = next_frame(recorded, read, None, **STILL), [module.render_frame(recorded)]
-    stages, cache = next_frame(recorded, read, cache, **STILL)
-    usual += [module.image_frame(recorded, stages)]
-    monkeypatch.setattr(module, "_LARGE", 2048)
-    large = made()
-    assert module.parts(large) == (large,)
-    assert isinstance(recorded.render, Frozen)
-    assert not isinstance(large.render, Frozen)
-    same(module.render_frame(large), usual[0])
-    kept = None
-    for expected in usual:
-        frame, kept, milliseconds = timed_image(large, read, kept, **STILL)
-        same(frame, expected)
-        assert len(kept) == 1
-        assert milliseconds > 0
 
 
 @pytest.mark.parametrize("name", METHODS)

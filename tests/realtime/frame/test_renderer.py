@@ -45,21 +45,6 @@ def test_integral_without_shadows_is_that_of_the_reference(variant, name, kernel
     assert relative_rmse(integral, truth(scene).airlight) < (1e-3 if name == "tabulated" else 1e-6)
 
 
-@pytest.mark.claim("one-source-two-precisions")
-@pytest.mark.parametrize("name", ["soft spot", "tabulated"])
-def test_single_and_double_precision_agree(variant, name):
-    scene = tiny_scene(**SCENES[name]())
-    single = render("unshadowed", kernel="quadrature", scene=scene)
-    double = render("unshadowed", kernel="quadrature", precision="double", scene=scene)
-    # Silhouette pixels see another surface if their ray differs in the last bit.
-    same = np.isclose(single.distance, double.distance, rtol=1e-4)
-    assert same.mean() > 0.97
-    # The kinks of a coarse phase table fall between other nodes, as double precision looks at more of an endless ray.
-    assert relative_rmse(single.airlight[same], double.airlight[same]) < (3e-3 if name == "tabulated" else 1e-5)
-    assert single.airlight.dtype == np.float32
-    assert double.airlight.dtype == np.float64
-
-
 # Uniform steps see their order later: an endless ray is 65 m long, and the light 4 m away.
 @pytest.mark.slow
 @pytest.mark.claim("march-orders", tolerance="order 2 within 0.15")
@@ -91,51 +76,3 @@ def test_shadow_map_converges_to_shadow_rays(variant):
     assert errors == sorted(errors, reverse=True)
     assert errors[-1] < 2e-3
     assert render("ray-march", scene=scene, shadow="none").airlight.sum() > rays.sum()
-
-
-@pytest.mark.claim("radiance", tolerance="1e-6 and 1e-4 relative: float32")
-def test_radiance_scales_with_light_and_length(variant):
-    """Intensity times k: radiance times k. Lengths times k, coefficients over k: radiance over k^2."""
-    import mitsuba as mi
-
-    base = tiny_scene(ball=None, floor=None)
-    bright = base | {"lamp": base["lamp"] | {"intensity": {"type": "rgb", "value": [15.0, 12.0, 9.0]}}}
-    airlight = render("unshadowed", kernel="quadrature", scene=base).airlight
-    assert render("unshadowed", kernel="quadrature", scene=bright).airlight == pytest.approx(3 * airlight, rel=1e-6)
-    large = base | {
-        "fog": base["fog"] | {"sigma_t": 0.31 / 4},
-        "lamp": base["lamp"] | {"position": [3.6, 2.8, 7.6]},
-        "sensor": base["sensor"]
-        | {"to_world": mi.ScalarTransform4f().look_at([0.8, -16.4, 5.2], [0.4, 0.0, 2.4], [0, 0, 1])},
-    }
-    scaled = render("unshadowed", kernel="quadrature", scene=large).airlight
-    assert scaled == pytest.approx(airlight / 16, rel=1e-4)  # float32 of the camera's matrix, amplified near the light
-
-
-@pytest.mark.claim("frames-are-replayed")
-def test_frames_replay_without_new_kernels(variant):
-    """The frozen stages are recorded once and launch the same few kernels each time, also after the light moved."""
-    import dataclasses
-
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.frame.renderer import frame_renderer, run_stages
-    from realtime.kernels.registry import KERNELS
-    from realtime.methods.registry import METHODS
-    from realtime.scene.read_scene import read_scene
-
-    scene = read_scene(mi.load_dict(tiny_scene()))
-    renderer = frame_renderer(scene, METHODS["unshadowed"], kernel=KERNELS["quadrature"].function)
-    run_stages(renderer, ())
-    counts, recordings = [], []
-    for height in (1.9, 2.3, 2.7, 3.1):
-        moved = dataclasses.replace(scene.lights[0], position=mi.Vector3f(0.9, 0.7, height))
-        dr.make_opaque(moved.position)
-        with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
-            dr.kernel_history_clear()
-            run_stages(dataclasses.replace(renderer, scene=dataclasses.replace(scene, lights=(moved,))), ())
-            counts.append(len([k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]))
-            recordings.append(renderer.render.n_recordings)
-    assert counts[1:] == [2, 2, 2]  # surface, airlight
-    assert recordings[1:] == [recordings[0]] * 3

@@ -4,7 +4,6 @@
 No GPU is asked: the code is read, and frames are rendered while every wait is counted.
 """
 
-import ast
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
@@ -17,7 +16,7 @@ from realtime.methods.registry import METHODS
 from reports.machine.environment import activate
 from tests.helpers.area_lamps import lit_by
 from tests.helpers.clouds import cloud_scene
-from tests.helpers.round_trips import ROOT, round_trips
+from tests.helpers.round_trips import round_trips
 from tests.helpers.scenes import spot
 from tests.helpers.sunlit import plank, shaded
 from tests.helpers.transport_formula import use_formula
@@ -46,22 +45,6 @@ WAITS: dict[str, tuple[tuple[str, ...], str, dict[str, int]]] = {
     "froxel-fog": (("light", "objects"), READ, {"area": 1}),
     "soft-shafts": (("light", "objects"), READ, {"area": 1}),
 }
-
-#: Names that only one kind of device has, or that wait for it, by the file that may use them and what for.
-SPOKEN: dict[str, dict[str, str]] = {
-    "realtime/numerics/fast_exp.py": {"llvm": "polynomials in place of a slow exponential; others take Dr.Jit's"},
-    "realtime/numerics/host_numbers.py": {"cuda": "one transfer where single reads wait"},
-    "realtime/memory.py": {"cuda": "how much memory the device has"},
-    "realtime/frame/renderer.py": {"flush_malloc_cache": "between the parts of a large image that goes to the host"},
-    "realtime/methods/light_volumes/jump_search.py": {"compress": "sides where the map jumps, when it is made"},
-    "realtime/methods/light_volumes/published/raster.py": {"compress": "the published mesh, rasterised by the host"},
-    "realtime/methods/light_volumes/published/signed_sum.py": {"compress": "the published mesh"},
-}
-BACKENDS = ("llvm", "cuda")
-DOORS = (
-    *("sync_thread", "sync_device", "sync_all_devices", "flush_malloc_cache", "compress", "numpy", "torch", "jax"),
-    *("set_thread_count", "set_flag", "scoped_set_flag", "kernel_history", "whos", "flush_kernel_cache"),
-)
 
 
 def scenes() -> dict[str, Callable[[], dict[str, Any]]]:
@@ -136,24 +119,3 @@ def test_a_frame_waits_for_the_host_where_the_table_says(elsewhere, method, scen
 @pytest.mark.parametrize("method", [name for name, method in METHODS.items() if method.renders_clouds])
 def test_a_frame_of_clouds_never_waits(elsewhere, method):
     assert elsewhere.submit(waits_in_clouds, method).result() == {name: {} for name in MOVES}
-
-
-def spoken(source: str) -> set[str]:
-    """The names of backends and the `DOORS` that code uses, as attributes or in texts that are no sentences."""
-    tree = ast.parse(source)
-    documented = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    used = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Attribute):
-            used |= {node.attr} & set(DOORS) | {word for word in BACKENDS if word == node.attr.lower()}
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in documented:
-            used |= {word for word in BACKENDS if word in node.value.lower() and " " not in node.value}
-    return used
-
-
-@pytest.mark.claim("no-backend-by-name")
-def test_methods_name_no_backend_and_do_not_wait():
-    used = {path.relative_to(ROOT).as_posix(): spoken(path.read_text()) for path in (ROOT / "realtime").rglob("*.py")}
-    assert {name: words for name, words in used.items() if words} == {
-        name: set(words) for name, words in SPOKEN.items()
-    }

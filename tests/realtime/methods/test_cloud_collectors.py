@@ -99,17 +99,6 @@ def test_a_slab_sends_back_what_the_transport_says(variant):
         np.testing.assert_allclose(image[shown][:, channel], irradiance * expected[shown], rtol=4e-3)
 
 
-def test_the_layers_of_all_sets_add_up(variant):
-    frame = _frame(_scene(), peak="full", extra_layers=True)
-    by_set = {name: np.array(layer) for name, layer in frame.extra.items()}
-    names = ["2", "3_4", "5_6", "7_8", "9_12", "13_18", "19_30", "31_inf"]
-    assert list(by_set) == ["airlight_1", *(f"airlight_{name}" for name in names), "opacity"]
-    total = sum(layer for name, layer in by_set.items() if name != "opacity")
-    np.testing.assert_allclose(total, np.array(frame.airlight), rtol=1e-5)
-    shares = [by_set[f"airlight_{name}"].mean() for name in names]
-    np.testing.assert_allclose(np.array(shares) / shares[0], np.array(WEIGHTS) / WEIGHTS[0], rtol=1e-3)
-
-
 def test_optical_lengths_alone_matter(variant):
     """Metres against kilometres."""
     scale = 1e3
@@ -128,24 +117,6 @@ def test_suns_add_up_and_so_does_a_sky_as_a_beam(variant):
     both = _airlight(_scene(slab=_slab(), **parts), sky="beams")
     alone = sum(_airlight(_scene(slab=_slab(), lamp=lamp)) for lamp in (parts["sun"], other, above))
     np.testing.assert_allclose(both, alone, rtol=2e-3)
-
-
-def test_a_search_is_recorded_for_what_occurs_alone(variant):
-    """Three albedos of three channels are three searches, where nine were recorded."""
-    coloured = DROPLETS | {"albedo": {"type": "rgb", "value": [0.99, 0.97, 0.93]}}
-    made = _renderer(_scene(sun=_sun(ALONG), slab=_slab(medium=coloured)))
-    occurs = [[of is not None for of in filling.clouds] for filling in made.prepare(made.scene).fillings]
-    assert sorted(occurs) == [[False, False, True], [False, True, False], [True, False, False]]
-
-
-@pytest.mark.slow
-def test_coloured_albedos_are_three_grey_ones(variant):
-    albedo = (0.99, 0.97, 0.93)
-    coloured = DROPLETS | {"albedo": {"type": "rgb", "value": list(albedo)}}
-    image = _airlight(_scene(sun=_sun(ALONG), slab=_slab(medium=coloured)))
-    for channel, value in enumerate(albedo):
-        grey = _airlight(_scene(sun=_sun(ALONG), slab=_slab(medium=DROPLETS | {"albedo": value})))
-        np.testing.assert_allclose(image[..., channel], grey[..., channel], rtol=1e-4, atol=1e-7)
 
 
 def test_coloured_clouds_are_three_grey_ones(variant):
@@ -203,15 +174,14 @@ def test_a_camera_in_the_cloud_is_its_point(variant):
     np.testing.assert_allclose(image[..., 0], 3.1 * expected, rtol=4e-3)
 
 
-@pytest.mark.claim("collector-frames", tolerance="2e-3 of the mean; interpolated 2 %, as tiles are coarse here")
-@pytest.mark.parametrize(("tolerance", "bound"), [(0.0, 2e-3), pytest.param(0.01, 0.02, marks=pytest.mark.slow)])
-def test_the_last_frame_s_collectors_go_on(variant, tolerance, bound):
-    """Three steps a frame end where forty end; in interpolated frames the corners of tiles go on for their pixels."""
+@pytest.mark.claim("collector-frames", tolerance="2e-3 of the mean")
+def test_the_last_frame_s_collectors_go_on(variant):
+    """Three steps a frame end where forty end."""
     from realtime.frame.incremental import next_frame
 
     scene = cloud_scene((64, 48), origin=(30.83, -400.91, 57.03), sun=_sun(ALONG), ring=cloud("ring", ring()))
-    whole = _airlight(scene, iterations=40, tolerance=tolerance, **WHOLE)
-    options = {"peak": "full", "tolerance": tolerance, "extra_layers": True} | WHOLE
+    whole = _airlight(scene, iterations=40, tolerance=0.0, **WHOLE)
+    options = {"peak": "full", "tolerance": 0.0, "extra_layers": True} | WHOLE
     renderer = _renderer(scene, start="previous", iterations=3, **options)
     still = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
     from realtime.frame.renderer import image_frame
@@ -223,7 +193,7 @@ def test_the_last_frame_s_collectors_go_on(variant, tolerance, bound):
         airlight = frame.airlight - frame.extra["airlight_1"]
         errors.append(np.abs(airlight - whole).mean() / whole.mean())
     assert errors[0] > 0.02
-    assert errors[-1] < bound
+    assert errors[-1] < 2e-3
     assert renderer.render.n_recordings <= 3
 
 

@@ -136,29 +136,6 @@ def test_the_sun_in_the_axis_of_the_view(sign, phase):
         assert (frame.airlight.max() > 1) == (sign == 1)
 
 
-def test_printed_equations_run_and_differ():
-    frame, single, opaque = (
-        rendered(loaded(sun=SUN, sky=SKY, ring=cloud("ring", ring())), **switch)
-        for switch in ({}, {"single": "printed"}, {"opacity": "printed"})
-    )
-    assert single.airlight.min() < 0
-    np.testing.assert_array_equal(opaque.airlight, frame.airlight)
-    assert opaque.surface.max() > frame.surface.max()
-
-
-@pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        ({"phase": "mie"}, "phase: got 'mie', wanted scene"),
-        ({"phase": "hg:1.2"}, "between -1 and 1"),
-        ({"phase": "hg-draine:3"}, "diameter of 'hg-draine'"),
-    ],
-)
-def test_parameters_out_of_range_are_refused(parameters, message):
-    with pytest.raises(InputError, match=message):
-        rendered(loaded(), **parameters)
-
-
 LAMP = {"type": "point", "position": [0.0, 0.0, 300.0], "intensity": {"type": "rgb", "value": 9.0}}
 
 
@@ -181,13 +158,6 @@ def test_methods_for_fog_refuse_clouds_and_skies_and_name_who_takes_them(name):
         frame_renderer(read_scene(loaded()), method, **kernel)
     with pytest.raises(InputError, match=wanted):
         frame_renderer(read_scene(loaded(sun=SUN, sky=SKY, slab=cloud("slab", slab()))), method, **kernel)
-
-
-def test_clouds_are_wanted():
-    from tests.helpers.scenes import tiny_scene
-
-    with pytest.raises(InputError, match="cloud-octaves: the scene has no clouds"):
-        rendered(mi.load_dict(tiny_scene()))
 
 
 def test_frames_after_the_sun_moved_and_the_cloud_thickened():

@@ -88,14 +88,6 @@ def test_the_g_buffer_is_that_of_the_visible_surfaces(scene, veil):
     assert np.all((albedo.max(axis=2) > 0) == seen)
 
 
-def test_half_the_light_is_half_the_surface(scene, veil):
-    whole, half = (frame(scene, veil, share=share).surface for share in (1.0, 0.5))
-    seen = np.isfinite(frame(scene, veil).distance)
-    assert np.max(whole[seen]) > 0
-    np.testing.assert_allclose(half[seen], 0.5 * whole[seen], rtol=1e-6)
-    np.testing.assert_array_equal(half[~seen], whole[~seen])
-
-
 def test_a_frame_is_composed_by_the_formula(scene, veil):
     """surface visibility transmittance + transmittance background, the surface that of a method without layers."""
 

@@ -76,7 +76,7 @@ def test_without_shadows_the_kernel_is_all(variant, name, spacing):
 
 @pytest.mark.slow
 @pytest.mark.claim("billeter-marcher", tolerance="0.25 of the order 1")
-def test_with_shadows_the_order_is_one_and_the_integrand_costs_nothing(variant):
+def test_with_shadows_the_order_is_one(variant):
     scene = tiny_scene(size=(48, 36))
     truth = render("ray-march", scene=scene, steps=6000, sum="transitions")
     steps = np.array([12, 48, 192])
@@ -86,16 +86,6 @@ def test_with_shadows_the_order_is_one_and_the_integrand_costs_nothing(variant):
     ]
     order = -np.polyfit(np.log(steps), np.log(errors), 1)[0]
     assert order == pytest.approx(1, abs=0.25)
-    # At twelve uniform steps the integrand near the light is most of the marcher's error.
-    summed = relative_rmse(render("ray-march", scene=scene, steps=12, spacing="uniform"), truth)
-    assert errors[0] < 0.5 * summed
-
-
-def test_a_map_says_what_is_lit(variant):
-    scene = tiny_scene(size=(24, 18))
-    rays = render("ray-march", scene=scene, steps=100, sum="transitions")
-    mapped = render("ray-march", scene=scene, steps=100, sum="transitions", shadow="map", map=512)
-    assert 0 < relative_rmse(mapped, rays) < 0.02
 
 
 @pytest.mark.parametrize(

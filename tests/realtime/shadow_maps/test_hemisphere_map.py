@@ -22,23 +22,6 @@ def maps(variant):
     return cast
 
 
-def test_points_in_the_air_are_lit_as_rays_say(maps):
-    import drjit as dr
-    import mitsuba as mi
-
-    read, state = maps(lamp_scene(), 512)
-    points = np.random.default_rng(3).uniform([-2, -2, 0.01], [2, 2, 1.8], (20000, 3))
-    place = mi.Vector3f(*(mi.Float(column) for column in points.T))
-    for number in range(3):
-        frame = dr.gather(type(state.frames), state.frames, mi.UInt32(number))
-        local = frame.local(place - frame.position)
-        lit = np.array(state.maps.lit(mi.UInt32(number), local))
-        rays = ~np.array(read.geometry.ray_test(frame.shadow_ray(place)))
-        before = np.array(local[2]) > 0.05
-        assert 0.02 < np.mean(~rays[before]) < 0.98
-        assert np.mean(lit[before] != rays[before]) < 0.01
-
-
 def test_a_plane_never_shadows_itself(maps):
     import drjit as dr
     import mitsuba as mi
@@ -50,20 +33,3 @@ def test_a_plane_never_shadows_itself(maps):
     local = frame.local(place - frame.position)
     lit = np.array(state.maps.lit_surface(mi.UInt32(1), local))[np.array(local[2]) > 0.1]
     assert np.all(lit)
-
-
-def test_a_blocker_is_as_far_as_it_is(maps):
-    """Along one ray: the ball between lamp and floor."""
-    import drjit as dr
-    import mitsuba as mi
-
-    read, state = maps(lamp_scene(), 1024)
-    frame = dr.gather(type(state.frames), state.frames, mi.UInt32(0))
-    start = np.array(frame.position + frame.normal * frame.lift).ravel()
-    way = np.array([0.1, 0.1, 0.7]) - start
-    way /= np.linalg.norm(way)
-    floor = start + way * (-start[2] / way[2])
-    hit = float(read.geometry.ray_intersect(mi.Ray3f(mi.Point3f(start), mi.Vector3f(way))).t[0])
-    local = frame.local(mi.Vector3f(floor) - frame.position)
-    beyond = float(state.maps.beyond(mi.UInt32(0), local)[0])
-    assert beyond == pytest.approx((np.linalg.norm(floor - start) - hit) / hit, rel=0.01)

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from realtime.errors import InputError
 from realtime.frame.renderer import frame_renderer, render_frame
 from realtime.kernels.registry import KERNELS
 from realtime.methods.interface.layers import Layers
@@ -131,24 +130,6 @@ def test_frames_err_by_about_the_tolerance(variant, method, parameters):
     assert np.array_equal(parted.distance, whole.distance)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["three-media", "windows"])
-def test_bounded_media(variant, name):
-    """Images this small are all edges: with less tolerance every tile would be computed."""
-    from realtime.scene.read_scene import read_scene
-    from validation.scenes.loading import load_scene
-
-    scene = read_scene(load_scene(name, (192, 144)).scene)
-    method = METHODS["light-volumes"]
-    kernel = KERNELS["exact"].function
-    whole, parted = (
-        render_frame(frame_renderer(scene, method, kernel=kernel, map=128, tolerance=tolerance)).airlight
-        for tolerance in (0.0, 0.3)
-    )
-    assert np.max(np.abs(parted - whole)) > 0
-    assert np.sqrt(np.mean((parted - whole) ** 2)) < 0.2 * np.mean(whole)
-
-
 def frame(method, parameters, size=(96, 72)):
     import mitsuba as mi
 
@@ -159,19 +140,6 @@ def frame(method, parameters, size=(96, 72)):
     scene = read_scene(mi.load_dict(tiny_scene(size=size, ball={"type": "cube", "to_world": turned})))
     kernel = KERNELS["exact"].function
     return render_frame(frame_renderer(scene, chosen, kernel=kernel, **parameters))
-
-
-@pytest.mark.parametrize(
-    ("parameters", "size", "message"),
-    [
-        ({"tolerance": 1.0}, (96, 72), "tolerance: got 1.0, wanted a share"),
-        ({"tolerance": 0.01}, (98, 72), "got an image of 98 x 72, wanted sides that are multiples of 4"),
-        ({"tolerance": 0.01, "evaluation": "vertex"}, (96, 72), "evaluation=mesh and vertex do not"),
-    ],
-)
-def test_bad_input(variant, parameters, size, message):
-    with pytest.raises(InputError, match=message):
-        frame("shadow-planes", parameters, size)
 
 
 @dataclass(frozen=True)

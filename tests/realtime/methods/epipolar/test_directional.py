@@ -4,7 +4,6 @@
 Claim: the error falls as the shadow map and the slices grow, to that of the same map without slices.
 """
 
-import numpy as np
 import pytest
 
 from tests.helpers.sunlit import read, relative_rmse, render
@@ -28,27 +27,3 @@ def test_against_the_truth(variant, name):
     # The height field of the map itself, with slanted walls, is about as far from the truth.
     walked = relative_rmse(render(loaded, "light-volumes", map=1024, walls="slanted").airlight, truth)
     assert errors[1] < 3 * walked + 2e-3
-
-
-def test_foot_and_height_are_cosine_and_sine(variant):
-    """Claim: one formula with the homogeneous vector l - w O serves all lights."""
-    import mitsuba as mi
-
-    from realtime.methods.epipolar.slices import image_slices
-    from realtime.rays.ray_light import ray_geometry
-    from tests.helpers.sunlit import rays
-
-    scene = read(scenes()["aslant"])
-    light = scene.lights[0]
-    axis = np.array(light.axis).ravel()
-    _, ways = rays(scene)
-    geometry = ray_geometry(scene.camera.origin, mi.Vector3d(ways.T), light)
-    np.testing.assert_allclose(np.array(geometry.foot), -ways @ axis, atol=1e-14)
-    np.testing.assert_allclose(np.array(geometry.height), np.linalg.norm(np.cross(ways, axis), axis=1), atol=1e-14)
-    x0, x1 = geometry.lit_segment(0.0, 3.0)
-    assert (x0, x1) == (0.0, 3.0)
-    slices = image_slices(scene.camera, light, 9)
-    assert slices.w == 0
-    np.testing.assert_allclose(np.array(slices.towards).ravel(), axis, atol=1e-14)
-    across = np.array(slices.across).T
-    np.testing.assert_allclose(across @ axis, 0, atol=1e-14)

@@ -100,35 +100,6 @@ def samples_of(heights):
     return np.concatenate([leaves[:, :, 0], leaves[:, -1:, 1]], axis=1)
 
 
-@pytest.mark.parametrize("kind", ["point", "spot"])
-def test_a_plane_is_where_it_is(variant, kind):
-    """Planes are linear in projective coordinates: not even the coarsest map distorts one."""
-    import mitsuba as mi
-
-    from realtime.methods.epipolar.min_max_tree import line_point
-
-    turned = mi.ScalarTransform4f().translate([0, 0, -1.3]).scale(1000)
-    floor = {"type": "rectangle", "to_world": turned}
-    scene = read((0.4, 1.9, 0.9), kind=kind, ball=None, floor=floor)
-    heights = height_maps(scene, size=8)
-    values = samples_of(heights)
-    number, q = (index.ravel() for index in np.mgrid[: values.shape[0], : values.shape[1]])
-    kx, ky = line_point(heights, mi.UInt32(number), mi.Float(q))
-    slices = heights.slices
-    k = np.outer(np.array(kx), vectors(slices.towards)) + np.array(ky)[:, None] * vectors(slices.across)[number]
-    s = values.ravel() / float(slices.distance[0])
-    light = np.array([0.4, 1.9, 0.9])
-    seen = s > 0.02  # nearer than 50 m: farther, texels hold the edge of the floor
-    if kind == "spot":  # beyond the cone the map ends
-        axis = vectors(scene.lights[0].axis).ravel()
-        seen &= k @ axis > float(scene.lights[0].cos_cutoff[0]) * np.linalg.norm(k, axis=1)
-    assert np.count_nonzero(seen) > 50
-    hit = light + k[seen] / s[seen, None]
-    assert hit[:, 2] == pytest.approx(-1.3, abs=1e-4)
-    if kind == "point":
-        assert np.all(values.ravel()[k[:, 2] > 0.3] == 0)
-
-
 @pytest.mark.claim("tree-of-bounds")
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_the_tree_holds_the_bounds(variant, kind):

@@ -67,23 +67,6 @@ def test_frames_that_sample_elsewhere_come_closer_to_a_finer_grid(variant):
     assert relative_rmse(many, fine) < 0.8 * relative_rmse(alone, fine)
 
 
-def test_samples_stay_in_their_froxels_and_cover_them(variant):
-    import mitsuba as mi
-
-    from realtime.methods.froxel_fog.history import FroxelHistory, frame_shift
-
-    shifts = np.array(
-        [
-            [float(value[0]) for value in frame_shift(FroxelHistory(None, None, mi.UInt32(frame)), mi.Float)]
-            for frame in range(512)
-        ]
-    )
-    assert (shifts[0] == 0).all()
-    assert (np.abs(shifts) <= 0.5).all()
-    for axis in range(3):
-        assert np.histogram(shifts[:, axis], 16, (-0.5, 0.5))[0].min() >= 24
-
-
 def test_history_follows_a_camera_that_moves(variant):
     now = scene()
     there = shifted_camera(now, (0.31, 0.0, 0.0))

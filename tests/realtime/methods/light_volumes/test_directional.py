@@ -1,22 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The map and the light volume of a directional light."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
-from tests.helpers.scenes import clear_scene
 from tests.helpers.sunlit import (
     box_part,
-    cube,
-    fog_sphere,
     read,
     relative_rmse,
     render,
     shaded,
     summed,
-    sun,
 )
 
 
@@ -30,28 +24,6 @@ def face_of(shadow_map, light):
     """Return position, across, up and axis in NumPy."""
     vectors = (light.position, *shadow_map.projection.basis)
     return [np.array(vector, dtype=float).ravel() for vector in vectors]
-
-
-@pytest.mark.claim("directional-light-volumes")
-def test_the_face_just_covers_the_media(variant):
-    """The corners of the box and the sphere fill the rectangle from side to side; nothing is before or behind it."""
-    from realtime.scene.directional_extent import media_spheres
-
-    scene = read(clear_scene(lamp=sun(), cube=cube(), ball=fog_sphere()))
-    spheres = media_spheres(scene.medium.bounded_media)
-    assert len(spheres) == 8 + 1
-    shadow_map = cast(scene, 4)
-    position, across, up, axis = face_of(shadow_map, scene.lights[0])
-    for side in (across, up):
-        half = np.linalg.norm(side)
-        places = (spheres[:, :3] - position) @ side / half  # [m]
-        # It has 0.1 % of its size to spare.
-        assert (places + spheres[:, 3]).max() == pytest.approx(half, rel=2e-3)
-        assert (places - spheres[:, 3]).min() == pytest.approx(-half, rel=2e-3)
-        assert (places + spheres[:, 3]).max() < half
-    depths = (spheres[:, :3] - position) @ axis
-    assert (depths + spheres[:, 3]).max() < 0
-    assert (depths - spheres[:, 3]).min() > -float(shadow_map.projection.depth[0])
 
 
 def height_field(scene, size):
@@ -86,29 +58,6 @@ def test_the_walk_against_steps_through_the_height_field(variant):
     assert relative_rmse(without, expected) > 0.05  # there is a shadow
     # A step of 1e-4 of a chord at each edge.
     assert relative_rmse(walked, expected) < 2e-4
-
-
-@pytest.mark.slow
-def test_the_error_falls_as_the_map_grows(variant):
-    """Against the truth, which casts its own rays and shares nothing with this side."""
-    import mitsuba as mi
-
-    from validation.estimates.quadrature import truth_image
-
-    scene = shaded(size=(32, 24))
-    truth = truth_image(mi.load_dict(scene)).airlight
-    loaded = read(scene, "single")
-
-    def error(size, walls):
-        return relative_rmse(render(loaded, "light-volumes", map=size, walls=walls).airlight, truth)
-
-    errors = [error(size, "slanted") for size in (32, 128, 512, 2048)]
-    # As 1/size where shadow edges are crossed, as its root for the few rays that graze the shadow of the sphere.
-    assert all(fine < 0.65 * coarse for coarse, fine in pairwise(errors))
-    assert errors[-1] < 5e-3
-    # Walls that stand upright where rays found them are worth a map of eight times the size.
-    assert error(128, "upright") < 1.5 * errors[2]
-    assert error(512, "upright") < errors[3]
 
 
 def test_a_map_of_rays_that_miss_all_media(variant):

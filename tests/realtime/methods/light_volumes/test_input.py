@@ -9,20 +9,6 @@ from tests.helpers.light_frames import EVALUATIONS, loaded_scene, render, render
 from tests.helpers.scenes import bounded_medium, clear_scene
 
 
-@pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        ({"map": 500}, "map: got 500, wanted a power of two from 4 to 8192"),
-        ({"tessellation": "adaptive"}, "tessellation=adaptive: got evaluation=walk.*; wanted evaluation=mesh"),
-        ({"threshold": 0.0}, "threshold: got 0.0, wanted a positive number"),
-    ],
-)
-def test_bad_parameters_are_named_without_casters_too(variant, parameters, message):
-    loaded = loaded_scene(size=(4, 4), ball=None, floor=None)
-    with pytest.raises(InputError, match=message):
-        renderer_of(loaded, **parameters)
-
-
 def test_a_mesh_is_for_media_without_bounds(variant):
     import mitsuba as mi
 
@@ -50,19 +36,3 @@ def test_memory_is_counted_before_it_is_taken(variant, monkeypatch, evaluation):
         with pytest.raises(InputError, match=message):
             renderer_of(loaded, map=4096, evaluation=evaluation)
     render(loaded, map=64, evaluation=evaluation)
-
-
-def test_memory_that_is_needed_is_what_the_arrays_hold(variant):
-    """Of a map of 8192 texels by proportion: nothing grows faster."""
-    import realtime.methods.light_volumes.method
-    from realtime.methods.light_volumes.jump_search import with_walls
-    from realtime.scene.read_scene import read_scene
-    from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
-    from realtime.shadow_maps.shadow_map import cast_shadow_map
-
-    scene = read_scene(loaded_scene())
-    shadow_map = cast_shadow_map(scene.geometry, scene.lights[0], 64)
-    heights = with_walls(inverse_depth_field(shadow_map), scene.geometry, scene.lights[0])
-    arrays = heights.texels, heights.bounds, heights.gaps, heights.sides, heights.walls
-    held = 4 * (2 * len(shadow_map.distance) + sum(len(array) for array in arrays))
-    assert realtime.methods.light_volumes.method._memory_of(scene.lights[0], 64, "walk") == held

@@ -84,19 +84,6 @@ def test_order_of_the_paper_is_by_the_stencil_rule(variant):
     assert np.any(lit)
 
 
-@pytest.mark.claim("buffer-of-eight-bits", tolerance="half a step of 255")
-def test_buffer_of_eight_bits_has_steps_and_clamps(variant):
-    import mitsuba as mi
-
-    buffer = Buffer(2.0)
-    values = np.linspace(-1, 3, 4001)
-    stored = np.array(buffer.stored(mi.Float(values)), dtype=np.float64)
-    assert len(set(stored.tolist())) == 256
-    assert (stored.min(), stored.max()) == (0.0, 2.0)
-    inside = (values >= 0) & (values <= 2)
-    assert np.max(np.abs(stored - values)[inside]) <= 2 / 255 / 2 + 1e-6
-
-
 @pytest.mark.claim("buffer-of-eight-bits")
 def test_buffer_clamps_after_every_plane(variant):
     """Full at the surface, it forgets what is above, and the planes then take away too much."""
@@ -112,25 +99,3 @@ def test_buffer_clamps_after_every_plane(variant):
     assert np.max(np.abs(rounded - free)) < 1.5 * 3 / 255 + 1e-5
     assert np.all(clamped[lit & ~shadowed] == pytest.approx(0.5))
     assert np.mean(free[shadowed] - clamped[shadowed]) > 0.05
-
-
-@pytest.mark.parametrize(("order", "room"), [("paper", 1), ("exact", 3)])
-def test_tiles_without_room_add_up_in_the_same_order(variant, monkeypatch, order, room):
-    """From the list of their block or from the bins; by the stencil rule and by rounding after every plane."""
-    import realtime.methods.shadow_planes.tile_lists as module
-
-    index = index_of(casters_of("torus", "crossing spheres"), precision="double")
-    ways = bundles(1920, spread=0.003)
-    end = np.full(len(ways), 4.7)
-    wanted, lit = added_up(index, ways, end, order=order)
-    stepped, _ = added_up(index, ways, end, order=order, buffer=Buffer(0.9))
-    monkeypatch.setattr(module, "ROOM", room)
-    monkeypatch.setattr(module, "LEAST", 0)
-    assert np.array(drawn_lists(index, ways, end, order=order)[0].sorted).mean() < 0.9
-    total, total_lit = added_up(index, ways, end, order=order)
-    total_stepped, _ = added_up(index, ways, end, order=order, buffer=Buffer(0.9))
-    # With room, crossings are in the order of the tile's middle ray; without, in that of the ray itself: one ray in a
-    # hundred differs. The paper's order is that of the planes, the same for all rays.
-    differing = 0.0 if order == "paper" else 0.01
-    assert np.mean((np.abs(total - wanted) > 1e-9) | (total_lit != lit)) <= differing
-    assert np.mean(np.abs(total_stepped - stepped) > 1e-9) <= differing

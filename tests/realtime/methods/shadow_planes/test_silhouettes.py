@@ -9,9 +9,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from realtime.methods.shadow_planes.silhouettes import layers, silhouette
+from realtime.methods.shadow_planes.silhouettes import silhouette
 from realtime.scene.mesh_adjacency import make_casters
-from tests.helpers.casters import ALL, closed_sphere, flat_roof
+from tests.helpers.casters import ALL
 
 LIGHTS = {"aside": (2.9, -1.7, 2.3), "near": (0.31, 0.47, 0.71), "inside": (0.11, -0.05, 0.17)}
 
@@ -99,24 +99,3 @@ def test_any_triangles_and_any_light(vertices, faces, light, seed):
     assume(len(casters.triangles))
     assert_is_cycle(silhouette(casters, np.array(light, dtype=float)))
     assert_counts_layers(casters, light, seed=seed, count=4)
-
-
-@pytest.mark.parametrize("turned", [False, True])
-def test_closed_component_has_the_silhouette_of_the_paper(turned):
-    """The edges between a facing and an averted triangle, whichever side is out."""
-    vertices, faces = closed_sphere()
-    casters = casters_of((vertices, faces[:, ::-1] if turned else faces))
-    light = np.array(LIGHTS["aside"])
-    contour = silhouette(casters, light)
-    faces_light = np.einsum("ij,ij->i", casters.normals, light - casters.vertices[casters.triangles[:, 0]]) > 0
-    expected = casters.edges[faces_light[casters.left] != faces_light[casters.right]]
-    assert np.array_equal(contour.edges, expected)
-    assert set(np.abs(contour.coefficient).tolist()) == {1}
-
-
-@pytest.mark.claim("silhouettes-count-layers")
-def test_light_in_the_plane_of_a_roof():
-    mesh, light = flat_roof()
-    casters = casters_of(mesh)
-    assert int(np.sum(layers(casters, light)[:-1] == 0)) > 0
-    assert_counts_layers(casters, light, count=80)

@@ -4,11 +4,6 @@
 import numpy as np
 import pytest
 
-from realtime.methods.shadow_planes.spot_pyramid import cone_ring, is_outside, ring_edges
-
-_AXIS = np.array([0.31, -0.57, 0.43]) / np.linalg.norm([0.31, -0.57, 0.43])
-_COSINE = np.cos(np.deg2rad(24.3))
-
 
 def frame(parameters, *, size=(64, 48), **changes):
     """A frame of the sphere under the spot; its scene can be turned so that the camera is in the cone."""
@@ -23,29 +18,6 @@ def frame(parameters, *, size=(64, 48), **changes):
     scene = mi.load_dict(sphere_spot() | changes)
     resize(scene, size)
     return render_frame(prepared(read_scene(scene), configuration("shadow-planes", None, parameters)))
-
-
-@pytest.mark.parametrize("sides", [3, 4, 32])
-def test_corners_lie_on_the_cone_and_turn_left_as_the_light_sees_them(sides):
-    ring = cone_ring(_AXIS, _COSINE, sides)
-    np.testing.assert_allclose(ring @ _AXIS, _COSINE, rtol=1e-14)
-    np.testing.assert_allclose(np.linalg.norm(ring, axis=1), 1, rtol=1e-14)
-    # For one who looks along the axis the cross products of counter-clockwise corners point back at him.
-    assert np.all(np.cross(ring, np.roll(ring, -1, axis=0)) @ _AXIS < 0)
-    assert ring_edges(ring).shape == (sides, 2, 3)
-    np.testing.assert_array_equal(ring_edges(ring)[-1, 1], ring[0])
-
-
-def test_outside_is_what_the_pyramid_does_not_hold():
-    ring = cone_ring(_AXIS, _COSINE, 5)
-    middle_of_edge = ring[0] + ring[1]
-    assert not is_outside(ring, _AXIS)
-    assert not is_outside(ring, 0.999 * ring[2] + 0.001 * _AXIS)
-    assert is_outside(ring, 1.001 * ring[2] - 0.001 * _AXIS)
-    assert is_outside(ring, -_AXIS)
-    # Between two corners the cone bulges beyond the pyramid.
-    assert is_outside(ring, middle_of_edge - 0.01 * _AXIS)
-    assert not is_outside(ring, middle_of_edge + 0.01 * _AXIS)
 
 
 def test_many_edges_are_the_cone_itself_and_fewer_are_darker_by_the_square(variant):

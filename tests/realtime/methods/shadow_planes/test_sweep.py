@@ -19,7 +19,7 @@ def walked(index, lists, ways, end, *, begin=0.0):
     from realtime.methods.shadow_planes.sweep import sum_lit_intervals
 
     Float = type(index.distance)
-    rays = rays_of(index, lists, ways)
+    rays = rays_of(index, lists, ways, end if lists is index.wedges else None)
     segment = Float(np.full(len(ways), begin)), Float(np.asarray(end, dtype=np.float64))
     total, lit = sum_lit_intervals(
         index, lists, rays, segment, lambda a, b: dr.exp(-a) - dr.exp(-b), dr.zeros(Float, len(ways))
@@ -40,11 +40,13 @@ def assert_same(sums, expected, *, tolerance):
 @pytest.mark.claim("planes-are-exact", tolerance="1e-4: float32 at grazing angles")
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("name", NAMES)
-def test_lit_segments_are_those_between_the_crossings(variant, name, camera):
-    index = index_of(casters_of(name), camera=CAMERAS[camera])
+@pytest.mark.parametrize("wedges", [False, True])
+def test_lit_segments_are_those_between_the_crossings(variant, name, camera, wedges):
+    """Whether planes are listed by tile, or by wedge for rays that are in no tile."""
+    index = index_of(casters_of(name), camera=CAMERAS[camera], wedges=wedges)
     ways = bundles(1920, spread=0.01, camera=CAMERAS[camera])
     end = np.random.default_rng(3).choice([0.9, 2.7, 6.1, np.inf], len(ways))
-    lists, _ = drawn_lists(index, ways, end)
+    lists = index.wedges if wedges else drawn_lists(index, ways, end)[0]
     # float32 crossings at grazing angles: 1e-7 over the sine of the angle between ray and plane.
     expected = lit_lengths(index, ways, end, weight=weight)
     assert_same(walked(index, lists, ways, end), expected, tolerance=1e-4)
@@ -84,16 +86,6 @@ def test_rays_notice_an_order_that_is_wrong(variant, order):
     assert_same(walked(index, lists, ways, end), expected, tolerance=1e-4)
 
 
-@pytest.mark.claim("rays-notice-a-wrong-order", tolerance="1e-4: float32 at grazing angles")
-def test_wide_tiles_are_out_of_order_and_right(variant):
-    """Bundles a quarter of a turn wide: no order is right for all their rays."""
-    index = index_of(casters_of("torus", "crossing spheres"))
-    ways = bundles(960, spread=0.4)
-    end = np.full(len(ways), 5.1)
-    lists, _ = drawn_lists(index, ways, end)
-    assert_same(walked(index, lists, ways, end), lit_lengths(index, ways, end, weight=weight), tolerance=1e-4)
-
-
 def test_segments_begin_where_they_are_told_to(variant):
     """Between two distances, as a spot's cone cuts them: what is lit up to the second less what is up to the first."""
     index = index_of(casters_of("torus", "open cylinder"))
@@ -104,31 +96,3 @@ def test_segments_begin_where_they_are_told_to(variant):
     until_begin, _ = lit_lengths(index, ways, np.full(len(ways), begin), weight=weight)
     sums = walked(index, lists, ways, end, begin=begin)
     assert_same(sums, (until_end - until_begin, lit), tolerance=1e-4)
-
-
-@pytest.mark.claim("rays-notice-a-wrong-order", tolerance="1e-4 in 999 of 1000 rays")
-@pytest.mark.parametrize("in_order", [True, False])
-def test_more_planes_at_one_place_than_a_ray_collects_at_once(variant, in_order):
-    """Beside every plane ten that add a layer there and ten that take it away again: the same segments."""
-    import mitsuba as mi
-
-    from realtime.methods.shadow_planes.plane_entries import GAIN_SHIFT, GAIN_ZERO, Source
-
-    index = index_of(casters_of("torus", "open cylinder"))
-    ways = bundles(320, spread=0.01)
-    end = np.full(len(ways), np.inf)
-    lists, _ = drawn_lists(index, ways, end)
-    entries = np.array(lists.entries)
-    first, count = np.array(lists.source.first), np.array(lists.source.count)
-    added = np.repeat([1, -1], 10)[None, :] + GAIN_ZERO << GAIN_SHIFT
-    more = (entries & ~np.uint32(63 << GAIN_SHIFT))[:, None] | added.astype(np.uint32)
-    entries = np.concatenate([more, entries[:, None]], axis=1)
-    every = [entries[begin : begin + length].ravel() for begin, length in zip(first, count)]
-    start = np.concatenate([[0], np.cumsum(21 * count)[:-1]])
-    source = Source(mi.UInt32(start), mi.UInt32(21 * count), mi.UInt32(start + 21 * count))
-    lists = replace(
-        lists, entries=mi.UInt32(np.concatenate(every)), source=source, sorted=mi.Bool(np.full(len(count), in_order))
-    )
-    assert count.max() > 3
-    expected = lit_lengths(index, ways, end, weight=weight)
-    assert_same(walked(index, lists, ways, end), expected, tolerance=1e-4)

@@ -43,18 +43,20 @@ def boxes(rng, count):
 
 
 @pytest.mark.claim("culled-casters")
-def test_no_component_is_dropped_whose_shadow_is_seen(variant):
+@pytest.mark.parametrize("w", [1.0, 0.0])
+def test_no_component_is_dropped_whose_shadow_is_seen(variant, w):
+    """From a light with a place, and from one at infinity in this direction."""
     rng = np.random.default_rng(11)
     dropped = 0
     for _ in range(40):
         casters = boxes(rng, 8)
         light, origin, target = rng.normal(size=(3, 3)) * 3
         camera = camera_at(origin, target)
-        used = components_in_view(casters, camera, light)
+        used = components_in_view(casters, camera, np.append(light, w))
         for component, (low, high) in enumerate(casters.boxes):
             points = rng.uniform(low, high, (4000, 3))
             beyond = rng.exponential(3, (len(points), 1)) * (rng.random((len(points), 1)) < 0.9)
-            if sees(camera, points + beyond * (points - light)).any():
+            if sees(camera, points + beyond * (w * points - light)).any():
                 assert used[component]
         dropped += int(np.sum(~used))
     # A third at least has its shadow elsewhere: the test is worth its time only if there is something to drop.

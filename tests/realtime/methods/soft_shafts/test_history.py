@@ -56,13 +56,3 @@ def test_a_light_that_jumps_leaves_nothing_behind(variant):
     assert images[1].airlight.max() > 1e-3
     assert np.all(images[2].airlight == 0)
     assert np.all(images[2].surface == 0)
-
-
-def test_another_surface_is_not_taken_for_this_one(variant):
-    """After a jump of the camera the first frame is as if it were alone, where other surfaces were seen."""
-    made = renderer(lamp_scene(size=(32, 24)), history=0.9, **SHARED)
-    far = shifted(made.scene, 1.7)
-    after = frames(made, [made.scene, far], camera=True)[1]
-    alone = frames(made, [far])[0]
-    assert np.median(np.abs(after.surface - alone.surface) / alone.surface.max()) < 0.02
-    assert np.all(np.isfinite(after.airlight))

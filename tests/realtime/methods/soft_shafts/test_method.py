@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Soft shafts are the sum of their light points, less what steps, scale, sharing and filters take from it."""
 
-import re
-
 import numpy as np
 import pytest
 
 from realtime.frame.renderer import render_frame
 from tests.helpers.frames import relative_rmse
-from tests.helpers.lamps import frame, lamp_scene, renderer
+from tests.helpers.lamps import frame, lamp_scene
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 
 NONE = {"filter": "none", "surfaces": "ray"}
@@ -54,23 +52,6 @@ def test_a_light_with_extent_in_bounded_media_is_the_sum_of_its_points(variant):
         assert relative_rmse(ours.airlight, march.airlight) < tolerance
 
 
-def test_rays_in_bounded_media_are_found_once_for_all_lights(variant, monkeypatch):
-    """For each of them the method recorded those of all: the square of their number."""
-    import realtime.methods.soft_shafts.method as module
-
-    found = []
-    rays_in_media = module.rays_in_media
-    monkeypatch.setattr(module, "rays_in_media", lambda view: found.append(view) or rays_in_media(view))
-    body = bounded_medium({"type": "sphere", "center": [0.1, 0.2, 0.9], "radius": 1.1}, 0.7, (0.8, 0.7, 0.6))
-    sensor = {key: entry for key, entry in tiny_scene()["sensor"].items() if key != "medium"}
-    lamp = tiny_scene()["lamp"]
-    lights = {"second": lamp | {"position": [0.3, 0.9, 2.9]}, "third": lamp | {"position": [-0.7, 0.2, 2.1]}}
-    made = renderer(tiny_scene(size=(8, 4), fog=None, body=body, sensor=sensor, **lights), **NONE)
-    found.clear()
-    render_frame(made)
-    assert len(found) == 1
-
-
 def test_maps_tend_to_rays(variant):
     scene = lamp_scene(size=(40, 32))
     rays = frame(scene, points=3, shadow="ray", **NONE)
@@ -102,41 +83,6 @@ def test_pixels_share_points_and_steps(variant):
     errors = [relative_rmse(image.airlight[inner], many.airlight[inner]) for image in (shared, alone)]
     assert errors[0] < 0.02
     np.testing.assert_allclose(shared.surface[inner], many.surface[inner], rtol=1e-4, atol=1e-6)
-
-
-def test_filters_keep_what_is_not_penumbra(variant):
-    """Far from shadows the filters of a share change nothing: its levels are all 1 there."""
-    scene = lamp_scene(size=(48, 32))
-    plain = frame(scene, points=5, **NONE)
-    for parameters in ({}, {"form": "separable"}, {"guide": "depth"}, {"guide": "depth", "hd": "auto"}):
-        filtered = frame(
-            scene,
-            points=5,
-            surfaces="ray",
-            hd=parameters.get("hd", "1.2"),
-            **{name: value for name, value in parameters.items() if name != "hd"},
-        )
-        difference = np.abs(filtered.surface - plain.surface).max(axis=2)
-        assert 0.05 < np.mean(difference == 0) < 1
-        assert relative_rmse(filtered.airlight, plain.airlight) < 0.2
-
-
-@pytest.mark.parametrize(
-    ("parameters", "words"),
-    [
-        ({"hr": 0}, "hr: got 0.0, wanted a number above 0"),
-        ({"hd": 65}, "hd: got '65', wanted 'auto' or a number above 0 to 64 [pixels]"),
-        ({"hd": "auto"}, "hd: auto has the depth for a guide; wanted filter=bilateral guide=depth with it"),
-        ({"scale": 8}, "scale: got 8 and an image of 16 x 12, wanted one that divides both sides"),
-        ({"interleave": True}, "interleave: got 5 points of a light, wanted 1, 2, 4, 8 or 16"),
-    ],
-)
-def test_wrong_parameters_are_refused_in_one_line(variant, parameters, words):
-    from realtime.errors import InputError
-
-    with pytest.raises(InputError, match=re.escape(words)) as caught:
-        renderer(lamp_scene(size=(16, 12)), **parameters)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.claim("soft-shafts-steps", tolerance="half of the light; 2 % of it")

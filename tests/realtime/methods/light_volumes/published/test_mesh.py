@@ -50,17 +50,6 @@ def test_mesh_is_closed(variant, kind, size, tessellation):
         assert len(mesh.triangles) < shadow_map.faces * size**2
 
 
-@pytest.mark.parametrize(("kind", "triangles"), [("point", 12), ("spot", 2 + 4)])
-def test_a_map_that_sees_nothing(variant, kind, triangles):
-    from realtime.methods.light_volumes.published.mesh import volume_mesh
-
-    shadow_map, light = map_of(kind, 8, floor=None, ball=None)
-    mesh = volume_mesh(shadow_map, light, tessellation="adaptive")
-    assert len(mesh.triangles) == triangles
-    assert_closed(mesh)
-    assert np.sum(mesh.vertices[:, 3] > 0) == (1 if kind == "spot" else 0)
-
-
 def random_cube(size: int, seed: int):
     """Return a map of six faces with random edges everywhere, also across the borders of faces."""
     import mitsuba as mi

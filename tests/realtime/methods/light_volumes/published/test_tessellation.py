@@ -6,7 +6,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from realtime.methods.light_volumes.published.tessellation import RING, configuration, divide, edges, quads, triangles
+from realtime.methods.light_volumes.published.tessellation import divide, edges, quads, triangles
 from tests.helpers.tessellated_heights import tessellated_heights
 
 
@@ -29,31 +29,6 @@ def grid_points(numbers, size: int):
 
 def random_edges(rng, *, faces: int, levels: int, share: float):
     return [rng.random((faces, 2**level, 2**level)) < share for level in range(levels)]
-
-
-@pytest.mark.claim("no-t-junctions")
-@pytest.mark.parametrize("sides", range(16))
-def test_configuration_covers_its_quad_once(sides):
-    corners = np.array(configuration(sides))
-    assert len(corners) == 2 + bin(sides).count("1") <= 6
-    points = np.array(RING)
-    area = areas(points, corners)
-    assert np.all(area > 0)
-    assert area.sum() == 8  # twice the square of two halves a side
-    # Each edge twice, in opposite directions, but for those of the quad: these once, with the middles that there are.
-    seen = directed_edges(corners)
-    assert set(seen.values()) == {1}
-    border = {edge for edge in seen if edge[::-1] not in seen}
-    ring = [k for k in range(8) if k % 2 == 0 or sides >> (k // 2) & 1]
-    assert border == set(zip(ring, ring[1:] + ring[:1], strict=True))
-    # No point of the inside is in two triangles or in none.
-    rng = np.random.default_rng(sides)
-    p = rng.uniform(0, 2, (500, 2))
-    inside = np.zeros(len(p), int)
-    for a, b, c in points[corners]:
-        signs = [(q - o)[0] * (p - o)[:, 1] - (q - o)[1] * (p - o)[:, 0] for o, q in ((a, b), (b, c), (c, a))]
-        inside += np.all(np.array(signs) > 0, axis=0)
-    assert np.all(inside == 1)
 
 
 @pytest.mark.claim("no-t-junctions")
@@ -98,17 +73,6 @@ def test_divided_sides_differ_by_one_level():
 def height_of(function, size: int):
     u = np.linspace(-1, 1, size + 1)
     return function(u[None, None, :], u[None, :, None]) + np.zeros((1, size + 1, size + 1))
-
-
-@pytest.mark.parametrize("saddle", [lambda u, v: 1 + 0.3 * u * v, lambda u, v: 1 + 0.3 * (u * u - v * v)])
-def test_saddles_have_edges(saddle):
-    """The sum of the second differences vanishes there, the error of the mesh does not."""
-    height = height_of(saddle, 64)
-    marks = edges(height, 1e-3)
-    assert marks[0].all()
-    assert not marks[-1].any()
-    error = abs(tessellated_heights(height, divide(marks)) / height - 1).max()
-    assert 1e-4 < error < 2e-3
 
 
 @pytest.mark.claim("tessellation-threshold")

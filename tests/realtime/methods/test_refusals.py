@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: parameters that a method cannot have, or not with one another, are refused by name before a frame is drawn."""
+
+import pytest
+
+from realtime.errors import InputError
+from tests.helpers.lamps import lamp_scene, renderer
+
+
+@pytest.mark.parametrize(
+    ("method", "parameters", "message"),
+    [
+        ("froxel-fog", {"near": 3.0, "far": 2.0}, "near: got 3 with far=2, wanted a depth before it"),
+        ("froxel-fog", {"width": 4096, "height": 4096, "slices": 4096}, "froxels: needs .* GB of memory"),
+        ("soft-shafts", {"hr": 0}, "hr: got 0.0, wanted a number above 0"),
+        ("soft-shafts", {"hd": "auto"}, "hd: auto has the depth for a guide; wanted filter=bilateral guide=depth"),
+        ("soft-shafts", {"scale": 8}, "scale: got 8 and an image of 18 x 12, wanted one that divides both sides"),
+        ("soft-shafts", {"interleave": True}, "interleave: got 5 points of a light, wanted 1, 2, 4, 8 or 16"),
+        ("light-volumes", {"map": 500}, "map: got 500, wanted a power of two from 4 to 8192"),
+        ("light-volumes", {"tessellation": "adaptive"}, "tessellation=adaptive: got evaluation=walk.*=mesh"),
+        ("shadow-planes", {"tolerance": 1.0}, "tolerance: got 1.0, wanted a share"),
+        ("shadow-planes", {"tolerance": 0.01}, "got an image of 18 x 12, wanted sides that are multiples of 4"),
+    ],
+)
+def test_parameters_that_cannot_be_are_refused_by_name(variant, method, parameters, message):
+    scene = lamp_scene(size=(18, 12), ball=None)
+    with pytest.raises(InputError, match=message) as caught:
+        renderer(scene, method, kernel="exact" if method != "soft-shafts" else None, **parameters)
+    assert "\n" not in str(caught.value)
