@@ -66,7 +66,7 @@ def cloud(sigma_t: str = "1, 1, 1", shape: str = "", name: str = ' id="cloud"') 
         <rgb name="albedo" value="0.5, 0.5, 0.5"/></medium><ref name="exterior" id="fog"/></shape>"""
 
 
-def mesh(vertices: str, faces: str, folder: Path, *, boundary: bool = False) -> str:
+def mesh(vertices: str, faces: str, folder: Path) -> str:
     """Write a mesh as binary PLY, which holds any float32 number, and return the shape."""
     corners, sides = ([line.split() for line in text.split("\n")] for text in (vertices, faces))
     header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(corners)}\n"
@@ -76,8 +76,7 @@ def mesh(vertices: str, faces: str, folder: Path, *, boundary: bool = False) -> 
     indices = b"".join(struct.pack("<Biii", *(int(corner) for corner in side)) for side in sides)
     path = folder / "mesh.ply"
     path.write_bytes(header.encode() + places + indices)
-    inside = '<bsdf type="null"/><ref name="interior" id="fog"/>' if boundary else ""
-    return f'<shape type="ply" id="mesh"><string name="filename" value="{path}"/>{inside}</shape>'
+    return f'<shape type="ply" id="mesh"><string name="filename" value="{path}"/></shape>'
 
 
 def numbers(folder: Path) -> Iterator[tuple[str, str]]:
@@ -105,10 +104,6 @@ def geometry(folder: Path) -> Iterator[tuple[str, str]]:
         own = folder / str(number)
         own.mkdir()
         yield f"vertex {odd}", scene(extra=mesh(square.replace("1 1 0", f"{odd} 1 0"), two, own))
-        body = folder / f"body-{number}"
-        body.mkdir()
-        bounds = mesh(square.replace("1 1 0", f"{odd} 1 0"), two, body, boundary=True)
-        yield f"vertex of bounds {odd}", scene(extra=bounds)
     for name, corners, sides in (
         ("face beyond the vertices", square, "3 0 1 7"),
         ("face without area", square, "3 0 1 1\n3 0 1 2"),
@@ -120,29 +115,20 @@ def geometry(folder: Path) -> Iterator[tuple[str, str]]:
         own.mkdir()
         yield name, scene(extra=mesh(corners, sides, own))
     yield "camera in the ball", scene(center="0, -5, 1")
-    yield "camera on the ball", scene(center="0, -5, 1.5")
     yield "camera without a direction", scene(target="0, -5, 1")
     yield "camera along up", scene(target="0, -5, 2")
     yield "camera of no size", scene(camera='<scale value="0"/>')
     yield "camera of NaN", scene(camera=f'<matrix value="{" ".join(["nan"] * 16)}"/>')
     yield "camera far away", scene(origin="0, -1e8, 1", position="0.3, 1e8, 1.1")
-    yield "nested elements", "<scene version='3.0.0'>" + "<shape>" * 20000 + "</shape>" * 20000 + "</scene>"
-    yield "no shape has a name", scene(extra='<shape type="rectangle"/><shape type="cube"/>' + cloud(name=""))
 
 
 def media(folder: Path) -> Iterator[tuple[str, str]]:
     """Yield scenes whose media are odd."""
     yield "vacuum", scene(sigma_t="0, 0, 0")
     yield "black fog", scene(albedo="0, 0, 0")
-    yield "one channel alone", scene(sigma_t="0, 0, 1")
-    yield "thick", scene(scale="1e4")
     yield "thicker than float32", scene(scale="1e8")
-    yield "thin", scene(scale="1e-20")
-    yield "cloud nan", scene(extra=cloud("nan, 1, 1"))
     yield "cloud of no size", scene(extra=cloud(shape='<float name="radius" value="0"/>'))
     yield "cloud 1e30", scene(extra=cloud(shape='<float name="radius" value="1e30"/>'))
-    yield "cloud without extinction", scene(extra=cloud("0, 0, 0"))
-    yield "overlapping clouds without names", scene(extra=cloud(name="") + cloud(name=""))
     yield "cloud about the lamp", scene(extra=cloud(shape='<point name="center" x="0.3" y="0.4" z="1.1"/>'))
     yield "cloud about the camera", scene(extra=cloud(shape='<point name="center" x="0" y="-5" z="1"/>'))
     for values in ("0, 0, 0", "nan, 1, 1", "-1, 1, 1", "1, inf, 1", "1"):
@@ -155,18 +141,13 @@ def lights(folder: Path) -> Iterator[tuple[str, str]]:
     straight = {"origin": "0, -5, 1", "target": "0, 0, 1", "size": "9, 9"}
     at_camera = scene(position="0, -5, 1")
     yield "light at the camera", at_camera
-    yield "light by the camera", scene(position="1e-9, -5, 1")
     yield "light a millimetre from the camera", scene(position="0.001, -5, 1")
     yield "light on a ray", scene(position="0, 0, 1", **straight)
     yield "light beside a ray", scene(position="1e-6, 0, 1", **straight)
-    yield "light beside a ray by rounding", scene(position="1e-9, 0, 1", **straight)
     yield "light behind the camera, on a ray", scene(position="0, -9, 1", **straight)
     yield "light on a ray behind the ball", scene(position="0, 9, 1", center="0, 0, 1", **straight)
-    yield "light on a ray on the ball", scene(position="0, -0.5, 1", center="0, 0, 1", **straight)
     yield "light in the ball", scene(position="-0.6, 0.7, 0.5")
     yield "no light", scene(light="<!-- -->")
-    yield "dark", scene(intensity="0, 0, 0")
-    yield "faint", scene(intensity="1e-38, 1e-38, 1e-38")
     yield "faintest", scene(intensity="1e-44, 0, 0")
     yield "bright", scene(intensity="1e18, 1e18, 1e18")
     yield (
@@ -210,17 +191,8 @@ def area_lights(folder: Path) -> Iterator[tuple[str, str]]:
         yield f"flat {kind}", scene(light=lamp(f'<scale x="0.5" y="0" z="1"/>{above}', kind=kind))
         shear = '<matrix value="0.5 0.2 0 0.3  0 0.5 0 0.4  0 0 0.5 2.1  0 0 0 1"/>'
         yield f"sheared {kind}", scene(light=lamp(shear, kind=kind))
-        yield f"{kind} of no material", scene(light=lamp(f'<scale value="0.3"/>{above}', kind=kind, bsdf=""))
-        null = lamp(f'<scale value="0.3"/>{above}', kind=kind, bsdf='<bsdf type="null"/>')
-        yield f"{kind} of material null", scene(light=null)
         at_camera = lamp('<scale value="0.3"/><translate x="0" y="-5" z="1"/>', kind=kind)
         yield f"{kind} about the camera", scene(light=at_camera)
-        cut = lamp('<scale value="0.3"/><translate x="-0.6" y="0.7" z="0.9"/>', kind=kind)
-        yield f"{kind} that cuts the ball", scene(light=cut)
-        panel = lamp(f'<scale value="0.3"/>{above}', kind=kind)
-        yield f"{kind} beside a point light", scene(extra=panel.replace('id="lamp"', 'id="panel"'))
-        filled = '<ref name="interior" id="fog"/>'
-        yield f"{kind} that bounds fog", scene(light=lamp(f'<scale value="0.3"/>{above}', kind=kind, extra=filled))
     yield (
         "sphere inside out",
         scene(light=lamp(above, kind="sphere", extra='<boolean name="flip_normals" value="true"/>')),
@@ -231,7 +203,6 @@ def area_lights(folder: Path) -> Iterator[tuple[str, str]]:
     yield "light on a mesh", scene(light=light.replace("</shape>", f'<emitter type="area">{usual}</emitter></shape>'))
     texture = '<texture type="checkerboard" name="radiance"/>'
     yield "light of a texture", scene(light=lamp(f'<scale value="0.3"/>{above}', radiance=texture))
-    yield "light edge-on", scene(light=lamp('<scale value="0.3"/><translate x="0" y="0" z="1"/>'), origin="0, -5, 1")
 
 
 def rows(folder: Path) -> Iterator[tuple[str, str]]:
@@ -242,7 +213,6 @@ def rows(folder: Path) -> Iterator[tuple[str, str]]:
         for odd in ("nan", "inf", "-1e300", "1e300", "1e-300", "0"):
             changed = usual | {column: odd}
             yield f"{column} {odd}", f"{header}\nhg,{','.join(changed.values())}\n"
-    yield "all large", f"{header}\nisotropic,0,1e200,1e200,1e200,1e300,1e200\n"
     yield "light on the segment", f"{header}\nisotropic,0,1,0,0,2,0.2\n"
 
 

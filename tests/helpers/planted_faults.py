@@ -51,11 +51,9 @@ class Planted:
     make: Make | None = None  #: the image of a scene with the fault; None: the scene is right
     values: Callable[[Array], Array | None] | None = None  #: what is done to the image then
 
-    def image(self, truth: TruthScene, right: Array | None = None) -> Array | None:
+    def image(self, truth: TruthScene) -> Array | None:
         """Return the image, (height, width, 3), or None where the scene cannot have the fault."""
-        if self.make is None and right is None:
-            right = right_image(truth)
-        image = right if self.make is None else self.make(truth)
+        image = right_image(truth) if self.make is None else self.make(truth)
         return image if image is None or self.values is None else self.values(image)
 
 
@@ -157,10 +155,6 @@ def _spots(truth: TruthScene) -> bool:
     return any(light.axis is not None for light in truth.lights)
 
 
-def _soft(truth: TruthScene) -> bool:
-    return any(light.axis is not None and 0 < light.beam < light.cutoff for light in truth.lights)
-
-
 def _pixels(truth: TruthScene, change: Callable[[Array, tuple[int, int]], Array]) -> TruthScene:
     """Return a scene whose rays go through other places on the film."""
     size = truth.width, truth.height
@@ -214,10 +208,6 @@ def _near_lights(truth: TruthScene) -> bool:
     return bool(truth.lights)
 
 
-def _point_lights(truth: TruthScene) -> bool:
-    return any(light.axis is None for light in truth.lights)
-
-
 def _in_feet(truth: TruthScene) -> TruthScene | None:
     """Return a scene whose lengths are 1/0.3048 times as long, brought back to size: lamps and media are not.
 
@@ -227,15 +217,6 @@ def _in_feet(truth: TruthScene) -> TruthScene | None:
         return None
     lights = tuple(replace(light, intensity=light.intensity * _FOOT**2) for light in truth.lights)
     return replace(_optics(lambda s, a: (s / _FOOT, a))(truth), lights=lights)
-
-
-def _near_plane(truth: TruthScene) -> Array | None:
-    """Return None, too, where all that is seen lies behind the plane: the fault is a factor then, exp(sigma_t near)."""
-    images = [_of_model(lambda truth: not truth.media, {"near": near}, near=near)(truth) for near in (0.7, 0.0)]
-    if images[0] is None or images[1] is None:
-        return None
-    lit = images[1] > 0
-    return images[0] if np.ptp(images[0][lit] / images[1][lit]) > 1e-3 else None
 
 
 def _clamped(image: Array) -> Array | None:
@@ -260,15 +241,12 @@ PLANTED = (
     Planted("g", "another g", _of_scene(_other_g)),
     Planted("light-leg", "the way from the light not attenuated", _light_leg),
     Planted("camera-leg", "the way to the camera not attenuated", _of_model(lambda truth: True, {"camera_leg": 0.0})),
-    Planted("near-plane", "no medium up to 0.7 m", _near_plane),
     Planted(
         "distance-law", "one over the distance", _of_model(lambda truth: bool(truth.lights), {"distance_power": 1.0})
     ),
-    Planted("light-radius", "lamps of 0.23 m", _of_model(_point_lights, {}, radius=0.23, seed=7)),
     Planted("no-shadow", "no shadows", _shadowless),
     Planted("spot-angle", "cones twice as wide", _of_scene(_scenery(_spots, cone=2.0))),
     Planted("spot-angle", "cones half as wide", _of_scene(_scenery(_spots, cone=0.5))),
-    Planted("spot-falloff", "spots without falloff", _of_scene(_scenery(_soft, edge="hard"))),
     Planted(
         "light-position",
         "the light moved",

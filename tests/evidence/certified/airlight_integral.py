@@ -50,10 +50,10 @@ import csv
 import io
 import sys
 from collections.abc import Mapping
-from decimal import Context, Decimal
 from pathlib import Path
 
 from flint import acb, arb, ctx
+from mpmath import mp
 
 FOLDER = Path(__file__).resolve().parents[3] / "validation/certified"
 FILES = ("airlight_integral.csv", "airlight_integral_rays.csv")
@@ -145,23 +145,10 @@ def _largest_phase(name: str, g: arb) -> arb:
 
 
 def _word(number: arb, count: int) -> str:
-    """Return an exact binary number in so many decimal digits, as mpmath's `nstr` writes them."""
+    """Return an exact binary number in so many decimal digits."""
     mantissa, exponent = (int(part) for part in number.man_exp())
-    # one division of integers, which Decimal rounds correctly
-    numerator, denominator = mantissa << max(exponent, 0), 1 << max(-exponent, 0)
-    rounded = Context(prec=count).divide(Decimal(numerator), Decimal(denominator))
-    sign, figures, _ = rounded.as_tuple()
-    text = "-" * sign + "".join(map(str, figures)).ljust(count, "0")
-    first = rounded.adjusted()  # the power of ten of the first digit
-    if -6 < first < count:
-        padded = text.rjust(len(text) - first, "0") if first < 0 else text
-        point = max(first, 0) + 1
-        return _stripped(padded[:point], padded[point:])
-    return _stripped(text[0], text[1:]) + f"e{first:+d}"
-
-
-def _stripped(whole: str, decimals: str) -> str:
-    return f"{whole}.{decimals.rstrip('0') or '0'}"
+    with mp.workprec(8 * PRECISION):
+        return str(mp.nstr(mp.ldexp(mp.mpf(mantissa), exponent), count))
 
 
 def main() -> int:
