@@ -47,12 +47,3 @@ def sleep_for_ever():
 def hold_the_interpreter():
     """Run for ever in C, without letting other threads of Python run."""
     re.match(r"(a+)+$", "a" * 60 + "b")
-
-
-def die_once(folder):
-    """End the process the first time, return the second time."""
-    flag = os.path.join(folder, "died")
-    if not os.path.exists(flag):
-        open(flag, "w").close()
-        os.abort()
-    return "alive"

@@ -21,17 +21,13 @@ class Page(HTMLParser):
     def __init__(self, text):
         super().__init__(convert_charrefs=True)
         self.source = text
-        self.open, self.tags, self.words, self.tables, self.captions, self.scripts = [], [], [], [], [], []
+        self.open, self.tags, self.words, self.scripts = [], [], [], []
         self.feed(text)
         self.close()
         assert self.open == []
 
     def handle_starttag(self, tag, attrs):
         self.tags.append((tag, dict(attrs)))
-        if tag == "table":
-            self.tables.append([])
-        elif self.tables and "table" in self.open:
-            self.tables[-1].append((tag, dict(attrs)))
         if tag == "script":
             self.scripts.append((dict(attrs), []))
         if tag not in VOID:
@@ -48,8 +44,6 @@ class Page(HTMLParser):
             self.scripts[-1][1].append(data)
         elif not {"style", "svg"} & set(self.open):
             self.words.append(data)
-            if "caption" in self.open:
-                self.captions.append(data)
 
     def attributes(self, tag):
         return [attributes for name, attributes in self.tags if name == tag]
@@ -62,22 +56,6 @@ class Page(HTMLParser):
     @property
     def text(self):
         return " ".join(" ".join(self.words).split())
-
-
-def widths(table):
-    """The columns of each row of a table."""
-    columns = []
-    for tag, attributes in table:
-        if tag == "tr":
-            columns.append(0)
-        if tag in ("td", "th"):
-            columns[-1] += int(attributes.get("colspan", 1))
-    return columns
-
-
-def table_of(page, caption):
-    """The table whose caption begins so."""
-    return page.tables[next(place for place, words in enumerate(page.captions) if words.startswith(caption))]
 
 
 def method(label, **changes):

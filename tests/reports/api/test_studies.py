@@ -37,14 +37,6 @@ def test_integrals_of_a_file_and_of_its_columns(data_folder, variant):
     assert not integrals.J.flags.writeable
 
 
-def test_integrals_of_rays_given_as_vectors(data_folder, variant):
-    cases = read_cases(data_folder / "airlight_integral_rays.csv")
-    named = ("phase", "g", "origin", "direction", "light", "x0", "x1", "sigma_t")
-    integrals = airlight.integrate({name: getattr(cases, name) for name in named}, precision="double")
-    np.testing.assert_array_equal(integrals.J, airlight.integrate(cases, precision="double").J)
-    assert integrals.value is integrals.error is None
-
-
 def test_integrals_have_the_shape_of_the_columns_and_a_certified_value(variant):
     foot, height = np.linspace(-1, 2, 5)[:, None], np.array([0.1, 0.7, 2.0])
     rays = {"phase": "hg", "g": 0.4, "foot": foot, "height": height, "x0": 0.0, "x1": np.inf, "sigma_t": 0.3}
@@ -68,9 +60,6 @@ def test_integrals_have_the_shape_of_the_columns_and_a_certified_value(variant):
         ({"sigma_t": -1.0}, "column 'sigma_t': -1.0 is out of range"),
         ({"foot": [1.0, 2.0], "height": [1.0, 2.0, 3.0]}, "shapes that do not go together"),
         ({"phase": "hgg"}, "did you mean 'hg'"),
-        ({"x1": "far"}, "wanted an array of numbers"),
-        ({"foot": np.nan}, "wanted a finite number"),
-        ({"foot": []}, "the columns are empty"),
     ],
 )
 def test_what_is_no_case_is_refused(change, words, variant):
@@ -117,8 +106,6 @@ def test_bench_refuses_what_is_not_known_before_any_work(variant):
 
 
 def test_report_hands_on_what_it_was_given(variant, tmp_path, monkeypatch):
-    from validation.configurations.methods import QUICK
-
     given = {}
 
     def write(folder, **options):
@@ -133,15 +120,6 @@ def test_report_hands_on_what_it_was_given(variant, tmp_path, monkeypatch):
     assert given["effort"].name == "default"
     names = [configuration.method.rpartition(":")[2] for configuration in given["configurations"]]
     assert names == ["min-max", "brighter"]
-    assert given["images"] == {}
-    assert not given["fresh"]
-    airlight.render("open-fog", "unshadowed", size=TINY).save(tmp_path / "open-fog.engine.exr")
-    airlight.report(tmp_path / "out", images=tmp_path, fresh=True)
-    assert given["scenes"] == ["open-fog"]
-    assert [image.label for image in given["images"]["open-fog"]] == ["engine"]
-    assert given["fresh"]
-    airlight.report(tmp_path / "out", effort="quick")
-    assert (given["effort"].name, given["configurations"]) == ("quick", QUICK)
     with pytest.raises(airlight.InputError, match="did you mean 'full'"):
         airlight.report(tmp_path, effort="ful")
     with pytest.raises(airlight.InputError, match="did you mean 'hall'"):
@@ -164,19 +142,6 @@ def test_a_report_without_options_is_the_commands(variant, tmp_path, monkeypatch
     airlight.report(tmp_path / "python")
     assert run(["report", "-o", str(tmp_path / "command")]) == 0
     assert given[0] == given[1]
-
-
-@pytest.mark.slow
-def test_a_report_from_python(variant, tmp_path):
-    report = airlight.report(tmp_path / "out", scenes=["open-fog"], methods=["unshadowed", brighter], effort="quick")
-    assert report.page.is_file()
-    assert report.confirmed
-    assert [entry["method"].rpartition(":")[2] for entry in report.data["scenes"][0]["methods"]] == [
-        "unshadowed",
-        "unshadowed",
-        "unshadowed",
-        "brighter",
-    ]
 
 
 @pytest.mark.slow

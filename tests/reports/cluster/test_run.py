@@ -72,21 +72,6 @@ def test_a_task_that_ends_its_process_is_given_up_and_no_other(cluster):
 
 
 @pytest.mark.slow
-def test_what_died_once_is_done_again(cluster, tmp_path):
-    ended = outcomes(cluster, alone(Task("phoenix", tasks.die_once, (str(tmp_path),))), retries=1)
-    assert (ended["phoenix"].value, ended["phoenix"].attempts) == ("alive", 2)
-
-
-@pytest.mark.slow
-def test_a_truth_that_ends_its_process_takes_its_cells_with_it(cluster):
-    cells = tuple(Task(f"c{n}", tasks.add, (n,)) for n in range(3))
-    ended = outcomes(cluster, Group(cells, Task("truth", tasks.abort)), alone(Task("s", tasks.square, (3,))), retries=0)
-    assert {ended[f"c{n}"].reason for n in range(3)} == {"truth: its process ended 1 times while it ran"}
-    assert ended["truth"].status == ended["c0"].status == "aborted"
-    assert ended["s"].value == 9
-
-
-@pytest.mark.slow
 @pytest.mark.claim("sweeps-end-what-hangs", tolerance="none")
 @pytest.mark.parametrize("hang", [tasks.sleep_for_ever, tasks.hold_the_interpreter], ids=lambda task: task.__name__)
 def test_what_hangs_is_stopped_and_its_process_too(cluster, hang):
@@ -102,13 +87,10 @@ def test_what_hangs_is_stopped_and_its_process_too(cluster, hang):
 
 @pytest.mark.slow
 @pytest.mark.claim("sweeps-lose-nothing", tolerance="none: every task has one outcome, with its value")
-@pytest.mark.parametrize("first", [None, Task("truth", tasks.square, (3, 0.1))], ids=["alone", "of a truth"])
-def test_what_belongs_together_is_done_when_all_workers_are_killed_at_once(cluster, first):
+def test_what_belongs_together_is_done_when_all_workers_are_killed_at_once(cluster):
     """A sweep that was timed in one process waited for ever: Dask kept its tasks for a worker that was gone."""
-    if first is None:
-        group = Group(tuple(Task(f"c{n}", tasks.square, (n, 0.2)) for n in range(20)), together=True)
-    else:
-        group = Group(tuple(Task(f"c{n}", tasks.add, (n * n - 9, 0.2)) for n in range(20)), first, together=True)
+    first = Task("truth", tasks.square, (3, 0.1))
+    group = Group(tuple(Task(f"c{n}", tasks.add, (n * n - 9, 0.2)) for n in range(20)), first, together=True)
 
     def kill():
         for pid in cluster.client.run(os.getpid, on_error="ignore").values():

@@ -23,18 +23,6 @@ def test_names_are_those_of_the_registries():
     assert completion.kernel_names() == list(KERNELS)
 
 
-def test_files_are_completed_by_their_ending(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "own").mkdir()
-    for name in ("own/fog.xml", "own/fog.py", "mine.xml", "mine.exr"):
-        (tmp_path / name).touch()
-    assert completion.scenes("m") == ["mine.xml"]
-    assert completion.scenes("own/") == ["own/fog.xml"]
-    assert completion.scenes_and_images("mi") == ["mine.xml", "mine.exr"]
-    assert completion.methods("own/f") == ["own/fog.py:"]
-    assert completion.scenes("nowhere/x") == []
-
-
 def _completed(line: str, *python: str, **variables: str) -> list[str]:
     """Return what bash is told for a line whose last word is being typed."""
     words = line.split(" ")
@@ -50,15 +38,8 @@ def _completed(line: str, *python: str, **variables: str) -> list[str]:
 
 
 @pytest.mark.claim("completion")
-@pytest.mark.parametrize(
-    ("line", "wanted"),
-    [
-        ("airlight re", ["render", "report", "reference"]),
-        ("airlight report --method shad", ["shadow-planes"]),
-    ],
-)
-def test_bash_is_told_what_fits(line, wanted):
-    assert sorted(_completed(line)) == sorted(wanted)
+def test_bash_is_told_what_fits():
+    assert _completed("airlight report --method shad") == ["shadow-planes"]
 
 
 @pytest.mark.claim("completion")

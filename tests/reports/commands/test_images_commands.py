@@ -7,11 +7,7 @@ import json
 import pytest
 
 import airlight
-from realtime.clouds.canonical.sets import SETS
-from realtime.clouds.canonical.tables import Grid
 from reports.commands import main as cli
-from reports.tables.clouds import clouds_sentence, clouds_table
-from validation.slab.canonical import canonical_record
 
 
 def printed(capfd, *arguments, status=0):
@@ -46,17 +42,6 @@ def test_slab_by_command_and_from_python(capfd):
     assert "<table" in light._repr_html_()
     with pytest.raises(airlight.InputError, match="wavelength"):
         airlight.slab(2.0, 30.0, phase="mie:6:2:0.7")
-
-
-@pytest.mark.slow
-def test_clouds_have_their_record_and_keep_it(variant, own_cache):
-    small = Grid(4, 4, 4, 7, 8)
-    first = canonical_record("hg:0.3", 0.9, grid=small)
-    assert not first["kept"]
-    assert len(clouds_table(first).rows) == len(SETS)
-    again = canonical_record("hg:0.3", 0.9, grid=small)
-    assert (again["kept"], again["seconds"]) == (True, first["seconds"])
-    assert "from the cache" in clouds_sentence(again)
 
 
 def test_maps_print_errors_and_flicker_by_size(variant, capfd):

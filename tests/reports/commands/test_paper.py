@@ -49,19 +49,3 @@ def test_quick_leaves_out_what_needs_images(variant, experiments, capfd):
     printed = json.loads(capfd.readouterr().out)
     assert printed["left_out"] > 100
     assert {row["verdict"] for row in printed["papers"] if row["paper"] == "ali"} == {"impossible"}
-
-
-def test_an_unknown_paper_is_refused_with_the_nearest(capfd):
-    assert cli.run(["paper", "billetter"]) == cli.WRONG_INPUT
-    assert "wanted one of biri, billeter, ali, bouthors; did you mean 'billeter'" in capfd.readouterr().err
-
-
-def test_the_function_gives_the_rows_of_the_command(variant, experiments):
-    import airlight
-
-    found = airlight.paper("biri", quick=True)
-    assert experiments == ["formulas", "stencil"]
-    columns = found.to_dict()
-    assert len(found) == len(columns["verdict"]) > 15
-    assert found.left_out > 10
-    assert "Biri, Arques, Michelin 2006" in found._repr_html_()

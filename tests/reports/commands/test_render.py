@@ -9,18 +9,12 @@ import pytest
 import validation.configurations.timing
 from reference.storage.exr import read_exr
 from reports.commands import main as cli
-from reports.interchange.frames import numbered
 
 SMALL = ["--size", "8x6"]
 
 
 def run(*arguments, status=0):
     assert cli.run(["render", *arguments]) == status
-
-
-def test_numbers_have_four_digits_or_more(tmp_path):
-    assert numbered(tmp_path / "a.b.exr", 7, 100).name == "a.b-0007.exr"
-    assert numbered(tmp_path / "a.exr", 7, 20_000).name == "a-00007.exr"
 
 
 def test_frames_are_numbered_files_that_differ_and_begin_as_the_scene_stands(variant, tmp_path, capfd):

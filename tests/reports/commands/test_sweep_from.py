@@ -7,7 +7,7 @@ import pytest
 
 from reports.commands.main import run
 from reports.sweep.read import FILE
-from tests.helpers.sweeps import METHODS, row, rows, write_rows
+from tests.helpers.sweeps import METHODS, rows, write_rows
 
 
 @pytest.fixture
@@ -29,31 +29,3 @@ def test_json_holds_the_claims_and_is_what_is_written(folder, capsys):
     data = json.loads(capsys.readouterr().out)
     assert len(data["claims"]) == 3 * len(METHODS)
     assert data == json.loads((folder / "said" / "sweep.json").read_text())
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda file: file.unlink(), "is not there"),
-        (lambda file: file.write_bytes(file.read_bytes()[:-100]), "cannot be read as Parquet"),
-        (
-            lambda file: file.write_bytes(file.read_bytes()[:400] + bytes(900) + file.read_bytes()[1300:]),
-            "cannot be read",
-        ),
-        (lambda file: write_rows(file, []), "has no rows"),
-    ],
-    ids=["missing", "cut off", "damaged", "empty"],
-)
-def test_what_is_no_sweep_is_refused_in_one_line(folder, capsys, make, words):
-    make(folder / FILE)
-    assert run(["sweep", "--from", str(folder)]) == 2
-    said = capsys.readouterr()
-    assert words in said.err
-    assert said.err.count("\n") == 1
-    assert {path.name for path in folder.iterdir()} <= {FILE}
-
-
-def test_sweep_of_which_all_was_refused_ends_well(folder, capsys):
-    write_rows(folder / FILE, [row(f"random:{n}", status="refused", reason="too dark") for n in range(12)])
-    assert run(["sweep", "--from", str(folder)]) == 0
-    assert "12 cells" in capsys.readouterr().out

@@ -3,9 +3,9 @@ import copy
 
 import pytest
 
-from reports.data.claims import claims, confirmed, growth_claims, unstudied
+from reports.data.claims import claims, confirmed
 from reports.tables.agreement import verdict
-from tests.helpers.reports import agreement, checked, entry, growth_record, report_of, scene
+from tests.helpers.reports import agreement, checked, entry, report_of, scene
 from tests.helpers.reports import refused as refused_entry
 
 
@@ -51,16 +51,6 @@ def test_claims_on_a_truth_that_is_confirmed():
     assert claims([]) == []
 
 
-def test_each_estimator_that_checked_the_truth_has_a_sentence():
-    data = scenes()
-    data[0]["agreement"]["single-scatter airlight"] = agreed(False, 1e-4, margin=5e-4, estimator="single-scatter")
-    volpath, single, *_ = claims(data)
-    assert "confirmed by Mitsuba's volpath in 3 of 3 comparisons" in volpath["text"]
-    assert "NOT confirmed within 0.05 % by our own Mitsuba integrator in fog (airlight)" in single["text"]
-    assert (volpath["good"], single["good"]) == (True, False)
-    assert not confirmed(data)
-
-
 @pytest.mark.claim("claims-follow")
 def test_claims_on_a_truth_that_is_not_confirmed():
     data = scenes()
@@ -68,15 +58,6 @@ def test_claims_on_a_truth_that_is_not_confirmed():
     trust = texts(data)[0]
     assert "NOT confirmed within 0.5 % by Mitsuba's volpath in hall (surface)" in trust
     assert "fog" not in trust
-
-
-def test_claims_without_any_comparison_confirm_nothing():
-    """A scene that is black has no layer to compare."""
-    data = scenes()
-    for black in data:
-        black["agreement"] = {}
-    trust = texts(data)[0]
-    assert trust.startswith("There is no light to compare with Mitsuba's volpath")
 
 
 def out_of_time(interval):
@@ -115,25 +96,3 @@ def test_what_failed_is_named_with_its_pixels():
     failed = [claim for claim in claims(data) if claim["kind"] == "failed"]
     assert [claim["good"] for claim in failed] == [False] * 3
     assert all(words in claim["text"] for words, claim in zip(("fast in fog (3", "fast in fog (2", "hall (7)"), failed))
-
-
-def test_what_is_wrong_as_published_is_no_failure():
-    data = scenes()
-    peer = method("shadow-planes (exact, order=none)", 0.1, 1.0) | {"parameters": {"order": "none"}}
-    peer["error"] |= {"negative": 5}
-    data[0]["methods"].append(peer)
-    assert [claim["good"] for claim in claims(data) if claim["kind"] == "published"] == [None]
-    assert "failed" not in [claim["kind"] for claim in claims(data)]
-    peer["parameters"] = {}
-    assert "failed" in [claim["kind"] for claim in claims(data)]
-
-
-def test_what_takes_too_long_or_jumps_has_a_claim_of_its_own():
-    data = scenes()
-    data[0]["methods"].append(method("slow", None, 0, refused="a frame would take 8 min") | {"left_out": True})
-    kinds = {claim["kind"]: claim["text"] for claim in claims(data)}
-    assert "refused" not in kinds
-    assert "slow in fog" in kinds["not-measured"]
-    assert [claim["good"] for claim in growth_claims([growth_record()])] == [True]
-    assert [claim["good"] for claim in growth_claims([growth_record(), growth_record(cliff=True)])] == [False]
-    assert [claim["kind"] for claim in unstudied(["fog"], ["fog", "hall"])] == ["not-measured"]

@@ -1,20 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import json
-import re
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
-from reports.data.reader import load_report, redraw_report
+from reports.data.reader import load_report
 from reports.plotting.pictures import write_png
 from tests.helpers.reports import checked, entry, report_of, scene, settings
-
-ROOT = Path(__file__).resolve().parents[3]
 
 
 def small_report():
@@ -39,34 +33,10 @@ def folder(tmp_path):
     return tmp_path / "old"
 
 
-def without_ids(page):
-    """Leave out the names that matplotlib gives to parts of a drawing, by chance."""
-    return re.sub(r"\b[mpc][0-9a-f]{10}\b", "", page)
-
-
 def changed(folder, change):
     data = small_report()
     change(data)
     (folder / "report.json").write_text(json.dumps(data))
-
-
-def test_a_report_is_read_by_its_file_or_its_folder(folder):
-    for path in (folder, folder / "report.json", str(folder)):
-        data, where = load_report(path)
-        assert data == small_report()
-        assert where == folder
-
-
-@pytest.mark.claim("report-drawn-again")
-def test_the_page_is_drawn_again_in_place_and_as_a_whole_elsewhere(folder, tmp_path):
-    data, where = load_report(folder)
-    redraw_report(data, where, folder)
-    page = (folder / "report.html").read_text(encoding="utf-8")
-    assert "It is so." in page
-    new = tmp_path / "new"
-    redraw_report(data, where, new)
-    assert without_ids((new / "report.html").read_text(encoding="utf-8")) == without_ids(page)
-    assert load_report(new)[0] == data
 
 
 @pytest.mark.parametrize(
@@ -111,18 +81,3 @@ def test_files_elsewhere_are_refused(folder, name):
     changed(folder, lambda data: data["scenes"][0]["methods"][0]["files"].update(exr=name))
     with pytest.raises(InputError, match=r"names .*, which is not in its folder"):
         load_report(folder)
-
-
-@pytest.mark.slow
-@pytest.mark.claim("report-drawn-again")
-def test_the_command_needs_no_mitsuba_to_draw_a_page_again(folder):
-    code = (
-        "import sys, airlight\n"
-        "sys.modules['mitsuba'] = sys.modules['drjit'] = None  # an import of them fails\n"
-        f"sys.argv = ['airlight', 'report', '--from', {str(folder / 'report.json')!r}]\n"
-        "airlight.main()\n"
-    )
-    ran = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
-    assert ran.returncode == 0, ran.stderr
-    assert "1 scene, drawn again" in ran.stdout
-    assert (folder / "report.html").is_file()

@@ -5,9 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from reports.data.serialize import measurement_data, truth_data
-from validation.configurations.methods import Configuration
-from validation.frames.benchmark import Measurement
+from reports.data.serialize import truth_data
 from validation.metrics.errors import plain
 
 
@@ -27,16 +25,6 @@ def test_plain_makes_what_json_can_hold():
         "sample": {"number": 0.5, "pair": [3, 0.25]},
         "1": [True, None, "word", None, None, None],
     }
-
-
-def test_refused_measurement_has_every_entry():
-    refused = Measurement(Configuration("unshadowed", "taylor"), None, None, None, None, refused="no series")
-    data = measurement_data(refused)
-    assert (data["label"], data["refused"]) == ("unshadowed (taylor)", "no series")
-    assert data["times"] is data["error"] is data["surface_error"] is None
-    assert data["files"] == {}
-    assert data["knows_shadows"] is False
-    json.dumps(data, allow_nan=False)
 
 
 @pytest.mark.parametrize("airlight", [np.zeros((2, 3, 3)), np.full((2, 3, 3), np.inf)])

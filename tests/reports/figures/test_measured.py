@@ -41,44 +41,15 @@ def test_kernel_errors_over_depth_and_angle(variant, tmp_path):
 
 
 @pytest.mark.slow
-def test_errors_by_cause_are_shown_for_each_method(variant, tmp_path):
-    figure_decomposition.compute(tmp_path, quick=True)
-    rows = rows_of(tmp_path / "decomposition.csv")
-    for method, _ in figure_decomposition.METHODS:
-        shares = [float(row["share"]) for row in rows if row["label"].startswith(method) and row["cause"] != "whole"]
-        assert sum(shares) == pytest.approx(1, abs=1e-6)
-    assert drawn(figure_decomposition, tmp_path) == drawn(figure_decomposition, tmp_path)
-
-
-@pytest.mark.slow
-def test_map_sizes_have_the_fitted_slope(variant, tmp_path):
-    figure_map_size.compute(tmp_path, quick=True, sizes=(32, 64, 128))
-    rows = rows_of(tmp_path / "map-size.csv")
-    assert len(rows) == 3 * len(figure_map_size.METHODS)
-    # Order 1 but for what grazes a shadow, 3/2 where walls stand between samples, see validation.frames.map_size;
-    # three sizes scatter by 0.3.
-    for row in rows:
-        wanted = 1.5 if row["method"] == "light-volumes" else 1.0
-        assert wanted - 0.4 < float(row["order"]) < wanted + 0.3
-    assert drawn(figure_map_size, tmp_path) == drawn(figure_map_size, tmp_path)
-
-
-@pytest.mark.slow
-def test_kernel_speed_has_times_and_errors(variant, tmp_path):
-    figure_kernel_speed.compute(tmp_path, quick=True, names=["quadrature-4", "quadrature-16"])
-    few, many = rows_of(tmp_path / "kernel-speed.csv")
-    assert float(few["p99"]) > 10 * float(many["p99"])
-    assert 0 < float(many["ns_low"]) <= float(many["ns"]) <= float(many["ns_high"])
-    assert drawn(figure_kernel_speed, tmp_path) == drawn(figure_kernel_speed, tmp_path)
-
-
-@pytest.mark.slow
-def test_estimators_converge_with_the_root_of_their_samples(variant, tmp_path):
-    figure_convergence.compute(tmp_path, quick=True)
-    for row in rows_of(tmp_path / "convergence.csv"):
-        # 16 batches give the order 1/2 within some 0.2.
-        assert abs(float(row["measured"]) - 0.5) < 0.25, row
-    assert drawn(figure_convergence, tmp_path) == drawn(figure_convergence, tmp_path)
+@pytest.mark.parametrize(
+    "module",
+    [figure_decomposition, figure_map_size, figure_kernel_speed, figure_convergence],
+    ids=lambda module: module.NAME,
+)
+def test_a_figure_is_measured_and_drawn_twice_to_the_same_bytes(variant, tmp_path, module):
+    module.compute(tmp_path, quick=True)
+    assert rows_of(tmp_path / f"{module.NAME}.csv")
+    assert drawn(module, tmp_path) == drawn(module, tmp_path)
 
 
 @pytest.mark.statistical

@@ -6,7 +6,7 @@ import pytest
 
 from reference.storage.exr import layer, read_exr
 from reports.figures import paper_images
-from reports.figures.files import plot, read_data
+from reports.figures.files import read_data
 
 pytestmark = pytest.mark.slow
 
@@ -37,11 +37,3 @@ def test_quads_are_small_at_edges_and_as_many_by_both_filters(folder):
     assert ours.min() == plain.min() == 1
     assert ours.max() >= 8
     assert not np.array_equal(ours, plain)
-
-
-def test_the_figure_is_drawn_again_to_the_same_bytes(folder):
-    drawn = []
-    for _ in range(2):
-        plot(paper_images, folder, column="single")
-        drawn.append((folder / "paper-images.png").read_bytes())
-    assert drawn[0] == drawn[1]

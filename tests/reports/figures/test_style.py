@@ -8,7 +8,6 @@ from reports.plotting.style import (
     COLOURS,
     LEAST_DIFFERENCE,
     method_style,
-    report_styles,
 )
 
 _SIGHTS = ("normal", "Protanomaly", "Deuteranomaly", "Tritanomaly")
@@ -47,17 +46,3 @@ def test_one_colour_and_one_marker_for_each_method():
     own = method_style("my_module:fog")
     assert own == method_style("my_module:fog")
     assert own["color"] not in {look["color"] for look in looks}
-
-
-def test_a_report_has_a_style_for_each_label_in_every_scene():
-    def methods(*pairs):
-        return {"methods": [{"method": method, "label": label} for method, label in pairs]}
-
-    scenes = [
-        methods(("ray-march", "ray-march (steps=16)"), ("a:f", "a:f"), ("b:f", "b:f")),
-        methods(("ray-march", "ray-march (steps=100)"), ("ray-march", "ray-march (steps=16)")),
-    ]
-    styles = report_styles(scenes)
-    assert styles["ray-march (steps=16)"] == method_style("ray-march", 0)
-    assert styles["ray-march (steps=100)"] == method_style("ray-march", 1)
-    assert styles["a:f"]["color"] != styles["b:f"]["color"]

@@ -59,15 +59,3 @@ def test_media_have_coefficients_and_the_sign_of_g(variant):
     three = describe_scene(load_scene("three-media", (8, 6)))["properties"]["Cycles"]
     assert three["world"] is None
     assert len(three["media"]) == 3
-
-
-def test_settings_ask_for_one_scattering_linear_values_and_means_over_pixels(variant):
-    described, cycles = properties()
-    settings = cycles["scene"]
-    assert settings["cycles.max_bounces"] == settings["cycles.sample_clamp_direct"] == 0
-    assert settings["cycles.pixel_filter_type"] == "BOX"
-    assert (settings["view_settings.view_transform"], settings["view_settings.gamma"]) == ("Raw", 1.0)
-    assert [settings[f"render.resolution_{axis}"] for axis in "xy"] == described["camera"]["size"]
-    lines = " ".join(described["recipes"]["Cycles"])
-    for words in ("Sensor Fit Auto", "Clip Start 1e-6 m", "View Transform Raw", "Anisotropy is g", "right-handed"):
-        assert words in lines

@@ -5,11 +5,10 @@ import struct
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
 from reports.interchange.gltf import write_gltf
 from reports.interchange.meshes import SIDES, shape_mesh
 from tests.helpers.area_lights import lamp
-from tests.helpers.scenes import bounded_medium, spot, tiny_scene
+from tests.helpers.scenes import spot, tiny_scene
 from validation.scenes.loading import LoadedScene, load_scene
 
 
@@ -139,52 +138,19 @@ def test_lights_are_those_of_the_scene(variant, tmp_path):
     assert np.linalg.det(matrix[:3, :3]) > 0
 
 
-def test_every_number_in_the_file_is_in_its_bounds(variant, tmp_path):
-    bubble = bounded_medium({"type": "sphere", "center": [2.0, 0.3, 1.1], "radius": 0.3}, 0.5, (0.5, 0.5, 0.5))
-    scene = loaded(bubble=bubble | {"exterior": {"type": "ref", "id": "fog"}})
-    write_gltf(tmp_path / "tiny.glb", scene)
-    document, binary = parts(tmp_path / "tiny.glb")
-    assert document["buffers"] == [{"byteLength": len(binary)}]
-    for view in document["bufferViews"]:
-        assert view["byteOffset"] % 4 == 0
-        assert view["byteOffset"] + view["byteLength"] <= len(binary)
-    for vertices, normals, faces in arrays(document, binary):
-        assert faces.max() == len(vertices) - 1
-        corners = vertices[faces].astype(np.float64)
-        area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        assert (np.linalg.norm(area, axis=1) > 0).all()
-        if normals is not None:
-            np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, rtol=1e-6)
-            assert (np.sum(normals[faces].mean(axis=1) * area, axis=1) > 0).all()
-    for node in document["nodes"]:
-        assert node.get("mesh", 0) < len(document["meshes"])
-    for mesh in document["meshes"]:
-        assert mesh["primitives"][0]["material"] < len(document["materials"])
-    names = [mesh["name"] for mesh in document["meshes"]]
-    material = document["materials"][document["meshes"][names.index("bubble")]["primitives"][0]["material"]]
-    assert material["alphaMode"] == "BLEND"
-    assert material["extras"]["medium"]["sigma_t"] == [0.5, 0.5, 0.5]
-    ball = document["materials"][document["meshes"][names.index("ball")]["primitives"][0]["material"]]
-    assert ball["pbrMetallicRoughness"]["baseColorFactor"] == [0.6, 0.5, 0.3, 1.0]
-    assert (ball["doubleSided"], ball["extensions"]["KHR_materials_specular"]["specularFactor"]) == (False, 0)
-
-
 @pytest.mark.claim("gltf", tolerance="the sagitta of 128 sides")
-@pytest.mark.parametrize("transform", ["plain", pytest.param("turned", marks=pytest.mark.slow), "mirrored"])
+@pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize(
     ("kind", "flipped"),
     # Mitsuba's cube cannot be turned inside out.
     [("cube", False), *((kind, way) for kind in ("sphere", "disk", "cylinder", "rectangle") for way in (False, True))],
 )
-def test_shapes_become_meshes_that_lie_on_them(variant, kind, transform, flipped):
+def test_shapes_become_meshes_that_lie_on_them(variant, kind, mirrored, flipped):
     """Rays of Mitsuba meet shape and mesh at the same place, with normals on the same side."""
     import mitsuba as mi
 
-    place = mi.ScalarTransform4f()
-    if transform != "plain":
-        place = place.translate([0.3, 0.2, -0.1]).rotate([0.6, 0, 0.8], 40).scale(0.7)
-    if transform == "mirrored":
-        place = place.scale([1, 1, -1])
+    place = mi.ScalarTransform4f().translate([0.3, 0.2, -0.1]).rotate([0.6, 0, 0.8], 40).scale(0.7)
+    place = place.scale([1, 1, -1 if mirrored else 1])
     entry = {"type": kind, "to_world": place} | ({"flip_normals": True} if flipped else {})
     shape = mi.load_dict(entry)
     mesh = shape_mesh(shape)
@@ -220,61 +186,16 @@ def test_shapes_become_meshes_that_lie_on_them(variant, kind, transform, flipped
         assert (np.sum(mesh.normals[mesh.faces].mean(axis=1) * area, axis=1) > 0).all()
 
 
-def test_shapes_that_cannot_be_meshes_are_refused_by_name(variant, tmp_path):
-    import mitsuba as mi
-
-    curve = tmp_path / "curve.txt"
-    curve.write_text("\n".join(f"{k} 0 1 0.1" for k in range(5)))
-    shape = mi.load_dict({"type": "scene", "hair": {"type": "bsplinecurve", "filename": str(curve)}}).shapes()[0]
-    with pytest.raises(InputError, match=r"shape 'hair' is a BSplineCurve; wanted meshes"):
-        shape_mesh(shape)
-
-
-def test_a_mesh_without_triangles_is_left_out(variant, tmp_path, monkeypatch):
-    """glTF has no empty lists. Mitsuba drops such shapes of most files; what is left of one must not end the export."""
-    from dataclasses import replace
-
-    import reports.interchange.gltf
-
-    real = reports.interchange.gltf.shape_mesh
-
-    def emptied(shape):
-        mesh = real(shape)
-        empty = np.empty((0, 3))
-        return mesh if mesh.name != "ball" else replace(mesh, vertices=empty, faces=empty.astype(int), normals=None)
-
-    monkeypatch.setattr(reports.interchange.gltf, "shape_mesh", emptied)
-    write_gltf(tmp_path / "tiny.glb", loaded())
-    document, binary = parts(tmp_path / "tiny.glb")
-    assert [mesh["name"] for mesh in document["meshes"]] == ["floor"]
-    assert [node["mesh"] for node in document["nodes"] if "mesh" in node] == [0]
-    assert len(arrays(document, binary)) == 1
-
-
-def test_a_light_at_infinity_is_directional_in_watts_a_square_metre(variant, tmp_path):
-    write_gltf(tmp_path / "windows.glb", load_scene("windows", (8, 6)))
-    document, _ = parts(tmp_path / "windows.glb")
-    (light,) = document["extensions"]["KHR_lights_punctual"]["lights"]
-    assert light["type"] == "directional"
-    np.testing.assert_allclose(light["intensity"] * np.array(light["color"]), [33.1, 28.7, 22.3], rtol=1e-12)
-    assert light["extras"]["irradiance_w_per_m2"] == [33.1, 28.7, 22.3]
-    (node,) = [node for node in document["nodes"] if "KHR_lights_punctual" in node.get("extensions", {})]
-    matrix = np.array(node["matrix"]).reshape(4, 4).T
-    x, y, z = np.array([0.737, -0.271, -0.419]) / np.linalg.norm([0.737, -0.271, -0.419])
-    # It shines along its own -z; y of glTF is the scene's z.
-    np.testing.assert_allclose(-matrix[:3, 2], [x, z, -y], atol=1e-6)
-
-
 @pytest.mark.claim("gltf-area-lights", tolerance="1e-6: float32")
 @pytest.mark.parametrize(
     ("kind", "flipped"),
-    [("rectangle", True), ("disk", False), ("sphere", False)],
+    [("rectangle", True), ("sphere", False)],
 )
 def test_a_light_with_extent_is_a_mesh_that_emits_from_the_side_of_its_normal(variant, tmp_path, kind, flipped):
     """Rationale: core glTF has no such light; faces run counter-clockwise seen from where it shines."""
     import mitsuba as mi
 
-    scale = {"rectangle": [0.5, 0.3, 1.0], "disk": [0.4] * 3, "sphere": [0.3] * 3}[kind]
+    scale = {"rectangle": [0.5, 0.3, 1.0], "sphere": [0.3] * 3}[kind]
     transform = mi.ScalarTransform4f().look_at([0.9, 0.7, 1.9], [0.1, -0.5, 0.4], [0, 0, 1]).scale(scale)
     light = lamp(kind, radiance=(5.0, 4.0, 2.5), to_world=transform, flip_normals=flipped)
     write_gltf(tmp_path / "tiny.glb", loaded(lamp=light))
@@ -292,7 +213,7 @@ def test_a_light_with_extent_is_a_mesh_that_emits_from_the_side_of_its_normal(va
     vertices, _, faces = arrays(document, binary)[number]
     corners = vertices[faces.reshape(-1, 3)].astype(np.float64)
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    # The disk and the sphere are of 128 sides.
+    # The sphere is of 128 sides.
     assert 0.5 * np.linalg.norm(across, axis=1).sum() == pytest.approx(material["extras"]["light"]["area"], rel=2e-3)
     turn = np.array(document["scenes"][0]["extras"]["scene_to_gltf"])
     if kind == "sphere":

@@ -2,24 +2,19 @@
 """Which libLLVM, which variant, and what is said where something is missing."""
 
 import os
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from analytic.errors import InputError
 from reports.machine import environment, gpu, llvm
 from reports.machine.environment import (
     MissingError,
-    describe_environment,
     missing_packages,
     prepare,
-    versions,
 )
 from reports.machine.llvm import examine_llvm, find_llvm
 
-ROOT = Path(__file__).resolve().parents[3]
 HEADER = Path(sys.executable).read_bytes()[:64]  # of a binary that suits this machine
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="looks at ELF files and Linux' library names")
@@ -110,51 +105,6 @@ class TestPrepare:
         monkeypatch.setattr(environment, "cuda_problem", lambda: "")
         assert prepare() == environment.Prepared("cuda_ad_rgb", None)
 
-    @pytest.mark.claim("variant")
-    def test_unknown_variant_names_the_nearest(self, only, monkeypatch):
-        with pytest.raises(InputError, match=r"'llvm_rgb'.*did you mean llvm_ad_rgb"):
-            prepare("llvm_rgb")
-        monkeypatch.setenv("AIRLIGHT_VARIANT", "scalar_rgb")
-        with pytest.raises(InputError, match="scalar_rgb"):
-            prepare()
-
-    def test_without_fma(self, only, monkeypatch):
-        monkeypatch.setattr(environment, "_cpuinfo", lambda key: "fpu sse2")
-        monkeypatch.setattr(environment.os, "uname", lambda: os.uname_result(("Linux", "x", "6", "1", "x86_64")))
-        _library(only, "libLLVM.so.19.1")
-        with pytest.raises(MissingError, match="FMA"):
-            prepare()
-
-
-@linux
-@pytest.mark.slow
-def test_a_machine_with_llvm_14_alone_gets_a_message_and_no_abort(tmp_path):
-    _library(tmp_path / "lib", "libLLVM-14.so.1")
-    code = (
-        "import sys, pathlib, reports.machine.llvm, reports.machine.environment\n"
-        f"reports.machine.llvm.llvm_folders = lambda: [pathlib.Path({str(tmp_path / 'lib')!r})]\n"
-        "reports.machine.environment.cuda_problem = lambda: 'no GPU'\n"
-        "import airlight\n"
-        "sys.argv = ['airlight', 'render', 'open-fog', '--size', '8x6']\n"
-        "airlight.main()\n"
-    )
-    variables = {key: value for key, value in os.environ.items() if key != "DRJIT_LIBLLVM_PATH"}
-    variables |= {"PYTHONPATH": str(ROOT)}
-    ran = subprocess.run([sys.executable, "-c", code], env=variables, capture_output=True, text=True, timeout=120)
-    assert (ran.returncode, ran.stdout, ran.stderr.count("\n")) == (3, "", 1)
-    assert ran.stderr.startswith("airlight: error: the newest libLLVM here")
-    assert "17 or newer is needed" in ran.stderr
-
-
-def test_drjit_loads_the_library_that_was_chosen(variant):
-    if variant != "llvm_ad_rgb" or not Path("/proc/self/maps").exists():
-        pytest.skip("needs the LLVM backend and a system that tells what a process has loaded")
-    from reports.machine.doctor import try_kernel
-
-    kernel = try_kernel(variant)
-    assert os.path.realpath(kernel["library"]) == os.path.realpath(os.environ["DRJIT_LIBLLVM_PATH"])
-    assert kernel["threads"] >= 1
-
 
 class _Driver:
     """A CUDA driver that answers as a test wants."""
@@ -200,24 +150,3 @@ def test_cuda_by_what_the_driver_says(driver, works, word, monkeypatch):
     status = gpu.cuda_status()
     assert status.works == works
     assert word in status.reason
-
-
-def test_optix_needs_its_library_and_a_driver_that_is_not_refused(monkeypatch):
-    libraries = {"libcuda.so.1": _Driver(version=12070)}
-    monkeypatch.setattr(gpu, "_load", lambda name, variable: libraries.get(name))
-    assert "565" in gpu.optix_status().reason
-    libraries["libcuda.so.1"] = _Driver()
-    assert "libnvoptix.so.1 cannot be loaded" in gpu.optix_status().reason
-    libraries["libnvoptix.so.1"] = type("OptiX", (), {"optixQueryFunctionTable": None})()
-    assert gpu.optix_status().works
-
-
-def test_versions_and_description_are_json_ready(variant):
-    import json
-
-    installed = versions()
-    assert installed["mitsuba"].startswith("3.9.")
-    assert "missing" not in installed.values()
-    described = json.loads(json.dumps(describe_environment()))
-    assert described["versions"] == installed
-    assert described["variant"] == variant

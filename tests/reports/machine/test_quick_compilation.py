@@ -9,9 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from analytic.errors import InputError
 from reports.machine.environment import prepare
-from reports.machine.quick_compilation import CACHE_VARIABLE, VARIABLE, is_asked_for
+from reports.machine.quick_compilation import CACHE_VARIABLE, VARIABLE
 
 RENDER = """
 import contextlib, hashlib, os, sys
@@ -26,13 +25,6 @@ with in_full() if sys.argv[1:] == ["in-full"] else contextlib.nullcontext():
         image = np.asarray(airlight.render(scene, method=method).airlight)
         print(hashlib.sha256(image.tobytes()).hexdigest())
 os.write(2, b"one line\\n")
-"""
-ABORT = """
-import os
-from reports.machine.environment import prepare
-prepare("llvm_ad_rgb")
-os.write(2, b"last words\\n")
-os.abort()
 """
 
 
@@ -80,19 +72,6 @@ def test_images_are_the_same_bit_for_bit_and_the_kernels_are_not(rendered):
 @pytest.mark.slow
 def test_llvm_says_nothing_and_others_do(rendered):
     assert {result.stderr for result, _ in rendered.values()} == {"one line\n"}
-
-
-@pytest.mark.slow
-def test_what_is_said_before_an_abort_is_passed_on(variant, tmp_path):
-    result = run(ABORT, tmp_path, quick=True)
-    assert result.returncode < 0
-    assert result.stderr == "last words\n"
-
-
-def test_another_word_is_refused(monkeypatch):
-    monkeypatch.setenv(VARIABLE, "fast")
-    with pytest.raises(InputError, match="AIRLIGHT_COMPILATION: got 'fast', wanted quick"):
-        is_asked_for()
 
 
 def test_a_process_that_has_imported_dr_jit_stays_as_it_is(variant, monkeypatch):

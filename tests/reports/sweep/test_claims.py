@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from reports.sweep.claims import best_claims, claim, percent
+from reports.sweep.claims import claim
 from reports.sweep.correlations import correlations, sentence, sentences, strongest, sure
 from reports.sweep.faults import checks, faults, reasons
 from reports.sweep.read import FILE, read_sweep
@@ -26,17 +26,6 @@ def test_share_of_the_scenes_and_its_interval(sweep_of):
     assert (made.tries, made.within, made.undecided, made.share) == (1000, 992, 0, 0.992)
     assert (made.low, made.high) == binomial_interval(992, 1000)
     assert made.text == "ray-march: within 1e-3 in 99.2 % of 1000 scenes, 98.4 to 99.7 %."
-
-
-def test_best_claim_is_the_one_that_promises_most(sweep_of):
-    """A method that was right in all of three scenes does not stand above one that was right in 99 of a hundred."""
-    several = [row(f"random:{n}", relative_rmse=1e-4 if n else 1.0) for n in range(100)]
-    several += [row(f"random:{n}", method="min-max", relative_rmse=1e-4) for n in range(3)]
-    made = [claim(sample, 1e-3) for sample in samples(sweep_of(several))]
-    (best,) = best_claims(made, 1e-3)
-    assert (best.name, best.within) == ("ray-march", 99)
-    assert best_claims([best, best], 1e-3) == [best, best]  # equals are not told apart by their names
-    assert best_claims([], 1e-3) == best_claims(made, 1e-5) == []
 
 
 @pytest.mark.claim("sweep-scenes-are-the-sample")
@@ -88,14 +77,6 @@ def test_what_the_truth_cannot_tell_widens_the_interval_on_one_side(sweep_of):
     assert made.low == binomial_interval(10, 13)[0]
     assert made.high == binomial_interval(12, 13)[1]
     assert made.text.endswith("the truth is not exact enough to tell in 2 scenes.")
-
-
-@pytest.mark.parametrize(
-    ("share", "trials", "text"),
-    [(0.992, 1000, "99.2"), (0.9999, 1000, "99.9"), (1.0, 1000, "100.0"), (0.0001, 100, "1"), (0.5, 1, "50")],
-)
-def test_a_share_is_not_rounded_to_all_or_none(share, trials, text):
-    assert percent(share, trials) == text
 
 
 @pytest.mark.claim("sweep-properties")

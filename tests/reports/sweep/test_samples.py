@@ -69,7 +69,6 @@ def test_cells_that_were_computed_again_count_once(sweep_of):
     ("make", "words"),
     [
         (lambda path: None, "is not there; wanted the folder of a sweep"),
-        (lambda path: path.write_bytes(b"PAR1 and no more"), "cannot be read as Parquet"),
         (lambda path: path.write_bytes(b""), "cannot be read as Parquet"),
         (lambda path: pq.write_table(pa.table({"a": [1]}), path), "has no column 'key'"),
         (lambda path: write_rows(path, []), "has no rows"),
@@ -104,34 +103,12 @@ def test_media_of_a_scene_are_one_sample_and_the_worst_stands_for_it(sweep_of):
     assert list(sample.nonfinite) == [4, 0]  # also where it is not the worst cell that has them
 
 
-def test_fault_stands_for_a_scene_and_a_refusal_only_where_nothing_was_measured(sweep_of):
-    sweep = sweep_of(
-        [
-            row(),
-            row(medium="m", status="hung", reason="x"),
-            row("random:1", status="refused", reason="x"),
-            row("random:1", medium="m", relative_rmse=0.5),
-            row("random:2", status="refused", reason="x"),
-        ]
-    )
-    (sample,) = samples(sweep)
-    assert sample.statuses == ("hung", "done", "refused")
-    assert list(sample.measured) == [False, True, False]
-    np.testing.assert_array_equal(sample.errors, [np.nan, 0.5, np.nan])
-
-
 @pytest.mark.claim("sweep-scenes-are-the-sample")
 def test_named_scenes_are_no_sample_where_scenes_were_drawn(sweep_of):
     (drawn,) = samples(sweep_of([row(), row("hall"), row("random:7")]))
     assert drawn.scenes == ("random:0", "random:7")
     (named,) = samples(sweep_of([row("hall"), row("clutter")]))
     assert named.scenes == ("clutter", "hall")
-
-
-def test_sizes_of_an_image_are_configurations(sweep_of):
-    made = samples(sweep_of([row(), row(width=320, height=240), row("random:1", method="min-max")]))
-    wanted = ["min-max", "ray-march at 160 x 120", "ray-march at 320 x 240"]
-    assert [sample.label for sample in made] == [sample.name for sample in made] == wanted
 
 
 @pytest.mark.claim("sweep-times-alone")

@@ -6,7 +6,7 @@ import re
 import pytest
 
 from reports.tables.drawing import csv, html, latex, markdown, text
-from reports.tables.methods import COLUMNS, TIMES, fastest_table, fastest_within, method_row, methods_table
+from reports.tables.methods import COLUMNS, TIMES, fastest_table, methods_table
 
 MEDIANS = {name: 2.0 + place for place, name in enumerate(TIMES)}  # no two alike
 
@@ -38,24 +38,6 @@ def test_each_time_stands_under_its_own_heading(name):
     assert rf"$\num{{{MEDIANS[name]:.2f}}}" in latex([table]).splitlines()[-3].split(" & ")[place]
     keys, values = (line.split(",") for line in csv(table).splitlines())
     assert dict(zip(keys, values))[name] == median
-
-
-def test_a_method_is_marked_by_what_it_is():
-    assert method_row(entry(knows_shadows=False)).remarks == ()
-    assert method_row(entry(knows_shadows=False, note="slow"), shadows=True).remarks == ("no shadows", "slow")
-    image = method_row(entry(kind="image", layer="total", times=None, knows_shadows=False), shadows=True)
-    assert (image.remarks, image.values["frame"]) == (("image, total",), None)
-    refused = method_row(entry(refused="no map", left_out=True))
-    assert (refused.reason, refused.values) == ("left out: no map", {"label": "a"})
-
-
-def test_the_fastest_is_within_the_error_and_finite():
-    slow, fast = entry("slow", frame=9.0), entry("fast", frame=1.0, rmse=0.2)
-    broken, unknown = entry("broken", frame=0.1, nonfinite=1), entry("unknown", frame=0.1, rmse=None)
-    everything = [slow, fast, broken, unknown, entry("untimed", times=None), entry("refused", error=None)]
-    assert fastest_within(0.01, everything) is slow
-    assert fastest_within(0.5, everything) is fast
-    assert fastest_within(1e-6, everything) is None
 
 
 def fastest_of(*methods):

@@ -7,10 +7,8 @@ import typer
 from reports.commands.stability import stability
 from reports.tables.agreement import verdict
 from reports.tables.kernels import kernel_tables
-from reports.tables.peers import published_as
 from reports.tables.scaling import cliffs, grown, scaling_tables
-from tests.helpers.reports import agreement, entry, growth_record
-from validation.configurations.methods import STANDARD
+from tests.helpers.reports import agreement, growth_record
 from validation.kernels.benchmark import KernelBench, KernelCost, Spread, speed_against_error
 from validation.metrics.errors import plain
 
@@ -40,19 +38,6 @@ def test_jumps_and_higher_powers_than_before_are_found():
     costs, exponents = scaling_tables([growth_record(works=(), refused="method x: no")])
     assert costs.rows[0].reason == "refused: method x: no"
     assert exponents.rows == ()
-
-
-def test_what_is_wrong_as_published_is_named_and_nothing_else():
-    peers = [c.label for c in STANDARD if published_as({"kernel": c.kernel, "parameters": dict(c.parameters)})]
-    assert peers == [
-        "unshadowed (taylor)",
-        "shadow-planes (taylor)",
-        "shadow-planes (exact, order=paper)",
-        "shadow-planes (exact, order=none)",
-        "shadow-planes (exact, media=paper)",
-        "light-volumes (taylor)",
-    ]
-    assert published_as(entry("m", kernel="exact", parameters={"steps": 100, "order": "exact"})) == ""
 
 
 def test_the_cheapest_kernel_is_that_within_the_error():

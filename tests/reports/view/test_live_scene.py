@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from realtime.errors import InputError as MethodError
 from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
 from reports.interchange.frames import STAGES
@@ -50,12 +49,6 @@ def recordings(scene):
         ("sphere-spot", "shadow-planes", (CAMERA, LIGHT, MEDIUM)),
         pytest.param("colonnade", "light-volumes", (FAR, LAMP), marks=pytest.mark.slow),
         ("sphere-spot", "ray-march", ({"medium.g": (0.3,)}, LIGHT | {"medium.g": (0.0,)})),
-        pytest.param(
-            "windows",
-            "ray-march",
-            ({"light.direction": (0.6, -0.4, -0.7)}, {"medium.sigma_t": (0.3,)}),
-            marks=pytest.mark.slow,
-        ),
     ],
 )
 def test_after_each_change_the_frame_is_that_of_a_scene_made_anew(name, method, moves):
@@ -110,26 +103,6 @@ def test_a_parameter_records_the_methods_stages_and_not_the_surface():
     assert recordings(scene) == before
 
 
-@pytest.mark.slow
-def test_another_method_takes_over_the_cast_rays():
-    scene = live()
-    shown(scene)
-    scene.change(CAMERA)
-    for method in ("light-volumes", "unshadowed", "min-max", "froxel-fog", "shadow-planes"):
-        scene.choose(configuration(method))
-        for layer, fresh in zip(shown(scene), anew(scene), strict=True):
-            np.testing.assert_array_equal(layer, fresh)
-
-
-@pytest.mark.slow
-def test_a_medium_that_turns_coloured_or_empty_has_another_renderer():
-    scene = live("three-media", "ray-march", steps=4)
-    shown(scene)
-    scene.change({"medium.sigma_t": (0.0,)})
-    for layer, fresh in zip(shown(scene), anew(scene), strict=True):
-        np.testing.assert_array_equal(layer, fresh)
-
-
 def test_a_change_that_cannot_be_leaves_all_as_it_was():
     scene = live()
     scene.change(LIGHT)
@@ -140,29 +113,3 @@ def test_a_change_that_cannot_be_leaves_all_as_it_was():
     assert scene.changes == LIGHT
     for layer, same in zip(shown(scene), before, strict=True):
         np.testing.assert_array_equal(layer, same)
-
-
-@pytest.mark.slow
-def test_a_camera_that_enters_a_medium_is_refused_and_stays():
-    scene = live("three-media", "ray-march", steps=4)
-    before = shown(scene)
-    middle = np.array(scene.scene.medium.bounded_media[0].centre).ravel()
-    with pytest.raises((InputError, MethodError), match="the camera is inside of shape"):
-        scene.change({"camera.origin": tuple(middle), "camera.target": tuple(middle + 1)})
-    assert scene.changes == {}
-    for layer, same in zip(shown(scene), before, strict=True):
-        np.testing.assert_array_equal(layer, same)
-
-
-def test_stages_are_timed_and_make_the_same_frame():
-    scene = live()
-    plain = shown(scene)
-    timed = scene.frame(by_stage=True)
-    assert set(timed.stages_ms) == {"shade", "render"}  # what was prepared, cast and sorted is kept
-    scene.change(CAMERA)
-    timed = scene.frame(by_stage=True)
-    assert set(timed.stages_ms) >= {"prepare", "surface", "cull", "render"}
-    assert all(milliseconds >= 0 for milliseconds in timed.stages_ms.values())
-    scene.reset()
-    scene.frame()
-    np.testing.assert_array_equal(scene.on_host(scene.frame(by_stage=True)).airlight, plain[0])

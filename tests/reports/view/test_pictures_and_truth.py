@@ -9,20 +9,10 @@ import pytest
 from reports.plotting.colour_maps import NOT_FINITE
 from reports.plotting.pictures import tone_mapped
 from reports.view.picture import LAYERS, Pictures
-from reports.view.truth_order import STEPS, KnownTruth, pixel_order, view_error
+from reports.view.truth_order import KnownTruth, view_error
 from validation.metrics.errors import error_metrics
 
 WIDTH, HEIGHT = 50, 37
-
-
-def test_every_pixel_comes_once_and_coarse_grids_first():
-    order = pixel_order(WIDTH, HEIGHT)
-    assert sorted(order) == list(range(WIDTH * HEIGHT))
-    row, column = np.divmod(order, WIDTH)
-    for step in STEPS:
-        count = len(range(0, WIDTH, step)) * len(range(0, HEIGHT, step))
-        assert ((row[:count] % step == 0) & (column[:count] % step == 0)).all()
-    assert order[1] != order[0] + STEPS[0]  # at random within a grid
 
 
 @pytest.mark.claim("view-error", tolerance="none for all pixels; 190 of 200 intervals of 95 % for a part, less 4 sigma")
