@@ -18,7 +18,6 @@ from reports.page.image_cache import page_images
 from reports.page.image_index import SceneImages
 from reports.page.tables import TABLES, trust_words
 from reports.plotting.colour_maps import signed_colours, unsigned_colours
-from reports.tables.methods import fastest_within
 
 if TYPE_CHECKING:
     import jinja2
@@ -128,18 +127,15 @@ def _lead(scenes: Sequence[Mapping[str, Any]], shown: Sequence[int]) -> int | No
     return max(shown, key=lambda place: scenes[place]["truth"]["transitions"] or 0, default=None)
 
 
-def _first_shown(methods: Sequence[Mapping[str, Any]], target: float = 0.01) -> int:
-    """Return the place of the fastest method within the target, as the claims name it, or else of the most accurate."""
-    best = fastest_within(target, methods)
-    if best is not None:
-        return next(place for place, entry in enumerate(methods) if entry is best)
+def _first_shown(methods: Sequence[Mapping[str, Any]]) -> int:
+    """Return the place of the method of median error: the error map of an exact method is white."""
 
     def error(place: int) -> float:
-        measured = methods[place]["error"] or {}
-        rmse = measured.get("relative_rmse")
-        return float("inf") if rmse is None or measured.get("nonfinite") else rmse
+        rmse = (methods[place]["error"] or {}).get("relative_rmse")
+        return float("inf") if rmse is None else rmse
 
-    return min(range(len(methods)), key=error)
+    ranked = sorted((place for place in range(len(methods)) if error(place) < float("inf")), key=error)
+    return ranked[len(ranked) // 2] if ranked else 0
 
 
 def _maps() -> dict[str, str]:
