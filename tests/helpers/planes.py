@@ -101,11 +101,10 @@ def lit_lengths(index, ways, end, *, weight=lambda x: x):
 
 
 def drawn_lists(index, ways, end, *, order="exact"):
-    """Return the lists of the tiles of sixteen rays each, and their boxes."""
+    """Return the lists of the tiles of sixteen rays each."""
     import drjit as dr
     import mitsuba as mi
 
-    from realtime.methods.shadow_planes.tile_boxes import tile_boxes
     from realtime.methods.shadow_planes.tile_lists import tile_lists
 
     Float = type(index.distance)
@@ -115,13 +114,12 @@ def drawn_lists(index, ways, end, *, order="exact"):
         return tuple(dr.gather(Float, part, mi.UInt32(lane)) for part in parts)
 
     distance = Float(np.asarray(end, dtype=np.float64))
-    lists = tile_lists(index, rays, distance, order=order, square=False)
-    return lists, tile_boxes(index, rays, distance, square=False)
+    return tile_lists(index, rays, distance, order=order, square=False)
 
 
 def listed_planes(lists):
-    """Return by tile the numbers of the planes that count, in order, and whether each is marked as full."""
-    from realtime.methods.shadow_planes.plane_entries import FIRST, FULL, NUMBER
+    """Return by tile the numbers of the planes that count, in order."""
+    from realtime.methods.shadow_planes.plane_entries import FIRST, NUMBER
 
     entries, source = np.array(lists.entries), lists.source
     by_tile = []
@@ -129,7 +127,7 @@ def listed_planes(lists):
         place = np.arange(first, first + count)
         entry = entries[place]
         counts = ((entry & FIRST) != 0) | (place < before)
-        by_tile.append((entry[counts] & NUMBER, (entry[counts] & FULL) != 0))
+        by_tile.append(entry[counts] & NUMBER)
     return by_tile
 
 

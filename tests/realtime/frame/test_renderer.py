@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A frame's airlight is the integral of the reference, in both precisions; frames replay what was recorded once."""
+"""A frame's airlight is the integral of the reference; marching converges to it, and shadow maps to shadow rays."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a GPU needs of a frame: nothing that only a processor has, and no wait for the host but those of a table.
+"""What a GPU needs of a frame: no wait for the host but those of a table.
 
-No GPU is asked: the code is read, and frames are rendered while every wait is counted.
+No GPU is asked: frames are rendered while every wait is counted.
 """
 
 from collections import Counter

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Several rays a pixel: their points fill it, the mean converges to that over its area, one ray is the centre."""
+"""Several rays a pixel: the mean converges to that over its area, and one ray is the centre."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Filters of images obey their laws: no change of a constant, the Gaussian as a limit, mirrors, no leak, no NaN."""
+"""Filters of images are their definition, let nothing leak across an edge in depth, and give numbers everywhere."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A shadow map says what rays say, away from the edges of shadows, and is never read outside."""
+"""A shadow map is never read outside; that it says what rays say is seen in frames, `tests/realtime/frame`."""
 
 import numpy as np
 import pytest

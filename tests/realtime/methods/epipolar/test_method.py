@@ -5,17 +5,17 @@ import numpy as np
 import pytest
 
 from tests.helpers.frames import frame, relative_rmse, truth
-from tests.helpers.light_frames import SIZE, camera
+from tests.helpers.light_frames import SIZE, camera, coloured_fog, lamp
 from tests.helpers.scenes import spot, tiny_scene
 
 MAP = 256
-
-
 CHANGES = {
     "light in view": lambda: camera((-2.5, -2.2, 0.3), (0.9, 0.7, 1.9)),
     "light behind": lambda: camera((1.7, 1.6, 2.9), (-0.9, -0.7, -0.1)),
     "spot": lambda: {"lamp": spot()},
+    "colour, HG, two lights": lambda: {"fog": coloured_fog(), "second": lamp(-1, 1.4, 0.6)},
 }
+ALL = [pytest.param(change, marks=pytest.mark.slow) if "HG" in change else change for change in CHANGES]
 
 
 def scene_with(change):
@@ -27,7 +27,7 @@ def render(scene, method, **parameters):
 
 
 @pytest.mark.claim("tree-of-bounds", tolerance="a fifth of the shadows; 0.4 of the error with an eighth of the texel")
-@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("change", ALL)
 def test_every_pixel_comes_to_the_truth_as_the_map_grows(variant, change):
     """Where the map jumps a wall leans over one texel: the error falls as its size, as its root at grazing rays."""
     scene = scene_with(change)
@@ -42,7 +42,7 @@ def test_every_pixel_comes_to_the_truth_as_the_map_grows(variant, change):
 
 
 @pytest.mark.claim("slices-converge", tolerance="relative RMSE 2e-3")
-@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("change", ALL)
 def test_slices_converge_to_the_light_volume(variant, change):
     """It has the same height field, in another way."""
     scene = scene_with(change)
@@ -58,7 +58,7 @@ def test_slices_converge_to_the_light_volume(variant, change):
 
 
 @pytest.mark.claim("slices-converge", tolerance="relative RMSE 6e-3")
-@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("change", ALL)
 def test_samples_converge_to_all_pixels(variant, change):
     scene = scene_with(change)
     expected = render(scene, "min-max", map=MAP, sampling="pixels", slices=1600)

@@ -9,7 +9,6 @@ import pytest
 
 from tests.helpers.area_lamps import lit_by
 from tests.helpers.frames import read, relative_rmse
-from tests.helpers.scenes import bounded_medium
 
 
 def frame(scene, method="froxel-fog", **parameters):
@@ -46,14 +45,3 @@ def test_surfaces_are_those_of_other_methods_and_airlight_nearly(variant, kind):
     assert np.median(relative) < 0.03
     mapped = frame(scene, points=3, width=32, height=24, slices=96, map=512)
     assert np.median(np.abs(mapped.airlight - froxels.airlight) / froxels.airlight.mean()) < 0.003
-
-
-def test_light_points_in_bounded_media_come_one_by_one(variant):
-    fog = bounded_medium({"type": "sphere", "center": [0.1, 0.2, 0.7], "radius": 0.6}, 0.9, (0.9, 0.4, 0.3))
-    scene = lit_by(changes={"fog": None, "mist": fog, "ball": None})
-    scene["sensor"] = {key: entry for key, entry in scene["sensor"].items() if key != "medium"}
-    now = read(scene)
-    froxels = frame(now, points=5, width=128, height=96, slices=128).airlight
-    exact = frame(now, "ray-march", points=5, steps=400).airlight
-    within = exact > 0  # not at the outline of the sphere, which is cut into columns
-    np.testing.assert_allclose(froxels[within], exact[within], rtol=0.01)

@@ -1,35 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The map and the light volume of a directional light."""
+"""Claim: the light volume of a directional light is that of its map."""
 
 import numpy as np
 import pytest
 
-from tests.helpers.sunlit import (
-    box_part,
-    read,
-    relative_rmse,
-    render,
-    shaded,
-    summed,
-)
-
-
-def cast(scene, size):
-    from realtime.shadow_maps.shadow_map import cast_shadow_map
-
-    return cast_shadow_map(scene.geometry, scene.lights[0], size)
-
-
-def face_of(shadow_map, light):
-    """Return position, across, up and axis in NumPy."""
-    vectors = (light.position, *shadow_map.projection.basis)
-    return [np.array(vector, dtype=float).ravel() for vector in vectors]
+from tests.helpers.sunlit import box_part, read, relative_rmse, render, shaded, summed
 
 
 def height_field(scene, size):
     """Return the function that tells whether points are lit by the triangles over the texels of a map."""
-    shadow_map = cast(scene, size)
-    position, across, up, axis = face_of(shadow_map, scene.lights[0])
+    from realtime.shadow_maps.shadow_map import cast_shadow_map
+
+    shadow_map = cast_shadow_map(scene.geometry, scene.lights[0], size)
+    vectors = scene.lights[0].position, *shadow_map.projection.basis
+    position, across, up, axis = (np.array(vector, dtype=float).ravel() for vector in vectors)
     depth = np.array(shadow_map.distance, dtype=float).reshape(size + 1, size + 1)
     # Where nothing is hit the height is 0 at the plane where the media end, and at any depth behind it the same.
     height = np.maximum(float(shadow_map.projection.depth[0]) - depth, 0)

@@ -8,14 +8,13 @@ from realtime.methods.shadow_planes.published_crossings import Buffer, sum_cross
 from tests.helpers.planes import bundles, casters_of, crossings, drawn_lists, index_of, lit_lengths, rays_of
 
 
-def added_up(index, ways, end, *, order, buffer=None, at=None):
+def added_up(index, ways, end, *, order, buffer=None):
     """The sum of 1 - exp(-x) over the crossings."""
     import drjit as dr
 
     Float = type(index.distance)
-    lists, _ = drawn_lists(index, ways, end, order=order)
-    at = at or (lambda x: 1 - dr.exp(-x))
-    gammas = (lambda plane, ray, x: at(x)), at
+    lists = drawn_lists(index, ways, end, order=order)
+    gammas = (lambda plane, ray, x: 1 - dr.exp(-x)), (lambda x: 1 - dr.exp(-x))
     distance = Float(np.asarray(end, dtype=np.float64))
     total, lit = sum_crossings(index, lists, rays_of(index, lists, ways), distance, gammas, order=order, buffer=buffer)
     return np.array(total, dtype=np.float64), np.array(lit)

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 
-def frame(parameters, *, size=(64, 48), **changes):
-    """A frame of the sphere under the spot; its scene can be turned so that the camera is in the cone."""
+def frame(parameters):
+    """A frame of the sphere under the spot."""
     import mitsuba as mi
 
     from realtime.frame.renderer import render_frame
@@ -15,8 +15,8 @@ def frame(parameters, *, size=(64, 48), **changes):
     from validation.scenes.loading import resize
     from validation.scenes.sphere_spot import sphere_spot
 
-    scene = mi.load_dict(sphere_spot() | changes)
-    resize(scene, size)
+    scene = mi.load_dict(sphere_spot())
+    resize(scene, (64, 48))
     return render_frame(prepared(read_scene(scene), configuration("shadow-planes", None, parameters)))
 
 

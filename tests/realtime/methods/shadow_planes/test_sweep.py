@@ -46,7 +46,7 @@ def test_lit_segments_are_those_between_the_crossings(variant, name, camera, wed
     index = index_of(casters_of(name), camera=CAMERAS[camera], wedges=wedges)
     ways = bundles(1920, spread=0.01, camera=CAMERAS[camera])
     end = np.random.default_rng(3).choice([0.9, 2.7, 6.1, np.inf], len(ways))
-    lists = index.wedges if wedges else drawn_lists(index, ways, end)[0]
+    lists = index.wedges if wedges else drawn_lists(index, ways, end)
     # float32 crossings at grazing angles: 1e-7 over the sine of the angle between ray and plane.
     expected = lit_lengths(index, ways, end, weight=weight)
     assert_same(walked(index, lists, ways, end), expected, tolerance=1e-4)
@@ -64,7 +64,7 @@ def test_rays_notice_an_order_that_is_wrong(variant, order):
     index = index_of(casters_of("torus", "open cylinder", "crossing spheres"))
     ways = bundles(960, spread=0.01)
     end = np.full(len(ways), np.inf)
-    lists, _ = drawn_lists(index, ways, end)
+    lists = drawn_lists(index, ways, end)
     entries = np.array(lists.entries)
     rng = np.random.default_rng(9)
     changed = 0
@@ -91,7 +91,7 @@ def test_segments_begin_where_they_are_told_to(variant):
     index = index_of(casters_of("torus", "open cylinder"))
     ways = bundles(960, spread=0.01)
     begin, end = 1.7, np.full(len(ways), 3.3)
-    lists, _ = drawn_lists(index, ways, end)
+    lists = drawn_lists(index, ways, end)
     until_end, lit = lit_lengths(index, ways, end, weight=weight)
     until_begin, _ = lit_lengths(index, ways, np.full(len(ways), begin), weight=weight)
     sums = walked(index, lists, ways, end, begin=begin)

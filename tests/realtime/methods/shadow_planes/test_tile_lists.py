@@ -18,7 +18,7 @@ def endless(*names, spread):
     """Where rays without an end cross planes, and the lists of their tiles."""
     index = index_of(casters_of(*names))
     ways = bundles(960, spread=spread)
-    lists, _ = drawn_lists(index, ways, np.full(960, np.inf))
+    lists = drawn_lists(index, ways, np.full(960, np.inf))
     return crossings(index, ways)[0], lists
 
 
@@ -30,10 +30,10 @@ def test_lists_hold_every_plane_that_a_ray_crosses(variant, name, camera):
         index = index_of(casters_of(name), camera=CAMERAS[camera])
         ways, ends = bundles(960, spread=spread, camera=CAMERAS[camera]), np.full(960, end)
         x, _ = crossings(index, ways)
-        lists, _ = drawn_lists(index, ways, ends)
+        lists = drawn_lists(index, ways, ends)
         planes_by_tile = listed_planes(lists)
         crossed = x < ends[:, None]
-        for tile, (numbers, _) in enumerate(planes_by_tile):
+        for tile, numbers in enumerate(planes_by_tile):
             wanted = np.flatnonzero(crossed[16 * tile : 16 * tile + 16].any(axis=0))
             assert set(wanted.tolist()) <= set(numbers.tolist())
             assert len(set(numbers.tolist())) == len(numbers)
@@ -50,7 +50,7 @@ def test_tiles_without_room_read_the_list_they_drew_on(variant, monkeypatch, roo
     monkeypatch.setattr(module, "LEAST", 0)
     x, lists = endless("torus", "open cylinder", spread=0.05)
     assert 0 < np.array(lists.sorted).mean() < 0.9
-    for tile, (numbers, _) in enumerate(listed_planes(lists)):
+    for tile, numbers in enumerate(listed_planes(lists)):
         wanted = np.flatnonzero(np.isfinite(x[16 * tile : 16 * tile + 16]).any(axis=0))
         assert set(wanted.tolist()) <= set(numbers.tolist())
         assert len(set(numbers.tolist())) == len(numbers)
