@@ -77,9 +77,18 @@ def test_a_medium_written_twice_is_one(load):
     np.testing.assert_array_equal(image(scene), image(plain))
 
 
+def test_a_floor_in_the_bound_of_a_medium_is_noted(load, capfd):
+    """There rays that pass the bound miss the floor: volpath and single-scatter lose a quarter of such surfaces."""
+    box = shape("cube", NULL + '<ref name="interior" id="fog"/>', name="box", at=(0, 0, 0.7), size=0.7)
+    for name, height, noted in (("floor", 0.0, True), ("lower", -0.01, False)):
+        load(LAMP, box, shape("rectangle", GREY, name=name, at=(0, 0, height), size=3), camera=CAMERA.format(""))
+        assert (f"shape '{name}' lies in the bound of a medium" in capfd.readouterr().err) == noted
+
+
 def test_shapes_keep_their_names_and_are_not_merged(load):
-    boxes = [shape("cube", GREY, name=name, at=(x, 0.2, 0.6), size=0.2) for name, x in (("a", -0.4), ("b", 0.5))]
-    assert [each.id() for each in load(LAMP, *boxes).shapes()] == ["a", "b"]
+    box = NULL + '<ref name="interior" id="fog"/>'
+    boxes = [shape("cube", box, name=name, at=(x, 0.2, 0.6), size=0.2) for name, x in (("a", -0.4), ("b", 0.5))]
+    assert [each.id() for each in load(LAMP, *boxes, camera=CAMERA.format("")).shapes()] == ["a", "b"]
 
 
 def test_instances_give_the_image_of_shapes_written_out(load):

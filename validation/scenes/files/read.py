@@ -13,7 +13,7 @@ from analytic.errors import InputError
 from validation.scenes.files.kinds import check_kinds
 from validation.scenes.files.media import give_extinction, pass_where_no_material
 from validation.scenes.files.nodes import kind, name_nodes, properties, references
-from validation.scenes.files.references import leave_out_media
+from validation.scenes.files.references import leave_out_media, touching
 from validation.scenes.files.shapes import lamps_as_rectangles, write_out_instances
 from validation.scenes.lobes import give_lobes
 
@@ -36,7 +36,6 @@ def read_file(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> 
         For a file that Mitsuba cannot read, and for what no command can take.
     """
     config = mi.parser.ParserConfig(mi.variant())
-    config.merge_meshes = False  # shapes keep their names, and two media stay two
     resolver = mi.file_resolver()
     try:
         mi.set_file_resolver(mi.FileResolver(resolver))
@@ -54,7 +53,10 @@ def read_file(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> 
 
 
 def _parsed(config: Any, path: Path) -> Any:
-    """Return the nodes of a file, with the names that Mitsuba 3 gives to everything, and references as numbers."""
+    """Return the nodes of a file, with the names that Mitsuba 3 gives to everything, and references as numbers.
+
+    Meshes are not merged, as `mi.load_file` would: shapes keep their names, and two bodies of a medium stay two.
+    """
     text = path.read_text(encoding="utf-8", errors="replace")
     if "<lookAt" in text:  # of version 0.5, which Mitsuba's own upgrade leaves out
         state = mi.parser.parse_string(config, re.sub(r"(</?)lookAt\b", r"\1lookat", text))
@@ -75,7 +77,10 @@ def _built(config: Any, state: Any, lobes: Mapping[str, float]) -> Any:
     give_lobes(state, lobes)
     scene = mi.parser.instantiate(config, mi.parser.ParserState(state))  # which takes the nodes apart
     changed = [lamps_as_rectangles(state, scene.shapes()), leave_out_media(state, scene)]
-    return mi.parser.instantiate(config, state) if any(changed) else scene
+    scene = mi.parser.instantiate(config, state) if any(changed) else scene
+    for note in touching(scene):
+        mi.Log(mi.LogLevel.Warn, note)
+    return scene
 
 
 def _mend(state: Any) -> None:
