@@ -139,6 +139,7 @@ def test_a_report_without_options_is_the_commands(variant, tmp_path, monkeypatch
         return {"claims": claims, "scenes": [], "created": "", "seconds": 1, "kept": 0, "computed": 1, "measured": None}
 
     monkeypatch.setattr("reports.report.measure.write_report", write)
+    monkeypatch.setattr("reports.report.asked.notes_on", lambda scenes: [])  # it loads every scene
     airlight.report(tmp_path / "python")
     assert run(["report", "-o", str(tmp_path / "command")]) == 0
     assert given[0] == given[1]

@@ -38,19 +38,6 @@ def test_places_by_their_words(tmp_path):
     assert parse_place(str(file)) == Place(file=file)
 
 
-@pytest.mark.parametrize(
-    ("word", "message"),
-    [
-        ("local:0", "local:N with a number of processes"),
-        ("10.1.2.3:8786", "wanted local, local:N, tcp://HOST:PORT or a scheduler file"),
-        ("none.json", "there is no file none.json"),
-    ],
-)
-def test_other_words_are_refused(word, message):
-    with pytest.raises(InputError, match=message):
-        parse_place(word)
-
-
 def test_where_no_scheduler_answers(monkeypatch):
     monkeypatch.setattr(connect, "_PATIENCE", 1.0)
     message = r"no scheduler answers at tcp://127\.0\.0\.1:9 .*start `dask scheduler`"

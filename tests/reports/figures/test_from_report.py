@@ -3,6 +3,9 @@
 
 import csv
 import json
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -84,7 +87,28 @@ def test_frame_speed_keeps_medians_quartiles_and_errors(report, tmp_path):
     origin = json.loads((tmp_path / "frame-speed.json").read_text())
     assert origin["report"]["created"].startswith("2031-01-02")
     assert origin["environment"]["processor"] == "a slide rule"  # the machine that measured, not this one
-    assert drawn(figure_frame_speed, tmp_path)
+
+
+@pytest.mark.claim("figures-repeat", tolerance="none: equal bytes")
+def test_drawing_again_only_reads_and_gives_the_same_bytes_without_mitsuba(report, tmp_path):
+    """In another process, by the command; and what is embedded are TrueType fonts, no date."""
+    data, again = tmp_path / "data", tmp_path / "again"
+    figure_frame_speed.compute(data, report=report)
+    first = drawn(figure_frame_speed, data)
+    options = ["--from", str(data), "-o", str(again), "--column", "single", "--style", str(data / "coarse.mplstyle")]
+    program = (
+        "import sys; from reports.commands.main import run\n"
+        f"assert run(['figures', *{options!r}]) == 0\n"
+        "assert not {'mitsuba', 'drjit'} & set(sys.modules), 'drawing started Mitsuba'\n"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True, cwd=Path(__file__).parents[3])
+    assert [(again / f"frame-speed{suffix}").read_bytes() for suffix in (".pdf", ".png")] == first
+    pdf, png = first
+    assert pdf.startswith(b"%PDF")
+    assert png.startswith(b"\x89PNG")
+    assert b"/FontFile2" in pdf
+    assert b"/Type3" not in pdf
+    assert b"CreationDate" not in pdf
 
 
 def test_the_strip_shows_where_methods_are_wrong(report, tmp_path):

@@ -11,6 +11,8 @@ from reports.figures import decomposition as figure_decomposition
 from reports.figures import kernel_errors as figure_kernel_errors
 from reports.figures import kernel_speed as figure_kernel_speed
 from reports.figures import map_size as figure_map_size
+from reports.figures import paper_images as figure_paper_images
+from reports.figures import polynomials as figure_polynomials
 from reports.figures import z_distribution as figure_z_distribution
 from reports.figures.files import plot
 
@@ -40,10 +42,32 @@ def test_kernel_errors_over_depth_and_angle(variant, tmp_path):
     assert np.median(errors["taylor"]) > 100 * errors["exact"].max()
 
 
+def test_curves_meet_at_the_foot_and_leave_it(variant, tmp_path):
+    """At theta = 0 all three are p(0); half a radian on, the derived polynomial is the closer one if isotropic."""
+    figure_polynomials.compute(tmp_path, rays=256)
+    rows = rows_of(tmp_path / "polynomials.csv")
+    middle = [row for row in rows if float(row["theta"]) == 0]
+    assert len(middle) == 12
+    for row in middle:
+        for name in ("taylor", "taylor-printed"):
+            assert float(row[name]) == pytest.approx(float(row["exact"]), rel=1e-7)  # nine digits are written
+    aside = next(
+        r for r in rows if (r["phase"], r["a"]) == ("isotropic", "0.5") and abs(float(r["theta"]) - 0.5) < 1e-9
+    )
+    exact = float(aside["exact"])
+    assert abs(float(aside["taylor"]) - exact) < 0.2 * abs(float(aside["taylor-printed"]) - exact)
+
+
+@pytest.mark.slow
+def test_curves_are_drawn(variant, tmp_path):
+    figure_polynomials.compute(tmp_path, rays=256)
+    assert drawn(figure_polynomials, tmp_path)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "module",
-    [figure_decomposition, figure_map_size, figure_kernel_speed, figure_convergence],
+    [figure_decomposition, figure_map_size, figure_kernel_speed, figure_convergence, figure_paper_images],
     ids=lambda module: module.NAME,
 )
 def test_a_figure_is_measured_and_drawn_twice_to_the_same_bytes(variant, tmp_path, module):

@@ -22,8 +22,8 @@ def run(line, **environment):
     ("line", "status"),
     [
         ("$AIRLIGHT list nowhere <&- >&- 2>&-", 2),
-        ("($AIRLIGHT list scenes; echo $? >&2) | head -c 1 >/dev/null", 0),
-        ("$AIRLIGHT list scenes >/dev/full", 2),
+        ("($AIRLIGHT list kernels; echo $? >&2) | head -c 1 >/dev/null", 0),
+        ("$AIRLIGHT list kernels >/dev/full", 2),
     ],
 )
 def test_closed_and_full_streams_are_no_fault(line, status):

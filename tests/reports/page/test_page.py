@@ -5,7 +5,6 @@ import json
 
 import pytest
 
-from analytic.errors import InputError
 from reports.page.chart import speed_error_chart
 from reports.page.filters import DASH
 from reports.page.render import SCRIPTS, render_page
@@ -111,11 +110,6 @@ def test_missing_values_are_dashes_and_failures_are_marked(data, folder):
         assert words in page.text
     marked = [tag for tag, attributes in page.tags if "bad" in (attributes.get("class") or "").split()]
     assert {"li", "td"} <= set(marked)
-
-
-def test_a_page_that_cannot_be_made_small_enough_is_refused(data, folder):
-    with pytest.raises(InputError, match="MB"):
-        render_page(data, folder, limit=2_500_100)
 
 
 def test_the_chart_has_a_panel_for_each_scene_whatever_it_is_called():

@@ -28,14 +28,6 @@ def test_share_of_the_scenes_and_its_interval(sweep_of):
     assert made.text == "ray-march: within 1e-3 in 99.2 % of 1000 scenes, 98.4 to 99.7 %."
 
 
-@pytest.mark.claim("sweep-scenes-are-the-sample")
-def test_cells_of_a_scene_do_not_narrow_the_interval(sweep_of):
-    one = claim(samples(sweep_of([row(f"random:{n}") for n in range(20)]))[0], 0.1)
-    media = [row(f"random:{n}", medium=medium) for n in range(20) for medium in (None, "a", "b", "c")]
-    four = claim(samples(sweep_of(media))[0], 0.1)
-    assert (one.tries, one.low) == (four.tries, four.low) == (20, binomial_interval(20, 20)[0])
-
-
 @pytest.mark.claim("sweep-tries")
 def test_what_is_no_number_misses_and_a_refusal_is_no_try(sweep_of):
     several = [

@@ -112,12 +112,6 @@ def test_named_scenes_are_no_sample_where_scenes_were_drawn(sweep_of):
 
 
 @pytest.mark.claim("sweep-times-alone")
-def test_times_count_only_where_the_machine_had_nothing_else_to_do(sweep_of):
-    (sample,) = samples(sweep_of([row(frame_ms=2.0), row("random:1", frame_ms=1.0, timed_alone=False)]))
-    np.testing.assert_array_equal(sample.times, [2.0, np.nan])
-
-
-@pytest.mark.claim("sweep-times-alone")
 def test_times_of_several_hosts_are_not_compared(sweep_of):
     several = [row(f"random:{n}", host="there" if n > 1 else "here", threads=8 if n == 4 else 2) for n in range(5)]
     (sample,) = samples(sweep_of(several))

@@ -6,11 +6,8 @@ import typer
 
 from reports.commands.stability import stability
 from reports.tables.agreement import verdict
-from reports.tables.kernels import kernel_tables
 from reports.tables.scaling import cliffs, grown, scaling_tables
 from tests.helpers.reports import agreement, growth_record
-from validation.kernels.benchmark import KernelBench, KernelCost, Spread, speed_against_error
-from validation.metrics.errors import plain
 
 
 @pytest.mark.parametrize(
@@ -38,20 +35,6 @@ def test_jumps_and_higher_powers_than_before_are_found():
     costs, exponents = scaling_tables([growth_record(works=(), refused="method x: no")])
     assert costs.rows[0].reason == "refused: method x: no"
     assert exponents.rows == ()
-
-
-def test_the_cheapest_kernel_is_that_within_the_error():
-    spread = Spread(7.5, 7.25, 8.0, 9)
-    costs = (
-        KernelCost("exact", "exact", None, "isotropic", 0.0, 480_000, spread, spread, 1e-7, 1e-6, 2e-5),
-        KernelCost("uniform-8", "uniform", 8, "isotropic", 0.0, 0, spread, spread, 0.1, 0.5, 0.9),
-        KernelCost("closed-form", "closed-form", None, "isotropic", 0.0, refused="not today"),
-    )
-    bench = plain(KernelBench(costs, speed_against_error(costs)))
-    cost, largest, _ = kernel_tables(bench["costs"], bench["levels"])
-    assert cost.rows[2].reason == "refused: not today"
-    cheapest = {row.values["level"]: row.values["cheapest"] for row in largest.rows}
-    assert (cheapest[1e-4], cheapest[1e-6]) == ("exact", "none")
 
 
 @pytest.mark.claim("exact-keeps-its-bar")

@@ -200,29 +200,6 @@ def test_a_page_chooses_no_code_to_run(view, tmp_path, monkeypatch):
     assert session._state().chosen == configuration("unshadowed")
 
 
-def test_changes_that_wait_are_one_frame_and_of_a_slider_the_last_is_chosen(view, monkeypatch):
-    session, page = view("open-fog", "ray-march")
-    turns(session, lambda: session._told >= session._changed_at)
-    before, chosen = len(page.frames), []
-    choose = session.live.choose
-    monkeypatch.setattr(session.live, "choose", lambda wanted: chosen.append(wanted) or choose(wanted))
-    for number in range(20):
-        session.told(page, {"kind": "change", "changes": {"camera.origin": [0.01 * number, 0.0, 0.0]}})
-        session.told(page, {"kind": "choose", "parameter": "steps", "value": 2 + number}) if number > 17 else None
-    session.turn()
-    assert len(page.frames) == before + 1
-    assert session.live.changes["camera.origin"] == (0.19, 0.0, 0.0)
-    assert [dict(wanted.parameters) for wanted in chosen][-1] == {"steps": 21}
-    # And no more than two frames ahead of a page that does not show them.
-    page.session = type("Nobody", (), {"told": lambda *_: None})()
-    session.told(page, {"kind": "show", "run": True})
-    before = len(page.frames)
-    for _ in range(6):
-        if session._can_draw() or session._said:
-            session.turn()
-    assert len(page.frames) - before <= 2
-
-
 def test_another_tab_takes_over_and_the_first_is_told(view):
     session, page = view("open-fog", "unshadowed")
     other = Page(session)
