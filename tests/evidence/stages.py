@@ -45,7 +45,7 @@ VOLPATH_MARGIN = 0.01
 #: Points of each of eight replicates under area lights.
 PLAN = PointPlan(error=0.0, first=128, most=128)
 _DISTANCES, _SAMPLES = 64, 256  # of single-scatter and volpath, a pixel and batch
-_LEAST, _MOST = 32, 1024  # batches
+_LEAST, _MOST, _MOST_WIDE = 32, 1024, 64  # batches; under area lights the points of the quadrature leave more
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,8 @@ def stage_of(name: str) -> Stage:
     image = quadrature.quadrature_image(truth, plan=PLAN)
     masks = {layer: mask for layer, mask in layer_masks(truth, image).items() if np.any(getattr(image, layer) > 0)}
     batches = _batches(truth, range(_LEAST))
-    while len(batches.seeds) < _MOST and not all(
+    most = _MOST_WIDE if name in WIDE_PROBES else _MOST
+    while len(batches.seeds) < most and not all(
         width_to_reach(_statistics(image, batches, layer, mask, margins[layer]), margins[layer]) < 1
         for layer, mask in masks.items()
     ):
