@@ -24,8 +24,8 @@ from tests.helpers.light_frames import (
 )
 from tests.helpers.scenes import spot
 
-#: One of a kind.
-FEW = ("light in view", "fence", "spot in view")
+#: One of a kind; beside the view the faces of the cube that a tile passes count.
+FEW = ("light beside the view", "light in view", "fence", "spot in view")
 
 #: Share of the pixels that must be within 1e-4 of their own value. Where many rays graze the rim of a cone, some
 #: millimetres of 3 m are lit, of which float32 holds 1e-4, or at the rim of a soft one what is lit is as dim.
