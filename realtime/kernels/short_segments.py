@@ -12,7 +12,7 @@ segment and light, and Gauss's rule converges as fast for every ray with the sam
 theorem). The exponent changes fastest at the end, by sigma_t (1 + s1/r1) a metre.
 
 A segment is short where L/r and sigma_t (1 + s1/r1) L are below limits up to which four nodes, or eight, are right to
-1e-6 for random rays; `tests/realtime/kernels/test_short_segments.py` tries others. Nodes are places s0 + f L, s0 = x0
+1e-6 for random rays; `tests/realtime/kernels/test_exact.py` tries others. Nodes are places s0 + f L, s0 = x0
 - foot: close to the light, x itself has not the digits.
 """
 

@@ -10,8 +10,7 @@ import drjit as dr
 
 from realtime.numerics.array_types import is_single
 
-#: Coefficients of 2^f on [-1/2, 1/2], highest power first: a Remez fit of degree 6 with relative error below 1.5e-8;
-#: `tests/realtime/numerics/test_fast_exp.py` fits them again.
+#: Coefficients of 2^f on [-1/2, 1/2], highest power first: a Remez fit of degree 6 with relative error below 1.5e-8.
 _EXP2 = (
     1.5353362e-4,
     1.3398874e-3,

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from analytic.area_light import disk_share, polygon_in_disk, polygon_overlap, sphere_airlight, sphere_fluence
+from analytic.area_light import polygon_in_disk, polygon_overlap, sphere_airlight, sphere_fluence
 
 #: Foot at 0, from -2 to 3, attenuation from -2 on; computed twice in mpmath, over directions and over the cap.
 CERTIFIED = [
@@ -26,13 +26,6 @@ def test_a_sphere_in_clear_air_fills_its_cone():
     distance = np.array([1.0001, 1.5, 7.0, 1e4])
     cone = np.pi / distance**2 * 2 / (1 + np.sqrt((1 - 1 / distance) * (1 + 1 / distance)))
     assert sphere_fluence(0.0, distance, 1.0) == pytest.approx(cone, rel=1e-12)
-
-
-def test_shares_of_a_disk():
-    assert disk_share([-1.0, 0.0, 1.0, 2.0]) == pytest.approx([1.0, 0.5, 0.0, 0.0])
-    for u in (-0.7, 0.2):
-        half_plane = [[u, -3], [9, -3], [9, 3], [u, 3]]
-        assert polygon_in_disk(half_plane) == pytest.approx(np.pi * disk_share(u), rel=1e-12)
 
 
 def test_polygons_by_counting_points():

@@ -135,26 +135,6 @@ def test_shadow_scale_and_weight_against_plain_quadrature(phase, shadow_scale):
     assert error[0] < 1.01e-10 * value[0]
 
 
-def test_weight_gets_the_rows_of_the_input():
-    # Rows 1 and 3 are empty or on the light and never asked for; each other row has its own factor.
-    factor = np.array([1.0, 1e9, 3.0, 1e9, 7.0])
-    asked = set()
-
-    def weight(x, index):
-        assert x.shape in ((len(index), 7), (len(index), 21))
-        asked.update(index.tolist())
-        assert (x >= 1.0).all()
-        return np.broadcast_to(factor[index, None], x.shape)
-
-    height = np.array([0.3, 0.3, 0.3, 0.0, 0.3])
-    x1 = np.array([4.0, 1.0, 4.0, 4.0, 4.0])
-    value, _ = airlight_segments(2.0, height, 1.0, x1, 0.1, ISOTROPIC, weight=weight)
-    assert asked == {0, 2, 4}
-    assert value[1] == 0
-    assert np.isposinf(value[3])
-    np.testing.assert_allclose(value[[2, 4]] / value[0], [3.0, 7.0], rtol=1e-14)
-
-
 def test_corners():
     through_light = {"foot": 5.0, "height": 0.0}
     empty, _ = airlight_segments(5.0, 0.0, 5.0, 5.0, 0.3, ISOTROPIC)

@@ -38,13 +38,6 @@ def test_shape_area_and_power_are_read(variant, kind, size, area):
     assert scene.features.area_lights == (kind,)
 
 
-def test_lights_with_extent_stand_beside_others_and_a_flipped_one_shines_on_its_other_side(variant):
-    scene = read(window=area_lamp("rectangle", flip_normals=True))
-    (light,) = scene.area_lights
-    assert (len(scene.lights), light.name) == (1, "window")
-    assert light.normal @ (np.array([0.13, 0.07, 0.31]) - light.middle) < 0
-
-
 def test_a_lamp_of_null_is_nothing_but_light(variant):
     scene = read(lamp=area_lamp("disk", size=0.29, material={"type": "null"}))
     assert not scene.area_lights[0].opaque

@@ -10,7 +10,6 @@ from tests.helpers.scenes import clear_scene, tiny_scene
 from tests.helpers.sunlit import (
     ALONG,
     CUBE_AT,
-    SPHERE_AT,
     box_part,
     cube,
     fog_sphere,
@@ -131,17 +130,6 @@ def test_a_ray_along_the_light(variant):
         assert airlight[2, 2].min() > 0
         assert airlight[2, 2] == pytest.approx(expected[2, 2], rel=1e-5)
         assert relative_rmse(airlight, expected) < 1e-5
-
-
-def test_a_camera_within_a_bounded_medium(variant):
-    inside = {"type": "ref", "id": "inside"}
-    sensor = look(np.asarray(SPHERE_AT) + np.array([0.2, 0.1, -0.15]), (0.4, 0.5, 0.9)) | {"medium": inside}
-    within = fog_sphere() | {"interior": inside}
-    parts = {"inside": fog_sphere()["interior"] | {"id": "inside"}, "sensor": sensor, "lamp": sun(), "ball": within}
-    scene = {"type": "scene"} | parts | {"cube": cube()}
-    expected = summed(read(scene), [box_part(), sphere_part()])
-    assert np.all(expected > 0)
-    assert relative_rmse(render(scene).airlight, expected) < 1e-5
 
 
 def test_surfaces_have_lambert_s_law_and_both_legs(variant):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realtime.numerics.aligned import aligned_array
-from tests.helpers.sunlit import ALONG, SIDES, TURN, clear_scene, cube, read, sun, unit
+from tests.helpers.sunlit import ALONG, SIDES, clear_scene, cube, read, sun, unit
 from tests.helpers.sunlit import CUBE_AT as MIDDLE
 
 SIZE = 64
@@ -29,32 +29,6 @@ def _vectors(points):
 
     columns = np.asarray(points, dtype=np.float64).reshape(-1, 3).T
     return mi.Vector3f(*(aligned_array(mi.Float, column) for column in columns))
-
-
-def test_the_finest_level_holds_the_faces_of_a_box(variant):
-    import mitsuba as mi
-
-    from realtime.clouds.light_maps.pyramid import filtered_surface
-
-    _, light_map = _cube_map(size=256)
-    along, turned = unit(ALONG), np.asarray(TURN)
-    inside = np.asarray(MIDDLE) + np.random.default_rng(3).uniform(-0.3, 0.3, (200, 3)) @ (turned * SIDES).T
-    surface = filtered_surface(light_map, _vectors(inside), mi.Float(0))
-    # Where the line through the point along the light enters and leaves the box.
-    local, way = (inside - MIDDLE) @ turned, along @ turned
-    ends = np.stack([(-0.5 * SIDES - local) / way, (0.5 * SIDES - local) / way])
-    enter, leave = ends.min(axis=0), ends.max(axis=0)
-    entries = inside + along * enter.max(axis=1)[:, None]
-    faces = turned[:, enter.argmax(axis=1)].T * -np.sign(way)[enter.argmax(axis=1)][:, None]
-    texel = float(light_map.texel[0])
-    np.testing.assert_allclose(np.array(surface.cover), 1.0, rtol=1e-6)
-    close = np.abs(np.array(surface.normal).T - faces).max(axis=1) < 1e-3
-    assert close.mean() > 0.9  # the others are within a texel of an edge
-    off = np.array(surface.middle).T - entries
-    assert np.abs(np.einsum("ij,ij->i", off, faces))[close].max() < 1e-4
-    assert np.linalg.norm(off - np.outer(off @ along, along), axis=1).max() < 1e-3
-    thickness = leave.min(axis=1) - enter.max(axis=1)
-    assert np.quantile(np.abs(np.array(surface.thickness) - thickness), 0.9) < 2 * texel
 
 
 @pytest.mark.claim("collector-slopes", tolerance="1e-4 of the cosine, against 0.05 by unit normals")

@@ -4,13 +4,12 @@
 import mpmath
 import numpy as np
 import pytest
-from scipy.integrate import quad
 
 from analytic.cases import read_cases
 from realtime.kernels.closed_form import closed_form, scaled_e1
 from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import array_types
-from tests.helpers.kernel_values import RAY, kernel_values, relative_error
+from tests.helpers.kernel_values import kernel_values, relative_error
 from validation.kernels.values import take
 
 pytestmark = pytest.mark.usefixtures("variant")
@@ -59,16 +58,3 @@ def test_accuracy_by_tag(cases):
             assert all(error[tags == tag].max() > 0.03 for tag in ("beyond", "far", "sliver"))
         else:
             assert error[hard].max() < 1e-7
-
-
-@pytest.mark.parametrize("precision", ["single", "double"])
-def test_limits(precision):
-    """Height 0 beyond the light, a vacuum, and no length."""
-    foot, height, x0, x1, sigma_t = RAY
-    expected, _ = quad(lambda x: np.exp(-sigma_t * (x + x + 0.5)) / (x + 0.5) ** 2, x0, x1)
-    angle = (np.arctan2(x1 - foot, height) - np.arctan2(x0 - foot, height)) / height
-    rays = ([-0.5, foot, foot], [0.0, height, height], x0, [x1, x1, x0], [sigma_t, 0.0, sigma_t])
-    beyond, vacuum, nothing = kernel_values(closed_form, rays, precision=precision)
-    assert beyond == pytest.approx(expected, rel=1e-5)
-    assert vacuum == pytest.approx(angle, rel=1e-6)
-    assert nothing == 0

@@ -1,22 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: a table's entries are its integrals; the published form is good near the light alone, the tails everywhere."""
 
-from functools import partial
-
-import drjit as dr
 import numpy as np
 import pytest
 from mpmath import exp, inf, mpf, pi, quad, tan
 
 from analytic.cases import read_cases
-from realtime.kernels.preparation import prepare_kernel, with_tables
 from realtime.kernels.table import table, table_records
-from realtime.numerics.aligned import aligned_array
-from realtime.numerics.array_types import array_types
-from realtime.rays.ray_light import RayGeometry
-from realtime.scene.lights import Light
-from realtime.scene.medium import Medium
-from realtime.scene.phase import Isotropic
 from tests.helpers.kernel_values import RAY, kernel_values
 from validation.kernels.values import take
 
@@ -73,24 +63,3 @@ def test_published_form_reads_the_edge_beyond_its_table(variant):
     assert outside / inside == pytest.approx(np.exp(-(30 - 10) / height * foot), rel=1e-9)
     truth = kernel_values(table, rays, precision="double", form="tail", size=512)[1]
     assert not 0.1 < outside / truth < 10
-
-
-@pytest.mark.parametrize("form", ["sun", "tail"])
-def test_frozen_and_in_colour(variant, form):
-    """Recorded once, right after another medium and another number of rays; three extinctions give three values."""
-    types, light, sized = array_types("single"), Light(None, None), partial(table, form=form, size=31)
-
-    def kernel(t, h, x0, x1, medium, tables):
-        return with_tables(sized, tables)(RayGeometry(t, h, None, None), x0, x1, medium, light)
-
-    tables = prepare_kernel(sized, types.scalar)
-    frozen = dr.freeze(kernel)
-    for count, extinctions in ((7, (0.11, 0.4, 0.9)), (7, (0.2, 0.5, 0.7)), (12, (0.3, 0.1, 1.3))):
-        medium = Medium(tuple(dr.opaque(types.scalar, s) for s in extinctions), types.color(1), Isotropic())
-        columns = [np.linspace(low, low + 1, count) for low in (1.1, 0.3, 0.2, 2.5)]
-        channels = np.array(frozen(*(aligned_array(types.scalar, column) for column in columns), medium, tables))
-        assert channels.shape == (3, count)
-        for row, sigma_t in zip(channels, extinctions):
-            # Recorded code may fuse differently: roundings, of reads of which half cancels.
-            assert row == pytest.approx(kernel_values(sized, (*columns, sigma_t)), rel=1e-5)
-    assert frozen.n_recordings == 1

@@ -46,25 +46,6 @@ def test_rounding_of_light_and_direction_is_no_height(variant, kind):
         assert np.max(np.abs(np.array(geometry.offset) - offset) / height) < 4e-7
 
 
-@pytest.mark.parametrize("degrees", [40.0, 50.0])
-def test_rays_through_the_light(variant, degrees):
-    """Height and all products with it are 0; in the cone lies what is beyond the light, before it, or nothing."""
-    from realtime.numerics.array_types import array_types
-    from realtime.rays.ray_light import ray_geometry
-
-    types = array_types()
-    light = spot_light(types, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), degrees)
-    direction = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (0.6, 0.0, 0.8), (0.6, 0.0, -0.8), (1.0, 0.0, 0.0)])
-    origin = -2 * direction.astype(np.float32).astype(np.float64)
-    geometry = ray_geometry(vectors(types, origin), vectors(types, direction), light)
-    assert np.all(np.array(geometry.height) == 0)
-    low, high = (np.array(x) for x in geometry.lit_segment(types.scalar(0), types.scalar(np.inf)))
-    foot = np.array(geometry.foot)
-    np.testing.assert_array_equal(low[:4], [foot[0], 0, foot[2], 0])
-    np.testing.assert_array_equal(high[:4], [np.inf, foot[1], np.inf, foot[3]])
-    assert high[4] == low[4]
-
-
 @pytest.mark.parametrize(("sine", "cosine"), [(0.6, 0.8), (0.8, 0.6)])
 def test_rays_parallel_to_a_line_on_the_cone(variant, sine, cosine):
     """The quadratic equation has one root: a half line inside the cone, or on the other side of the axis nothing.

@@ -4,30 +4,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from realtime.errors import InputError
-from realtime.scene.animate import (
-    closed_shapes,
-    coloured_light,
-    read_objects,
-    turned_light,
-    turned_objects,
-)
-from realtime.scene.mesh_adjacency import read_casters
-from tests.helpers.scenes import spot, tiny_scene
+from realtime.scene.animate import coloured_light, read_objects, turned_light, turned_objects
 from validation.scenes.parts import rotation
 
 
 def host(array) -> np.ndarray:
     return np.array(array, dtype=np.float64).ravel()
-
-
-@pytest.fixture
-def scene(variant):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-
-    return read_scene(mi.load_dict(tiny_scene(ball=None, floor=None, lamp=spot())))
 
 
 @pytest.fixture
@@ -116,12 +98,3 @@ def test_moved_objects_render_as_a_scene_read_anew(pens):
     # A surface that ends a plane of its own silhouette is before or behind it by rounding: two pixels of 192 here.
     same = np.isclose(frame.surface, fresh.surface, rtol=2e-5, atol=1e-6 * fresh.surface.mean()).all(axis=-1)
     assert np.mean(~same) < 0.02
-
-
-def test_a_shape_that_is_not_there_cannot_move(pens):
-    with pytest.raises(InputError, match="shape 'pencil' cannot move"):
-        read_objects(pens, ["pencil"])
-
-
-def test_closed_shapes_are_things_not_floors(pens):
-    assert closed_shapes(read_casters(pens.geometry)) == ("pens",)

@@ -65,17 +65,15 @@ def test_a_turned_grid_far_away():
     np.testing.assert_allclose(found, linear_between(ROUGH, np.zeros(3), np.ones(3), share) / ROUGH.max(), atol=5e-4)
 
 
-def changed(values):
-    rough = ROUGH.copy()
-    rough[2, 3, 1] = values
-    return {"values": rough}
+NEGATIVE = ROUGH.copy()
+NEGATIVE[2, 3, 1] = -0.1
 
 
 @pytest.mark.claim("hypertexture-refused", tolerance="none: an error and its words")
 @pytest.mark.parametrize(
     ("medium", "words"),
     [
-        (lambda: dense(changed(-0.1)["values"], LOW, HIGH), r"has -0.1 in voxel \(1, 3, 2\), and 1 such"),
+        (lambda: dense(NEGATIVE, LOW, HIGH), r"has -0.1 in voxel \(1, 3, 2\), and 1 such"),
         (lambda: dense(0 * ROUGH, LOW, HIGH), "is empty: its grid is 0 everywhere"),
         (lambda: dense(ROUGH, LOW, HIGH * (1, 1, 0.1)), r"does not cover the shape: vertex \d+ at \("),
         (lambda: dense(ROUGH, LOW, HIGH) | {"sigma_t": 0.1}, "is no grid"),

@@ -10,7 +10,7 @@ from realtime.clouds.bounds.crossings import next_crossing, optical_depths
 from realtime.clouds.bounds.surfaces import cloud_surfaces
 from realtime.numerics.aligned import aligned_array
 from realtime.scene.read_scene import read_scene
-from tests.helpers.clouds import SUN, length_inside, loaded, ring
+from tests.helpers.clouds import length_inside, loaded, ring
 
 pytestmark = pytest.mark.usefixtures("variant")
 
@@ -41,19 +41,6 @@ def test_depths_in_a_ring_are_those_of_all_its_triangles(precision, end):
     expected = [SIGMA * length_inside(ring(), *ray, end) for ray in zip(origin, direction)]
     assert np.count_nonzero(expected) > 50
     assert depth == pytest.approx(np.array(expected), abs=SIGMA * 5e-4)
-
-
-def test_a_sphere_is_a_cloud_too():
-    ball = {"type": "sphere", "center": [1.3, -2.7, 3.1], "radius": 71.3, "bsdf": {"type": "null"}}
-    fog = {"type": "homogeneous", "sigma_t": SIGMA, "albedo": 1.0}
-    origin, direction = random_rays(300, seed=7, spread=90.0)
-    (depth,) = depths_of(loaded(sun=SUN, ball=ball | {"interior": fog}), origin, direction, np.inf)
-    toward = np.array([1.3, -2.7, 3.1]) - origin
-    middle = np.sum(toward * direction, axis=1)
-    half = 71.3**2 - np.sum(toward**2, axis=1) + middle**2
-    chord = np.sqrt(np.maximum(half, 0))
-    inside = np.maximum(middle + chord, 0) - np.maximum(middle - chord, 0)
-    assert depth == pytest.approx(SIGMA * inside, abs=2e-4)
 
 
 def test_points_on_the_boundary_are_neither_lost_nor_counted_twice():

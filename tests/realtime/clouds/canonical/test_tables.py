@@ -19,7 +19,6 @@ from tests.helpers.canonical_errors import look_up_errors, looked_up_points, ran
 PHASE, ALBEDO = HenyeyGreensteinPhase(0.5), 0.95
 GRID = Grid(thicknesses=21, depths=13, suns=5, directions=17, azimuths=8)
 STREAMS, MODES = 8, 8  #: of the computation on both sides: what is tested here is what lies between entries
-SMALL = Grid(thicknesses=4, depths=4, suns=4, directions=7, azimuths=8)
 
 
 @pytest.fixture(scope="module")
@@ -117,26 +116,6 @@ def test_outside_the_tables_what_happens_is_what_the_page_says(look_up):
         np.testing.assert_allclose(deep, middle, rtol=1e-3)
         np.testing.assert_allclose(lower, [0.5 * low[0], *low[1:]], rtol=1e-4)
         np.testing.assert_allclose(night, [0, *low[1:]], rtol=1e-4)
-
-
-def test_tables_are_kept_and_damaged_ones_are_made_again(coarse, tmp_path, monkeypatch):
-    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path))
-    made = []
-
-    def tell(share, what):
-        made.append(share)
-
-    first = canonical_tables(HenyeyGreensteinPhase(0.0), 0.5, grid=SMALL, progress=tell)
-    count = len(made)
-    again = canonical_tables(HenyeyGreensteinPhase(0.0), 0.5, grid=SMALL, progress=tell)
-    assert len(made) == count
-    np.testing.assert_array_equal(first.coefficients[3], again.coefficients[3])
-    (path,) = tmp_path.iterdir()
-    data = bytearray(path.read_bytes())
-    data[len(data) // 2] ^= 255
-    path.write_bytes(data)
-    canonical_tables(HenyeyGreensteinPhase(0.0), 0.5, grid=SMALL, progress=tell)
-    assert len(made) == 2 * count
 
 
 @pytest.mark.slow
