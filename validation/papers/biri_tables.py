@@ -83,9 +83,7 @@ def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, A
     figures: dict[str, Any] = {}
     errors = []
     for entry in ENTRIES:
-        size, compared = (
-            tuple(max(16, 4 * round(scale * side / 4)) for side in sides) for sides in (entry.size, _COMPARED)
-        )
+        size, compared = _scaled(entry.size, scale), _scaled(_COMPARED, scale)
         scene = read_scene(load_scene(entry.scene, size).scene)
         small = load_scene(entry.scene, compared).scene
         truth = truth_image(small)
@@ -172,3 +170,9 @@ def _silhouettes(renderer: FrameRenderer, scene: Scene) -> None:
     for light in scene.lights:
         position = np.array(light.position, dtype=np.float64).ravel()
         silhouette(occluders, position, used=components_in_view(occluders, camera, position))
+
+
+def _scaled(size: tuple[int, int], scale: float) -> tuple[int, int]:
+    """Return a size times a scale, in whole tiles of four pixels."""
+    width, height = (max(16, 4 * round(scale * side / 4)) for side in size)
+    return width, height

@@ -78,7 +78,7 @@ def _renderer(scene: Scene, evaluation: str, size: int) -> FrameRenderer:
 
 def triangle_times(seconds: float = 0.3) -> dict[str, Any]:
     """Return the times of the volume and of a frame of shadow planes with few and with many triangles [ms]."""
-    times = {}
+    times: dict[str, Any] = {}
     for name, facets in FACETS.items():
         scene = _sphere(facets)
         volumes = _renderer(scene, "walk", MAP)
