@@ -73,7 +73,7 @@ def _two_spots():
     lamps = {"hard": spot | bright | {"beam_width": 37.0}, "soft": spot | bright | {"beam_width": 11.0}}
     turned = mi.ScalarTransform4f().translate([0.63, 0.47, 1.63]).rotate([1, 2, 3], 37).scale(0.07)
     solid = {"type": "cube", "to_world": turned}
-    return read_scene(mi.load_dict(shaded(size=(16, 12), pearl=fog_sphere(), solid=solid, **lamps)))
+    return read_scene(mi.load_dict(shaded(size=(16, 12), lamp=None, pearl=fog_sphere(), solid=solid, **lamps)))
 
 
 def test_many_lights_one_by_one_are_all_at_once(variant):
