@@ -324,36 +324,6 @@ def cloud_collectors(view: View, state: CloudState, lists, *, kernel, parameters
     return replace(layers, extra=extra, carried=tuple(kept) if carries(parameters) else None)
 
 
-def scattered_once(view: View, state: CloudState, lists, *, kernel, parameters: CollectorParameters) -> Layers:
-    """Return what `cloud_collectors` does without the sets of orders: order 1, opacity and what is seen behind it.
-
-    With this in its place a method's frame tells what that part of a frame costs.
-    """
-    rays, thin_rays = _rays(view, state, parameters)
-    once = _scattered_once(view, state, thin_rays, parameters)
-    return _with_opacity(view, state, rays, once, _opacity(view, state, rays, parameters))
-
-
-def missed_collectors(view: View, state: CloudState, lists, *, kernel, parameters: CollectorParameters) -> Layers:
-    """Return how far the searches of a frame ended from their fixed points, in place of light.
-
-    The layers `airlight_2` to `airlight_31_inf` hold the largest distance over the suns, channels and fillings [sigma]
-    and `airlight` is 1 where there is a cloud; collectors go on as they do in frames.
-    """
-    Color, Float = type(view.medium.albedo), type(view.distance)
-    rays, thin_rays = _rays(view, state, parameters)
-    entry = _entry(view, state, rays)
-    missed, kept = [Float(0) for _ in SETS], []
-    for number, sun in enumerate(_suns(view, parameters)):
-        last = view.carried[number] if view.carried is not None else None
-        orders = _many_times(view, state, thin_rays, entry, sun, last=last, parameters=parameters)
-        missed = [dr.maximum(*pair) for pair in zip(missed, orders.missed, strict=True)]
-        kept.append(orders.collectors)
-    extra = {order_layer(int(first)): Color(value) for (first, _), value in zip(SETS, missed, strict=True)}
-    there = Color(dr.select(entry.there, Float(1), 0))
-    return Layers(there, None, None, None, extra, tuple(kept) if carries(parameters) else None)
-
-
 def _suns(view: View, parameters: CollectorParameters) -> list[int]:
     """Return the numbers of the lights that shine from one direction."""
     assert view.medium.clouds is not None
@@ -469,9 +439,8 @@ def _many_times(
 ) -> OrdersLight:
     """Return the light of the sun of a number that was scattered twice and more, for unit irradiance [1/sr].
 
-    Its sets are colours; `missed` is the largest over channels and fillings; `collectors` are by channel and filling
-    what the next frame takes as `last`. Of an interpolated frame, those of the corners of tiles go on for all their
-    pixels.
+    Its sets are colours; `collectors` are by channel and filling what the next frame takes as `last`. In an
+    interpolated frame, those of the corners of tiles go on for all their pixels.
     """
     Float, Color = type(view.distance), type(view.medium.albedo)
     search = Search(
@@ -484,7 +453,7 @@ def _many_times(
     )
     of_sun = state.maps[sun]
     assert of_sun is not None
-    sums, missed = [], [Float(0) for _ in SETS]
+    sums: list[Any] = []
     kept: list[Any] = []
     for channel, own in enumerate(rays.clouds.sigma_t):
         if state.body is not None:
@@ -513,11 +482,10 @@ def _many_times(
             lit = [_reaching(view, of_sun, own, entry, sun, collector) for collector in light.collectors]
             of_fillings.append(tuple(radiance * share for radiance, share in zip(light.by_set, lit)))
             of_channel.append(light.collectors)
-            missed = [dr.maximum(*pair) for pair in zip(missed, light.missed, strict=True)]
         kept.append(tuple(of_channel))
         sums.append([sum(parts) for parts in zip(*of_fillings)])
     by_set = tuple(Color(*parts) for parts in zip(*(sums * (3 // len(sums)))))
-    return OrdersLight(by_set, tuple(missed), tuple(kept))
+    return OrdersLight(by_set, tuple(kept))
 
 
 def _reaching(view: View, of_sun: LightMap, sigma_t: Any, entry: _Entry, sun: int, collector: Collector) -> Any:

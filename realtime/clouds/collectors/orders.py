@@ -20,7 +20,6 @@ class OrdersLight:
     """The light of sets of orders at points."""
 
     by_set: tuple[Any, ...]  #: for unit irradiance across the beam [1/sr]
-    missed: tuple[Any, ...]  #: by set `CollectorLight.missed`
     collectors: tuple[Collector, ...]  #: for the next frame, by set; centres count from the points [m]
 
 
@@ -69,7 +68,7 @@ def light_of_orders(
         )
         lights.append(light)
     kept = (Collector(light.collector.centre - point, dr.select(active, light.collector.width, 0)) for light in lights)
-    return OrdersLight(tuple(light.radiance for light in lights), tuple(light.missed for light in lights), tuple(kept))
+    return OrdersLight(tuple(light.radiance for light in lights), tuple(kept))
 
 
 def _warm(cold: Collector, last: Collector, point, place: Any, active) -> Collector:
