@@ -50,8 +50,6 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from reports.machine.environment import versions as versions
     from validation.certified.files import certified_data as certified_data
     from validation.comparison.images import compare_files as compare_files
-    from validation.configurations.methods import configuration as configuration
-    from validation.configurations.timing import time_frame as time_frame
     from validation.estimates.budget import Budget as Budget
     from validation.estimates.images import monte_carlo_reference as monte_carlo_reference
     from validation.estimates.images import quadrature_reference as quadrature_reference
@@ -60,6 +58,8 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from validation.estimates.multiple_scattering import multiple_scattering_share as multiple_scattering_share
     from validation.metrics.errors import error_metrics as error_metrics
     from validation.scenes.registry import SCENES as SCENES
+    from validation.study.configuration import configuration as configuration
+    from validation.study.frame_times import time_frame as time_frame
 
 # name -> module; names that are missing here are not part of the API
 _API = {
@@ -82,11 +82,11 @@ _API = {
     "Method": "realtime.methods.interface.method",
     "find_method": "realtime.methods.registry",
     "KERNELS": "realtime.kernels.registry",
-    "configuration": "validation.configurations.methods",
+    "configuration": "validation.study.configuration",
     "read_scene": "realtime.scene.read_scene",
     "frame_renderer": "realtime.frame.renderer",
     "render_frame": "realtime.frame.renderer",
-    "time_frame": "validation.configurations.timing",
+    "time_frame": "validation.study.frame_times",
     "error_metrics": "validation.metrics.errors",
     "quadrature_reference": "validation.estimates.images",
     "volpath_reference": "validation.estimates.images",

@@ -23,13 +23,13 @@ def test_errors_are_those_of_the_baseline(name, variant):
 
 @pytest.mark.claim("baselines")
 def test_a_fault_of_a_thousandth_is_found(monkeypatch, variant):
-    import validation.configurations.methods
-    from validation.configurations.methods import Configuration
+    import validation.study.configuration
+    from validation.study.configuration import Configuration
 
     plain = Configuration("unshadowed", "exact")
-    find = validation.configurations.methods.find_kernel
+    find = validation.study.configuration.find_kernel
     monkeypatch.setattr(
-        validation.configurations.methods,
+        validation.study.configuration,
         "find_kernel",
         lambda name: lambda *args, **known: 1.001 * find(name)(*args, **known),
     )

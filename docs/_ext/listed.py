@@ -148,7 +148,7 @@ def figures() -> str:
 
 def sweep_columns() -> str:
     """Return the columns of a sweep's rows."""
-    from validation.sweep.row import COLUMNS
+    from validation.study.row import COLUMNS
 
     rows = [(f"`{each.name}`", each.unit, _cell(each.meaning)) for each in COLUMNS]
     return table(("column", "unit", "meaning"), rows, 3)

@@ -27,12 +27,12 @@ from reference.storage.files import temporary_folder, write_bytes, write_text
 from reports.data.reader import read_report
 from reports.machine.environment import MissingError, activate, versions
 from reports.plotting.pictures import error_map, preview, tone_curve
-from validation.configurations.methods import configuration, parse_settings, prepared
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import error_metrics
 from validation.scenes.changes import parse_changes
 from validation.scenes.loading import LoadedScene, load_scene
 from validation.scenes.registry import SCENES
+from validation.study.configuration import configuration, parse_settings, prepared
 
 DOCS = Path(__file__).resolve().parents[1]
 FOLDER = DOCS / "gallery"

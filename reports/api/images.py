@@ -98,9 +98,9 @@ def render(
     from realtime.scene.read_scene import read_scene
     from reports.api.results import Rendering, sealed
     from reports.machine.environment import activate
-    from validation.configurations.methods import configuration, prepared
-    from validation.configurations.timing import time_frame
-    from validation.estimates.images import layered_frame
+    from validation.study.configuration import configuration, prepared
+    from validation.study.frame_times import time_frame
+    from validation.study.run import layered_frame
 
     activate()  # a user's module may need a variant when it is imported
     # A method that is not known is refused before the scene is loaded.

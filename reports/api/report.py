@@ -64,8 +64,8 @@ def report(
     from reports.machine.environment import activate
     from reports.report.asked import notes_on, scenes_of_images
     from reports.report.measure import write_report
-    from validation.configurations.methods import QUICK, chosen_configurations
-    from validation.frames.scene_study import EFFORTS
+    from validation.study.configuration import QUICK, chosen_configurations
+    from validation.study.scene import EFFORTS
 
     if effort not in EFFORTS:
         raise InputError(f"effort: got {effort!r}, wanted one of {', '.join(EFFORTS)}" + nearest(effort, EFFORTS))

@@ -22,7 +22,7 @@ from analytic.errors import InputError
 from reference.storage.exr import TOTAL, Image
 from reference.storage.exr import layer as image_layer
 from reports.tables.table import number
-from validation.configurations.timing import FrameTimes
+from validation.study.frame_times import FrameTimes
 
 Array = NDArray[np.floating]
 

@@ -13,8 +13,8 @@ from reports.api.inputs import Progress, SceneLike, Size, kernel_name, one_error
 if TYPE_CHECKING:
     from analytic.cases import Cases
     from reports.api.tables import BenchTable, Integrals, PaperClaims
-    from validation.configurations.methods import Configuration
-    from validation.frames.benchmark import Measurement
+    from validation.study.configuration import Configuration
+    from validation.study.run import Measurement
 
 #: A name, 'module:function', a function, or a method with its kernel and parameters.
 MethodLike: TypeAlias = "str | Callable[..., Any] | Configuration"
@@ -150,7 +150,7 @@ def bench(
     from reports.api.tables import BenchTable
     from reports.machine.environment import activate, describe_environment
     from validation.estimates.quadrature import truth_image
-    from validation.frames.benchmark import configurations_for, measure
+    from validation.study.run import configurations_for, measure
 
     activate()
     chosen = chosen_methods(methods)
@@ -178,7 +178,7 @@ def several(things: Any) -> list[Any]:
 
 def chosen_methods(methods: Any) -> "tuple[Configuration, ...]":
     """Return what to measure, all standard configurations for None; see `bench`."""
-    from validation.configurations.methods import STANDARD, Configuration, chosen_configurations, configuration
+    from validation.study.configuration import STANDARD, Configuration, chosen_configurations, configuration
 
     if methods is None:
         return STANDARD

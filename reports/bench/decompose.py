@@ -45,10 +45,10 @@ def _decomposed_scene(name: str, pixels, chosen, *, apart, progress) -> tuple[di
     from realtime.errors import InputError
     from realtime.scene.read_scene import read_scene
     from validation.estimates.quadrature import truth_image
-    from validation.frames.benchmark import configurations_for, render_by_name
-    from validation.frames.decomposition import decompose, exact_sum, part_numbers
     from validation.metrics.errors import plain
     from validation.scenes.loading import load_scene
+    from validation.study.decompose import decompose, exact_sum, part_numbers
+    from validation.study.run import configurations_for, render_by_name
 
     loaded = load_scene(name, pixels)
     scene = read_scene(loaded.scene)

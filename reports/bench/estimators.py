@@ -8,9 +8,9 @@ def print_estimators(scenes: list[str] | None, *, size: str | None, force: bool,
     from reports.machine.progress import progress_bar
     from reports.tables.terminal import print_json
     from validation.estimates.efficiency import efficiency_lines, scene_efficiency, thin_fog
-    from validation.frames.expected_work import check_work, sampled_work
     from validation.scenes.loading import load_scene, parse_size
     from validation.scenes.registry import FOG_SCENES
+    from validation.study.cost import check_work, sampled_work
 
     pixels = parse_size(size) if size else (160, 120)
     activate()

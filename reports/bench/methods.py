@@ -36,10 +36,10 @@ def _bench_scene(name: str, pixels, chosen, *, margin: float | None, apart, prog
     from reports.data.serialize import measurement_data
     from reports.machine.progress import counted, part_of
     from validation.estimates.agreement import agreements
-    from validation.frames.benchmark import bench as run
-    from validation.frames.scene_study import EFFORTS
     from validation.metrics.errors import plain
     from validation.scenes.loading import load_scene
+    from validation.study.run import bench as run
+    from validation.study.scene import EFFORTS
 
     loaded = load_scene(name, pixels)
     share = 1.0 if margin is None else 0.6
@@ -81,6 +81,6 @@ def _print_tables(scenes: list[dict], *, markdown: bool) -> None:
 
 def steps(chosen) -> float:
     """Return how many steps a configuration marches."""
-    from validation.frames.expected_work import steps_of
+    from validation.study.cost import steps_of
 
     return steps_of(chosen.parameters) if chosen.method == "ray-march" else 0

@@ -23,8 +23,8 @@ def print_scaling(
     from reports.machine.progress import counted, part_of, progress_bar
     from reports.tables.scaling import cliffs, grown, scaling_tables
     from reports.tables.terminal import print_json
-    from validation.scaling.ladders import KINDS, ladder
-    from validation.scaling.study import study_scaling
+    from validation.study.growth import study_scaling
+    from validation.study.ladders import KINDS, ladder
 
     wanted = [kind.strip() for kind in kinds.split(",")]
     for kind in wanted:

@@ -24,12 +24,12 @@ from reports.machine.quick_compilation import in_full
 from reports.plotting.pictures import error_map, exposure, tone_mapped
 from validation.properties.properties import scene_properties
 from validation.scenes.loading import LoadedScene
-from validation.sweep.keys import Made, cell_key, row_source
-from validation.sweep.row import NO_TRUTH
-from validation.sweep.rows import RowStore
-from validation.sweep.study import Cell, Study
-from validation.sweep.truth import CellTruth, cell_truth, load_cell
-from validation.sweep.work import cell_columns, cell_row, cell_times
+from validation.study.keys import Made, cell_key, row_source
+from validation.study.reference import CellTruth, cell_truth, load_cell
+from validation.study.row import NO_TRUTH
+from validation.study.rows import RowStore
+from validation.study.study import Cell, Study
+from validation.study.work import cell_columns, cell_row, cell_times
 
 _LONG = ("ray-march",)  # methods whose one image takes longer than a good compilation of its kernels
 _AGAIN = ("failed", "hung", "aborted")  #: what `--again` computes again
@@ -98,7 +98,7 @@ def cell_groups(
     again
         Whether cells that failed, hung or aborted are computed again.
     scenes
-        Digests of scenes of files, see `validation.sweep.keys.cell_key`.
+        Digests of scenes of files, see `validation.study.keys.cell_key`.
     """
     for cells in study.images():
         keyed = {cell_key(cell, made, scenes): cell for cell in cells}

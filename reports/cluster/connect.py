@@ -138,7 +138,7 @@ def check_workers(client: Any) -> dict[str, dict[str, Any]]:
     from reports import __version__
     from reports.cluster.worker import facts
     from reports.machine.environment import activate
-    from validation.sweep.keys import made_here
+    from validation.study.keys import made_here
 
     own = made_here(__version__, activate())
     told: dict[str, Any] = client.run(facts, on_error="return")

@@ -24,7 +24,7 @@ from reports.machine.environment import activate
 from validation.estimates.monte_carlo import Elsewhere, ElsewhereFor, Trace, batch_tracer
 from validation.estimates.quadrature import has_truth, keep_truth, truth_image
 from validation.scenes.loading import load_scene
-from validation.sweep.keys import Made, made_here
+from validation.study.keys import Made, made_here
 
 _LIMIT = 6 * 3600.0  # of a truth or a batch [s]
 _WAVE = 8  # batches that are asked for at once by worker, where their number is not known before

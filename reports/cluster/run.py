@@ -106,7 +106,7 @@ def run_groups(
     groups
         Read as there is room for them.
     made
-        What workers must be made of, `validation.sweep.keys.Made`; None where any version will do.
+        What workers must be made of, `validation.study.keys.Made`; None where any version will do.
     retries
         How often a task is begun again whose process died.
     patience

@@ -45,7 +45,7 @@ class Order:
     limit: float  #: seconds
     needs: str  #: name of the task whose value it needs; empty for none
     keep: bool  #: whether its answer stays in the cluster, for other tasks
-    made: Any  #: `validation.sweep.keys.Made` of whoever asks; None for tasks that every version may do
+    made: Any  #: `validation.study.keys.Made` of whoever asks; None for tasks that every version may do
 
 
 def do(order: Order, function: Callable[..., Any], arguments: tuple[Any, ...], first: Answer | None = None) -> Answer:
@@ -89,10 +89,10 @@ def do(order: Order, function: Callable[..., Any], arguments: tuple[Any, ...], f
 
 
 def facts(dask_worker: Any) -> dict[str, Any]:
-    """Return what a worker is made of, `validation.sweep.keys.Made`, and whether it is alone on its host."""
+    """Return what a worker is made of, `validation.study.keys.Made`, and whether it is alone on its host."""
     from reports import __version__
     from reports.machine.environment import activate
-    from validation.sweep.keys import made_here
+    from validation.study.keys import made_here
 
     return {"made": made_here(__version__, activate()), "alone": is_alone(dask_worker)}
 
@@ -109,7 +109,7 @@ def _ready(worker: Any, order: Order) -> str | None:
     if "airlight_made" not in worker.__dict__:
         from reports import __version__
         from reports.machine.environment import activate
-        from validation.sweep.keys import made_here
+        from validation.study.keys import made_here
 
         worker.airlight_made = made_here(__version__, activate())
         import drjit as dr

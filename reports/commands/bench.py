@@ -166,11 +166,11 @@ def bench(
     from reports.machine.environment import activate
     from reports.machine.own_process import in_own_process
     from reports.machine.printing import print_notes
-    from validation.configurations.methods import rendered_lights
-    from validation.frames.expected_work import check_work, frame_work, truth_work
-    from validation.scaling.study import METHODS
     from validation.scenes.loading import load_scene, parse_size
     from validation.scenes.registry import FOG_SCENES
+    from validation.study.configuration import rendered_lights
+    from validation.study.cost import check_work, frame_work, truth_work
+    from validation.study.growth import METHODS
 
     chosen = named_configurations(
         method or [],

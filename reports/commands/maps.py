@@ -10,7 +10,7 @@ from reports.commands import completion
 from reports.commands.options import USUAL_LIMIT, Force, Json, Kernel, Markdown, MethodLimit, Scenes, Settings
 
 if TYPE_CHECKING:
-    from validation.frames.map_size import MapErrors, MapFlicker
+    from validation.study.maps import MapErrors, MapFlicker
 
 
 def maps(
@@ -49,10 +49,10 @@ def maps(
     from reports.machine.own_process import in_own_process
     from reports.machine.printing import print_heading
     from reports.tables.terminal import print_json
-    from validation.configurations.methods import parse_settings
     from validation.metrics.errors import plain
     from validation.scenes.loading import parse_size
     from validation.scenes.registry import FOG_SCENES
+    from validation.study.configuration import parse_settings
 
     pixels = parse_size(size)
     texels = parse_map_sizes("--sizes", sizes)
@@ -91,10 +91,10 @@ def _studied(
     """Return of every scene its name, the errors, and the flicker where the light moves."""
     from realtime.scene.read_scene import read_scene
     from reports.machine.progress import counted, part_of, progress_bar
-    from validation.configurations.methods import configuration, prepared
-    from validation.frames.expected_work import check_work, frame_work, truth_work
-    from validation.frames.map_size import map_errors, map_flicker
     from validation.scenes.loading import load_scene
+    from validation.study.configuration import configuration, prepared
+    from validation.study.cost import check_work, frame_work, truth_work
+    from validation.study.maps import map_errors, map_flicker
 
     loaded = [load_scene(name, pixels) for name in names]
     images = 1 + (moves["frames"] if moves else 0)

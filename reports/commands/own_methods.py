@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from reports.machine.own_process import LIMIT
 
 if TYPE_CHECKING:
-    from validation.configurations.methods import Configuration
+    from validation.study.configuration import Configuration
 
 ALL = "all"  #: the word for all built-in methods
 
@@ -25,7 +25,7 @@ def checked_configuration(
 ) -> "Configuration":
     """Return a configuration, checked; the user's own method is imported in a process of its own."""
     from reports.machine.own_process import in_own_process
-    from validation.configurations.methods import configuration
+    from validation.study.configuration import configuration
 
     check_limit(limit)
     if ":" not in method and ":" not in (kernel or ""):
@@ -63,7 +63,7 @@ def named_configurations(
     """
     from analytic.errors import InputError
     from realtime.methods.registry import FOG_METHODS
-    from validation.configurations.methods import chosen_configurations, parse_settings
+    from validation.study.configuration import chosen_configurations, parse_settings
 
     check_limit(limit)
     given = parse_settings(settings)

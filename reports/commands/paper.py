@@ -38,7 +38,7 @@ def paper(
     from reports.machine.printing import print_heading, print_tables
     from reports.tables.papers import count_words, number_tables, verdict_tables
     from reports.tables.terminal import print_json
-    from validation.frames.result_cache import now
+    from validation.study.results import now
 
     found = measured(name, quick=quick, fresh=fresh, progress=True)
     rows = found.rows

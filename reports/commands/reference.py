@@ -123,9 +123,9 @@ def reference(
     from reports.machine.progress import progress_bar
     from validation.estimates.budget import Budget
     from validation.estimates.images import cloud_orders
-    from validation.frames.expected_work import check_work, sampled_work, truth_work
     from validation.scenes.changes import parse_changes
     from validation.scenes.loading import load_scene, parse_size
+    from validation.study.cost import check_work, sampled_work, truth_work
 
     sampled = estimator is not Estimator.quadrature
     place = None if cluster is None else _place(cluster, time_budget)

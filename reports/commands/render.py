@@ -105,9 +105,9 @@ def render(
     from reports.commands.own_methods import checked_configuration
     from reports.machine.environment import activate
     from reports.machine.own_process import in_own_process
-    from validation.configurations.methods import parse_settings
     from validation.scenes.changes import parse_changes
     from validation.scenes.loading import parse_size
+    from validation.study.configuration import parse_settings
 
     name = single("--method", method) or "ray-march"
     own_kernel, given = single("--kernel", kernel), parse_settings(settings or [])
@@ -205,8 +205,8 @@ def _warn(warnings) -> None:
 
 
 def _check_work(name: str, scene, chosen, frames: int | None = None, *, force: bool) -> None:
-    from validation.configurations.methods import rendered_lights
-    from validation.frames.expected_work import TIMED, check_work, frame_work, steps_of
+    from validation.study.configuration import rendered_lights
+    from validation.study.cost import TIMED, check_work, frame_work, steps_of
 
     size = scene.camera.width, scene.camera.height
     marches = chosen.method == "ray-march" or "steps" in dict(chosen.parameters)
@@ -221,7 +221,7 @@ def _prepared(scene, chosen, *, extra_layers: bool = False):
     """Return the frame renderer; print the notes on the scene, and the warnings of its casters."""
     from realtime.methods.shadow_planes.method import PlanePreparation
     from reports.machine.printing import print_notes
-    from validation.configurations.methods import prepared
+    from validation.study.configuration import prepared
 
     print_notes(scene.features.notes)
     renderer = prepared(scene, chosen, extra_layers=extra_layers)
@@ -250,9 +250,9 @@ def _render(
     from realtime.scene.read_scene import read_scene
     from reports.interchange.frames import write_frame
     from reports.machine.progress import progress_bar
-    from validation.configurations.methods import prepared
-    from validation.frames.expected_work import TIMED
     from validation.scenes.loading import load_scene
+    from validation.study.configuration import prepared
+    from validation.study.cost import TIMED
 
     loaded = load_scene(name_or_path, pixels, changes)
     scene = read_scene(loaded.scene, precision)
@@ -278,7 +278,7 @@ def _render(
 
 def _costs(renderer) -> dict[str, Any]:
     """Return what frames cost, after nothing changed and after something did."""
-    from validation.configurations.timing import time_frame
+    from validation.study.frame_times import time_frame
 
     times = time_frame(renderer)
     return {

@@ -187,9 +187,9 @@ def _measured(
     from reports.report.asked import notes_on, scenes_of_images
     from reports.report.measure import write_report
     from validation.comparison.engine_images import images_size
-    from validation.configurations.methods import QUICK
-    from validation.frames.expected_work import check_work, frame_work, truth_work
-    from validation.frames.scene_study import EFFORTS
+    from validation.study.configuration import QUICK
+    from validation.study.cost import check_work, frame_work, truth_work
+    from validation.study.scene import EFFORTS
 
     place = None if cluster is None else parse_place(cluster)
     if place is not None:

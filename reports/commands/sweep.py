@@ -12,9 +12,9 @@ from reports.commands.options import ClusterPlace, Json
 
 if TYPE_CHECKING:
     from reports.cluster.connect import Place
-    from validation.sweep.keys import Made
-    from validation.sweep.rows import RowStore
-    from validation.sweep.study import Study
+    from validation.study.keys import Made
+    from validation.study.rows import RowStore
+    from validation.study.study import Study
 
 _USUAL = 100  # random scenes of a study without a file
 _EVERY = 300.0  # between two times that the Parquet is written while rows come [s]
@@ -64,8 +64,8 @@ def sweep(
     from analytic.errors import InputError
     from reports.cluster.connect import check_library, parse_place
     from reports.machine.environment import activate
-    from validation.sweep.rows import RowStore
-    from validation.sweep.study import default_study, read_study
+    from validation.study.rows import RowStore
+    from validation.study.study import default_study, read_study
 
     if redraw is not None:
         given = {"a study": study, "--random": random, "--cluster": cluster, "--again": again or None}
@@ -132,7 +132,7 @@ def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, aga
 
     from reports import __version__
     from reports.cluster.cells import cell_groups, row_without_numbers, timing_groups
-    from validation.sweep.keys import made_here, scene_identities
+    from validation.study.keys import made_here, scene_identities
 
     made, scenes = made_here(__version__, variant), scene_identities(study.scenes)
     how: dict[str, Any] = {"store": store, "scenes": scenes}
@@ -184,7 +184,7 @@ def _part(
     from reports.cluster.connect import connected
     from reports.cluster.run import run_groups
     from reports.machine.progress import progress_bar
-    from validation.sweep.study import Cell
+    from validation.study.study import Cell
 
     missing = sum(len(cells) for _, cells in groups_of(study, made))
     counts: Counter[str] = Counter()

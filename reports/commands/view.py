@@ -42,9 +42,9 @@ def view(
 
     check_library()
     from reports.machine.environment import activate
-    from validation.configurations.methods import configuration, parse_settings
     from validation.scenes.changes import parse_changes
     from validation.scenes.loading import parse_size
+    from validation.study.configuration import configuration, parse_settings
 
     name = single("--method", method) or "shadow-planes"
     own_kernel, given = single("--kernel", kernel), parse_settings(settings or [])

@@ -10,10 +10,10 @@ from typing import Any
 from realtime.scene.features import describe
 from reference.quadrature.ray_values import TruthImage
 from validation.comparison.engine_images import ImageMeasurement
-from validation.frames.benchmark import Measurement, knows_shadows
-from validation.frames.scene_study import SceneStudy
 from validation.metrics.errors import plain
-from validation.scaling.study import Scaling
+from validation.study.growth import Scaling
+from validation.study.run import Measurement, knows_shadows
+from validation.study.scene import SceneStudy
 
 
 def scene_facts(study: SceneStudy) -> dict[str, Any]:

@@ -54,8 +54,8 @@ def _estimator_rows(scene: str, image: tuple[int, int], estimator: str, batches:
     from validation.estimates.agreement import layer_mean
     from validation.estimates.expected_airlight import estimator_truth
     from validation.estimates.monte_carlo import monte_carlo_batches
-    from validation.frames.map_size import fitted_slope
     from validation.scenes.loading import load_scene
+    from validation.study.maps import fitted_slope
 
     loaded = load_scene(scene, image).scene
     expected, mask = estimator_truth(loaded, estimator)

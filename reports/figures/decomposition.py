@@ -15,7 +15,7 @@ from reports.machine.progress import Progress, counted
 from reports.plotting.style import WIDTHS
 
 if TYPE_CHECKING:
-    from validation.frames.decomposition import Decomposition
+    from validation.study.decompose import Decomposition
 
 NAME = "decomposition"
 SUMMARY = "images of methods with their error and its parts by cause, which add up to it"
@@ -41,10 +41,10 @@ def compute(folder: Path | str, *, quick: bool = False, scene: str = SCENE, prog
         A built-in scene or the path of a Mitsuba XML file.
     """
     from realtime.scene.read_scene import read_scene
-    from validation.configurations.methods import configuration
     from validation.estimates.quadrature import truth_image
-    from validation.frames.decomposition import decompose
     from validation.scenes.loading import load_scene
+    from validation.study.configuration import configuration
+    from validation.study.decompose import decompose
 
     loaded = load_scene(scene, (96, 72) if quick else (240, 180))
     read, truth = read_scene(loaded.scene), truth_image(loaded.scene).airlight

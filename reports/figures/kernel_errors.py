@@ -33,9 +33,9 @@ def compute(folder: Path | str, *, quick: bool = False, progress: Progress | Non
     import numpy as np
 
     from realtime.kernels.registry import KERNELS
-    from validation.configurations.kernel_names import find_kernel
     from validation.kernels.errors import relative_error
     from validation.kernels.values import evaluate_cases
+    from validation.study.configuration import find_kernel
 
     target = ensure_folder(folder)
     cases, depth, angle = _rays(*((24, 18) if quick else (48, 37)))

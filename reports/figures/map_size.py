@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The figure of the shadow map's size: the error of methods with a shadow map over its size, with the fitted slopes.
 
-The lines are `validation.frames.map_size.fitted_slope`: error ~ size^-order; its docstring derives why the order is 1
+The lines are `validation.study.maps.fitted_slope`: error ~ size^-order; its docstring derives why the order is 1
 or a little less.
 """
 
@@ -47,8 +47,8 @@ def compute(
     sizes
         Of the shadow map [texels].
     """
-    from validation.frames.map_size import map_errors
     from validation.scenes.loading import load_scene
+    from validation.study.maps import map_errors
 
     target = ensure_folder(folder)
     image = (96, 72) if quick else (160, 120)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The figure of scaling: the time of a frame over its work, by kind of work, with the fitted exponents and the floor.
 
-The lines are those of `validation.scaling.study`: time ~ work^exponent.
+The lines are those of `validation.study.growth`: time ~ work^exponent.
 """
 
 from collections.abc import Sequence
@@ -39,12 +39,12 @@ def compute(
     scene
         A built-in scene or the path of a Mitsuba XML file.
     kinds
-        Of `validation.scaling.ladders.KINDS`.
+        Of `validation.study.ladders.KINDS`.
     size
         Of the image [pixels].
     """
-    from validation.scaling.ladders import ladder
-    from validation.scaling.study import METHODS, study_scaling
+    from validation.study.growth import METHODS, study_scaling
+    from validation.study.ladders import ladder
 
     target = ensure_folder(folder)
     image = size or ((160, 120) if quick else (800, 600))

@@ -58,8 +58,8 @@ def write_frames(
     """
     import numpy as np
 
-    from validation.configurations.timing import timed_image
     from validation.scenes.animation import animate, moved_parts
+    from validation.study.frame_times import timed_image
 
     cost: list[tuple[float, float]] = []
     kept = None
@@ -104,7 +104,7 @@ def write_frame(name: str, chosen, frame, *, outputs: dict[str, Path | None], cu
     if outputs["exr"] is not None:
         from reference.storage.exr import write_exr
         from reports.machine.environment import stamped
-        from validation.estimates.images import layered_frame
+        from validation.study.run import layered_frame
 
         image = layered_frame(name, chosen, frame)
         if samples > 1:

@@ -10,10 +10,10 @@ from reports.machine.environment import machine
 from reports.machine.progress import Progress, part_of
 from reports.report.expected import shares
 from reports.report.papers import OtherPart
-from validation.frames.result_cache import CachedResult, Computed, cached_result
-from validation.frames.scene_study import Effort
 from validation.papers.claims import Claim, claims, judged
 from validation.papers.experiments import EFFORTS, EXPERIMENTS
+from validation.study.results import CachedResult, Computed, cached_result
+from validation.study.scene import Effort
 
 
 def paper_parts(effort: Effort, scenes: Sequence[str]) -> list[OtherPart]:

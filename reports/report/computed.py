@@ -11,11 +11,11 @@ from reports.data.serialize import image_data, measurement_data, truth_data
 from reports.machine.environment import stamped
 from reports.plotting.pictures import error_map, exposure, png_bytes, tone_mapped
 from validation.comparison.engine_images import EngineImage, ImageMeasurement, image_flip, measure_image
-from validation.estimates.images import layered_frame, layered_truth
-from validation.frames.benchmark import Measurement
-from validation.frames.result_cache import Computed
-from validation.frames.scene_study import SceneStudy
+from validation.estimates.images import layered_truth
 from validation.metrics.flip import Flip
+from validation.study.results import Computed
+from validation.study.run import Measurement, layered_frame
+from validation.study.scene import SceneStudy
 
 
 def truth_result(study: SceneStudy) -> Computed:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The error report: studies written down as EXR files, pictures, report.json and one page of HTML.
 
-Every result is kept on disk as soon as it is there (`validation.frames.result_cache`): a report that was killed goes on
+Every result is kept on disk as soon as it is there (`validation.study.results`): a report that was killed goes on
 where it stopped, and one in which nothing changed measures nothing. The files of a report appear when it is whole.
 """
 
@@ -36,14 +36,14 @@ from reports.report.papers import OtherPart, other_parts
 from reports.report.scene import OwnMethods, SceneKeys, folder_of, scene_report
 from reports.report.staging import staged
 from validation.comparison.engine_images import EngineImage, images_size
-from validation.configurations.methods import STANDARD, Configuration, prepared
-from validation.frames.benchmark import Apart, render_by_name
-from validation.frames.result_cache import CachedResult, cached_result, now
-from validation.frames.scene_study import Effort, SceneStudy, open_study
 from validation.metrics.errors import plain
 from validation.scenes.loading import scene_stem
 from validation.scenes.random_scene import is_random
 from validation.scenes.registry import FOG_SCENES, SCENES
+from validation.study.configuration import STANDARD, Configuration, prepared
+from validation.study.results import CachedResult, cached_result, now
+from validation.study.run import Apart, render_by_name
+from validation.study.scene import Effort, SceneStudy, open_study
 
 
 def write_report(

@@ -13,9 +13,9 @@ from reports.data.serialize import scaling_data
 from reports.machine.environment import machine
 from reports.machine.own_process import in_own_process
 from reports.machine.progress import Progress, counted
-from validation.frames.result_cache import Computed
-from validation.frames.scene_study import Effort
 from validation.metrics.errors import plain
+from validation.study.results import Computed
+from validation.study.scene import Effort
 
 _GROWING = "colonnade"  # of which times are measured as its work grows
 _GROWING_SIZE = (400, 300)  # of its images [pixels]
@@ -63,8 +63,8 @@ def known_kernels(rays: int) -> list[dict[str, Any]]:
 
 def _scaling(kind: str, seconds: float) -> OtherPart:
     """Return how times grow with one kind of work."""
-    from validation.scaling.ladders import ladder
-    from validation.scaling.study import METHODS, study_scaling
+    from validation.study.growth import METHODS, study_scaling
+    from validation.study.ladders import ladder
 
     def compute(progress: Progress) -> Computed:
         steps = ladder(kind, _GROWING, _GROWING_SIZE)

@@ -17,11 +17,12 @@ from reports.machine.progress import Progress, part_of
 from reports.report.computed import judged_result, measured_result, truth_result
 from reports.report.expected import scene_seconds, shares
 from validation.comparison.engine_images import EngineImage
-from validation.configurations.methods import Configuration
-from validation.configurations.user_code import user_code
 from validation.estimates.monte_carlo import ElsewhereFor
-from validation.frames.benchmark import Apart, Measurement, configurations_for
-from validation.frames.result_cache import (
+from validation.metrics.errors import plain
+from validation.scenes.identity import scene_identity
+from validation.scenes.loading import scene_stem
+from validation.study.configuration import Configuration, user_code
+from validation.study.results import (
     CachedResult,
     Computed,
     cached_result,
@@ -29,7 +30,8 @@ from validation.frames.result_cache import (
     now,
     store_result,
 )
-from validation.frames.scene_study import (
+from validation.study.run import Apart, Measurement, configurations_for
+from validation.study.scene import (
     Effort,
     SceneStudy,
     check_truth,
@@ -38,9 +40,6 @@ from validation.frames.scene_study import (
     wants_flip,
     with_flips,
 )
-from validation.metrics.errors import plain
-from validation.scenes.identity import scene_identity
-from validation.scenes.loading import scene_stem
 
 #: Files of a report by what they are.
 SUFFIXES = {"exr": ".exr", "picture": ".png", "airlight": "-airlight.png", "error": "-error.png"}

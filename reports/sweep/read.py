@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from validation.sweep.row import COLUMNS, PROPERTY, STATUSES
+from validation.study.row import COLUMNS, PROPERTY, STATUSES
 
 FILE = "sweep.parquet"  #: in the folder of a sweep
 

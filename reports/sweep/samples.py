@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reports.sweep.read import Numbers, Sweep, Texts, natural
-from validation.sweep.row import NO_TRUTH
+from validation.study.row import NO_TRUTH
 
 FAULTS = ("failed", "hung", "aborted")  #: what became of a cell that neither ended nor was refused
 UNTOLD = "no truth"  #: of a scene whose truth was not done, so that no method was asked

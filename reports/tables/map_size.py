@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from reports.tables.table import Table, number, numbers, table
 
 if TYPE_CHECKING:
-    from validation.frames.map_size import MapErrors, MapFlicker, Slope
+    from validation.study.maps import MapErrors, MapFlicker, Slope
 
 _SHARES = {"digits": 2, "share": True}
 

@@ -21,9 +21,9 @@ from realtime.frame.renderer import Frame, FrameRenderer, image_frame
 from realtime.methods.interface.method import method_parameters
 from realtime.scene.read_scene import read_again, read_scene
 from reports.view.stages import timed_stages
-from validation.configurations.methods import Configuration, prepared
 from validation.scenes.changes import Values, change_scene, changeable, isotropic_media
 from validation.scenes.loading import load_scene
+from validation.study.configuration import Configuration, prepared
 
 _KEPT = 6  # configurations of which the recorded functions are kept
 

@@ -34,9 +34,9 @@ from reports.view.widgets import (
     parameter_widgets,
     scene_widgets,
 )
-from validation.configurations.methods import Configuration, configuration
 from validation.metrics.errors import plain
 from validation.scenes.changes import Values
+from validation.study.configuration import Configuration, configuration
 
 _AHEAD = 2  # frames that are sent before the page has shown the first of them
 _QUIET = 0.15  # after so long without a change the page is told where all stands [s]
@@ -347,7 +347,7 @@ def sparing(method: str, kernel: Any, given: Mapping[str, Any]) -> Configuration
     Raises
     ------
     InputError
-        As `validation.configurations.methods.configuration`.
+        As `validation.study.configuration.configuration`.
     """
     record = find_method(method)
     own, light_points = method_parameters(record, given)

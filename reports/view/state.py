@@ -5,8 +5,8 @@ import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from validation.configurations.methods import Configuration
 from validation.scenes.changes import Values, change_words
+from validation.study.configuration import Configuration
 
 
 @dataclass(frozen=True)

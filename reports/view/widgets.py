@@ -9,8 +9,8 @@ from realtime.kernels.registry import KERNELS
 from realtime.methods.interface.method import Method, method_parameters
 from realtime.methods.registry import METHODS, find_method
 from realtime.parameters import limits_of
-from validation.configurations.methods import Configuration
 from validation.scenes.changes import Changeable
+from validation.study.configuration import Configuration
 
 
 def method_widgets(own: str) -> list[dict[str, Any]]:

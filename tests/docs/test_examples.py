@@ -15,7 +15,7 @@ import pytest
 
 from reports.commands.main import run
 from tests.helpers.scenes import tiny_scene
-from validation.configurations.methods import configuration
+from validation.study.configuration import configuration
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -112,7 +112,7 @@ def test_the_worked_method_is_measured_like_a_built_in_one(fog, variant):
 
     from realtime.scene.read_scene import read_scene
     from validation.estimates.quadrature import truth_image
-    from validation.frames.benchmark import measure
+    from validation.study.run import measure
 
     loaded = mi.load_dict(tiny_scene())
     scene, truth = read_scene(loaded), truth_image(loaded)
@@ -135,7 +135,7 @@ def test_the_plain_method_returns_what_the_page_says(fog, variant):
 
     from realtime.frame.renderer import render_frame
     from realtime.scene.read_scene import read_scene
-    from validation.configurations.methods import prepared
+    from validation.study.configuration import prepared
 
     scene = read_scene(mi.load_dict(tiny_scene()))
     frame = render_frame(prepared(scene, configuration(f"{fog.parent / 'plain.py'}:uniform_fog")))

@@ -27,13 +27,13 @@ from realtime.kernels.registry import KERNELS
 from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import Scene, read_scene
 from reference.quadrature.ray_values import TruthImage
-from validation.configurations.methods import STANDARD, Configuration, prepared
 from validation.estimates.quadrature import truth_image
-from validation.frames.benchmark import configurations_for
 from validation.metrics.errors import error_metrics, plain
 from validation.scenes.loading import load_scene
 from validation.scenes.registry import FOG_SCENES
 from validation.statistics.noise import ERROR_TOLERANCE, error_band
+from validation.study.configuration import STANDARD, Configuration, prepared
+from validation.study.run import configurations_for
 
 FOLDER = Path(__file__).parent / "baselines"
 SIZE = (64, 48)  # of the images [pixels]

@@ -295,7 +295,7 @@ def _fault(order: list[str]) -> tuple[str, str]:
 
 def _child(kind: str, path: Path, report: Path) -> None:
     from reports.machine.environment import activate
-    from validation.frames import scene_study
+    from validation.study import scene as scene_study
 
     os.environ["AIRLIGHT_CACHE_DIR"] = str(path.parent / "cache")
     activate()

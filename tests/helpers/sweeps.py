@@ -8,7 +8,7 @@ import json
 import numpy as np
 from PIL import Image
 
-from validation.sweep.row import arrow_schema, checked_row, property_names
+from validation.study.row import arrow_schema, checked_row, property_names
 
 #: method, kernel, parameters, and the median of its error, its spread in e-folds, and its time [ms].
 METHODS = (

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from realtime.frame.renderer import Frame
 from reference.monte_carlo.batches import LARGEST_SEED, Batches, seed_ranges
 from reference.monte_carlo.cloud_paths.opacity import seen_clouds
 from reference.quadrature.light_points import REPLICATES
@@ -21,7 +20,6 @@ from reference.scene.clouds import read_clouds
 from reference.scene.read import read_truth
 from reference.storage.exr import Image
 from reference.storage.scene_digest import scene_digest
-from validation.configurations.methods import Configuration
 from validation.estimates.budget import LEAST_BATCHES, Budget, RelativeErrors, batch_plan, near_light, relative_errors
 from validation.estimates.monte_carlo import Elsewhere, monte_carlo_batches
 from validation.estimates.quadrature import truth_image
@@ -67,14 +65,6 @@ def layered_truth(name: str, truth: TruthImage) -> Image:
     if truth.airlight_se is not None:
         made["airlight:batches"] = REPLICATES
     return Image(layers, truth.distance, made)
-
-
-def layered_frame(name: str, chosen: Configuration, frame: Frame) -> Image:
-    """Return a frame of the scene of that name as layers; the header says what rendered it."""
-    attributes = {"airlight:scene": name, "airlight:method": chosen.method}
-    attributes |= {"airlight:kernel": chosen.kernel} if chosen.kernel else {}
-    attributes |= {f"airlight:{key}": str(value) for key, value in chosen.parameters}
-    return Image({"airlight": frame.airlight, "surface": frame.surface, **frame.extra}, frame.distance, attributes)
 
 
 @dataclass(frozen=True)

@@ -25,11 +25,11 @@ from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
 from realtime.scene.phase import named_phase
-from validation.configurations.kernel_names import find_kernel, sized, split_name
-from validation.configurations.timing import Timing, time_repeated
 from validation.kernels.errors import relative_error
 from validation.kernels.rays import wide_rays
 from validation.kernels.values import TABLE, Kernel
+from validation.study.clock import Timing, time_repeated
+from validation.study.configuration import find_kernel, sized, split_name
 
 Progress = Callable[[int, int, str], None]
 
@@ -66,7 +66,7 @@ class Spread:
 class KernelCost:
     """What one kernel of one size costs for one phase function, and its relative errors in float32."""
 
-    kernel: str  #: as in `validation.configurations.kernel_names.find_kernel`
+    kernel: str  #: as in `validation.study.configuration.find_kernel`
     family: str  #: the kernel without its size
     size: int | None
     phase: str
@@ -121,7 +121,7 @@ def bench_kernels(
     Parameters
     ----------
     names
-        Kernels as in `validation.configurations.kernel_names.find_kernel`; 'name' stands for all its sizes, 'name-N'
+        Kernels as in `validation.study.configuration.find_kernel`; 'name' stands for all its sizes, 'name-N'
         for one. All of the registry by default.
     phases
         Phase functions with their g: the first with all sizes, the others with the default sizes.

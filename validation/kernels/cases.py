@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from analytic.cases import Cases
 from analytic.errors import InputError
 from reference.storage.files import write_text
-from validation.configurations.kernel_names import find_kernel
 from validation.kernels.values import evaluate_rows
+from validation.study.configuration import find_kernel
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
     cases
         From `analytic.cases.read_cases`; where it has rays, foot and height are computed from them in `precision`.
     kernel
-        See `validation.configurations.kernel_names.find_kernel`.
+        See `validation.study.configuration.find_kernel`.
     precision
         'single' or 'double'.
 

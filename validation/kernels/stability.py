@@ -17,10 +17,10 @@ import numpy as np
 from analytic.cases import Cases, read_cases
 from realtime.kernels.registry import KERNELS
 from validation.certified.files import certified_data
-from validation.configurations.kernel_names import find_kernel
 from validation.kernels.errors import EPSILON, Errors, Rows, errors_by_group, groups
 from validation.kernels.rays import hard_rays, slivers
 from validation.kernels.values import Kernel, Values, evaluate_cases
+from validation.study.configuration import find_kernel
 
 Progress = Callable[[int, int, str], None]
 
@@ -91,7 +91,7 @@ def stability(
     Parameters
     ----------
     names
-        Kernels as in `validation.configurations.kernel_names.find_kernel`; all of the registry by default.
+        Kernels as in `validation.study.configuration.find_kernel`; all of the registry by default.
     count
         Number of generated rays.
     progress

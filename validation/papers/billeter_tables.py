@@ -28,12 +28,13 @@ from realtime.scene.read_scene import Scene, read_scene
 from realtime.shadow_maps.shadow_map import cast_shadow_map
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import TruthScene, read_truth
-from validation.configurations.methods import configuration, prepared
-from validation.configurations.timing import moved_light, time_repeated
 from validation.metrics.errors import error_metrics
 from validation.papers.measured import attempted, frame_within, milliseconds, rate
 from validation.scenes.colonnade import colonnade
 from validation.scenes.loading import load_scene, resize
+from validation.study.clock import time_repeated
+from validation.study.configuration import configuration, prepared
+from validation.study.frame_times import moved_light
 
 Array = NDArray[np.float64]
 

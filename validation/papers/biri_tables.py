@@ -37,12 +37,13 @@ from realtime.methods.shadow_planes.silhouettes import silhouette
 from realtime.methods.shadow_planes.view_culling import components_in_view
 from realtime.scene.camera import read_camera
 from realtime.scene.read_scene import Scene, read_scene
-from validation.configurations.methods import Configuration, configuration, prepared
-from validation.configurations.timing import Timing, first_frame, moved_light, time_in_turns
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import error_metrics
 from validation.papers.measured import milliseconds, rate
 from validation.scenes.loading import load_scene
+from validation.study.clock import Timing, time_in_turns
+from validation.study.configuration import Configuration, configuration, prepared
+from validation.study.frame_times import first_frame, moved_light
 
 STAGES = ("silhouettes", "scene", "airlight", "sorting", "planes")  #: of Table 1
 _COMPARED = (320, 240)  # size of the frames that are compared: the default report keeps these references [pixels]

@@ -40,14 +40,15 @@ from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene, read_scene
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth
 from reference.scene.read import read_truth
-from validation.configurations import methods
-from validation.configurations.timing import moved_light, time_in_turns
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import error_metrics
 from validation.papers.measured import milliseconds
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.parts import lathe, mitsuba_mesh, placed
 from validation.scenes.sphere_spot import sphere_spot
+from validation.study import configuration as methods
+from validation.study.clock import time_in_turns
+from validation.study.frame_times import moved_light
 
 Array = NDArray[np.float64]
 

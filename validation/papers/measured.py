@@ -8,7 +8,7 @@ from typing import Any
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeError
 from realtime.frame.renderer import Frame, FrameRenderer, render_frame
-from validation.configurations.timing import Timing
+from validation.study.clock import Timing
 
 LIMIT = 30.0  #: frames that take longer are not measured [s]
 

@@ -18,11 +18,11 @@ from realtime.methods.light_volumes.published.tessellation import divide, edges,
 from realtime.scene.animate import thicker_medium
 from realtime.scene.read_scene import Scene, read_scene
 from realtime.shadow_maps.shadow_map import cast_shadow_map
-from validation.configurations.methods import configuration, prepared
 from validation.papers.light_volumes import corner_heights, plain_edges, quad_levels
 from validation.scenes.colonnade import colonnade
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.parts import point_light
+from validation.study.configuration import configuration, prepared
 
 Array = NDArray[np.float64]
 

@@ -25,13 +25,13 @@ from numpy.typing import NDArray
 from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import Scene, read_scene
 from reference.monte_carlo.batches import LAYERS
-from validation.configurations.methods import configuration, prepared
 from validation.estimates.monte_carlo import monte_carlo_batches
 from validation.estimates.multiple_scattering import multiple_scattering_share
 from validation.metrics.errors import error_metrics
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.open_fog import open_fog
 from validation.scenes.parts import camera
+from validation.study.configuration import configuration, prepared
 
 Array = NDArray[np.float64]
 

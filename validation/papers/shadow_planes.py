@@ -16,11 +16,11 @@ from analytic.geometry import foot_and_height
 from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
 from reference.scene.read import read_truth
-from validation.configurations.methods import configuration, prepared
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import Metrics, error_metrics
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.parts import camera, fog, point_light
+from validation.study.configuration import configuration, prepared
 
 Array = NDArray[np.float64]
 

@@ -110,7 +110,7 @@ def light_volumes(
     -----
     Valid for all lights and any shapes that rays can be cast against; the map of a directional light covers the media,
     and its shadows on surfaces always come from rays. Exact with respect to the shadow map:
-    what it misses of the scene falls as the size of a texel (`validation.frames.map_size`). A map that sees nothing
+    what it misses of the scene falls as the size of a texel (`validation.study.maps`). A map that sees nothing
     lights everything; a light inside a closed occluder lights nothing outside it. Bounded media are for
     evaluation=walk; they have nodes of their own, but for a polynomial kernel.
 

@@ -171,9 +171,9 @@ def test_random_scenes_against_the_truth(variant, scene, bound):
     """
     from realtime.frame.renderer import render_frame
     from realtime.scene.read_scene import read_scene
-    from validation.configurations.methods import configuration, prepared
     from validation.estimates.quadrature import truth_image
     from validation.scenes.loading import load_scene
+    from validation.study.configuration import configuration, prepared
 
     loaded = load_scene(scene, (64, 48)).scene
     truth = truth_image(loaded).airlight

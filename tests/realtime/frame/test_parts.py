@@ -53,8 +53,8 @@ def test_frames_of_an_animation_are_the_same_in_parts(name, variant, monkeypatch
     import realtime.frame.renderer as module
     from realtime.frame.incremental import next_frame
     from realtime.scene.animate import coloured_light, turned_light
-    from validation.configurations.timing import timed_image
     from validation.scenes.parts import rotation
+    from validation.study.frame_times import timed_image
 
     made = renderer(name)
     read, turn = made.scene, rotation([0.3, 0.9, -0.2], 11.0)

@@ -7,9 +7,9 @@ import pytest
 from realtime.frame.renderer import render_frame
 from realtime.frame.samples import render_samples
 from realtime.scene.read_scene import read_scene
-from validation.configurations.methods import configuration, prepared
 from validation.estimates.quadrature import truth_image
 from validation.scenes.loading import load_scene
+from validation.study.configuration import configuration, prepared
 
 
 @pytest.mark.parametrize("method", ["shadow-planes", "froxel-fog"])

@@ -19,7 +19,7 @@ from realtime.frame.renderer import render_frame
 from realtime.methods.registry import METHODS
 from realtime.scene.read_scene import read_scene
 from tests.helpers.transport_formula import use_formula
-from validation.configurations.methods import configuration, prepared
+from validation.study.configuration import configuration, prepared
 from validation.scenes.loading import load_scene
 
 # The tables of clouds take minutes to make, and are the same whoever draws.

@@ -14,7 +14,7 @@ from realtime.methods.interface.layers import Layers
 from realtime.scene.animate import coloured_light
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
-from validation.configurations.methods import configuration, prepared
+from validation.study.configuration import configuration, prepared
 
 SIZE = 24, 16
 FAR = 99.0  # in place of no surface

@@ -85,7 +85,7 @@ def test_moved_objects_render_as_a_scene_read_anew(pens):
     """Frozen functions recorded before the move, against a renderer made after it."""
     from realtime.frame.renderer import render_frame
     from realtime.scene.read_scene import read_scene
-    from validation.configurations.methods import configuration, prepared
+    from validation.study.configuration import configuration, prepared
 
     renderer = prepared(pens, configuration("shadow-planes"))
     before = render_frame(renderer)

@@ -85,8 +85,8 @@ def test_one_kernel_serves_images_of_all_sizes(variant):
 
     from realtime.frame.renderer import render_frame
     from realtime.scene.read_scene import read_scene
-    from validation.configurations.methods import configuration, prepared
     from validation.scenes.loading import load_scene
+    from validation.study.configuration import configuration, prepared
 
     launched = []
     for size in ((64, 48), (96, 80)):

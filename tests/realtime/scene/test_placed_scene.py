@@ -18,8 +18,8 @@ def bumpy_ball(turn=None, *, normals: bool):
     """
     import mitsuba as mi
 
-    from validation.scaling.subdivision import bumpy
     from validation.scenes.solids import icosphere
+    from validation.study.subdivision import bumpy
 
     sphere, faces = icosphere(3)
     vertices = 0.31 * bumpy(sphere, np.full(3, -1.0), 3.5) * (1.0, 0.6, 1.3) + np.array([0.13, -0.07, 0.73])
@@ -53,7 +53,7 @@ def read(turn=None, *, normals: bool = False):
 
 def image(scene, method: str, parameters):
     from realtime.frame.renderer import render_frame
-    from validation.configurations.methods import configuration, prepared
+    from validation.study.configuration import configuration, prepared
 
     return render_frame(prepared(scene, configuration(method, None, parameters)))
 

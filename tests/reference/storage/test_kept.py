@@ -184,12 +184,12 @@ def functions():
     from reference.quadrature.image import quadrature_image
     from reports.page.image_index import packed_scene
     from reports.report.computed import judged_result, measured_result, truth_result
-    from validation.frames.scene_study import check_truth, study_multiple
     from validation.kernels.rays import _truth
     from validation.kernels.stability import stability
-    from validation.scaling.study import study_scaling
-    from validation.sweep.sampled_truth import sampled_truth
-    from validation.sweep.work import cell_row
+    from validation.study.growth import study_scaling
+    from validation.study.reference import sampled_truth
+    from validation.study.scene import check_truth, study_multiple
+    from validation.study.work import cell_row
 
     quadrature = "reference.quadrature.segments"
     return {

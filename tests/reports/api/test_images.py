@@ -46,7 +46,7 @@ def test_a_scene_by_name_dictionary_mitsuba_scene_and_again(variant):
 
 
 def test_a_frame_is_that_of_the_parts_it_is_made_of(variant):
-    from validation.configurations.methods import configuration, prepared
+    from validation.study.configuration import configuration, prepared
 
     frame = airlight.render("sphere-spot", "shadow-planes", "quadrature-32", size=TINY, order="paper")
     scene = airlight.read_scene(airlight.load_scene("sphere-spot", TINY).scene)

@@ -18,7 +18,7 @@ import pytest
 from analytic.errors import InputError
 from reports import __version__
 from reports.cluster.connect import Cluster, Place, connected, parse_place
-from validation.sweep.keys import made_here
+from validation.study.keys import made_here
 
 pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
 

@@ -10,8 +10,8 @@ pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
 
 from reports.cluster.connect import Place, connected
 from reports.report.measure import write_report
-from validation.configurations.methods import configuration
-from validation.frames.scene_study import EFFORTS
+from validation.study.configuration import configuration
+from validation.study.scene import EFFORTS
 
 #: Names of what is measured by the clock.
 TIMES = {"created", "seconds", "parts", "measured", "stages", "times", "environment", "claims"}

@@ -67,7 +67,7 @@ def test_kernels_are_named_by_an_option(variant, capfd, monkeypatch):
 def test_scaling_that_grows_more_steeply_than_before_ends_with_1(variant, capfd, monkeypatch, tmp_path):
     from tests.helpers.reports import growth_record
 
-    monkeypatch.setattr("validation.scaling.study.study_scaling", lambda *given, **options: [growth_record()])
+    monkeypatch.setattr("validation.study.growth.study_scaling", lambda *given, **options: [growth_record()])
     monkeypatch.setattr("reports.data.serialize.scaling_data", lambda name, size, found: found)
     before = tmp_path / "before.json"
     arguments = ["sphere-spot", "--scaling", "size", "--method", "unshadowed", "--against", str(before)]

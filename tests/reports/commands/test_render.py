@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-import validation.configurations.timing
+import validation.study.frame_times
 from reference.storage.exr import read_exr
 from reports.commands import main as cli
 
@@ -37,8 +37,8 @@ def test_frames_are_numbered_files_that_differ_and_begin_as_the_scene_stands(var
 @pytest.mark.claim("render-says-what-it-wrote")
 def test_what_was_written_is_said_and_times_are_measured_only_if_asked(variant, tmp_path, capfd, monkeypatch):
     timed = []
-    real = validation.configurations.timing.time_frame
-    monkeypatch.setattr("validation.configurations.timing.time_frame", lambda *given: timed.append(1) or real(*given))
+    real = validation.study.frame_times.time_frame
+    monkeypatch.setattr("validation.study.frame_times.time_frame", lambda *given: timed.append(1) or real(*given))
     layers, picture = str(tmp_path / "fog.exr"), str(tmp_path / "fog.png")
     run("open-fog", *SMALL, "--samples", "4", "-o", layers, "--preview", picture)
     printed = capfd.readouterr().out

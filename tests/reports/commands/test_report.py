@@ -124,7 +124,7 @@ def test_methods_and_parameters_are_those_of_render_and_bench(variant, handed_on
 
 @pytest.mark.claim("methods-are-named-alike")
 def test_what_is_named_is_measured_alone_and_all_are_a_word(variant, mine, handed_on, capsys, monkeypatch):
-    from validation.configurations.methods import QUICK
+    from validation.study.configuration import QUICK
 
     # `tests/reports/machine/test_own_process.py` has the process that imports it.
     monkeypatch.setattr("reports.machine.own_process.in_own_process", lambda work, *given, **how: work(*given))

@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
 
-from validation.sweep.rows import ROWS, RowStore
+from validation.study.rows import ROWS, RowStore
 
 ROOT = Path(__file__).resolve().parents[3]
 

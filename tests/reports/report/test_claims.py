@@ -4,7 +4,7 @@
 from dataclasses import replace
 
 from reports.report.claims import paper_parts
-from validation.frames.scene_study import EFFORTS
+from validation.study.scene import EFFORTS
 
 
 def test_a_larger_effort_measures_more_and_part_of_its_scenes_none(own_cache):

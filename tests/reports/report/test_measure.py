@@ -13,9 +13,9 @@ from reports.data.reader import SCHEMA_FILE, named_files
 from reports.report.measure import write_report
 from reports.report.scene import file_stems, folder_of
 from tests.helpers.reports import checked
-from validation.configurations.methods import Configuration
-from validation.frames.scene_study import Effort, check_truth
 from validation.scenes.random_scene import random_name
+from validation.study.configuration import Configuration
+from validation.study.scene import Effort, check_truth
 
 SCENE = """<scene version="3.0.0">
     <medium type="homogeneous" id="fog">

@@ -9,8 +9,8 @@ from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
 from reports.interchange.frames import STAGES
 from reports.view.live_scene import LiveScene
-from validation.configurations.methods import configuration, prepared
 from validation.scenes.loading import load_scene
+from validation.study.configuration import configuration, prepared
 
 pytestmark = pytest.mark.usefixtures("variant")
 

@@ -18,7 +18,7 @@ from reports.view.session import Session
 from reports.view.state import ViewState
 from reports.view.truth_order import KnownTruth
 from reports.view.truth_process import Task, answers
-from validation.configurations.methods import configuration
+from validation.study.configuration import configuration
 
 SIZE = (20, 15)
 AIM = {"camera.origin": [0.61, -0.3, 0.4], "camera.target": [0.2, 0.1, 4.0], "camera.up": [0, 1, 0]}

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from tests.validation.papers.test_claims import JUDGED, key, measured
-from validation.configurations.timing import Timing
 from validation.papers.claims import claims, taken, verdict
 from validation.papers.experiments import EXPERIMENTS
+from validation.study.clock import Timing
 
 
 def test_a_stencil_of_one_ray_by_hand():

@@ -56,7 +56,7 @@ def test_frames_record_nothing_and_compile_nothing(variant, name, moves, method)
     """From the second frame on every kernel is replayed; what moves is data."""
     import drjit as dr
 
-    from validation.configurations.methods import configuration, prepared
+    from validation.study.configuration import configuration, prepared
 
     scene, animation = read(name)
     parameters = {"points": 4} if scene.area_lights else {}
@@ -81,7 +81,7 @@ def test_frames_record_nothing_and_compile_nothing(variant, name, moves, method)
 )
 def test_what_stands_still_is_kept(variant, moves, casts, prepared_frames):
     """Four frames: camera rays are cast again where objects move alone, planes are found again where the light does."""
-    from validation.configurations.methods import configuration, prepared
+    from validation.study.configuration import configuration, prepared
 
     scene, animation = read("two-pens")
     animation = replace(animation, moves=moves)

@@ -76,8 +76,8 @@ def test_no_pixel_is_brighter_than_without_shadows(variant):
     """Lights in view and sharp phase functions: shares of a rough estimate made an image 363 times too bright."""
     from realtime.frame.renderer import render_frame
     from realtime.scene.read_scene import read_scene
-    from validation.configurations.methods import configuration, prepared
     from validation.scenes.loading import load_scene
+    from validation.study.configuration import configuration, prepared
 
     scene = read_scene(load_scene("random:427", (80, 60)).scene)
     image, bare = (

@@ -16,10 +16,10 @@ from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_truth
-from validation.configurations.methods import configuration, prepared
 from validation.metrics.errors import FLOOR
 from validation.scenes.parts import camera, fog, joined, mitsuba_mesh, placed, point_light
 from validation.scenes.solids import box
+from validation.study.configuration import configuration, prepared
 
 SIZE = (20, 16)
 

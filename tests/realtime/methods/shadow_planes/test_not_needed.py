@@ -5,8 +5,8 @@ import pytest
 
 from realtime.frame.renderer import run_stages
 from realtime.scene.read_scene import read_scene
-from validation.configurations.methods import Configuration, prepared
 from validation.scenes.loading import load_scene
+from validation.study.configuration import Configuration, prepared
 
 
 def kernels(renderer):

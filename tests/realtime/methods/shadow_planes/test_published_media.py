@@ -18,7 +18,7 @@ def render(scene, kernel="exact", *, precision="double", **parameters):
 
     from realtime.frame.renderer import render_frame
     from realtime.scene.read_scene import read_scene
-    from validation.configurations.methods import configuration, prepared
+    from validation.study.configuration import configuration, prepared
 
     read = read_scene(mi.load_dict(scene), precision)
     return render_frame(prepared(read, configuration("shadow-planes", kernel, parameters)))

@@ -11,9 +11,9 @@ def frame(parameters):
 
     from realtime.frame.renderer import render_frame
     from realtime.scene.read_scene import read_scene
-    from validation.configurations.methods import configuration, prepared
     from validation.scenes.loading import resize
     from validation.scenes.sphere_spot import sphere_spot
+    from validation.study.configuration import configuration, prepared
 
     scene = mi.load_dict(sphere_spot())
     resize(scene, (64, 48))

@@ -88,9 +88,9 @@ def test_pixels_share_points_and_steps(variant):
 @pytest.mark.claim("soft-shafts-steps", tolerance="half of the light; 2 % of it")
 def test_equal_steps_miss_the_peak_next_to_a_light_and_equal_angles_do_not(variant):
     from realtime.scene.read_scene import read_scene
-    from validation.configurations.methods import configuration, prepared
     from validation.estimates.quadrature import truth_image
     from validation.scenes.loading import load_scene
+    from validation.study.configuration import configuration, prepared
 
     loaded = load_scene("random:1", (80, 60)).scene
     truth, scene = truth_image(loaded).airlight.mean(), read_scene(loaded)

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: times are medians with quartiles, after warm-up, in turns; a slow frame is timed a few times."""
+
+import pytest
+
+from tests.helpers.scenes import tiny_scene
+from validation.study.clock import time_in_turns, time_repeated
+from validation.study.frame_times import time_frame
+
+
+class Clock:
+    """A clock that goes on only while work is done: no test waits, and no other load counts."""
+
+    def __init__(self):
+        self.now, self.calls = 0.0, []
+
+    def perf_counter(self):
+        return self.now
+
+    def process_time(self):
+        return 2 * self.now
+
+    def work(self, name, *times):
+        """Work that takes these times [ms] one after the other, the last one again and again."""
+
+        def done():
+            self.now += 1e-3 * times[min(self.calls.count(name), len(times) - 1)]
+            self.calls.append(name)
+
+        return done
+
+
+@pytest.fixture
+def clock(variant, monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr("validation.study.clock.time", clock)
+    return clock
+
+
+@pytest.mark.claim("times-are-medians", tolerance="rounding")
+def test_times_are_medians_and_quartiles_without_the_warm_up(clock):
+    timing = time_repeated(clock.work("a", 300, 300, 1, 2, 300, 4, 5), seconds=0.0, least=5, most=5)
+    assert len(clock.calls) == 7
+    assert (timing.low_ms, timing.median_ms, timing.high_ms) == pytest.approx((2, 4, 5))
+    assert timing.cpu_ms == pytest.approx(2)  # the least, of two processors
+    assert time_repeated(clock.work("b", 1), seconds=10.0, most=17).repetitions == 17
+    assert time_repeated(clock.work("c", 1), seconds=0.0, least=3).repetitions == 3
+
+
+def test_works_are_timed_in_turns(clock):
+    slow, fast = time_in_turns([clock.work("slow", 20), clock.work("fast", 5)], seconds=0.0, least=5)
+    assert clock.calls == ["slow", "fast"] * 7  # two turns of warm-up
+    assert (slow.repetitions, fast.repetitions) == (5, 5)
+    assert (slow.median_ms, fast.median_ms) == pytest.approx((20, 5))
+
+
+@pytest.fixture(scope="module")
+def renderer(variant):
+    import mitsuba as mi
+
+    from realtime.frame.renderer import frame_renderer
+    from realtime.methods.registry import METHODS
+    from realtime.scene.read_scene import read_scene
+
+    scene = read_scene(mi.load_dict(tiny_scene(size=(16, 12))))
+    return frame_renderer(scene, METHODS["ray-march"], steps=8, shadow="map", map=16)
+
+
+def test_every_stage_of_a_frame_is_timed(renderer):
+    times = time_frame(renderer, seconds=0.02)
+    for name in (
+        "frame",
+        "surface",
+        "airlight",
+        "light_moved",
+        "objects_moved",
+        "light_moved_camera_kept",
+        "colours_changed",
+    ):
+        timing = getattr(times, name)
+        assert 0 < timing.low_ms <= timing.median_ms <= timing.high_ms, name
+        assert timing.repetitions >= 3
+
+
+@pytest.mark.parametrize(("spent", "turns"), [(0.0, 1), (1e6, 5)])
+def test_a_slow_frame_is_timed_a_few_times(variant, monkeypatch, spent, turns):
+    """A frame that takes minutes must not be rendered thirty times."""
+    import mitsuba as mi
+
+    from realtime.frame.renderer import frame_renderer
+    from realtime.methods.registry import METHODS
+    from realtime.scene.read_scene import read_scene
+    from validation.study import frame_times as timing
+
+    monkeypatch.setattr(timing, "_TURNS", spent)
+    scene = read_scene(mi.load_dict(tiny_scene(size=(16, 12))))
+    renderer = frame_renderer(scene, METHODS["ray-march"], steps=3)
+    assert time_frame(renderer, seconds=0.01).frame.repetitions >= 5  # not slow
+    times = time_frame(renderer, slow=-1.0)
+    each = (
+        times.frame,
+        times.surface,
+        times.airlight,
+        times.light_moved,
+        times.objects_moved,
+        times.light_moved_camera_kept,
+        times.colours_changed,
+    )
+    assert {spread.repetitions for spread in each} == {turns}
+    assert times.frame.median_ms <= times.light_moved.median_ms <= times.objects_moved.median_ms
+    assert times.colours_changed.median_ms <= times.light_moved_camera_kept.median_ms
+    if turns == 1:
+        assert times.frame.median_ms == pytest.approx(times.surface.median_ms + times.airlight.median_ms)
+        assert all(spread.low_ms == spread.median_ms == spread.high_ms for spread in each)

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: a key changes with everything that decides the numbers of a cell, and with nothing else."""
+
+from dataclasses import replace
+
+import mitsuba as mi
+
+from validation.scenes.random_scene import random_name, random_parts
+from validation.study.configuration import Configuration
+from validation.study.keys import Made, cell_key, scene_identities
+from validation.study.study import Cell
+
+CELL = Cell("windows", (32, 24), (), Configuration("ray-march", None, (("steps", 4), ("map", 64))))
+MADE = Made("1.0", "ab", (("mitsuba", "3.9.1"),), "llvm_ad_rgb", "3.11.7")
+
+SCENE = """<scene version="3.0.0">
+    <path value="meshes"/>
+    <medium type="homogeneous" id="fog"><float name="sigma_t" value="0.31"/></medium>
+    <emitter type="point"><rgb name="intensity" value="5, 4, 3"/></emitter>
+    <sensor type="perspective"><ref name="medium" id="fog"/></sensor>
+    <shape type="ply"><string name="filename" value="a.ply"/></shape>
+</scene>"""
+
+
+def test_what_decides_the_numbers_is_in_the_key():
+    others = [
+        replace(CELL, scene="hall"),
+        replace(CELL, size=(32, 25)),
+        replace(CELL, medium=("medium.sigma_t=0.1",)),
+        replace(CELL, chosen=Configuration("ray-march", None, (("steps", 5), ("map", 64)))),
+        replace(CELL, chosen=Configuration("ray-march", "exact", CELL.chosen.parameters)),
+        replace(CELL, flip=True),
+        replace(CELL, times="none"),
+    ]
+    made = [
+        replace(MADE, airlight="1.1"),
+        replace(MADE, source="ac"),
+        replace(MADE, packages=(("mitsuba", "3.9.2"),)),
+        replace(MADE, variant="cuda_ad_rgb"),
+    ]
+    keys = [cell_key(CELL, MADE), *(cell_key(cell, MADE) for cell in others), *(cell_key(CELL, each) for each in made)]
+    assert len(set(keys)) == len(keys) == 12
+
+
+def test_what_does_not_is_not():
+    turned = replace(CELL, chosen=Configuration("ray-march", None, (("map", 64), ("steps", 4))))
+    assert cell_key(turned, MADE) == cell_key(CELL, MADE) == cell_key(CELL, replace(MADE, python="3.11.9"))
+
+
+def test_a_file_is_its_content_and_that_of_its_meshes(variant, tmp_path):
+    path, mesh = tmp_path / "a.xml", tmp_path / "meshes" / "a.ply"
+    mesh.parent.mkdir()
+    mi.load_dict({"type": "cube"}).write_ply(str(mesh))
+    path.write_text(SCENE)
+    cell = replace(CELL, scene=str(path))
+    first = cell_key(cell, MADE)
+    assert cell_key(cell, MADE, scene_identities([str(path), "windows"])) == first
+    path.write_text(SCENE.replace("<shape", "<!-- a box -->  <shape"))
+    assert cell_key(cell, MADE) == first
+    path.write_text(SCENE.replace("0.31", "0.32"))
+    second = cell_key(cell, MADE)
+    mi.load_dict({"type": "rectangle"}).write_ply(str(mesh))
+    assert len({first, second, cell_key(cell, MADE)}) == 3
+
+
+def test_a_random_scene_is_its_seed_and_the_content_of_its_files(tmp_path):
+    """On any path: colons, spaces, commas, per cent signs."""
+    folder = tmp_path / "C:my, 5% meshes"
+    folder.mkdir()
+    (folder / "a.ply").write_bytes(b"1")
+    name = random_name("random:7", meshes=folder)
+    assert random_parts(name) == (7, {"meshes": folder})
+    cells = [replace(CELL, scene=scene) for scene in ("random:7", "random:8", name)]
+    keys = [cell_key(cell, MADE) for cell in cells]
+    (folder / "a.ply").write_bytes(b"22")
+    keys.append(cell_key(cells[2], MADE))
+    assert len(set(keys)) == 4
+
+
+def test_a_users_code_is_in_the_key(tmp_path):
+    """The kernel's too, and that of the modules beside it."""
+    (tmp_path / "fog_kernel.py").write_text("from beside_it import two\n\n\ndef kernel(x):\n    return two * x\n")
+    (tmp_path / "beside_it.py").write_text("two = 2\n")
+    own = f"{tmp_path / 'fog_kernel.py'}:kernel"
+    for chosen in (Configuration("shadow-planes", own), Configuration(own, "exact")):
+        cell = replace(CELL, chosen=chosen)
+        (tmp_path / "beside_it.py").write_text("two = 2\n")
+        first = cell_key(cell, MADE)
+        assert cell_key(cell, MADE) == first
+        (tmp_path / "beside_it.py").write_text("two = 2.5\n")
+        assert cell_key(cell, MADE) != first
+    # What has no file cannot be compared, and is computed again.
+    assert cell_key(replace(CELL, chosen=Configuration("gone:f")), MADE) != cell_key(
+        replace(CELL, chosen=Configuration("gone:f")), MADE
+    )

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: a finished row is never lost and never there twice, whatever ends the process or the disk."""
+
+import pytest
+
+from analytic.errors import InputError
+from validation.study.rows import PICTURES, ROWS, RowStore
+
+pytest.importorskip("pyarrow", reason="the extra `sweep` is not installed")
+
+
+def row(key, status="done", **values):
+    return {"key": key, "status": status, "label": "m", **values}
+
+
+def keys(folder):
+    with RowStore(folder) as store:
+        return [each["key"] for each in store.rows()]
+
+
+def test_rows_stay_and_later_ones_replace(tmp_path):
+    with RowStore(tmp_path) as store:
+        store.add(row("a", p99=0.5))
+        store.add(row("b", "hung"))
+        store.add(row("b", max=0.25, picture=b"\x00\xff"))
+        assert "b" in store
+        assert (store.status("a"), store.status("b"), store.status("c")) == ("done", "done", None)
+    with RowStore(tmp_path) as store:
+        again = list(store.rows())
+    assert [(each["key"], each["p99"], each["max"], each["picture"]) for each in again] == [
+        ("a", 0.5, None, None),
+        ("b", None, 0.25, b"\x00\xff"),
+    ]
+
+
+@pytest.mark.claim("sweeps-go-on", tolerance="none")
+@pytest.mark.parametrize("cut", [1, 5, 30])
+def test_a_torn_line_is_cut_off_and_the_rest_stays(tmp_path, cut):
+    with RowStore(tmp_path) as store:
+        store.add(row("a"))
+        store.add(row("b"))
+    path = tmp_path / ROWS
+    path.write_bytes(path.read_bytes()[:-cut])
+    with RowStore(tmp_path) as store:
+        assert [each["key"] for each in store.rows()] == ["a"]
+        store.add(row("c"))
+    assert keys(tmp_path) == ["a", "c"]
+
+
+@pytest.mark.claim("sweeps-go-on", tolerance="none")
+def test_a_full_disk_leaves_what_was_there(tmp_path):
+    """A file that may not grow stands for the disk: the system writes what has room, and says no to the rest."""
+    resource = pytest.importorskip("resource", reason="Windows has no limit of the size of files")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    with RowStore(tmp_path) as store:
+        store.add(row("a"))
+        size = (tmp_path / ROWS).stat().st_size
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size + size // 2, limits[1]))
+        try:
+            with pytest.raises(OSError, match=r"File too large; 1 rows are kept.*rows\.jsonl"):
+                store.add(row("b"))
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        assert (tmp_path / ROWS).stat().st_size == size
+        store.add(row("c"))
+    assert keys(tmp_path) == ["a", "c"]
+
+
+def test_one_run_at_a_time_writes(tmp_path):
+    with RowStore(tmp_path), pytest.raises(InputError, match="another sweep writes into"):
+        RowStore(tmp_path)
+    assert keys(tmp_path) == []
+
+
+def test_a_parquet_alone_is_gone_on_from(tmp_path):
+    there, here = tmp_path / "there", tmp_path / "here"
+    with RowStore(there) as store:
+        store.add(row("a", p99=0.5, **{"property.lights": 3}))
+        store.add(row("b", "refused", reason="it is too dark"))
+        source = store.write_parquet()
+        known = list(store.rows())
+    here.mkdir()
+    source.rename(here / source.name)
+    with RowStore(here) as store:
+        taken = list(store.rows())
+        store.add(row("c"))
+    assert [{name: value for name, value in each.items() if value is not None} for each in taken] == [
+        {name: value for name, value in each.items() if value is not None} for each in known
+    ]
+    assert keys(here) == ["a", "b", "c"]
+
+
+def test_the_parquet_has_every_row_once_and_the_worst_pictures(tmp_path):
+    import pyarrow.parquet as pq
+
+    count = 2 * PICTURES
+    with RowStore(tmp_path) as store:
+        for number in range(count):
+            store.add(row(f"{number:02d}", p99=0.0, picture=b"old"))
+        for number in range(count):
+            worst = {"relative_rmse": number / 10, "p99": number / 10, "max": number / 10}
+            store.add(row(f"{number:02d}", picture=b"new", **worst, **{"property.depth": 1.5}))
+        store.add(row("none", "refused", reason="no", seed=2**40))
+        table = pq.read_table(store.write_parquet())
+    assert table["key"].to_pylist() == [*(f"{number:02d}" for number in range(count)), "none"]
+    assert table["picture"].to_pylist() == [None] * (count - PICTURES) + [b"new"] * PICTURES + [None]
+    assert table["property.depth"].to_pylist()[-2:] == [1.5, None]
+    assert table["seed"].to_pylist()[-1] == 2**40
+    assert table["p99"].null_count == 1

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: what a method states of its own error holds where rounding and tables are at their worst, and not by far."""
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from realtime.scene.read_scene import read_scene
+from reference.scene.read import read_truth
+from tests.helpers.light_frames import render
+from tests.helpers.scenes import bounded_medium
+from validation.estimates.quadrature import truth_image
+from validation.scenes.loading import load_scene
+from validation.scenes.parts import camera, fog, point_light, tabulated_phase
+from validation.study import stated_errors as bounds
+from validation.study.configuration import configuration, prepared
+from validation.study.reference import CellTruth, cell_truth
+from validation.study.study import Cell
+from validation.study.work import error_columns, run_stages, unchecked_frame
+
+pytestmark = pytest.mark.usefixtures("variant", "own_cache")
+
+HALF, SIGMA_T, ALBEDO, INTENSITY = np.array([0.31, 0.27, 0.23]), 13.7, 0.43, 5.3
+LAMP = np.array([0.83, 0.71, 0.12])  # in the frame of the box, in clear air before the edge [m]
+
+
+def turned():
+    return mi.ScalarTransform4f().rotate([-0.879, -0.121, 0.461], 59.11)
+
+
+ACROSS, SKIMMING = (0.694, -0.712, 0.107), (0.99894, -0.0127, 0.0443)  # through two faces, and along one of them
+
+
+def clipped_edge(along=ACROSS, fov=0.012):
+    """A camera that looks over the edge of a box of fog, 0.66 m away: its pixels are some micrometres apart."""
+    world, along = turned(), np.array(along) / np.linalg.norm(along)
+    edge = HALF * (1, 1, 0)
+    eye = [*(world @ mi.ScalarPoint3f(edge - 0.66 * along))]
+    # The box is half the image.
+    target = [*(world @ mi.ScalarPoint3f(edge - 1e-9 * along))]
+    cube = {"type": "cube", "to_world": world.scale([float(half) for half in HALF])}
+    return mi.load_dict(
+        {
+            "type": "scene",
+            "box": bounded_medium(cube, SIGMA_T, (ALBEDO,) * 3),
+            "light": point_light([*(world @ mi.ScalarPoint3f(LAMP))], (INTENSITY,) * 3),
+            "camera": camera(eye, target, fov=fov, size=(16, 12), in_fog=False),
+        }
+    )
+
+
+def chords(scene):
+    """Return what of each ray lies in the box, by crossings with the triangles of it, in float64 [m]."""
+    truth = read_truth(scene)
+    parameters = mi.traverse(scene.shapes()[0])
+    vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
+    a, b, c = np.moveaxis(vertices[np.array(parameters["faces"]).reshape(-1, 3)], 1, 0)
+    ends = []
+    for direction in truth.direction:
+        # Moeller and Trumbore 1997.
+        p, q = np.cross(direction, c - a), np.cross(truth.origin - a, b - a)
+        scale = 1 / np.sum((b - a) * p, axis=1)
+        u, v = np.sum((truth.origin - a) * p, axis=1) * scale, (q @ direction) * scale
+        t = np.sum((c - a) * q, axis=1) * scale
+        hit = t[(u >= 0) & (v >= 0) & (u + v <= 1)]
+        ends.append(np.ptp(hit) if len(hit) else 0.0)
+    return np.array(ends)
+
+
+def errors(scene, method, **parameters):
+    """Return truth and the error of an image, (pixels, 3) each [W/(m^2 sr)]."""
+    frame = np.asarray(render(scene, method, **parameters).airlight, dtype=np.float64).reshape(-1, 3)
+    truth = truth_image(scene).airlight.reshape(-1, 3)
+    return truth, np.abs(frame - truth)
+
+
+@pytest.mark.claim("sweep-bounds", tolerance="8 units of float32 of each end; a quarter of the bends of a table")
+def test_a_chord_of_micrometres_errs_by_what_the_rounding_of_its_ends_is_worth():
+    # random:3 has such pixels: a ray clips the edge of a medium, or a surface stands just behind its bound.
+    scene = clipped_edge()
+    truth, error = errors(scene, "shadow-planes")
+    lit = np.flatnonzero(truth[:, 0] > 0)
+    assert len(lit) > 50
+    # A third route says that the truth is right: over so short a chord all is constant.
+    distance = np.linalg.norm(LAMP - HALF * (1, 1, 0))
+    scattered = ALBEDO * SIGMA_T * INTENSITY / (4 * np.pi * distance**2)
+    assert truth[lit, 0] == pytest.approx(chords(scene)[lit] * scattered, rel=2e-3)
+    worth = bounds.worth_of_ends(scene, lit)
+    assert (error[lit] > bounds.ROUNDING * truth[lit]).any()  # so rounding of the pixel alone is no bound
+    assert (error[lit] <= worth).all()
+    assert error[lit].max() > 0.05 * worth.max()
+    # The most where rays leave, by the face that they meet at the smaller angle, behind the whole chord.
+    kept = np.exp(-SIGMA_T * chords(scene)[lit])
+    assert worth[:, 0] == pytest.approx(1.1 * bounds.END * 0.66 / ACROSS[0] * scattered * kept, rel=2e-3)
+
+
+def columns(name, size, method="shadow-planes"):
+    loaded = load_scene(name, size)
+    scene = read_scene(loaded.scene)
+    chosen = configuration(method)
+    renderer = prepared(scene, chosen)
+    frame = unchecked_frame(renderer, run_stages(renderer, renderer.prepare(scene)))
+    return error_columns(cell_truth(loaded), frame, scene, Cell(name, size, (), chosen), whole=loaded.scene)
+
+
+def test_a_sweep_counts_no_pixel_whose_ends_are_rounded(monkeypatch):
+    scene, chosen = clipped_edge(), configuration("shadow-planes")
+    image, frame = truth_image(scene), render(scene, "shadow-planes")
+    truth = CellTruth("quadrature", image.airlight, image.airlight_bound, None, None, None, 0.0, 0.0)
+
+    def outside():
+        cell = Cell("edge", (16, 12), (), chosen)
+        return error_columns(truth, frame, read_scene(scene), cell, whole=scene)["outside_bound"]
+
+    assert outside() == 0
+    monkeypatch.setattr(bounds, "END", 0.1 * bounds.END)
+    assert outside() > 0
+
+
+@pytest.mark.claim("sweep-bounds", tolerance="8 units of float32 of each end; a quarter of the bends of a table")
+@pytest.mark.parametrize(("words", "values"), [("murky", 129), ("murky", 513), ("hazy", 513), ("isotropic", 65)])
+def test_the_kinks_of_a_table_are_worth_a_quarter_of_its_bends(words, values):
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "fog": fog(0.0031, (0.9, 0.9, 0.9), tabulated_phase(words, values)),
+            "light": point_light((0.7, 3.1, 0.4), (5.0, 4.0, 3.0)),
+            "camera": camera((0.1, -2.3, 0.2), (0.6, 1.9, 0.3), fov=77.0, size=(24, 18)),
+        }
+    )
+    truth, error = errors(scene, "unshadowed")
+    stated = bounds.stated_bound(configuration("unshadowed"), read_scene(scene))
+    assert stated is not None
+    kinks = stated - bounds.ROUNDING
+    relative = (error / truth).max()
+    assert relative < 3e-6 + kinks
+    if words == "murky":
+        assert relative > 0.03 * kinks > 1e-5

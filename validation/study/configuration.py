@@ -1,0 +1,278 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Configurations: a method with a kernel and the values of its parameters, by the names that a user gives.
+
+A kernel is named 'quadrature', 'quadrature-32', or as a user's own 'module:function' or 'file.py:function'.
+"""
+
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial, wraps
+from typing import Any
+
+from analytic.errors import InputError, named_values, nearest
+from realtime.errors import InputError as MethodError
+from realtime.frame.renderer import FrameRenderer, frame_renderer
+from realtime.kernels.registry import KERNELS, Kernel
+from realtime.methods.interface.method import method_parameters
+from realtime.methods.registry import find_method
+from realtime.methods.user_method import method_file, own_errors, user_object
+from realtime.parameters import values
+from realtime.scene.read_scene import Scene
+from reference.storage.kept import code_digest
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A method, its kernel (None if it calls none) and the parameters that differ from their defaults."""
+
+    method: str  #: name in the registry, or one's own as 'module:function'
+    kernel: str | None = None  #: see `find_kernel`
+    parameters: tuple[tuple[str, int | float | str], ...] = ()  #: names and values
+
+    @property
+    def label(self) -> str:
+        """The name of the configuration in tables, plots and files."""
+        values = [f"{name}={value}" for name, value in self.parameters]
+        inside = ", ".join(([self.kernel] if self.kernel else []) + values)
+        return f"{self.method} ({inside})" if inside else self.method
+
+    @property
+    def own(self) -> bool:
+        """Whether the method or its kernel is the user's own, named 'module:function'."""
+        return ":" in self.method or ":" in (self.kernel or "")
+
+
+#: What `soft-shafts` does beyond Ali 2016: the pixels of a tile share sixteen light points and their steps.
+SHARED_POINTS: tuple[tuple[str, int | float | str], ...] = (
+    ("points", 16),
+    ("pattern", "sobol"),
+    ("interleave", True),
+    ("scale", 2),
+    ("steps", 12),
+    ("spacing", "equiangular"),
+    ("map", 128),
+    ("surfaces", "ray"),
+    ("guide", "depth"),
+    ("hd", "auto"),
+    ("hz", 0.02),
+    ("narrow", 16.0),
+)
+
+#: The configurations that `bench` and `report` measure by default. Those that say their light points are left out where
+#: no light has an extent.
+STANDARD: tuple[Configuration, ...] = (
+    Configuration("unshadowed", "taylor"),
+    Configuration("unshadowed", "quadrature"),
+    Configuration("unshadowed", "exact"),
+    Configuration("ray-march", None, (("steps", 16),)),
+    Configuration("ray-march", None, (("steps", 100),)),
+    Configuration("ray-march", None, (("steps", 100), ("spacing", "uniform"))),
+    Configuration("ray-march", None, (("steps", 100), ("shadow", "map"))),
+    Configuration("ray-march", None, (("steps", 400), ("shadow", "map"), ("map", 1024))),
+    Configuration("shadow-planes", "exact"),
+    Configuration("shadow-planes", "taylor"),
+    Configuration("shadow-planes", "exact", (("order", "paper"),)),
+    Configuration("shadow-planes", "exact", (("order", "none"),)),
+    Configuration("shadow-planes", "exact", (("media", "paper"),)),
+    Configuration("min-max", "exact"),
+    Configuration("light-volumes", "exact"),
+    Configuration("light-volumes", "taylor"),
+    Configuration("light-volumes", "exact", (("map", 2048),)),
+    Configuration("soft-shafts", None, (("points", 5),)),
+    Configuration("soft-shafts", None, (("points", 5), ("scale", 2))),
+    Configuration("soft-shafts", None, SHARED_POINTS),
+    Configuration("froxel-fog", None, (("points", 16),)),
+)
+
+#: The configurations that `report --quick` measures: one of each kind.
+QUICK: tuple[Configuration, ...] = (
+    Configuration("unshadowed", "exact"),
+    Configuration("ray-march", None, (("steps", 100),)),
+    Configuration("ray-march", None, (("steps", 100), ("shadow", "map"))),
+    Configuration("shadow-planes", "exact"),
+    Configuration("shadow-planes", "taylor"),
+    Configuration("min-max", "exact"),
+    Configuration("light-volumes", "exact"),
+    Configuration("soft-shafts", None, (("points", 5),)),
+    Configuration("froxel-fog", None, (("points", 16),)),
+)
+
+
+def configuration(
+    method: str | Callable[..., Any], kernel: str | None = None, parameters: Mapping[str, Any] | None = None
+) -> Configuration:
+    """Return a configuration, checked.
+
+    Parameters
+    ----------
+    method
+        A name of `realtime.methods.registry.METHODS`, one's own as 'module:function' or 'path/to/file.py:function', or
+        such a function itself.
+    kernel
+        See `find_kernel`; 'exact' by default for methods that call a kernel.
+    parameters
+        Values of the method's parameters; words are converted to the type of the default.
+
+    Raises
+    ------
+    InputError
+        For an unknown method, kernel or parameter (the nearest is named), a value of the wrong type or outside its
+        range, values that contradict one another, and a method of one's own that cannot be loaded.
+    """
+    method = method if isinstance(method, str) else _function_name(method)
+    try:
+        record = find_method(method)
+    except MethodError as error:
+        raise InputError(str(error)) from error
+    try:
+        chosen, light_points = method_parameters(record, parameters or {})
+    except MethodError as error:
+        raise InputError(str(error)) from error
+    uses_kernel = record.uses_kernel(chosen)
+    if not uses_kernel and kernel is not None:
+        raise InputError(f"method {method}: got the kernel {kernel!r}, but this method calls no kernel: leave it out")
+    if uses_kernel:
+        kernel = kernel or "exact"
+        find_kernel(kernel)
+    known = values(light_points) | values(chosen)
+    return Configuration(method, kernel, tuple((name, known[name]) for name in parameters or {}))
+
+
+def chosen_configurations(methods: Sequence[str]) -> tuple[Configuration, ...]:
+    """Return the standard configurations of some methods; one without any for every scene has its defaults too.
+
+    Raises
+    ------
+    InputError
+        As `configuration`.
+    """
+    chosen: list[Configuration] = []
+    for method in methods:
+        default = configuration(method)
+        standard = [known for known in STANDARD if known.method == method]
+        everywhere = any("points" not in dict(known.parameters) for known in standard)
+        chosen += standard if everywhere else [default, *standard]
+    return tuple(chosen)
+
+
+def parse_settings(settings: Sequence[str]) -> dict[str, str]:
+    """Return values by name from words of the form 'NAME=VALUE'.
+
+    Raises
+    ------
+    InputError
+        As of `analytic.errors.named_values`.
+    """
+    return named_values("--set", settings, str, "NAME=VALUE, for example steps=100")
+
+
+def prepared(scene: Scene, chosen: Configuration, *, extra_layers: bool = False) -> FrameRenderer:
+    """Return the frame renderer of a configuration for a scene; `extra_layers` as of `frame_renderer`.
+
+    Raises
+    ------
+    realtime.errors.InputError
+        If the method refuses the scene or a parameter.
+    """
+    kernel = find_kernel(chosen.kernel) if chosen.kernel else None
+    parameters: dict[str, Any] = dict(chosen.parameters)
+    return frame_renderer(scene, find_method(chosen.method), kernel=kernel, extra_layers=extra_layers, **parameters)
+
+
+def rendered_lights(scene: Scene, chosen: Configuration) -> int:
+    """Return how many lights a method renders in a scene, the points of those with extent among them."""
+    points = dict(chosen.parameters).get("points", find_method(chosen.method).light_points.points)
+    return len(scene.lights) + int(points) * len(scene.area_lights)
+
+
+def _function_name(function: Callable[..., Any]) -> str:
+    """Return 'module:function', the name by which a function can be imported again."""
+    name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', '')}"
+    named: Any = sys.modules.get(getattr(function, "__module__", None) or "")
+    for part in getattr(function, "__qualname__", "").split("."):
+        named = getattr(named, part, None)
+    if not callable(function) or named is not function:
+        raise InputError(
+            f"method: got {function!r}, wanted a name or a function at the top of a module: give it a name there"
+        )
+    return name
+
+
+def find_kernel(name: str) -> Callable[..., Any]:
+    """Return the kernel function of a name.
+
+    Parameters
+    ----------
+    name
+        A name of `realtime.kernels.registry.KERNELS`, 'name-N' for the same kernel with its first parameter set to the
+        whole number N, or a user's own: 'module:function', 'path/to/file.py:function'
+        (`realtime.methods.user_method`).
+
+    Raises
+    ------
+    InputError
+        For an unknown name (the message suggests the nearest), a number for a kernel without parameters, and what
+        cannot be imported or called.
+    """
+    if ":" in name:
+        return _imported(name)
+    record, size = split_name(name)
+    if size is None:
+        return record.function
+    return partial(record.function, **{next(iter(record.parameters)): size})
+
+
+def split_name(name: str) -> tuple[Kernel, int | None]:
+    """Return the record of a kernel, and the N of 'name-N' or None for a plain name.
+
+    Raises
+    ------
+    InputError
+        As `find_kernel`.
+    """
+    if name in KERNELS:
+        return KERNELS[name], None
+    base, separator, digits = name.rpartition("-")
+    if not (separator and base in KERNELS and digits.isascii() and digits.isdecimal()):
+        raise InputError(
+            f"kernel: got {name!r}, wanted one of {', '.join(KERNELS)}, such a name with '-N', or 'module:function'"
+            + nearest(name, KERNELS)
+        )
+    record = KERNELS[base]
+    if not record.parameters:
+        raise InputError(f"kernel: got {name!r}, but {base!r} has no parameter to set: leave '-{digits}' out")
+    return record, int(digits)
+
+
+def sized(name: str, size: int | None) -> str:
+    """Return 'name-N' for a size N, or the plain name for None."""
+    return name if size is None else f"{name}-{size}"
+
+
+def _imported(name: str) -> Callable[..., Any]:
+    try:
+        kernel = user_object(name, "kernel")
+    except MethodError as error:
+        raise InputError(str(error)) from error
+    if not callable(kernel):
+        raise InputError(f"kernel {name}: it is a {type(kernel).__name__}; wanted a function")
+
+    @wraps(kernel)
+    def guarded(*arguments: Any, **parameters: Any) -> Any:
+        with own_errors(f"kernel {name}"):
+            return kernel(*arguments, **parameters)
+
+    return guarded
+
+
+def user_code(chosen: Configuration) -> list[str]:
+    """Return digests of the user's own code in a configuration, with the modules of its folder that it imports."""
+    return [_user_digest(name) for name in (chosen.method, chosen.kernel) if name is not None and ":" in name]
+
+
+def _user_digest(name: str) -> str:
+    file = method_file(name)
+    # A function typed into a notebook has no file, so its results cannot be kept.
+    return code_digest([file]) if file is not None and file.is_file() else f"no file, {time.time_ns()}"

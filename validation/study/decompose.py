@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""The error of an image by its causes: differences of renders, which add up to the whole.
+
+A method says which of its parameters make errors (`realtime.methods.interface.method.Method.error_causes`). They are
+taken away one on top of the other: R_0 is the image as asked for, R_1 that without the first cause, and so on to R_n,
+the best that the method can do. E is the exact sum over the same light points, by `shadow-planes` with the kernel
+`exact`, and T the truth. Then
+
+    R_0 - T = (R_0 - R_1) + (R_1 - R_2) + ... + (R_n - E) + (E - T),
+
+pixel by pixel: by its causes, the rest, and the light points in place of the light's extent. In a scene without lights
+with extent E is the truth. If the method says that its last cause is all that is left, that takes the rest.
+
+With <a, b> the mean of a b over pixels and channels, the *share* of a part P in the error D = R_0 - T is
+
+    <P, D> / <D, D>,
+
+so that the shares add up to 1. A share below 0 is of a part that hides others.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.area_lights.points import LightPoints
+from realtime.frame.renderer import render_frame
+from realtime.methods.interface.method import method_parameters
+from realtime.methods.registry import find_method
+from realtime.parameters import values
+from realtime.scene.read_scene import Scene
+from validation.study.configuration import Configuration, prepared
+
+Array = NDArray[np.float64]
+Render = Callable[[Configuration], Array]  #: airlight of a configuration, (height, width, 3) [W/(m^2 sr)]
+
+REST, POINTS = "rest", "light points"
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of an error."""
+
+    cause: str
+    without: str  #: what has this cause no more: values of parameters, 'exact sum' or 'truth'
+    image: Array  #: signed, (height, width, 3) [W/(m^2 sr)]
+    relative_rmse: float  #: root of its mean square over the mean of the truth
+    relative_bias: float  #: its mean over that of the truth
+    share: float  #: in the square of the whole error; NaN where there is none
+
+
+@dataclass(frozen=True)
+class Decomposition:
+    """The error of a configuration in a scene by its causes."""
+
+    configuration: Configuration
+    truth: Array  #: airlight, (height, width, 3) [W/(m^2 sr)]
+    image: Array  #: that of the configuration
+    parts: tuple[Part, ...]  #: add up to `whole.image`
+
+    @property
+    def whole(self) -> Part:
+        """The error itself."""
+        difference = self.image - self.truth
+        return _part("whole", "truth", difference, difference, self.truth)
+
+
+def decompose(
+    scene: Scene,
+    chosen: Configuration,
+    truth: Array,
+    *,
+    render: Render | None = None,
+    exact: Callable[[LightPoints], Array] | None = None,
+) -> Decomposition:
+    """Return the error of a configuration by its causes.
+
+    Parameters
+    ----------
+    truth
+        Airlight at pixel centres, (height, width, 3) [W/(m^2 sr)].
+    render
+        What renders a configuration, for a method of one's own in a process of its own; a frame here by default.
+    exact
+        What renders the exact sum over light points, for callers that keep it; `exact_sum` by default.
+
+    Raises
+    ------
+    realtime.errors.InputError
+        For what the method refuses, and `shadow-planes` where the scene has lights with extent.
+    """
+
+    def airlight(configuration: Configuration) -> Array:
+        own = render if render is not None and configuration.own else lambda each: rendered(scene, each)
+        return np.asarray(own(configuration), dtype=np.float64)
+
+    truth = np.asarray(truth, dtype=np.float64)
+    image = last = airlight(chosen)
+    best = truth
+    if scene.area_lights:
+        points = method_parameters(find_method(chosen.method), dict(chosen.parameters))[1]
+        best = np.asarray(exact_sum(scene, points) if exact is None else exact(points), dtype=np.float64)
+    steps: list[tuple[str, str, Array]] = []
+    left = REST
+    before = chosen
+    for cause, without in _configurations(chosen, (scene.camera.width, scene.camera.height)):
+        if without is None:
+            left = cause
+            break
+        better = airlight(without)
+        steps.append((cause, _changes(before, without), last - better))
+        last, before = better, without
+    if scene.area_lights:
+        steps.append((left, "exact sum", last - best))
+        steps.append((POINTS, "truth", best - truth))
+    else:
+        steps.append((left, "truth", last - truth))
+    whole = image - truth
+    parts = tuple(_part(cause, without, part, whole, truth) for cause, without, part in steps)
+    return Decomposition(chosen, truth, image, parts)
+
+
+def exact_sum(scene: Scene, points: LightPoints) -> Array:
+    """Return the airlight of the light points of a scene, exactly, (height, width, 3) [W/(m^2 sr)]."""
+    return rendered(scene, Configuration("shadow-planes", "exact", tuple(values(points).items())))
+
+
+def rendered(scene: Scene, chosen: Configuration) -> Array:
+    """Return the airlight of a configuration, (height, width, 3) [W/(m^2 sr)]."""
+    return render_frame(prepared(scene, chosen)).airlight
+
+
+def _configurations(chosen: Configuration, size: tuple[int, int]) -> Iterator[tuple[str, Configuration | None]]:
+    """Yield the causes that matter, and the configuration without each and those before it; None for the exact sum."""
+    if chosen.kernel not in (None, "exact"):
+        chosen = replace(chosen, kernel="exact")
+        yield "kernel", chosen
+    method = find_method(chosen.method)
+    parameters, _ = method_parameters(method, dict(chosen.parameters))
+    for cause, better in method.error_causes(parameters, size):
+        if better is None:
+            yield cause, None
+            return
+        now = values(parameters)
+        changes = {name: value for name, value in better.items() if now[name] != value}
+        if changes:
+            chosen = replace(chosen, parameters=tuple((dict(chosen.parameters) | changes).items()))
+            parameters = replace(parameters, **changes)
+            yield cause, chosen
+
+
+def _changes(before: Configuration, after: Configuration) -> str:
+    known = dict(before.parameters)
+    words = [f"{name}={value}" for name, value in after.parameters if name not in known or known[name] != value]
+    return ", ".join([f"kernel={after.kernel}"] * (before.kernel != after.kernel) + words)
+
+
+def _part(cause: str, without: str, image: Array, whole: Array, truth: Array) -> Part:
+    mean, square = float(truth.mean()), float(np.mean(whole * whole))
+    rmse = float(np.sqrt(np.mean(image * image)))
+    relative = (rmse / mean, float(image.mean()) / mean) if mean > 0 else (np.nan, np.nan)
+    return Part(cause, without, image, *relative, float(np.mean(image * whole)) / square if square > 0 else np.nan)
+
+
+def part_numbers(part: Part) -> Mapping[str, Any]:
+    """Return what a table says of a part, JSON-ready but for numbers that are not finite."""
+    return {
+        "cause": part.cause,
+        "without": part.without,
+        "relative_rmse": part.relative_rmse,
+        "relative_bias": part.relative_bias,
+        "share": part.share,
+    }

@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The times of a frame and of its stages, and of frames after light, objects or colours changed."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from realtime.frame.incremental import FrameCache, next_frame, next_parts
+from realtime.frame.light_on_ray import check_radiance
+from realtime.frame.renderer import (
+    FrameRenderer,
+    frame_with_part,
+    parts,
+    run_cast_and_shade,
+    run_cull,
+    run_method,
+    run_shade,
+    run_stages,
+)
+from realtime.frame.surface import cast_rays
+from realtime.numerics.recorded import Frozen
+from realtime.scene.animate import Objects, read_objects, turned_objects
+from realtime.scene.camera import ray_directions
+from realtime.scene.read_scene import Scene
+from validation.study.clock import Timing, time_repeated, timed, timing_of
+
+#: A frame that takes longer is timed stage by stage, in few frames [s]. Its spread matters little, and the usual thirty
+#: or more frames would take minutes.
+SLOW = 8.0
+_TURNS = 1.5  # approximate time for the one to five frames that are timed stage by stage [s]
+
+
+def timed_image(renderer: FrameRenderer, scene: Scene, caches: tuple[FrameCache, ...] | None, **moved: bool):
+    """Render the next frame by `realtime.frame.incremental.next_parts`.
+
+    Returns
+    -------
+    frame, caches
+        The image on the host, and what its parts leave to the next frame.
+    milliseconds
+        What it took without bringing it to the host [ms].
+    """
+    in_turn, frame, kept, took = next_parts(renderer, scene, caches, **moved), None, [], 0.0
+    while True:
+        run = timed(lambda: next(in_turn, None))
+        found, took = run.value, took + run.ms
+        if found is None:
+            assert frame is not None
+            check_radiance(scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
+            return frame, tuple(kept), took
+        part, stages, cache = found
+        frame = frame_with_part(frame, part, stages, cache.extra)
+        kept.append(cache)
+        del run, found, stages, cache
+
+
+def moved_light(renderer: FrameRenderer) -> Callable[[], Any]:
+    """Return the work of a frame after the light moved: all stages run again, camera rays too, in the same geometry."""
+    return _step(renderer, None, light_moved=True)
+
+
+def moved_light_alone(renderer: FrameRenderer, cache: FrameCache) -> Callable[[], Any]:
+    """Return the work of a frame after the light alone moved, which reuses the camera rays of the cache."""
+    return _step(renderer, cache, light_moved=True)
+
+
+def changed_look(renderer: FrameRenderer, cache: FrameCache) -> Callable[[], Any]:
+    """Return the work of a frame after only the medium or colours changed: surface and airlight are computed."""
+    return _step(renderer, cache, light_moved=False)
+
+
+def camera_rays(renderer: FrameRenderer) -> Callable[[], Any]:
+    """Return the work of casting the camera rays without shading, the least time of a frame that casts them."""
+    scene = renderer.scene
+
+    @Frozen
+    def cast(geometry, facets, pixel, camera):
+        return cast_rays(geometry, facets, camera.origin, ray_directions(camera, pixel)[0]).distance
+
+    return lambda: dr.eval(cast(scene.geometry, scene.facets, renderer.pixel, scene.camera))
+
+
+def _step(renderer: FrameRenderer, cache: FrameCache | None, *, light_moved: bool) -> Callable[[], Any]:
+    moved = {"camera_moved": cache is None, "geometry_moved": False, "light_moved": light_moved}
+    return lambda: next_frame(renderer, renderer.scene, cache, **moved)
+
+
+def first_frame(renderer: FrameRenderer) -> FrameCache:
+    """Render the frame of the renderer's scene and return its cache for the next frame."""
+    return next_frame(renderer, renderer.scene, None, camera_moved=True, geometry_moved=True, light_moved=True)[1]
+
+
+@dataclass(frozen=True)
+class FrameTimes:
+    """The times of a frame and of its stages [ms]."""
+
+    frame: Timing  #: camera rays, lit surface, tiles and airlight; shadow maps or planes are there
+    surface: Timing  #: camera rays and lit surface
+    airlight: Timing  #: tiles and airlight: the kernel with its ray set-up, or the marching
+    light_moved: Timing  #: a frame after the light moved: shadow maps or silhouettes and planes, all stages
+    objects_moved: Timing  #: a frame after the objects moved too: acceleration structure, adjacent planes, all stages
+    light_moved_camera_kept: Timing  #: a frame after the light moved, with the camera rays of the last frame
+    colours_changed: Timing  #: a frame after only medium or colours changed: surface and airlight from what is there
+
+
+def time_frame(
+    renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | None = None, took: float | None = None
+) -> FrameTimes:
+    """Time the stages of a frame, the whole frame, and frames after light, objects or only colours changed.
+
+    Parameters
+    ----------
+    seconds
+        Time to spend on each of the first three, and half of it on each of the others.
+    slow
+        If a frame takes longer than this with its preparation, frames are run stage by stage and the seven are added up
+        from them: up to five frames in place of some forty; `SLOW` by default [s]. So are images that are rendered in
+        parts.
+    took
+        What the last frame took with its preparation, if one was rendered just before [s]; else two are.
+    """
+    if len(parts(renderer)) > 1:
+        return _slow_frame(renderer, turns=3)
+    scene = renderer.scene
+    if took is None:
+        first_frame(renderer)  # compiles and records
+        took = 1e-3 * timed(lambda: first_frame(renderer)).ms
+    if took > (SLOW if slow is None else slow):
+        return _slow_frame(renderer, turns=int(np.clip(_TURNS / took, 1, 5)))
+    cache = first_frame(renderer)
+    state, cast = cache.state, cache.cast
+    by_light = run_shade(renderer, cast)
+    dr.eval(cast, by_light)
+
+    def airlight():
+        dr.eval(run_method(renderer, state, cast, by_light))
+
+    def surface():
+        dr.eval(run_cast_and_shade(renderer))
+
+    objects = _objects(scene)
+
+    def objects_moved():
+        # Where they stand: the work is that of any other place.
+        there = turned_objects(scene, objects, np.eye(3)) if objects else scene
+        next_frame(renderer, there, None, camera_moved=False, geometry_moved=True, light_moved=True)
+
+    def few(work: Callable[[], Any]) -> Timing:
+        return time_repeated(work, seconds=0.5 * seconds, least=3)
+
+    return FrameTimes(
+        frame=time_repeated(lambda: run_stages(renderer, state), seconds=seconds),
+        surface=time_repeated(surface, seconds=seconds),
+        airlight=time_repeated(airlight, seconds=seconds),
+        light_moved=few(moved_light(renderer)),
+        objects_moved=few(objects_moved),
+        light_moved_camera_kept=few(moved_light_alone(renderer, cache)),
+        colours_changed=few(changed_look(renderer, cache)),
+    )
+
+
+def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
+    """Time the stages of some frames."""
+    scene, in_parts = renderer.scene, parts(renderer)
+    objects = _objects(scene)
+    steps = []
+    for _ in range(turns):
+        times = [time.perf_counter()]
+
+        def done(times: list[float] = times) -> None:
+            dr.sync_thread()
+            times.append(time.perf_counter())
+
+        there = turned_objects(scene, objects, np.eye(3)) if objects else scene
+        done()
+        state = renderer.prepare(there)
+        done()
+        of_parts = np.zeros(4)
+        for part in in_parts:
+            cast, by_light = run_cast_and_shade(part)
+            dr.eval(cast, by_light)
+            done()
+            dr.eval(run_shade(part, cast))
+            done()
+            # Of many groups of lights in a large image, the lists would take most of the memory.
+            apart = part.groups is None or len(in_parts) == 1
+            lists = run_cull(part, state, cast.distance) if apart else None
+            done()
+            dr.eval(run_method(part, state, cast, by_light, lists))
+            done()
+            of_parts += np.diff(times[-5:])
+        steps.append([*np.diff(times[:3]), *of_parts])
+    move, prepare, surface, shade, in_tiles, rest = 1e3 * np.array(steps).T
+    needed = renderer.method.prepared_from
+    airlight = in_tiles + rest
+    light_moved = prepare + surface + airlight
+    return FrameTimes(
+        frame=timing_of(surface + airlight),
+        surface=timing_of(surface),
+        airlight=timing_of(airlight),
+        light_moved=timing_of(light_moved),
+        objects_moved=timing_of(move + light_moved),
+        light_moved_camera_kept=timing_of(shade + airlight + prepare * bool(needed & {"light", "look"})),
+        colours_changed=timing_of(shade + rest + prepare * ("look" in needed)),
+    )
+
+
+def _objects(scene: Scene) -> Objects | None:
+    """Read all meshes of a scene whose vertices can be moved; None where there are none."""
+    if not scene.geometry.shapes():
+        return None
+    keys = list(mi.traverse(scene.geometry).keys())
+    names = [key.rsplit(".", 1)[0] for key in keys if key.endswith(".vertex_positions")]
+    return read_objects(scene, names) if names else None

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""The errors that a method states for itself: what is further from the truth is a fault.
+
+What claims to be exact but for rounding, the kernel `exact` along whole rays where nothing casts a shadow and shadow
+planes in exact order, states three:
+
+* **Rounding** of the pixel, `ROUNDING` of it.
+* **Ends.** A lit interval ends at a surface, at the bounds of a medium or at a shadow plane, at a distance x that is
+  known to some units of float32. With s(x) the radiance that a metre of the ray scatters in full light, that is worth
+  x s(x) times `END`. It is little, but a ray may be lit along little: where it clips the edge of a medium by 37 um at
+  0.66 m, an error of 2.6 units changes its length, and all of its airlight, by 4e-3.
+
+  A ray that meets the bounds of a medium at a small angle knows the place less well. In x = n . (p - o)/(n . d) the
+  direction d is rounded, and so are the three products of the divisor, which are not small where their sum, the cosine
+  c, is: x is known to x `END`/|c|. A sphere of radius r has the same law: with b the distance of its middle from the
+  ray and h = sqrt(r^2 - b^2) half of the chord, dh = b/h db, where b is known to x `END` and c = h/r.
+* **Kinks.** The rules of the kernel have positive weights, and are exact for the smooth function that a tabulated phase
+  function stands for. It departs from the table by an eighth of the second difference of its values, so rule and
+  integral together err by two eighths of the largest second difference over the value.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.methods.registry import METHODS
+from realtime.scene.phase import Tabulated
+from realtime.scene.read_scene import Scene
+from reference.quadrature.segments import AMBIENT, camera_segments, optical_depth, scattering_range
+from reference.quadrature.surface import surface_hits
+from reference.scene.convex_bounds import normals_at
+from reference.scene.directional_light import DirectionalLight
+from reference.scene.read import TruthLight, TruthMedium, TruthScene, read_truth
+from reference.visibility.line_crossings import crossings
+from validation.study.configuration import Configuration
+
+Array = NDArray[np.float64]
+
+#: The error of methods that claim rounding alone, relative to the pixel, or to a thousandth of the mean in the dark.
+ROUNDING = 1e-3
+
+END = 8 * 2.0**-24  #: uncertainty of the end of a lit interval that a ray meets head on, relative to its distance
+
+_SAMPLES = 256  # of a ray, about each light: what is scattered is smooth between them
+_RAYS = 1024  # at once: so many take some 100 MB
+_BETWEEN = 1.1  # times the largest of these no place scatters
+
+
+def stated_bound(chosen: Configuration, scene: Scene) -> float | None:
+    """Return the relative error that a method states for itself in a scene, ends left aside [1]; None for none.
+
+    Points in the place of lights with extent are an approximation.
+    """
+    defaults = METHODS[chosen.method].defaults if chosen.method in METHODS else {}
+    usual = all(defaults.get(name, value) == value for name, value in chosen.parameters if name != "map")
+    plain = usual and chosen.kernel == "exact" and not scene.area_lights
+    whole_rays = chosen.method in ("unshadowed", "light-volumes") and not scene.features.shadows
+    if not plain or not (chosen.method == "shadow-planes" or whole_rays):
+        return None
+    media = [scene.medium, *(bounded.medium for bounded in scene.medium.bounded_media)]
+    bound = ROUNDING + max(_kinks(medium.phase) for medium in media)
+    return bound if np.isfinite(bound) else None
+
+
+def _kinks(phase: Any) -> float:
+    """Return what the kinks of a phase function are worth, relative to the integral."""
+    if not isinstance(phase, Tabulated):
+        return 0.0
+    values = np.array(phase.values, dtype=np.float64)
+    neighbours = np.lib.stride_tricks.sliding_window_view(values, min(3, len(values)))
+    bends = np.abs(neighbours @ np.array([1, -2, 1])) if len(values) > 2 else np.zeros(1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(np.nan_to_num(0.25 * bends / neighbours.min(axis=1), posinf=np.inf).max())
+
+
+def worth_of_ends(scene: Any, pixels: NDArray[np.int64]) -> Array:
+    """Return what the uncertain ends of lit intervals are worth, (pixels, 3) [W/(m^2 sr)].
+
+    Parameters
+    ----------
+    scene
+        The `mi.Scene`.
+
+    Notes
+    -----
+    Valid for lights without extent. Wherever a ray may end: the largest x s(x) along it, whether it is lit there or
+    not.
+    """
+    whole = read_truth(scene)
+    parts = np.array_split(pixels, range(_RAYS, len(pixels), _RAYS))
+    return np.concatenate([_worth_of_ends(replace(whole, direction=whole.direction[part])) for part in parts])
+
+
+def _worth_of_ends(truth: TruthScene) -> Array:
+    """Return what the uncertain ends of the lit intervals of all rays of `truth` are worth, (rays, 3)."""
+    distance = surface_hits(truth).distance
+    worth = np.zeros((len(distance), 3))
+    sources: list[tuple[Any, ...]] = [(light, _angles_about, _from_place) for light in truth.lights]
+    sources += [(light, _equal_steps, _from_infinity) for light in truth.directional]
+    ends, growth = _ends(truth, distance)
+    for light, places_of, incident in sources:
+        places = np.concatenate([ends, places_of(truth, light, distance)])
+        uncertain = np.concatenate([growth, np.ones_like(places[len(ends) :])]).T
+        x = np.clip(places, 0, distance).T
+        ray, column = np.nonzero(np.isfinite(x))
+        uncertain, x = (uncertain * x)[ray, column], x[ray, column]
+        scattered = uncertain[:, None] * _scattered(truth, partial(incident, truth, light), ray, x, distance)
+        largest = np.zeros_like(worth)
+        np.maximum.at(largest, ray, scattered)
+        worth += largest
+    return _BETWEEN * END * worth
+
+
+def _ends(truth: TruthScene, distance: Array) -> tuple[Array, Array]:
+    """Return distances along rays [m], and what divides their certainty, 1/|c| [1], (places, rays) each.
+
+    They are those of the ends of rays, the middles of segments in media and between them, and where rays cross bounds.
+    """
+    places = [np.zeros_like(distance), distance]
+    if truth.media:
+        segments = camera_segments(truth, distance)
+        places += list(0.5 * (segments.start + segments.end))
+    growth = [np.ones_like(distance)] * len(places)
+    for medium in truth.media:
+        enter, leave = crossings(medium.bounds, truth.origin, truth.direction)
+        for x in (enter, leave):
+            met = (enter < leave) & (x > 0) & (x < distance)
+            points = truth.origin + np.where(met, x, 0)[:, None] * truth.direction
+            cosine = np.abs(np.sum(normals_at(medium.bounds, points) * truth.direction, axis=1))
+            places.append(np.where(met, x, np.inf))
+            growth.append(1 / np.where(met, np.maximum(cosine, END), 1))  # below it nothing is known of x
+    return np.stack(places), np.stack(growth)
+
+
+def _angles_about(truth: TruthScene, light: TruthLight, distance: Array) -> Array:
+    """Return distances at equal angles about a light, (places, rays) [m]."""
+    toward = light.position - truth.origin
+    foot = truth.direction @ toward
+    height = np.linalg.norm(toward - foot[:, None] * truth.direction, axis=1)
+    first, last = np.arctan2(-foot, height), np.arctan2(distance - foot, height)
+    angle = first + np.linspace(0, 1, _SAMPLES)[:, None] * (last - first)
+    return np.where(angle < np.pi / 2 - 1e-6, foot + height * np.tan(angle), np.inf)
+
+
+def _equal_steps(truth: TruthScene, light: DirectionalLight, distance: Array) -> Array:
+    """Return distances at equal steps where rays scatter, (places, rays) [m]."""
+    low, high = scattering_range(camera_segments(truth, distance))
+    return low + np.linspace(0, 1, _SAMPLES)[:, None] * (high - low)
+
+
+def _from_place(truth: TruthScene, light: TruthLight, point: Array) -> tuple[Array, Array]:
+    """Return the direction in which light arrives at points, and how much of it [W/m^2], (n, 3)."""
+    leg = point - light.position
+    r = np.linalg.norm(leg, axis=1)
+    leg /= r[:, None]
+    depth = optical_depth(truth, light.position, leg, np.zeros(len(r)), r)
+    return leg, light.intensity / (r * r)[:, None] * np.exp(-depth)
+
+
+def _from_infinity(truth: TruthScene, light: DirectionalLight, point: Array) -> tuple[Array, Array]:
+    """As `_from_place`; nothing is taken off on the way, which is an upper bound."""
+    return np.broadcast_to(light.direction, point.shape), np.broadcast_to(light.irradiance, point.shape)
+
+
+def _scattered(
+    truth: TruthScene,
+    incident: Callable[[Array], tuple[Array, Array]],
+    ray: NDArray[np.int64],
+    x: Array,
+    distance: Array,
+) -> Array:
+    """Return what a metre of rays scatters at distances x in the full light of one light, (n, 3) [W/(m^3 sr)]."""
+    direction = truth.direction[ray]
+    leg, arriving = incident(truth.origin + x[:, None] * direction)
+    from_camera = optical_depth(truth, truth.origin, direction, np.zeros(len(x)), x)
+    kept = arriving * np.exp(-from_camera) / (4 * np.pi)
+    total = np.zeros_like(kept)
+    for medium, inside in _media(truth, ray, x, distance):
+        phase = medium.phase(np.clip(np.sum(leg * -direction, axis=1), -1, 1))
+        total += np.where(inside, phase, 0)[:, None] * medium.albedo * medium.sigma_t * kept
+    return total
+
+
+def _media(truth: TruthScene, ray: NDArray[np.int64], x: Array, distance: Array) -> list[tuple[TruthMedium, Any]]:
+    """Return media and which places are in them; a place at a bound is on either side of it."""
+    if not truth.media:
+        return [(truth.medium, np.ones(len(x), dtype=bool))]
+    segments = camera_segments(truth, distance)
+    slack = END * x
+    inside = [
+        (number[ray], (x >= start[ray] - slack) & (x <= end[ray] + slack) & (start[ray] < end[ray]))
+        for start, end, number in zip(segments.start, segments.end, segments.medium)
+    ]
+    numbers = [AMBIENT, *range(len(truth.media))]
+    media = [truth.medium, *truth.media]
+    return [
+        (medium, np.any([which & (of == number) for of, which in inside], axis=0))
+        for number, medium in zip(numbers, media, strict=True)
+    ]
