@@ -43,7 +43,7 @@ _INTEGERS = "colours in unsigned integers"
 _COLOURS = {"r": "R", "g": "G", "b": "B", "red": "R", "green": "G", "blue": "B"}  # as other programs name channels
 _WHOLE = frozenset((*_COLOURS, "y"))
 _MAGIC = 20000630
-_KINDS = {0x200: "tiled", 0x800: "deep"}  # bits of the second word of a file
+_DEEP = 0x800  # the bit of the second word of a file
 _PLAIN = frozenset(("", "rgb", "rgba"))  # names of a part whose channels are the image itself
 
 
@@ -60,11 +60,24 @@ class Image:
         Distance along the ray to the visible surface [m], (height, width); infinite where the ray hits nothing.
     attributes
         Header attributes such as `airlight:method`.
+    window
+        First column and row, and those after the last, of the pixels that the file holds, where these are a part of
+        the frame: the others are 0 and say nothing.
     """
 
     layers: Mapping[str, NDArray[np.floating]]
     depth: NDArray[np.floating] | None = None
     attributes: Mapping[str, Attribute] = field(default_factory=dict)
+    window: tuple[int, int, int, int] | None = None
+
+    def with_data(self, mask: NDArray[np.bool_] | None = None) -> NDArray[np.bool_] | None:
+        """Return which pixels of a mask the file holds, (height, width); None where that is all."""
+        if self.window is None or not self.layers:
+            return mask
+        inside = np.zeros(next(iter(self.layers.values())).shape[:2], dtype=bool)
+        left, top, right, bottom = self.window
+        inside[top:bottom, left:right] = True
+        return inside if mask is None or np.shape(mask) != inside.shape else inside & (np.asarray(mask) != 0)
 
 
 def layer(image: Image, name: str, path: str | os.PathLike[str] = "the image") -> NDArray[np.floating]:
@@ -131,13 +144,13 @@ def read_exr(path: str | os.PathLike[str]) -> Image:
     Plain `R`, `G`, `B` (or `r`, `Red` and so on) become the layer `total`, half floats float32, a lone `Y` three equal
     channels; the attribute `airlight:read` says so, and names the channels left out (alpha, integers, incomplete
     layers). Of a file with several parts, all are read: a channel that names no layer is of the layer that its part is
-    named by.
+    named by. The image is the display window: what a data window has beyond it is cut off, what it lacks is 0, see
+    `Image.window`. A subsampled channel is repeated.
 
     Raises
     ------
     InputError
-        If the file is missing, broken, not an EXR file, tiled, deep or subsampled, shows a part of its frame, or has a
-        channel twice.
+        If the file is missing, broken, not an EXR file, deep, stored as luminance and chroma, or has a channel twice.
     """
     _check_kind(path)
     try:
@@ -154,43 +167,84 @@ def read_exr(path: str | os.PathLike[str]) -> Image:
         )
     if not any(part.planes for part in parts):
         raise InputError(f"{path} is a broken EXR file: it has no channels; write or copy it again")
-    return _image(_channels_of(parts, path), parts[0].header)
+    channels, window, notes = _channels_of(parts, path)
+    return _image(channels, parts[0].header, window, notes)
 
 
 @dataclass(frozen=True)
 class _Part:
-    """A part of a file; of each channel the pixels, and whether a pixel has a value of its own."""
+    """A part of a file; of each channel the pixels, and how many columns and rows share one."""
 
     name: str
     header: dict[str, Any]
-    planes: dict[str, tuple[NDArray[Any], bool]]
+    planes: dict[str, tuple[NDArray[Any], int, int]]
 
 
-def _planes(channels: Mapping[str, Any]) -> dict[str, tuple[NDArray[Any], bool]]:
-    return {key: (channel.pixels, channel.xSampling * channel.ySampling == 1) for key, channel in channels.items()}
+def _planes(channels: Mapping[str, Any]) -> dict[str, tuple[NDArray[Any], int, int]]:
+    return {key: (channel.pixels, channel.xSampling, channel.ySampling) for key, channel in channels.items()}
 
 
-def _channels_of(parts: list[_Part], path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
-    """Return the channels of all parts by name."""
+Window = tuple[int, int, int, int]  # first column and row, and those after the last
+
+
+def _channels_of(
+    parts: list[_Part], path: str | os.PathLike[str]
+) -> tuple[dict[str, NDArray[Any]], Window | None, list[str]]:
+    """Return the channels of all parts by name, in the frame of the first; which pixels have data; what was changed."""
     channels: dict[str, NDArray[Any]] = {}
+    frame, common, notes = _window(parts[0].header["displayWindow"]), None, list[str]()
     for part in parts:
-        if part.header.get("type") not in (None, OpenEXR.scanlineimage):
-            raise InputError(f"{path} has a part '{part.name}' that is tiled or deep; save it as flat scan lines")
-        if not all(np.array_equal(a, b) for a, b in zip(part.header["dataWindow"], part.header["displayWindow"])):
-            raise InputError(
-                f"{path} holds another window of pixels than its frame (dataWindow is not displayWindow); "
-                "crop or pad it to the frame first"
+        if any(key.rpartition(".")[2] in ("RY", "BY") for key in part.planes):
+            raise InputError(f"{path} is stored as luminance and chroma (Y, RY, BY); convert it to R, G, B channels")
+        data = _window(part.header["dataWindow"])
+        inside = max(data[0], frame[0]), max(data[1], frame[1]), min(data[2], frame[2]), min(data[3], frame[3])
+        if inside[0] >= inside[2] or inside[1] >= inside[3]:
+            raise InputError(f"{path} holds no pixel of its frame: the data window {data} lies beside {frame}")
+        if inside != data and _CUT not in notes:
+            notes.append(_CUT)
+        common = (
+            inside
+            if common is None
+            else (
+                max(common[0], inside[0]),
+                max(common[1], inside[1]),
+                min(common[2], inside[2]),
+                min(common[3], inside[3]),
             )
-        whole = all(complete for _, complete in part.planes.values())
-        if not whole or any(key.rpartition(".")[2] in ("RY", "BY") for key in part.planes):
-            raise InputError(f"{path} is stored as luminance and subsampled chroma; convert it to R, G, B channels")
+        )
         prefix = "" if len(parts) == 1 or part.name.lower() in _PLAIN else f"{part.name}."
-        for key, (pixels, _) in part.planes.items():
+        for key, (pixels, across, down) in part.planes.items():
             name = key if "." in key else prefix + key
             if name in channels:
                 raise InputError(f"{path} has the channel '{name}' in two parts; save each layer once")
-            channels[name] = pixels
-    return channels
+            if across * down != 1:
+                notes.append(f"'{name}' has a value for {across} x {down} pixels")
+                rows, columns = data[3] - data[1], data[2] - data[0]
+                pixels = np.repeat(np.repeat(pixels, down, axis=0), across, axis=1)[:rows, :columns]
+            channels[name] = _framed(pixels, data, inside, frame)
+    if common is None or common == frame:
+        return channels, None, notes
+    left, top, right, bottom = common[0] - frame[0], common[1] - frame[1], common[2] - frame[0], common[3] - frame[1]
+    notes.append(f"data in columns {left} to {right - 1} and rows {top} to {bottom - 1} of the frame alone")
+    return channels, (left, top, right, bottom), notes
+
+
+_CUT = "pixels beyond the frame cut off"
+
+
+def _window(box: Any) -> Window:
+    (left, top), (right, bottom) = ([int(value) for value in corner] for corner in box)
+    return left, top, right + 1, bottom + 1
+
+
+def _framed(pixels: NDArray[Any], data: Window, inside: Window, frame: Window) -> NDArray[Any]:
+    """Return the pixels of a frame from those of a data window, 0 where it has none."""
+    if data == frame:
+        return pixels
+    whole = np.zeros((frame[3] - frame[1], frame[2] - frame[0]), pixels.dtype)
+    rows, columns = slice(inside[1] - frame[1], inside[3] - frame[1]), slice(inside[0] - frame[0], inside[2] - frame[0])
+    whole[rows, columns] = pixels[inside[1] - data[1] : inside[3] - data[1], inside[0] - data[0] : inside[2] - data[0]]
+    return whole
 
 
 def _channels(image: Image) -> dict[str, NDArray[np.float32]]:
@@ -272,9 +326,8 @@ def _check_kind(path: str | os.PathLike[str]) -> None:
     if len(start) < 8 or struct.unpack("<I", start[:4])[0] != _MAGIC:
         raise InputError(f"{Path(path)} is not an EXR file; give an image with the layers of an EXR")
     flags = struct.unpack("<I", start[4:])[0]
-    for bit, kind in reversed(_KINDS.items()):
-        if flags & bit:
-            raise InputError(f"{path} is a {kind} EXR file; save it as a single part of flat scan lines")
+    if flags & _DEEP:
+        raise InputError(f"{path} is a deep EXR file; save it flat")
 
 
 @contextlib.contextmanager
@@ -302,7 +355,7 @@ def _quiet() -> Iterator[None]:
             os.close(saved)
 
 
-def _image(channels: dict[str, NDArray[Any]], header: dict[str, Any]) -> Image:
+def _image(channels: dict[str, NDArray[Any]], header: dict[str, Any], window: Window | None, notes: list[str]) -> Image:
     """Group channels into layers; note what is changed or left out."""
     floats = {k: v.astype(np.float32, copy=False) for k, v in channels.items() if v.dtype.kind == "f"}
     groups: dict[str, dict[str, str]] = {}
@@ -325,7 +378,6 @@ def _image(channels: dict[str, NDArray[Any]], header: dict[str, Any]) -> Image:
     # Beside an X it is a component of a vector.
     depth_key = next((key for key in ("depth.Z", "Z") if key in floats and key[:-1] + "X" not in floats), None)
     used |= {depth_key} if depth_key else set()
-    notes = []
     if grey:
         notes.append(f"grey, Y repeated as R, G, B: {', '.join(sorted(grey))}")
     if any(channels[key].dtype == np.float16 for key in used):
@@ -336,4 +388,4 @@ def _image(channels: dict[str, NDArray[Any]], header: dict[str, Any]) -> Image:
     if left := sorted(channels.keys() - used - integers):
         notes.append(f"channels left out: {', '.join(left)}")
     kept = {k: v for k, v in header.items() if isinstance(v, str | int | float) and k not in _STANDARD and k != NOTE}
-    return Image(layers, floats.get(depth_key or ""), {**kept, NOTE: "; ".join(notes)} if notes else kept)
+    return Image(layers, floats.get(depth_key or ""), {**kept, NOTE: "; ".join(notes)} if notes else kept, window)

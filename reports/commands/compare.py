@@ -25,8 +25,7 @@ def compare(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Layer to compare, 'airlight' by default; 'total' is R/G/B, the default with a scene where there is "
-            "no airlight.",
+            help="Layer to compare, 'airlight' by default; 'total' is R/G/B, the default where there is no airlight.",
             show_default=False,
         ),
     ] = None,
@@ -124,7 +123,7 @@ def compare(
         "exposure": exposure,
     }
     if scene is None:
-        comparison: Any = _two_files(paths, "airlight" if layer is None else layer, by_order=by_order, **options)
+        comparison: Any = _two_files(paths, layer, by_order=by_order, **options)
     else:
         comparison = _with_scene(scene, paths[0], layer=layer, holds=holds, pixel=pixel, **options)
     written = {}
@@ -189,7 +188,7 @@ def _images(paths: list[Path], layer: str):
     return tuple(image_layer(read_exr(path), layer, path) for path in paths)
 
 
-def _two_files(files: list[Path], layer: str, **options):
+def _two_files(files: list[Path], layer: str | None, **options):
     from validation.comparison.images import compare_files
 
     return compare_files(files[0], files[1], layer, **options)

@@ -157,7 +157,7 @@ def compare_scene(
         raise InputError(f"--pixel {pixel}; wanted 'centre' or 'area'")
     image = read_exr(path)
     judged = judged_layer(image, path, name=layer, holds=holds)
-    chosen = None if mask is None else read_mask(mask)
+    chosen = image.with_data(None if mask is None else read_mask(mask))
     loaded = scene_of_size(scene, judged.size, path)
     truth_of = truths(loaded, progress)
     fit = fit_pixel(judged, truth_of, pixel)

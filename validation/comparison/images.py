@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analytic.errors import InputError
-from reference.storage.exr import TOTAL, Image, read_exr
+from reference.storage.exr import NOTE, TOTAL, Image, layer_names, read_exr
 from reference.storage.exr import layer as image_layer
 from validation.comparison.compare_text import (
     colour_lines,
@@ -46,6 +46,7 @@ class Comparison:
     colour: ColourDifference | None = None  #: None if it was not asked for
     flip: Flip | None = None  #: None if it was not asked for
     orders: tuple["Comparison", ...] = ()  #: of the layers by order of scattering that both images have, if asked for
+    notes: tuple[str, ...] = ()  #: what was changed or left out when files were read
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -74,7 +75,8 @@ class Comparison:
         }
         flat = {"layer": self.layer, **statistics, **self.metrics.to_json(), "masked": self.masked}
         by_order = {"orders": [each.to_json() for each in self.orders]} if self.orders else {}
-        return {**flat, **extras, **by_order, "failures": list(self.failures)}
+        notes = {"notes": list(self.notes)} if self.notes else {}
+        return {**flat, **extras, **by_order, **notes, "failures": list(self.failures)}
 
     def summary(self) -> str:
         """Return the numbers as text, a line for each group."""
@@ -95,6 +97,7 @@ class Comparison:
         lines += [] if self.colour is None else colour_lines(self.colour)
         lines += [] if self.flip is None else [flip_line(self.flip)]
         lines += [order_line(each.layer, each.metrics, each.statistics) for each in self.orders]
+        lines += [f"file             {note}" for note in self.notes]
         return "\n".join(lines + [f"failed           {reason}" for reason in self.failures])
 
 
@@ -145,7 +148,7 @@ def compare_images(
 def compare_files(
     reference: str | os.PathLike[str],
     test: str | os.PathLike[str],
-    layer: str = "airlight",
+    layer: str | None = None,
     *,
     mask: str | os.PathLike[str] | None = None,
     margin: float | None = None,
@@ -159,9 +162,11 @@ def compare_files(
     Parameters
     ----------
     layer
-        The layer to compare, (height, width, 3) [W/(m^2 sr)].
+        The layer to compare, (height, width, 3) [W/(m^2 sr)]: by default the airlight where both files have one, else
+        the plain channels.
     mask
-        An EXR file; pixels whose R, G and B (or Y) are all zero there are left out.
+        An EXR file; pixels whose R, G and B (or Y) are all zero there are left out, and so are pixels of the frame
+        that a file does not hold.
     margin, all_metrics, flip, exposure
         See `compare_images`.
     by_order
@@ -173,9 +178,13 @@ def compare_files(
         Also if a file is missing, broken or of a kind that is not read, or has no layer by order.
     """
     reference_image, test_image = read_exr(reference), read_exr(test)
-    chosen = None if mask is None else read_mask(mask)
+    chosen = test_image.with_data(reference_image.with_data(None if mask is None else read_mask(mask)))
     names = (str(reference), reference_image), (str(test), test_image)
+    layer = _common_layer(*names) if layer is None else layer
     whole = _compare(*names, name=layer, mask=chosen, margin=margin, extras=_Extras(all_metrics, flip, exposure))
+    whole = replace(
+        whole, notes=tuple(f"{path}: {image.attributes[NOTE]}" for path, image in names if NOTE in image.attributes)
+    )
     if not by_order:
         return whole
     plain = _Extras(all_metrics=False, flip=False, exposure=None)
@@ -183,6 +192,18 @@ def compare_files(
         _compare(*names, name=name, mask=chosen, margin=margin, extras=plain) for name in _layers_by_order(*names)
     )
     return replace(whole, orders=orders)
+
+
+def _common_layer(reference: tuple[str, Image], test: tuple[str, Image]) -> str:
+    """Return the layer that both images have: the airlight, the plain channels, or the only one."""
+    common = [name for name in reference[1].layers if name in test[1].layers]
+    for usual in ("airlight", TOTAL):
+        if usual in common:
+            return usual
+    if len(common) == 1:
+        return common[0]
+    have = "; ".join(f"{path} has {layer_names(image)}" for path, image in (reference, test))
+    raise InputError(f"the files share {'no layer' if not common else 'several layers, name one by --layer'}: {have}")
 
 
 def _layers_by_order(reference: tuple[str, Image], test: tuple[str, Image]) -> list[str]:
