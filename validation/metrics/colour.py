@@ -26,6 +26,7 @@ import colour
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analytic.columns import column
 from analytic.errors import InputError
 from validation.metrics.errors import colours, compared, plain
 
@@ -38,37 +39,21 @@ PQ_PEAK = 10000.0  #: the brightest that PQ encodes [cd/m^2]
 
 @dataclass(frozen=True)
 class ColourDifference:
-    """Colour difference of two images (see the module); NaN if no pixel is finite in both.
+    """Colour difference of two images (see the module); NaN if no pixel is finite in both."""
 
-    Attributes
-    ----------
-    exposure
-        In stops: the radiance was multiplied by 2 to this power.
-    white_luminance, peak_luminance
-        Of the screen of Delta E ITP [cd/m^2].
-    pixels, nonfinite
-        Pixels asked for, and those left out because either image is NaN or infinite there.
-    clipped, clipped_itp
-        Pixels of which either image was outside what is shown: [0, 1] for CIEDE2000, [0, peak] for Delta E ITP.
-    ciede2000_mean, ciede2000_p99, ciede2000_max
-        Mean, 99 % quantile and largest CIEDE2000 over the pixels.
-    itp_mean, itp_p99, itp_max
-        The same of Delta E ITP.
-    """
-
-    exposure: float
-    white_luminance: float
-    peak_luminance: float
-    pixels: int
-    nonfinite: int
-    clipped: int
-    clipped_itp: int
-    ciede2000_mean: float
-    ciede2000_p99: float
-    ciede2000_max: float
-    itp_mean: float
-    itp_p99: float
-    itp_max: float
+    exposure: float = column("exposure", "stops", "the radiance was multiplied by 2 to this power")
+    white_luminance: float = column("white", "cd/m^2", "of the screen of Delta E ITP")
+    peak_luminance: float = column("peak", "cd/m^2", "of the screen of Delta E ITP")
+    pixels: int = column("pixels", "pixels", "asked for")
+    nonfinite: int = column("not finite", "pixels", "left out because either image is NaN or infinite there")
+    clipped: int = column("clipped", "pixels", "of which either image is outside [0, 1], which CIEDE2000 sees")
+    clipped_itp: int = column("clipped, ITP", "pixels", "of which either image is outside what Delta E ITP sees")
+    ciede2000_mean: float = column("CIEDE2000", "1", "mean CIEDE2000")
+    ciede2000_p99: float = column("CIEDE2000, p99", "1", "99 % quantile of CIEDE2000")
+    ciede2000_max: float = column("CIEDE2000, largest", "1", "largest CIEDE2000")
+    itp_mean: float = column("Delta E ITP", "1", "mean Delta E ITP")
+    itp_p99: float = column("Delta E ITP, p99", "1", "99 % quantile of Delta E ITP")
+    itp_max: float = column("Delta E ITP, largest", "1", "largest Delta E ITP")
 
     def to_json(self) -> dict[str, Any]:
         """Return the numbers by name; what is not finite becomes None."""

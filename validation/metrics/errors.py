@@ -17,42 +17,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analytic.columns import column
 from analytic.errors import InputError
 
 FLOOR = 1e-3  #: the least denominator of a relative error, as a share of the mean of the reference
+RADIANCE = "W/(m^2 sr)"
+_RELATIVE = "|error| over the reference, or over a thousandth of its mean where that is more"
 
 
 @dataclass(frozen=True)
 class Metrics:
     """Error of a test image against a reference.
 
-    Attributes
-    ----------
-    pixels
-        Pixels compared, those of the mask, with or without finite values.
-    bias, rmse
-        Mean error and root of the mean square error [W/(m^2 sr)].
-    relative_bias, relative_rmse
-        The same over the mean of the reference; NaN if that is not above zero.
-    p50, p99, max
-        Median, 99 % quantile (between order statistics linear) and largest of |test - ref| / max(ref, 0.001 mean(ref)).
-    nonfinite
-        Pixels with a NaN or an infinity in either image. They are left out of all averages: whoever sees a number
-        above zero here must call the comparison failed.
-    negative
-        Pixels in which the test image has a negative value. They stay in the averages.
+    Whoever sees `nonfinite` above zero must call the comparison failed.
     """
 
-    pixels: int
-    bias: float
-    relative_bias: float
-    rmse: float
-    relative_rmse: float
-    p50: float
-    p99: float
-    max: float
-    nonfinite: int
-    negative: int
+    pixels: int = column("pixels", "pixels", "compared, those of the mask, with or without finite values")
+    bias: float = column("bias", RADIANCE, "mean error")
+    relative_bias: float = column("rel. bias", "1", "mean error over the mean of the reference: below 0 is too dark")
+    rmse: float = column("RMSE", RADIANCE, "root of the mean square error")
+    relative_rmse: float = column("rel. RMSE", "1", "root of the mean square error over the mean of the reference")
+    p50: float = column("median error", "1", f"half of the values err by less: {_RELATIVE}")
+    p99: float = column("p99", "1", f"99 of 100 values err by less: {_RELATIVE}")
+    max: float = column("max", "1", f"all values err by at most: {_RELATIVE}")
+    nonfinite: int = column("not finite", "pixels", "with NaN or infinity in either image; left out of every average")
+    negative: int = column("negative", "pixels", "with a negative value in the test image; they stay in the averages")
 
     def to_json(self) -> dict[str, Any]:
         """Return the numbers by name; what is not finite becomes None, which JSON can hold."""
@@ -73,7 +62,7 @@ def error_metrics(reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike | No
     -------
     Metrics
         In float64. If no pixel is finite in both images, every error is NaN; if the reference is black, the relative
-        ones are.
+        ones are. Quantiles are linear between order statistics.
 
     Raises
     ------

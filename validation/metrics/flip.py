@@ -30,6 +30,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analytic.columns import column
 from analytic.errors import InputError
 from reference.storage.files import temporary_folder
 from validation.metrics.errors import colours, compared, plain
@@ -60,26 +61,15 @@ print("finished")
 
 @dataclass(frozen=True)
 class Flip:
-    """HDR-FLIP of two images, or why there is none.
+    """HDR-FLIP of two images, or why there is none."""
 
-    Attributes
-    ----------
-    value
-        Mean over the pixels compared, from 0 for equal images to 1; None without an answer.
-    note
-        Why there is no answer; empty with one.
-    start_exposure, stop_exposure, exposures, pixels_per_degree
-        What it was computed with, exposures in stops; None where it was not.
-    error_map
-        Error of every pixel, (height, width).
-    """
-
-    value: float | None
-    note: str = ""
-    start_exposure: float | None = None
-    stop_exposure: float | None = None
-    exposures: int | None = None
-    pixels_per_degree: float | None = None
+    value: float | None = column("HDR-FLIP", "1", "mean over the pixels compared: 0 for equal images, at most 1")
+    note: str = column("note", "", "why there is no answer; empty with one", default="")
+    start_exposure: float | None = column("first exposure", "stops", "of the range", default=None)
+    stop_exposure: float | None = column("last exposure", "stops", "of the range", default=None)
+    exposures: int | None = column("exposures", "1", "how many", default=None)
+    pixels_per_degree: float | None = column("pixels per degree", "1/degree", "of visual angle", default=None)
+    #: error of every pixel, (height, width)
     error_map: NDArray[np.float32] | None = field(default=None, compare=False, repr=False)
 
     def to_json(self) -> dict[str, Any]:

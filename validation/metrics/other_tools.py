@@ -41,8 +41,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analytic.columns import column
 from analytic.errors import InputError
-from validation.metrics.errors import FLOOR, compared, plain
+from validation.metrics.errors import FLOOR, RADIANCE, compared, plain
 
 Array = NDArray[np.float64]
 
@@ -53,37 +54,27 @@ TRIMMED = 0.001  #: share of the largest values that `relmse_trim` leaves out
 
 @dataclass(frozen=True)
 class PublishedErrors:
-    """Error of a test image against a reference as other tools print it (formulae: see the module).
+    """Error of a test image against a reference as other tools print it (formulae: see the module)."""
 
-    Attributes
-    ----------
-    unit
-        Radiance that counts as 1 [W/(m^2 sr)]; both images were divided by it.
-    values, nonfinite
-        Values compared, and pixels left out because either image is NaN or infinite there.
-    dark
-        Values whose reference is below 0.001 of its mean; `relative` leaves them out, `dark_max` is for them.
-    """
-
-    unit: float
-    values: int
-    nonfinite: int
-    dark: int
-    mse: float
-    rmse: float
-    mae: float
-    rae_tev: float
-    rse_tev: float
-    mrse_pbrt: float
-    relmse: float
-    relmse_trim: float
-    mape: float
-    smape: float
-    mrse_jeri: float
-    psnr: float
-    relative: float
-    relative_max: float
-    dark_max: float
+    unit: float = column("unit", RADIANCE, "radiance that counts as 1: both images were divided by it")
+    values: int = column("values", "1", "compared")
+    nonfinite: int = column("not finite", "pixels", "left out because either image is NaN or infinite there")
+    dark: int = column("dark values", "1", "whose reference is below 0.001 of its mean")
+    mse: float = column("MSE", "unit^2", "mean square error")
+    rmse: float = column("RMSE", "unit", "root of the mean square error")
+    mae: float = column("MAE", "unit", "mean absolute error")
+    rae_tev: float = column("RAE (tev)", "1", "tev's relative absolute error")
+    rse_tev: float = column("RSE (tev)", "1", "tev's relative squared error")
+    mrse_pbrt: float = column("MRSE (pbrt)", "1", "pbrt's MRSE")
+    relmse: float = column("relMSE", "1", "SimpleImageIO's relative MSE")
+    relmse_trim: float = column("relMSE, trimmed", "1", "that without the largest 0.1 % of the values")
+    mape: float = column("MAPE", "1", "JERI's MAPE")
+    smape: float = column("SMAPE", "1", "JERI's SMAPE")
+    mrse_jeri: float = column("MRSE (JERI)", "1", "JERI's MRSE")
+    psnr: float = column("PSNR", "dB", "peak signal to noise, with the reference's peak; none for equal images")
+    relative: float = column("relative", "1", "mean of |error| over the reference where that is not dark")
+    relative_max: float = column("relative, largest", "1", "largest of the same")
+    dark_max: float = column("in the dark", "1", "largest |error| of dark values, over the mean of the reference")
 
     def to_json(self) -> dict[str, Any]:
         """Return the numbers by name; what is not finite (PSNR of equal images) becomes None."""

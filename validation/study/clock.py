@@ -19,6 +19,8 @@ from typing import Any, NamedTuple
 import drjit as dr
 import numpy as np
 
+from analytic.columns import column
+
 _MIB = 1024  # of the numbers in `status` [KiB]
 _FORGET = "5"  # what makes Linux forget the peak so far
 
@@ -35,11 +37,11 @@ class Run(NamedTuple):
 class Timing:
     """Repeated measurements of one piece of work [ms]."""
 
-    median_ms: float  #: median
-    low_ms: float  #: first quartile
-    high_ms: float  #: third quartile
-    repetitions: int  #: number of measurements
-    cpu_ms: float | None = None  #: least processor time, of all threads; None where it was not measured
+    median_ms: float = column("median", "ms", "of the wall clock")
+    low_ms: float = column("first quartile", "ms", "of the wall clock")
+    high_ms: float = column("third quartile", "ms", "of the wall clock")
+    repetitions: int = column("repetitions", "1", "how often it was measured")
+    cpu_ms: float | None = column("processor", "ms", "least processor time, of all threads", default=None)
 
 
 def timed(work: Callable[[], Any]) -> Run:

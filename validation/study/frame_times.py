@@ -10,6 +10,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from analytic.columns import column
 from realtime.frame.incremental import FrameCache, next_frame, next_parts
 from realtime.frame.light_on_ray import check_radiance
 from realtime.frame.renderer import (
@@ -99,13 +100,15 @@ def first_frame(renderer: FrameRenderer) -> FrameCache:
 class FrameTimes:
     """The times of a frame and of its stages [ms]."""
 
-    frame: Timing  #: camera rays, lit surface, tiles and airlight; shadow maps or planes are there
-    surface: Timing  #: camera rays and lit surface
-    airlight: Timing  #: tiles and airlight: the kernel with its ray set-up, or the marching
-    light_moved: Timing  #: a frame after the light moved: shadow maps or silhouettes and planes, all stages
-    objects_moved: Timing  #: a frame after the objects moved too: acceleration structure, adjacent planes, all stages
-    light_moved_camera_kept: Timing  #: a frame after the light moved, with the camera rays of the last frame
-    colours_changed: Timing  #: a frame after only medium or colours changed: surface and airlight from what is there
+    frame: Timing = column("frame", "ms", "a whole frame while nothing moves: shadow maps or planes are there")
+    surface: Timing = column("rays + surface", "ms", "camera rays and lit surface")
+    airlight: Timing = column("airlight", "ms", "tiles and airlight: the kernel with its ray set-up, or the marching")
+    light_moved: Timing = column("light moved", "ms", "a frame after the light moved: maps or planes again, all stages")
+    objects_moved: Timing = column("objects moved", "ms", "a frame after the objects moved too: acceleration structure")
+    light_moved_camera_kept: Timing = column(
+        "light moved, camera rays kept", "ms", "a frame after the light moved, with the camera rays of the last frame"
+    )
+    colours_changed: Timing = column("colours changed", "ms", "a frame after only medium or colours changed")
 
 
 def time_frame(

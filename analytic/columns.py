@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Records that know their columns: heading, unit and meaning stand at the field, for every table, figure and file.
+
+    @dataclass(frozen=True)
+    class Cost:
+        frame: float | None = column("frame", "ms", "a frame while nothing moves")
+        error: Metrics | None = None        # a record within: its columns are `error.rmse` and so on
+
+A value within a record within a record has a key with dots, the path of the value in the JSON of the record too.
+"""
+
+import types
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
+from functools import cache
+from typing import Any, Union, get_args, get_origin, get_type_hints
+
+_COLUMN = "column"
+_KINDS = {str: "string", int: "int64", float: "float64", bool: "bool", bytes: "binary"}
+
+
+@dataclass(frozen=True)
+class Column:
+    """What the values of a column are."""
+
+    key: str  #: the path of the value in the record, with dots
+    heading: str
+    unit: str  #: '1' for a number without a unit, empty for what is no number
+    meaning: str
+    kind: str  #: 'string', 'int64', 'float64', 'bool' or 'binary', as Arrow names them
+    needed: bool = False  #: whether every record has a value
+
+
+def column(heading: str = "", unit: str | None = None, meaning: str = "", *, default: Any = MISSING) -> Any:
+    """Return a field of a data class with its heading (its name with spaces by default), its unit and its meaning."""
+    return field(default=default, metadata={_COLUMN: (heading, unit, meaning)})
+
+
+@cache
+def columns_of(record: type) -> tuple[Column, ...]:
+    """Return the columns of a data class, those of the records within it too, in order.
+
+    Fields of other types, such as arrays and mappings, have no column.
+    """
+    return tuple(_columns(record, ""))
+
+
+def values_of(record: Any) -> dict[str, Any]:
+    """Return the values of a record by the keys of its columns, and `NAME.KEY` for what its mappings hold."""
+    return flat({each.name: getattr(record, each.name) for each in fields(record)})
+
+
+def flat(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return mappings and records within a mapping as one dictionary, keys joined by dots."""
+    values: dict[str, Any] = {}
+    for key, value in data.items():
+        if is_dataclass(value) and not isinstance(value, type):
+            value = values_of(value)
+        if isinstance(value, Mapping):
+            values |= {f"{key}.{name}": inner for name, inner in flat(value).items()}
+        else:
+            values[str(key)] = value
+    return values
+
+
+def _columns(record: Any, prefix: str) -> Iterator[Column]:
+    hints = get_type_hints(record)
+    for each in fields(record):
+        kind, optional = _kind(hints[each.name])
+        heading, unit, meaning = each.metadata.get(_COLUMN, ("", None, ""))
+        heading = heading or each.name.replace("_", " ")
+        if is_dataclass(kind):
+            for inner in _columns(kind, f"{prefix}{each.name}."):
+                words = f"{meaning}: {inner.meaning}" if meaning else inner.meaning
+                yield replace(inner, heading=f"{heading}, {inner.heading}", meaning=words)
+        elif kind in _KINDS:
+            usual = "1" if kind in (int, float) else ""
+            needed = not (optional or prefix)
+            yield Column(prefix + each.name, heading, usual if unit is None else unit, meaning, _KINDS[kind], needed)
+
+
+def _kind(hint: Any) -> tuple[Any, bool]:
+    """Return the type of a field without None, and whether None is allowed."""
+    if get_origin(hint) in (Union, types.UnionType):
+        inside = [each for each in get_args(hint) if each is not type(None)]
+        return (inside[0] if len(inside) == 1 else None), len(inside) < len(get_args(hint))
+    return hint, False
