@@ -23,7 +23,6 @@ from realtime.numerics.fast_exp import exp_bounded
 from realtime.rays.ray_light import falloff, ray_geometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, per_extinction, transmittance
-from realtime.scene.placed_scene import PlacedScene
 from realtime.scene.triangle_table import Facets, facet_at, facet_number
 
 _NO_DISTANCE = 1e-12  # what stands for the square of a distance of 0, of which no power is finite [m^2]
@@ -116,8 +115,6 @@ def visible_triangle(scene, origin, direction):
     mesh = dr.select(seen, mesh, dr.zeros(mi.MeshPtr))
     face = mesh.face_indices(hit.prim_index, seen)
     corners = [type(direction)(mesh.vertex_position(vertex, seen)) for vertex in (face.x, face.y, face.z)]
-    if isinstance(scene, PlacedScene):
-        corners = [scene.placed(hit, corner) for corner in corners]
     Float = type(direction.x)
     u, v = Float(hit.prim_uv.x), Float(hit.prim_uv.y)
     return corners, (1 - u - v, u, v), seen

@@ -39,7 +39,6 @@ from realtime.methods.shadow_planes.method import (
     prepare_shadow_planes,
     shadow_planes,
 )
-from realtime.methods.soft_shafts.history import accumulate
 from realtime.methods.soft_shafts.method import prepare_soft_shafts, shares_by_source, soft_shafts
 from realtime.methods.soft_shafts.parameters import SoftShaftsParameters, soft_shaft_errors
 from realtime.methods.unshadowed import render_unshadowed
@@ -136,9 +135,6 @@ METHODS: dict[str, Method] = {
         uses_kernel=never,
         casts_rays=always,
         provides_visibility=always,
-        passes=(accumulate,),
-        passes_read_depth_alone=True,
-        runs_passes=lambda parameters: parameters.history > 0,
         lights_at_once=always,
         by_source=shares_by_source,
         light_points=LightPoints(5, "ring"),

@@ -14,7 +14,6 @@ Read in this order:
 - `directional_extent.py`: the smallest rectangle across a directional light through which all light of the media comes;
 - `triangle_table.py`: what shading needs of every triangle;
 - `mesh_adjacency.py`: triangles that cast shadows, and their neighbours;
-- `placed_scene.py`: shapes that stand elsewhere than in their own acceleration structure;
 - `features.py`: what the scene needs of a method;
 - `read_media.py`: reads the media of a Mitsuba scene;
 - `read_scene.py`: reads a Mitsuba scene;

@@ -23,16 +23,11 @@ from realtime.numerics.array_types import types_of
 from realtime.scene.directional_extent import directional_fields, extent_spheres
 from realtime.scene.lights import DirectionalExtent, Light
 from realtime.scene.medium import Medium
-from realtime.scene.mesh_adjacency import Casters, Placement
-from realtime.scene.placed_scene import PlacedScene, mitsuba_scene, parted, placed
+from realtime.scene.mesh_adjacency import Casters
 from realtime.scene.read_scene import Scene
 from realtime.scene.triangle_table import Facets, read_facets, with_rotations
 
 Array = NDArray[np.float64]
-
-#: Triangles from which on a shape that moves has an acceleration structure of its own. Four times as many move in
-#: 93 ms with it and in 267 without (`airlight bench sphere-spot --scaling triangles --size 800x600`).
-MANY = 65_536
 
 
 def turned_light(light: Light, about: Array, turn: Array) -> Light:
@@ -92,7 +87,7 @@ def with_area_lights(scene: Scene, area_lights: Sequence[AreaLight]) -> Scene:
     black = [light for light in area_lights if light.opaque]
     if not black:
         return replace(scene, area_lights=tuple(area_lights))
-    parameters = mi.traverse(mitsuba_scene(scene.geometry))
+    parameters = mi.traverse(scene.geometry)
     for light in black:
         key = f"{light.name}.to_world"
         third = np.cross(light.across, light.up)
@@ -102,9 +97,7 @@ def with_area_lights(scene: Scene, area_lights: Sequence[AreaLight]) -> Scene:
         parameters[key] = type(parameters[key])(mi.Matrix4f(matrix.astype(np.float32)))
     parameters.update()
     moved = {light.name: caster_vertices(light) for light in black}
-    placements = {name: placement for name, placement in scene.placements.items() if name not in moved}
-    positions = {**scene.positions, **moved}
-    return replace(scene, area_lights=tuple(area_lights), positions=positions, placements=placements)
+    return replace(scene, area_lights=tuple(area_lights), positions={**scene.positions, **moved})
 
 
 def thicker_medium(medium: Medium, factor: float) -> Medium:
@@ -134,36 +127,21 @@ def thicker_medium(medium: Medium, factor: float) -> Medium:
 class Objects:
     """Shapes that can move, as they stood when they were read."""
 
-    geometry: Any  #: of the scene, in parts where shapes have many triangles
-    parameters: Any  #: `mi.traverse` of its Mitsuba scene
+    parameters: Any  #: `mi.traverse` of the Mitsuba scene
     vertices: Mapping[str, NDArray[np.float32]]  #: by shape, its vertices as Mitsuba has them [m]
     middles: Mapping[str, Array]  #: of their bounding boxes [m]
     numbers: Mapping[str, int]  #: of the shapes in the scene
-    apart: tuple[str, ...]  #: the shapes that have spaces of their own
     facets: Facets | None  #: the triangles of the scene
 
 
-def read_objects(scene: Scene, names: Sequence[str], *, many: int = MANY) -> Objects:
-    """Read the shapes that are to move.
-
-    Parameters
-    ----------
-    scene
-        The scene as it was read.
-    names
-        Of meshes.
-    many
-        How many triangles a shape has at least that gets an acceleration structure of its own
-        (`realtime.scene.placed_scene`), if shading reads triangles from a table.
+def read_objects(scene: Scene, names: Sequence[str]) -> Objects:
+    """Read the shapes that are to move; `names` are those of meshes.
 
     Raises
     ------
     InputError
-        For a shape that is not there, or whose vertices Mitsuba does not let move; if objects of the scene that stand
-        in spaces of their own have moved before.
+        For a shape that is not there, or whose vertices Mitsuba does not let move.
     """
-    if isinstance(scene.geometry, PlacedScene):
-        raise InputError("objects of this scene have moved before: wanted the scene as it was read")
     parameters = mi.traverse(scene.geometry)
     vertices = {}
     for name in names:
@@ -175,14 +153,10 @@ def read_objects(scene: Scene, names: Sequence[str], *, many: int = MANY) -> Obj
     if scene.facets is not None:
         # Objects may have moved before in Mitsuba's scene: as it is now, vertices and normals are of one place.
         facets = read_facets(scene.geometry, types_of(type(scene.camera.origin.x)))
-    shapes = scene.geometry.shapes()
-    numbers = _numbers(parameters, names, shapes) if facets is not None else {}
-    apart = tuple(name for name, number in numbers.items() if _stands_apart(shapes[number], name, many))
-    geometry = parted(scene.geometry, apart) if apart else scene.geometry
-    parameters = mi.traverse(mitsuba_scene(geometry))
+    numbers = _numbers(parameters, names, scene.geometry.shapes()) if facets is not None else {}
     middles = {name: 0.5 * (own.min(axis=0).astype(float) + own.max(axis=0)) for name, own in vertices.items()}
-    replace_positions(parameters, {name: own for name, own in vertices.items() if name not in apart})
-    return Objects(geometry, parameters, vertices, middles, numbers, apart, facets)
+    replace_positions(parameters, vertices)
+    return Objects(parameters, vertices, middles, numbers, facets)
 
 
 def _numbers(parameters, names: Sequence[str], shapes) -> dict[str, int]:
@@ -193,11 +167,6 @@ def _numbers(parameters, names: Sequence[str], shapes) -> dict[str, int]:
         if "vertex_positions" in own:
             numbers[own["vertex_positions"].index] = number
     return {name: numbers[parameters[f"{name}.vertex_positions"].index] for name in names}
-
-
-def _stands_apart(shape, name: str, many: int) -> bool:
-    """Return whether a shape gets a space of its own; casters know it by its own name alone."""
-    return shape.id() == name and shape.face_count() >= many
 
 
 def replace_positions(parameters, positions: Mapping[str, NDArray[Any]]) -> None:
@@ -214,33 +183,17 @@ def replace_positions(parameters, positions: Mapping[str, NDArray[Any]]) -> None
 def turned_objects(scene: Scene, objects: Objects, turn: Array) -> Scene:
     """Return the scene with each of the objects turned about the middle of its bounding box, from where it stood.
 
-    Parameters
-    ----------
-    scene
-        The scene; its Mitsuba scene is changed but for shapes with spaces of their own.
-    objects
-        From `read_objects`.
-    turn
-        Rotation matrix, (3, 3).
+    `turn` is a rotation matrix, (3, 3). The scene's Mitsuba scene is changed.
     """
-    placements = {
-        name: Placement(turn, objects.middles[name] - turn @ objects.middles[name], vertices)
+    positions = {
+        name: ((vertices - objects.middles[name]) @ turn.T + objects.middles[name]).astype(np.float32)
         for name, vertices in objects.vertices.items()
     }
-    inside = {name: own.positions() for name, own in placements.items() if name not in objects.apart}
-    replace_positions(objects.parameters, inside)
-    geometry, facets = objects.geometry, objects.facets
-    if objects.apart:
-        geometry = placed(geometry, [placements[name] for name in objects.apart])
+    replace_positions(objects.parameters, positions)
+    facets = objects.facets
     if facets is not None:
-        facets = with_rotations(facets, {objects.numbers[name]: own.rotation for name, own in placements.items()})
-    return replace(
-        scene,
-        geometry=geometry,
-        positions={name: own for name, own in scene.positions.items() if name not in placements},
-        placements={**scene.placements, **placements},
-        facets=facets,
-    )
+        facets = with_rotations(facets, dict.fromkeys(objects.numbers.values(), turn))
+    return replace(scene, positions={**scene.positions, **positions}, facets=facets)
 
 
 def closed_shapes(casters: Casters) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 """Shadow casters: the triangles of a scene and how they hang together.
 
 Adjacency is computed once; when a light moves only signs change (`realtime.methods.shadow_planes.silhouettes`), when
-an object moves only its vertices (`moved`).
+an object moves only its vertices (`with_positions`).
 
 Vertices that coincide exactly are one vertex: meshes come with seams where texture coordinates differ. An edge is met
 by *half-edges*, one for each triangle at it, each with a direction. Half-edges of an edge are paired, opposite ones
@@ -12,7 +12,7 @@ triangles meet two entries: their sum is the same whichever way they are paired.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -31,34 +31,6 @@ Index = NDArray[np.int32]
 
 
 @dataclass(frozen=True)
-class Placement:
-    """Where a shape that moved as a whole stands: a point p of it as it was is at `rotation` p + `shift`."""
-
-    rotation: Array  #: (3, 3)
-    shift: Array  #: [m], (3,)
-    start: NDArray[np.float32]  #: its vertices before, as Mitsuba had them [m], (vertices, 3)
-
-    def seen(self, point: Array, w: int = 1) -> Array:
-        """Return a place (w = 1) or direction (w = 0) as the shape's own space has it."""
-        return (point - w * self.shift) @ self.rotation
-
-    def positions(self, vertices: Any = slice(None)) -> Array:
-        """Return where some of its vertices are, all by default, rounded to float32 as Mitsuba holds them [m]."""
-        # Sums and no product of matrices: a vertex is at the same place, bit for bit, whichever others are asked for.
-        x, y, z = np.moveaxis(self.start[vertices].astype(np.float64), -1, 0)[..., None]
-        there = x * self.rotation[:, 0] + y * self.rotation[:, 1] + z * self.rotation[:, 2] + self.shift
-        return there.astype(np.float32).astype(np.float64)
-
-
-@dataclass(frozen=True)
-class _Placed:
-    """A shape of casters that stands elsewhere."""
-
-    placement: Placement
-    own: Index  #: which of the shape's own vertices each vertex of the casters is
-
-
-@dataclass(frozen=True)
 class Casters:
     """Triangles that cast shadows, with their adjacency."""
 
@@ -74,49 +46,13 @@ class Casters:
     closed: NDArray[np.bool_]  #: by component: whether every edge is met as often one way as the other
     boxes: Array  #: by component: lower and upper corner of its bounding box [m], (components, 2, 3)
     shapes: tuple[tuple[str, int, Index], ...]  #: name, its first vertex, and which of the shape's own each one is
-    first_triangles: NDArray[np.int64]  #: of every shape, and the end of the last
     owner: NDArray[np.int64]  #: by component: the number of its shape
     warnings: tuple[str, ...] = ()  #: what is odd about the meshes, by name
-    read: tuple[NDArray[np.float32], ...] = ()  #: by shape, its own vertices as they were read [m]
-    placed: Mapping[int, _Placed] = field(default_factory=dict)  #: by number, shapes that stand elsewhere as a whole
 
     @property
     def none(self) -> int:
         """The number that stands for no triangle."""
         return len(self.triangles)
-
-    def positions_of(self, vertices: NDArray[Any]) -> Array:
-        """Return where some vertices are [m], (..., 3)."""
-        here = self.vertices[vertices]
-        for number, placed in self.placed.items():
-            first = self.shapes[number][1]
-            own = (vertices >= first) & (vertices < first + len(placed.own))
-            here[own] = placed.placement.positions(placed.own[vertices[own] - first])
-        return here
-
-    def planes_of(self, triangles: NDArray[Any]) -> tuple[Array, Array]:
-        """Return normals [m^2], (n, 3), and offsets [m^3], (n,), of some triangles where they are."""
-        if not self.placed:
-            return self.normals[triangles], self.offsets[triangles]
-        return _planes_at(self.positions_of(self.triangles[triangles]))
-
-    def vertices_by_space(self) -> list[tuple[slice, Placement | None]]:
-        """Return all vertices in runs of one space, and where what is in it stands; None: where it was read."""
-        return self._by_space([*(first for _, first, _ in self.shapes), len(self.vertices)])
-
-    def triangles_by_space(self) -> list[tuple[slice, Placement | None]]:
-        """Return all triangles in such runs."""
-        return self._by_space(self.first_triangles)
-
-    def _by_space(self, firsts) -> list[tuple[slice, Placement | None]]:
-        """Return runs of what of every shape begins at `firsts`, which has the end of the last too."""
-        runs: list[tuple[slice, Placement | None]] = []
-        begin = 0
-        for number in sorted(self.placed):
-            runs += [(slice(begin, firsts[number]), None)]
-            begin = firsts[number + 1]
-            runs += [(slice(firsts[number], begin), self.placed[number].placement)]
-        return [*runs, (slice(begin, firsts[-1]), None)]
 
     def of_shape(self, name: str) -> NDArray[np.bool_]:
         """Return which components are of a shape."""
@@ -160,11 +96,10 @@ def make_casters(meshes) -> Casters:
         (name, vertices (n, 3) [m], triangles (m, 3)) each. Triangles with a vertex twice and repeated ones are left
         out, the latter with a warning.
     """
-    parts, warnings, shapes, read, first_vertex, first_component = [], [], [], [], 0, 0
+    parts, warnings, shapes, first_vertex, first_component = [], [], [], 0, 0
     for name, vertices, triangles in meshes:
         part, remarks, own = _mesh_part(name, vertices, triangles)
         shapes.append((name, first_vertex, own))
-        read.append(np.asarray(vertices, dtype=np.float32))
         parts.append(_shifted(part, first_vertex, first_component))
         first_vertex += len(part["vertices"])
         first_component += len(part["closed"])
@@ -183,18 +118,9 @@ def make_casters(meshes) -> Casters:
     return Casters(
         **joined,
         shapes=tuple(shapes),
-        first_triangles=first_triangle,
         owner=owner,
         warnings=tuple(warnings),
-        read=tuple(read),
     )
-
-
-def moved(casters: Casters, vertices: Array) -> Casters:
-    """Return the casters with their vertices elsewhere; adjacency stays."""
-    normals, offsets = _planes(vertices, casters.triangles)
-    boxes = _boxes(vertices, casters.triangles, casters.component, len(casters.closed))
-    return replace(casters, vertices=vertices, normals=normals, offsets=offsets, boxes=boxes)
 
 
 def with_positions(casters: Casters, positions: Mapping[str, Array]) -> Casters:
@@ -205,7 +131,9 @@ def with_positions(casters: Casters, positions: Mapping[str, Array]) -> Casters:
     for name, first, own in casters.shapes:
         if name in positions:
             vertices[first : first + len(own)] = positions[name][own]
-    return moved(casters, vertices)
+    normals, offsets = _planes(vertices, casters.triangles)
+    boxes = _boxes(vertices, casters.triangles, casters.component, len(casters.closed))
+    return replace(casters, vertices=vertices, normals=normals, offsets=offsets, boxes=boxes)
 
 
 def mesh_triangles(mesh) -> tuple[Array, NDArray[np.int64]]:
@@ -214,43 +142,6 @@ def mesh_triangles(mesh) -> tuple[Array, NDArray[np.int64]]:
     position = mesh.vertex_position(dr.arange(mi.UInt32, mesh.vertex_count()))
     face = mesh.face_indices(dr.arange(mi.UInt32, mesh.face_count()))
     return np.array(position, dtype=np.float64).T.copy(), np.array(face, dtype=np.int64).T.copy()
-
-
-def with_placements(casters: Casters, positions: Mapping[str, Array], placements: Mapping[str, Placement]) -> Casters:
-    """Return what `with_positions` does, with no work on the triangles of shapes that moved as a whole.
-
-    Their vertices, normals and offsets stay those of the space in which the shapes were read; what of casters takes a
-    place asks for that, and vertices move where they are asked for. A shape with positions, or with a placement from
-    another start than what was read, moves vertex by vertex.
-    """
-    if not positions and not placements:
-        return casters
-    placed: dict[int, _Placed] = {}
-    others: dict[str, Array] = {}
-    boxes = casters.boxes.copy()
-    for number, (name, _, own) in enumerate(casters.shapes):
-        placement = placements.get(name)
-        if placement is None:
-            if name in positions:
-                others[name] = positions[name]
-            continue
-        if not np.array_equal(placement.start, casters.read[number]):
-            others[name] = placement.positions()
-            continue
-        placed[number] = _Placed(placement, own)
-        boxes[casters.owner == number] = _turned_boxes(boxes[casters.owner == number], placement)
-    standing = with_positions(casters, others)
-    if others:
-        moved_otherwise = ~np.isin(casters.owner, list(placed))
-        boxes[moved_otherwise] = standing.boxes[moved_otherwise]
-    return replace(standing, boxes=boxes, placed=placed)
-
-
-def _turned_boxes(boxes: Array, placement: Placement) -> Array:
-    """Return boxes about turned boxes, (boxes, 2, 3)."""
-    middle, half = boxes.mean(axis=1) @ placement.rotation.T + placement.shift, 0.5 * (boxes[:, 1] - boxes[:, 0])
-    reach = half @ np.abs(placement.rotation).T * (1 + 1e-6)  # vertices are rounded to float32
-    return np.stack([middle - reach, middle + reach], axis=1)
 
 
 def _triangles(shape) -> tuple[Array, NDArray[np.int64]]:
@@ -317,13 +208,12 @@ def _shifted(part: dict[str, Any], vertex: int, component: int) -> dict[str, Any
 
 
 def _planes(vertices: Array, triangles) -> tuple[Array, Array]:
-    return _planes_at(vertices[triangles])
-
-
-def _planes_at(corner: Array) -> tuple[Array, Array]:
-    """Return normals and offsets of triangles with corners (triangles, 3, 3)."""
-    normals = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    return normals, np.einsum("ij,ij->i", normals, corner[:, 0])
+    """Return normals and offsets of triangles."""
+    first, second, third = (vertices[corner] for corner in triangles.T)
+    ax, ay, az = (second - first).T
+    bx, by, bz = (third - first).T  # `np.cross` takes three times as long
+    normals = np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
+    return normals, np.einsum("ij,ij->i", normals, first)
 
 
 def _boxes(vertices: Array, triangles, component, components: int) -> Array:

@@ -24,7 +24,6 @@ from realtime.scene.directional_extent import directional_fields, distance_befor
 from realtime.scene.features import SceneFeatures, backgrounds, scene_notes
 from realtime.scene.lights import Light, spot_fields
 from realtime.scene.medium import Medium
-from realtime.scene.mesh_adjacency import Placement
 from realtime.scene.read_media import opaque_scene, read_medium, sort_shapes
 from realtime.scene.triangle_table import Facets, read_facets
 
@@ -35,14 +34,13 @@ _UPRIGHT = 1e-3  # cosine between a camera's left, or its up, and an axis that c
 class Scene:
     """A Mitsuba scene with what a real-time method reads from it."""
 
-    geometry: Any  #: of all opaque shapes, for casting rays: an `mi.Scene`, or one in parts once objects moved
+    geometry: Any  #: of all opaque shapes, for casting rays: an `mi.Scene`
     camera: Camera
     medium: Medium
     lights: tuple[Light, ...]  #: those without extent
     features: SceneFeatures
     facets: Facets | None = None  #: the triangles, where a table says all that shading needs
-    positions: Mapping[str, Any] = field(default_factory=dict)  #: vertices of shapes that moved otherwise, by name [m]
-    placements: Mapping[str, Placement] = field(default_factory=dict)  #: of shapes that moved as a whole, by name
+    positions: Mapping[str, Any] = field(default_factory=dict)  #: vertices of shapes that moved, by name [m]
     area_lights: tuple[AreaLight, ...] = ()  #: those with extent, of which methods render points
     boundaries: tuple[Any, ...] = ()  #: Mitsuba's shapes around bounded media, in the order of `Medium.clouds`
 

@@ -50,7 +50,7 @@ from realtime.parameters import Parameters, parameter
 from realtime.scene.camera import HostCamera, read_camera
 from realtime.scene.light_points import source_shape
 from realtime.scene.lights import Light, host_position
-from realtime.scene.mesh_adjacency import Casters, read_casters, with_placements
+from realtime.scene.mesh_adjacency import Casters, read_casters, with_positions
 from realtime.scene.read_scene import Scene
 from realtime.tiles.adaptive_sampling import tolerance
 from realtime.tiles.layout import Layout
@@ -155,7 +155,7 @@ class PlanePreparation:
 
     def standing(self, scene: Scene) -> Casters:
         """Return the casters where they are in a scene."""
-        return with_placements(self.casters, scene.positions, scene.placements)
+        return with_positions(self.casters, scene.positions)
 
 
 def prepare_shadow_planes(scene: Scene, parameters: ShadowPlaneParameters) -> Preparation:

@@ -9,7 +9,7 @@ from realtime.methods.shadow_planes.view_culling import components_in_view
 from realtime.scene.camera import HostCamera, read_camera
 from realtime.scene.light_points import source_shape
 from realtime.scene.lights import Light, host_position
-from realtime.scene.mesh_adjacency import Casters, read_casters, with_placements
+from realtime.scene.mesh_adjacency import Casters, read_casters, with_positions
 from realtime.scene.read_scene import Scene
 
 
@@ -42,7 +42,7 @@ def caster_plan(scene: Scene) -> CasterPlan:
     InputError
         For a caster without triangles.
     """
-    casters = with_placements(read_casters(scene.geometry, scene.area_lights), scene.positions, scene.placements)
+    casters = with_positions(read_casters(scene.geometry, scene.area_lights), scene.positions)
     camera = read_camera(scene.camera)
     lights = tuple(_light_plan(casters, camera, light, source_shape(scene, light)) for light in scene.lights)
     return CasterPlan(

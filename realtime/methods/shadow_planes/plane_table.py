@@ -120,7 +120,7 @@ def light_basis(light: Array, camera: Array) -> LightBasis:
 
 def shadow_planes(casters: Casters, edges: Silhouette, basis: LightBasis) -> Planes:
     """Return the shadow planes of silhouette edges in the frame of a light and a camera."""
-    return edge_planes(basis.coordinates(casters.positions_of(edges.edges)), edges.coefficient, w=basis.w)
+    return edge_planes(basis.coordinates(casters.vertices[edges.edges]), edges.coefficient, w=basis.w)
 
 
 def edge_planes(vertices: Array, coefficient: NDArray[np.int8], *, w: int = 1) -> Planes:
@@ -222,8 +222,7 @@ def layers_between(casters: Casters, light: Array, basis: LightBasis, *, used: N
     if not len(number):
         return 0
     crossed = number[_crosses(casters, number, (start, direction), reach)]
-    normals, offsets = casters.planes_of(crossed)
-    sign = np.sign(normals @ l - w * offsets)
+    sign = np.sign(casters.normals[crossed] @ l - w * casters.offsets[crossed])
     component = casters.component[crossed]
     components = len(casters.closed)
     front, back = (
@@ -238,13 +237,8 @@ def _beside_axis(casters: Casters, number, start: Array, axes: Array) -> NDArray
 
     It runs through x = y = 0, and those have all three corners beyond it on one of four sides.
     """
-    sides = np.empty(len(casters.vertices), dtype=np.uint8)
-    for vertices, placement in casters.vertices_by_space():
-        own, here = (axes[:2] @ placement.rotation, placement.seen(start)) if placement else (axes[:2], start)
-        x, y = own @ casters.vertices[vertices].T - (own @ here)[:, None]
-        sides[vertices] = (
-            (x > 0) | (x < 0).view(np.uint8) << 1 | (y > 0).view(np.uint8) << 2 | (y < 0).view(np.uint8) << 3
-        )
+    x, y = axes[:2] @ casters.vertices.T - (axes[:2] @ start)[:, None]
+    sides = (x > 0) | (x < 0).view(np.uint8) << 1 | (y > 0).view(np.uint8) << 2 | (y < 0).view(np.uint8) << 3
     first, second, third = casters.triangles[number].T
     return np.asarray(sides[first] & sides[second] & sides[third] == 0)
 
@@ -260,12 +254,12 @@ def _crosses(casters: Casters, number, line: tuple[Array, Array], reach: tuple[f
     sides = []
     for k in range(3):
         tail, head = triangle[:, k], triangle[:, (k + 1) % 3]
-        low, high = (casters.positions_of(end(tail, head)) - start for end in (np.minimum, np.maximum))
+        low, high = (casters.vertices[end(tail, head)] - start for end in (np.minimum, np.maximum))
         left = np.cross(low, high) @ direction >= 0
         sides.append(np.where(tail < head, left, ~left))
     inside = (sides[0] == sides[1]) & (sides[1] == sides[2])
     # The plane normal . p = offset is met at start + u direction.
-    normal, offset = casters.planes_of(number)
+    normal, offset = casters.normals[number], casters.offsets[number]
     with np.errstate(divide="ignore", invalid="ignore"):
         u = (offset - normal @ start) / (normal @ direction)
     return inside & (u > reach[0]) & (u < reach[1])

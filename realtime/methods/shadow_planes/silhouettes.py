@@ -49,11 +49,7 @@ class Silhouette:
 def facing(casters: Casters, light: Array) -> NDArray[np.int8]:
     """Return by triangle whether its front faces a light: 1 yes, -1 no, 0 edge-on; and a last 0 for no triangle."""
     l, w = place_and_weight(np.asarray(light, dtype=np.float64))  # noqa: E741
-    sign = np.zeros(casters.none + 1, dtype=np.int8)
-    for triangles, placement in casters.triangles_by_space():
-        seen = placement.seen(l, w) if placement else l
-        sign[triangles] = np.sign(casters.normals[triangles] @ seen - w * casters.offsets[triangles])
-    return sign
+    return np.append(np.sign(casters.normals @ l - w * casters.offsets), 0).astype(np.int8)
 
 
 def layers(casters: Casters, light: Array) -> NDArray[np.int8]:

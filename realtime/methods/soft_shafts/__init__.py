@@ -10,6 +10,5 @@ Read in this order:
 - `march.py`: the airlight of all points of a light along rays.
 - `surfaces.py`: which share of a light reaches the visible surfaces, and how wide its penumbrae are.
 - `smoothing.py`: the filters that the parameters ask for.
-- `history.py`: the last frame, where it still holds.
 - `method.py`: the method, and how its stages follow one another.
 """

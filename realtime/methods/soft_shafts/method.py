@@ -39,7 +39,6 @@ from realtime.memory import check_memory
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.marching import marched_integral
 from realtime.methods.interface.view import View, bounded_radiance, radiance, rays_in_media
-from realtime.methods.soft_shafts.history import turn
 from realtime.methods.soft_shafts.light_sources import SourceState, frame_at, source_state
 from realtime.methods.soft_shafts.march import Share, integral_of_points
 from realtime.methods.soft_shafts.parameters import AUTO, SoftShaftsParameters
@@ -62,7 +61,6 @@ from realtime.tiles.layout import Layout
 
 _MOST_AUTO = 8.0  # the widest filter of hd=auto [pixels]
 _LEAST_AUTO, _LEAST_SHARED = 0.3, 0.5  # its narrowest, and that where pixels share the points [pixels]
-_GROUP = 4  # how many light points a pixel of a narrow penumbra asks
 
 
 @dataclass(frozen=True)
@@ -222,23 +220,15 @@ class _Frame:
         state = self.states[number]
         if p.filter == "none" and not p.interleave:
             return [there & self._reached(state, place, light, point) for place, light in enumerate(lights)]
-        own = None
         if p.interleave:
             number = self._share(self.raster, lights).number
-            own = reached_surfaces(whole, state, lambda _: number, 1, p)
-            if p.narrow:
-                # With the means over tiles: who asks for it later would cast its rays again.
-                dr.schedule(own.lit, own.all)
-            lit = self._over_tiles(own).share
+            lit = self._over_tiles(reached_surfaces(whole, state, lambda _: number, 1, p)).share
         else:
             lit = reached_surfaces(whole, state, lambda index: index, len(lights), p).share
         if p.hd == AUTO:
             dr.eval(lit)
             width = self._penumbra_width(state, len(lights))
             dr.eval(width)
-            if own is not None and p.narrow:
-                lit = self._where_narrow(lit, width, own, number, state, len(lights))
-            own = None  # two images that the filter needs not
             lit = self._smooth_by_width(lit, width, len(lights))
         elif p.filter != "none":
             there, levels = dr.isfinite(whole.distance), state.flat and not p.interleave
@@ -258,25 +248,6 @@ class _Frame:
         """Return the means over a tile: the share is then one mean over another."""
         sums = two_numbers(type(self.view.distance))(reached.lit, reached.all)
         return Reached(*tile_average(sums, self.raster, guides=(self.depth,)))
-
-    def _where_narrow(self, lit: Any, width: Any, own: Reached, number: Any, state: SourceState, points: int) -> Any:
-        """Return the share with that of a few points where penumbrae are narrow: neighbours then ask the others.
-
-        Pixels side by side lie in other groups of `_GROUP` points, four of which the filter that follows brings
-        together. Of its own group a pixel has asked one point before.
-        """
-        p = self.parameters
-        group = min(_GROUP, points)
-        asked = (lit > 0) & (lit < 1) & (width < p.narrow)
-
-        def other(index: Any) -> Any:
-            return number // group * group + (number + 1 + index) % group
-
-        more = reached_surfaces(self.whole, state, other, group - 1, p, asked)
-        summed = Reached(own.lit + more.lit, own.all + more.all)
-        lit = dr.select(asked, summed.share, lit)
-        dr.eval(lit)
-        return lit
 
     def _smooth_by_width(self, lit: Any, width: Any, points: int) -> Any:
         p = self.parameters
@@ -313,8 +284,6 @@ class _Frame:
         other = column ^ row
         order = (other & 1) * 8 + (row & 1) * 4 + (other & 2) + ((row & 2) >> 1)
         # Another lattice, so that the shifts of neighbouring points are far apart too.
-        if self.parameters.history:
-            order = (order + turn(self.view.camera, lights[0].position)) & 15
         shift = (order * 7 + 3) & 15
         return Share(order % len(lights), (type(self.view.distance)(shift) + 0.5) / 16)
 

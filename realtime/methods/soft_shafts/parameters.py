@@ -67,12 +67,6 @@ class SoftShaftsParameters(Parameters):
     interleave: bool = parameter(
         False, "each pixel of a tile of 4 x 4 takes one of the light points and a shift of the steps of its own"
     )
-    narrow: float = parameter(
-        0.0,
-        "with `interleave` and `hd=auto`: in penumbrae narrower than this every pixel asks four light points",
-        least=0,
-        unit="pixels",
-    )
     filter: str = parameter("bilateral", "of visibility and airlight", choices=("bilateral", "gauss", "none"))
     form: str = parameter(
         "direct", "of the filter: as it is defined, or along rows and then columns", choices=("direct", "separable")
@@ -95,7 +89,6 @@ class SoftShaftsParameters(Parameters):
     )
     hz: float = parameter(0.05, "relative difference of depths at which pixels are no longer alike", above=0, most=10)
     support: float = parameter(3.0, "half side of the square of taps", above=0, most=4, unit="hd")
-    history: float = parameter(0.0, "weight of the last frame where it still holds; 0: none", least=0, below=1)
 
     def _check_together(self) -> None:
         if self.hd == AUTO and (self.filter != "bilateral" or self.guide != "depth"):

@@ -60,9 +60,8 @@ def reached_surfaces(
     number_of: Callable[[Any], Any],
     count: int,
     p: SoftShaftsParameters,
-    asked: Any = True,
 ) -> Reached:
-    """Return what of a light with extent reaches the surfaces of a view, where they are `asked` for.
+    """Return what of a light with extent reaches the surfaces of a view.
 
     Parameters
     ----------
@@ -74,11 +73,9 @@ def reached_surfaces(
         Which light point each ray asks first, second and so on, counted from 0, and how many.
     p
         The parameters.
-    asked
-        Which rays are asked for; the others return 0.
     """
     Float = type(view.distance)
-    there = dr.isfinite(view.distance) & asked
+    there = dr.isfinite(view.distance)
     place = view.origin + view.direction * dr.select(there, view.distance, 0)
     if count == 1:
         return Reached(*_of_point(view, state, place, there, number_of(mi.UInt32(0)), p))

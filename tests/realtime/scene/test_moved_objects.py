@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shapes in spaces of their own: images are those of the same shapes with moved vertices, and nothing is built anew."""
+"""Shapes that moved: images are those of a file with the same shapes there."""
 
 import numpy as np
 import pytest
 
-from realtime.scene.animate import MANY, read_objects, turned_objects
+from realtime.scene.animate import read_objects, turned_objects
 from tests.helpers.scenes import tiny_scene
 from validation.scenes.parts import rotation
 
@@ -59,19 +59,13 @@ def image(scene, method: str, parameters):
 
 
 @pytest.mark.parametrize(
-    ("method", "parameters", "normals", "many"),
-    [
-        ("shadow-planes", {}, True, 1),
-        ("shadow-planes", {}, False, MANY),
-        ("light-volumes", {"map": 64}, False, 1),
-    ],
+    ("method", "parameters", "normals"), [("shadow-planes", {}, True), ("light-volumes", {"map": 64}, False)]
 )
-def test_moved_objects_are_those_of_a_file_with_the_object_moved(variant, method, parameters, normals, many):
-    """Rays, normals, shadows on surfaces and in the fog; with a space of its own and with moved vertices."""
+def test_moved_objects_are_those_of_a_file_with_the_object_moved(variant, method, parameters, normals):
+    """Rays, normals, shadows on surfaces and in the fog."""
     scene = read(normals=normals)
     before = image(scene, method, parameters)  # moved vertices move in this scene too
-    objects = read_objects(scene, ["ball"], many=many)
-    assert objects.apart == (("ball",) if many == 1 else ())
+    objects = read_objects(scene, ["ball"])
     moved, loaded = turned_objects(scene, objects, TURN), read(TURN, normals=normals)
     here, there = (image(each, method, parameters) for each in (moved, loaded))
     for name in ("airlight", "surface"):
@@ -82,21 +76,3 @@ def test_moved_objects_are_those_of_a_file_with_the_object_moved(variant, method
         # a ray or a sample of it is on the other side, in a few pixels.
         same = np.isclose(ours, theirs, rtol=1e-4, atol=1e-4 * scale).all(axis=-1)
         assert np.mean(~same) < 0.01
-
-
-def test_a_move_builds_nothing_and_touches_no_vertices(variant, monkeypatch):
-    """The cost of a move does not grow with the triangles: no vertex, no triangle and no structure is made anew."""
-    import mitsuba as mi
-
-    scene = read()
-    objects = read_objects(scene, ["ball"], many=1)
-    told = []
-    monkeypatch.setattr(type(objects.parameters), "update", lambda *_: told.append("update"))
-    monkeypatch.setattr(mi, "load_dict", lambda *_: told.append("load"))
-    first, second = (turned_objects(scene, objects, rotation((0, 0, 1), angle)) for angle in (10.0, 20.0))
-    assert not told
-    assert second.geometry.spaces[0].scene is first.geometry.spaces[0].scene
-    assert second.placements["ball"].start is first.placements["ball"].start
-    assert not second.positions
-    for name in ("normals", "albedos", "first"):
-        assert getattr(second.facets, name).index == getattr(first.facets, name).index
