@@ -35,7 +35,6 @@ from realtime.methods.light_volumes.method import (
 from realtime.methods.ray_march import RayMarchParameters, marching_errors, prepare_maps, ray_march
 from realtime.methods.shadow_planes.method import (
     ShadowPlaneParameters,
-    cull_shadow_planes,
     prepare_shadow_planes,
     shadow_planes,
 )
@@ -74,7 +73,6 @@ METHODS: dict[str, Method] = {
         "Biri, Arques, Michelin 2006",
         prepare=prepare_shadow_planes,
         prepared_from=frozenset({"camera", "geometry", "light"}),
-        cull=cull_shadow_planes,
         casts_rays=lambda parameters: parameters.evaluation == "vertex",  # to know the triangle of a surface
         provides_visibility=always,
         by_rays=lambda parameters: parameters.evaluation == "pixel",

@@ -139,7 +139,7 @@ def tiled_pixels(width: int, height: int, tile: int = 4):
     """Return the pixel numbers (row times width + column) in square tiles, (width times height,), uint32.
 
     A packet of 16 lanes then covers 4 x 4 pixels, which Embree's coherent traversal rewards; 16 packets cover 16 x 16
-    pixels, and 16 of those 64 x 64 (`realtime.methods.shadow_planes.tile_lists`).
+    pixels, and 16 of those 64 x 64.
     """
     row, column = np.divmod(np.arange(width * height, dtype=np.uint32), width)
     keys: list[np.ndarray] = [column, row]

@@ -17,18 +17,13 @@ def casters_of(*names):
     return make_casters([(name, *ALL[name]()) for name in names])
 
 
-def index_of(casters, light=LIGHT, camera=CAMERA, precision="single", *, wedges=False, order="exact"):
-    """Return the index of the shadow planes of all components; with `wedges`, as for tiles wider than most planes."""
+def index_of(casters, light=LIGHT, camera=CAMERA, precision="single", *, order="exact"):
+    """Return the index of the shadow planes of all components."""
     from realtime.numerics.array_types import array_types
 
     used = np.ones(len(casters.closed), dtype=bool)
     light, camera = np.asarray(light, dtype=float), np.asarray(camera, dtype=float)
-    wide = (np.arange(0, 4, 0.1), np.full(40, 99.0)) if wedges else None
-    index = index_planes(
-        casters, light, camera, used=used, types=array_types(precision), order=order, tiles=wide and (lambda axes: wide)
-    )
-    assert (index.wedges is not None) == wedges
-    return index
+    return index_planes(casters, light, camera, used=used, types=array_types(precision), order=order)
 
 
 def bundles(count, *, spread, light=LIGHT, camera=CAMERA, seed=1):
@@ -100,46 +95,19 @@ def lit_lengths(index, ways, end, *, weight=lambda x: x):
     return total, lit
 
 
-def drawn_lists(index, ways, end, *, order="exact"):
-    """Return the lists of the tiles of sixteen rays each."""
-    import drjit as dr
-    import mitsuba as mi
+def listed_planes(index, rays):
+    """Return by ray the numbers of the planes of its wedge that it may cross, in order."""
+    from realtime.methods.shadow_planes.plane_table import NUMBER
 
-    from realtime.methods.shadow_planes.tile_lists import tile_lists
-
-    Float = type(index.distance)
-    parts = [Float(np.ascontiguousarray(part)) for part in ways.T]
-
-    def rays(lane):
-        return tuple(dr.gather(Float, part, mi.UInt32(lane)) for part in parts)
-
-    distance = Float(np.asarray(end, dtype=np.float64))
-    return tile_lists(index, rays, distance, order=order, square=False)
+    entries = np.array(index.entries)
+    places = zip(np.array(rays.first), np.array(rays.count))
+    return [entries[first : first + count] & NUMBER for first, count in places]
 
 
-def listed_planes(lists):
-    """Return by tile the numbers of the planes that count, in order."""
-    from realtime.methods.shadow_planes.plane_entries import FIRST, NUMBER
-
-    entries, source = np.array(lists.entries), lists.source
-    by_tile = []
-    for first, count, before in zip(*(np.array(part) for part in (source.first, source.count, source.all_before))):
-        place = np.arange(first, first + count)
-        entry = entries[place]
-        counts = ((entry & FIRST) != 0) | (place < before)
-        by_tile.append(entry[counts] & NUMBER)
-    return by_tile
-
-
-def rays_of(index, lists, ways, end=None):
-    """Return the rays of a walk over lists up to a distance `end`, without an end by default."""
-    import drjit as dr
-    import mitsuba as mi
-
+def rays_of(index, ways, end=None):
+    """Return the rays of a walk up to a distance `end`, without an end by default."""
     from realtime.methods.shadow_planes.sweep import ray_planes
-    from realtime.tiles.layout import TILE
 
     Float = type(index.distance)
-    tile = dr.arange(mi.UInt32, len(ways)) // TILE
     ray_end = Float(0) if end is None else index.distance / Float(np.asarray(end, dtype=np.float64))
-    return ray_planes(lists, *(Float(np.ascontiguousarray(part)) for part in ways.T), tile=tile, ray_end=ray_end)
+    return ray_planes(index, *(Float(np.ascontiguousarray(part)) for part in ways.T), ray_end=ray_end)

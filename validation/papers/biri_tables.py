@@ -33,8 +33,7 @@ from realtime.frame.renderer import (
     run_shade,
 )
 from realtime.methods.shadow_planes.method import PlanePreparation
-from realtime.methods.shadow_planes.silhouettes import silhouette
-from realtime.methods.shadow_planes.view_culling import components_in_view
+from realtime.methods.shadow_planes.silhouettes import components_in_view, silhouette
 from realtime.scene.camera import read_camera
 from realtime.scene.read_scene import Scene, read_scene
 from validation.estimates.quadrature import truth_image

@@ -34,16 +34,13 @@ from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.methods.interface.method import Preparation
 from realtime.methods.interface.view import View, rays_in_media
-from realtime.methods.shadow_planes.pixel_rays import aim_at, read_spot, seen_rays, seen_ways, tile_azimuths
+from realtime.methods.shadow_planes.pixel_rays import aim_at, read_spot, seen_rays
 from realtime.methods.shadow_planes.plane_table import PlaneIndex, index_planes
 from realtime.methods.shadow_planes.published_crossings import Buffer, reaches, sum_crossings
 from realtime.methods.shadow_planes.published_media import check_vertices, sum_in_media
 from realtime.methods.shadow_planes.published_mesh import mesh_gamma, surface_gamma
-from realtime.methods.shadow_planes.spot_pyramid import cone_ring
+from realtime.methods.shadow_planes.silhouettes import components_in_view, cone_ring
 from realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_intervals
-from realtime.methods.shadow_planes.tile_lists import Lists, tile_lists
-from realtime.methods.shadow_planes.view_culling import components_in_view
-from realtime.methods.shadow_planes.wedges import Wedges
 from realtime.numerics.array_types import ArrayTypes, types_of
 from realtime.numerics.host_numbers import host_numbers
 from realtime.parameters import Parameters, parameter
@@ -53,7 +50,6 @@ from realtime.scene.lights import Light, host_position
 from realtime.scene.mesh_adjacency import Casters, read_casters, with_positions
 from realtime.scene.read_scene import Scene
 from realtime.tiles.adaptive_sampling import tolerance
-from realtime.tiles.layout import Layout
 
 
 @dataclass(frozen=True)
@@ -200,10 +196,7 @@ def plane_finder(
         if own is not None:
             used &= ~casters.of_shape(own)
         aim = partial(aim_at, camera, spot=seen, types=types)
-        tiles = partial(tile_azimuths, camera)
-        return index_planes(
-            casters, position, camera.origin, used=used, types=types, order=order, ring=ring, aim=aim, tiles=tiles
-        )
+        return index_planes(casters, position, camera.origin, used=used, types=types, order=order, ring=ring, aim=aim)
 
     return find
 
@@ -211,7 +204,7 @@ def plane_finder(
 def shadow_planes(
     view: View,
     state: tuple[PlaneIndex, ...],
-    lists: tuple[Lists | Wedges, ...],
+    lists,
     *,
     kernel,
     parameters: ShadowPlaneParameters,
@@ -225,7 +218,7 @@ def shadow_planes(
     state
         By light its shadow planes, from `prepare_shadow_planes`.
     lists
-        By light the planes that concern each tile, from `cull_shadow_planes`.
+        Not used.
     kernel
         An airlight kernel, see `realtime.kernels`.
     parameters
@@ -276,21 +269,21 @@ def shadow_planes(
         index = state[number]
         seen = seen_rays(index.aim, view.camera, view.pixel, index.distance, light)
         ray_end = index.distance / view.distance
-        rays = ray_planes(lists[number], seen.x, seen.y, seen.z, tile=view.tile, ray_end=ray_end)
+        rays = ray_planes(index, seen.x, seen.y, seen.z, ray_end=ray_end)
         airlight = ray_airlight(view, light, kernel, media, geometry=seen.geometry)
         if parameters.segments:
             differences = parameters.sum == "gamma"
-            value, reached = _segments(index, lists[number], rays, airlight, differences=differences)
+            value, reached = _segments(index, rays, airlight, differences=differences)
             total += value
         elif buffer:
-            reached = reaches(index, lists[number], rays, view.distance) if light.w else mi.Bool(True)
+            reached = reaches(index, rays, view.distance) if light.w else mi.Bool(True)
             surface = _surface(view, number, reached)
             surfaces += surface
             total = _with_surface(view, buffer, total, surface, _fog_of(number, parameters), in_media)
-            planes = index, lists[number], rays
+            planes = index, rays
             total, _ = _drawn(planes, airlight, parameters, cone=cone, buffer=buffer, start=total)
         else:
-            planes = index, lists[number], rays
+            planes = index, rays
             value, reached = _drawn(planes, airlight, parameters, cone=cone, buffer=None, start=None)
             total += value
         # Frames cast rays for the shadows of a light at infinity on surfaces.
@@ -303,7 +296,7 @@ def shadow_planes(
 
 
 def _drawn(
-    planes: tuple[PlaneIndex, Lists | Wedges, RayPlanes],
+    planes: tuple[PlaneIndex, RayPlanes],
     airlight: RayAirlight,
     parameters: ShadowPlaneParameters,
     *,
@@ -356,26 +349,7 @@ def _ambient_fog(view: View, ambient: float, in_media: tuple[LitRay, ...]):
     return view.medium.albedo * ambient * type(view.medium.albedo)(*for_channel)
 
 
-def cull_shadow_planes(
-    view: View, state: tuple[PlaneIndex, ...], parameters: ShadowPlaneParameters
-) -> tuple[Lists | Wedges, ...]:
-    """Return by light the planes that concern each tile of the image."""
-    return tuple(tile_planes(view, index, order=parameters.order) for index in state)
-
-
-def tile_planes(view: View, index: PlaneIndex, *, order: str) -> Lists | Wedges:
-    """Return the planes that concern each tile of the image."""
-    if index.wedges is not None:
-        return index.wedges
-
-    def rays(lane):
-        pixel = dr.gather(mi.UInt32, view.pixel, lane)
-        return seen_ways(index.aim, view.camera, pixel)
-
-    return tile_lists(index, rays, view.distance, order=order, square=view.layout is Layout.SQUARES)
-
-
-def _segments(index: PlaneIndex, lists: Lists | Wedges, rays: RayPlanes, airlight: RayAirlight, *, differences: bool):
+def _segments(index: PlaneIndex, rays: RayPlanes, airlight: RayAirlight, *, differences: bool):
     """Sum the lit segments of one light."""
     view = airlight.view
 
@@ -383,7 +357,7 @@ def _segments(index: PlaneIndex, lists: Lists | Wedges, rays: RayPlanes, airligh
         return airlight.gamma(b) - airlight.gamma(a) if differences else airlight.integral(a, b)
 
     zero = dr.zeros(integral_type(view), dr.width(view.distance))
-    value, reached = sum_lit_intervals(index, lists, rays, airlight.segment, integral, zero)
+    value, reached = sum_lit_intervals(index, rays, airlight.segment, integral, zero)
     return airlight.radiance(value), reached
 
 

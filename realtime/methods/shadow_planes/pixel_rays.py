@@ -43,19 +43,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.numerics.array_types import ArrayTypes, is_single
-from realtime.numerics.diamond_angle import TURN, host_diamond_angle
 from realtime.numerics.host_numbers import host_numbers
 from realtime.rays.ray_light import RayGeometry, before_plane
 from realtime.rays.spot_cone import AxisGeometry, axis_distance, cone_roots
 from realtime.scene.camera import Camera, HostCamera, row_and_column
 from realtime.scene.lights import Light
-from realtime.tiles.layout import SIDE
 
 Array = NDArray[np.float64]
 
 _FAR = 4  # images beside the image that the light's may be away before it is as good as at infinity
 _BITS = 11
-_SAMPLES = 24, 32  # rows and columns of tiles that stand for all
 
 
 @dataclass(frozen=True)
@@ -176,29 +173,6 @@ def seen_rays(aim: Aim, camera: Camera, pixel, distance, light: Light) -> SeenRa
     elif light.cone is not None:
         geometry = _in_cone(aim, (c, r), (x, y, z, scale), geometry, light=light, distance=distance)
     return SeenRay(x, y, z, geometry)
-
-
-def seen_ways(aim: Aim, camera: Camera, pixel):
-    """Return the unit directions of the rays of pixel numbers `pixel` in the light's basis, three arrays."""
-    _, _, w = _aimed(aim, camera, pixel)
-    return tuple(w * dr.rsqrt(dr.squared_norm(w)))
-
-
-def tile_azimuths(camera: HostCamera, axes: Array) -> tuple[Array, Array]:
-    """Return the azimuths of some tiles of an image in the frame of a light, and how wide each is; diamond angles.
-
-    Tiles that hold the axis, where all azimuths meet, are left out.
-    """
-    rows, columns = ((np.arange(count) + 0.5) / count - 0.5 for count in _SAMPLES)
-    place = np.stack([part.ravel() for part in np.meshgrid(columns * camera.width, rows * camera.height)], axis=1)
-    sides = 0.5 * SIDE * np.array([(0, 0), (-1, -1), (1, -1), (-1, 1), (1, 1)])
-    directions = camera.forward + (place[:, None] + sides) @ np.stack([camera.left, camera.up])
-    x, y, _ = np.moveaxis(directions @ axes.T, -1, 0).astype(np.float32)
-    azimuth = host_diamond_angle(x, y).astype(np.float64)
-    turn = (azimuth - azimuth[:, :1] + 1.5 * TURN) % TURN - 0.5 * TURN
-    width = np.max(turn, axis=1) - np.min(turn, axis=1)
-    narrow = width < 0.25 * TURN
-    return azimuth[narrow, 0], width[narrow]
 
 
 def _aimed(aim: Aim, camera: Camera, pixel):

@@ -4,8 +4,7 @@
 from dataclasses import dataclass
 
 from realtime.methods.shadow_planes.plane_table import light_basis, shadow_planes
-from realtime.methods.shadow_planes.silhouettes import silhouette
-from realtime.methods.shadow_planes.view_culling import components_in_view
+from realtime.methods.shadow_planes.silhouettes import components_in_view, silhouette
 from realtime.scene.camera import HostCamera, read_camera
 from realtime.scene.light_points import source_shape
 from realtime.scene.lights import Light, host_position

@@ -31,9 +31,24 @@ light is a point there, without azimuths to span, and no plane; a ray along the 
 In both cases a plane has four numbers, two of which give the quotient q, D/x or 1/x, that is positive ahead of the
 camera and falls along the ray. `plane_crossing` is the one place where they differ on the device.
 
-Four numbers an edge, no division but one, and no test of depth against a triangle. Only edges whose azimuths hold phi
-count, so they are kept in `BINS` bins of azimuth, from which the tiles of the image draw their lists
-(`realtime.methods.shadow_planes.tile_lists`).
+Four numbers an edge, no division but one, and no test of depth against a triangle.
+
+**Wedges.** Only edges whose azimuths hold phi count. A *wedge* is a range of azimuths about the axis, narrower than
+most planes: its list holds the planes at its azimuths and few others, and serves every ray there, so that nothing is
+sorted for a frame.
+
+**Order.** In a half plane of one azimuth phi all rays cross planes in one order, that of psi, hence of c = A cos(phi) +
+B sin(phi), from large to small (w = 0: P and Q). A wedge is in the order of its middle; where that is wrong for a ray
+the walk notices (`realtime.methods.shadow_planes.sweep`).
+
+**End.** With (w_x, w_y) = sin g (cos phi, sin phi) a plane is crossed at D/x = c sin g - cos g, so before the ray ends
+at x_end only if
+
+    c > (D/x_end + cos g)/sin g          (w = 0: c > 1/(x_end sin g)).
+
+Over a wedge of the angle d, c = R cos(phi - phi_0) is at most the larger of its values at both ends, over cos(d) where
+that is positive: phi_0 may lie between them. The largest such bound of an entry and all behind it falls along the list;
+where it falls below what a ray asks for, a search by halves says, and there the list ends for the ray.
 
 Azimuths are diamond angles (`realtime.numerics.diamond_angle`), 0 to 4 for a full turn. Two edges that share a vertex
 share its azimuth bit by bit, and an edge holds phi if first <= phi < last: no ray slips between two edges of a loop,
@@ -49,16 +64,22 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.methods.shadow_planes.plane_entries import BINS, FIRST, entry_words, in_bins
-from realtime.methods.shadow_planes.silhouettes import Silhouette, silhouette
-from realtime.methods.shadow_planes.spot_pyramid import NEARNESS, is_outside, ring_edges
-from realtime.methods.shadow_planes.wedges import Wedges, wedge_lists, wedges_pay
+from realtime.methods.shadow_planes.silhouettes import NEARNESS, Silhouette, is_outside, ring_edges, silhouette
 from realtime.numerics.array_types import four_numbers, is_single
-from realtime.numerics.diamond_angle import TURN, host_diamond_angle
+from realtime.numerics.diamond_angle import TURN, host_diamond_angle, host_direction
 from realtime.scene.lights import place_and_weight
 from realtime.scene.mesh_adjacency import Casters
 
 Array = NDArray[np.float64]
+
+# An entry of a list: the number of a plane, the layers gained beyond it, and a mark.
+NUMBER = (1 << 24) - 1
+GAIN_SHIFT, GAIN_ZERO = 24, 32  #: gains from -32 to 31; a plane that gains more is there more than once
+FULL = 1 << 30  #: the plane is at all azimuths of the wedge
+
+_FINE = 4  # wedges that a plane spans on average: lists are a quarter longer than what is at an azimuth
+_LEAST, _MOST = 1 << 6, 1 << 16  # wedges
+_SLACK = 1e-5  # of the terms of a sum: float32 rounding, with room to spare
 
 
 @dataclass(frozen=True)
@@ -69,15 +90,16 @@ class PlaneIndex:
     y_axis: Any
     z_axis: Any
     distance: Any  #: D, from the light to the camera [m]; w = 0: 1
-    start: Any  #: first place in `entries` of every bin of two turns, (2 bins + 1,)
-    entries: Any  #: the planes bin by bin, two turns of them
+    start: Any  #: first place in `entries` of every wedge, and the end of the last
+    entries: Any  #: the planes of wedge after wedge
+    bounds: Any  #: the largest c of an entry and of those behind it in its wedge
+    scale: Any  #: wedges in a unit of azimuth
     lines: Any  #: A, B, P [1/m], Q [1/m] of every plane, flat; w = 0: P, Q, A, B
     spans: Any  #: first and last azimuth, layers gained when psi grows past it, Biri's cosine of every plane; flat
     ends: Any  #: ends of the edge of every plane in the frame [m], six numbers each, flat
     layers: Any  #: layers between the light and the camera
     aim: Any = None  #: where the pixels of the camera aim in the frame, see `realtime.methods.shadow_planes.pixel_rays`
     w: int = 1  #: last coordinate of the light's homogeneous position
-    wedges: Wedges | None = None  #: lists of the planes for all rays; None: tiles draw theirs from `entries`
 
 
 @dataclass(frozen=True)
@@ -158,20 +180,59 @@ def edge_planes(vertices: Array, coefficient: NDArray[np.int8], *, w: int = 1) -
     return _chosen(Planes(lines, first, last, gain, vertices.reshape(-1, 6), centre), kept)
 
 
-def binned(planes: Planes) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
-    """Put planes into bins of azimuth.
+def wedge_lists(planes: Planes, *, order: str) -> tuple[NDArray[np.uint32], NDArray[np.uint32], Array, np.float32]:
+    """Return first places, entries, bounds and scale of the wedges of planes, as of `PlaneIndex`, in NumPy.
 
-    Returns
-    -------
-    start, entries
-        First place of every bin of two turns, and the planes bin by bin, twice: a range of azimuths that passes 0 is
-        then one run of places.
+    Parameters
+    ----------
+    planes
+        None across azimuth 0.
+    order
+        'paper': towards the camera by the cosine of the middle of the edge; 'exact' and 'none': as rays cross them.
     """
-    plane, bins, first = in_bins(planes.first, planes.last, BINS)
-    place = np.argsort(bins.astype(np.uint16), kind="stable")
-    entries = entry_words(plane, planes.gain, FIRST * first)[place]
-    start = np.concatenate([[0], np.cumsum(np.tile(np.bincount(bins, minlength=BINS), 2))])
-    return start.astype(np.uint32), np.tile(entries, 2)
+    span = np.minimum(planes.last, TURN) - np.maximum(planes.first, 0)
+    count = int(np.clip(2 ** np.ceil(np.log2(_FINE * TURN / np.mean(span))), _LEAST, _MOST)) if len(span) else _LEAST
+    scale = np.float32(count / TURN)
+    plane, wedge = _in_wedges(planes, scale, count)
+    borders, middles = (host_direction((np.arange(count + 1) + step) / float(scale)).T for step in (0.0, 0.5))
+    a, b = planes.lines[:, :2].T
+    at_middle = [form[plane] * way[wedge] for form, way in zip((a, b), middles)]
+    at_low, at_high = (a[plane] * borders[0][end] + b[plane] * borders[1][end] for end in (wedge, wedge + 1))
+    key = -planes.centre[plane] if order == "paper" else at_middle[0] + at_middle[1]
+    place = np.lexsort((-key, wedge))
+    bound = np.maximum(at_low, at_high)
+    cos_width = np.sum(borders[:, 1:] * borders[:, :-1], axis=0)
+    bound = np.where(bound > 0, bound / cos_width[wedge], bound)
+    bound += _SLACK * (np.abs(at_middle[0]) + np.abs(at_middle[1]))
+    start = np.concatenate([[0], np.cumsum(np.bincount(wedge, minlength=count))])
+    bound = _largest_behind(bound[place], start)
+    holds = (planes.first[plane] * scale <= wedge) & (planes.last[plane] * scale >= wedge + 1)
+    gained = (planes.gain.astype(np.int64) + GAIN_ZERO) << GAIN_SHIFT
+    entries = (plane + gained[plane] + FULL * holds).astype(np.uint32)
+    return start.astype(np.uint32), entries[place], bound, scale
+
+
+def _in_wedges(planes: Planes, scale: np.float32, count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return every pair of a plane and a wedge that it meets.
+
+    `count` of the wedges is a power of two: then a ray and a plane round alike.
+    """
+    low = np.maximum((planes.first * scale).astype(np.int64), 0)
+    high = np.minimum((planes.last * scale).astype(np.int64), count - 1)
+    width = high - low + 1
+    plane = np.repeat(np.arange(len(width)), width)
+    return plane, np.arange(len(plane)) - np.repeat(np.cumsum(width) - width, width) + low[plane]
+
+
+def _largest_behind(values: Array, start: NDArray[np.int64]) -> Array:
+    """Return of each value of a run the largest of it and those behind it; `start` is where runs begin."""
+    # Runs one after another, from the last: a number that grows by more than the values from run to run parts them.
+    run = np.repeat(np.arange(len(start) - 1), np.diff(start))
+    order = np.argsort(values)
+    rank = np.empty(len(values), dtype=np.int64)
+    rank[order] = np.arange(len(values))
+    largest = np.maximum.accumulate((rank - run * len(values))[::-1])[::-1] + run * len(values)
+    return values[order[largest]]
 
 
 def _parted(planes: Planes) -> Planes:
@@ -275,9 +336,8 @@ def index_planes(
     order: str = "exact",
     ring: Array | None = None,
     aim: Callable[[Array], Any] | None = None,
-    tiles: Callable[[Array], tuple[Array, Array]] | None = None,
 ) -> PlaneIndex:
-    """Find the shadow planes of a light and put them into bins for a camera.
+    """Find the shadow planes of a light and put them into wedges for a camera.
 
     Parameters
     ----------
@@ -292,14 +352,11 @@ def index_planes(
     types
         The array types to use, see `realtime.numerics.array_types`.
     order
-        In which rays go over planes, see `realtime.methods.shadow_planes.wedges.wedge_lists`.
+        In which rays go over planes, see `wedge_lists`.
     ring
-        Of a spot whose cone is a caster, see `realtime.methods.shadow_planes.spot_pyramid`.
+        Of a spot whose cone is a caster, see `realtime.methods.shadow_planes.silhouettes.cone_ring`.
     aim
         Axes of the frame -> where the pixels of the camera aim in it.
-    tiles
-        Axes of the frame -> azimuths of some tiles of rays and how wide each is, which decide whether there are wedges;
-        without them there are none.
     """
     basis = light_basis(light, camera)
     axes = basis.axes
@@ -310,19 +367,9 @@ def index_planes(
         planes = _joined(planes, edge_planes(edges, np.full(len(ring), -1, dtype=np.int8)))
         layers += is_outside(ring, axes[2])
     planes = _parted(planes)
-    start, entries = binned(planes)
+    start, entries, bounds, scale = wedge_lists(planes, order=order)
     Float = types.scalar
     real = np.float32 if is_single(Float) else np.float64
-    wedges = None
-    if tiles is not None and wedges_pay(start, entries, *tiles(axes)):
-        start_of_wedge, in_order, bounds, scale = wedge_lists(planes, order=order)
-        wedges = Wedges(
-            mi.UInt32(_padded(start_of_wedge)),
-            mi.UInt32(_padded(in_order, 3)),
-            Float(_padded(bounds.astype(real), 3)),
-            Float(float(scale)),
-            basis.w,
-        )
     spans = np.stack([planes.first, planes.last, planes.gain, planes.centre], axis=1)
     x_axis, y_axis, z_axis = (types.vector(*(float(c) for c in axis)) for axis in axes)
     index = PlaneIndex(
@@ -331,17 +378,46 @@ def index_planes(
         z_axis,
         Float(basis.distance),
         mi.UInt32(_padded(start)),
-        mi.UInt32(_padded(entries, 7)),
+        mi.UInt32(_padded(entries, 3)),
+        Float(_padded(bounds.astype(real), 3)),
+        Float(float(scale)),
         Float(_padded(planes.lines.astype(real).ravel(), 5)),
         Float(_padded(spans.astype(real).ravel(), 5)),
         Float(_padded(planes.ends.astype(real).ravel(), 6)),
         Float(layers),
         aim(axes) if aim else None,
         basis.w,
-        wedges,
     )
     dr.make_opaque(index)
     return index
+
+
+def planes_of_rays(index: PlaneIndex, azimuth, way, ray_end):
+    """Return the place of the first plane of the wedges of rays, and how many of them they may cross.
+
+    Parameters
+    ----------
+    index
+        The planes.
+    azimuth, way
+        Of the rays: diamond angle, and unit direction in the frame, three arrays.
+    ray_end
+        D/x at the end of each; w = 0: 1/x.
+    """
+    x, y, z = way
+    # About a light at the camera an azimuth is no number: whole numbers have the upper bound.
+    wedge = dr.minimum(mi.UInt32(azimuth * index.scale), dr.width(index.start) - 2)
+    first, last = (dr.gather(mi.UInt32, index.start, wedge + step) for step in (0, 1))
+    asked = dr.fma(-_SLACK, ray_end + 1, ray_end + z) if index.w else ray_end
+    asked *= dr.rsqrt(dr.fma(x, x, y * y))
+
+    def halve(low, high):
+        middle = (low + high) >> 1
+        more = dr.gather(type(x), index.bounds, middle) > asked
+        return dr.select(more, middle + 1, low), dr.select(more, high, middle)
+
+    low, _ = dr.while_loop(state=(first, +last), cond=lambda low, high: low < high, body=halve, labels=("low", "high"))
+    return first, low - first
 
 
 def plane_crossing(index: PlaneIndex, number, way, active):

@@ -15,9 +15,6 @@ the camera and itself, planes of a larger cosine are left out, and it comes last
 since their middles stand for them in the order: here they are points. Otherwise the planes behind the entry count.
 
 **The frame buffer** holds the frame, not one sum: what is there already is `start`.
-
-The list of a tile is in order, but for a tile that found no room for a list of its own and reads the longer one that it
-would have drawn on. Its rays look for each next crossing in the whole of that list.
 """
 
 from dataclasses import dataclass
@@ -28,8 +25,6 @@ import mitsuba as mi
 
 from realtime.methods.shadow_planes.plane_table import PlaneIndex
 from realtime.methods.shadow_planes.sweep import RayPlanes, read_plane
-from realtime.methods.shadow_planes.tile_lists import Lists
-from realtime.methods.shadow_planes.wedges import Wedges
 from realtime.tiles.candidate_lists import over_lists
 
 
@@ -56,8 +51,7 @@ class Entry:
 class _Draw:
     """What has been drawn of a ray's planes."""
 
-    place: Any  #: next entry to read; in a list without order the one that was drawn last, or its end
-    key: Any  #: of the crossing drawn last, in a list without order: larger come first
+    place: Any  #: next entry to read
     stencil: Any
     quotient: Any  #: of the plane to draw
     number: Any  #: of the plane to draw
@@ -67,7 +61,6 @@ class _Draw:
 
 def sum_crossings(
     index: PlaneIndex,
-    lists: Lists | Wedges,
     ray: RayPlanes,
     distance,
     gammas,
@@ -81,7 +74,7 @@ def sum_crossings(
 
     Parameters
     ----------
-    index, lists, ray
+    index, ray
         The planes and the rays.
     distance
         To the visible surface, or to the end in a bounded medium [m].
@@ -107,7 +100,7 @@ def sum_crossings(
     ray_end = index.distance / distance
     width = dr.width(ray.x)
     Float = type(ray.x)
-    over_surface = _layers_at_end(index, lists, ray, ray_end)
+    over_surface = _layers_at_end(index, ray, ray_end)
     lit = over_surface <= 0
     keep = buffer.stored if buffer else lambda value: value
     at_end = dr.select(lit, at_surface(distance), 0)
@@ -116,7 +109,6 @@ def sum_crossings(
     begin = Float(index.layers) + dr.zeros(Float, width) if order == "exact" else over_surface
     draw = _Draw(
         dr.zeros(mi.UInt32, width),
-        dr.full(Float, dr.inf, width),
         begin,
         dr.zeros(Float, width),
         dr.zeros(mi.UInt32, width),
@@ -127,8 +119,8 @@ def sum_crossings(
     def body(draw):
         (draw,) = dr.while_loop(
             state=(draw,),
-            cond=lambda draw: (draw.factor == 0) & (draw.place < ray.source.count),
-            body=lambda draw: (_next(index, lists, ray, ray_end, draw, order, key),),
+            cond=lambda draw: (draw.factor == 0) & (draw.place < ray.count),
+            body=lambda draw: (_next(index, ray, ray_end, draw, order, key),),
             labels=("draw",),
         )
         x = dr.minimum(index.distance / dr.select(draw.factor == 0, index.distance, draw.quotient), distance)
@@ -137,20 +129,20 @@ def sum_crossings(
         draw.factor = Float(0)
         return (draw,)
 
-    (draw,) = dr.while_loop(state=(draw,), cond=lambda draw: draw.place < ray.source.count, body=body, labels=("draw",))
+    (draw,) = dr.while_loop(state=(draw,), cond=lambda draw: draw.place < ray.count, body=body, labels=("draw",))
     if entry is None:
         return draw.total, lit
     enters: Any = mi.Bool(True)
     if order == "paper":
         enters = draw.stencil == 0
     elif order == "exact":
-        enters = _layers_at_end(index, lists, ray, index.distance / entry.distance) <= 0
+        enters = _layers_at_end(index, ray, index.distance / entry.distance) <= 0
     return keep(draw.total - dr.select(enters, entry.gamma, 0)), lit
 
 
-def reaches(index: PlaneIndex, lists: Lists | Wedges, ray: RayPlanes, distance):
+def reaches(index: PlaneIndex, ray: RayPlanes, distance):
     """Return whether the light reaches the points of rays at a distance [m]."""
-    return _layers_at_end(index, lists, ray, index.distance / distance) <= 0
+    return _layers_at_end(index, ray, index.distance / distance) <= 0
 
 
 def _entry_key(index: PlaneIndex, ray: RayPlanes, entry: Entry, order: str):
@@ -164,13 +156,9 @@ def _entry_key(index: PlaneIndex, ray: RayPlanes, entry: Entry, order: str):
     return -along * dr.rsqrt(dr.fma(along, along, beside * beside))
 
 
-def _next(
-    index: PlaneIndex, lists: Lists | Wedges, ray: RayPlanes, ray_end, draw: _Draw, order: str, entry_key
-) -> _Draw:
-    """Read one plane: the next of the list, or the next crossing of a list without order."""
-    place, key = _sought(index, lists, ray, ray_end, draw, order)
-    place = dr.select(ray.sorted, draw.place, place)
-    quotient, crossed, gain, number = read_plane(index, lists, ray, place, place < ray.source.count)
+def _next(index: PlaneIndex, ray: RayPlanes, ray_end, draw: _Draw, order: str, entry_key) -> _Draw:
+    """Read the next plane of the list."""
+    quotient, crossed, gain, number = read_plane(index, ray, draw.place, draw.place < ray.count)
     crossed &= quotient > ray_end
     counts = crossed
     if entry_key is not None and order == "paper":
@@ -189,8 +177,7 @@ def _next(
         begins, ends = (draw.stencil <= 0) & (stencil > 0), (draw.stencil > 0) & (stencil <= 0)
         factor = dr.select(begins, 1, dr.select(ends, -1, 0))
     return _Draw(
-        dr.select(ray.sorted, draw.place + 1, place),
-        key,
+        draw.place + 1,
         dr.select(crossed, stencil, draw.stencil),
         quotient,
         number,
@@ -199,34 +186,12 @@ def _next(
     )
 
 
-def _sought(index: PlaneIndex, lists: Lists | Wedges, ray: RayPlanes, ray_end, draw: _Draw, order: str):
-    """Return the place in a list without order of the crossing that comes after the last one, and its key.
-
-    That is the largest key below the last, of crossings of one key the first in the list that was not drawn: the order
-    in which `realtime.methods.shadow_planes.tile_lists` puts lists, but that the ray's own crossings tell it, not
-    those of the middle ray. Behind the last crossing the place is the end of the list. Lists in order are not read.
-    """
-    Float, width = type(ray.x), dr.width(ray.x)
-    count = dr.select(ray.sorted, 0, ray.source.count)
-
-    def look(k, nearest):
-        place, key = nearest
-        quotient, crossed, _, number = read_plane(index, lists, ray, k, k < count)
-        crossed &= quotient > ray_end
-        own = -dr.gather(Float, index.spans, number * 4 + 3, crossed) if order == "paper" else quotient
-        waits = (own < draw.key) | ((own == draw.key) & (k > draw.place))
-        nearer = crossed & waits & (own > key)
-        return dr.select(nearer, k, place), dr.select(nearer, own, key)
-
-    return over_lists(count, look, (count + dr.zeros(mi.UInt32, width), dr.full(Float, -dr.inf, width)))
-
-
-def _layers_at_end(index: PlaneIndex, lists: Lists | Wedges, ray: RayPlanes, ray_end):
+def _layers_at_end(index: PlaneIndex, ray: RayPlanes, ray_end):
     """Return the layers over the visible surface."""
     Float, width = type(ray.x), dr.width(ray.x)
 
     def look(k, layers):
-        quotient, crossed, gain, _ = read_plane(index, lists, ray, k, k < ray.source.count)
+        quotient, crossed, gain, _ = read_plane(index, ray, k, k < ray.count)
         return layers + dr.select(crossed & (quotient > ray_end), gain, 0)
 
-    return over_lists(ray.source.count, look, dr.zeros(Float, width) + Float(index.layers))
+    return over_lists(ray.count, look, dr.zeros(Float, width) + Float(index.layers))

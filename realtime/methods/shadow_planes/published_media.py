@@ -39,8 +39,6 @@ from realtime.methods.shadow_planes.plane_table import PlaneIndex
 from realtime.methods.shadow_planes.published_crossings import Buffer, Entry, sum_crossings
 from realtime.methods.shadow_planes.published_mesh import mesh_gamma, surface_gamma
 from realtime.methods.shadow_planes.sweep import RayPlanes
-from realtime.methods.shadow_planes.tile_lists import Lists
-from realtime.methods.shadow_planes.wedges import Wedges
 
 
 def check_vertices(view: View) -> None:
@@ -61,7 +59,6 @@ def sum_in_media(
     view: View,
     media: PlacedRay,
     index: PlaneIndex,
-    lists: Lists | Wedges,
     rays: RayPlanes,
     *,
     rows: int,
@@ -76,7 +73,7 @@ def sum_in_media(
     ----------
     view, media
         The frame, and its rays in the media, with the light.
-    index, lists, rays
+    index, rays
         The planes and the rays.
     rows, cone
         See `realtime.methods.shadow_planes.published_mesh.mesh_gamma`.
@@ -117,7 +114,7 @@ def sum_in_media(
 
         entry = Entry(begin, at(begin))
         gammas = at_plane, at_end
-        total, _ = sum_crossings(index, lists, rays, end, gammas, order=order, buffer=buffer, start=total, entry=entry)
+        total, _ = sum_crossings(index, rays, end, gammas, order=order, buffer=buffer, start=total, entry=entry)
     return total
 
 

@@ -10,7 +10,7 @@ quadrilateral that a graphics card draws as two triangles; in the coordinates p 
 
 Near the light Gamma falls as 1/u. Interpolated linearly between u and ratio u it is too large by up to (ratio + 1)^2/(4
 ratio) - 1, 4 % for 1.5, at whatever distance: this is why rows at equal ratios are wise. The planes of a cone begin
-NEARNESS of the camera's distance from the light (`realtime.methods.shadow_planes.spot_pyramid`); by the same ratio they
+NEARNESS of the camera's distance from the light (`realtime.methods.shadow_planes.silhouettes`); by the same ratio they
 need log(1/NEARNESS)/log(ratio) rows, 35, to come as far as the camera, and have so many more than the planes of
 casters.
 
@@ -28,7 +28,7 @@ import mitsuba as mi
 from realtime.kernels.registry import gamma
 from realtime.methods.interface.view import View, radiance
 from realtime.methods.shadow_planes.plane_table import PlaneIndex
-from realtime.methods.shadow_planes.spot_pyramid import NEARNESS
+from realtime.methods.shadow_planes.silhouettes import NEARNESS
 from realtime.rays.ray_light import ray_geometry
 from realtime.scene.lights import Light
 

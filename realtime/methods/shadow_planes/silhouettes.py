@@ -25,6 +25,16 @@ normal n in the plane n . p = c faces it where n . l - c > 0, or n . l > 0. Noth
 of one at infinity the plane across it takes the place of the sphere of directions.
 
 Biri, Arques, Michelin 2006, section 5.1.1, for closed meshes.
+
+**A spot as an occluder**: the cone over a point light that the paper adds (its section 6, with 32 edges). What is
+outside the cone is in shadow, one layer deep. Its silhouette is a ring of edges about the axis, close to the light; the
+corners lie on the cone of the spot, so that the pyramid is inside it. As the light sees the ring it runs
+counter-clockwise, with no layer to its left and one to its right: every edge has the coefficient -1.
+
+**What the camera can see.** The shadow volume of an occluder lies in its bounding box extruded away from the light at
+(l, w): all points c + s (w c - l), s >= 0, c in the box. That is convex, the hull of the corners c and of the
+directions w c - l. It misses the view if it lies wholly outside one of the five planes through the pinhole that bound
+what the camera sees (section 5.2 of the paper does the same for bounded media).
 """
 
 from dataclasses import dataclass
@@ -32,10 +42,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from realtime.scene.camera import HostCamera
 from realtime.scene.lights import place_and_weight
 from realtime.scene.mesh_adjacency import Casters
 
 Array = NDArray[np.float64]
+
+#: Distance of the ring of a spot from the light over that of the camera: within it what passes is lit all around.
+NEARNESS = 1e-6
 
 
 @dataclass(frozen=True)
@@ -90,3 +104,57 @@ def silhouette(casters: Casters, light: Array, *, used: NDArray[np.bool_] | None
     coefficient = weight[casters.left] - right
     on_silhouette = np.flatnonzero(coefficient)
     return Silhouette(casters.edges[on_silhouette], coefficient[on_silhouette])
+
+
+def cone_ring(axis: Array, cos_cutoff: float, sides: int) -> Array:
+    """Return unit vectors from a light through the corners of a ring on its cone, (sides, 3).
+
+    Parameters
+    ----------
+    axis
+        Of the spot, a unit vector.
+    cos_cutoff
+        Cosine of the half angle of the cone, in (0, 1).
+    sides
+        Edges of the ring, 3 or more.
+    """
+    across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    across /= np.linalg.norm(across)
+    above = np.cross(across, axis)  # looking along the axis, `across` is to the right of it
+    angle = 2 * np.pi * (np.arange(sides) + 0.5) / sides
+    sine = np.sqrt((1 - cos_cutoff) * (1 + cos_cutoff))
+    return cos_cutoff * axis + sine * (np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * above)
+
+
+def ring_edges(ring: Array) -> Array:
+    """Return the corners at both ends of every edge of a ring, (sides, 2, 3)."""
+    return np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
+
+
+def is_outside(ring: Array, direction: Array) -> bool:
+    """Return whether a direction from the light, (3,), of any length [1], is outside the pyramid of a ring, (n, 3)."""
+    # The axis is on the other side of every plane of the pyramid: seen along it the ring runs counter-clockwise.
+    normals = np.cross(ring, np.roll(ring, -1, axis=0))
+    return bool(np.any(normals @ direction > 0))
+
+
+def components_in_view(casters: Casters, camera: HostCamera, light: Array) -> NDArray[np.bool_]:
+    """Return by component whether its shadow can be seen; `light` is a homogeneous position, (4,), or a place, (3,)."""
+    l, w = place_and_weight(light)  # noqa: E741
+    origin, normals = view_planes(camera)
+    choose = np.array([[i >> k & 1 for k in range(3)] for i in range(8)])
+    corners = casters.boxes[:, choose, np.arange(3)]
+    near = (corners - origin) @ normals.T
+    far = (w * corners - l) @ normals.T
+    outside = np.all(near < 0, axis=1) & np.all(far <= 0, axis=1)
+    return ~outside.any(axis=1)
+
+
+def view_planes(camera: HostCamera) -> tuple[Array, Array]:
+    """Return the pinhole and the normals, towards the view, of the planes through it that bound the view."""
+    half = 0.5 * np.array([camera.width, camera.height])
+    signs = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
+    corner = camera.forward + (signs * half) @ np.stack([camera.left, camera.up])
+    normals = np.cross(corner, np.roll(corner, 1, axis=0))
+    normals[normals @ camera.forward < 0] *= -1
+    return camera.origin, np.vstack([normals, camera.forward])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The lit intervals of a camera ray between shadow planes: a walk along the planes of its tile.
+"""The lit intervals of a camera ray between shadow planes: a walk along the planes of its wedge.
 
 `realtime.methods.shadow_planes.plane_table` has the mathematics. With D the distance from the light to the camera and
 w the direction of the ray in the frame of the light, a plane is crossed at the distance x with D/x = A wx + B wy - wz,
@@ -7,12 +7,11 @@ where 0 < D/x < D (P wx + Q wy); for a light at infinity D is 1. The walk works 
 camera on, and divides twice an interval.
 
 A count holds how many layers lie between the light and the point: it starts with those between light and camera, and
-the point is lit where it is zero. Planes come in the order in which the middle ray of the tile crosses them. Two that
-cross within the tile can come in the wrong order for a ray, so a crossing waits in a queue of two until two more have
+the point is lit where it is zero. Planes come in the order of the middle of a wedge. Two that
+cross within the wedge can come in the wrong order for a ray, so a crossing waits in a queue of two until two more have
 been read. Where that is not enough the ray notices, since its quotients must fall, and starts again with a queue of
 eight; after that it collects the eight nearest crossings from the whole list, goes over them, collects the next eight,
-and so on. That is right for any order. At 800 x 600 a queue of two fails in none to three of a hundred tiles of the
-built-in scenes, one of eight in less than one in a thousand.
+and so on. That is right for any order.
 
 A walk is one loop that reads a plane or goes over a crossing. An interval that has ended waits until every fourth plane
 (`realtime.intervals.lit_intervals` says why): neighbours whose intervals end at two edges of one silhouette are then
@@ -28,10 +27,15 @@ import mitsuba as mi
 
 from realtime.intervals.lit_intervals import LitIntervals, add_waiting, close_interval, no_intervals, sum_at_end
 from realtime.intervals.nearest_crossings import exchange, filled, insert, pop
-from realtime.methods.shadow_planes.plane_entries import FULL, GAIN_SHIFT, GAIN_ZERO, NUMBER, Source, entry_at
-from realtime.methods.shadow_planes.plane_table import PlaneIndex, plane_crossing
-from realtime.methods.shadow_planes.tile_lists import Lists
-from realtime.methods.shadow_planes.wedges import Wedges
+from realtime.methods.shadow_planes.plane_table import (
+    FULL,
+    GAIN_SHIFT,
+    GAIN_ZERO,
+    NUMBER,
+    PlaneIndex,
+    plane_crossing,
+    planes_of_rays,
+)
 from realtime.numerics.array_types import two_numbers
 from realtime.numerics.diamond_angle import diamond_angle
 
@@ -47,63 +51,46 @@ class RayPlanes:
     y: Any
     z: Any
     azimuth: Any  #: diamond angle
-    source: Source  #: the planes of its tile
-    sorted: Any  #: whether they are in order
+    first: Any  #: place of the first plane of its wedge
+    count: Any  #: how many of them it may cross before its end
 
 
-def ray_planes(lists: Lists | Wedges, x, y, z, *, tile, ray_end) -> RayPlanes:
+def ray_planes(index: PlaneIndex, x, y, z, *, ray_end) -> RayPlanes:
     """Return camera rays, unit directions (x, y, z) in the basis of a light, with the planes that concern them.
 
-    `tile` is that of `View`, `ray_end` the quotient D/x at the end of each.
+    `ray_end` is the quotient D/x at the end of each.
     """
     azimuth = diamond_angle(x, y)
-    return RayPlanes(x, y, z, azimuth, *lists.of_rays(tile, azimuth, (x, y, z), ray_end))
+    return RayPlanes(x, y, z, azimuth, *planes_of_rays(index, azimuth, (x, y, z), ray_end))
 
 
-def read_plane(index: PlaneIndex, lists: Lists | Wedges, ray: RayPlanes, k, active):
-    """Return the quotient D/x of a plane, whether the ray crosses it, the layers gained, and the plane's number.
-
-    Parameters
-    ----------
-    index, lists, ray
-        The planes and the rays.
-    k
-        Which plane of the list.
-    active
-        Lanes to read for.
-    """
-    entry, counts = entry_at(lists.entries, ray.source, k, active)
+def read_plane(index: PlaneIndex, ray: RayPlanes, k, active):
+    """Return the quotient D/x of the `k`-th plane of rays, whether they cross it, the layers gained, and its number."""
+    active = active & (k < ray.count)
+    entry = dr.gather(mi.UInt32, index.entries, ray.first + k, active)
     number = entry & NUMBER
     Float = type(ray.x)
-    quotient, beyond = plane_crossing(index, number, (ray.x, ray.y, ray.z), counts)
+    quotient, beyond = plane_crossing(index, number, (ray.x, ray.y, ray.z), active)
 
     def within(number, azimuth, unsure):
         first, last = dr.gather(two_numbers(Float), index.spans, 2 * number, unsure)
         return (azimuth >= first) & (azimuth < last)
 
-    def looked_up(number, azimuth, quotient, beyond, unsure):
-        return within(number, azimuth, unsure) & beyond & (quotient > 0)
-
-    if lists.by_wedge:
-        counts &= beyond & (quotient > 0)
+    counts = active & beyond & (quotient > 0)
     unsure = counts & ((entry & FULL) == 0)
-    asked = (number, ray.azimuth, unsure) if lists.by_wedge else (number, ray.azimuth, quotient, beyond, unsure)
     crossed = dr.if_stmt(
-        args=asked,
-        cond=unsure,
-        true_fn=within if lists.by_wedge else looked_up,
-        false_fn=lambda *_: mi.Bool(True),
+        args=(number, ray.azimuth, unsure), cond=unsure, true_fn=within, false_fn=lambda *_: mi.Bool(True)
     )
     gain = Float(mi.Int32((entry >> GAIN_SHIFT) & 63) - GAIN_ZERO)
     return quotient, counts & crossed, gain, number
 
 
-def sum_lit_intervals(index: PlaneIndex, lists: Lists | Wedges, ray: RayPlanes, segment, integral, zero):
+def sum_lit_intervals(index: PlaneIndex, ray: RayPlanes, segment, integral, zero):
     """Add up an integral over the lit intervals of every ray.
 
     Parameters
     ----------
-    index, lists, ray
+    index, ray
         The planes and the rays.
     segment
         Distances (x0, x1) between which to look; `x1` may be infinite [m].
@@ -125,9 +112,9 @@ def sum_lit_intervals(index: PlaneIndex, lists: Lists | Wedges, ray: RayPlanes, 
         begin = dr.maximum(index.distance / opened, x0)
         return integral(begin, dr.maximum(dr.minimum(index.distance / closed, x1), begin))
 
-    sweep = _Sweep(index, lists, ray, index.distance / x1, between, zero)
+    sweep = _Sweep(index, ray, index.distance / x1, between, zero)
     wanted = x1 > x0
-    passed, lost = _walk(sweep, wanted & ray.sorted, places=FEW)
+    passed, lost = _walk(sweep, wanted, places=FEW)
     passed, lost = dr.if_stmt(
         args=(passed, lost),
         cond=lost,
@@ -136,7 +123,7 @@ def sum_lit_intervals(index: PlaneIndex, lists: Lists | Wedges, ray: RayPlanes, 
     )
     passed = dr.if_stmt(
         args=(passed,),
-        cond=lost | (wanted & ~ray.sorted),
+        cond=lost,
         true_fn=lambda passed: _collect(sweep),
         false_fn=lambda passed: passed,
     )
@@ -151,7 +138,6 @@ class _Sweep:
     """What stays the same during a walk."""
 
     index: PlaneIndex
-    lists: Lists | Wedges
     ray: RayPlanes
     ray_end: Any  #: D/x at the end of the ray
     integral: Callable[[Any, Any], Any]  #: between two quotients D/x
@@ -194,7 +180,7 @@ def _read(sweep: _Sweep, place, reads):
     Float = type(sweep.ray_end)
 
     def read(place, reads):
-        quotient, crossed, gain, _ = read_plane(sweep.index, sweep.lists, sweep.ray, place, reads)
+        quotient, crossed, gain, _ = read_plane(sweep.index, sweep.ray, place, reads)
         return quotient, gain, crossed & (quotient > sweep.ray_end)
 
     return dr.if_stmt(
@@ -213,7 +199,7 @@ def _walk(sweep: _Sweep, active, *, places: int):
         Whether the order was wrong, or wrong by more than the queue could mend.
     """
     Float, width = type(sweep.ray_end), dr.width(sweep.ray.x)
-    count = sweep.ray.source.count
+    count = sweep.ray.count
     end = dr.select(active & (count > 0), count + places, 0)
 
     def body(place, waiting, passed, lost):
@@ -249,7 +235,7 @@ def _collect(sweep: _Sweep):
     Returns what the ray has passed.
     """
     Float, width = type(sweep.ray_end), dr.width(sweep.ray.x)
-    count = sweep.ray.source.count
+    count = sweep.ray.count
 
     def body(place, nearest, more, ties, seen, passed, done):
         reads = place < count

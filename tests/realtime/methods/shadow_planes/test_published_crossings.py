@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from realtime.methods.shadow_planes.published_crossings import Buffer, sum_crossings
-from tests.helpers.planes import bundles, casters_of, crossings, drawn_lists, index_of, lit_lengths, rays_of
+from tests.helpers.planes import bundles, casters_of, crossings, index_of, lit_lengths, rays_of
 
 
 def added_up(index, ways, end, *, order, buffer=None):
@@ -13,10 +13,9 @@ def added_up(index, ways, end, *, order, buffer=None):
     import drjit as dr
 
     Float = type(index.distance)
-    lists = drawn_lists(index, ways, end, order=order)
     gammas = (lambda plane, ray, x: 1 - dr.exp(-x)), (lambda x: 1 - dr.exp(-x))
     distance = Float(np.asarray(end, dtype=np.float64))
-    total, lit = sum_crossings(index, lists, rays_of(index, lists, ways), distance, gammas, order=order, buffer=buffer)
+    total, lit = sum_crossings(index, rays_of(index, ways), distance, gammas, order=order, buffer=buffer)
     return np.array(total, dtype=np.float64), np.array(lit)
 
 
@@ -36,7 +35,7 @@ def test_exact_order_is_right_where_shadows_overlap(variant):
     end = np.full(len(ways), 4.7)
     expected, lit = lit_lengths(index, ways, end, weight=weight)
     total, total_lit = added_up(index, ways, end, order="exact")
-    # Two crossings can come in the wrong order within a tile: that is counted, not mended.
+    # Two crossings can come in the wrong order within a wedge: that is counted, not mended.
     wrong = (np.abs(total - expected) > 1e-4) | (total_lit != lit)
     assert wrong.mean() < 0.03
 
@@ -60,7 +59,7 @@ def test_without_an_order_every_plane_counts(variant):
 @pytest.mark.claim("orders-of-the-planes")
 def test_order_of_the_paper_is_by_the_stencil_rule(variant):
     """Plane by plane in NumPy, towards the camera by the cosine of the edge's middle."""
-    index = index_of(casters_of("torus", "crossing spheres"), precision="double")
+    index = index_of(casters_of("torus", "crossing spheres"), precision="double", order="paper")
     ways = bundles(960, spread=0.003)
     end = np.full(len(ways), 4.7)
     x, gain = crossings(index, ways)

@@ -1,28 +1,29 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Sums over lit segments are those between the crossings, in whatever order planes come."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tests.helpers.planes import CAMERA, LIGHT, bundles, casters_of, drawn_lists, index_of, lit_lengths, rays_of
+from tests.helpers.planes import CAMERA, LIGHT, bundles, casters_of, index_of, lit_lengths, rays_of
 
 CAMERAS = {"in the light": CAMERA, "in shadow": -0.7 * LIGHT, "among the casters": np.array([0.1, -0.05, 0.31])}
 NAMES = ["torus", "open cylinder", "Moebius strip"]
 
 
-def walked(index, lists, ways, end, *, begin=0.0):
+def walked(index, ways, end, *, begin=0.0):
     """The sum over lit segments of 1 - exp(-x), and whether the light reaches the end."""
     import drjit as dr
 
     from realtime.methods.shadow_planes.sweep import sum_lit_intervals
 
     Float = type(index.distance)
-    rays = rays_of(index, lists, ways, end if lists is index.wedges else None)
+    rays = rays_of(index, ways, end)
     segment = Float(np.full(len(ways), begin)), Float(np.asarray(end, dtype=np.float64))
     total, lit = sum_lit_intervals(
-        index, lists, rays, segment, lambda a, b: dr.exp(-a) - dr.exp(-b), dr.zeros(Float, len(ways))
+        index, rays, segment, lambda a, b: dr.exp(-a) - dr.exp(-b), dr.zeros(Float, len(ways))
     )
     return np.array(total, dtype=np.float64), np.array(lit)
 
@@ -40,50 +41,45 @@ def assert_same(sums, expected, *, tolerance):
 @pytest.mark.claim("planes-are-exact", tolerance="1e-4: float32 at grazing angles")
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("wedges", [False, True])
-def test_lit_segments_are_those_between_the_crossings(variant, name, camera, wedges):
-    """Whether planes are listed by tile, or by wedge for rays that are in no tile."""
-    index = index_of(casters_of(name), camera=CAMERAS[camera], wedges=wedges)
+def test_lit_segments_are_those_between_the_crossings(variant, name, camera):
+    index = index_of(casters_of(name), camera=CAMERAS[camera])
     ways = bundles(1920, spread=0.01, camera=CAMERAS[camera])
     end = np.random.default_rng(3).choice([0.9, 2.7, 6.1, np.inf], len(ways))
-    lists = index.wedges if wedges else drawn_lists(index, ways, end)
     # float32 crossings at grazing angles: 1e-7 over the sine of the angle between ray and plane.
     expected = lit_lengths(index, ways, end, weight=weight)
-    assert_same(walked(index, lists, ways, end), expected, tolerance=1e-4)
+    assert_same(walked(index, ways, end), expected, tolerance=1e-4)
     assert expected[1].any()
 
 
 @pytest.mark.claim("rays-notice-a-wrong-order", tolerance="1e-4: float32 at grazing angles")
-@pytest.mark.parametrize(
-    "order", ["shuffled", "backwards", "two changed", "five at a time backwards", "said to be unsorted"]
-)
+@pytest.mark.parametrize("order", ["shuffled", "backwards", "two changed", "five at a time backwards"])
 def test_rays_notice_an_order_that_is_wrong(variant, order):
     """And find their segments with a longer queue, or by selection."""
+    import drjit as dr
     import mitsuba as mi
 
     index = index_of(casters_of("torus", "open cylinder", "crossing spheres"))
     ways = bundles(960, spread=0.01)
     end = np.full(len(ways), np.inf)
-    lists = drawn_lists(index, ways, end)
-    entries = np.array(lists.entries)
+    entries, start = np.array(index.entries), np.array(index.start)
     rng = np.random.default_rng(9)
     changed = 0
-    for first, count in zip(np.array(lists.source.first), np.array(lists.source.count)):
-        places = np.arange(first, first + count)
-        if order == "shuffled":
+    for first, behind in itertools.pairwise(start):
+        places, count = np.arange(first, behind), int(behind) - int(first)
+        if order == "shuffled" and count > 0:
             entries[places] = entries[rng.permutation(places)]
-        elif order == "backwards":
+        elif order == "backwards" and count > 0:
             entries[places] = entries[places[::-1]]
-        elif order == "five at a time backwards" and count:  # too much for a queue of two, nothing for one of eight
+        elif order == "five at a time backwards" and count > 0:  # too much for a queue of two, nothing for one of eight
             entries[places] = entries[np.concatenate([places[k : k + 5][::-1] for k in range(0, count, 5)])]
         elif order == "two changed" and count > 3:
             entries[places[[0, -1]]] = entries[places[[-1, 0]]]
         changed += count > 3
-    unsorted = mi.Bool(False) & lists.sorted if order == "said to be unsorted" else lists.sorted
-    lists = replace(lists, entries=mi.UInt32(entries), sorted=unsorted)
-    assert changed > 20
+    bounds = dr.full(type(index.bounds), np.inf, dr.width(index.bounds))  # rays read all of their wedge
     expected = lit_lengths(index, ways, end, weight=weight)
-    assert_same(walked(index, lists, ways, end), expected, tolerance=1e-4)
+    index = replace(index, entries=mi.UInt32(entries), bounds=bounds)
+    assert changed > 20
+    assert_same(walked(index, ways, end), expected, tolerance=1e-4)
 
 
 def test_segments_begin_where_they_are_told_to(variant):
@@ -91,8 +87,7 @@ def test_segments_begin_where_they_are_told_to(variant):
     index = index_of(casters_of("torus", "open cylinder"))
     ways = bundles(960, spread=0.01)
     begin, end = 1.7, np.full(len(ways), 3.3)
-    lists = drawn_lists(index, ways, end)
     until_end, lit = lit_lengths(index, ways, end, weight=weight)
     until_begin, _ = lit_lengths(index, ways, np.full(len(ways), begin), weight=weight)
-    sums = walked(index, lists, ways, end, begin=begin)
+    sums = walked(index, ways, end, begin=begin)
     assert_same(sums, (until_end - until_begin, lit), tolerance=1e-4)

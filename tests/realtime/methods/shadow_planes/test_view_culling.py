@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from realtime.methods.shadow_planes.view_culling import components_in_view
+from realtime.methods.shadow_planes.silhouettes import components_in_view
 from realtime.scene.mesh_adjacency import make_casters
 from tests.helpers.scenes import tiny_scene
 
