@@ -21,6 +21,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from realtime.errors import InputError
+from realtime.numerics.aligned import aligned_array
 from realtime.scene.named_shapes import scene_of
 
 Array = NDArray[np.float64]
@@ -229,14 +230,15 @@ def _met_triangles(boundary: Any, begin: Array, end: Array):
     for _ in range(_HITS):
         start = begin[left] + unit[left] * past[left, None]
         ray = mi.Ray3f(
-            mi.Point3f(*(mi.Float(column) for column in start.T)),
-            mi.Vector3f(*(mi.Float(column) for column in unit[left].T)),
-            mi.Float(length[left] - past[left]),
+            mi.Point3f(*(aligned_array(mi.Float, column) for column in start.T)),
+            mi.Vector3f(*(aligned_array(mi.Float, column) for column in unit[left].T)),
+            aligned_array(mi.Float, length[left] - past[left]),
             0.0,
             [],
         )
         hit = boundary.ray_intersect_preliminary(ray)
-        valid = np.array(hit.is_valid())
+        dr.eval(hit)
+        valid = np.isfinite(np.array(hit.t))
         distance = np.array(hit.t, dtype=np.float64)
         shapes.append(np.array(dr.reinterpret_array(mi.UInt32, hit.shape))[valid])
         triangles.append(np.array(hit.prim_index)[valid].astype(np.int64))

@@ -141,7 +141,11 @@ def mesh_triangles(mesh) -> tuple[Array, NDArray[np.int64]]:
     # Ask for vertices one by one: `mi.traverse` shows the transform of a rectangle or a cube, not its vertices.
     position = mesh.vertex_position(dr.arange(mi.UInt32, mesh.vertex_count()))
     face = mesh.face_indices(dr.arange(mi.UInt32, mesh.face_count()))
-    return np.array(position, dtype=np.float64).T.copy(), np.array(face, dtype=np.int64).T.copy()
+    dr.eval(position, face)
+    return (
+        np.stack([np.array(part, dtype=np.float64) for part in position], axis=1),
+        np.stack([np.array(part, dtype=np.int64) for part in face], axis=1),
+    )
 
 
 def _triangles(shape) -> tuple[Array, NDArray[np.int64]]:

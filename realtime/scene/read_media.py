@@ -283,6 +283,7 @@ def _homogeneous(medium, types: ArrayTypes) -> Medium:
         raise InputError(f"the medium is a {medium.class_name()}; wanted a medium of type 'homogeneous'")
     _require_constant(medium, "sigma_t", "albedo")
     sigma_s, _, sigma_t = medium.get_scattering_coefficients(dr.zeros(mi.MediumInteraction3f))
+    dr.eval(sigma_s, sigma_t)  # in one kernel: Mitsuba's scale is a literal in it
     scattering = np.array(sigma_s, dtype=np.float64).reshape(-1)
     extinction = np.array(sigma_t, dtype=np.float64).reshape(-1)
     for name, values in (("sigma_t", extinction), ("sigma_s = albedo sigma_t", scattering)):

@@ -45,13 +45,12 @@ def read_facets(scene, types: ArrayTypes) -> Facets | None:
     for number, before in zip(numbers, accumulate(counts, initial=0)):
         first[number] = before
     smooth = any(_is_smooth(shape) for shape in shapes)
-    rows = [_of_shape(shape, types, smooth, number) for number, shape in enumerate(shapes)]
-    normals, albedos = ([row[k] for row in rows] for k in range(2))
-    corners = [3 * count if smooth else count for count in counts]
+    rows = [_of_shape(shape, smooth, number) for number, shape in enumerate(shapes)]
+    normals, albedos = (np.concatenate([row[k] for row in rows]) for k in range(2))
     table = Facets(
         mi.UInt32(first),
-        _joined(types, normals, corners),
-        _joined(types, albedos, counts),
+        aligned_array(types.scalar, normals.ravel()),
+        aligned_array(types.scalar, albedos.ravel()),
         smooth,
         aligned_array(types.scalar, _no_rotations(len(shapes)).ravel()),
     )
@@ -124,23 +123,27 @@ def _is_smooth(shape) -> bool:
     return not dr.all(flat)
 
 
-def _of_shape(shape, types: ArrayTypes, smooth: bool, number: int):
-    """Return normals and albedos of the triangles of a shape, as Mitsuba has them."""
-    Float, Four = types.scalar, four_numbers(types.scalar)
+def _of_shape(shape, smooth: bool, number: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return normals and albedos of the triangles of a shape, as Mitsuba has them, in rows of four numbers.
+
+    Rows are put together in NumPy: a kernel would hold the place of its shape in the table, and each shape its kernel.
+    """
     two_sided = float(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.BackSide))
     middle = _interaction(shape, 1 / 3, 1 / 3)
     middle.wi = mi.Vector3f(0, 0, 1)
     albedo = shape.bsdf().eval_diffuse_reflectance(middle)
-    albedos = Four(*(Float(channel) for channel in albedo), number)
-    if not smooth:
-        return Four(*(Float(part) for part in middle.sh_frame.n), two_sided), albedos
-    count = shape.face_count()
-    normals = dr.empty(Float, 12 * count)
-    for corner, (u, v) in enumerate(_CORNERS):
-        normal = _interaction(shape, u, v).sh_frame.n
-        row = Four(*(Float(part) for part in normal), two_sided)
-        dr.scatter(normals, row, 3 * dr.arange(mi.UInt32, count) + corner)
-    return dr.gather(Four, normals, dr.arange(mi.UInt32, 3 * count)), albedos
+    normals = [_interaction(shape, u, v).sh_frame.n for u, v in _CORNERS] if smooth else [middle.sh_frame.n]
+    dr.eval(albedo, normals)
+    of_corners = np.stack([_rows(normal, two_sided, shape.face_count()) for normal in normals], axis=1)
+    return of_corners.reshape(-1, 4), _rows(albedo, number, shape.face_count())
+
+
+def _rows(three, fourth: float, count: int) -> NDArray[np.float64]:
+    """Return three numbers of each triangle, or those that all share, and a fourth, (triangles, 4)."""
+    rows = np.empty((count, 4))
+    for column, part in zip(rows.T, (*three, fourth)):
+        column[:] = part
+    return rows
 
 
 def _interaction(shape, u: float, v: float):
@@ -151,13 +154,3 @@ def _interaction(shape, u: float, v: float):
     hit.prim_uv = mi.Point2f(u, v)
     hit.prim_index = dr.arange(mi.UInt32, count)
     return shape.compute_surface_interaction(mi.Ray3f(mi.Point3f(0), mi.Vector3f(0, 0, 1)), hit, mi.RayFlags.All)
-
-
-def _joined(types: ArrayTypes, parts, counts):
-    """Return rows of shapes one after the other; a row that all triangles of a shape share counts for each."""
-    table = dr.empty(types.scalar, 4 * sum(counts))
-    place = 0
-    for part, count in zip(parts, counts):
-        dr.scatter(table, part, dr.arange(mi.UInt32, count) + place)
-        place += count
-    return table

@@ -36,7 +36,9 @@ class SurfaceHits:
 def surface_hits(truth: TruthScene) -> SurfaceHits:
     """Cast the pixel-centre rays from the pinhole."""
     ray = mi.Ray3f(mi.Point3f(*(float(c) for c in truth.origin)), dr.normalize(mi.Vector3f(truth.direction.T)))
+    dr.make_opaque(ray)  # one kernel for all cameras
     interaction = truth.occluders.ray_intersect(ray, mi.RayFlags.All, coherent=True)
+    dr.eval(interaction)  # whatever is read of it
     valid = np.array(interaction.is_valid(), dtype=bool)
     return SurfaceHits(np.where(valid, np.array(interaction.t, dtype=np.float64), np.inf), interaction)
 

@@ -79,7 +79,10 @@ def enclosing(shapes: list[Any], point: Array) -> int:
     """
     scene = scene_from(shapes)
     for direction in ((0.2672, 0.5345, 0.8018), (-0.6247, 0.3714, 0.6868)):
-        si = scene.ray_intersect(mi.Ray3f(mi.Point3f(*(float(c) for c in point)), mi.Vector3f(*direction)))
+        ray = mi.Ray3f(mi.Point3f(*(float(c) for c in point)), mi.Vector3f(*direction))
+        dr.make_opaque(ray)
+        si = scene.ray_intersect(ray)
+        dr.eval(si)
         if not bool(si.is_valid()[0]) or float(dr.dot(si.n, mi.Vector3f(*direction))[0]) <= 0:
             return -1
     hit = si.shape
@@ -103,13 +106,15 @@ def _check_crossings(scene, shapes: list[Any], shape: Any) -> None:
         ray = mi.Ray3f(mi.Point3f(origin.T), mi.Vector3f(direction[left].T))
         ray.maxt = mi.Float(length[left] - passed[left])
         si = scene.ray_intersect_preliminary(ray)
+        dr.eval(si)
+        met = np.array(dr.reinterpret_array(mi.UInt32, si.shape))
         hit = np.array(si.is_valid(), dtype=bool)
         if not hit.any():
             return
         left, travelled = left[hit], passed[left[hit]] + np.array(si.t, dtype=np.float64)[hit]
         face = np.array(si.prim_index, dtype=np.int64)[hit]
         for other, of_faces in zip(shapes, corners, strict=True):
-            on = np.array(si.shape == mi.ShapePtr(other), dtype=bool)[hit]
+            on = (met == np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(other))))[hit]
             if of_faces is None:
                 shares = np.zeros(int(on.sum()), dtype=bool)
             else:

@@ -286,6 +286,7 @@ def _read_light(emitter) -> TruthLight:
     distance = 1024.0 * max(1.0, float(np.abs(position).max()))
     interaction = dr.zeros(mi.Interaction3f)
     interaction.p = mi.Point3f(*(float(c) for c in position + distance * axis))
+    dr.make_opaque(interaction)  # one kernel for all lights of a kind
     _, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
     intensity = _as_given(parameters, _rgb(arriving) * distance**2)
     if not spot:

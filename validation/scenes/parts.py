@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analytic.errors import InputError
 from analytic.phase import phase_from_words
+from realtime.numerics.aligned import aligned_array
 
 Vertices = NDArray[np.float64]  #: (vertices, 3) [m]
 Faces = NDArray[np.int64]  #: (faces, 3), counter-clockwise as seen from outside
@@ -137,8 +138,8 @@ def _mesh(name: str, mesh: Mesh, plugins: dict[str, Any]):
     vertices, faces = mesh
     result = mi.Mesh(name, vertex_count=len(vertices), face_count=len(faces), props=properties)
     parameters = mi.traverse(result)
-    parameters["vertex_positions"] = vertices.astype(np.float32).ravel()
-    parameters["faces"] = faces.astype(np.uint32).ravel()
+    parameters["vertex_positions"] = aligned_array(mi.Float, vertices.astype(np.float32).ravel())
+    parameters["faces"] = aligned_array(mi.UInt32, faces.astype(np.uint32).ravel())
     parameters.update()
     return result
 

@@ -79,6 +79,7 @@ def cloud_paths_batch(
             sampler.seed((seed * 3 + number) * (1 + len(pixels) * streams // _LANES) + place, len(part) * streams)
             directions = dr.normalize(mi.Vector3f(np.repeat(clouds.direction[part], streams, axis=0).T))
             rays = mi.Ray3f(mi.Point3f(*(float(c) for c in clouds.origin)), directions)
+            dr.make_opaque(rays)  # one kernel for all cameras
             side = SIDE if scene.has_suns else 0.0  # flights are drawn about suns
             walked, _ = walk(scene, targets, sampler, rays, samples=samples // streams, side=side)
             for channel in channels:

@@ -8,6 +8,7 @@ are summed up by small steps.
 
 from dataclasses import dataclass
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,8 @@ def seen_clouds(clouds: CloudScene) -> SeenClouds:
         start = cast[left]
         ray = mi.Ray3f(mi.Point3f((clouds.origin + start[:, None] * way).T), mi.Vector3f(way.T))
         si = clouds.scene.ray_intersect(ray)
+        dr.eval(si)
+        shape = np.array(dr.reinterpret_array(mi.UInt32, si.shape))
         hit = np.array(si.is_valid(), dtype=bool)
         left, way, start = left[hit], way[hit], start[hit]
         meets[left] = True
@@ -52,7 +55,7 @@ def seen_clouds(clouds: CloudScene) -> SeenClouds:
         opaque = np.ones(len(left), dtype=bool)
         within = inside[left]
         for number, cloud in enumerate(clouds.clouds):
-            on = np.array(si.shape == mi.ShapePtr(cloud.shape), dtype=bool)[hit]
+            on = (shape == np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(cloud.shape))))[hit]
             opaque &= ~on
             triangles = corners[number]
             if triangles is not None:

@@ -101,6 +101,7 @@ def _is_directional(emitter) -> bool:
 
 def _is_grey(medium) -> bool:
     _, sigma_t = coefficients(mi.MediumPtr(medium), mi.Bool(True))
+    dr.eval(sigma_t)
     return len({float(np.ravel(channel)[0]) for channel in sigma_t}) == 1
 
 

@@ -5,9 +5,12 @@ The spans cover what a camera can see: a light behind it, beside it, beyond the 
 that are short, endless, thin or many mean free paths thick, and the spans that a spot's cone cuts out.
 """
 
+import drjit as dr
 import numpy as np
 import pytest
 from scipy.stats import chi2
+
+from realtime.numerics.aligned import aligned_array
 
 SPANS = {  # height, start, length, extinctions
     "light ahead": (0.7, -3.1, 7.3, [0.31]),
@@ -34,7 +37,7 @@ def _span(case):
     from reference.monte_carlo.single_scatter.distance_sampling import Span
 
     height, start, length, _ = SPANS[case]
-    return Span(mi.Float64(height), mi.Float64(start), mi.Float64(length))
+    return Span(*(dr.opaque(mi.Float64, value) for value in (height, start, length)))
 
 
 def _mixture(case):
@@ -42,7 +45,7 @@ def _mixture(case):
 
     from reference.monte_carlo.single_scatter.distance_sampling import mixture_of
 
-    return mixture_of(_span(case), [mi.Float64(rate) for rate in SPANS[case][3]])
+    return mixture_of(_span(case), [dr.opaque(mi.Float64, rate) for rate in SPANS[case][3]])
 
 
 def equi_angular_pdf(y, span):
@@ -69,7 +72,7 @@ def _technique(case, name):
     if name == "equi-angular":
         return lambda u: ds.equi_angular(u, _span(case)), lambda y: equi_angular_pdf(y, _span(case))
     if name == "free-flight":
-        flight = ds.free_flights(_span(case).length, mi.Float64(SPANS[case][3][-1]))
+        flight = ds.free_flights(_span(case).length, dr.opaque(mi.Float64, SPANS[case][3][-1]))
         return lambda u: ds.free_flight(u, flight), lambda y: ds.free_flight_pdf(y, flight)
     mixture = _mixture(case)
     return lambda u: mi.Float64(ds.sample_distance(u, mixture)[0]), lambda y: sum(ds.mixture_pdfs(y, mixture))
@@ -80,7 +83,7 @@ def _edges(case, sample):
     import mitsuba as mi
 
     length = SPANS[case][2]
-    shares = np.array(sample(mi.Float64(np.arange(1, CELLS) / CELLS)), dtype=np.float64)
+    shares = np.array(sample(aligned_array(mi.Float64, np.arange(1, CELLS) / CELLS)), dtype=np.float64)
     return np.concatenate([[0.0], np.unique(shares), [length]])
 
 
@@ -98,7 +101,7 @@ def _probabilities(edges, density):
     # An endless cell goes by y = low + width v/(1 - v).
     y = np.where(np.isinf(high), low + width * v / rest, low + width * v)
     jacobian = np.where(np.isinf(high), width / rest**2, width)
-    values = np.array(density(mi.Float64(y.ravel())), dtype=np.float64).reshape(y.shape)
+    values = np.array(density(aligned_array(mi.Float64, y.ravel())), dtype=np.float64).reshape(y.shape)
     return (values * jacobian * weight).sum(axis=1)
 
 
@@ -110,7 +113,7 @@ def _p_value(case, name, *, sample=None, density=None, seed=0):
     edges = _edges(case, own_sample)
     expected = SAMPLES * _probabilities(edges, density)
     u = np.random.default_rng(seed).random(SAMPLES)
-    y = np.array(sample(mi.Float64(u)), dtype=np.float64)
+    y = np.array(sample(aligned_array(mi.Float64, u)), dtype=np.float64)
     assert y.min() >= 0
     observed = np.histogram(np.minimum(y, np.finfo(float).max), edges)[0]
     assert observed.sum() == SAMPLES
