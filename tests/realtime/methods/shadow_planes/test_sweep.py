@@ -61,11 +61,11 @@ def test_rays_notice_an_order_that_is_wrong(variant, order):
     index = index_of(casters_of("torus", "open cylinder", "crossing spheres"))
     ways = bundles(960, spread=0.01)
     end = np.full(len(ways), np.inf)
-    entries, start = np.array(index.entries), np.array(index.start)
+    entries, start = np.array(index.entries), np.array(index.start).astype(int)
     rng = np.random.default_rng(9)
     changed = 0
     for first, behind in itertools.pairwise(start):
-        places, count = np.arange(first, behind), int(behind) - int(first)
+        places, count = np.arange(first, behind), behind - first
         if order == "shuffled" and count > 0:
             entries[places] = entries[rng.permutation(places)]
         elif order == "backwards" and count > 0:
