@@ -14,8 +14,8 @@ _ROOT = Path(__file__).resolve().parents[2]
 
 def scene_names() -> list[str]:
     """Return the names of the built-in scenes, in alphabetical order."""
-    files = sorted((_ROOT / "validation" / "scenes").glob("*.py"))
-    return sorted(name for file in files for name in _named(file, r'\bSceneRecord\(\s*(?:name=)?"([^"]+)"'))
+    files = sorted((_ROOT / "validation" / "scenes").glob("*.toml"))
+    return sorted(name for file in files for name in _named(file, r"^\[([\w-]+)\]"))
 
 
 def method_names() -> list[str]:

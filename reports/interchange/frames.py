@@ -48,7 +48,7 @@ def write_frames(
     name, renderer, chosen
         The name of the scene, its frame renderer, and the configuration.
     animation
-        What moves, a `validation.scenes.record.Animation`.
+        What moves, a `validation.scenes.registry.Animation`.
     frames
         How many.
     outputs

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from tests.helpers import airlight_sum
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
-from validation.scenes.parts import medium_boundary, placed, rotation
-from validation.scenes.solids import box
+from validation.scenes.meshes import box, placed, rotation
+from validation.scenes.parts import medium_boundary
 
 Array = NDArray[np.float64]
 

@@ -26,8 +26,8 @@ from reference.scene.read import TruthScene, read_truth
 from validation.estimates.agreement import layer_masks
 from validation.estimates.quadrature import truth_image
 from validation.scenes.loading import resize
-from validation.scenes.open_fog import open_fog
 from validation.scenes.parts import fog
+from validation.scenes.registry import SCENES
 
 Array = NDArray[np.float64]
 Batch = Callable[[TruthScene, int, int], Batches]
@@ -141,7 +141,7 @@ def thin_fog(size: tuple[int, int]):
 
     In thin fog free flights seldom end before the lamp: volpath wastes most of its paths.
     """
-    description = open_fog()
+    description = SCENES["open-fog"].build()
     lamp = np.array(description["lamp"]["position"])
     distance = float(np.linalg.norm(lamp - np.array(description["sensor"]["to_world"].matrix)[:3, 3]))
     description["fog"] = fog(0.2 / distance, (0.93, 0.87, 0.78))

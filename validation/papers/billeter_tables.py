@@ -30,8 +30,8 @@ from reference.quadrature.image import quadrature_image
 from reference.scene.read import TruthScene, read_truth
 from validation.metrics.errors import error_metrics
 from validation.papers.measured import attempted, frame_within, milliseconds, rate
-from validation.scenes.colonnade import colonnade
 from validation.scenes.loading import load_scene, resize
+from validation.scenes.registry import SCENES
 from validation.study.clock import time_repeated
 from validation.study.configuration import configuration, prepared
 from validation.study.frame_times import moved_light
@@ -118,7 +118,7 @@ def table_scene(name: str, size: tuple[int, int]) -> Any:
     """Return the `mi.Scene` of a view: a built-in scene, the hall with a spot in place of its lamp."""
     if name != "colonnade":
         return load_scene(name, size).scene
-    described = colonnade()
+    described = SCENES["colonnade"].build()
     lamp = described["lamp"]
     described["lamp"] = {
         "type": "spot",

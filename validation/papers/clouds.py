@@ -24,17 +24,15 @@ from realtime.clouds.collectors.search import Collector
 from realtime.clouds.order_layers import order_layer
 from realtime.frame.renderer import frame_renderer, render_frame, run_cast_and_shade, run_method
 from realtime.methods.registry import METHODS
+from realtime.scene.mesh_adjacency import mesh_triangles
 from realtime.scene.read_scene import Scene, read_scene
 from reference.scene.clouds import CloudScene, read_clouds
 from validation.estimates.budget import Budget
 from validation.estimates.images import monte_carlo_reference
 from validation.papers.measured import rate
-from validation.scenes.cloud_parts import cloud, droplets, sun
 from validation.scenes.loading import LoadedScene, load_scene, resize
-from validation.scenes.parts import medium_boundary
+from validation.scenes.parts import fog, medium_boundary, sun, tabulated_phase
 from validation.scenes.registry import SCENES
-from validation.scenes.ring import ring_mesh
-from validation.scenes.two_lobes import two_lobes_mesh
 from validation.study.clock import Timing, time_repeated
 from validation.study.frame_times import first_frame
 
@@ -46,7 +44,6 @@ _FEWER = 4  #: times as few in Fig. 11, of which means over pixels are compared
 RESULTS = ("stratocumulus", "cumulus")  #: of Fig. 12
 FRAMES = (*RESULTS, "cumulus-detail")  #: of section 9
 GAP, LOBES = "ring", "two-lobes"  #: of Fig. 11
-_MESHES = {GAP: ring_mesh, LOBES: two_lobes_mesh}
 _METHOD = "cloud-collectors"
 _HIGH = (0.013, 0.029, -1.0)  #: way of the sun's light over the ring
 _MOST = 16  #: crossings of a ray towards the sun
@@ -120,7 +117,8 @@ def shown(name: str, size: tuple[int, int]) -> LoadedScene:
         return load_scene(name, size)
     record = SCENES[name]
     description = record.build() | ({"sun": sun(_HIGH, (3.17, 3.05, 2.83))} if name == GAP else {})
-    description["cloud"] = medium_boundary("cloud", _MESHES[name](), cloud(droplets()))
+    droplets = fog(0.0363, (0.99997,) * 3, tabulated_phase("mie", 20001))
+    description["cloud"] = medium_boundary("cloud", mesh_triangles(description["cloud"]), droplets)
     loaded = LoadedScene(name, mi.load_dict(description), record.purpose, record.published)
     resize(loaded.scene, size)
     return loaded

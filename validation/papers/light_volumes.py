@@ -44,8 +44,9 @@ from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import error_metrics
 from validation.papers.measured import milliseconds
 from validation.scenes.loading import load_scene, resize
-from validation.scenes.parts import lathe, mitsuba_mesh, placed
-from validation.scenes.sphere_spot import sphere_spot
+from validation.scenes.meshes import lathe, placed
+from validation.scenes.parts import mitsuba_mesh
+from validation.scenes.registry import SCENES
 from validation.study import configuration as methods
 from validation.study.clock import time_in_turns
 from validation.study.frame_times import moved_light
@@ -99,7 +100,7 @@ def _evaluation(volumes: FrameRenderer, *given: Any) -> Callable[[], None]:
 
 def _sphere(facets: int) -> Scene:
     """Return `sphere-spot` with a round sphere of so many facets a ring."""
-    described = sphere_spot()
+    described = SCENES["sphere-spot"].build()
     polar = np.pi * (1 - (np.arange(facets) + 0.5) / facets)
     mesh = placed(lathe(0.47 * np.sin(polar), 0.47 * np.cos(polar), facets), (0.11, -0.07, 1.93))
     described["sphere"] = mitsuba_mesh("sphere", mesh, (0.57, 0.31, 0.23))

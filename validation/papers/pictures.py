@@ -19,9 +19,9 @@ from realtime.scene.animate import thicker_medium
 from realtime.scene.read_scene import Scene, read_scene
 from realtime.shadow_maps.shadow_map import cast_shadow_map
 from validation.papers.light_volumes import corner_heights, plain_edges, quad_levels
-from validation.scenes.colonnade import colonnade
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.parts import point_light
+from validation.scenes.registry import SCENES
 from validation.study.configuration import configuration, prepared
 
 Array = NDArray[np.float64]
@@ -42,7 +42,7 @@ def triptych(size: tuple[int, int]) -> dict[str, Array]:
 
 def two_lights_image(size: tuple[int, int]) -> Array:
     """Return the hall with two lamps by light volumes with maps of 1024 texels, all light [W/(m^2 sr)]."""
-    described = colonnade()
+    described = SCENES["colonnade"].build()
     described["lamp-2"] = point_light((-0.73, 3.31, 6.23), (97.0, 103.0, 111.0))
     scene = mi.load_dict(described)
     resize(scene, size)

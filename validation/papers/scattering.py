@@ -29,8 +29,8 @@ from validation.estimates.monte_carlo import monte_carlo_batches
 from validation.estimates.multiple_scattering import multiple_scattering_share
 from validation.metrics.errors import error_metrics
 from validation.scenes.loading import load_scene, resize
-from validation.scenes.open_fog import open_fog
 from validation.scenes.parts import camera
+from validation.scenes.registry import SCENES
 from validation.study.configuration import configuration, prepared
 
 Array = NDArray[np.float64]
@@ -48,7 +48,7 @@ _RADIUS = 0.97  # [m]
 
 def multiple_scattering() -> dict[str, Any]:
     """Return what a constant leaves of multiple scattering, the worst of three scenes, and its fraction in thin fog."""
-    described = open_fog()
+    described = SCENES["open-fog"].build()
     described["fog"]["scale"] = _THIN
     scene = mi.load_dict(described)
     resize(scene, _SIZE)

@@ -33,8 +33,8 @@ from realtime.scene.animate import (
 )
 from realtime.scene.mesh_adjacency import read_casters
 from realtime.scene.read_scene import Scene
-from validation.scenes.parts import rotation
-from validation.scenes.record import MOVES, Animation
+from validation.scenes.meshes import rotation
+from validation.scenes.registry import MOVES, Animation
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def parse_moves(text: str) -> tuple[str, ...]:
     Raises
     ------
     InputError
-        For a word that is not in `validation.scenes.record.MOVES`.
+        For a word that is not in `validation.scenes.registry.MOVES`.
     """
     moves = tuple(dict.fromkeys(word.strip() for word in text.split(",")))
     for move in moves:

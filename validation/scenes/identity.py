@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a scene is, in keys of results: by name where our source code says the rest, else by content."""
+"""What a scene is, in keys of results."""
 
 import hashlib
 from functools import lru_cache
@@ -12,7 +12,7 @@ from validation.scenes.registry import SCENES
 
 
 def scene_identity(scene: str) -> str:
-    """Return what a scene is: a built-in name, a seed with the content of its files, the digest of a file's scene.
+    """Return what a scene is: a name or seed with a digest of its description or files, the digest of a file's scene.
 
     Raises
     ------
@@ -20,7 +20,7 @@ def scene_identity(scene: str) -> str:
         If a file cannot be read, as of `validation.scenes.loading.load_scene`.
     """
     if scene in SCENES:
-        return scene
+        return f"{scene} {SCENES[scene].digest}"
     if is_random(scene):
         seed, given = random_parts(scene)
         places = [place for _, place in sorted(given.items())]

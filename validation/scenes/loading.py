@@ -19,8 +19,7 @@ from validation.scenes.files.read import read_file
 from validation.scenes.lobes import scene_with_lobes
 from validation.scenes.numbers import check_numbers
 from validation.scenes.random_scene import PREFIX, is_random, random_parts, random_record
-from validation.scenes.record import Animation, SceneRecord
-from validation.scenes.registry import SCENES
+from validation.scenes.registry import SCENES, Animation, SceneRecord
 
 _LARGEST = 16384
 _DEEPEST = 200  # elements in one another; a scene has about ten

@@ -1,110 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parts that the built-in scenes share: meshes, materials, cameras and media for `mi.load_dict`."""
+"""What scenes are made of, for `mi.load_dict`: shapes of meshes, media, phase functions, lights and cameras."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from analytic.errors import InputError
 from analytic.phase import phase_from_words
 from realtime.numerics.aligned import aligned_array
-
-Vertices = NDArray[np.float64]  #: (vertices, 3) [m]
-Faces = NDArray[np.int64]  #: (faces, 3), counter-clockwise as seen from outside
-Mesh = tuple[Vertices, Faces]
-
-
-def lathe(radius: ArrayLike, height: ArrayLike, sides: int) -> Mesh:
-    """Return the closed surface of a profile turned about the z axis, 2 sides len(radius) triangles.
-
-    Parameters
-    ----------
-    radius, height
-        The profile from bottom to top, (n,) each [m]. Every radius is positive; fans close the ends.
-    """
-    radius, height = np.asarray(radius, dtype=np.float64), np.asarray(height, dtype=np.float64)
-    angle = 2 * np.pi * np.arange(sides) / sides
-    circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(sides)], axis=1)
-    return skin(radius[:, None, None] * circle + height[:, None, None] * np.array([0.0, 0.0, 1.0]))
-
-
-def skin(rings: ArrayLike, *, ring_of_rings: bool = False) -> Mesh:
-    """Return the closed surface through n rings of k points, 2 k n triangles with or without ends.
-
-    Parameters
-    ----------
-    rings
-        (n, k, 3) [m]. Each ring runs counter-clockwise as seen from the next ring.
-    ring_of_rings
-        Whether the last ring is joined to the first. Otherwise fans about the mean of a ring close both ends.
-    """
-    rings = np.asarray(rings, dtype=np.float64)
-    count, sides = rings.shape[:2]
-    i = np.arange(sides)
-    j = (i + 1) % sides
-    faces = []
-    for ring in range(count if ring_of_rings else count - 1):
-        low, high = ring * sides, (ring + 1) % count * sides
-        faces += [np.stack([low + i, low + j, high + j], axis=1), np.stack([low + i, high + j, high + i], axis=1)]
-    vertices = rings.reshape(-1, 3)
-    if not ring_of_rings:
-        first, last, end = count * sides, count * sides + 1, (count - 1) * sides
-        faces += [
-            np.stack([np.full(sides, first), j, i], axis=1),
-            np.stack([np.full(sides, last), end + i, end + j], 1),
-        ]
-        vertices = np.concatenate([vertices, rings[[0, -1]].mean(axis=1)])
-    return vertices, np.concatenate(faces)
-
-
-def grid(corner: Sequence[float], across: Sequence[float], up: Sequence[float], cells: tuple[int, int]) -> Mesh:
-    """Return an open rectangle of 2 cells[0] cells[1] triangles; its normal is across x up.
-
-    Parameters
-    ----------
-    corner, across, up
-        A corner and the two edges that start there, (3,) each [m].
-    cells
-        Number of cells along `across` and along `up`, two triangles each.
-    """
-    n, m = cells
-    u, v = np.meshgrid(np.arange(n + 1) / n, np.arange(m + 1) / m, indexing="ij")
-    vertices = np.asarray(corner) + u.reshape(-1, 1) * np.asarray(across) + v.reshape(-1, 1) * np.asarray(up)
-    i, j = (index.reshape(-1) for index in np.meshgrid(np.arange(n), np.arange(m), indexing="ij"))
-    a, b, c, d = i * (m + 1) + j, (i + 1) * (m + 1) + j, (i + 1) * (m + 1) + j + 1, i * (m + 1) + j + 1
-    return vertices, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-
-
-def rotation(axis: Sequence[float], degrees: float) -> NDArray[np.float64]:
-    """Return the matrix, (3, 3), of a rotation about an axis through the origin by an angle [degrees] (Rodrigues)."""
-    x, y, z = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
-    skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    angle = np.deg2rad(degrees)
-    return np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * (skew @ skew)
-
-
-def placed(mesh: Mesh, position: Sequence[float], turn: NDArray[np.float64] | None = None) -> Mesh:
-    """Return a mesh turned about the origin by a matrix, (3, 3), then moved by `position`, (3,) [m]."""
-    vertices, faces = mesh
-    return (vertices if turn is None else vertices @ turn.T) + np.asarray(position), faces
-
-
-def scaled(mesh: Mesh, factor: float | Sequence[float]) -> Mesh:
-    """Return a mesh scaled about the origin, by one `factor` [1] or by one for each axis, (3,)."""
-    vertices, faces = mesh
-    return vertices * factor, faces
-
-
-def joined(meshes: Sequence[Mesh]) -> Mesh:
-    """Return several meshes as one, with the parts in the order given."""
-    offsets = np.cumsum([0] + [len(vertices) for vertices, _ in meshes[:-1]])
-    return (
-        np.concatenate([vertices for vertices, _ in meshes]),
-        np.concatenate([faces + offset for (_, faces), offset in zip(meshes, offsets)]),
-    )
+from validation.scenes.meshes import Mesh
 
 
 def mitsuba_mesh(name: str, mesh: Mesh, reflectance: Sequence[float]):
@@ -171,6 +77,14 @@ def fog(
     }
 
 
+def phase_function(words: str, values: int) -> dict[str, Any]:
+    """Return a phase function from words such as 'hg:0.37', a table of `values` where Mitsuba has no other plugin."""
+    name, _, number = words.partition(":")
+    if name == "hg":
+        return {"type": "hg", "g": float(number)}
+    return {"type": name} if name in ("isotropic", "rayleigh") else tabulated_phase(words, values)
+
+
 def tabulated_phase(words: str, values: int = 2001) -> dict[str, Any]:
     """Return any phase function as a table, which Mitsuba and both readers of scenes take; 'mie' has no other plugin.
 
@@ -206,16 +120,63 @@ def tabulated_phase(words: str, values: int = 2001) -> dict[str, Any]:
     return {"type": "tabphase", "values": ", ".join(repr(float(value)) for value in hats)}
 
 
+def light(type: str, colour: Sequence[float], **given: Any) -> dict[str, Any]:
+    """Return a light of a type and a colour, RGB.
+
+    Parameters
+    ----------
+    type
+        'point' and 'spot' have an intensity [W/sr], a 'sun' an irradiance [W/m^2]; 'rectangle', 'disk', 'sphere' and
+        'sky' a radiance [W/(m^2 sr)].
+    given
+        Of all but sun and sky `position`; of all but these and points `target`. Of a spot the half angles `cutoff` and
+        `beam` [degrees], and perhaps `up`; of a sun the `direction` of its light; of others `size`, and `opaque`, which
+        is false for a light that only shines.
+    """
+    match type:
+        case "point":
+            return point_light(given["position"], colour)
+        case "spot":
+            aim = {"origin": given["position"], "target": given["target"], "up": given.get("up", [0, 0, 1])}
+            return {
+                "type": "spot",
+                "to_world": mi.ScalarTransform4f().look_at(**aim),
+                "cutoff_angle": given["cutoff"],
+                "beam_width": given["beam"],
+                "intensity": {"type": "rgb", "value": list(colour)},
+            }
+        case "sun":
+            return sun(given["direction"], colour)
+        case "sky":
+            return sky(colour)
+    lamp = area_lamp(type, given["position"], given["target"], given["size"], colour)
+    return lamp if given.get("opaque", True) else lamp | {"material": {"type": "null"}}
+
+
 def point_light(position: Sequence[float], intensity: Sequence[float]) -> dict[str, Any]:
     """Return a point light at `position`, (3,) [m], with the RGB `intensity`, (3,) [W/sr]."""
     return {"type": "point", "position": list(position), "intensity": {"type": "rgb", "value": list(intensity)}}
+
+
+def sun(travels: Sequence[float], irradiance: Sequence[float]) -> dict[str, Any]:
+    """Return a directional light that travels in a direction, (3,), with an RGB `irradiance` across it [W/m^2]."""
+    return {
+        "type": "directional",
+        "direction": [float(part) for part in np.asarray(travels) / np.linalg.norm(travels)],
+        "irradiance": {"type": "rgb", "value": list(irradiance)},
+    }
+
+
+def sky(radiance: Sequence[float]) -> dict[str, Any]:
+    """Return a sky of constant RGB `radiance`, (3,) [W/(m^2 sr)]."""
+    return {"type": "constant", "radiance": {"type": "rgb", "value": list(radiance)}}
 
 
 def area_lamp(
     shape: str,
     position: Sequence[float],
     target: Sequence[float],
-    size: float | tuple[float, float],
+    size: float | Sequence[float],
     radiance: Sequence[float],
 ) -> dict[str, Any]:
     """Return a black light with extent, of constant radiance.
@@ -231,7 +192,7 @@ def area_lamp(
     radiance
         RGB, (3,) [W/(m^2 sr)].
     """
-    across, up = size if isinstance(size, tuple) else (size, size)
+    across, up = (size, size) if isinstance(size, float) else size
     turned = mi.ScalarTransform4f().look_at(origin=list(position), target=list(target), up=[0, 0, 1])
     return {
         "type": shape,

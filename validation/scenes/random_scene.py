@@ -22,25 +22,33 @@ from validation.random_scenes.draw import draw_scene
 from validation.random_scenes.drawn import AREA_KINDS, DrawnCaster, DrawnLight, DrawnMedium, DrawnScene
 from validation.random_scenes.ranges import Ranges, ranges_from, read_ranges
 from validation.random_scenes.reach import Reach, reach
-from validation.scenes.parts import (
+from validation.scenes.meshes import (
     Mesh,
+    box,
+    gem,
+    grid,
+    icosphere,
+    joined,
+    lathe,
+    pierced_slab,
+    placed,
+    prism,
+    rotation,
+    scaled,
+    star,
+    tetrahedron,
+    torus,
+)
+from validation.scenes.parts import (
     area_lamp,
     camera,
     fog,
-    grid,
-    joined,
-    lathe,
     medium_boundary,
     mitsuba_mesh,
-    placed,
     point_light,
-    rotation,
-    scaled,
     tabulated_phase,
 )
-from validation.scenes.record import Animation, SceneRecord
-from validation.scenes.solids import box, gem, icosphere, prism, star, tetrahedron, torus
-from validation.scenes.windows import pierced_slab
+from validation.scenes.registry import Animation, SceneRecord
 
 Array = NDArray[np.float64]
 
@@ -217,7 +225,7 @@ def _light(light: DrawnLight) -> dict[str, Any]:
         return point_light(light.position, light.colour)
     if light.kind in AREA_KINDS:
         size = light.size if light.kind == "rectangle" else light.size[0]
-        lamp = area_lamp(light.kind, light.position, light.target, size, light.colour)  # type: ignore[arg-type]
+        lamp = area_lamp(light.kind, light.position, light.target, size, light.colour)
         if light.kind == "sphere":  # Mitsuba takes the rounding of the turn of a large one for shear, and warns
             lamp["to_world"] = mi.ScalarTransform4f().translate(list(light.position)).scale(light.size[0])
         return lamp if light.black else lamp | {"material": {"type": "null"}}

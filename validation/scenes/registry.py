@@ -1,84 +1,195 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The built-in scenes: one registry for tests, benchmarks and figures.
+"""The built-in scenes: `fog.toml` and `clouds.toml` describe them, and a record of each builds Mitsuba's dictionary.
 
-A function builds each scene from arbitrary, never round numbers, so that no constant of the code can hide behind a
-constant of the scene. Every command and report knows the scenes that have a `SceneRecord` in `SCENES`. Those of
-`FOG_SCENES` scatter light once: the standard report, the baselines and the tests of all methods study these.
+Their numbers are arbitrary, never round, so that no constant of the code can hide behind a constant of a scene. Those
+of `FOG_SCENES` scatter light once: the standard report, the baselines and the tests of all methods study these.
+
+Each scene is a table with these keys; lengths are in metres, angles in degrees, colours RGB:
+
+* `purpose`: one sentence, what the scene is for; `published`: the published figure that it stands for;
+* `animation`: what moves in it, see `Animation`; `clouds`: whether light is scattered many times in it;
+* `fog`: the medium around all, with `sigma_t` (one number or RGB) [1/m], `albedo`, and `phase` in words of
+  `analytic.phase.phase_from_words`;
+* `camera`: `origin`, `target` and the horizontal `fov`;
+* `lights`: each with `name`, `type`, `colour` (intensity, irradiance or radiance) and what `parts.light` takes;
+* `shapes`: each with `name` and either `reflectance` or the `medium` that it bounds, which may have a `density`;
+* `kinds`: meshes by name that its shapes use.
+
+A shape, a part of one and a kind is a mesh. `mesh` names a kind or a function of `MESHES`, which takes the further
+keys; or there are `parts`, which are joined. A mesh may be displaced by `waves`, then multiplied by a `scale`, turned
+(`turn`: an axis and an angle) and moved to `at`, and from there by `polar`: a distance and an angle about the vertical.
+
+Of a shape or part with `copies`, copy k has k times the numbers of `step` added to its own, and a shape the name
+'NAME-k', from `first` on; with `of` all of that list are copied together. With `sunflower` the copies lie like its
+seeds, and take the kinds of that list in turn.
 """
 
-from validation.scenes.cloud_slab import SCENE as CLOUD_SLAB
-from validation.scenes.clutter import SCENE as CLUTTER
-from validation.scenes.colonnade import colonnade
-from validation.scenes.cumulus import SCENE as CUMULUS
-from validation.scenes.cumulus_detail import SCENE as CUMULUS_DETAIL
-from validation.scenes.fence import SCENE as FENCE
-from validation.scenes.hall import SCENE as HALL
-from validation.scenes.omni_box import SCENE as OMNI_BOX
-from validation.scenes.open_fog import open_fog
-from validation.scenes.overlap import SCENE as OVERLAP
-from validation.scenes.penumbra_plane import SCENE as PENUMBRA_PLANE
-from validation.scenes.record import Animation, SceneRecord
-from validation.scenes.ring import SCENE as RING
-from validation.scenes.soft_hall import SCENE as SOFT_HALL
-from validation.scenes.sphere_spot import sphere_spot
-from validation.scenes.step_cloud import SCENE as STEP_CLOUD
-from validation.scenes.stratocumulus import SCENE as STRATOCUMULUS
-from validation.scenes.tangle import SCENE as TANGLE
-from validation.scenes.three_media import SCENE as THREE_MEDIA
-from validation.scenes.two_lobes import SCENE as TWO_LOBES
-from validation.scenes.two_pens import two_pens
-from validation.scenes.windows import SCENE as WINDOWS
+import hashlib
+import json
+import math
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
 
-SCENES: dict[str, SceneRecord] = {
-    record.name: record
-    for record in (
-        SceneRecord(
-            "open-fog",
-            open_fog,
-            "Fog and a lamp in view, nothing else: the airlight integral alone, with its peak near the light.",
-            "Biri, Arques, Michelin 2006, section 4.1; Sun et al. 2005",
-            Animation(about=(0.11, 0.31, 1.57)),
-        ),
-        SceneRecord(
-            "sphere-spot",
-            sphere_spot,
-            "A sphere below a spot light: one shadow in a cone of light, a silhouette of 32 edges.",
-            "Biri, Arques, Michelin 2006, section 6: 120 frames/s at 800 x 600",
-            Animation(about=(0.11, -0.07, 1.93)),
-        ),
-        SceneRecord(
-            "colonnade",
-            colonnade,
-            "A hall of fluted columns in fog, lit through them: many parallel shafts, thin shadows, 66 000 triangles.",
-            "Billeter, Sintorn, Assarsson 2010, Fig. 7 (the Sponza atrium)",
-            Animation(about=(4.73, 1.57, 4.37)),
-        ),
-        SceneRecord(
-            "two-pens",
-            two_pens,
-            "Two pens standing on a sheet before a lamp: smooth casters whose shadows cross, 34 549 triangles.",
-            "Biri, Arques, Michelin 2006, Fig. 7a and Table 2: 23 frames/s",
-            Animation(("objects",), objects=("pens",)),
-        ),
-        THREE_MEDIA,
-        CLUTTER,
-        HALL,
-        OMNI_BOX,
-        TANGLE,
-        WINDOWS,
-        PENUMBRA_PLANE,
-        FENCE,
-        SOFT_HALL,
-        OVERLAP,
-        CLOUD_SLAB,
-        STRATOCUMULUS,
-        CUMULUS,
-        CUMULUS_DETAIL,
-        STEP_CLOUD,
-        RING,
-        TWO_LOBES,
-    )
+import mitsuba as mi
+import numpy as np
+
+from validation.scenes import cloud_meshes, meshes
+from validation.scenes.hypertexture import hypertexture
+from validation.scenes.meshes import Mesh, bent, joined, placed, rotation, scaled
+from validation.scenes.parts import camera, fog, light, medium_boundary, mitsuba_mesh, phase_function
+
+MOVES = ("light", "objects", "medium", "colour")
+FILES = tuple(Path(__file__).with_name(name) for name in ("fog.toml", "clouds.toml"))
+
+Table = dict[str, Any]
+
+_DROPLETS = 20001  # values of a tabulated phase function: glory and fogbow are blurred by less than 0.1 degrees
+_COPYING = ("copies", "first", "step", "of", "sunflower", "colours")
+_PLACING = ("name", "mesh", "waves", "scale", "turn", "at", "polar", "reflectance", "medium")
+_SOLIDS = (
+    *(
+        "arch",
+        "box",
+        "faceted_sphere",
+        "fluted_column",
+        "gable",
+        "gem",
+        "grid",
+        "icosphere",
+        "knot",
+        "lathe",
+        "pierced",
+    ),
+    *("pierced_slab", "profile", "spindle", "statue", "tetrahedron", "torus", "vase"),
+)
+MESHES: dict[str, Callable[..., Mesh]] = {
+    **{name: getattr(meshes, name) for name in _SOLIDS},
+    **{name: getattr(cloud_meshes, name) for name in ("cumulus", "stratocumulus", "two_lobes")},
+    "star": lambda inner, outer, points, height: meshes.prism(meshes.star(inner, outer, points), height),
+    "triangle": lambda corners: (np.array(corners), np.array([[0, 1, 2]])),
 }
 
-#: Those without clouds.
-FOG_SCENES: dict[str, SceneRecord] = {name: record for name, record in SCENES.items() if not record.clouds}
+
+@dataclass(frozen=True)
+class Animation:
+    """What moves in the frames of a scene; `validation.scenes.animation` says how."""
+
+    moves: tuple[str, ...] = ("light",)  #: of `MOVES`
+    about: tuple[float, float, float] | None = None  #: on the axis that lights circle [m]; None: the scene's middle
+    objects: tuple[str, ...] = ()  #: names of the shapes that turn; empty: all closed ones
+
+
+@dataclass(frozen=True)
+class SceneRecord:
+    """A built-in scene."""
+
+    name: str
+    build: Callable[[], dict[str, Any]]  #: the dictionary for `mi.load_dict`; needs an active Mitsuba variant
+    purpose: str  #: one sentence: what the scene is for
+    published: str  #: the published figure that the scene stands for
+    animation: Animation = field(default_factory=Animation)  #: what moves in it
+    clouds: bool = False  #: whether light is scattered many times: then `cloud-paths` is its truth, and few methods fit
+    digest: str = ""  #: of its description
+
+
+def read_scenes(path: Path) -> dict[str, SceneRecord]:
+    """Return the scenes of a file by name, in its order."""
+    tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    return {name: _record(name, table) for name, table in tables.items()}
+
+
+def _record(name: str, table: Table) -> SceneRecord:
+    animation = Animation(**{key: tuple(value) for key, value in table.get("animation", {}).items()})
+    digest = hashlib.sha256(json.dumps(table).encode()).hexdigest()
+    words = table["purpose"], table["published"]
+    return SceneRecord(name, partial(_build, table), *words, animation, table.get("clouds", False), digest)
+
+
+def _build(table: Table) -> dict[str, Any]:
+    scene: dict[str, Any] = {"type": "scene"}
+    if "fog" in table:
+        scene["fog"] = _medium(table["fog"])
+    scene["sensor"] = camera(**table["camera"], size=(800, 600), in_fog="fog" in table)
+    for each in table["lights"]:
+        scene[each["name"]] = light(**{key: value for key, value in each.items() if key != "name"})
+    kinds = table.get("kinds", {})
+    for shape in copies(table.get("shapes", [])):
+        name, mesh = shape["name"], mesh_of(shape, kinds)
+        if "medium" in shape:
+            scene[name] = medium_boundary(name, mesh, _medium(shape["medium"], shape.get("mesh", "")))
+        else:
+            scene[name] = mitsuba_mesh(name, mesh, shape["reflectance"])
+    return scene
+
+
+def copies(entries: Iterable[Table]) -> Iterator[Table]:
+    """Yield shapes or parts one by one, copies written out."""
+    for entry in entries:
+        step = entry.get("step", {})
+        for number in range(entry.get("copies", 1)):
+            for each in entry.get("of", [entry]):
+                copy = {key: _plus(value, step.get(key), number) for key, value in each.items() if key not in _COPYING}
+                if "copies" in entry and "name" in each:
+                    copy["name"] = f"{each['name']}-{number + entry.get('first', 0)}"
+                yield copy | (_seed(entry, number) if "sunflower" in entry else {})
+
+
+def _plus(value: Any, step: Any, times: int) -> Any:
+    if step is None:
+        return value
+    if isinstance(value, list):
+        return [_plus(own, added, times) for own, added in zip(value, step, strict=True)]
+    return value + times * step
+
+
+def _seed(entry: Table, number: int) -> Table:
+    """Return place, kind, size, turn and colour of a seed of a sunflower, a spiral that is a little flat."""
+    distance, angle = 0.419 * math.sqrt(number + 2.3), math.radians(137.50776 * number + 21.7)
+    x, y, z = entry["at"]
+    return {
+        "mesh": entry["sunflower"][number % len(entry["sunflower"])],
+        "scale": 0.87 + 0.31 * math.sin(2.7 * number),
+        "turn": [0, 0, 1, 53.0 * number],
+        "at": [x + distance * math.cos(angle), y + 0.87 * distance * math.sin(angle), z],
+        "reflectance": entry["colours"][number % len(entry["colours"])],
+    }
+
+
+def mesh_of(entry: Table, kinds: Mapping[str, Table]) -> Mesh:
+    """Return the mesh of a shape, a part or a kind, where it is."""
+    if "parts" in entry:
+        mesh = joined([mesh_of(part, kinds) for part in copies(entry["parts"])])
+    else:
+        name, given = entry["mesh"], {key: value for key, value in entry.items() if key not in _PLACING}
+        mesh = mesh_of({**kinds[name], **given}, {}) if name in kinds else MESHES[name](**given)
+    if "waves" in entry:
+        mesh = bent(mesh[0], entry["waves"]), mesh[1]
+    x, y, z = entry.get("at", (0.0, 0.0, 0.0))
+    distance, angle = entry.get("polar", (0.0, 0.0))
+    at = x + distance * math.cos(math.radians(angle)), y + distance * math.sin(math.radians(angle)), z
+    *axis, degrees = entry.get("turn", (0, 0, 1, 0))
+    return placed(scaled(mesh, entry.get("scale", 1.0)), at, rotation(axis, degrees) if "turn" in entry else None)
+
+
+def _medium(table: Table, shape: str = "") -> dict[str, Any]:
+    medium = fog(table["sigma_t"], table["albedo"], phase_function(table.get("phase", "isotropic"), _DROPLETS))
+    if "density" not in table:
+        return medium
+    density, low, high = _density(shape, json.dumps(table["density"]))
+    box = mi.ScalarTransform4f().translate(low.tolist()).scale((high - low).tolist())
+    grid = {"type": "gridvolume", "grid": mi.VolumeGrid(density[..., None]), "to_world": box}
+    return medium | {"type": "heterogeneous", "sigma_t": grid}
+
+
+@cache
+def _density(mesh: str, given: str) -> Any:
+    return hypertexture(MESHES[mesh](), **json.loads(given))
+
+
+#: The built-in scenes by name, and those without clouds.
+SCENES = {name: record for path in FILES for name, record in read_scenes(path).items()}
+FOG_SCENES = {name: record for name, record in SCENES.items() if not record.clouds}

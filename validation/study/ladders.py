@@ -25,7 +25,7 @@ from realtime.scene.lights import Light
 from realtime.scene.read_media import sort_shapes
 from realtime.scene.read_scene import Scene, read_scene
 from validation.scenes.loading import load_scene
-from validation.scenes.parts import rotation
+from validation.scenes.meshes import rotation
 from validation.study.subdivision import subdivided, triangles_of, with_shapes
 
 KINDS = ("size", "triangles", "lights", "media", "map")

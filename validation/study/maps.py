@@ -48,7 +48,7 @@ from reference.scene.read import TruthLight, TruthScene, read_truth
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import Metrics, error_metrics
 from validation.scenes.animation import animate
-from validation.scenes.record import Animation
+from validation.scenes.registry import Animation
 from validation.study.configuration import Configuration, configuration, prepared
 
 Array = NDArray[np.float64]

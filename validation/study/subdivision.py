@@ -23,8 +23,8 @@ from analytic.errors import InputError
 from realtime.area_lights.read import is_area_light
 from realtime.scene.mesh_adjacency import mesh_triangles
 from realtime.scene.named_shapes import scene_of
+from validation.scenes.meshes import divided
 from validation.scenes.parts import mesh_with_material
-from validation.scenes.solids import divided
 
 _WAVES = ((3.1, 2.3, -1.1), (-5.3, 6.7, 3.7), (11.3, -7.9, 9.1), (-17.3, 15.1, 13.9))  # along the size of the scene
 _STEEPNESS = 0.15

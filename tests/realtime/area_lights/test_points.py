@@ -8,7 +8,7 @@ from realtime.area_lights.patterns import PATTERNS
 from realtime.area_lights.points import place_points
 from realtime.area_lights.shape import AreaLight, turned_area_light
 from realtime.errors import InputError
-from validation.scenes.parts import rotation
+from validation.scenes.meshes import rotation
 
 AXES = rotation((0.3, -1.0, 0.7), 37.0)
 MIDDLE = np.array([0.7, -1.3, 2.9])

@@ -9,8 +9,8 @@ import pytest
 from realtime.errors import InputError
 from tests.helpers import airlight_sum
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
-from validation.scenes.parts import medium_boundary, placed, rotation
-from validation.scenes.solids import box
+from validation.scenes.meshes import box, placed, rotation
+from validation.scenes.parts import medium_boundary
 
 TURN = rotation((0.4, 1.0, 0.1), 33.0)
 SIDES = np.array([1.1, 0.9, 1.4])

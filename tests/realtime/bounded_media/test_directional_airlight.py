@@ -25,7 +25,7 @@ from tests.helpers.sunlit import (
     sun,
     unit,
 )
-from validation.scenes.parts import rotation
+from validation.scenes.meshes import rotation
 
 SMALL = (8, 6)
 
@@ -95,8 +95,8 @@ def test_bounded_media_against_sums_over_small_steps(variant, case):
 def test_media_of_many_planes_have_nodes(variant):
     """A faceted sphere of 80 planes: the bends within the nodes are small."""
     from realtime.scene.convex_bounds import mesh_bounds
+    from validation.scenes.meshes import icosphere
     from validation.scenes.parts import medium_boundary
-    from validation.scenes.solids import icosphere
 
     medium = {"type": "homogeneous", "sigma_t": 1.3, "albedo": 0.7}
     vertices, faces = icosphere(1)

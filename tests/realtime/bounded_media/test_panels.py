@@ -8,8 +8,7 @@ import pytest
 from realtime.numerics.aligned import aligned_array
 from realtime.scene.convex_bounds import mesh_bounds
 from tests.helpers.kernel_values import opaque, phase_of
-from validation.scenes.parts import placed, rotation
-from validation.scenes.solids import gem, prism
+from validation.scenes.meshes import gem, placed, prism, rotation
 
 TURN = rotation((0.3, 1.0, 0.2), 27.3)
 CENTRE = np.array([0.1, 0.2, 0.3])

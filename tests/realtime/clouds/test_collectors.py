@@ -6,8 +6,8 @@ import pytest
 
 from realtime.numerics.aligned import aligned_array
 from tests.helpers.sunlit import clear_scene, cube, read, sun, unit
-from validation.scenes.parts import medium_boundary, rotation
-from validation.scenes.solids import box
+from validation.scenes.meshes import box, rotation
+from validation.scenes.parts import medium_boundary
 
 SLAB_TURN = np.asarray(rotation((0.2, 1.0, 0.4), 21.0))
 SLAB = np.array([9.0, 9.0, 0.8])

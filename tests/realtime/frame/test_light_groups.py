@@ -20,7 +20,7 @@ from tests.helpers.area_lamps import area_lamp, lit_by
 from tests.helpers.frames import relative_rmse
 from tests.helpers.scenes import tiny_scene
 from tests.helpers.sunlit import fog_sphere, shaded
-from validation.scenes.parts import rotation
+from validation.scenes.meshes import rotation
 
 SIZE = (32, 24)
 #: Methods with what brings them close to the truth, and the relative RMSE of airlight that remains.

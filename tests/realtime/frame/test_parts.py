@@ -53,7 +53,7 @@ def test_frames_of_an_animation_are_the_same_in_parts(name, variant, monkeypatch
     import realtime.frame.renderer as module
     from realtime.frame.incremental import next_frame
     from realtime.scene.animate import coloured_light, turned_light
-    from validation.scenes.parts import rotation
+    from validation.scenes.meshes import rotation
     from validation.study.frame_times import timed_image
 
     made = renderer(name)

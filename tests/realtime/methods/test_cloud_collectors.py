@@ -8,8 +8,8 @@ import pytest
 
 from tests.helpers.clouds import DROPLETS, cloud, cloud_scene, ring
 from tests.helpers.transport_formula import WEIGHTS, Formula, use_formula
-from validation.scenes.parts import camera, placed, rotation
-from validation.scenes.solids import box
+from validation.scenes.meshes import box, placed, rotation
+from validation.scenes.parts import camera
 
 THICKNESS, EXTINCTION = 143.7, 0.0363
 TURN = rotation((0.3, 1.0, -0.2), 11.0)

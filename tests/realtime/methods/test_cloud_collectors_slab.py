@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tests.helpers.clouds import DROPLETS, cloud
-from validation.scenes.parts import camera, placed
-from validation.scenes.solids import box
+from validation.scenes.meshes import box, placed
+from validation.scenes.parts import camera
 
 THICKNESS, EXTINCTION, G, ALBEDO = 110.3, 0.0363, 0.85, 0.99
 AXIS = np.array([0.517, 0.211, -0.829]) / np.linalg.norm([0.517, 0.211, -0.829])

@@ -17,8 +17,8 @@ from realtime.scene.animate import thicker_medium
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import DROPLETS, SUN, cloud, cloud_scene, loaded, ring
-from validation.scenes.parts import grid, mitsuba_mesh, placed
-from validation.scenes.solids import box
+from validation.scenes.meshes import box, grid, placed
+from validation.scenes.parts import mitsuba_mesh
 
 pytestmark = pytest.mark.usefixtures("variant")
 

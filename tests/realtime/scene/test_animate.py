@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from realtime.scene.animate import coloured_light, read_objects, turned_light, turned_objects
-from validation.scenes.parts import rotation
+from validation.scenes.meshes import rotation
 
 
 def host(array) -> np.ndarray:

@@ -9,8 +9,7 @@ from realtime.errors import InputError
 from realtime.scene.closed_mesh import closed_mesh, encloses
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import DROPLETS, SUN, TURN, cloud, cloud_of, cloud_scene, loaded, ring
-from validation.scenes.parts import joined, placed
-from validation.scenes.solids import box, torus
+from validation.scenes.meshes import box, joined, placed, torus
 
 pytestmark = pytest.mark.usefixtures("variant")
 

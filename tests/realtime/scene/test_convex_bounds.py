@@ -6,8 +6,7 @@ import pytest
 
 from realtime.errors import InputError
 from realtime.scene.convex_bounds import Bounds, holds, mean_distance, mesh_bounds, overlap
-from validation.scenes.parts import placed, rotation
-from validation.scenes.solids import box, icosphere
+from validation.scenes.meshes import box, icosphere, placed, rotation
 
 TURN = rotation((0.3, 1.0, 0.2), 27.3)
 

@@ -12,8 +12,7 @@ from realtime.methods.registry import FOG_METHODS, METHODS
 from realtime.scene.density import density_at
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import SUN, cloud, cloud_scene, dense, linear_between, ring
-from validation.scenes.parts import placed
-from validation.scenes.solids import box
+from validation.scenes.meshes import box, placed
 
 pytestmark = pytest.mark.usefixtures("variant")
 

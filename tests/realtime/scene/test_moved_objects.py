@@ -6,7 +6,7 @@ import pytest
 
 from realtime.scene.animate import read_objects, turned_objects
 from tests.helpers.scenes import tiny_scene
-from validation.scenes.parts import rotation
+from validation.scenes.meshes import rotation
 
 TURN = rotation((0.3, -0.2, 1), 71.0)
 
@@ -18,7 +18,7 @@ def bumpy_ball(turn=None, *, normals: bool):
     """
     import mitsuba as mi
 
-    from validation.scenes.solids import icosphere
+    from validation.scenes.meshes import icosphere
     from validation.study.subdivision import bumpy
 
     sphere, faces = icosphere(3)
@@ -37,7 +37,8 @@ def bumpy_ball(turn=None, *, normals: bool):
 
 
 def floor():
-    from validation.scenes.parts import grid, mitsuba_mesh
+    from validation.scenes.meshes import grid
+    from validation.scenes.parts import mitsuba_mesh
 
     return mitsuba_mesh("floor", grid((-3.1, -3.3, -0.03), (6.7, 0, 0), (0, 6.1, 0), (2, 2)), (0.5, 0.6, 0.4))
 

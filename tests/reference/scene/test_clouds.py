@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from validation.scenes.parts import joined, placed, scaled
-from validation.scenes.solids import box, icosphere, torus
+from validation.scenes.meshes import box, icosphere, joined, placed, scaled, torus
 
 
 def cloud(mesh, name="puff"):
@@ -19,8 +18,7 @@ def read(**parts):
     import mitsuba as mi
 
     from reference.scene.clouds import read_clouds
-    from validation.scenes.cloud_parts import sun
-    from validation.scenes.parts import camera
+    from validation.scenes.parts import camera, sun
 
     usual = {
         "sensor": camera((0.3, -7.1, 0.7), (0, 0, 0), fov=41.0, size=(4, 3), in_fog=False),
@@ -62,8 +60,7 @@ def test_crossing_and_nested_clouds_are_refused(variant):
 
 
 def test_other_lights_and_scenes_without_clouds_are_refused(variant):
-    from validation.scenes.cloud_parts import sky
-    from validation.scenes.parts import mitsuba_mesh, point_light
+    from validation.scenes.parts import mitsuba_mesh, point_light, sky
 
     ball = icosphere(1)
     with pytest.raises(InputError, match="light 'lamp' is a PointLight; clouds are lit by"):

@@ -22,8 +22,7 @@ from realtime.numerics.aligned import aligned_array
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import SUN, TURN, cloud, cloud_scene, crossings, dense, linear_between, ring
-from validation.scenes.parts import placed
-from validation.scenes.solids import box
+from validation.scenes.meshes import box, placed
 
 pytestmark = pytest.mark.usefixtures("variant")
 

@@ -17,8 +17,8 @@ from realtime.scene.read_scene import read_scene
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_truth
 from validation.metrics.errors import FLOOR
-from validation.scenes.parts import camera, fog, joined, mitsuba_mesh, placed, point_light
-from validation.scenes.solids import box
+from validation.scenes.meshes import box, joined, placed
+from validation.scenes.parts import camera, fog, mitsuba_mesh, point_light
 from validation.study.configuration import configuration, prepared
 
 SIZE = (20, 16)

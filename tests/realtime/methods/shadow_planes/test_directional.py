@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from tests.helpers.sunlit import plank, read, relative_rmse, render, shaded, sun
-from validation.scenes.parts import mitsuba_mesh, placed
-from validation.scenes.solids import box
+from validation.scenes.meshes import box, placed
+from validation.scenes.parts import mitsuba_mesh
 
 CAMERA_AT = np.array([0.2, -4.1, 1.3])  # of `tests.helpers.scenes`
 

@@ -53,7 +53,7 @@ def test_layers_between_light_and_camera(seed, components):
 @pytest.mark.claim("no-ray-slips-through")
 def test_axis_through_edges_and_vertices_counts_each_layer_once():
     """The axis runs through edges and vertices of a grid: of the triangles there one counts."""
-    from validation.scenes.parts import grid
+    from validation.scenes.meshes import grid
 
     casters = make_casters([("grid", *grid((-1, -1, 0), (2, 0, 0), (0, 2, 0), (4, 4)))])
     used = np.ones(1, dtype=bool)

@@ -7,16 +7,12 @@ import pytest
 
 def frame(parameters):
     """A frame of the sphere under the spot."""
-    import mitsuba as mi
-
     from realtime.frame.renderer import render_frame
     from realtime.scene.read_scene import read_scene
-    from validation.scenes.loading import resize
-    from validation.scenes.sphere_spot import sphere_spot
+    from validation.scenes.loading import load_scene
     from validation.study.configuration import configuration, prepared
 
-    scene = mi.load_dict(sphere_spot())
-    resize(scene, (64, 48))
+    scene = load_scene("sphere-spot", (64, 48)).scene
     return render_frame(prepared(read_scene(scene), configuration("shadow-planes", None, parameters)))
 
 

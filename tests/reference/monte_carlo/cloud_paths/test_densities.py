@@ -17,9 +17,8 @@ def clouds_of(medium=None, **parts):
 
     from reference.scene.clouds import read_clouds
     from tests.helpers.clouds import SUN, cloud, cloud_scene
-    from validation.scenes.cloud_parts import sky
-    from validation.scenes.parts import placed
-    from validation.scenes.solids import box
+    from validation.scenes.meshes import box, placed
+    from validation.scenes.parts import sky
 
     mesh = placed(box(tuple(HIGH - LOW - 2.6)), tuple(0.5 * (LOW + HIGH)))
     scene = cloud_scene(sun=SUN, sky=sky((0.06, 0.11, 0.2)), box=cloud("box", mesh, medium), **parts)
@@ -72,8 +71,7 @@ def test_an_even_grid_is_a_homogeneous_cloud(variant):
 def test_opacity_is_the_sum_over_the_grid(variant):
     from reference.monte_carlo.cloud_paths.opacity import seen_clouds
     from tests.helpers.clouds import length_inside, linear_between
-    from validation.scenes.parts import placed
-    from validation.scenes.solids import box
+    from validation.scenes.meshes import box, placed
 
     clouds = clouds_of(rough())
     mesh = placed(box(tuple(HIGH - LOW - 2.6)), tuple(0.5 * (LOW + HIGH)))

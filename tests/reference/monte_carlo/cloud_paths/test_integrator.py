@@ -43,8 +43,7 @@ def ball(sigma_t, albedo, phase, centre=(0.0, 0.0, 0.0), radius=1.3):
 def scene(**parts):
     import mitsuba as mi
 
-    from validation.scenes.cloud_parts import sun
-    from validation.scenes.parts import camera
+    from validation.scenes.parts import camera, sun
 
     usual = {
         "type": "scene",
@@ -55,8 +54,8 @@ def scene(**parts):
 
 
 def scenes():
-    from validation.scenes.cloud_parts import sky, sun
-    from validation.scenes.parts import grid, mitsuba_mesh
+    from validation.scenes.meshes import grid
+    from validation.scenes.parts import mitsuba_mesh, sky, sun
 
     hg = {"type": "hg", "g": 0.6}
     ground = mitsuba_mesh("ground", grid((-9, -9, -1.7), (18, 0, 0), (0, 18, 0), (1, 1)), (0.7, 0.5, 0.3))

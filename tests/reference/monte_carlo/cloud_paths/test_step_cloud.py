@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 COLUMNS = 32
+PERIODS, WIDTH, THICKNESS = 9, 500.0, 250.0  #: of the cloud, widths [m]
+THIN, THICK = 2.0, 18.0  #: optical thickness of both halves
 #: Light at the zenith, and at 60 degrees travelling to +x: mean reflectance, and that of columns 1, 8, 17, 24.
 CONSENSUS = {
     0.0: (0.32760, (0.27859, 0.22592, 0.32332, 0.45022)),
@@ -18,11 +20,12 @@ def lit_from(sun):
     """Return the scene with the sun at a zenith angle [degrees]."""
     import mitsuba as mi
 
-    from validation.scenes import cloud_parts, step_cloud
+    from validation.scenes.parts import sun as light
+    from validation.scenes.registry import SCENES
 
     angle = math.radians(sun)
-    own = {"sun": cloud_parts.sun((math.sin(angle), 0.0, -math.cos(angle)), (math.pi,) * 3)}
-    return mi.load_dict(step_cloud.step_cloud() | own)
+    own = {"sun": light((math.sin(angle), 0.0, -math.cos(angle)), (math.pi,) * 3)}
+    return mi.load_dict(SCENES["step-cloud"].build() | own)
 
 
 def rays_from_above(paths, seed):
@@ -63,8 +66,6 @@ def by_walk(scene, paths, seed):
 def as_grid(scene):
     """Return the cloud as one box of a `heterogeneous` medium: `volpath` would leap over the gaps between boxes."""
     import mitsuba as mi
-
-    from validation.scenes.step_cloud import PERIODS, THICK, THICKNESS, THIN, WIDTH
 
     grid = np.tile([THIN / THICKNESS, THICK / THICKNESS], PERIODS).astype(np.float32).reshape(1, 1, 2 * PERIODS, 1)
     to_world = mi.ScalarTransform4f().translate([-(PERIODS // 2) * WIDTH, -1200.0, 0.0])

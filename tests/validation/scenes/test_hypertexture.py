@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from validation.scenes.clouds.hypertexture import (
+from validation.scenes.hypertexture import (
     NOISE_BOUND,
     gradient_noise,
     octaves,
