@@ -150,7 +150,7 @@ def sweep_columns() -> str:
     """Return the columns of a sweep's rows."""
     from validation.study.row import COLUMNS
 
-    rows = [(f"`{each.name}`", each.unit, _cell(each.meaning)) for each in COLUMNS]
+    rows = [(f"`{each.key}`", each.unit, _cell(each.meaning)) for each in COLUMNS]
     return table(("column", "unit", "meaning"), rows, 3)
 
 

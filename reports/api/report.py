@@ -3,6 +3,7 @@
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 from analytic.errors import InputError, nearest
@@ -58,30 +59,26 @@ def report(
     >>> report.claims[0]  # doctest: +SKIP
     'The truth is confirmed by our own Mitsuba integrator in 1 of 1 comparisons: ...'
     """
-    from realtime.methods.registry import FOG_METHODS
     from reference.storage.files import ensure_folder
     from reports.api.tables import Report
     from reports.machine.environment import activate
     from reports.report.asked import notes_on, scenes_of_images
     from reports.report.measure import write_report
-    from validation.study.configuration import QUICK, chosen_configurations
-    from validation.study.scene import EFFORTS
+    from validation.study.study import STUDIES, standard_study
 
-    if effort not in EFFORTS:
-        raise InputError(f"effort: got {effort!r}, wanted one of {', '.join(EFFORTS)}" + nearest(effort, EFFORTS))
+    if effort not in STUDIES:
+        raise InputError(f"effort: got {effort!r}, wanted one of {', '.join(STUDIES)}" + nearest(effort, STUDIES))
     target = ensure_folder(folder)
     activate()
-    usual = QUICK if effort == "quick" else chosen_configurations(list(FOG_METHODS))
-    chosen = usual if methods is None else chosen_methods(methods)
+    study = standard_study(effort)
+    chosen = study.configurations if methods is None else chosen_methods(methods)
     asked = None if scenes is None else [os.fspath(path) for path in several(scenes)]
-    names, shown = scenes_of_images(asked, images, EFFORTS[effort].scenes)
+    names, shown = scenes_of_images(asked, images, study.scenes)
     notes_on(names)  # refuses a scene that cannot be read, before the work; the notes stand in report.json
     with telling(progress, "report") as callback:
         data = write_report(
             target,
-            scenes=names,
-            effort=EFFORTS[effort],
-            configurations=chosen,
+            replace(study, scenes=tuple(names), configurations=chosen),
             images=shown,
             command=f"airlight.report({os.fspath(folder)!r}, ..)",
             fresh=fresh,

@@ -201,7 +201,7 @@ class Rendering(LayeredImage):
                 f"{number(frame.median_ms)} ms, quartiles {number(frame.low_ms)}..{number(frame.high_ms)}"
             )
             facts["of it airlight"] = f"{number(self.times.airlight.median_ms)} ms"
-            facts["after the light moved"] = f"{number(self.times.light_moved.median_ms)} ms"
+            facts["after the light moved"] = f"{number(self.times.medians['light_moved'])} ms"
         return facts | ({"notes": " ".join(self.notes)} if self.notes else {})
 
     @property

@@ -3,7 +3,7 @@
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from analytic.cases import Cases
     from reports.api.tables import BenchTable, Integrals, PaperClaims
     from validation.study.configuration import Configuration
-    from validation.study.run import Measurement
+    from validation.study.row import Row
 
 #: A name, 'module:function', a function, or a method with its kernel and parameters.
 MethodLike: TypeAlias = "str | Callable[..., Any] | Configuration"
@@ -150,7 +150,10 @@ def bench(
     from reports.api.tables import BenchTable
     from reports.machine.environment import activate, describe_environment
     from validation.estimates.quadrature import truth_image
-    from validation.study.run import configurations_for, measure
+    from validation.study.reference import of_image
+    from validation.study.run import run
+    from validation.study.scene import configurations_for
+    from validation.study.study import Cell, Measure
 
     activate()
     chosen = chosen_methods(methods)
@@ -161,12 +164,13 @@ def bench(
     with telling(progress, "bench") as callback:
         for number, (opened_scene, scene) in enumerate(zip(loaded, read)):
             callback(number / len(loaded), f"{opened_scene.name}: the truth")
-            truth = truth_image(opened_scene.scene)
+            reference = of_image(truth_image(opened_scene.scene))
+            size_of, wanted = (scene.camera.width, scene.camera.height), Measure("stages", seconds, flip=flip)
             useful = configurations_for(scene.features, chosen)
             for place, each in enumerate(useful):
                 callback((number + place / len(useful)) / len(loaded), f"{opened_scene.name}: {each.label}")
-                measured = measure(scene, each, truth=truth, seconds=seconds, with_flip=flip)
-                rows.append({"scene": opened_scene.name, **_size(scene), **_numbers(measured)})
+                cell = Cell(opened_scene.name, size_of, (), each, replace(wanted, every_metric=False))
+                rows.append(_numbers(run(cell, scene, reference)[0], each))
         callback(1.0, "done")
     return BenchTable(rows=tuple(rows), environment=describe_environment())
 
@@ -191,26 +195,22 @@ def chosen_methods(methods: Any) -> "tuple[Configuration, ...]":
     return tuple(chosen)
 
 
-def _size(scene: Any) -> dict[str, int]:
-    return {"width": scene.camera.width, "height": scene.camera.height}
-
-
-def _numbers(measured: "Measurement") -> dict[str, Any]:
-    """Return a measurement as one row, see `BenchTable`."""
+def _numbers(row: "Row", chosen: "Configuration") -> dict[str, Any]:
+    """Return the numbers of a row, see `BenchTable`."""
     from validation.metrics.errors import plain
+    from validation.study.frame_times import FrameTimes
 
-    chosen, times, error = measured.configuration, measured.times, measured.error
-    row: dict[str, Any] = {"label": chosen.label, "method": chosen.method, "kernel": chosen.kernel}
-    row |= {"parameters": dict(chosen.parameters)}
-    row["frame_ms"] = times and times.frame.median_ms
-    row["frame_low_ms"] = times and times.frame.low_ms
-    row["frame_high_ms"] = times and times.frame.high_ms
-    for stage in ("airlight", "surface", "light_moved", "objects_moved", "light_moved_camera_kept", "colours_changed"):
-        row[f"{stage}_ms"] = times and getattr(times, stage).median_ms
+    times, error = row.times, row.error
+    numbers: dict[str, Any] = {name: getattr(row, name) for name in ("scene", "width", "height", "label", "method")}
+    numbers |= {"kernel": row.kernel, "parameters": dict(chosen.parameters)}
+    numbers["frame_low_ms"] = times and times.frame.low_ms
+    numbers["frame_high_ms"] = times and times.frame.high_ms
+    medians = times.medians if times else {}
+    numbers |= {f"{each.name}_ms": medians.get(each.name) for each in fields(FrameTimes)}
     for name in ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative"):
-        row[name] = error and plain(getattr(error, name))
-    row["flip"] = measured.flip and measured.flip.value
-    return row | {"refused": measured.refused, "note": measured.note}
+        numbers[name] = error and plain(getattr(error, name))
+    numbers["flip"] = row.flip and row.flip.value
+    return numbers | {"refused": row.reason, "note": row.note}
 
 
 @one_error
@@ -246,7 +246,7 @@ def paper(
     from reference.storage.kept import fresh_results
     from reports.api.tables import PaperClaims
     from reports.machine.environment import activate
-    from reports.report.claims import measure_claims
+    from reports.report.others import measure_claims
     from validation.papers.claims import claims, papers
 
     if name is not None and name not in papers():

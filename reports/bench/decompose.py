@@ -48,7 +48,9 @@ def _decomposed_scene(name: str, pixels, chosen, *, apart, progress) -> tuple[di
     from validation.metrics.errors import plain
     from validation.scenes.loading import load_scene
     from validation.study.decompose import decompose, exact_sum, part_numbers
-    from validation.study.run import configurations_for, render_by_name
+    from validation.study.run import frame_of
+    from validation.study.scene import configurations_for
+    from validation.study.study import Cell
 
     loaded = load_scene(name, pixels)
     scene = read_scene(loaded.scene)
@@ -62,8 +64,8 @@ def _decomposed_scene(name: str, pixels, chosen, *, apart, progress) -> tuple[di
         progress((1 + number) / (1 + len(configurations)), f"{loaded.name}: {each.label}")
 
         def own(configuration, each=each):
-            path = str(loaded.path or loaded.name)
-            return apart(render_by_name, path, size, configuration, name=each.method).airlight
+            cell = Cell(str(loaded.path or loaded.name), size, (), configuration)
+            return apart(frame_of, cell, name=each.method).airlight
 
         entry = {
             "label": each.label,

@@ -33,34 +33,38 @@ def print_methods(names, pixels, chosen, *, margin: float | None, apart, json: b
 
 
 def _bench_scene(name: str, pixels, chosen, *, margin: float | None, apart, progress) -> dict:
-    from reports.data.serialize import measurement_data
-    from reports.machine.progress import counted, part_of
+    from realtime.scene.read_scene import read_scene
+    from reports.machine.progress import part_of
+    from reports.report.scene import row_entry
     from validation.estimates.agreement import agreements
+    from validation.estimates.quadrature import truth_image
     from validation.metrics.errors import plain
     from validation.scenes.loading import load_scene
-    from validation.study.run import bench as run
-    from validation.study.scene import EFFORTS
+    from validation.study.reference import of_image
+    from validation.study.run import run
+    from validation.study.scene import configurations_for
+    from validation.study.study import Cell, Measure, standard_study
 
     loaded = load_scene(name, pixels)
     share = 1.0 if margin is None else 0.6
-    rows, camera = [], None
-    progress(0.0, f"{loaded.name}: the truth")
-    for scene, measured in run(loaded, chosen, apart=apart, progress=counted(part_of(progress, 0.0, share))):
-        rows.append(measurement_data(measured))
-        camera = scene.camera
+    progress(0.0, f"{loaded.name}: the reference")
+    scene, reference = read_scene(loaded.scene), of_image(truth_image(loaded.scene))
+    size, useful, rows = (scene.camera.width, scene.camera.height), configurations_for(scene.features, chosen), []
+    for number, each in enumerate(useful):
+        progress(share * number / len(useful), f"{loaded.name}: {each.label}")
+        cell = Cell(str(loaded.path or loaded.name), size, (), each, Measure("stages", every_metric=False))
+        rows.append(row_entry(plain(run(cell, scene, reference, apart=apart)[0])))
     agreed = {}
     if margin is not None:
-        margins = {**EFFORTS["default"].margins, "volpath": margin}
         agreed = plain(
             agreements(
                 load_scene(name, (160, 120)).scene,
-                margins,
+                {**standard_study("default").checks.margins, "volpath": margin},
                 batches=_BATCHES,
                 progress=part_of(progress, share, 1.0),
             )
         )
-    size = [camera.width, camera.height] if camera else None
-    return {"name": loaded.name, "size": size, "methods": rows, "agreement": agreed}
+    return {"name": loaded.name, "size": list(size), "methods": rows, "agreement": agreed}
 
 
 def _print_tables(scenes: list[dict], *, markdown: bool) -> None:

@@ -17,10 +17,10 @@ def print_scaling(
 ) -> None:
     """Print times, memory and exponents by the work; exit status 1 if a time jumps or grows faster than it did."""
     from analytic.errors import InputError
-    from reports.data.serialize import scaling_data
     from reports.machine.environment import activate, describe_environment
     from reports.machine.printing import print_heading, print_tables
     from reports.machine.progress import counted, part_of, progress_bar
+    from reports.report.others import scaling_data
     from reports.tables.scaling import cliffs, grown, scaling_tables
     from reports.tables.terminal import print_json
     from validation.study.growth import study_scaling

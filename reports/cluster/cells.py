@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Cells as tasks: the truth of an image, and the rows of its cells, as workers compute them."""
+"""Cells as tasks: the reference of an image, and the rows of its cells, as workers compute them."""
 
 import io
 import platform
 from collections.abc import Iterator
 from contextlib import nullcontext
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import lru_cache
 from typing import Any
@@ -25,11 +26,11 @@ from reports.plotting.pictures import error_map, exposure, tone_mapped
 from validation.properties.properties import scene_properties
 from validation.scenes.loading import LoadedScene
 from validation.study.keys import Made, cell_key, row_source
-from validation.study.reference import CellTruth, cell_truth, load_cell
-from validation.study.row import NO_TRUTH
+from validation.study.reference import Reference, cell_reference, load_cell
+from validation.study.row import FRAME_MS, NO_TRUTH, Origin, row_values
 from validation.study.rows import RowStore
+from validation.study.run import cell_row, render, run
 from validation.study.study import Cell, Study
-from validation.study.work import cell_columns, cell_row, cell_times
 
 _LONG = ("ray-march",)  # methods whose one image takes longer than a good compilation of its kernels
 _AGAIN = ("failed", "hung", "aborted")  #: what `--again` computes again
@@ -37,36 +38,34 @@ _QUALITY = 60  # of WebP
 _SMALLER = 320  # pixels: wider images are shown smaller in the rows' pictures
 
 
-def truth_of(cell: Cell) -> CellTruth:
-    """Return the truth of a cell's image."""
-    return cell_truth(_opened(cell.image)[0])
+def reference_of(cell: Cell) -> Reference:
+    """Return the reference of a cell's image."""
+    return cell_reference(_opened(cell.image)[0])
 
 
-def row_of(truth: CellTruth, cell: Cell, key: str) -> dict[str, Any]:
-    """Return the row of a cell, from the truth of its image."""
+def row_of(reference: Reference, cell: Cell, key: str) -> dict[str, Any]:
+    """Return the row of a cell by columns, from the reference of its image."""
     from distributed import get_worker
 
     started = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     loaded, scene = _opened(cell.image)
     properties = _properties(cell.image)
     with in_full() if cell.chosen.method in _LONG else nullcontext():
-        row = cell_row(cell, scene, truth, whole=loaded.scene, properties=properties, paint=_picture)
-    return row | {
-        "key": key,
-        "started": started,
-        "timed_alone": is_alone(get_worker()) if row.get("frame_ms") is not None else None,
-        "threads": dr.thread_count(),
-        "variant": mi.variant(),
-        **_machine(),
-    }
+        row, _ = run(cell, scene, reference, whole=loaded.scene, paint=_picture)
+    row = replace(row, key=key, properties=properties, origin=replace(_origin(), started=started))
+    if row.cost is not None and row.times is not None:
+        row = replace(row, cost=replace(row.cost, alone=is_alone(get_worker())))
+    return row_values(row)
 
 
 def times_of(cell: Cell) -> dict[str, Any]:
     """Return the columns of a cell's times, of a worker that is alone on its host."""
     from distributed import get_worker
 
-    times = cell_times(cell, _opened(cell.image)[1])
-    return times | {"timed_alone": is_alone(get_worker()), "threads": dr.thread_count(), **_machine()}
+    done = render(_opened(cell.image)[1], replace(cell, measure=replace(cell.measure, times="with")))
+    row = cell_row(cell, times=done.times, cost=done.cost and replace(done.cost, alone=is_alone(get_worker())))
+    values = {name: value for name, value in row_values(row).items() if value is not None}
+    return {name: value for name, value in values.items() if name.startswith(("times.", "cost."))}
 
 
 def timing_groups(
@@ -76,7 +75,7 @@ def timing_groups(
     for cells in study.timed_images():
         keyed = {cell_key(cell, made, scenes): cell for cell in cells}
         wanted = {key: cell for key, cell in keyed.items() if store.status(key) == "done"}
-        missing = {key: cell for key, cell in wanted.items() if store.row(key)["frame_ms"] is None}
+        missing = {key: cell for key, cell in wanted.items() if store.row(key)[FRAME_MS] is None}
         tasks = tuple(Task(key, times_of, (cell,), study.limit, alone=True) for key, cell in missing.items())
         if tasks:
             yield Group(tasks, together=True), missing
@@ -111,20 +110,15 @@ def cell_groups(
 
 def row_without_numbers(cell: Cell, key: str, outcome: Outcome) -> dict[str, Any]:
     """Return the row of a cell that came to nothing: the outcome says why."""
-    return cell_columns(cell) | {
-        "key": key,
-        "status": outcome.status,
-        "reason": outcome.reason,
-        "airlight": __version__,
-        "source": row_source()[:12],
-    }
+    origin = Origin(__version__, row_source()[:12])
+    return row_values(cell_row(cell, status=outcome.status, reason=outcome.reason, key=key, origin=origin))
 
 
 def _group(study: Study, cells: dict[str, Cell]) -> Group:
     image = next(iter(cells.values())).image
     words = " ".join((image.scene, *image.medium, f"{image.size[0]}x{image.size[1]}"))
     tasks = tuple(Task(key, row_of, (cell, key), study.limit) for key, cell in cells.items())
-    return Group(tasks, Task(f"{NO_TRUTH}{words}", truth_of, (image,), study.limit), together=True)
+    return Group(tasks, Task(f"{NO_TRUTH}{words}", reference_of, (image,), study.limit), together=True)
 
 
 @lru_cache(maxsize=1)
@@ -140,18 +134,20 @@ def _properties(image: Cell) -> dict[str, float]:
 
 
 @lru_cache(maxsize=1)
-def _machine() -> dict[str, Any]:
+def _origin() -> Origin:
     from importlib.metadata import version
 
-    return {
-        "host": platform.node(),
-        "device": processor(),
-        "airlight": __version__,
-        "source": row_source()[:12],
-        "mitsuba": version("mitsuba"),
-        "drjit": version("drjit"),
-        "python": platform.python_version(),
-    }
+    return Origin(
+        airlight=__version__,
+        source=row_source()[:12],
+        host=platform.node(),
+        device=processor(),
+        variant=mi.variant(),
+        threads=dr.thread_count(),
+        mitsuba=version("mitsuba"),
+        drjit=version("drjit"),
+        python=platform.python_version(),
+    )
 
 
 def _picture(truth: NDArray[np.float64], test: NDArray[np.float64]) -> bytes:

@@ -38,11 +38,11 @@ def paper(
     from reports.machine.printing import print_heading, print_tables
     from reports.tables.papers import count_words, number_tables, verdict_tables
     from reports.tables.terminal import print_json
-    from validation.study.results import now
+    from validation.study.results import date
 
     found = measured(name, quick=quick, fresh=fresh, progress=True)
     rows = found.rows
-    data = {"measured": now(), "environment": describe_environment(), "papers": rows, "left_out": found.left_out}
+    data = {"measured": date(), "environment": describe_environment(), "papers": rows, "left_out": found.left_out}
     if output is not None:
         write_text(output, json_format.dumps(data, indent=1) + "\n")
     if json:

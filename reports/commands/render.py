@@ -280,19 +280,9 @@ def _costs(renderer) -> dict[str, Any]:
     """Return what frames cost, after nothing changed and after something did."""
     from validation.study.frame_times import time_frame
 
-    times = time_frame(renderer)
-    return {
-        "frame_ms": times.frame.median_ms,
-        "fps": 1000 / times.frame.median_ms,
-        "stages": [
-            {"name": "surface", "ms": times.surface.median_ms},
-            {"name": "airlight", "ms": times.airlight.median_ms},
-        ],
-        "light_moved_ms": times.light_moved.median_ms,
-        "objects_moved_ms": times.objects_moved.median_ms,
-        "light_moved_camera_kept_ms": times.light_moved_camera_kept.median_ms,
-        "colours_changed_ms": times.colours_changed.median_ms,
-    }
+    times = time_frame(renderer).medians
+    stages = [{"name": name, "ms": times.pop(name)} for name in ("surface", "airlight")]
+    return {f"{name}_ms": time for name, time in times.items()} | {"fps": 1000 / times["frame"], "stages": stages}
 
 
 def _render_frames(

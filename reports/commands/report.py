@@ -177,6 +177,7 @@ def _measured(
     """Measure and write a report; unusable input is refused before the work begins."""
     import gc
     from contextlib import ExitStack
+    from dataclasses import replace
 
     from reference.storage.files import ensure_folder
     from reports.cluster.connect import check_library, connected, parse_place
@@ -187,16 +188,17 @@ def _measured(
     from reports.report.asked import notes_on, scenes_of_images
     from reports.report.measure import write_report
     from validation.comparison.engine_images import images_size
-    from validation.study.configuration import QUICK
     from validation.study.cost import check_work, frame_work, truth_work
-    from validation.study.scene import EFFORTS
+    from validation.study.study import RandomScenes, read_study, standard_study
 
     place = None if cluster is None else parse_place(cluster)
     if place is not None:
         check_library()
-    names, shown = scenes_of_images(scenes or None, images, EFFORTS[effort_name].scenes)
-    usual = QUICK if effort_name == "quick" else None
-    chosen = named_configurations(methods, kernels, settings, usual=usual, limit=method_limit)
+    study = standard_study(effort_name)
+    if len(scenes) == 1 and scenes[0].endswith(".toml"):
+        study, scenes = read_study(Path(scenes[0])), []
+    names, shown = scenes_of_images(scenes or None, images, tuple(study.scene_names()))
+    chosen = named_configurations(methods, kernels, settings, usual=study.configurations, limit=method_limit)
     if methods and all(":" in name for name in methods):
         print_notes(["what --method names is measured alone; --method all adds the built-in methods"])
     activate()
@@ -211,9 +213,7 @@ def _measured(
     with ExitStack() as stack, progress_bar("report") as progress:
         return write_report(
             target,
-            scenes=names,
-            effort=EFFORTS[effort_name],
-            configurations=chosen,
+            replace(study, scenes=tuple(names), random=RandomScenes(), configurations=tuple(chosen)),
             images=shown,
             command=shlex.join(["airlight", *sys.argv[1:]]),
             fresh=fresh,

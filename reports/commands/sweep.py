@@ -145,9 +145,9 @@ def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, aga
         return store.row(key) | (outcome.value if outcome.status == "done" else {})
 
     # Images that nobody times are rendered once: their kernels compile longer than they run.
-    quick = study.times != "with"
+    quick = study.measure.times not in ("with", "stages")
     parts = [_part(study, store, place, made, partial(cell_groups, again=again, **how), with_errors, quick=quick)]
-    if study.times == "alone":
+    if study.measure.times == "alone":
         where = replace(place, workers=1) if place.workers else place
         parts.append(_part(study, store, where, made, partial(timing_groups, **how), with_times))
     total = study.scene_count * study.cells_by_scene

@@ -55,7 +55,7 @@ def _shown(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _measured(names: Sequence[str], progress: Progress | None) -> list[dict[str, Any]]:
-    from reports.report.claims import decided
+    from reports.report.others import decided
     from validation.papers.claims import claims
     from validation.papers.experiments import EXPERIMENTS
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The error report: studies written down as EXR files, pictures, report.json and one page of HTML.
+"""The error report: a study written down as EXR files, pictures, report.json and one page of HTML.
 
-Every result is kept on disk as soon as it is there (`validation.study.results`): a report that was killed goes on
-where it stopped, and one in which nothing changed measures nothing. The files of a report appear when it is whole.
+Every result is kept on disk as soon as it is there (`validation.study.scene`): a report that was killed goes on where
+it stopped, and one in which nothing changed measures nothing. The files of a report appear when it is whole.
 """
 
 import sys
@@ -10,15 +10,12 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
-from datetime import datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
-from realtime.frame.renderer import render_frame
 from reference.storage.files import ensure_folder
 from reference.storage.kept import fresh_results
 from reports.cluster.connect import Cluster
@@ -26,32 +23,30 @@ from reports.cluster.references import Picture, bring_truths, spread
 from reports.data.claims import claims, growth_claims, unstudied
 from reports.data.own_faults import own_fault
 from reports.data.reader import SCHEMA, report_text
-from reports.machine.environment import describe_environment
+from reports.machine.environment import describe_environment, machine, threads
 from reports.machine.own_process import EndedError, in_own_process
 from reports.machine.progress import Progress, part_of
 from reports.page.render import render_page
-from reports.report.claims import paper_parts, paper_rows
-from reports.report.expected import PAGE_SECONDS, other_seconds, scene_seconds, shares
-from reports.report.papers import OtherPart, other_parts
-from reports.report.scene import OwnMethods, SceneKeys, folder_of, scene_report
+from reports.report.others import other_parts, paper_rows, shares
+from reports.report.scene import folder_of, write_scene
 from reports.report.staging import staged
 from validation.comparison.engine_images import EngineImage, images_size
-from validation.metrics.errors import plain
 from validation.scenes.loading import scene_stem
 from validation.scenes.random_scene import is_random
 from validation.scenes.registry import FOG_SCENES, SCENES
-from validation.study.configuration import STANDARD, Configuration, prepared
-from validation.study.results import CachedResult, cached_result, now
-from validation.study.run import Apart, render_by_name
-from validation.study.scene import Effort, SceneStudy, open_study
+from validation.study.configuration import Configuration
+from validation.study.results import Result, date
+from validation.study.run import PROBE, Apart, frame_of
+from validation.study.scene import SceneStudy, open_scene, study_scene
+from validation.study.study import STUDIES, Cell, Study, standard_study
+
+_PAGE_SECONDS = 1.0  # to pack the images of a scene and draw its part of the page
 
 
 def write_report(
     folder: Path | str,
+    study: Study,
     *,
-    scenes: Sequence[str],
-    effort: Effort,
-    configurations: Sequence[Configuration] = STANDARD,
     images: Mapping[str, Sequence[EngineImage]] | None = None,
     command: str = "airlight report",
     fresh: bool = False,
@@ -65,12 +60,8 @@ def write_report(
     ----------
     folder
         Where `report.html`, `report.json` and a folder for each scene go.
-    scenes
-        Built-in names and paths of Mitsuba XML files.
-    effort
-        How much work to do.
-    configurations
-        What to measure.
+    study
+        Which scenes and configurations, and how; of its sizes and media the first alone.
     images
         By scene, images from elsewhere to judge; such a scene is studied at their size.
     command
@@ -83,7 +74,7 @@ def write_report(
     progress
         Called with (share done, what) now and then.
     cluster
-        Whose workers compute truths, the batches that check them, and faults of the physics; methods run here.
+        Whose workers compute references and the batches that check them; methods run here.
 
     Returns
     -------
@@ -96,71 +87,68 @@ def write_report(
         If the folder cannot be written, a scene or an image cannot be used, or a method of one's own that runs in
         this process is at fault; nothing that was there before is damaged.
     """
-    _refuse_twins(scenes)
+    names = tuple(study.scene_names())
+    _refuse_twins(names)
     shown = dict(images or {})
     sizes = {name: images_size(tuple(several)) for name, several in shown.items()}
     target = ensure_folder(folder)
-    environment = describe_environment()
-    results: list[CachedResult] = []
-    start = time.monotonic()
-    efforts = {name: effort.of(name).at(sizes.get(scene_stem(name))) for name in scenes}
+    environment, start = describe_environment(), time.monotonic()
     apart = None if method_limit is None else partial(in_own_process, limit=method_limit)
-    ended: dict[Configuration, str] = {}
     seconds = dict.fromkeys(("scenes", "stability", "scaling", "papers"), 0.0)
     with fresh_results(time.time() if fresh else None), staged(target) as hidden:
-        keys = {name: SceneKeys.of(name, each) for name, each in efforts.items()}
-        others = [*other_parts(effort, scenes), *paper_parts(effort, scenes)]
-        steps = _steps(progress, keys, configurations, others)
-        if cluster is not None:
-            with _timed(seconds, "scenes"):
-                bring_truths(cluster, [_picture(name, each.image) for name, each in efforts.items()])
-        studied = []
         with _timed(seconds, "scenes"):
-            for number, (name, sized_effort) in enumerate(efforts.items()):
-                study = open_study(name, sized_effort)
-                if number == 0:
-                    ended = _try_own(study, configurations, apart)
-                studied.append(
-                    scene_report(
-                        study,
-                        configurations=configurations,
-                        images=shown.get(scene_stem(name), ()),
-                        keys=keys[name],
-                        folder=hidden,
-                        results=results,
-                        own=OwnMethods(apart, ended),
-                        progress=steps[name],
-                        spread=None if cluster is None else spread(cluster, _picture(name, sized_effort.checked)),
-                    )
+            studies = [open_scene(name, study.of(name).at(sizes.get(scene_stem(name))), machine()) for name in names]
+        others = other_parts(study)
+        of_scenes = [each.seconds() for each in studies]
+        whole = [sum(each.values()) for each in of_scenes] + [part.seconds for part in others]
+        spans = list(shares({str(n): each for n, each in enumerate([*whole, _PAGE_SECONDS * len(studies)])}).values())
+        studied, results = [], list[Result]()
+        with _timed(seconds, "scenes"):
+            if cluster is not None:
+                bring_truths(cluster, [_picture(each, each.size) for each in studies])
+            ended = _try_own(studies[0], apart) if studies else {}
+            for each, parts, span in zip(studies, of_scenes, spans):
+                step = part_of(progress, *span, before=f"{each.name}: ")
+                begins = {part: first for part, (first, _) in shares(parts).items()}
+                result = study_scene(
+                    each,
+                    images=shown.get(scene_stem(each.path), ()),
+                    apart=apart,
+                    ended=ended,
+                    progress=lambda part, step=step, begins=begins: step(begins[part], part),  # type: ignore[misc]
+                    spread=None if cluster is None else spread(cluster, _picture(each, each.study.checks.size)),
+                    workers=threads(),
                 )
-        by_kind: dict[str, list[CachedResult]] = {}
-        for number, part in enumerate(others):
-            step = part_of(steps[str(number)], 0.0, 1.0, before=f"{part.title}, ")
+                _raise_own_faults(result.rows, apart)
+                results += result.results
+                studied.append(write_scene(result, hidden))
+        by_kind: dict[str, list[Result]] = {}
+        for part, span in zip(others, spans[len(studies) :]):
             with _timed(seconds, part.kind):
-                results.append(cached_result(part.key, partial(part.compute, step)))
-            by_kind.setdefault(part.kind, []).append(results[-1])
-        stability = by_kind.get("stability")
-        scaling = [record for result in by_kind.get("scaling", ()) for record in result.data["scaling"]]
+                found = part.result(part_of(progress, *span, before=f"{part.title}, "))
+            by_kind.setdefault(part.kind, []).append(found)
+            results.append(found)
+        scaling = [record for found in by_kind.get("scaling", ()) for record in found.data["scaling"]]
+        usual = study.name in STUDIES and names == standard_study(study.name).scenes
         data = {
             "schema": SCHEMA,
-            "created": now(),
+            "created": date(),
             "command": command,
             "seconds": round(time.monotonic() - start, 1),
             "parts": seconds,
             **_counts(results),
-            "settings": plain(asdict(effort)),
+            "settings": settings(study),
             "environment": environment,
-            "claims": claims(studied)
-            + growth_claims(scaling)
-            + (unstudied(scenes, list(FOG_SCENES)) if tuple(scenes) == effort.scenes else []),
+            "claims": claims(studied) + growth_claims(scaling) + (unstudied(names, list(FOG_SCENES)) if usual else []),
             "scenes": studied,
-            "stability": stability[-1].data["kernels"] if stability else [],
+            "stability": next((found.data["kernels"] for found in by_kind.get("stability", ())), []),
             "scaling": scaling,
-            "papers": paper_rows(by_kind),
+            "papers": paper_rows(by_kind.get("papers", ())),
         }
-        steps["page"](0.0, "the page")
+        page = part_of(progress, *spans[-1])
+        page(0.0, "the page")
         write_page(data, images=hidden, folder=hidden)
-    steps["page"](1.0, "done")
+    page(1.0, "done")
     return data
 
 
@@ -170,21 +158,27 @@ def write_page(data: Mapping[str, Any], *, images: Path, folder: Path) -> None:
     (folder / "report.html").write_text(render_page(dict(data), images), encoding="utf-8", newline="\n")
 
 
-def _steps(
-    progress: Progress | None,
-    keys: Mapping[str, SceneKeys],
-    configurations: Sequence[Configuration],
-    others: Sequence[OtherPart],
-) -> dict[str, Progress]:
-    """Return the progress of each part: a scene by its name, another part by its number, and the 'page'."""
-    seconds = {
-        name: sum(scene_seconds(scene_stem(name), of_scene.effort.image, of_scene.named(configurations)).values())
-        for name, of_scene in keys.items()
+def settings(study: Study) -> dict[str, Any]:
+    """Return what a study asked for, ready for JSON."""
+    measure, checks = study.measure, study.checks
+    return {
+        "name": study.name,
+        "scenes": list(study.scene_names()),
+        "image": list(study.sizes[0]),
+        "timed": list(measure.timed_size or study.sizes[0]),
+        "checked": list(checks.size),
+        "margins": dict(checks.margins),
+        "samples": dict(checks.samples),
+        "batches": checks.batches,
+        "multiple": list(checks.multiple),
+        "patience": checks.patience,
+        "seconds": measure.seconds,
+        "slow": measure.slow,
+        "limit": measure.limit,
+        "flip": study.flip,
+        "rays": study.stability,
+        "scaling": list(study.growth),
     }
-    seconds |= {str(number): other_seconds(part.key, part.kind) for number, part in enumerate(others)}
-    seconds["page"] = PAGE_SECONDS * len(keys)
-    names = {name: f"{scene_stem(name)}: " for name in keys}
-    return {name: part_of(progress, *share, before=names.get(name, "")) for name, share in shares(seconds).items()}
 
 
 @contextmanager
@@ -192,50 +186,52 @@ def _timed(seconds: dict[str, float], part: str) -> Iterator[None]:
     """Add the time that a block takes to that of a part [s]."""
     start = time.monotonic()
     yield
-    seconds[part] = round(seconds.get(part, 0.0) + time.monotonic() - start, 2)
+    seconds[part] = round(seconds[part] + time.monotonic() - start, 2)
 
 
-def _picture(name: str, size: tuple[int, int]) -> Picture:
-    """Return a scene of the command line as workers load it."""
+def _picture(study: SceneStudy, size: tuple[int, int]) -> Picture:
+    """Return a scene as workers load it."""
+    name = study.path
     return Picture(name if name in SCENES or is_random(name) else str(Path(name).resolve()), size)
 
 
-def _counts(results: Sequence[CachedResult]) -> dict[str, Any]:
+def _counts(results: Sequence[Result]) -> dict[str, Any]:
     """Return how many results were kept, how many computed, and when the first and the last of all."""
     kept = sum(result.cached for result in results)
-    times = [result.measured for result in results]
-    order = sorted(times, key=lambda text: datetime.strptime(text, "%Y-%m-%d %H:%M:%S %z"))
-    measured = {"first": order[0], "last": order[-1]} if order else None
+    made = sorted(result.made for result in results)
+    measured = {"first": date(made[0]), "last": date(made[-1])} if made else None
     return {"kept": kept, "computed": len(results) - kept, "measured": measured}
 
 
-def _try_own(
-    study: SceneStudy, configurations: Sequence[Configuration], apart: Apart | None
-) -> dict[Configuration, str]:
+def _try_own(study: SceneStudy, apart: Apart | None) -> dict[Configuration, str]:
     """Render a small frame with every method of the user's own: what is at fault there is said before the work.
 
     Returns those that ended their process, with how: they are not called again.
     """
     ended = {}
-    for configuration in configurations:
-        if not configuration.own:
+    for chosen in study.study.configurations:
+        if not chosen.own:
             continue
+        cell = Cell(study.path, PROBE, (), chosen)
         try:
-            if apart is None:
-                render_frame(prepared(study.probe, configuration))
-            else:
-                name = str(study.loaded.path or study.loaded.name)
-                size = study.probe.camera.width, study.probe.camera.height
-                apart(render_by_name, name, size, configuration, name=configuration.method)
+            _ = frame_of(cell) if apart is None else apart(frame_of, cell, name=chosen.method)
         except (InputError, MethodError) as error:
-            fault = own_fault(configuration.method, str(error))
+            fault = own_fault(chosen.method, str(error))
             if fault and apart is None:
                 raise InputError(fault) from error
             if fault:
                 print(f"airlight: warning: {fault}; the report goes on", file=sys.stderr)
             if isinstance(error, EndedError):
-                ended[configuration] = str(error)
+                ended[chosen] = str(error)
     return ended
+
+
+def _raise_own_faults(rows: Sequence[Any], apart: Apart | None) -> None:
+    """Raise the first fault of a user's method that runs in this process."""
+    for judged in rows if apart is None else ():
+        fault = own_fault(judged.row["method"], judged.row["reason"])
+        if fault:
+            raise InputError(fault)
 
 
 def _refuse_twins(scenes: Sequence[str]) -> None:

@@ -16,10 +16,10 @@ from reports.sweep.samples import FAULTS
 
 #: What may be wrong with an image: its name, the column that counts the pixels, and in words.
 CHECKS = (
-    ("not finite", "nonfinite", "pixels of the airlight that are NaN or infinite"),
-    ("surface not finite", "surface_nonfinite", "pixels of the lit surfaces that are NaN or infinite"),
-    ("negative", "negative", "pixels with a negative value"),
-    ("outside of the bound", "outside_bound", "pixels whose error is larger than the bound that the method states"),
+    ("not finite", "error.nonfinite", "pixels of the airlight that are NaN or infinite"),
+    ("surface not finite", "surface_error.nonfinite", "pixels of the lit surfaces that are NaN or infinite"),
+    ("negative", "error.negative", "pixels with a negative value"),
+    ("outside of the bound", "stated.outside", "pixels whose error is larger than the bound that the method states"),
 )
 
 
@@ -101,7 +101,7 @@ def checks(sweep: Sweep) -> list[Check]:
 
 def faults(sweep: Sweep) -> list[Fault]:
     """Return every image that is wrong, those with the most pixels first within a check."""
-    labels, scenes, commands, of = (*map(sweep.texts, ("label", "scene", "command")), sweep.numbers("pixels"))
+    labels, scenes, commands, of = (*map(sweep.texts, ("label", "scene", "command")), sweep.numbers("error.pixels"))
     made = []
     for name, column, _ in CHECKS:
         pixels = np.nan_to_num(sweep.numbers(column))

@@ -22,7 +22,7 @@ Numbers = NDArray[np.float64]
 #: Columns without which nothing can be said.
 _NEEDED = (
     *("key", "scene", "seed", "medium", "method", "label", "status", "reason"),
-    *("relative_rmse", "rmse", "truth_error"),
+    *("error.relative_rmse", "error.rmse", "reference.error"),
 )
 
 _CELL = ("scene", "medium", "label", "width", "height")  #: what makes a cell one: the label has method and parameters
@@ -95,7 +95,7 @@ def read_sweep(path: Path | str) -> Sweep:
                 f"{file} has no column {missing[0]!r}, wanted the columns of a sweep of this version of airlight; "
                 "run the sweep again: what its rows hold is kept"
             )
-        kinds = {column.name: column.kind for column in COLUMNS}
+        kinds = {column.key: column.kind for column in COLUMNS}
         for name in names:
             text = pa.types.is_string(schema.field(name).type) or pa.types.is_large_string(schema.field(name).type)
             if text != (kinds.get(name, "float64") == "string") and name in kinds:
@@ -149,8 +149,8 @@ def _current(columns: Mapping[str, NDArray[Any]]) -> list[int]:
         values = columns.get(name)
         return [None] * len(rows) if values is None else values.tolist()
 
-    started = [each or "" for each in column("started")]
-    source, alone = column("source"), [each == 1 for each in column("timed_alone")]
+    started = [each or "" for each in column("origin.started")]
+    source, alone = column("origin.source"), [each == 1 for each in column("cost.alone")]
     cells: dict[tuple[Any, ...], list[int]] = {}
     for row, cell in enumerate(zip(*(column(name) for name in _CELL))):
         # NaN, where a number is not known, is not equal to itself.

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reports.sweep.read import Numbers, Sweep, Texts, natural
-from validation.study.row import NO_TRUTH
+from validation.study.row import FRAME_MS, NO_TRUTH
 
 FAULTS = ("failed", "hung", "aborted")  #: what became of a cell that neither ended nor was refused
 UNTOLD = "no truth"  #: of a scene whose truth was not done, so that no method was asked
@@ -55,9 +55,9 @@ def samples(sweep: Sweep) -> list[Sample]:
     """Return the sample of every configuration, sorted by method and label."""
     labels, scenes, statuses = sweep.texts("label"), sweep.texts("scene"), _statuses(sweep)
     methods, errors = sweep.texts("method"), errors_of(sweep)
-    truth_errors = np.nan_to_num(sweep.numbers("truth_error"), nan=0.0)
-    nonfinite = np.nan_to_num(sweep.numbers("nonfinite"), nan=0.0)
-    times = np.where(comparable_times(sweep), sweep.numbers("frame_ms"), np.nan)
+    truth_errors = np.nan_to_num(sweep.numbers("reference.error"), nan=0.0)
+    nonfinite = np.nan_to_num(sweep.numbers("error.nonfinite"), nan=0.0)
+    times = np.where(comparable_times(sweep), sweep.numbers(FRAME_MS), np.nan)
     counted = np.isfinite(sweep.numbers("seed")) if drawn_at_random(sweep) else np.ones(len(sweep), dtype=bool)
     groups: dict[tuple[str, str, str], dict[str, list[int]]] = {}
     for row, label in enumerate(labels):
@@ -96,9 +96,9 @@ def comparable_times(sweep: Sweep) -> "np.ndarray[tuple[int], np.dtype[np.bool_]
     Those that were taken while nothing else of the sweep ran on the host, on the host, device and threads that have the
     most such rows.
     """
-    hosts, devices = sweep.texts("host"), sweep.texts("device")
-    places = list(zip(hosts, devices, np.nan_to_num(sweep.numbers("threads")).tolist()))
-    alone = sweep.numbers("timed_alone") == 1
+    hosts, devices = sweep.texts("origin.host"), sweep.texts("origin.device")
+    places = list(zip(hosts, devices, np.nan_to_num(sweep.numbers("origin.threads")).tolist()))
+    alone = sweep.numbers("cost.alone") == 1
     most = Counter(place for place, timed in zip(places, alone) if timed).most_common(1)
     return alone & np.array([bool(most) and place == most[0][0] for place in places], dtype=bool)
 
@@ -110,7 +110,7 @@ def errors_of(sweep: Sweep) -> Numbers:
     a finite pixel has an infinite error.
     """
     done = sweep.texts("status") == "done"
-    relative, absolute = sweep.numbers("relative_rmse"), sweep.numbers("rmse")
+    relative, absolute = sweep.numbers("error.relative_rmse"), sweep.numbers("error.rmse")
     unknown = np.where(absolute == 0, 0.0, np.inf)
     return np.where(done, np.where(np.isfinite(relative), relative, unknown), np.nan)
 

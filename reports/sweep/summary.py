@@ -122,7 +122,7 @@ def summary_of(sweep: Sweep) -> Summary:
         truths=tuple(_truths(sweep)),
         hosts=tuple(_hosts(sweep)),
         properties=tuple(_properties(sweep)),
-        versions={name: tuple(sorted(set(sweep.texts(name)) - {None})) for name in _VERSIONS},
+        versions={name: tuple(sorted(set(sweep.texts(f"origin.{name}")) - {None})) for name in _VERSIONS},
         statuses=dict(Counter(sweep.texts("status").tolist()).most_common()),
         scenes=len(set(names[random] if drawn else names)),
         named_scenes=len(set(names[~random])) if drawn else 0,
@@ -281,7 +281,8 @@ def _fastest(made: Sequence[Sample], target: float) -> Fastest:
 
 
 def _truths(sweep: Sweep) -> list[Truth]:
-    estimators, scenes, errors = sweep.texts("truth"), sweep.texts("scene"), sweep.numbers("truth_error")
+    estimators, scenes = sweep.texts("reference.estimator"), sweep.texts("scene")
+    errors = sweep.numbers("reference.error")
     made = []
     for estimator in sorted(set(estimators) - {None}):
         own = (estimators == estimator) & np.isfinite(errors)
@@ -292,9 +293,11 @@ def _truths(sweep: Sweep) -> list[Truth]:
 
 
 def _hosts(sweep: Sweep) -> list[Host]:
-    places = Counter(zip(sweep.texts("host"), sweep.texts("device"), sweep.numbers("threads").tolist()))
-    alone = sweep.numbers("timed_alone") == 1
-    timed = Counter(zip(*(sweep.texts(name)[alone] for name in ("host", "device")), sweep.numbers("threads")[alone]))
+    hosts, devices = sweep.texts("origin.host"), sweep.texts("origin.device")
+    threads_of = sweep.numbers("origin.threads")
+    places = Counter(zip(hosts, devices, threads_of.tolist()))
+    alone = sweep.numbers("cost.alone") == 1
+    timed = Counter(zip(hosts[alone], devices[alone], threads_of[alone]))
     return [
         Host(host or "", device or "", None if np.isnan(threads) else int(threads), rows, timed[host, device, threads])
         for (host, device, threads), rows in places.most_common()
@@ -314,7 +317,7 @@ def _properties(sweep: Sweep) -> list[Property]:
 
 
 def _span(sweep: Sweep) -> tuple[str, str] | None:
-    known = sorted(set(sweep.texts("started")) - {None})
+    known = sorted(set(sweep.texts("origin.started")) - {None})
     return (_time_words(known[0]), _time_words(known[-1])) if known else None
 
 

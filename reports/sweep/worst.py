@@ -8,6 +8,7 @@ import numpy as np
 
 from reports.sweep.read import Sweep
 from reports.sweep.samples import Sample
+from validation.study.row import PROPERTY
 
 COUNT = 10  #: worst scenes of a configuration
 
@@ -56,11 +57,11 @@ def worst(sweep: Sweep, sample: Sample, properties: Sequence[str], count: int = 
             scene=sample.scenes[place],
             medium=sweep.texts("medium")[row],
             relative_rmse=float(sample.errors[place]) if np.isfinite(sample.errors[place]) else None,
-            p99=known("p99", row),
-            relative_bias=known("relative_bias", row),
-            truth_error=known("truth_error", row),
+            p99=known("error.p99", row),
+            relative_bias=known("error.relative_bias", row),
+            truth_error=known("reference.error", row),
             nonfinite=int(sample.nonfinite[place]),
-            properties={name: known(f"property.{name}", row) for name in properties},
+            properties={name: known(f"{PROPERTY}{name}", row) for name in properties},
             command=sweep.texts("command")[row] or "",
         )
         for place in places

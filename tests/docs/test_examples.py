@@ -112,20 +112,24 @@ def test_the_worked_method_is_measured_like_a_built_in_one(fog, variant):
 
     from realtime.scene.read_scene import read_scene
     from validation.estimates.quadrature import truth_image
-    from validation.study.run import measure
+    from validation.study.reference import of_image
+    from validation.study.run import run
+    from validation.study.study import Cell, Measure
 
     loaded = mi.load_dict(tiny_scene())
-    scene, truth = read_scene(loaded), truth_image(loaded)
+    scene, reference = read_scene(loaded), of_image(truth_image(loaded))
+    size = scene.camera.width, scene.camera.height
 
     def measured(method, **parameters):
-        measurement = measure(scene, configuration(method, None, parameters), truth=truth, seconds=0.01)
-        assert (measurement.refused, measurement.note) == (None, None)
-        return measurement
+        cell = Cell("tiny", size, (), configuration(method, None, parameters), Measure("stages", 0.01))
+        row, frame = run(cell, scene, reference)
+        assert (row.reason, row.note) == (None, None)
+        return row.error.relative_rmse, frame.airlight
 
     own, built_in = measured(f"{fog}:interleaved", steps=16, jitter="no"), measured("ray-march", steps=16)
     # The same sum in another order, in float32.
-    np.testing.assert_allclose(own.frame.airlight, built_in.frame.airlight, rtol=2e-5)
-    shifted, finer = (measured(f"{fog}:interleaved", steps=steps).error.relative_rmse for steps in (16, 64))
+    np.testing.assert_allclose(own[1], built_in[1], rtol=2e-5)
+    shifted, finer = (measured(f"{fog}:interleaved", steps=steps)[0] for steps in (16, 64))
     assert finer < 0.5 * shifted < 0.05
 
 

@@ -21,19 +21,20 @@ from typing import Any
 
 import numpy as np
 
-from realtime.errors import InputError
-from realtime.frame.renderer import render_frame
 from realtime.kernels.registry import KERNELS
 from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import Scene, read_scene
 from reference.quadrature.ray_values import TruthImage
 from validation.estimates.quadrature import truth_image
-from validation.metrics.errors import error_metrics, plain
+from validation.metrics.errors import plain
 from validation.scenes.loading import load_scene
 from validation.scenes.registry import FOG_SCENES
 from validation.statistics.noise import ERROR_TOLERANCE, error_band
-from validation.study.configuration import STANDARD, Configuration, prepared
-from validation.study.run import configurations_for
+from validation.study.configuration import STANDARD, Configuration
+from validation.study.reference import of_image
+from validation.study.run import run
+from validation.study.scene import configurations_for
+from validation.study.study import Cell, Measure
 
 FOLDER = Path(__file__).parent / "baselines"
 SIZE = (64, 48)  # of the images [pixels]
@@ -84,16 +85,14 @@ def measure_baseline(name: str) -> dict[str, Any]:
 
 
 def _entry(scene: Scene, chosen: Configuration, truth: TruthImage) -> dict[str, Any]:
-    """Render one configuration and return its errors, or why it was refused."""
-    try:
-        frame = render_frame(prepared(scene, chosen))
-    except InputError as error:
-        return {"refused": str(error)}
-    numbers = error_metrics(truth.airlight, frame.airlight).to_json()
-    numbers["mean"] = float(np.mean(np.asarray(frame.airlight, dtype=np.float64)))
+    """Return the errors of one configuration, or why it was refused."""
+    row, frame = run(Cell("", SIZE, (), chosen, Measure("none", every_metric=False)), scene, of_image(truth))
+    if row.error is None or frame is None:
+        return {"refused": row.reason}
+    numbers = row.error.to_json() | {"mean": float(np.mean(np.asarray(frame.airlight, dtype=np.float64)))}
     entry: dict[str, Any] = {"airlight": _rounded({name: numbers[name] for name in ERRORS})}
-    if scene.features.surfaces:
-        surface = error_metrics(truth.surface, frame.surface).to_json()
+    if row.surface_error is not None:
+        surface = row.surface_error.to_json()
         entry["surface"] = _rounded({name: surface[name] for name in _SURFACE})
     return entry
 

@@ -8,7 +8,7 @@ import json
 import numpy as np
 from PIL import Image
 
-from validation.study.row import arrow_schema, checked_row, property_names
+from validation.study.row import COLUMNS, arrow_schema, property_names
 
 #: method, kernel, parameters, and the median of its error, its spread in e-folds, and its time [ms].
 METHODS = (
@@ -43,39 +43,59 @@ def row(scene="random:0", method="ray-march", kernel=None, parameters=None, **ch
         "height": 120,
         "status": "done",
         "attempts": 1,
-        "pixels": 19200,
-        "masked": 0,
-        "nonfinite": 0,
-        "negative": 0,
-        "rmse": 0.01,
-        "relative_rmse": 0.01,
-        "relative_bias": 0.002,
-        "p50": 0.001,
-        "p99": 0.05,
-        "truth": "quadrature",
-        "truth_error": 1e-7,
-        "truth_s": 0.5,
-        "frame_ms": 3.0,
-        "frame_ms_low": 2.9,
-        "frame_ms_high": 3.2,
-        "timed_alone": True,
-        "host": "here",
-        "device": "a processor",
-        "variant": "llvm_ad_rgb",
-        "threads": 2,
-        "started": "2026-11-23T08:30:00Z",
-        "airlight": "0.1.0",
-        "mitsuba": "3.9.1",
-        "drjit": "1.5.0",
-        "python": "3.11.2",
+        "error.pixels": 19200,
+        "error.nonfinite": 0,
+        "error.negative": 0,
+        "error.rmse": 0.01,
+        "error.relative_rmse": 0.01,
+        "error.relative_bias": 0.002,
+        "error.p50": 0.001,
+        "error.p99": 0.05,
+        "reference.estimator": "quadrature",
+        "reference.error": 1e-7,
+        "reference.seconds": 0.5,
+        "times.frame.median_ms": 3.0,
+        "times.frame.low_ms": 2.9,
+        "times.frame.high_ms": 3.2,
+        "cost.alone": True,
+        "origin.host": "here",
+        "origin.device": "a processor",
+        "origin.variant": "llvm_ad_rgb",
+        "origin.threads": 2,
+        "origin.started": "2026-11-23T08:30:00Z",
+        "origin.airlight": "0.1.0",
+        "origin.mitsuba": "3.9.1",
+        "origin.drjit": "1.5.0",
+        "origin.python": "3.11.2",
         "command": f"airlight compare {scene} --method {method}",
     }
-    changes = {name.replace("property_", "property."): value for name, value in changes.items()}
-    values |= changes
+    values |= {column_of(name): value for name, value in changes.items()}
     if values["status"] != "done":
-        measured = ("rmse", "relative_rmse", "relative_bias", "p50", "p99", "nonfinite", "negative", "frame_ms")
-        values |= {name: None for name in (*measured, "frame_ms_low", "frame_ms_high", "timed_alone", "pixels")}
-    return checked_row(values)
+        values = {name: None if name.startswith(("error.", "times.", "cost.")) else values[name] for name in values}
+    return {each.key: None for each in COLUMNS} | values
+
+
+def column_of(name):
+    """The column of a short name: `relative_rmse`, `frame_ms`, `property_NAME`."""
+    if name.startswith("property_"):
+        return name.replace("property_", "properties.")
+    known = {each.key for each in COLUMNS}
+    return (
+        name
+        if name in known
+        else {
+            "frame_ms": "times.frame.median_ms",
+            "frame_ms_low": "times.frame.low_ms",
+            "frame_ms_high": "times.frame.high_ms",
+            "timed_alone": "cost.alone",
+            "truth": "reference.estimator",
+            "truth_error": "reference.error",
+            "surface_nonfinite": "surface_error.nonfinite",
+            "outside_bound": "stated.outside",
+            "bound": "stated.bound",
+            **{each: f"origin.{each}" for each in ("host", "device", "threads", "started", "source", "airlight")},
+        }.get(name, f"error.{name}")
+    )
 
 
 def rows(scenes=60, seed=3, methods=METHODS):
@@ -132,9 +152,9 @@ def faulty_rows():
     several = rows(40)
     for name in {each["label"] for each in several}:
         own = [each for each in several if each["label"] == name and each["status"] == "done"]
-        for number, each in enumerate(sorted(own, key=lambda each: -each["relative_rmse"])[:12]):
+        for number, each in enumerate(sorted(own, key=lambda each: -each["error.relative_rmse"])[:12]):
             each["picture"] = picture(number)
-    several[7] |= {"nonfinite": 12, "picture": picture(12)}
-    several[13] |= {"outside_bound": 2, "bound": 1e-5}
+    several[7] |= {"error.nonfinite": 12, "picture": picture(12)}
+    several[13] |= {"stated.outside": 2, "stated.bound": 1e-5}
     several.append(row("random:99", parameters={"steps": 16}, status="hung", reason="longer than 60 s"))
     return several

@@ -3,6 +3,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import Field, fields, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from reference.quadrature.ray_values import TruthImage
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import TruthScene, read_truth
 from reference.storage.cache import drop_arrays
-from reference.storage.kept import Spent, is_kept, kept, key_of, load, stopwatch, store
+from reference.storage.kept import Kept, Spent, is_kept, kept, key_of, load, stopwatch, store
 from reference.storage.scene_digest import scene_digest
 from validation.estimates.light_on_ray import check_camera, check_rays, check_values
 
@@ -46,18 +47,26 @@ def truth_image(
         For a scene that cannot be read, and for radiance that is not finite, see `validation.estimates.light_on_ray`.
     """
     settings: dict[str, Any] = {"samples": samples, "shadow_scale": shadow_scale, "pixel": pixel}
+    return kept_truth(scene, settings, progress=progress)[0]
+
+
+def kept_truth(
+    scene, settings: Mapping[str, Any] = MappingProxyType(_USUAL), *, progress: Progress | None = None
+) -> tuple[TruthImage, Kept]:
+    """Return what `truth_image` does, and how it is kept: what it took, and whether it was there already."""
     key, spent = _key(scene, settings), stopwatch()
     stored = load(key)
     if stored is not None:
-        return TruthImage(**{each.name: _as_kept(each, stored.arrays.get(each.name)) for each in fields(TruthImage)})
+        values = {each.name: _as_kept(each, stored.arrays.get(each.name)) for each in fields(TruthImage)}
+        return TruthImage(**values), stored
     truth = read_truth(scene)
     parts = _Parts(key)
-    # Only lights with extent take so long that a run is worth going on with.
-    keep = parts if truth.area and pixel == "centre" else None
+    # Only area lights take so long that a run is worth going on with.
+    keep = parts if truth.area and settings["pixel"] == "centre" else None
     image = _checked_image(truth, settings, keep=keep, progress=progress)
-    _store(key, image, spent())
+    stored = _store(key, image, spent())
     parts.drop()
-    return image
+    return image, stored
 
 
 def truth_of_pixels(scene, pixels: NDArray[np.integer]) -> TruthImage:
@@ -110,9 +119,9 @@ def _key(scene, settings: Mapping[str, Any]) -> str:
     return key_of("quadrature", quadrature_image, scene=scene_digest(scene), **settings)
 
 
-def _store(key: str, image: TruthImage, spent: Spent) -> None:
+def _store(key: str, image: TruthImage, spent: Spent) -> Kept:
     values = {each.name: getattr(image, each.name) for each in fields(TruthImage)}
-    store(key, {name: value for name, value in values.items() if value is not None}, spent)
+    return store(key, {name: value for name, value in values.items() if value is not None}, spent)
 
 
 class _Parts:

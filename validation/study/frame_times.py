@@ -3,7 +3,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import drjit as dr
@@ -15,6 +15,7 @@ from realtime.frame.incremental import FrameCache, next_frame, next_parts
 from realtime.frame.light_on_ray import check_radiance
 from realtime.frame.renderer import (
     FrameRenderer,
+    evaluated,
     frame_with_part,
     parts,
     run_cast_and_shade,
@@ -33,6 +34,9 @@ from validation.study.clock import Timing, time_repeated, timed, timing_of
 #: A frame that takes longer is timed stage by stage, in few frames [s]. Its spread matters little, and the usual thirty
 #: or more frames would take minutes.
 SLOW = 8.0
+_BRIEF = 0.1  # on frames that are timed briefly, and as much on the airlight alone [s]
+_BRIEF_MOST = 9  # of these frames
+_BRIEF_SLOW = 500.0  # a slower one is timed once, without a warm-up of its own [ms]
 _TURNS = 1.5  # approximate time for the one to five frames that are timed stage by stage [s]
 
 
@@ -101,14 +105,29 @@ class FrameTimes:
     """The times of a frame and of its stages [ms]."""
 
     frame: Timing = column("frame", "ms", "a whole frame while nothing moves: shadow maps or planes are there")
-    surface: Timing = column("rays + surface", "ms", "camera rays and lit surface")
     airlight: Timing = column("airlight", "ms", "tiles and airlight: the kernel with its ray set-up, or the marching")
-    light_moved: Timing = column("light moved", "ms", "a frame after the light moved: maps or planes again, all stages")
-    objects_moved: Timing = column("objects moved", "ms", "a frame after the objects moved too: acceleration structure")
-    light_moved_camera_kept: Timing = column(
-        "light moved, camera rays kept", "ms", "a frame after the light moved, with the camera rays of the last frame"
+    surface: Timing | None = column("rays + surface", "ms", "camera rays and lit surface", default=None)
+    light_moved: Timing | None = column(
+        "light moved", "ms", "a frame after the light moved: shadow maps or planes again, all stages", default=None
     )
-    colours_changed: Timing = column("colours changed", "ms", "a frame after only medium or colours changed")
+    objects_moved: Timing | None = column(
+        "objects moved", "ms", "a frame after the objects moved too: acceleration structure", default=None
+    )
+    light_moved_camera_kept: Timing | None = column(
+        "light moved, camera rays kept",
+        "ms",
+        "a frame after the light moved, with the camera rays of the last frame",
+        default=None,
+    )
+    colours_changed: Timing | None = column(
+        "colours changed", "ms", "a frame after only medium or colours changed", default=None
+    )
+
+    @property
+    def medians(self) -> dict[str, float]:
+        """The medians of the times that were measured, by name [ms]."""
+        times = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {name: timing.median_ms for name, timing in times.items() if timing is not None}
 
 
 def time_frame(
@@ -165,6 +184,34 @@ def time_frame(
         light_moved_camera_kept=few(moved_light_alone(renderer, cache)),
         colours_changed=few(changed_look(renderer, cache)),
     )
+
+
+def brief_times(renderer: FrameRenderer) -> tuple[FrameTimes, float]:
+    """Time frames for a tenth of a second, and as long their airlight alone; return what a preparation takes too [ms].
+
+    The renderer has made a frame before, so that its kernels are compiled.
+    """
+    preparation = timed(lambda: renderer.prepare(renderer.scene))
+    state = preparation.value
+    frame = _brief(lambda: run_stages(renderer, state))
+    if frame.median_ms >= _BRIEF_SLOW:  # camera rays and surfaces take little of it, and it takes too long to ask
+        return FrameTimes(frame, frame), preparation.ms
+    cast, by_light = run_cast_and_shade(renderer)
+    dr.eval(cast, by_light)
+
+    def airlight():
+        lists = run_cull(renderer, state, cast.distance)
+        return evaluated(cast, by_light, run_method(renderer, state, cast, by_light, lists))
+
+    return FrameTimes(frame, _brief(airlight)), preparation.ms
+
+
+def _brief(work: Callable[[], Any]) -> Timing:
+    """Time some runs after one of warm-up; a slow one is not repeated."""
+    first = timed(work)
+    if first.ms >= _BRIEF_SLOW:
+        return timing_of([first.ms], cpu_ms=first.cpu_ms)
+    return time_repeated(work, seconds=_BRIEF, least=1, most=_BRIEF_MOST, warm_up=0)
 
 
 def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:

@@ -20,14 +20,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from analytic.errors import InputError as TruthError
 from realtime.errors import InputError
-from realtime.frame.renderer import render_frame
-from validation.study.clock import Timing, peak_memory, time_repeated
+from realtime.scene.read_scene import Scene
+from validation.study.clock import Timing, time_repeated
 from validation.study.configuration import Configuration, configuration, prepared
-from validation.study.frame_times import camera_rays, time_frame
+from validation.study.frame_times import camera_rays
 from validation.study.ladders import Step
 from validation.study.maps import Slope, fitted_slope
+from validation.study.run import REFUSALS, render
+from validation.study.study import Cell, Measure
 
 Progress = Callable[[int, int, str], None]
 
@@ -111,7 +112,7 @@ def study_scaling(
             if chosen not in refused:
                 try:
                     costs[chosen].append(_cost(scene, step, chosen, seconds))
-                except (InputError, TruthError) as error:
+                except REFUSALS as error:
                     refused[chosen] = str(error)
             if progress is not None:
                 progress(number * len(configurations) + place + 1, total, f"{kind} {step.work:g}, {chosen.label}")
@@ -127,16 +128,17 @@ def study_scaling(
     ]
 
 
-def _cost(scene, step: Step, chosen: Configuration, seconds: float) -> Cost:
+def _cost(scene: Scene, step: Step, chosen: Configuration, seconds: float) -> Cost:
     if step.parameters:
         own = dict(chosen.parameters) | dict(step.parameters)
         chosen = configuration(chosen.method, chosen.kernel, own)
-    renderer = prepared(scene, chosen)
-    render_frame(renderer)
-    memory = peak_memory(lambda: render_frame(renderer))
-    times = time_frame(renderer, seconds=seconds)
-    rays = time_repeated(camera_rays(renderer), seconds=0.5 * seconds, least=3)
-    return Cost(step.work, times.frame, times.light_moved, times.objects_moved, rays, memory)
+    camera = scene.camera
+    done = render(scene, Cell("", (camera.width, camera.height), (), chosen, Measure("stages", seconds)))
+    if done.times is None:
+        raise InputError(done.reason or "")
+    rays = time_repeated(camera_rays(prepared(scene, chosen)), seconds=0.5 * seconds, least=3)
+    frame, light, objects = (getattr(done.times, name) for name in TIMES)
+    return Cost(step.work, frame, light, objects, rays, done.memory)
 
 
 def growth(kind: str, name: str, costs: Sequence[Cost]) -> Growth:

@@ -12,9 +12,9 @@ from validation.scenes.identity import scene_identity
 from validation.scenes.random_scene import is_random
 from validation.scenes.registry import SCENES
 from validation.study.configuration import user_code
-from validation.study.reference import cell_truth
+from validation.study.reference import cell_reference
+from validation.study.run import run
 from validation.study.study import Cell
-from validation.study.work import cell_row
 
 _PACKAGES = ("mitsuba", "drjit", "numpy", "scipy")
 
@@ -50,7 +50,7 @@ def made_here(airlight: str, variant: str) -> Made:
 
 def row_source() -> str:
     """Return a digest of the source code that computes rows, the same wherever it is installed."""
-    return source_digest(cell_row, cell_truth, scene_properties)
+    return source_digest(run, cell_reference, scene_properties)
 
 
 def cell_key(cell: Cell, made: Made, scenes: Mapping[str, str] | None = None) -> str:
@@ -71,8 +71,7 @@ def cell_key(cell: Cell, made: Made, scenes: Mapping[str, str] | None = None) ->
         size=cell.size,
         medium=cell.medium,
         method=[cell.chosen.method, cell.chosen.kernel, sorted(cell.chosen.parameters), user_code(cell.chosen)],
-        flip=cell.flip,
-        times=cell.times,
+        measure=cell.measure,
         made=[made.airlight, made.source, made.packages, made.variant],
     )
 

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The truth of the cells of one image, computed once, with its own error.
+"""The reference of the cells of one image, computed once, with its own error.
 
 It is the quadrature at pixel centres. An area light needs many light samples, each as costly as a point light: it has
 fewer here than in `airlight reference`, and their standard error is part of the bound. A sixteenth of the pixels has a
 truth there, chosen by chance once for all: quantiles of errors need no more.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +22,10 @@ from reference.storage.kept import Spent, kept, key_of, stopwatch
 from reference.storage.scene_digest import scene_digest
 from validation.estimates.light_on_ray import check_camera, check_rays
 from validation.estimates.quadrature import truth_image
+from validation.metrics.errors import FLOOR
 from validation.scenes.changes import parse_changes
 from validation.scenes.loading import LoadedScene, load_scene
+from validation.study.row import ReferenceError
 from validation.study.study import Cell
 
 Array = NDArray[np.float64]
@@ -37,21 +38,46 @@ _SHARE = 16  # one pixel in so many has a truth where lights have an extent
 
 _LEAST = 64  # pixels that have one
 _SEED = 20261123  # of their choice
+_UNKNOWN = Spent(0.0, 0.0)
 _STANDARD_ERRORS = 3.0  # that a bound has of a light with extent
 
 
 @dataclass(frozen=True)
-class CellTruth:
-    """What all cells of one image share."""
+class Reference:
+    """What all cells of one image are compared with."""
 
-    estimator: str
     airlight: Array  #: (height, width, 3) [W/(m^2 sr)]
-    bound: Array  #: of its error, three standard errors of lights with extent among it [W/(m^2 sr)]
-    surface: Array | None  #: (height, width, 3) [W/(m^2 sr)]; None where lights with extent are left out of it
-    mask: NDArray[np.bool_] | None  #: pixels that have a truth, (height, width); None for all
+    bound: Array  #: of its error, three standard errors of area lights among it [W/(m^2 sr)]
+    surface: Array | None  #: (height, width, 3) [W/(m^2 sr)]; None where area lights leave it out
+    mask: NDArray[np.bool_] | None  #: pixels that have a reference, (height, width); None for all
     crossings: int | None  #: of all camera rays with edges between light and shadow
-    seconds: float  #: that it took when it was computed
-    processor_seconds: float  #: of all threads, in that time
+    spent: Spent  #: what it took when it was computed
+
+    @property
+    def light(self) -> Array:
+        """Airlight and lit surface, (height, width, 3) [W/(m^2 sr)]."""
+        return self.airlight if self.surface is None else self.airlight + self.surface
+
+    @cached_property
+    def own_error(self) -> ReferenceError:
+        """What the reference says of its own error."""
+        kept = np.ones(self.airlight.shape[:2], dtype=bool) if self.mask is None else self.mask
+        airlight, bound = self.airlight[kept], self.bound[kept]
+        mean = float(airlight.mean())
+        known = mean > 0
+        return ReferenceError(
+            "quadrature",
+            mean,
+            float(bound.mean()) / mean if known else None,
+            float((bound / np.maximum(airlight, FLOOR * mean)).max()) if known else None,
+            *self.spent,
+            self.crossings,
+        )
+
+
+def of_image(image: TruthImage, spent: Spent = _UNKNOWN) -> Reference:
+    """Return a quadrature image as the reference of cells."""
+    return Reference(image.airlight, image.airlight_bound, image.surface, None, image.transitions, spent)
 
 
 def load_cell(cell: Cell) -> LoadedScene:
@@ -65,8 +91,8 @@ def load_cell(cell: Cell) -> LoadedScene:
     return load_scene(cell.scene, cell.size, parse_changes(cell.medium))
 
 
-def cell_truth(loaded: LoadedScene) -> CellTruth:
-    """Return the truth of a loaded scene, from the cache where it was computed before.
+def cell_reference(loaded: LoadedScene) -> Reference:
+    """Return the reference of a loaded scene, from the cache where it was computed before.
 
     Raises
     ------
@@ -75,21 +101,14 @@ def cell_truth(loaded: LoadedScene) -> CellTruth:
     """
     if not any(emitter.get_shape() is not None for emitter in loaded.scene.emitters()):
         spent = stopwatch()
-        return _of_all(truth_image(loaded.scene), spent())
-    key = key_of("sweep-truth", sampled_truth, scene=scene_digest(loaded.scene))
-    result = kept(key, lambda: sampled_truth(loaded.scene))
-    return _of_some(result.arrays, result.spent)
+        return of_image(truth_image(loaded.scene), spent())
+    key = key_of("sweep-truth", sampled_reference, scene=scene_digest(loaded.scene))
+    result = kept(key, lambda: sampled_reference(loaded.scene))
+    some = result.arrays
+    return Reference(some["airlight"], some["bound"], None, some["mask"], None, result.spent)
 
 
-def _of_all(image: TruthImage, cost: Spent) -> CellTruth:
-    return CellTruth("quadrature", image.airlight, image.airlight_bound, image.surface, None, image.transitions, *cost)
-
-
-def _of_some(values: Mapping[str, Any], cost: Spent) -> CellTruth:
-    return CellTruth("quadrature", values["airlight"], values["bound"], None, values["mask"], None, *cost)
-
-
-def sampled_truth(scene) -> dict[str, Array]:
+def sampled_reference(scene) -> dict[str, Array]:
     """Return airlight, its bound and the mask of the pixels that have one, of an `mi.Scene`.
 
     Raises

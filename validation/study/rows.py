@@ -1,53 +1,60 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rows on disk: one file to which finished rows are added, and the Parquet that is made of it.
+"""Rows on disk: a database to which finished rows are added, and the Parquet that is made of it.
 
-`rows.jsonl` has a line for each row: a checksum and the row as JSON. A line is written with one call, so a process that
-is killed leaves at most one torn line at the end, which the next run cuts off; nothing that was finished is lost. A row
-whose key is there already replaces it, in the Parquet too, so no row is there twice. A full disk leaves the file as it
-was. One run at a time writes: it holds a lock that the system drops when the process ends. Where there is a Parquet
-alone, it is as good: a run begins with its rows.
+`rows.sqlite` has each row once, by its key: a row whose key is there already replaces it. A row that was added is on
+disk: a run that is killed, or whose disk is full, loses nothing that was finished. One run at a time writes. Where
+there is a Parquet alone, it is as good: a run begins with its rows.
 """
 
-import base64
 import heapq
 import json
-import os
-import zlib
+import sqlite3
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from analytic.errors import InputError
 from reference.storage.files import atomic_path, ensure_folder
-from validation.study.row import arrow_schema, checked_row, property_names
+from validation.study.row import COLUMNS, arrow_schema, property_names
 
-ROWS, PARQUET = "rows.jsonl", "sweep.parquet"  #: files of a sweep's folder
+ROWS, PARQUET = "rows.sqlite", "sweep.parquet"  #: files of the folder of a study
 
 #: Of every configuration, so many of the worst rows by each of `_WORST_BY` keep their pictures in the Parquet.
 PICTURES = 12
-_WORST_BY = ("relative_rmse", "p99", "max")
+_WORST_BY = ("error.relative_rmse", "error.p99", "error.max")
 
 _BATCH = 4096  # rows that the Parquet is written in at once
-_DIGITS = 9  # of the checksum, and a space
+_TABLE = "CREATE TABLE IF NOT EXISTS rows (key TEXT PRIMARY KEY, status TEXT, data TEXT, picture BLOB)"
+_ADD = "INSERT INTO rows VALUES (?, ?, ?, ?) ON CONFLICT DO UPDATE SET (status, data, picture) = "
+_ADD += "(excluded.status, excluded.data, excluded.picture)"
 
 
 class RowStore:
-    """The rows of a folder, open for adding."""
+    """The rows of a folder, open for adding: each is a dictionary by the names of `validation.study.row.COLUMNS`."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = ensure_folder(folder)
         self.path = self.folder / ROWS
-        self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666)
+        self._rows = sqlite3.connect(self.path, timeout=0.0, isolation_level=None)
         try:
-            _lock(self._file, self.folder)
-            self._places: dict[str, tuple[int, int]] = {}  # key -> offset and length of its last line
-            self._statuses: dict[str, str] = {}
-            self._end = 0
-            self._read()
-            if not self._places:
+            self._rows.execute("PRAGMA locking_mode = EXCLUSIVE")
+            self._rows.execute("BEGIN EXCLUSIVE")
+            self._rows.execute(_TABLE)
+            self._rows.execute("COMMIT")
+            if not len(self):
                 self._take_over()
+        except sqlite3.OperationalError as error:
+            self.close()
+            if "locked" in str(error):
+                raise InputError(
+                    f"another sweep writes into {folder}: wait for it, or name another folder by -o"
+                ) from None
+            raise OSError(f"{error}: {self.path}") from error
+        except sqlite3.DatabaseError as error:
+            self.close()
+            raise InputError(f"{self.path}: {error}; remove it, or name another folder by -o") from None
         except BaseException:
-            os.close(self._file)
+            self.close()
             raise
 
     def __enter__(self) -> "RowStore":
@@ -58,57 +65,44 @@ class RowStore:
 
     def close(self) -> None:
         """Give up the lock."""
-        if self._file >= 0:
-            os.close(self._file)
-            self._file = -1
+        self._rows.close()
 
     def __contains__(self, key: object) -> bool:
-        return key in self._places
+        return self._one("SELECT 1 FROM rows WHERE key = ?", key) is not None
 
     def __len__(self) -> int:
-        return len(self._places)
+        return int(self._rows.execute("SELECT count(*) FROM rows").fetchone()[0])
 
     def status(self, key: str) -> str | None:
         """Return the status of a row; None where there is none."""
-        return self._statuses.get(key)
+        found = self._one("SELECT status FROM rows WHERE key = ?", key)
+        return None if found is None else found[0]
 
     def row(self, key: str) -> dict[str, Any]:
         """Return the row of a key that is there."""
-        offset, length = self._places[key]
-        os.lseek(self._file, offset, os.SEEK_SET)
-        row = _row(os.read(self._file, length))
-        assert row is not None, "it was read, or written, before"
-        return row
+        found = self._one("SELECT data, picture FROM rows WHERE key = ?", key)
+        assert found is not None, "it was added before"
+        return _row(*found)
 
-    def add(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Add a row, or replace the one of the same key, and return it as it is kept.
+    def add(self, row: Mapping[str, Any]) -> None:
+        """Add a row, or replace the one of the same key.
 
         Raises
         ------
-        InputError
-            If it is no row.
         OSError
-            If the disk is full: the file is as it was, and the message names it.
+            If the disk is full: the rows are as they were, and the message names the file.
         """
-        row = checked_row(values)
-        line = _line(row)
+        data = {name: value for name, value in row.items() if value is not None and name != "picture"}
+        text = json.dumps(data, allow_nan=False)
         try:
-            os.lseek(self._file, self._end, os.SEEK_SET)
-            written = 0
-            while written < len(line):
-                written += os.write(self._file, line[written:])
-        except OSError as error:
-            os.ftruncate(self._file, self._end)
-            raise OSError(error.errno, f"{error.strerror}; {len(self)} rows are kept", str(self.path)) from error
-        self._places[row["key"]] = (self._end, len(line))
-        self._statuses[row["key"]] = row["status"]
-        self._end += len(line)
-        return row
+            self._rows.execute(_ADD, (row["key"], row["status"], text, row.get("picture")))
+        except sqlite3.OperationalError as error:
+            raise OSError(f"{error}; {len(self)} rows are kept: {self.path}") from error
 
     def rows(self) -> Iterator[dict[str, Any]]:
-        """Yield every row once, in the order in which they were finished."""
-        for key in sorted(self._places, key=self._places.__getitem__):
-            yield self.row(key)
+        """Yield every row once, in the order in which they were first finished."""
+        for data, picture in self._rows.execute("SELECT data, picture FROM rows ORDER BY rowid"):
+            yield _row(data, picture)
 
     def write_parquet(self) -> Path:
         """Write `sweep.parquet` from all rows, whole or not at all, and return its path."""
@@ -131,6 +125,10 @@ class RowStore:
             writer.write_table(pa.Table.from_pylist(batch, schema=schema))
         return target
 
+    def _one(self, question: str, key: object) -> tuple[Any, ...] | None:
+        found: tuple[Any, ...] | None = self._rows.execute(question, (key,)).fetchone()
+        return found
+
     def _take_over(self) -> None:
         """Begin with the rows of a Parquet that somebody brought here without the file that it was made of."""
         source = self.folder / PARQUET
@@ -144,24 +142,11 @@ class RowStore:
                 for batch in file.iter_batches(batch_size=_BATCH):
                     for row in batch.to_pylist():
                         self.add(row)
-        except pa.ArrowException as error:
+        except (pa.ArrowException, KeyError) as error:
             words = " ".join(str(error).split())
             raise InputError(
                 f"{source}: it cannot be read ({words}); remove it, or name another folder by -o"
             ) from None
-
-    def _read(self) -> None:
-        with os.fdopen(os.dup(self._file), "rb") as file:
-            file.seek(0)
-            for line in file:
-                row = _row(line)
-                if row is not None:
-                    self._places[row["key"]] = (self._end, len(line))
-                    self._statuses[row["key"]] = row["status"]
-                elif not line.endswith(b"\n"):
-                    break  # torn by a kill: what comes next is written over it
-                self._end += len(line)
-        os.ftruncate(self._file, self._end)
 
 
 def worst_rows(rows: Iterator[Mapping[str, Any]]) -> set[str]:
@@ -177,32 +162,5 @@ def worst_rows(rows: Iterator[Mapping[str, Any]]) -> set[str]:
     return {key for best in worst.values() for _, key in best}
 
 
-def _line(row: Mapping[str, Any]) -> bytes:
-    kept = {name: value for name, value in row.items() if value is not None}
-    if "picture" in kept:
-        kept["picture"] = base64.b64encode(kept["picture"]).decode()
-    text = json.dumps(kept, allow_nan=False, ensure_ascii=True).encode()
-    return f"{zlib.crc32(text):08x} ".encode() + text + b"\n"
-
-
-def _row(line: bytes) -> dict[str, Any] | None:
-    """Return the row of a line; None where the line is damaged."""
-    text = line[_DIGITS:].rstrip(b"\n")
-    if not line.endswith(b"\n") or line[:_DIGITS] != f"{zlib.crc32(text):08x} ".encode():
-        return None
-    kept = json.loads(text)
-    if "picture" in kept:
-        kept["picture"] = base64.b64decode(kept["picture"])
-    return checked_row(kept)
-
-
-def _lock(file: int, folder: Path) -> None:
-    """Refuse a folder into which another run writes."""
-    try:
-        import fcntl
-    except ImportError:  # Windows: two runs at once are the user's to avoid
-        return
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise InputError(f"another sweep writes into {folder}: wait for it, or name another folder by -o") from None
+def _row(data: str, picture: bytes | None) -> dict[str, Any]:
+    return {**dict.fromkeys(each.key for each in COLUMNS), **json.loads(data), "picture": picture}

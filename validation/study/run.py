@@ -1,302 +1,220 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Speed against error: every configuration of a scene is timed and compared with the quadrature truth."""
+"""A cell becomes a row: its image is rendered, timed and compared with the reference. Nothing else does all three.
 
+A method that refuses a scene gives a row too, with its reason, and so does one that would take too long. Other
+exceptions are the caller's: they are faults. Nothing here knows where it runs.
+"""
+
+import json
+import shlex
 import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
-from analytic.errors import InputError as TruthError
+from analytic.errors import InputError as ReferenceInputError
 from realtime.errors import InputError
-from realtime.frame.renderer import Frame, FrameRenderer, light_groups, render_frame
+from realtime.frame.renderer import Frame, FrameRenderer, light_groups, render_frame, run_stages, unchecked_frame
 from realtime.methods.registry import find_method
 from realtime.numerics.recorded import Frozen
-from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import Scene, read_scene
-from reference.quadrature.ray_values import TruthImage
 from reference.storage.exr import Image
-from validation.estimates.quadrature import truth_image
-from validation.metrics.errors import Metrics, error_metrics
-from validation.metrics.flip import Flip, flip_hdr
-from validation.scenes.loading import LoadedScene, load_scene
-from validation.study.clock import peak_memory
-from validation.study.configuration import STANDARD, Configuration, prepared
-from validation.study.frame_times import FrameTimes, time_frame
+from validation.metrics.colour import colour_difference
+from validation.metrics.errors import FLOOR, error_metrics
+from validation.metrics.flip import flip_hdr
+from validation.metrics.other_tools import published_errors
+from validation.study.clock import largest_memory, peak_memory, timed
+from validation.study.configuration import Configuration, prepared, rendered_lights
+from validation.study.frame_times import FrameTimes, brief_times, time_frame
+from validation.study.reference import Reference, load_cell
+from validation.study.row import Cost, Row, StatedError
+from validation.study.stated_errors import stated_bound, worth_of_ends
+from validation.study.study import Cell, map_side, seed_of
 
-Progress = Callable[[int, int, str], None]
+Array = NDArray[np.float64]
 #: Calls a function with arguments in another process: ``apart(function, *arguments, name=the method's)``.
 Apart = Callable[..., Any]
+#: Makes a picture of reference and image, both (height, width, 3) [W/(m^2 sr)]; None where there is none.
+Paint = Callable[[Array, Array], bytes | None]
 
+REFUSALS = (InputError, ReferenceInputError)  #: what methods and readers of scenes raise for what they cannot do
+PROBE = (64, 48)  #: size of the frame from which the time of a full-size frame is estimated [pixels]
 _DOUBTFUL = 0.5  # share of the limit: after a longer preparation, the time of a frame is estimated before it begins
 _RECORDED = 1.0  # in a first frame that takes less, its recording takes a part of time and memory that counts [s]
 _LONG = 25.0  # after a longer first frame, compilation included, no larger frame is timed [s]
 
 
-@dataclass(frozen=True)
-class Rendering:
-    """A frame by one configuration and its cost, not yet compared with anything."""
+class Rendered(NamedTuple):
+    """A frame and its cost, not yet compared with anything."""
 
-    frame: Frame | None  #: None if the method refused the scene
-    times: FrameTimes | None
-    knows_shadows: bool  #: whether it renders volumetric shadows
-    refused: str | None = None  #: why there is no frame
-    left_out: bool = False  #: whether only the time speaks against this configuration, which could render the scene
-    note: str | None = None  #: how its times differ from those of other configurations
-    memory: float | None = None  #: at the peak of the timed frame, beyond what was there before [MiB]; None: not known
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """The cost and the error of one configuration in one scene."""
-
-    configuration: Configuration  #: what was measured
-    frame: Frame | None  #: None if the method refused the scene
-    times: FrameTimes | None
-    error: Metrics | None  #: of the airlight
-    surface_error: Metrics | None
-    flip: Flip | None = None  #: HDR-FLIP of airlight plus surface; None if it was not asked for
-    refused: str | None = None  #: why there is no frame
-    left_out: bool = False  #: whether only the time speaks against this configuration, which could render the scene
-    note: str | None = None  #: how its times differ from those of other configurations
-    knows_shadows: bool | None = None  #: whether it renders volumetric shadows; None: the method's record says it
-    memory: float | None = None  #: at the peak of the timed frame, beyond what was there before [MiB]; None: not known
+    frame: Frame | None  #: None if there is none
+    status: str = "done"
+    reason: str | None = None
+    note: str | None = None
+    times: FrameTimes | None = None
+    memory: float | None = None
+    cost: Cost | None = None
+    knows_shadows: bool = True
 
 
-def configurations_for(
-    features: SceneFeatures, configurations: Sequence[Configuration] = STANDARD
-) -> tuple[Configuration, ...]:
-    """Return the configurations that differ in this scene from the ones before them.
-
-    Variants of the shadows are left out if nothing casts a shadow. The published treatment of bounded media is left out
-    if the scene has none, or if they do not lie in clear air, and so are light points where no light has an extent.
-    """
-    without_effect = set() if features.shadows else {"shadow", "order", "map"}
-    without_effect |= set() if features.clear else {"media"}
-    without_effect |= set() if features.area_lights else {"points", "pattern"}
-    return tuple(chosen for chosen in configurations if not without_effect & set(dict(chosen.parameters)))
-
-
-def measure(
+def run(
+    cell: Cell,
     scene: Scene,
-    chosen: Configuration,
+    reference: Reference,
     *,
-    truth: TruthImage,
-    timed: Scene | None = None,
-    seconds: float = 0.6,
-    with_flip: bool = False,
-    slow: float | None = None,
-    limit: float | None = None,
-    probe: Callable[[], Scene] | None = None,
-    render: Callable[[], Rendering] | None = None,
-) -> Measurement:
-    """Render, compare and time one configuration.
+    timed_scene: Scene | None = None,
+    whole: Any = None,
+    paint: Paint | None = None,
+    apart: Apart | None = None,
+) -> tuple[Row, Frame | None]:
+    """Render, time and compare a cell.
 
     Parameters
     ----------
+    cell
+        What to render and to measure.
     scene
-        From `realtime.scene.read_scene.read_scene`, at the size of the truth.
-    truth
-        The quadrature truth of the same scene.
-    timed, seconds, slow, limit, probe
-        See `render_and_time`.
-    with_flip
-        Whether to compute HDR-FLIP; if the package is missing, the result holds a note.
-    render
-        Renders and times instead of `render_and_time`, in another process.
+        That of the cell at its size, from `realtime.scene.read_scene.read_scene`.
+    reference
+        Of the same image.
+    timed_scene
+        The scene at the size of the timed frames; None if that is the size of the image.
+    whole
+        The `mi.Scene` that both were read from; without it no error is held against what the method states.
+    paint
+        Makes the picture of the row.
+    apart
+        Calls a user's method in a process of its own.
+
+    Returns
+    -------
+    tuple
+        The row, without what only the caller knows (key, study, origin), and the frame, if there is one.
     """
-    if render is None:
-        rendered = render_and_time(scene, chosen, timed=timed, seconds=seconds, slow=slow, limit=limit, probe=probe)
-    else:
+    begin, spent = time.perf_counter(), time.process_time()
+    if apart is not None and cell.chosen.own:
         try:
-            rendered = render()
-        except (InputError, TruthError) as error:
-            rendered = Rendering(None, None, True, refused=str(error))
-    frame = rendered.frame
-    if frame is None:
-        return Measurement(
-            chosen,
-            None,
-            None,
-            None,
-            None,
-            refused=rendered.refused,
-            left_out=rendered.left_out,
-            knows_shadows=rendered.knows_shadows,
+            done = apart(render_cell, cell, name=cell.chosen.method)
+        except REFUSALS as error:
+            done = Rendered(None, "refused", str(error))
+    else:
+        done = render(scene, cell, timed_scene=timed_scene)
+    row = replace(
+        cell_row(cell),
+        status=done.status,
+        reason=done.reason,
+        note=done.note,
+        times=done.times,
+        memory=done.memory,
+        cost=done.cost,
+        knows_shadows=done.knows_shadows,
+        reference=reference.own_error,
+    )
+    if done.frame is None:
+        return row, None
+    row = replace(row, **_errors(cell, done.frame, scene, reference, whole))
+    if paint is not None:
+        shown = np.asarray(done.frame.airlight, dtype=np.float64)
+        # Pixels without a reference are shown as if they were right.
+        known = (
+            reference.airlight
+            if reference.mask is None
+            else np.where(reference.mask[..., None], reference.airlight, shown)
         )
-    return Measurement(
-        chosen,
-        frame,
-        rendered.times,
-        error_metrics(truth.airlight, frame.airlight),
-        error_metrics(truth.surface, frame.surface) if scene.features.surfaces else None,
-        flip_hdr(truth.airlight + truth.surface, frame.airlight + frame.surface) if with_flip else None,
-        note=rendered.note,
-        knows_shadows=rendered.knows_shadows,
-        memory=rendered.memory,
+        row = replace(row, picture=paint(known, shown))
+    assert done.cost is not None
+    cost = replace(
+        done.cost,
+        lights=rendered_lights(scene, cell.chosen),
+        peak_mib=largest_memory(),
+        work_ms=1e3 * (time.perf_counter() - begin),
+        cpu_ms=1e3 * (time.process_time() - spent),
+    )
+    return replace(row, cost=cost), done.frame
+
+
+def cell_row(cell: Cell, **outcome: Any) -> Row:
+    """Return the row of a cell with an outcome, by default that it was done, and no numbers."""
+    chosen = cell.chosen
+    return Row(
+        scene=cell.scene,
+        label=chosen.label,
+        method=chosen.method,
+        kernel=chosen.kernel,
+        parameters=json.dumps(dict(chosen.parameters)),
+        width=cell.size[0],
+        height=cell.size[1],
+        kind="function" if chosen.own else "built-in",
+        map=map_side(chosen),
+        seed=seed_of(cell.scene),
+        medium=" ".join(cell.medium) or None,
+        command=_command(cell),
+        **{"status": "done", **outcome},
     )
 
 
-def render_and_time(
-    scene: Scene,
-    chosen: Configuration,
-    *,
-    timed: Scene | None = None,
-    seconds: float = 0.6,
-    slow: float | None = None,
-    limit: float | None = None,
-    probe: Callable[[], Scene] | None = None,
-) -> Rendering:
-    """Render and time one configuration.
+def render_cell(cell: Cell) -> Rendered:
+    """Render and time a cell in a process that has loaded nothing."""
+    larger = cell.measure.timed_size
+    timed_scene = None
+    if larger is not None and larger != cell.size:
+        timed_scene = read_scene(load_cell(replace(cell, size=larger)).scene)
+    return render(read_scene(load_cell(cell).scene), cell, timed_scene=timed_scene)
 
-    Parameters
-    ----------
-    scene
-        From `realtime.scene.read_scene.read_scene`.
-    timed
-        The scene at the size of the timed frames; None if that is the size of the scene.
-    slow
-        See `validation.study.frame_times.time_frame` [s].
-    limit, probe
-        A configuration is left out if a frame of it would take longer than `limit` [s]. The estimate comes from what
-        the frame prepares and from a frame of the small scene that `probe` returns. It is made only where the
-        preparation takes long, and for a user's own method.
-    """
+
+def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> Rendered:
+    """Render and time a cell; see `run`."""
+    chosen, wanted = cell.chosen, cell.measure
     shadows = knows_shadows(chosen)
+    dr.sync_thread()
+    dr.detail.malloc_clear_statistics()
+    before = dr.detail.launch_stats()
+    begin = time.perf_counter()
     try:
-        begin = time.perf_counter()
         renderer = prepared(scene, chosen)
-        took = time.perf_counter() - begin
-        if limit is not None and probe is not None:
-            doubtful = chosen.own or took * len(light_groups(renderer)) > _DOUBTFUL * limit
-            reason = _too_long(renderer, probe, chosen, limit) if doubtful else None
-            if reason:
-                return Rendering(None, None, shadows, refused=reason, left_out=True)
+        reason = _too_long(renderer, cell, time.perf_counter() - begin)
+        if reason:
+            return Rendered(None, "left out", reason, knows_shadows=shadows)
         begin = time.perf_counter()
-        frame = render_frame(renderer)
-        took = time.perf_counter() - begin
+        frame = render_frame(renderer) if wanted.times == "stages" else unchecked_frame(renderer, _stages(renderer))
+        first = time.perf_counter() - begin
     except InputError as error:
-        return Rendering(None, None, shadows, refused=str(error))
+        return Rendered(None, "refused", str(error), knows_shadows=shadows)
+    after = dr.detail.launch_stats()
+    backend = dr.JitBackend.CUDA if (mi.variant() or "").startswith("cuda") else dr.JitBackend.LLVM
+    watermark = int(dr.detail.malloc_watermark(backend))
+    cost = Cost(1e3 * first, None, after[0] - before[0], after[2] - before[2], watermark)
+    done = Rendered(frame, cost=cost, knows_shadows=shadows)
+    if wanted.times == "with":
+        times, prepare = brief_times(renderer)
+        return done._replace(times=times, cost=replace(cost, prepare_ms=prepare))
+    if wanted.times != "stages":
+        return done
     notes = []
-    if timed is not None and took > _LONG:
-        timed = None
+    if timed_scene is not None and first > _LONG:
+        timed_scene = None
         notes.append(f"timed at {scene.camera.width} x {scene.camera.height}: larger frames take minutes")
     if chosen.own and not isinstance(renderer.render, Frozen):
         notes.append("not frozen: its Python runs again for every frame")
-    shown = renderer if timed is None else prepared(timed, chosen)
-    spent: list[float] = []
-
-    def again() -> None:
-        begin = time.perf_counter()
-        render_frame(shown)
-        spent.append(time.perf_counter() - begin)
-
+    shown = renderer if timed_scene is None else prepared(timed_scene, chosen)
+    took: list[float] = []
+    again = partial(_timed_frame, shown, took)
     memory = peak_memory(again)
-    if timed is not None and spent and spent[0] < _RECORDED:
+    if timed_scene is not None and took and took[0] < _RECORDED:
         memory = peak_memory(again)
-    times = time_frame(shown, seconds=seconds, slow=slow, took=spent[-1] if spent else None)
-    return Rendering(frame, times, shadows, note="; ".join(notes) or None, memory=memory)
+    times = time_frame(shown, seconds=wanted.seconds, slow=wanted.slow, took=took[-1] if took else None)
+    return done._replace(times=times, memory=memory, note="; ".join(notes) or None)
 
 
-def render_and_time_by_name(
-    name_or_path: str,
-    size: tuple[int, int],
-    chosen: Configuration,
-    *,
-    timed: tuple[int, int] | None = None,
-    probe: tuple[int, int] | None = None,
-    seconds: float = 0.6,
-    slow: float | None = None,
-    limit: float | None = None,
-) -> Rendering:
-    """Do what `render_and_time` does in a process that has loaded nothing: scenes are named, with their sizes."""
-
-    def at(size: tuple[int, int]) -> Scene:
-        return read_scene(load_scene(name_or_path, size).scene)
-
-    return render_and_time(
-        at(size),
-        chosen,
-        timed=None if timed is None or timed == size else at(timed),
-        seconds=seconds,
-        slow=slow,
-        limit=limit,
-        probe=None if probe is None else lambda: at(probe),
-    )
-
-
-def render_by_name(name_or_path: str, size: tuple[int, int], chosen: Configuration) -> Frame:
-    """Render a frame in a process that has loaded nothing."""
-    return render_frame(prepared(read_scene(load_scene(name_or_path, size).scene), chosen))
-
-
-def _too_long(renderer: FrameRenderer, probe: Callable[[], Scene], chosen: Configuration, limit: float) -> str | None:
-    """Return why a frame would take too long, or None.
-
-    It is judged by its preparation once kernels are compiled and, where that takes long and for a user's own method,
-    by the second frame of a small scene, whose preparation takes as long. Of many groups of lights only the first are
-    prepared before the frame; the others take as long each.
-    """
-    begin = time.perf_counter()
-    states = renderer.prepare(renderer.scene)
-    dr.sync_thread()
-    preparation = time.perf_counter() - begin
-    if renderer.groups is not None:
-        preparation *= len(states) / sum(state is not None for state in states)
-    del states
-    words = f"more than the limit of {limit:g} s"
-    if preparation > limit:
-        return f"not measured: what a frame prepares takes {preparation:.2g} s, {words}"
-    if not chosen.own and preparation <= _DOUBTFUL * limit:
-        return None
-    small, large = prepared(probe(), chosen), renderer.scene.camera
-    render_frame(small)
-    begin = time.perf_counter()
-    render_frame(small)
-    took = time.perf_counter() - begin
-    camera = small.scene.camera
-    share = (large.width * large.height) / (camera.width * camera.height)
-    expected = preparation + max(0.0, took - preparation) * share
-    if expected <= limit:
-        return None
-    return (
-        f"not measured: by a frame of {camera.width} x {camera.height} pixels that took {took:.2g} s, "
-        f"{min(took, preparation):.2g} s of these for what it prepares, a frame of {large.width} x {large.height} "
-        f"would take {expected:.0f} s, {words}"
-    )
-
-
-def bench(
-    loaded: LoadedScene,
-    configurations: Sequence[Configuration] = STANDARD,
-    *,
-    apart: Apart | None = None,
-    progress: Progress | None = None,
-) -> Iterator[tuple[Scene, Measurement]]:
-    """Yield the measurements of a scene's configurations at its own size, one after the other.
-
-    Methods of the user's own are called by `apart`, if given.
-    """
-    scene = read_scene(loaded.scene)
-    chosen = configurations_for(scene.features, configurations)
-    truth = truth_image(loaded.scene)
-    for number, configuration in enumerate(chosen):
-        render = None
-        if configuration.own and apart is not None:
-            size = scene.camera.width, scene.camera.height
-            render = partial(
-                apart,
-                render_and_time_by_name,
-                str(loaded.path or loaded.name),
-                size,
-                configuration,
-                name=configuration.method,
-            )
-        yield scene, measure(scene, configuration, truth=truth, render=render)
-        if progress is not None:
-            progress(number + 1, len(chosen), loaded.name)
+def frame_of(cell: Cell) -> Frame:
+    """Render the frame of a cell in a process that has loaded nothing."""
+    return render_frame(prepared(read_scene(load_cell(cell).scene), cell.chosen))
 
 
 def knows_shadows(chosen: Configuration) -> bool:
@@ -310,3 +228,89 @@ def layered_frame(name: str, chosen: Configuration, frame: Frame) -> Image:
     attributes |= {"airlight:kernel": chosen.kernel} if chosen.kernel else {}
     attributes |= {f"airlight:{key}": str(value) for key, value in chosen.parameters}
     return Image({"airlight": frame.airlight, "surface": frame.surface, **frame.extra}, frame.distance, attributes)
+
+
+def _stages(renderer: FrameRenderer) -> Any:
+    return run_stages(renderer, renderer.prepare(renderer.scene))
+
+
+def _timed_frame(renderer: FrameRenderer, took: list[float]) -> None:
+    took.append(1e-3 * timed(lambda: render_frame(renderer)).ms)
+
+
+def _errors(cell: Cell, frame: Frame, scene: Scene, reference: Reference, whole: Any) -> dict[str, Any]:
+    """Return the errors of a frame by the names of their fields in a row."""
+    test, mask = np.asarray(frame.airlight, dtype=np.float64), reference.mask
+    errors: dict[str, Any] = {"error": error_metrics(reference.airlight, test, mask=mask)}
+    surface = np.asarray(frame.surface, dtype=np.float64)
+    if scene.features.surfaces and reference.surface is not None:
+        errors["surface_error"] = error_metrics(reference.surface, surface)
+    if cell.measure.flip:
+        lit = (reference.airlight, test) if reference.surface is None else (reference.light, test + surface)
+        errors["flip"] = flip_hdr(*lit, mask=mask)
+    if not cell.measure.every_metric:
+        return errors
+    errors["published"] = published_errors(reference.airlight, test, mask=mask)
+    errors["normalised"] = published_errors(reference.airlight, test, unit=None, mask=mask)
+    errors["colour"] = colour_difference(reference.airlight, test, mask=mask)
+    bound = stated_bound(cell.chosen, scene)
+    if bound is not None and whole is not None:
+        floor = FLOOR * reference.airlight.mean()  # of all pixels: who states a bound has a reference in each
+        allowed = bound * np.maximum(reference.airlight, floor) + reference.bound
+        excess = np.abs(test - reference.airlight).reshape(-1, 3) - allowed.reshape(-1, 3)
+        outside = np.flatnonzero(~(excess <= 0).all(axis=1))
+        if len(outside):  # few: what the ends of intervals are worth takes a while
+            outside = outside[~(excess[outside] <= worth_of_ends(whole, outside)).all(axis=1)]
+        errors["stated"] = StatedError(bound, len(outside))
+    return errors
+
+
+def _too_long(renderer: FrameRenderer, cell: Cell, took: float) -> str | None:
+    """Return why a frame would take longer than the limit, or None.
+
+    It is judged by its preparation once kernels are compiled and, where that takes long and for a user's own method,
+    by the second frame of a small scene, whose preparation takes as long. Of many groups of lights only the first are
+    prepared before the frame; the others take as long each. Nothing is judged where the making of the renderer, which
+    `took` so long [s], says that it is far below the limit.
+    """
+    chosen, limit = cell.chosen, cell.measure.limit
+    if limit is None or not (chosen.own or took * len(light_groups(renderer)) > _DOUBTFUL * limit):
+        return None
+    begin = time.perf_counter()
+    states = renderer.prepare(renderer.scene)
+    dr.sync_thread()
+    preparation = time.perf_counter() - begin
+    if renderer.groups is not None:
+        preparation *= len(states) / sum(state is not None for state in states)
+    del states
+    words = f"more than the limit of {limit:g} s"
+    if preparation > limit:
+        return f"not measured: what a frame prepares takes {preparation:.2g} s, {words}"
+    if not chosen.own and preparation <= _DOUBTFUL * limit:
+        return None
+    small, large = prepared(read_scene(load_cell(replace(cell, size=PROBE)).scene), chosen), renderer.scene.camera
+    render_frame(small)
+    begin = time.perf_counter()
+    render_frame(small)
+    took = time.perf_counter() - begin
+    share = (large.width * large.height) / (PROBE[0] * PROBE[1])
+    expected = preparation + max(0.0, took - preparation) * share
+    if expected <= limit:
+        return None
+    return (
+        f"not measured: by a frame of {PROBE[0]} x {PROBE[1]} pixels that took {took:.2g} s, "
+        f"{min(took, preparation):.2g} s of these for what it prepares, a frame of {large.width} x {large.height} "
+        f"would take {expected:.0f} s, {words}"
+    )
+
+
+def _command(cell: Cell) -> str:
+    """Return the command that shows the image of a cell again, as a shell reads it."""
+    chosen = cell.chosen
+    words = ["airlight", "view", cell.scene, "--method", chosen.method]
+    words += ["--kernel", chosen.kernel] if chosen.kernel else []
+    for name, value in chosen.parameters:
+        words += ["--set", f"{name}={value}"]
+    for change in cell.medium:
+        words += ["--change", change]
+    return shlex.join([*words, "--size", f"{cell.size[0]}x{cell.size[1]}"])

@@ -1,146 +1,60 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The study of one scene: its truth, the checks of the truth, and the error and cost of every configuration.
+"""The study of one scene: its reference, the checks of the reference, every configuration, images from elsewhere.
 
-Each part is a function of its own, so that a report can reuse earlier results and compute only the rest.
+Each part is kept on disk as soon as it is there: a study that was killed goes on where it stopped, and one in which
+nothing changed computes nothing.
 """
 
+import hashlib
+import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, partial
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.frame.renderer import Frame
+from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import Scene, read_scene
 from reference.quadrature.ray_values import TruthImage
-from reference.storage.scene_digest import scene_digest
-from validation.estimates.agreement import Agreement, agreements
+from reference.storage.exr import TOTAL, Image
+from reference.storage.kept import Kept, is_kept, key_of
+from validation.comparison.engine_images import EngineImage, measure_image
+from validation.estimates.agreement import agreements
 from validation.estimates.monte_carlo import ElsewhereFor
-from validation.estimates.multiple_scattering import MultipleScattering, multiple_scattering_share
-from validation.estimates.quadrature import truth_image
+from validation.estimates.multiple_scattering import multiple_scattering_share
+from validation.estimates.quadrature import has_truth, kept_truth, truth_image
+from validation.metrics.errors import plain
 from validation.metrics.flip import flip_hdr
+from validation.scenes.identity import scene_identity
 from validation.scenes.loading import LoadedScene, load_scene
-from validation.scenes.registry import FOG_SCENES
-from validation.study.configuration import QUICK, Configuration
-from validation.study.run import Apart, Measurement, measure, render_and_time_by_name
+from validation.study.configuration import Configuration, rendered_lights, user_code
+from validation.study.cost import frame_work, sampled_work, steps_of, truth_work
+from validation.study.reference import of_image
+from validation.study.results import Computed, Result, cached_result
+from validation.study.row import Row
+from validation.study.run import Apart, cell_row, layered_frame, run
+from validation.study.study import Cell, Study
 
+Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
 _MULTIPLE = (64, 48)  # size of the image whose share of multiple scattering is measured [pixels]
-_PROBE = (64, 48)  # size of the frame from which the time of a full-size frame is estimated [pixels]
-
-
-@dataclass(frozen=True)
-class Effort:
-    """How much work a study does."""
-
-    name: str
-    image: tuple[int, int]  #: width and height of the images that are compared and shown [pixels]
-    timed: tuple[int, int]  #: width and height of the frames that are timed [pixels]
-    checked: tuple[int, int]  #: width and height of the comparisons of the truth [pixels]
-    margins: Mapping[str, float]  #: by estimator, the margin of its relative bias
-    samples: Mapping[str, int]  #: by estimator, samples per pixel in each batch of these comparisons
-    seconds: float  #: spent on each timing
-    scenes: tuple[str, ...] = ()  #: scenes that are studied by default
-    batches: int = 2048  #: largest number of batches in these comparisons
-    multiple: tuple[int, int] = (8, 4)  #: batches, and samples per pixel in each, for the share of multiple scattering
-    patience: float | None = None  #: an estimator that has not decided after this time is stopped [s]; None: never
-    #: If a frame takes longer, preparation included, frames are timed stage by stage [s]: from there on `seconds` allow
-    #: only the least number of frames for each of the seven times, and as many by their stages give all of these.
-    slow: float = 0.04
-    limit: float = 10.0  #: frames that would take longer are not measured, and the report says so [s]
-    flip: str = "none"  #: which configurations get HDR-FLIP: 'none', 'kinds' (those of `QUICK`) or 'all'
-    rays: int = 0  #: number of generated rays for the stability of kernels; 0 leaves it out
-    scaling: tuple[str, ...] = ()  #: kinds of work by whose growth a scene is timed, see `validation.study.ladders`
-
-    def at(self, size: tuple[int, int] | None) -> "Effort":
-        """Return the effort with images and timed frames of another size [pixels]; itself for None."""
-        return self if size is None else replace(self, image=size, timed=size)
-
-    def of(self, scene: str) -> "Effort":
-        """Return the effort for a scene: built-in ones lit by lights with extent are compared at half the width.
-
-        A batch of volpath has as many paths there as in others: launches would take all the time of fewer.
-        """
-        if scene not in _WIDE:
-            return self
-        image, checked = ((width // 2, height // 2) for width, height in (self.image, self.checked))
-        samples = {**self.samples, "volpath": 4 * self.samples["volpath"]}
-        return replace(self, image=image, checked=checked, samples=samples)
-
-
-def _by_estimator(single_scatter: Any, volpath: Any) -> Mapping[str, Any]:
-    return {"single-scatter": single_scatter, "volpath": volpath}
-
-
-# `report --quick` studies scenes that take seconds. The default effort leaves out `tangle`, of which a frame takes up
-# to minutes, and `clutter` and `soft-hall`, in which the truth or its checks take long and show what `hall` and `fence`
-# show. The truth of a light with extent sums thousands of points.
-_QUICK = ("open-fog", "sphere-spot", "two-pens", "penumbra-plane")
-_HEAVY = ("clutter", "tangle", "soft-hall")
-_WIDE = ("penumbra-plane", "fence", "overlap", "soft-hall")
-
-# Few samples per batch would be a waste: then launches take all the time, and `single-scatter`, which stratifies its
-# samples over the ray, gains more than a factor of four from four times as many.
-EFFORTS: dict[str, Effort] = {
-    effort.name: effort
-    for effort in (
-        Effort(
-            "quick",
-            scenes=_QUICK,
-            image=(240, 180),
-            timed=(240, 180),
-            checked=(48, 36),
-            margins=_by_estimator(0.002, 0.02),
-            samples=_by_estimator(32, 8),
-            seconds=0.05,
-            patience=16.0,
-        ),
-        Effort(
-            "default",
-            scenes=tuple(name for name in FOG_SCENES if name not in _HEAVY),
-            image=(320, 240),
-            timed=(320, 240),
-            checked=(64, 48),
-            margins=_by_estimator(0.0005, 0.01),
-            samples=_by_estimator(128, 16),
-            seconds=0.1,
-            patience=18.0,
-            flip="kinds",
-            rays=10_000,
-        ),
-        Effort(
-            "full",
-            scenes=tuple(FOG_SCENES),
-            image=(640, 480),
-            timed=(800, 600),
-            checked=(160, 120),
-            margins=_by_estimator(0.0005, 0.002),
-            samples=_by_estimator(128, 64),
-            seconds=0.4,
-            batches=4096,
-            multiple=(16, 8),
-            patience=75.0,
-            slow=0.1,
-            limit=40.0,
-            flip="all",
-            rays=100_000,
-            scaling=("size", "triangles", "lights", "map"),
-        ),
-    )
-}
+_LAYER = "layer "  # begins the names of arrays that are layers of an image from elsewhere
+_COMPILED = 2.0  # that the kernels of a configuration or an estimator take [s], beside its work on one thread
 
 
 @dataclass(frozen=True)
 class SceneStudy:
-    """One scene and the effort of its study; properties that take time are computed on first use."""
+    """One scene and what to study of it; properties that take time are computed on first use."""
 
     loaded: LoadedScene  #: at the size of the images
-    effort: Effort
-
-    @cached_property
-    def digest(self) -> str:
-        """Digest of the content of the scene."""
-        return scene_digest(self.loaded.scene)
+    study: Study  #: with one size of images
+    machine: Mapping[str, str]  #: on which times hang
 
     @cached_property
     def scene(self) -> Scene:
@@ -150,111 +64,286 @@ class SceneStudy:
     @cached_property
     def timed(self) -> Scene | None:
         """The scene at the size of the timed frames; None if that is the size of the images."""
-        return None if self.effort.timed == self.effort.image else read_scene(self.at(self.effort.timed).scene)
+        size = self.study.measure.timed_size
+        return None if size is None or size == self.size else read_scene(self.at(size))
 
     @cached_property
-    def probe(self) -> Scene:
-        """The scene at a small size, for an estimate of the time of a full-size frame."""
-        return read_scene(self.at(_PROBE).scene)
+    def kept_truth(self) -> tuple[TruthImage, Kept]:
+        """The quadrature reference at pixel centres, and what it took."""
+        return kept_truth(self.loaded.scene)
 
-    @cached_property
+    @property
     def truth(self) -> TruthImage:
-        """The quadrature truth at pixel centres."""
-        return truth_image(self.loaded.scene)
+        """The quadrature reference at pixel centres."""
+        return self.kept_truth[0]
 
-    def truth_of(self, pixel: str) -> TruthImage:
-        """Return the quadrature truth at pixel centres, or its means over their areas: 'centre' or 'area'."""
-        return self.truth if pixel == "centre" else truth_image(self.loaded.scene, pixel=pixel)
+    @cached_property
+    def identity(self) -> str:
+        """What the scene is."""
+        return scene_identity(self.path)
+
+    @cached_property
+    def configurations(self) -> tuple[Configuration, ...]:
+        """What to measure."""
+        return configurations_for(self.scene.features, self.study.configurations)
 
     @property
     def name(self) -> str:
         """The name of a built-in scene, or the stem of the user's file."""
         return self.loaded.name
 
-    def at(self, size: tuple[int, int]) -> LoadedScene:
-        """Return the scene at another size [pixels]."""
-        return load_scene(str(self.loaded.path or self.loaded.name), size)
+    @property
+    def path(self) -> str:
+        """The name of a built-in scene, or the path of the user's file."""
+        return str(self.loaded.path or self.loaded.name)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Of the images [pixels]."""
+        return self.study.sizes[0]
+
+    def at(self, size: tuple[int, int]) -> Any:
+        """Return the `mi.Scene` at another size [pixels]."""
+        return load_scene(self.path, size).scene
+
+    def truth_of(self, pixel: str) -> TruthImage:
+        """Return the quadrature reference at pixel centres, or its means over their areas: 'centre' or 'area'."""
+        return self.truth if pixel == "centre" else truth_image(self.loaded.scene, pixel=pixel)
+
+    def cell(self, chosen: Configuration) -> Cell:
+        """Return the cell of a configuration."""
+        return Cell(self.path, self.size, (), chosen, self.study.measure)
+
+    def seconds(self) -> dict[str, float]:
+        """Return roughly what each part that is not kept will take on one thread [s], by name and by label."""
+        lights = len(self.scene.lights) + 16 * len(self.scene.area_lights)
+        checks, parts = self.study.checks, {"reference": 0.0}
+        if not has_truth(self.loaded.scene):
+            parts["reference"] = truth_work(self.size, lights=lights).seconds
+        parts["checks"] = 0.0 if is_kept(_checks_key(self)) else len(checks.margins) * (checks.patience or 60.0)
+        samples = 20 * checks.multiple[0] * checks.multiple[1]
+        works = {"multiple scattering": (_multiple_key(self), sampled_work(_MULTIPLE, samples))}
+        for chosen in self.configurations:
+            steps = steps_of(chosen.parameters) if chosen.method == "ray-march" else 0
+            work = frame_work(self.size, lights=rendered_lights(self.scene, chosen), steps=steps)
+            works[chosen.label] = (_cell_key(self, chosen), work)
+        return parts | {name: 0.0 if is_kept(key) else _COMPILED + work.seconds for name, (key, work) in works.items()}
 
 
-def open_study(name_or_path: str, effort: Effort) -> SceneStudy:
+@dataclass(frozen=True)
+class Judged:
+    """A row of a scene, and its image."""
+
+    row: Mapping[str, Any]  #: a `Row` as JSON has it
+    image: Image | None = None  #: its layers; None if there is none
+    expected: Array | None = None  #: what its layer `row["layer"]` was compared with, (height, width, 3) [W/(m^2 sr)]
+    whole: Array | None = None  #: what all of its light is compared with by HDR-FLIP; None where nobody asks
+    results: tuple[Result, ...] = ()  #: that it was made of
+
+    @property
+    def light(self) -> Array:
+        """All light, to look at, (height, width, 3) [W/(m^2 sr)]."""
+        assert self.image is not None
+        shown = [self.image.layers[name] for name in ("airlight", "surface", "total") if name in self.image.layers]
+        return np.sum([np.asarray(values, dtype=np.float64) for values in shown], axis=0)
+
+
+@dataclass(frozen=True)
+class SceneResult:
+    """All that a study says of a scene."""
+
+    study: SceneStudy
+    reference: TruthImage
+    agreement: Mapping[str, Any]  #: by estimator and layer, `validation.estimates.agreement.Agreement` as JSON has it
+    multiple: Mapping[str, Any]  #: `validation.estimates.multiple_scattering.MultipleScattering` as JSON has it
+    rows: tuple[Judged, ...]
+    seconds: Mapping[str, float]  #: that its parts took when they were computed
+    results: tuple[Result, ...] = field(repr=False, default=())  #: every part, as it was kept
+
+
+def open_scene(name_or_path: str, study: Study, machine: Mapping[str, str]) -> SceneStudy:
     """Load a scene for a study, by its built-in name or by the path of a Mitsuba XML file."""
-    return SceneStudy(load_scene(name_or_path, effort.image), effort)
+    return SceneStudy(load_scene(name_or_path, study.sizes[0]), study, machine)
 
 
-def check_truth(
-    study: SceneStudy, *, progress: Progress | None = None, spread: ElsewhereFor | None = None
-) -> dict[str, Agreement]:
-    """Compare the truth with the Monte Carlo estimators, with the size, margins and patience of the effort.
+def study_scene(
+    study: SceneStudy,
+    *,
+    images: Sequence[EngineImage] = (),
+    apart: Apart | None = None,
+    ended: Mapping[Configuration, str] | None = None,
+    progress: Callable[[str], None] = lambda part: None,
+    spread: ElsewhereFor | None = None,
+    workers: int = 1,
+) -> SceneResult:
+    """Return what a study says of a scene.
 
-    `spread` lets other processes trace batches.
+    Parameters
+    ----------
+    study
+        The scene.
+    images
+        From elsewhere, to judge.
+    apart
+        Calls a user's method in a process of its own.
+    ended
+        Configurations that ended such a process before, with how: they are not called again.
+    progress
+        Called with the name of each part, as of `SceneStudy.seconds`, before it begins.
+    spread
+        Lets other processes trace the batches that check the reference.
+    workers
+        Processes of HDR-FLIP at once: each runs on one processor.
     """
-    effort = study.effort
+    progress("reference")
+    truth, kept = study.kept_truth
+    made = Result({}, {}, kept.made, round(kept.spent.seconds, 3), kept.loaded)
+    progress("checks")
+    checks = cached_result(_checks_key(study), lambda: (plain(check_reference(study, spread=spread)), {}))
+    progress("multiple scattering")
+    multiple = cached_result(_multiple_key(study), partial(_multiple, study))
+    rows = []
+    for chosen in study.configurations:
+        progress(chosen.label)
+        rows.append(_row(study, chosen, apart, ended or {}))
+    # Nothing is timed any more: FLIP, which runs on one processor in a process of its own, may have all of them.
+    with ThreadPoolExecutor(workers) as pool:
+        rows = list(pool.map(_with_flip, rows))
+    rows += [_image(study, shown) for shown in images]
+    results = (made, checks, multiple, *(result for row in rows for result in row.results))
+    seconds = {"truth": made.seconds, "agreement": checks.seconds, "multiple": multiple.seconds}
+    seconds["methods"] = round(sum(result.seconds for result in results[3:]), 3)
+    return SceneResult(study, truth, checks.data, multiple.data, tuple(rows), seconds, results)
+
+
+def configurations_for(features: SceneFeatures, configurations: Sequence[Configuration]) -> tuple[Configuration, ...]:
+    """Return the configurations that differ in this scene from the ones before them.
+
+    Variants of the shadows are left out if nothing casts a shadow. The published treatment of bounded media is left out
+    if the scene has none, or if they do not lie in vacuum, and so are light samples where there is no area light.
+    """
+    without_effect = set() if features.shadows else {"shadow", "order", "map"}
+    without_effect |= set() if features.clear else {"media"}
+    without_effect |= set() if features.area_lights else {"points", "pattern"}
+    return tuple(chosen for chosen in configurations if not without_effect & set(dict(chosen.parameters)))
+
+
+def check_reference(study: SceneStudy, *, spread: ElsewhereFor | None = None) -> dict[str, Any]:
+    """Compare the reference with the Monte Carlo estimators; see `validation.estimates.agreement.agreements`."""
+    checks = study.study.checks
     return agreements(
-        study.at(effort.checked).scene,
-        effort.margins,
-        batches=effort.batches,
-        samples=effort.samples,
-        seconds=effort.patience,
-        progress=progress,
+        study.at(checks.size),
+        checks.margins,
+        batches=checks.batches,
+        samples=checks.samples,
+        seconds=checks.patience,
         spread=spread,
     )
 
 
-def study_multiple(study: SceneStudy) -> MultipleScattering:
-    """Measure the share of light that single scattering leaves out."""
-    batches, samples = study.effort.multiple
-    return multiple_scattering_share(study.at(_MULTIPLE).scene, batches=batches, samples=samples)
+def _checks_key(study: SceneStudy) -> str:
+    asked = asdict(study.study.checks)
+    return key_of("scene-checks", check_reference, scene=study.identity, machine=study.machine, **asked)
 
 
-def study_configuration(study: SceneStudy, chosen: Configuration, *, apart: Apart | None = None) -> Measurement:
-    """Measure a configuration against the truth, without HDR-FLIP, which `with_flips` adds.
+def _multiple_key(study: SceneStudy) -> str:
+    asked = study.study.checks.multiple
+    return key_of("scene-multiple", multiple_scattering_share, scene=study.identity, multiple=asked)
 
-    A method of the user's own is called by `apart`, if given.
-    """
-    effort = study.effort
-    render = None
-    if chosen.own and apart is not None:
-        name = str(study.loaded.path or study.loaded.name)
-        function = partial(
-            render_and_time_by_name,
-            timed=effort.timed,
-            probe=_PROBE,
-            seconds=effort.seconds,
-            slow=effort.slow,
-            limit=effort.limit,
-        )
-        render = partial(apart, function, name, effort.image, chosen, name=chosen.method)
-    return measure(
-        study.scene,
-        chosen,
-        truth=study.truth,
-        timed=study.timed,
-        seconds=effort.seconds,
-        slow=effort.slow,
-        limit=effort.limit,
-        probe=lambda: study.probe,
-        render=render,
+
+def _multiple(study: SceneStudy) -> Computed:
+    batches, samples = study.study.checks.multiple
+    return plain(multiple_scattering_share(study.at(_MULTIPLE), batches=batches, samples=samples)), {}
+
+
+def _cell_key(study: SceneStudy, chosen: Configuration) -> str:
+    cell = replace(study.cell(chosen), scene=study.identity)
+    return key_of("cell", _measured, cell=cell, code=user_code(chosen), machine=study.machine)
+
+
+def _measured(study: SceneStudy, chosen: Configuration, apart: Apart | None) -> Computed:
+    """Return the row and the image of a configuration."""
+    row, frame = run(study.cell(chosen), study.scene, of_image(study.truth), timed_scene=study.timed, apart=apart)
+    if frame is None:
+        return plain(row), {}
+    return plain(row), {"airlight": frame.airlight, "surface": frame.surface, "depth": frame.distance, **frame.extra}
+
+
+def _row(study: SceneStudy, chosen: Configuration, apart: Apart | None, ended: Mapping[Configuration, str]) -> Judged:
+    if chosen in ended:
+        row = plain(cell_row(study.cell(chosen), status="refused", reason=ended[chosen]))
+        return Judged(row, results=(Result(row, {}, time.time(), 0.0, False),))
+    _ = study.truth  # loaded or computed now: it is no part of the time of a configuration
+    # A fault of the user's method may have gone by the next run.
+    worth = (lambda row: row["status"] == "done") if chosen.own else (lambda row: True)
+    result = cached_result(_cell_key(study, chosen), partial(_measured, study, chosen, apart), worth=worth)
+    if not result.arrays:
+        return Judged(result.data, results=(result,))
+    airlight, surface, distance = (result.arrays[name] for name in ("airlight", "surface", "depth"))
+    extra = {name: array for name, array in result.arrays.items() if name not in ("airlight", "surface", "depth")}
+    image = layered_frame(study.name, chosen, Frame(airlight, surface, distance, extra))
+    whole = study.truth.airlight + study.truth.surface if study.study.wants_flip(chosen) else None
+    return Judged(result.data, image, study.truth.airlight, whole, (result,))
+
+
+def _with_flip(judged: Judged) -> Judged:
+    """Return a row with its HDR-FLIP, whose map is a grey layer of the image, where it is asked for."""
+    if judged.whole is None or judged.image is None:
+        return judged
+    shown = judged.whole, judged.light
+
+    def compute() -> Computed:
+        flip = flip_hdr(*shown)
+        return flip.to_json(), {} if flip.error_map is None else {"map": flip.error_map}
+
+    result = cached_result(key_of("flip", flip_hdr, images=shown, version=_flip_version()), compute)
+    image = judged.image
+    if "map" in result.arrays:
+        grey = np.repeat(result.arrays["map"][:, :, None], 3, axis=2)
+        image = replace(image, layers=dict(image.layers) | {"flip": grey})
+    return replace(judged, row={**judged.row, "flip": result.data}, image=image, results=(*judged.results, result))
+
+
+def _image(study: SceneStudy, shown: EngineImage) -> Judged:
+    """Return the row of an image from elsewhere."""
+    digest = hashlib.sha256(shown.path.read_bytes()).hexdigest()
+    key = key_of("scene-image", _image_measured, scene=study.identity, size=study.size, label=shown.label, file=digest)
+    result = cached_result(key, partial(_image_measured, study, shown))
+    layers = {name.removeprefix(_LAYER): array for name, array in result.arrays.items() if name.startswith(_LAYER)}
+    attributes = {"airlight:scene": study.name, "airlight:image": shown.path.name}
+    whole = None if study.study.flip == "none" else result.arrays.get("whole")
+    return Judged(result.data, Image(layers, attributes=attributes), result.arrays["expected"], whole, (result,))
+
+
+def _image_measured(study: SceneStudy, shown: EngineImage) -> Computed:
+    measured = measure_image(shown, study.truth_of, surfaces=study.scene.features.surfaces)
+    row = Row(
+        scene=study.path,
+        label=shown.label,
+        method="image",
+        kernel=None,
+        parameters="{}",
+        width=study.size[0],
+        height=study.size[1],
+        status="done",
+        note=measured.note,
+        kind="image",
+        layer=measured.layer,
+        pixel=measured.pixel,
+        error=measured.error,
+        surface_error=measured.surface_error,
     )
+    arrays = {f"{_LAYER}{name}": values for name, values in measured.image.layers.items()}
+    arrays["expected"] = measured.expected
+    if measured.layer == TOTAL:
+        arrays["whole"] = measured.expected
+    elif "surface" in measured.image.layers or not np.any(measured.truth.surface > 0):
+        arrays["whole"] = measured.truth.airlight + measured.truth.surface
+    return plain(row), arrays
 
 
-def with_flips(study: SceneStudy, measured: Sequence[Measurement], *, workers: int) -> list[Measurement]:
-    """Return measurements with their HDR-FLIP, if the effort asks for it.
-
-    FLIP runs on one processor in a process of its own, so `workers` of them take no longer than one. They must not run
-    while anything is timed.
-    """
-
-    def flipped(measurement: Measurement) -> Measurement:
-        frame = measurement.frame
-        if frame is None or not wants_flip(study.effort, measurement.configuration):
-            return measurement
-        light = study.truth.airlight + study.truth.surface
-        return replace(measurement, flip=flip_hdr(light, frame.airlight + frame.surface))
-
-    with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(flipped, measured))
-
-
-def wants_flip(effort: Effort, chosen: Configuration) -> bool:
-    """Return whether an effort asks for the HDR-FLIP of a configuration."""
-    return effort.flip == "all" or (effort.flip == "kinds" and (chosen in QUICK or chosen.own))
+def _flip_version() -> str:
+    try:
+        return version("flip-evaluator")
+    except PackageNotFoundError:
+        return "missing"

@@ -11,7 +11,7 @@
     flip = false                                            # HDR-FLIP takes about a second a cell
     times = "with"                                          # or "none", or "alone"
     # timed = 150                                           # with "alone": how many scenes, the first; else all
-    limit = 600                                             # seconds that a cell or a truth may take
+    limit = 600                                             # seconds that a cell or a reference may take
     retries = 3                                             # how often a cell is begun again whose process died
 
     [random]
@@ -24,33 +24,81 @@
     steps = [16, 100]                                       # a list has a cell for each of its values
     shadow = "map"
 
-A cell is one combination of all of these. Every mistake is refused by name before any work.
+A cell is one combination of all of these. Every mistake is refused by name before any work. What a report measures is
+a study too (`validation/study/studies/`), which says more:
+
+    scenes = "all"                                          # every built-in scene of fog
+    half = ["fence"]                                        # scenes that are compared at half the width
+    methods = "quick"                                       # one of each kind
+    metrics = "usual"                                       # without those of other tools and colours
+    flip = "kinds"                                          # of the methods of "quick" alone
+    times = "stages"                                        # all stages, frames after light, objects or colours changed
+    timed_size = "800x600"                                  # of the frames that are timed
+    seconds = 0.1                                           # on each of these times
+    slow = 0.04                                             # a longer frame is timed stage by stage [s]
+    frame_limit = 10                                        # a cell is left out if a frame would take longer [s]
+    stability = 10_000                                      # rays on which kernels are tried
+    growth = ["size", "map"]                                # by which work times are to grow (`ladders.py`)
+
+    [checks]                                                # of the references
+    size = "64x48"
+    margins = { single-scatter = 0.0005, volpath = 0.01 }   # of the relative bias, by estimator
+    samples = { single-scatter = 128, volpath = 16 }        # a pixel in each batch, by estimator
+    batches = 2048                                          # at most
+    multiple = [8, 4]                                       # batches and samples, for multiple scattering
+    patience = 18                                           # an estimator that has not decided is stopped [s]
 """
 
 import itertools
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from dataclasses import dataclass, field, fields, replace
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
 from analytic.errors import InputError, nearest
-from realtime.methods.registry import METHODS
+from realtime.methods.registry import FOG_METHODS, METHODS
 from validation.random_scenes.ranges import ranges_from, read_ranges
 from validation.scenes.changes import change_words
 from validation.scenes.loading import parse_size
 from validation.scenes.random_scene import PREFIX, is_random, random_name
-from validation.scenes.registry import SCENES
-from validation.study.configuration import QUICK, STANDARD, Configuration, configuration, find_kernel
-from validation.study.row import TIMES
+from validation.scenes.registry import FOG_SCENES, SCENES
+from validation.study.configuration import QUICK, Configuration, chosen_configurations, configuration, find_kernel
+
+#: How frames are timed: 'none'; 'with' the computation of errors, briefly, whatever else runs on the host; 'alone',
+#: where nothing else of the study runs there; 'stages': all stages, and frames after light, objects or colours changed.
+TIMES = ("none", "with", "alone", "stages")
 
 SIZE = (160, 120)  #: of the images where a study gives none [pixels]
 
-_METHOD_SETS = ("all", "standard")
+#: Studies of ours, and the kinds of work by which times may grow.
+STUDIES = ("quick", "default", "full")
+GROWTH = ("size", "triangles", "lights", "media", "map")
+
+_FOLDER = Path(__file__).parent / "studies"
+_METHOD_SETS = ("all", "quick", "standard")
+_KEYS = (
+    *("name", "scenes", "random", "half", "sizes", "methods", "kernels", "parameters", "maps", "media", "metrics"),
+    *("flip", "times", "timed", "timed_size", "seconds", "slow", "frame_limit", "limit", "retries", "checks"),
+    *("stability", "growth"),
+)
 _LONGEST = 86400.0
 _MOST_RETRIES = 100
 _MOST_SCENES = 10_000_000
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What to measure of a cell beside its errors."""
+
+    times: str = "with"  #: one of `TIMES`
+    seconds: float = 0.6  #: spent on each of the times of 'stages'
+    timed_size: tuple[int, int] | None = None  #: of the frames that are timed by stages [pixels]; None: of the image
+    slow: float | None = None  #: see `validation.study.frame_times.time_frame` [s]
+    limit: float | None = None  #: a cell is left out if a frame would take longer [s]; None: never
+    flip: bool = False  #: HDR-FLIP, which takes about a second
+    every_metric: bool = True  #: those of other tools, colours, and the error that a method states for itself
 
 
 @dataclass(frozen=True)
@@ -61,13 +109,12 @@ class Cell:
     size: tuple[int, int]  #: width and height [pixels]
     medium: tuple[str, ...]  #: changes of the medium, as `parse_changes` reads them
     chosen: Configuration
-    flip: bool = False  #: whether HDR-FLIP is asked for
-    times: str = "with"  #: one of `validation.study.row.TIMES`
+    measure: Measure = Measure()
 
     @property
     def image(self) -> "Cell":
-        """The cell that stands for all cells of the same image, which share a truth."""
-        return replace(self, chosen=Configuration("truth"), flip=False, times="none")
+        """The cell that stands for all cells of the same image, which share a reference."""
+        return replace(self, chosen=Configuration("truth"), measure=Measure())
 
 
 @dataclass(frozen=True)
@@ -81,20 +128,61 @@ class RandomScenes:
 
 
 @dataclass(frozen=True)
+class Checks:
+    """How the references of a study are held against Monte Carlo estimators."""
+
+    size: tuple[int, int] = (64, 48)  #: of the images [pixels]
+    margins: Mapping[str, float] = field(default_factory=lambda: {"single-scatter": 0.0005, "volpath": 0.01})
+    samples: Mapping[str, int] = field(default_factory=lambda: {"single-scatter": 128, "volpath": 16})
+    batches: int = 2048  #: largest number of batches
+    multiple: tuple[int, int] = (8, 4)  #: batches, and samples a pixel in each, for the share of multiple scattering
+    patience: float | None = None  #: an estimator that has not decided after this time is stopped [s]; None: never
+
+
+@dataclass(frozen=True)
 class Study:
     """What a study file says; the defaults are those of a study without a file."""
 
     name: str = "sweep"
     scenes: tuple[str, ...] = ()
     random: RandomScenes = RandomScenes()
+    half: tuple[str, ...] = ()  #: scenes that are compared at half the width
     sizes: tuple[tuple[int, int], ...] = (SIZE,)
     configurations: tuple[Configuration, ...] = ()
     media: tuple[tuple[str, ...], ...] = ((),)
-    flip: bool = False
-    times: str = "with"
+    measure: Measure = Measure()
+    flip: str = "none"  #: which configurations get HDR-FLIP: 'none', 'kinds' (those of `QUICK`) or 'all'
     timed: int | None = None  #: scenes that are timed alone, the first; None for all
-    limit: float = 600.0  #: seconds that a cell or a truth may take
+    limit: float = 600.0  #: seconds that a cell or a reference may take
     retries: int = 3  #: how often a cell is begun again whose process died
+    checks: Checks = Checks()
+    stability: int = 0  #: generated rays for the stability of kernels; 0 leaves it out
+    growth: tuple[str, ...] = ()  #: kinds of work by whose growth a scene is timed
+
+    def at(self, size: tuple[int, int] | None) -> "Study":
+        """Return the study with images and timed frames of another size [pixels]; itself for None."""
+        return self if size is None else replace(self, sizes=(size,), measure=replace(self.measure, timed_size=size))
+
+    def of(self, scene: str) -> "Study":
+        """Return the study of one scene: those of `half` are compared at half the width.
+
+        A batch of volpath has as many paths there as in others: launches would take all the time of fewer.
+        """
+        if scene not in self.half:
+            return self
+        size, checked = ((width // 2, height // 2) for width, height in (self.sizes[0], self.checks.size))
+        samples = {**self.checks.samples, "volpath": 4 * self.checks.samples["volpath"]}
+        timed = self.measure.timed_size or self.sizes[0]
+        return replace(
+            self,
+            sizes=(size,),
+            measure=replace(self.measure, timed_size=timed),
+            checks=replace(self.checks, size=checked, samples=samples),
+        )
+
+    def wants_flip(self, chosen: Configuration) -> bool:
+        """Return whether HDR-FLIP of a configuration is asked for."""
+        return self.flip == "all" or (self.flip == "kinds" and (chosen in QUICK or chosen.own))
 
     @property
     def scene_count(self) -> int:
@@ -127,11 +215,14 @@ class Study:
     def images(self) -> Iterator[tuple[Cell, ...]]:
         """Yield the cells of one image after the other: they share a truth."""
         for scene, size, medium in itertools.product(self.scene_names(), self.sizes, self.media):
-            yield tuple(Cell(scene, size, medium, each, self.flip, self.times) for each in self.configurations)
+            yield tuple(
+                Cell(scene, size, medium, each, replace(self.measure, flip=self.wants_flip(each)))
+                for each in self.configurations
+            )
 
     def timed_images(self) -> Iterator[tuple[Cell, ...]]:
         """Yield those `images` whose cells are timed alone."""
-        if self.times != "alone":
+        if self.measure.times != "alone":
             return iter(())
         count = None if self.timed is None else self.timed * len(self.sizes) * len(self.media)
         return itertools.islice(self.images(), count)
@@ -195,29 +286,73 @@ def parse_study(data: Mapping[str, Any], *, folder: Path = Path(), name: str = "
     InputError
         As `read_study`.
     """
-    known = ("name", "scenes", "random", "sizes", "methods", "kernels", "parameters", "maps", "media", "flip", "times")
-    _known("", data, (*known, "timed", "limit", "retries"))
-    sizes = tuple(parse_size(_word("sizes", size)) for size in _list("sizes", data.get("sizes", ["160x120"])))
-    for size in sizes:
-        if not all(1 <= side <= 16384 for side in size):
-            raise InputError(f"sizes: got {size[0]}x{size[1]}, wanted at least 1x1 and at most 16384 pixels on a side")
+    _known("", data, _KEYS)
     times = _one_of("times", data.get("times", "with"), TIMES)
     if "timed" in data and times != "alone":
         raise InputError(f'timed: it is of times = "alone", got times = "{times}"; leave one of them out')
-    given = Study(
+    scenes = data.get("scenes", [])
+    named = tuple(FOG_SCENES) if scenes == "all" else tuple(_scene(item, folder) for item in _list("scenes", scenes, 0))
+    flip = data.get("flip", False)
+    return Study(
         name=_word("name", data.get("name", name)),
-        scenes=tuple(_scene(item, folder) for item in _list("scenes", data.get("scenes", []), empty=True)),
+        scenes=_once("scenes", named),
         random=_random(data.get("random", {}), folder),
-        sizes=_once("sizes", sizes),
+        half=tuple(_word("half", item) for item in _list("half", data.get("half", []), 0)),
+        sizes=_once("sizes", tuple(_size("sizes", size) for size in _list("sizes", data.get("sizes", ["160x120"])))),
         configurations=_configurations(data),
         media=_once("media", tuple(_medium(item) for item in _list("media", data.get("media", [{}])))),
-        flip=_truth_value("flip", data.get("flip", False)),
-        times=times,
+        measure=Measure(
+            times=times,
+            seconds=_number("seconds", data.get("seconds", 0.6), 0, _LONGEST, whole=False),
+            timed_size=_size("timed_size", data["timed_size"]) if "timed_size" in data else None,
+            slow=_number("slow", data["slow"], 0, _LONGEST, whole=False) if "slow" in data else None,
+            limit=_number("frame_limit", data["frame_limit"], 0, _LONGEST, False) if "frame_limit" in data else None,
+            every_metric=_one_of("metrics", data.get("metrics", "all"), ("usual", "all")) == "all",
+        ),
+        flip="kinds" if flip == "kinds" else "all" if _truth_value("flip", flip) else "none",
         timed=_number("timed", data["timed"], 1, _MOST_SCENES) if "timed" in data else None,
         limit=float(_number("limit", data.get("limit", 600), 1e-3, _LONGEST, whole=False)),
         retries=_number("retries", data.get("retries", 3), 0, _MOST_RETRIES),
+        checks=_checks(_table("checks", data.get("checks", {}))),
+        stability=_number("stability", data.get("stability", 0), 0, _MOST_SCENES),
+        growth=tuple(_one_of("growth", kind, GROWTH) for kind in _list("growth", data.get("growth", []), 0)),
     )
-    return replace(given, scenes=_once("scenes", given.scenes))
+
+
+@cache
+def standard_study(name: str) -> Study:
+    """Return a study of ours by its name, one of `STUDIES`."""
+    return read_study(_FOLDER / f"{name}.toml")
+
+
+def _checks(table: Mapping[str, Any]) -> Checks:
+    usual = Checks()
+    _known("checks.", table, [item.name for item in fields(Checks)])
+    margins, samples = (
+        {name: _number(f"checks.{what}.{name}", value, least, most, whole) for name, value in given.items()}
+        for what, given, least, most, whole in (
+            ("margins", _table("checks.margins", table.get("margins", usual.margins)), 0, 1, False),
+            ("samples", _table("checks.samples", table.get("samples", usual.samples)), 1, 256, True),
+        )
+    )
+    if margins.keys() != samples.keys():
+        raise InputError("checks: margins and samples name other estimators; name the same in both")
+    first, each = _list("checks.multiple", table.get("multiple", list(usual.multiple)), 2)[:2]
+    return Checks(
+        size=_size("checks.size", table["size"]) if "size" in table else usual.size,
+        margins=margins,
+        samples=samples,
+        batches=_number("checks.batches", table.get("batches", usual.batches), 2, 1 << 16),
+        multiple=(_number("checks.multiple", first, 2, 1 << 16), _number("checks.multiple", each, 1, 256)),
+        patience=_number("checks.patience", table["patience"], 0, _LONGEST, False) if "patience" in table else None,
+    )
+
+
+def _size(what: str, value: Any) -> tuple[int, int]:
+    size = parse_size(_word(what, value))
+    if not all(1 <= side <= 16384 for side in size):
+        raise InputError(f"{what}: got {size[0]}x{size[1]}, wanted at least 1x1 and at most 16384 pixels on a side")
+    return size
 
 
 def _configurations(data: Mapping[str, Any]) -> tuple[Configuration, ...]:
@@ -226,7 +361,8 @@ def _configurations(data: Mapping[str, Any]) -> tuple[Configuration, ...]:
     asked = data.get("methods", "all")
     if isinstance(asked, str):
         _one_of("methods", asked, _METHOD_SETS)
-        standard = STANDARD if asked == "standard" else default_configurations()
+        sets = {"quick": lambda: QUICK, "standard": lambda: chosen_configurations(list(FOG_METHODS))}
+        standard = sets.get(asked, default_configurations)()
         if not (parameters or "kernels" in data or "maps" in data):
             return standard
         names = list(dict.fromkeys(each.method for each in standard))
@@ -350,9 +486,9 @@ def _table(what: str, value: Any) -> Mapping[str, Any]:
     return value
 
 
-def _list(what: str, value: Any, *, empty: bool = False) -> list[Any]:
-    if not isinstance(value, list) or not (value or empty):
-        raise InputError(f"{what}: got {value!r}, wanted a list" + ("" if empty else " with at least one entry"))
+def _list(what: str, value: Any, least: int = 1) -> list[Any]:
+    if not isinstance(value, list) or len(value) < least:
+        raise InputError(f"{what}: got {value!r}, wanted a list" + (f" with at least {least} entries" if least else ""))
     return value
 
 
@@ -374,7 +510,7 @@ def _truth_value(what: str, value: Any) -> bool:
     return value
 
 
-def _number(what: str, value: Any, least: float, most: float, *, whole: bool = True) -> Any:
+def _number(what: str, value: Any, least: float, most: float, whole: bool = True) -> Any:
     if type(value) not in ((int,) if whole else (int, float)) or not least <= value <= most:
         kind = "a whole number" if whole else "a number"
         raise InputError(f"{what}: got {value!r}, wanted {kind} from {least:g} to {most:g}")

@@ -183,13 +183,14 @@ def functions():
     from reference.monte_carlo.volpath.integrator import volpath_batch
     from reference.quadrature.image import quadrature_image
     from reports.page.image_index import packed_scene
-    from reports.report.computed import judged_result, measured_result, truth_result
+    from validation.estimates.multiple_scattering import multiple_scattering_share
     from validation.kernels.rays import _truth
     from validation.kernels.stability import stability
+    from validation.metrics.flip import flip_hdr
     from validation.study.growth import study_scaling
-    from validation.study.reference import sampled_truth
-    from validation.study.scene import check_truth, study_multiple
-    from validation.study.work import cell_row
+    from validation.study.reference import sampled_reference
+    from validation.study.run import run
+    from validation.study.scene import _image_measured, _measured, check_reference
 
     quadrature = "reference.quadrature.segments"
     return {
@@ -198,14 +199,14 @@ def functions():
         "volpath": (volpath_batch, "reference.scene.read"),
         "cloud-paths": (cloud_paths_batch, "reference.monte_carlo.cloud_paths.walk"),
         "kernel-rays": (_truth, "analytic.panels"),
-        "sweep-truth": (sampled_truth, quadrature),
-        "row": (cell_row, "realtime.methods.ray_march"),
+        "sweep-truth": (sampled_reference, quadrature),
+        "row": (run, "realtime.methods.ray_march"),
         "page": (packed_scene, "reports.page.image_codec"),
-        "report-truth": (truth_result, quadrature),
-        "report-agreement": (check_truth, "validation.statistics.relative_bias"),
-        "report-multiple": (study_multiple, "reference.monte_carlo.volpath.integrator"),
-        "report-method": (measured_result, "realtime.methods.ray_march"),
-        "report-image": (judged_result, "validation.metrics.errors"),
+        "scene-checks": (check_reference, "validation.statistics.relative_bias"),
+        "scene-multiple": (multiple_scattering_share, "reference.monte_carlo.volpath.integrator"),
+        "cell": (_measured, "realtime.methods.ray_march"),
+        "scene-image": (_image_measured, "validation.metrics.errors"),
+        "flip": (flip_hdr, "validation.metrics.errors"),
         "report-stability": (stability, "realtime.kernels.exact"),
         "report-scaling": (study_scaling, "realtime.methods.ray_march"),
     }

@@ -2,7 +2,6 @@
 """Claim: a report whose truths and checks a cluster computed says what it says without one."""
 
 import json
-from dataclasses import replace
 
 import pytest
 
@@ -11,7 +10,7 @@ pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
 from reports.cluster.connect import Place, connected
 from reports.report.measure import write_report
 from validation.study.configuration import configuration
-from validation.study.scene import EFFORTS
+from validation.study.study import Checks, Measure, Study
 
 #: Names of what is measured by the clock.
 TIMES = {"created", "seconds", "parts", "measured", "stages", "times", "environment", "claims"}
@@ -28,16 +27,16 @@ def without_times(data):
 @pytest.mark.slow
 @pytest.mark.claim("reports-from-clusters", tolerance="none: the same numbers, but for times")
 def test_a_report_from_a_cluster_says_the_same(tmp_path, monkeypatch, variant):
-    sizes = {"image": (32, 24), "timed": (32, 24), "checked": (16, 12)}
     # No patience, which a busy machine would try; margins that some dozen batches decide.
-    margins = {"single-scatter": 0.02, "volpath": 0.2}
-    small = replace(EFFORTS["quick"], **sizes, margins=margins, patience=None, batches=64, seconds=0.01)
-    chosen = [configuration("shadow-planes"), configuration("ray-march")]
+    checks = Checks((16, 12), {"single-scatter": 0.02, "volpath": 0.2}, {"single-scatter": 32, "volpath": 8}, 64)
+    measure = Measure("stages", 0.01, every_metric=False)
+    chosen = (configuration("shadow-planes"), configuration("ray-march"))
+    study = Study("small", ("sphere-spot",), sizes=((32, 24),), configurations=chosen, measure=measure, checks=checks)
 
     def report(name, cluster):
         monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / f"cache-{name}"))
-        folder, scenes = tmp_path / name, ["sphere-spot"]
-        data = write_report(folder, scenes=scenes, effort=small, configurations=chosen, cluster=cluster)
+        folder = tmp_path / name
+        data = write_report(folder, study, cluster=cluster)
         images = {path.relative_to(folder): path.read_bytes() for path in folder.rglob("reference.exr")}
         return without_times(json.loads(json.dumps(data))), images
 

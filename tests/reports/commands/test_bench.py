@@ -68,7 +68,7 @@ def test_scaling_that_grows_more_steeply_than_before_ends_with_1(variant, capfd,
     from tests.helpers.reports import growth_record
 
     monkeypatch.setattr("validation.study.growth.study_scaling", lambda *given, **options: [growth_record()])
-    monkeypatch.setattr("reports.data.serialize.scaling_data", lambda name, size, found: found)
+    monkeypatch.setattr("reports.report.others.scaling_data", lambda name, size, found: found)
     before = tmp_path / "before.json"
     arguments = ["sphere-spot", "--scaling", "size", "--method", "unshadowed", "--against", str(before)]
     for exponent, status in ((0.47, 0), (0.1, 1)):

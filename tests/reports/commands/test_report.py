@@ -60,8 +60,8 @@ def handed_on(monkeypatch):
     """What the command hands to `write_report`."""
     given = {}
 
-    def write(folder, **options):
-        given.update(options, folder=folder)
+    def write(folder, study, **options):
+        given.update(options, folder=folder, scenes=study.scenes, configurations=study.configurations)
         claims = [{"text": "`--full` has all."}]
         return {"claims": claims, "scenes": [], "seconds": 1.2, "kept": 0, "computed": 3, "measured": None}
 
@@ -112,7 +112,7 @@ def _measured(handed_on):
 def test_methods_and_parameters_are_those_of_render_and_bench(variant, handed_on):
     """One configuration of each method that is named, with the kernel and the parameters that are given."""
     assert run(["report", "open-fog", "--method", "ray-march", "--set", "steps=32"]) == 0
-    assert handed_on["scenes"] == ["open-fog"]
+    assert handed_on["scenes"] == ("open-fog",)
     assert _measured(handed_on) == [("ray-march", None, {"steps": 32})]
     named = ["--method", "shadow-planes", "--method", "light-volumes", "--kernel", "taylor"]
     assert run(["report", "open-fog", *named, "--set", "tolerance=0.01"]) == 0
@@ -132,7 +132,7 @@ def test_what_is_named_is_measured_alone_and_all_are_a_word(variant, mine, hande
     assert [each[0] for each in _measured(handed_on)] == ["fog_of_mine:half"]
     assert "note: what --method names is measured alone; --method all adds" in capsys.readouterr().err
     assert run(["report", "--quick", "--method", "all", "--method", "fog_of_mine:half"]) == 0
-    assert handed_on["configurations"][:-1] == list(QUICK)
+    assert handed_on["configurations"][:-1] == QUICK
     assert handed_on["configurations"][-1].method == "fog_of_mine:half"
     assert capsys.readouterr().err == ""
 
@@ -152,7 +152,7 @@ def test_with_images_alone_their_scenes_are_studied(variant, images, handed_on):
     labels = {name: [image.label for image in several] for name, several in handed_on["images"].items()}
     assert labels == {"omni-box": ["engine"], "open-fog": ["a", "b"]}
     assert run(["report", "--quick", "--images", str(images), "omni-box", "sphere-spot"]) == 0
-    assert handed_on["scenes"] == ["omni-box", "sphere-spot"]
+    assert handed_on["scenes"] == ("omni-box", "sphere-spot")
     assert list(handed_on["images"]) == ["omni-box"]
 
 

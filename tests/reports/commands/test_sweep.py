@@ -13,6 +13,7 @@ import pytest
 
 pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
 
+from validation.study.row import FRAME_MS
 from validation.study.rows import ROWS, RowStore
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -46,12 +47,14 @@ def test_a_killed_sweep_goes_on_and_a_second_computes_nothing(tmp_path):
     study.write_text(STUDY)
     begun = subprocess.Popen([*COMMAND, study, "-o", folder, "--cluster", "local:1"], stderr=subprocess.DEVNULL)
     until = time.monotonic() + 600
-    while time.monotonic() < until and not ((folder / ROWS).exists() and (folder / ROWS).stat().st_size):
+    with RowStore(tmp_path / "empty") as store:
+        empty = store.path.stat().st_size
+    while time.monotonic() < until and not ((folder / ROWS).exists() and (folder / ROWS).stat().st_size > empty):
         time.sleep(0.05)
     begun.send_signal(signal.SIGKILL)
     begun.wait()
     with RowStore(folder) as store:
-        kept = {row["key"]: row["started"] for row in store.rows()}
+        kept = {row["key"]: row["origin.started"] for row in store.rows()}
     assert 1 <= len(kept) <= 8
     ran = _run(study, "-o", folder, "--cluster", "local:2", "--json")
     assert ran.returncode == 0, ran.stderr
@@ -60,9 +63,9 @@ def test_a_killed_sweep_goes_on_and_a_second_computes_nothing(tmp_path):
     rows = _rows(folder)
     assert len({row["key"] for row in rows}) == len(rows) == 8
     assert {row["status"] for row in rows} == {"done"}
-    assert {key: value for key, value in ((row["key"], row["started"]) for row in rows) if key in kept} == kept
+    assert {key: value for key, value in ((row["key"], row["origin.started"]) for row in rows) if key in kept} == kept
     assert {row["seed"] for row in rows} == {None, 3}
-    assert {row["property.lights"] is None for row in rows} == {False}
+    assert {row["properties.lights"] is None for row in rows} == {False}
     assert all(row["picture"][:4] == b"RIFF" for row in rows)
     again = json.loads(_run(study, "-o", folder, "--json").stdout)
     assert (again["kept"], again["computed"]) == (8, 0)
@@ -78,14 +81,14 @@ def test_times_of_a_process_alone_are_added_to_the_errors_of_all(tmp_path):
     assert (summary["cells"], summary["computed"], summary["timed_alone"], summary["problems"]) == (6, 6, 6, [])
     rows = _rows(folder)
     assert len({row["key"] for row in rows}) == len(rows) == 6
-    assert {(row["status"], row["timed_alone"]) for row in rows} == {("done", True)}
-    assert all(row["frame_ms"] > 0 and row["p99"] is not None for row in rows)
+    assert {(row["status"], row["cost.alone"]) for row in rows} == {("done", True)}
+    assert all(row[FRAME_MS] > 0 and row["error.p99"] is not None for row in rows)
     with RowStore(folder) as store:  # a run that ended between the errors and the times
         row = store.row(rows[0]["key"])
-        store.add(row | {"frame_ms": None, "timed_alone": None})
+        store.add(row | {FRAME_MS: None, "cost.alone": None})
     again = json.loads(_run(study, "-o", folder, "--cluster", "local:2", "--json").stdout)
     assert (again["kept"], again["computed"], again["timed_alone"]) == (6, 0, 1)
-    assert {row["timed_alone"] for row in _rows(folder)} == {True}
+    assert {row["cost.alone"] for row in _rows(folder)} == {True}
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from reports.report.scene import file_stems, folder_of
 from tests.helpers.reports import checked
 from validation.scenes.random_scene import random_name
 from validation.study.configuration import Configuration
-from validation.study.scene import Effort, check_truth
+from validation.study.study import Checks, Measure, Study
 
 SCENE = """<scene version="3.0.0">
     <medium type="homogeneous" id="fog">
@@ -37,21 +37,16 @@ SCENE = """<scene version="3.0.0">
     <shape type="rectangle"><transform name="to_world"><scale value="6.3"/></transform></shape>
 </scene>
 """
-# Numbers of samples and no times: what two runs find must not hang on how busy the machine is.
-TINY = Effort(
-    "tiny",
-    (20, 15),
-    (12, 9),
-    (10, 8),
-    {"single-scatter": 0.2, "volpath": 0.5},
-    {"single-scatter": 4, "volpath": 4},
-    0.01,
-    batches=32,
-    multiple=(4, 1),
-    limit=1e6,
-)
 MARCH = Configuration("ray-march", None, (("steps", 50),))
 CHOSEN = (Configuration("unshadowed", "taylor"), Configuration("unshadowed", "quadrature"), MARCH)
+# Numbers of samples and no times: what two runs find must not hang on how busy the machine is.
+TINY = Study(
+    "tiny",
+    sizes=((20, 15),),
+    configurations=CHOSEN,
+    measure=Measure("stages", 0.01, (12, 9), slow=0.04, limit=1e6, every_metric=False),
+    checks=Checks((10, 8), {"single-scatter": 0.2, "volpath": 0.5}, {"single-scatter": 4, "volpath": 4}, 32, (4, 1)),
+)
 
 
 @pytest.fixture(scope="module")
@@ -80,9 +75,7 @@ def written(variant, tmp_path_factory, cache_of_module, monkeypatch_of_module):
     told = []
     data = write_report(
         folder / "out" / "here",
-        scenes=[str(folder / "my <fog>.xml")],
-        effort=TINY,
-        configurations=CHOSEN,
+        replace(TINY, scenes=(str(folder / "my <fog>.xml"),)),
         command="airlight report --tiny",
         progress=lambda share, what: told.append((share, what)),
     )
@@ -101,7 +94,7 @@ def test_the_data_keep_to_their_schema_and_every_file_that_they_name_is_there(wr
     assert (data["command"], data["settings"]["name"]) == ("airlight report --tiny", "tiny")
     (scene,) = data["scenes"]
     assert (scene["name"], scene["size"]) == ("my <fog>", [20, 15])
-    checks = {f"{estimator} {layer}" for estimator in TINY.margins for layer in ("airlight", "surface")}
+    checks = {f"{estimator} {layer}" for estimator in TINY.checks.margins for layer in ("airlight", "surface")}
     assert set(scene["agreement"]) == checks
     assert 0 < scene["multiple"]["medium"]["value"] < 1
     assert [entry["label"] for entry in scene["methods"]] == [configuration.label for configuration in CHOSEN]
@@ -137,8 +130,9 @@ def test_images_can_be_read_and_give_the_errors_of_the_table(written):
 
 def again(written, tmp_path, **options):
     """The same report, into another folder."""
-    given = {"scenes": [written.data["scenes"][0]["path"]], "effort": TINY, "configurations": CHOSEN}
-    return write_report(tmp_path / "again", **(given | options))
+    fresh = options.pop("fresh", False)
+    study = replace(TINY, **({"scenes": (written.data["scenes"][0]["path"],)} | options))
+    return write_report(tmp_path / "again", study, fresh=fresh)
 
 
 @pytest.mark.claim("report-kept")
@@ -172,16 +166,13 @@ def test_fresh_computes_truths_and_batches_again_too(written, variant, tmp_path,
 
         return call
 
-    def by_single_scatter(study, **options):
-        """Half the time: what `fresh` tells one estimator it tells both."""
-        margins = {"single-scatter": TINY.margins["single-scatter"]}
-        return check_truth(replace(study, effort=replace(study.effort, margins=margins)), **options)
-
-    monkeypatch.setattr("reports.report.scene.check_truth", by_single_scatter)
+    # Half the time: what `fresh` tells one estimator it tells both.
+    checks = replace(TINY.checks, margins={"single-scatter": 0.2}, samples={"single-scatter": 4})
     monkeypatch.setattr("validation.estimates.quadrature.quadrature_image", counted(quadrature_image))
     monkeypatch.setattr("validation.estimates.monte_carlo.single_scatter_batch", counted(single_scatter_batch))
-    monkeypatch.setattr("reports.report.scene.study_multiple", lambda study: written.data["scenes"][0]["multiple"])
-    repeated = again(written, tmp_path, fresh=True, configurations=[MARCH])
+    multiple = written.data["scenes"][0]["multiple"]
+    monkeypatch.setattr("validation.study.scene.multiple_scattering_share", lambda scene, **options: multiple)
+    repeated = again(written, tmp_path, fresh=True, configurations=(MARCH,), checks=checks)
     assert (repeated["kept"], repeated["computed"]) == (0, 3 + 1)
     assert set(calls) == {quadrature_image, single_scatter_batch}
     # The same numbers, but for the times.
@@ -197,13 +188,13 @@ def test_fresh_computes_truths_and_batches_again_too(written, variant, tmp_path,
 def test_a_changed_scene_is_measured_again(written, variant, tmp_path, monkeypatch, own_cache):
     """In a cache of its own: what it finds anew replaces what was kept."""
     multiple = written.data["scenes"][0]["multiple"]
-    monkeypatch.setattr("reports.report.scene.check_truth", lambda study, progress, spread: {})
-    monkeypatch.setattr("reports.report.scene.study_multiple", lambda study: multiple)
+    monkeypatch.setattr("validation.study.scene.agreements", lambda scene, margins, **options: {})
+    monkeypatch.setattr("validation.study.scene.multiple_scattering_share", lambda scene, **options: multiple)
     path = tmp_path / "mine.xml"
     counts = []
     for sigma_t in ("0.31", "0.37"):
         path.write_text(SCENE.replace("0.31", sigma_t))
-        measured = again(written, tmp_path, scenes=[str(path)], configurations=())
+        measured = again(written, tmp_path, scenes=(str(path),), configurations=())
         counts.append((measured["kept"], measured["computed"]))
     assert counts == [(0, 3), (0, 3)]
     assert measured["scenes"][0]["truth"]["mean"] != written.data["scenes"][0]["truth"]["mean"]
@@ -211,13 +202,13 @@ def test_a_changed_scene_is_measured_again(written, variant, tmp_path, monkeypat
 
 def test_a_random_scene_with_meshes_on_any_path_has_a_safe_folder(written, variant, tmp_path, monkeypatch, own_cache):
     multiple = written.data["scenes"][0]["multiple"]
-    monkeypatch.setattr("reports.report.scene.check_truth", lambda study, progress, spread: {})
-    monkeypatch.setattr("reports.report.scene.study_multiple", lambda study: multiple)
+    monkeypatch.setattr("validation.study.scene.agreements", lambda scene, margins, **options: {})
+    monkeypatch.setattr("validation.study.scene.multiple_scattering_share", lambda scene, **options: multiple)
     folder = tmp_path / "C:my, 5% meshes"
     folder.mkdir()
     mi.load_dict({"type": "cube"}).write_ply(str(folder / "a.ply"))
     name = random_name("random:1", meshes=folder)
-    data = again(written, tmp_path, scenes=[name], configurations=CHOSEN[1:2])
+    data = again(written, tmp_path, scenes=(name,), configurations=CHOSEN[1:2])
     assert data["scenes"][0]["name"] == name
     files = named_files(data)
     assert all(re.fullmatch(r"random-1/[a-z-]+(\.exr|\.png)", file) for file in files)
@@ -235,9 +226,9 @@ def test_scenes_of_one_name_are_refused_before_the_work(variant, tmp_path):
     for folder in ("a", "b"):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "x.xml").write_text(SCENE)
-    names = [str(tmp_path / folder / "x.xml") for folder in ("a", "b")]
+    names = tuple(str(tmp_path / folder / "x.xml") for folder in ("a", "b"))
     with pytest.raises(InputError, match="two scenes are called x"):
-        write_report(tmp_path / "out", scenes=names, effort=TINY)
+        write_report(tmp_path / "out", replace(TINY, scenes=names))
 
 
 def test_labels_that_would_share_a_file_get_numbers():
@@ -248,11 +239,11 @@ def test_labels_that_would_share_a_file_get_numbers():
 
 @pytest.mark.slow
 def test_a_report_times_growing_work(variant, tmp_path, monkeypatch):
-    from reports.report import papers
+    from reports.report import others
 
-    monkeypatch.setattr(papers, "_GROWING", "open-fog")
-    monkeypatch.setattr(papers, "_GROWING_SIZE", (16, 12))
-    data = write_report(tmp_path, scenes=["open-fog"], effort=replace(TINY, scaling=("size",)))
+    monkeypatch.setattr(others, "_GROWING", "open-fog")
+    monkeypatch.setattr(others, "_GROWING_SIZE", (16, 12))
+    data = write_report(tmp_path, replace(TINY, scenes=("open-fog",), growth=("size",)))
     assert len(data["scaling"]) == 4  # methods
     assert [cost["work"] for cost in data["scaling"][0]["costs"]] == [48, 192, 768, 3072]
     assert "growth" in {claim["kind"] for claim in data["claims"]}

@@ -148,10 +148,10 @@ def test_refusals_are_counted_by_reason(sweep_of):
 @pytest.mark.claim("sweep-faults")
 def test_planted_faults_are_found_and_counted(sweep_of):
     several = rows(20)
-    several[7] |= {"nonfinite": 12}
-    several[8] |= {"negative": 5}
-    several[13] |= {"outside_bound": 2, "bound": 1e-5}
-    several[3] |= {"outside_bound": 0, "bound": 1e-5}
+    several[7] |= {"error.nonfinite": 12}
+    several[8] |= {"error.negative": 5}
+    several[13] |= {"stated.outside": 2, "stated.bound": 1e-5}
+    several[3] |= {"stated.outside": 0, "stated.bound": 1e-5}
     sweep = sweep_of(several)
     found = faults(sweep)
     assert [(each.check, each.scene, each.pixels, each.of) for each in found] == [

@@ -25,12 +25,12 @@ def test_parquet_is_read_as_it_was_written(tmp_path):
     for place, key in enumerate(sweep.texts("key")):
         wanted = by_key.pop(key)
         assert sweep.texts("scene")[place] == wanted["scene"]
-        assert sweep.property("lights")[place] == wanted["property.lights"]
-        errors = [wanted["relative_rmse"] or np.nan]
-        np.testing.assert_array_equal(sweep.numbers("relative_rmse")[place : place + 1], errors)
+        assert sweep.property("lights")[place] == wanted["properties.lights"]
+        errors = [wanted["error.relative_rmse"] or np.nan]
+        np.testing.assert_array_equal(sweep.numbers("error.relative_rmse")[place : place + 1], errors)
     assert not by_key
     assert sweep.properties == ("light_distance", "lights", "optical_depth", "silhouettes", "triangles")
-    assert set(sweep.numbers("timed_alone")[sweep.texts("status") == "done"]) == {1.0}
+    assert set(sweep.numbers("cost.alone")[sweep.texts("status") == "done"]) == {1.0}
 
 
 @pytest.mark.claim("sweep-from-parquet")
@@ -74,9 +74,9 @@ def test_cells_that_were_computed_again_count_once(sweep_of):
         (lambda path: write_rows(path, []), "has no rows"),
         (
             lambda path: pq.write_table(
-                pq.read_table(write_rows(path, [row()])).drop(["truth_error"]), path.with_name(FILE)
+                pq.read_table(write_rows(path, [row()])).drop(["reference.error"]), path.with_name(FILE)
             ),
-            "has no column 'truth_error'",
+            "has no column 'reference.error'",
         ),
     ],
 )

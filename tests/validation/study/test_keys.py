@@ -8,7 +8,7 @@ import mitsuba as mi
 from validation.scenes.random_scene import random_name, random_parts
 from validation.study.configuration import Configuration
 from validation.study.keys import Made, cell_key, scene_identities
-from validation.study.study import Cell
+from validation.study.study import Cell, Measure
 
 CELL = Cell("windows", (32, 24), (), Configuration("ray-march", None, (("steps", 4), ("map", 64))))
 MADE = Made("1.0", "ab", (("mitsuba", "3.9.1"),), "llvm_ad_rgb", "3.11.7")
@@ -29,8 +29,8 @@ def test_what_decides_the_numbers_is_in_the_key():
         replace(CELL, medium=("medium.sigma_t=0.1",)),
         replace(CELL, chosen=Configuration("ray-march", None, (("steps", 5), ("map", 64)))),
         replace(CELL, chosen=Configuration("ray-march", "exact", CELL.chosen.parameters)),
-        replace(CELL, flip=True),
-        replace(CELL, times="none"),
+        replace(CELL, measure=Measure(flip=True)),
+        replace(CELL, measure=Measure("none")),
     ]
     made = [
         replace(MADE, airlight="1.1"),

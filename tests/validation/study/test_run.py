@@ -1,16 +1,30 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""Claim: a cell becomes a row of finite numbers that are those of the metrics, or says why there are none."""
+
+import weakref
 from dataclasses import replace
 
 import mitsuba as mi
+import numpy as np
 import pytest
+from scipy import stats
 
 from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
-from validation.scenes.loading import LoadedScene
-from validation.study.configuration import STANDARD, Configuration
-from validation.study.run import configurations_for, measure
+from validation.estimates.quadrature import truth_image, truth_of_pixels
+from validation.metrics.errors import error_metrics
+from validation.study import reference as sampled
+from validation.study import run as module
+from validation.study.configuration import STANDARD, Configuration, configuration, prepared
+from validation.study.reference import cell_reference, load_cell, of_image
+from validation.study.row import row_values
+from validation.study.run import run
+from validation.study.scene import configurations_for
+from validation.study.stated_errors import ROUNDING
+from validation.study.study import Cell, Measure
 
+SIZE = (24, 18)
 MARCH = Configuration("ray-march", None, (("steps", 200),))
 UNSHADOWED = Configuration("unshadowed", "quadrature")
 FEATURES = SceneFeatures(
@@ -26,65 +40,109 @@ FEATURES = SceneFeatures(
 )
 
 
-@pytest.fixture(scope="module")
-def loaded(variant):
-    return LoadedScene("tiny", mi.load_dict(tiny_scene(size=(16, 12))), "A tiny scene.", "")
+USUAL, UNTIMED = Measure(), Measure("none")
 
 
-@pytest.fixture(scope="module")
-def measured(loaded):
-    from validation.estimates.quadrature import truth_image
-
-    scene, truth = read_scene(loaded.scene), truth_image(loaded.scene)
-    return {chosen: measure(scene, chosen, truth=truth, seconds=0.01) for chosen in (MARCH, UNSHADOWED)}
+def row_of(scene, chosen, measure=USUAL, medium=()):
+    cell = Cell(scene, SIZE, medium, chosen, measure)
+    loaded = load_cell(cell)
+    return run(cell, read_scene(loaded.scene), cell_reference(loaded), whole=loaded.scene)
 
 
-def test_marching_with_visibility_is_near_the_truth(measured):
-    error = measured[MARCH].error
+def tiny_row(chosen):
+    loaded = mi.load_dict(tiny_scene(size=(16, 12)))
+    return run(Cell("tiny", (16, 12), (), chosen, UNTIMED), read_scene(loaded), of_image(truth_image(loaded)))[0]
+
+
+@pytest.mark.usefixtures("variant")
+def test_a_row_has_the_errors_and_what_they_cost():
+    chosen = configuration("shadow-planes")
+    row, frame = row_of("sphere-spot", chosen)
+    loaded = load_cell(Cell("sphere-spot", SIZE, (), chosen))
+    assert row.error == error_metrics(cell_reference(loaded).airlight, frame.airlight)
+    assert (row.status, row.reason, row.error.nonfinite) == ("done", None, 0)
+    assert (row.stated.bound, row.stated.outside) == (ROUNDING, 0)
+    assert row.reference.estimator == "quadrature"
+    assert 0 < row.reference.error < 1e-6
+    assert row.reference.crossings > 0
+    assert row.times.frame.median_ms > 0 < row.cost.prepare_ms
+    assert row.times.light_moved is None
+    assert (row.times.frame.repetitions >= 1, row.cost.lights) == (True, 1)
+    assert row.colour.ciede2000_max < 0.1
+    assert row.command == "airlight view sphere-spot --method shadow-planes --kernel exact --size 24x18"
+    assert row_values(row)["error.p99"] == row.error.p99
+
+
+@pytest.mark.usefixtures("variant")
+def test_marching_with_visibility_is_near_the_reference_and_without_shadows_too_bright():
+    march, unshadowed = tiny_row(MARCH).error, tiny_row(UNSHADOWED).error
     # Every step that straddles the edge of a shadow is wrong by up to half of itself: 200 steps leave a few per mille.
-    assert error.relative_rmse < 0.02
-    assert error.nonfinite == error.negative == 0
-    assert error.pixels == 16 * 12
+    assert march.relative_rmse < 0.02
+    assert march.nonfinite == march.negative == 0
+    assert march.pixels == 16 * 12
+    assert unshadowed.relative_bias > 0.003
+    assert unshadowed.relative_rmse > 3 * march.relative_rmse
 
 
-def test_method_without_shadows_is_too_bright_by_what_shadows_take_away(measured):
-    error = measured[UNSHADOWED].error
-    assert error.relative_bias > 0.003
-    assert error.relative_rmse > 3 * measured[MARCH].error.relative_rmse
+@pytest.mark.usefixtures("variant")
+def test_preparation_is_timed_when_what_was_prepared_before_is_gone(monkeypatch):
+    """In `random:20` the maps of 35 lights take a gigabyte: two of these ended the worker."""
+    alive = []
+
+    def counted(scene, chosen):
+        renderer = prepared(scene, chosen)
+
+        def prepare(scene):
+            assert not any(each() for each in alive)
+            state = renderer.prepare(scene)
+            alive.append(weakref.ref(state))
+            return state
+
+        return replace(renderer, prepare=prepare)
+
+    monkeypatch.setattr(module, "prepared", counted)
+    row, _ = row_of("sphere-spot", configuration("soft-shafts"))
+    assert len(alive) == 2
+    assert row.cost.prepare_ms > 0
+
+
+@pytest.mark.usefixtures("variant")
+def test_times_are_left_out_where_nobody_asks():
+    row, _ = row_of("open-fog", configuration("unshadowed"), Measure("none"), ("medium.sigma_t=0.3",))
+    assert (row.status, row.times, row.medium) == ("done", None, "medium.sigma_t=0.3")
+    assert row.stated.outside == 0  # nothing casts a shadow there, so the kernel's claim holds for whole rays
+    assert row_of("windows", configuration("unshadowed"), Measure("none"))[0].stated is None
 
 
 @pytest.mark.claim("refusals-stand-in-the-report")
-def test_refusal_is_kept_and_not_raised(variant):
+@pytest.mark.usefixtures("variant")
+def test_a_refusal_is_a_row():
     """What a method cannot do is a line of the table; one bad configuration must not end a report."""
-    from validation.estimates.quadrature import truth_image
-
-    scene = mi.load_dict(
-        tiny_scene(
-            size=(4, 3), fog=tiny_scene()["fog"] | {"phase": {"type": "tabphase", "values": "0.3, 0.2, 0.4, 0.9, 2.0"}}
-        )
-    )
-    measurement = measure(
-        read_scene(scene), Configuration("unshadowed", "taylor"), truth=truth_image(scene, samples=16)
-    )
-    assert measurement.frame is None
-    assert measurement.times is None
-    assert measurement.error is None
-    assert "tab" in measurement.refused
-    assert "\n" not in measurement.refused
+    row, frame = row_of("windows", configuration("shadow-planes", None, {"media": "paper"}))
+    assert (row.status, frame, row.error, row.times) == ("refused", None, None, None)
+    assert "lights with a place" in row.reason
+    assert "\n" not in row.reason
+    assert row.reference.mean > 0
 
 
-def test_variants_of_shadows_are_left_out_where_nothing_casts_one():
-    lamp = replace(FEATURES, area_lights=("disk",))
-    assert configurations_for(replace(lamp, bounded=True, clear=True)) == STANDARD
-    unbounded = configurations_for(lamp)
-    (left_out,) = (configuration for configuration in STANDARD if configuration not in unbounded)
-    assert dict(left_out.parameters) == {"media": "paper"}
-    without_points = configurations_for(FEATURES)
-    assert set(unbounded) - set(without_points) == {given for given in STANDARD if "points" in dict(given.parameters)}
-    left = configurations_for(replace(lamp, shadows=False))
-    assert 0 < len(left) < len(STANDARD)
-    assert all(not {"shadow", "map"} & set(dict(configuration.parameters)) for configuration in left)
-    assert {configuration.method for configuration in left} == {configuration.method for configuration in STANDARD}
+@pytest.mark.usefixtures("variant")
+def test_what_would_take_too_long_is_left_out_with_what_it_would_take(monkeypatch):
+    """16 x 12 pixels are four times 8 x 6: 0.15 s there, of which little is preparation, are at least 0.4 s here."""
+    clock = Clock()
+    render = module.render_frame
+
+    def slowed(renderer):
+        clock.now += 0.15 if renderer.scene.camera.width == 8 else 0
+        return render(renderer)
+
+    monkeypatch.setattr(module, "_DOUBTFUL", -1.0)
+    monkeypatch.setattr(module, "PROBE", (8, 6))
+    monkeypatch.setattr(module, "time", clock)
+    monkeypatch.setattr(module, "render_frame", slowed)
+    row = row_of("open-fog", MARCH, Measure("stages", 0.01, limit=0.3))[0]
+    assert (row.status, row.error, row.times) == ("left out", None, None)
+    assert "by a frame of 8 x 6 pixels" in row.reason
+    assert "more than the limit of 0.3 s" in row.reason
 
 
 class Clock:
@@ -95,32 +153,43 @@ class Clock:
     def perf_counter(self):
         return self.now
 
-
-def probed(loaded, monkeypatch, chosen, *, seconds, limit, clock=None):
-    """Measure a configuration whose small frame takes so long."""
-    clock = clock or Clock()
-    from validation.estimates.quadrature import truth_image
-    from validation.study import run as module
-
-    monkeypatch.setattr(module, "_DOUBTFUL", -1.0)
-    render = module.render_frame
-
-    def slowed(renderer):
-        if renderer.scene.camera.width == 8:
-            clock.now += seconds
-        return render(renderer)
-
-    monkeypatch.setattr(module, "time", clock)
-    monkeypatch.setattr(module, "render_frame", slowed)
-    scene, truth = read_scene(loaded.scene), truth_image(loaded.scene)
-    small = read_scene(mi.load_dict(tiny_scene(size=(8, 6))))
-    return measure(scene, chosen, truth=truth, seconds=0.01, limit=limit, probe=lambda: small)
+    def process_time(self):
+        return self.now
 
 
-def test_what_would_take_too_long_is_left_out_with_what_it_would_take(loaded, monkeypatch):
-    # 16 x 12 pixels are four times 8 x 6: 0.15 s there, of which little is preparation, are at least 0.4 s here.
-    measurement = probed(loaded, monkeypatch, MARCH, seconds=0.15, limit=0.3)
-    assert measurement.left_out
-    assert measurement.frame is measurement.times is measurement.error is None
-    assert "by a frame of 8 x 6 pixels" in measurement.refused
-    assert "more than the limit of 0.3 s" in measurement.refused
+@pytest.mark.slow
+@pytest.mark.usefixtures("variant")
+def test_under_an_area_light_a_sixteenth_of_the_pixels_has_a_reference(own_cache, monkeypatch):
+    loaded = load_cell(Cell("penumbra-plane", (40, 32), (), configuration("unshadowed")))
+    truth = cell_reference(loaded)
+    assert truth.mask is not None
+    assert int(truth.mask.sum()) == 40 * 32 // 16
+    assert truth.surface is None
+    again = cell_reference(loaded)
+    assert (again.airlight == truth.airlight).all()
+    assert again.spent == truth.spent
+    finer = truth_of_pixels(loaded.scene, np.flatnonzero(truth.mask))
+    assert finer.airlight_se is not None
+    beyond = []
+    for seed in range(16):
+        monkeypatch.setattr(sampled, "_PLAN", replace(sampled._PLAN, seed=seed))
+        some = sampled.sampled_reference(loaded.scene)
+        difference = np.abs(some["airlight"][truth.mask] - finer.airlight[0])
+        beyond.append((difference > some["bound"][truth.mask] + 3 * finer.airlight_se[0]).mean())
+    # The bound is three standard errors of eight replicates, beyond which 2.0 % of Student's law lie. The pixels of a
+    # run share their points, the runs do not: four standard errors of the mean over runs.
+    assert np.mean(beyond) <= 2 * stats.t.sf(3, 7) + 4 * np.std(beyond, ddof=1) / np.sqrt(len(beyond))
+
+
+def test_variants_of_shadows_are_left_out_where_nothing_casts_one():
+    lamp = replace(FEATURES, area_lights=("disk",))
+    assert configurations_for(replace(lamp, bounded=True, clear=True), STANDARD) == STANDARD
+    unbounded = configurations_for(lamp, STANDARD)
+    (left_out,) = (configuration for configuration in STANDARD if configuration not in unbounded)
+    assert dict(left_out.parameters) == {"media": "paper"}
+    without_points = configurations_for(FEATURES, STANDARD)
+    assert set(unbounded) - set(without_points) == {given for given in STANDARD if "points" in dict(given.parameters)}
+    left = configurations_for(replace(lamp, shadows=False), STANDARD)
+    assert 0 < len(left) < len(STANDARD)
+    assert all(not {"shadow", "map"} & set(dict(configuration.parameters)) for configuration in left)
+    assert {configuration.method for configuration in left} == {configuration.method for configuration in STANDARD}

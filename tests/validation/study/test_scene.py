@@ -4,10 +4,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from validation.study import scene as study
-from validation.study.scene import Effort, open_study
+from validation.study.scene import check_reference, open_scene
+from validation.study.study import Checks, Study
 
-TINY = Effort("tiny", (16, 12), (16, 12), (8, 6), {"volpath": 0.5}, {"volpath": 8}, 0.01)
+TINY = Study("tiny", ("open-fog",), sizes=((16, 12),))
+CHECKS = Checks((8, 6), {"volpath": 0.5}, {"volpath": 8})
 
 
 @pytest.mark.slow
@@ -15,15 +16,17 @@ def test_without_patience_the_clock_decides_nothing(variant, own_cache, monkeypa
     """Two runs, one of them on a machine so busy that hours pass between two batches: the same samples."""
     from validation.estimates import agreement
 
-    def checked():
-        return study.check_truth(open_study("open-fog", replace(TINY, margins={"single-scatter": 0.01})))
+    def checked(**changes):
+        study = replace(TINY, checks=replace(CHECKS, **changes))
+        return check_reference(open_scene("open-fog", study, {}))
 
+    exact = {"margins": {"single-scatter": 0.01}, "samples": {"single-scatter": 8}}
     hours = iter(range(0, 10**9, 3600))
-    quiet = checked()
+    quiet = checked(**exact)
     own_cache.rename(own_cache.with_name("other"))
     monkeypatch.setattr(agreement, "time", SimpleNamespace(monotonic=lambda: float(next(hours))))
-    busy = checked()
+    busy = checked(**exact)
     assert quiet
     assert busy == quiet
-    impatient = study.check_truth(open_study("open-fog", replace(TINY, margins={"volpath": 1e-6}, patience=1.0)))
+    impatient = checked(margins={"volpath": 1e-6}, patience=1.0)
     assert not any(verdict.finished for verdict in impatient.values())

@@ -10,13 +10,12 @@ from reference.scene.read import read_truth
 from tests.helpers.light_frames import render
 from tests.helpers.scenes import bounded_medium
 from validation.estimates.quadrature import truth_image
-from validation.scenes.loading import load_scene
 from validation.scenes.parts import camera, fog, point_light, tabulated_phase
 from validation.study import stated_errors as bounds
-from validation.study.configuration import configuration, prepared
-from validation.study.reference import CellTruth, cell_truth
-from validation.study.study import Cell
-from validation.study.work import error_columns, run_stages, unchecked_frame
+from validation.study.configuration import configuration
+from validation.study.reference import of_image
+from validation.study.run import run
+from validation.study.study import Cell, Measure
 
 pytestmark = pytest.mark.usefixtures("variant", "own_cache")
 
@@ -94,27 +93,13 @@ def test_a_chord_of_micrometres_errs_by_what_the_rounding_of_its_ends_is_worth()
     assert worth[:, 0] == pytest.approx(1.1 * bounds.END * 0.66 / ACROSS[0] * scattered * kept, rel=2e-3)
 
 
-def columns(name, size, method="shadow-planes"):
-    loaded = load_scene(name, size)
-    scene = read_scene(loaded.scene)
-    chosen = configuration(method)
-    renderer = prepared(scene, chosen)
-    frame = unchecked_frame(renderer, run_stages(renderer, renderer.prepare(scene)))
-    return error_columns(cell_truth(loaded), frame, scene, Cell(name, size, (), chosen), whole=loaded.scene)
-
-
 def test_a_sweep_counts_no_pixel_whose_ends_are_rounded(monkeypatch):
-    scene, chosen = clipped_edge(), configuration("shadow-planes")
-    image, frame = truth_image(scene), render(scene, "shadow-planes")
-    truth = CellTruth("quadrature", image.airlight, image.airlight_bound, None, None, None, 0.0, 0.0)
-
-    def outside():
-        cell = Cell("edge", (16, 12), (), chosen)
-        return error_columns(truth, frame, read_scene(scene), cell, whole=scene)["outside_bound"]
-
-    assert outside() == 0
+    scene = clipped_edge()
+    reference, read = of_image(truth_image(scene)), read_scene(scene)
+    cell = Cell("edge", (16, 12), (), configuration("shadow-planes"), Measure("none"))
+    assert run(cell, read, reference, whole=scene)[0].stated.outside == 0
     monkeypatch.setattr(bounds, "END", 0.1 * bounds.END)
-    assert outside() > 0
+    assert run(cell, read, reference, whole=scene)[0].stated.outside > 0
 
 
 @pytest.mark.claim("sweep-bounds", tolerance="8 units of float32 of each end; a quarter of the bends of a table")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from reports.data.serialize import truth_data
+from reports.report.scene import truth_data
 from validation.metrics.errors import plain
 
 

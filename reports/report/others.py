@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The parts of a report that belong to no scene of it: the stability of kernels, how times grow, claims of papers."""
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from reference.storage.kept import is_kept, key_of
+from reports.machine.environment import machine
+from reports.machine.own_process import in_own_process
+from reports.machine.progress import Progress, counted, part_of
+from validation.metrics.errors import plain
+from validation.papers.claims import Claim, claims, judged
+from validation.papers.experiments import EFFORTS, EXPERIMENTS
+from validation.study.growth import METHODS, Scaling, study_scaling
+from validation.study.ladders import ladder
+from validation.study.results import Computed, Result, cached_result
+from validation.study.study import Study, standard_study
+
+_GROWING = "colonnade"  # of which times are measured as its work grows
+_GROWING_SIZE = (400, 300)  # of its images [pixels]
+_STABILITY, _GROWTH = 20.0, 80.0  # that these take [s]
+_LEAST = 0.01  # to read a kept result [s]
+
+
+@dataclass(frozen=True)
+class OtherPart:
+    """A part of a report that belongs to no scene."""
+
+    kind: str  #: 'stability', 'scaling' or 'papers'
+    title: str  #: shown as the progress
+    key: str  #: of its result
+    usual: float  #: roughly what it takes [s]
+    compute: Callable[[Progress], Computed]
+
+    @property
+    def seconds(self) -> float:
+        """What it will take [s]."""
+        return 0.0 if is_kept(self.key) else self.usual
+
+    def result(self, progress: Progress) -> Result:
+        """Return its result, kept or computed."""
+        return cached_result(self.key, partial(self.compute, progress))
+
+
+def other_parts(study: Study) -> list[OtherPart]:
+    """Return the parts that a study asks for; claims of papers only with all scenes of a study of ours."""
+    parts = []
+    if study.stability:
+        from validation.kernels.stability import stability
+
+        key = key_of("report-stability", stability, rays=study.stability)
+        parts.append(OtherPart("stability", "stability", key, _STABILITY, partial(_stability, study.stability)))
+    if _GROWING in study.scenes:
+        parts += [_scaling(kind, study.measure.seconds) for kind in study.growth]
+    if study.name in EFFORTS and set(standard_study(study.name).scenes) <= set(study.scenes):
+        parts += [_paper(name) for name in experiments_of(claims(), study.name)]
+    return parts
+
+
+def shares(seconds: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+    """Return where each part begins and ends, as shares of the time that all of them take in turn."""
+    spent = [max(_LEAST, value) for value in seconds.values()]
+    total = sum(spent)
+    bounds = [sum(spent[:number]) / total for number in range(len(spent))] + [1.0]
+    return dict(zip(seconds, itertools.pairwise(bounds)))
+
+
+# --- kernels ---------------------------------------------------------------------------------------------------------
+
+
+def _stability(rays: int, progress: Progress) -> Computed:
+    """Return how stable kernels are. Nearly all of its time goes into compilation: a process compiles them quickly."""
+    from realtime.kernels.registry import KERNELS
+    from validation.kernels.stability import stability
+
+    known = in_own_process(known_kernels, rays, what="study", name="of the kernels", limit=None, quick=True)
+    added = [name for name in KERNELS if name not in {kernel["kernel"] for kernel in known}]
+    return {"kernels": known + (plain(stability(added, count=rays, progress=counted(progress))) if added else [])}, {}
+
+
+def known_kernels(rays: int) -> list[dict[str, Any]]:
+    """Return how stable the kernels of airlight are, in a process that knows no others."""
+    from validation.kernels.stability import stability
+
+    return plain(stability(count=rays))
+
+
+# --- growth ----------------------------------------------------------------------------------------------------------
+
+
+def _scaling(kind: str, seconds: float) -> OtherPart:
+    """Return how times grow with one kind of work."""
+
+    def compute(progress: Progress) -> Computed:
+        steps = ladder(kind, _GROWING, _GROWING_SIZE)
+        found = study_scaling(kind, steps, METHODS, seconds=seconds, progress=counted(progress))
+        return {"scaling": [scaling_data(_GROWING, _GROWING_SIZE, each) for each in found]}, {}
+
+    identity = {"scene": _GROWING, "size": _GROWING_SIZE, "kind": kind, "seconds": seconds}
+    key = key_of("report-scaling", study_scaling, ladder, scaling_data, machine=machine(), **identity)
+    return OtherPart("scaling", "how times grow", key, _GROWTH, compute)
+
+
+def scaling_data(name: str, size: tuple[int, int], found: Scaling) -> dict[str, Any]:
+    """Return how a method grows with one kind of work, in a scene with images of a size [pixels]."""
+    shown = {"scene": Path(name).stem, "size": list(size), "label": found.configuration.label, "kind": found.kind}
+    growth = {time: plain(of_time) for time, of_time in found.growth.items()}
+    return shown | {"costs": plain(found.costs), "growth": growth, "refused": found.refused}
+
+
+# --- claims of papers ------------------------------------------------------------------------------------------------
+
+
+def experiments_of(chosen: Sequence[Claim], effort: str = EFFORTS[-1]) -> list[str]:
+    """Return the names of the experiments that claims need and that an effort has."""
+    needed = {claim.experiment for claim in chosen}
+    most = EFFORTS.index(effort)
+    return [name for name, each in EXPERIMENTS.items() if name in needed and EFFORTS.index(each.effort) <= most]
+
+
+def _paper(name: str) -> OtherPart:
+    experiment = EXPERIMENTS[name]
+
+    def compute(progress: Progress) -> Computed:
+        progress(0.0, "claims of papers")
+        return {"experiment": name, "figures": experiment.run()}, {}
+
+    module = f"validation.papers.{experiment.function.partition(':')[0]}"
+    key = key_of("report-paper", module, experiment=name, machine=machine())
+    return OtherPart("papers", name, key, experiment.seconds, compute)
+
+
+def paper_rows(results: Sequence[Result]) -> list[dict[str, Any]]:
+    """Return the claims that the results of experiments decide."""
+    found = {result.data["experiment"]: result.data["figures"] for result in results}
+    return decided(claims(), found) if found else []
+
+
+def decided(chosen: Sequence[Claim], figures: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return the claims whose experiments were made, and those that no experiment can measure, ready for JSON."""
+    return [
+        judged(claim, figures.get(claim.experiment, {}))
+        for claim in chosen
+        if not claim.experiment or claim.experiment in figures
+    ]
+
+
+def measure_claims(
+    chosen: Sequence[Claim], *, quick: bool = False, progress: Progress | None = None
+) -> list[dict[str, Any]]:
+    """Measure what claims need and is not cached, and return those that are decided.
+
+    Parameters
+    ----------
+    chosen
+        Of `validation.papers.claims.claims`.
+    quick
+        Leave out what needs images.
+    progress
+        Called with (share done, what) now and then.
+    """
+    parts = {name: _paper(name) for name in experiments_of(chosen, "quick" if quick else EFFORTS[-1])}
+    steps = shares({name: part.seconds for name, part in parts.items()})
+    figures = {
+        name: part.result(part_of(progress, *steps[name], before=f"{name}, ")).data["figures"]
+        for name, part in parts.items()
+    }
+    return decided(chosen, figures)
