@@ -147,7 +147,7 @@ def drawn_from(scenes: list[str], meshes: Path | None, ranges: Path | None) -> l
     """
     if meshes is None and ranges is None:
         return scenes
-    from validation.scenes.random_scene import is_random, random_name
+    from validation.scenes.random.scene import is_random, random_name
 
     if not any(map(is_random, scenes)):
         random_name(scenes[0] if scenes else "", meshes, ranges)

@@ -15,7 +15,7 @@ from reference.scene.read import TruthLight, TruthMedium, TruthScene, read_truth
 from reports.interchange.cycles import cycles_properties
 from reports.interchange.recipes import recipes
 from validation.scenes.loading import LoadedScene, scene_stem
-from validation.scenes.random_scene import drawn_values, is_random
+from validation.scenes.random.scene import drawn_values, is_random
 
 Array = NDArray[np.float64]
 

@@ -32,7 +32,7 @@ from reports.report.scene import folder_of, write_scene
 from reports.report.staging import staged
 from validation.comparison.engine_images import EngineImage, images_size
 from validation.scenes.loading import scene_stem
-from validation.scenes.random_scene import is_random
+from validation.scenes.random.scene import is_random
 from validation.scenes.registry import FOG_SCENES, SCENES
 from validation.study.configuration import Configuration
 from validation.study.results import Result, date

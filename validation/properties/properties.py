@@ -103,7 +103,7 @@ def _medium_properties(scene: Scene, lights: list[LightPlace], view: SeenView) -
 
 
 def _shadow_properties(scene: Scene, lights: list[LightPlace], view: SeenView) -> dict[str, float]:
-    lit = [lit_points(scene, light, view.points) for light in lights]
+    lit = [lit_points(scene.geometry, light, view.points) for light in lights]
     along = sum(np.diff(each.astype(np.int8), axis=2).astype(bool).sum(axis=2).mean() for each in lit)
     across = sum(np.diff(each.astype(np.int8), axis=1).astype(bool).mean() for each in lit)
     depth = np.log(view.ends)

@@ -94,7 +94,7 @@ def see(scene: Scene, lights: list[LightPlace]) -> SeenView:
     upwards = (0.5 * (camera.height - 1) - np.arange(camera.height))[:, None, None] * camera.up
     directions = camera.forward + across + upwards
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
-    depth = _cast(scene.geometry, np.broadcast_to(camera.origin, directions.shape), directions)
+    depth = distance(scene.geometry, np.broadcast_to(camera.origin, directions.shape), directions)
     far = [float(np.linalg.norm(light.place - camera.origin)) for light in lights if light.kind != "directional"]
     for bounded in scene.medium.bounded_media:
         far.append(float(np.linalg.norm(_host(bounded.centre) - camera.origin)) + float(bounded.radius[0]))
@@ -108,24 +108,24 @@ def _rays(origin: Array, direction: Array, longest: Array | None = None) -> Any:
     return mi.Ray3f(o, d, limit, mi.Float(0), mi.Color0f())
 
 
-def _cast(geometry: Any, origin: Array, direction: Array) -> Array:
+def distance(geometry: Any, origin: Array, direction: Array) -> Array:
     """Return the distance of the nearest surface, infinity where there is none [m]."""
     if not geometry.shapes():
         return np.full(direction.shape[:-1], np.inf)
     hit = geometry.ray_intersect_preliminary(_rays(origin, direction), coherent=True)
-    distance = np.array(dr.select(hit.is_valid(), hit.t, dr.inf), dtype=np.float64)
-    return distance.reshape(direction.shape[:-1])
+    found = np.array(dr.select(hit.is_valid(), hit.t, dr.inf), dtype=np.float64)
+    return found.reshape(direction.shape[:-1])
 
 
-def lit_points(scene: Scene, light: LightPlace, points: Array) -> NDArray[np.bool_]:
+def lit_points(geometry: Any, light: LightPlace, points: Array) -> NDArray[np.bool_]:
     """Return which points a light reaches, the middle of one with extent; points (..., 3) [m]."""
     unit, distance = light.toward(points)
     lit = np.ones(points.shape[:-1], dtype=bool)
     if light.axis is not None:
         lit &= -(unit @ light.axis) > light.cos_cutoff
-    if scene.geometry.shapes():
+    if geometry.shapes():
         longest = np.where(np.isfinite(distance), distance * (1 - _BEFORE) - light.radius, np.finfo(np.float32).max)
         start = points + unit * np.where(np.isfinite(distance), distance * _BEFORE, 0.0)[..., None]
-        blocked = scene.geometry.ray_test(_rays(start, unit, np.maximum(longest, 0)))
+        blocked = geometry.ray_test(_rays(start, unit, np.maximum(longest, 0)))
         lit &= ~np.array(blocked, dtype=bool).reshape(lit.shape)
     return lit

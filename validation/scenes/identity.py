@@ -7,7 +7,8 @@ from pathlib import Path
 
 from reference.storage.scene_digest import scene_digest
 from validation.scenes.loading import load_scene
-from validation.scenes.random_scene import PREFIX, is_random, random_parts
+from validation.scenes.random.ranges import FILE as RANGES
+from validation.scenes.random.scene import PREFIX, is_random, random_parts
 from validation.scenes.registry import SCENES
 
 
@@ -23,7 +24,7 @@ def scene_identity(scene: str) -> str:
         return f"{scene} {SCENES[scene].digest}"
     if is_random(scene):
         seed, given = random_parts(scene)
-        places = [place for _, place in sorted(given.items())]
+        places = [RANGES, *(place for _, place in sorted(given.items()))]
         files = [path for place in places for path in (sorted(place.iterdir()) if place.is_dir() else [place])]
         stamps = tuple((path, path.stat().st_mtime_ns, path.stat().st_size) for path in files if path.is_file())
         return f"{PREFIX}{seed} {sorted(given)} {_files_digest(stamps)}"

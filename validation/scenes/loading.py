@@ -18,7 +18,7 @@ from validation.scenes.changes import change_scene, isotropic_media
 from validation.scenes.files.read import read_file
 from validation.scenes.lobes import scene_with_lobes
 from validation.scenes.numbers import check_numbers
-from validation.scenes.random_scene import PREFIX, is_random, random_parts, random_record
+from validation.scenes.random.scene import PREFIX, is_random, random_parts, random_record
 from validation.scenes.registry import SCENES, Animation, SceneRecord
 
 _LARGEST = 16384

@@ -15,7 +15,7 @@ Faces = NDArray[np.int64]  #: (faces, 3), counter-clockwise as seen from outside
 Mesh = tuple[Vertices, Faces]
 
 
-def rotation(axis: Sequence[float], degrees: float) -> NDArray[np.float64]:
+def rotation(axis: ArrayLike, degrees: float) -> NDArray[np.float64]:
     """Return the matrix, (3, 3), of a rotation about an axis through the origin by an angle [degrees] (Rodrigues)."""
     x, y, z = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
     skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -23,16 +23,16 @@ def rotation(axis: Sequence[float], degrees: float) -> NDArray[np.float64]:
     return np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * (skew @ skew)
 
 
-def placed(mesh: Mesh, position: Sequence[float], turn: NDArray[np.float64] | None = None) -> Mesh:
+def placed(mesh: Mesh, position: ArrayLike, turn: NDArray[np.float64] | None = None) -> Mesh:
     """Return a mesh turned about the origin by a matrix, (3, 3), then moved by `position`, (3,) [m]."""
     vertices, faces = mesh
     return (vertices if turn is None else vertices @ turn.T) + np.asarray(position), faces
 
 
-def scaled(mesh: Mesh, factor: float | Sequence[float]) -> Mesh:
+def scaled(mesh: Mesh, factor: ArrayLike) -> Mesh:
     """Return a mesh scaled about the origin, by one `factor` [1] or by one for each axis, (3,)."""
     vertices, faces = mesh
-    return vertices * factor, faces
+    return vertices * np.asarray(factor), faces
 
 
 def joined(meshes: Sequence[Mesh]) -> Mesh:
@@ -105,7 +105,7 @@ def grid(corner: Sequence[float], across: Sequence[float], up: Sequence[float], 
     return vertices, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
-def box(size: Sequence[float]) -> Mesh:
+def box(size: ArrayLike) -> Mesh:
     """Return a box about the origin with edges of lengths `size`, (3,) [m]: 12 triangles, 8 vertices."""
     corners = np.array([[x, y, z] for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)])
     quads = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])

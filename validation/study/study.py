@@ -59,10 +59,10 @@ from typing import Any
 
 from analytic.errors import InputError, nearest
 from realtime.methods.registry import FOG_METHODS, METHODS
-from validation.random_scenes.ranges import ranges_from, read_ranges
 from validation.scenes.changes import change_words
 from validation.scenes.loading import parse_size
-from validation.scenes.random_scene import PREFIX, is_random, random_name
+from validation.scenes.random.ranges import ranges_from, read_ranges
+from validation.scenes.random.scene import PREFIX, is_random, random_name
 from validation.scenes.registry import FOG_SCENES, SCENES
 from validation.study.configuration import QUICK, Configuration, chosen_configurations, configuration, find_kernel
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import mitsuba as mi
 
-from validation.scenes.random_scene import random_name, random_parts
+from validation.scenes.random.scene import random_name, random_parts
 from validation.study.configuration import Configuration
 from validation.study.keys import Made, cell_key, scene_identities
 from validation.study.study import Cell, Measure

@@ -11,7 +11,7 @@ from realtime.scene.read_scene import read_scene
 from reference.scene.read import read_truth
 from reference.storage.scene_digest import scene_digest
 from validation.scenes.loading import load_scene
-from validation.scenes.random_scene import drawn_values
+from validation.scenes.random.scene import drawn_values
 
 
 @pytest.mark.claim("random-valid", tolerance="none: both readers take seeds 0 to 47, with all that was drawn")
@@ -29,7 +29,7 @@ def test_both_readers_take_what_was_drawn(variant, seeds):
         # What was drawn arrives, to the precision of the scene, single.
         sigma = {medium.name: medium.sigma_t for medium in truth.media} | {"endless": truth.medium.sigma_t}
         for medium in drawn["media"]:
-            np.testing.assert_allclose(sigma[medium["name"]], np.resize(medium["sigma_t"], 3), rtol=1e-6)
+            np.testing.assert_allclose(sigma[medium["name"]], np.divide(medium["sigma_t"], drawn["scale"]), rtol=1e-6)
         assert len(truth.occluders.shapes()) >= len(drawn["casters"])
 
 
@@ -41,8 +41,10 @@ def test_the_same_seed_is_the_same_scene(variant):
     words = hashlib.sha256()
     for seed in range(8):
         drawn = drawn_values(f"random:{seed}")
-        words.update(",".join(f"{light['kind']} {light['position'][0]:.6g}" for light in drawn["lights"]).encode())
-        words.update(",".join(f"{each['kind']} {each['radius']:.6g}" for each in drawn["casters"]).encode())
+        scale, x = drawn["scale"], drawn["centre"][0]
+        places = [f"{light['kind']} {x + scale * light['position'][0]:.6g}" for light in drawn["lights"]]
+        words.update(",".join(places).encode())
+        words.update(",".join(f"{each['kind']} {scale * each['radius']:.6g}" for each in drawn["casters"]).encode())
     assert words.hexdigest()[:16] == KEPT
 
 

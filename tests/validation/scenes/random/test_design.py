@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from validation.random_scenes.design import COORDINATES, LARGEST_SEED, Draws, point
+from validation.scenes.random.design import COORDINATES, LARGEST_SEED, Draws, point
 
 _POINTS = 512
 

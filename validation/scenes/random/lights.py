@@ -11,14 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.random_scenes.brightness import Ways, unit_airlight
-from validation.random_scenes.design import Draws
-from validation.random_scenes.drawn import AREA_KINDS
-from validation.random_scenes.media import PlacedMedium, optical_depths
-from validation.random_scenes.ranges import Ranges
+from validation.scenes.random.design import Draws
+from validation.scenes.random.media import Medium, Ways, optical_depths, unit_airlight
+from validation.scenes.random.ranges import Ranges
 
 Array = NDArray[np.float64]
 
+AREA_KINDS = ("rectangle", "disk", "sphere")
 _FAR = 1e3  # where directional lights come from, in radii of the stage
 _DEEPEST = 7.0  # optical depth from a light to the camera by the nearest way
 _TRIES = 9
@@ -27,18 +26,19 @@ _CLEAR = 0.19  # around the camera nothing of a light is nearer, in radii of the
 
 
 @dataclass(frozen=True)
-class PlacedLight:
+class Light:
     """A light in radii of the stage."""
 
-    kind: str
-    position: Array
-    target: Array
+    name: str
+    kind: str  #: 'point', 'spot', 'directional' or one of `AREA_KINDS`
+    position: Array  #: of a directional light a point on its way
+    target: Array  #: a point at which it shines
     colour: Array  #: intensity, irradiance, or radiance, for a stage of radius 1
-    brightness: float
-    size: tuple[float, ...]
-    cutoff: float
-    beam: float
-    black: bool
+    brightness: float  #: of the airlight that it makes in the middle of the image without shadows [W/(m^2 sr)]
+    size: tuple[float, ...] = ()  #: radius, or half of both sides
+    cutoff: float = 0.0  #: of a spot, half angle [degrees]
+    beam: float = 0.0  #: of a spot, half angle of full intensity [degrees]
+    black: bool = True  #: whether the shape of a light with extent is opaque
 
     @property
     def ball(self) -> float:
@@ -46,9 +46,7 @@ class PlacedLight:
         return math.hypot(*self.size) if self.kind == "rectangle" else max(self.size, default=0.0)
 
 
-def draw_lights(
-    draws: Draws, ranges: Ranges, media: list[PlacedMedium], camera: Array, seen: Ways
-) -> list[PlacedLight]:
+def draw_lights(draws: Draws, ranges: Ranges, media: list[Medium], camera: Array, seen: Ways) -> list[Light]:
     """Return the lights of a scene.
 
     Parameters
@@ -57,11 +55,11 @@ def draw_lights(
         Rays of the camera, for the brightness.
     """
     endless = any(medium.bounds == "endless" for medium in media)
-    kinds = {kind: 0.0 if endless and kind == "directional" else weight for kind, weight in ranges.light_kinds.items()}
+    kinds = ranges["light_kinds"] | ({"directional": 0.0} if endless else {})
     kinds = kinds if any(kinds.values()) else {"point": 1.0}
     return [
         _light(draws, ranges, draws.pick(kinds, f"light_kind-{number}"), number, media, camera, seen)
-        for number in range(1, draws.few(*ranges.lights, "lights") + 1)
+        for number in range(1, draws.few(*ranges["lights"], name="lights") + 1)
     ]
 
 
@@ -70,10 +68,10 @@ def _light(
     ranges: Ranges,
     kind: str,
     number: int,
-    media: list[PlacedMedium],
+    media: list[Medium],
     camera: Array,
     seen: Ways,
-) -> PlacedLight:
+) -> Light:
     stream = draws.of(f"light-{number}")
     size = _size(draws, stream, ranges, kind, number)
     ball = math.hypot(*size) if kind == "rectangle" else max(size, default=0.0)
@@ -85,7 +83,7 @@ def _light(
             math.sin(math.radians(-17.0))
             + (1 + math.sin(math.radians(17.0))) * first.share(f"light_elevation-{number}") * 0.99
         )
-        azimuth = first.between(0, 2 * math.pi, f"light_azimuth-{number}")
+        azimuth = first.between(0, 2 * math.pi, name=f"light_azimuth-{number}")
         across = math.cos(elevation)
         direction = np.array([across * math.cos(azimuth), across * math.sin(azimuth), math.sin(elevation)])
         if kind == "directional":
@@ -93,32 +91,32 @@ def _light(
             direction[2] = 0.17 + abs(direction[2])
             position = direction / np.linalg.norm(direction) * _FAR
         else:
-            distance = first.logarithmic(*ranges.light_distance, f"light_distance-{number}")
+            distance = first.logarithmic(*ranges["light_distance"], name=f"light_distance-{number}")
             position = _nearer(media, camera, ahead, (distance + ball) * direction)
         target = (ahead if attempt % 2 == 0 else np.zeros(3)) + 0.29 * stream.in_ball()
         unit = unit_airlight(media, seen, position, directional=kind == "directional")
         if np.linalg.norm(position - camera) > ball + _CLEAR and unit > 0 and math.log(unit) > -_DEEPEST - 9:
             break
     colour = np.array([stream.between(0.53, 1.0) for _ in range(3)])
-    brightness = draws.logarithmic(*ranges.brightness, f"brightness-{number}") / (1 + 0.5 * (number - 1))
+    brightness = draws.logarithmic(*ranges["brightness"], name=f"brightness-{number}") / (1 + 0.5 * (number - 1))
     strength = brightness / max(unit, 1e-7)
     cutoff = beam = 0.0
     if kind == "spot":
         # A narrow cone that begins near by would light next to nothing.
         least = math.degrees(math.atan(_LEAST_CONE / float(np.linalg.norm(target - position))))
-        cutoff = max(draws.logarithmic(*ranges.cutoff, f"cutoff-{number}"), min(least, ranges.cutoff[1]))
+        cutoff = max(draws.logarithmic(*ranges["cutoff"], name=f"cutoff-{number}"), min(least, ranges["cutoff"][1]))
         share = draws.share(f"beam-{number}")
         beam = cutoff * (1.0 if share > 0.6 else 0.07 + 1.4 * share)
     if kind in AREA_KINDS:
         strength /= _projected_area(kind, size)
-    black = draws.pick(ranges.light_materials, f"light_material-{number}") == "black"
-    return PlacedLight(kind, position, target, strength * colour, brightness, size, cutoff, beam, black)
+    black = draws.pick(ranges["light_materials"], f"light_material-{number}") == "black"
+    return Light(f"light-{number}", kind, position, target, strength * colour, brightness, size, cutoff, beam, black)
 
 
 def _size(draws: Draws, stream: Draws, ranges: Ranges, kind: str, number: int) -> tuple[float, ...]:
     if kind not in AREA_KINDS:
         return ()
-    size = draws.logarithmic(*ranges.light_size, f"light_size-{number}")
+    size = draws.logarithmic(*ranges["light_size"], name=f"light_size-{number}")
     return (size, size * stream.between(0.23, 0.97)) if kind == "rectangle" else (size,)
 
 
@@ -127,7 +125,7 @@ def _projected_area(kind: str, size: tuple[float, ...]) -> float:
     return 4 * size[0] * size[1] if kind == "rectangle" else math.pi * size[0] ** 2
 
 
-def _ahead(media: list[PlacedMedium], camera: Array, seen: Ways) -> Array:
+def _ahead(media: list[Medium], camera: Array, seen: Ways) -> Array:
     """Return a point on the axis of the camera, the middle of the stage or where the optical depth is about 2."""
     axis = seen.directions[0]
     far = float(np.linalg.norm(camera))
@@ -138,7 +136,7 @@ def _ahead(media: list[PlacedMedium], camera: Array, seen: Ways) -> Array:
     return camera + max(0.07 * far, 1.7 * _CLEAR) * axis
 
 
-def _nearer(media: list[PlacedMedium], camera: Array, ahead: Array, position: Array) -> Array:
+def _nearer(media: list[Medium], camera: Array, ahead: Array, position: Array) -> Array:
     """Return a position from which enough light arrives, moved towards a point ahead where needed."""
     for share in (1.0, 0.71, 0.5, 0.35, 0.25, 0.17, 0.11):
         moved = ahead + share * (position - ahead)

@@ -87,19 +87,19 @@ class Draws:
         # The highest 53 bits: the stream of raw numbers is what NumPy promises never to change.
         return ((int(self._bits.random_raw()) >> 11) + 0.5) * 2.0**-53
 
-    def between(self, low: float, high: float, name: str = "") -> float:
+    def between(self, low: float, high: float, *, name: str = "") -> float:
         """Return a number within a range, evenly."""
         return low + (high - low) * self.share(name)
 
-    def logarithmic(self, low: float, high: float, name: str = "") -> float:
+    def logarithmic(self, low: float, high: float, *, name: str = "") -> float:
         """Return a number within a range of positive numbers, evenly in the logarithm."""
         return float(low * math.exp(math.log(high / low) * self.share(name)))
 
-    def count(self, low: float, high: float, name: str = "") -> int:
+    def count(self, low: float, high: float, *, name: str = "") -> int:
         """Return a whole number from `low` to `high`, evenly in the logarithm."""
-        return min(math.floor(self.logarithmic(low + 0.5, high + 1.5, name) - 0.5), int(high))
+        return min(math.floor(self.logarithmic(low + 0.5, high + 1.5, name=name) - 0.5), int(high))
 
-    def few(self, low: float, high: float, name: str = "") -> int:
+    def few(self, low: float, high: float, *, name: str = "") -> int:
         """Return a whole number from `low` to `high`, of which small ones come more often than by `count`."""
         span = math.log((high + 1.5) / (low + 0.5))
         return min(math.floor((low + 0.5) * math.exp(span * self.share(name) ** 2) - 0.5), int(high))

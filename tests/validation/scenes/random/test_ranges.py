@@ -4,8 +4,8 @@
 import pytest
 
 from analytic.errors import InputError
-from validation.random_scenes.draw import draw_scene
-from validation.random_scenes.ranges import ranges_from
+from validation.scenes.random.ranges import ranges_from
+from validation.scenes.random.scene import draw_stage
 
 
 @pytest.mark.claim("random-ranges", tolerance="none: what is drawn lies within the range")
@@ -14,7 +14,7 @@ def test_what_is_set_is_drawn():
         {"optical_depth": [0.5, 0.7], "lights": 2, "light_kinds": {"spot": 1}, "media": {"endless": 1}}
     )
     for seed in range(12):
-        drawn = draw_scene(seed, ranges)
+        drawn = draw_stage(seed, ranges)
         assert [light.kind for light in drawn.lights] == ["spot", "spot"]
         assert [medium.bounds for medium in drawn.media] == ["endless"]
         assert 0.5 <= drawn.media[0].optical_depth <= 0.7

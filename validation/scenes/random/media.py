@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Media of random scenes, an endless one, bounded ones or both, and how bright a light makes them without shadows.
+
+Bounds are convex bodies within a ball. Of each the radius of a ball inside of it is known: where the camera shall be
+in a medium it is in that ball. The balls around bounds are disjoint.
+
+A light is as bright as drawn whatever the optical depth and its distance: its intensity follows from what a unit of it
+does. Shadows and bounds are approximations there; nothing but the exposure of the image depends on them.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.phase import phase_from_words
+from validation.scenes.random.design import Draws
+from validation.scenes.random.ranges import Ranges
+
+Array = NDArray[np.float64]
+
+#: By kind, the radius of a ball that holds the body of half sizes 1, and of one within it.
+_BALLS = {"sphere": (1.0, 1.0), "ellipsoid": (1.0, 0.93), "gem": (1.0, 0.91), "box": (math.sqrt(3), 1.0)}
+_TRIES = 12
+_STEPS = 96
+_NEAR = 0.07  # light spreads from a ball of this radius at least, in radii of the stage
+
+
+@dataclass(frozen=True)
+class Medium:
+    """A medium in radii of the stage."""
+
+    name: str
+    bounds: str  #: 'endless', 'sphere', 'box', 'gem' or 'ellipsoid'
+    sigma_t: Array  #: RGB, one over a radius of the stage
+    grey: bool  #: whether the three are one
+    albedo: Array
+    phase: str  #: words of the phase function, such as 'isotropic', 'hg:0.31' and 'hazy'
+    optical_depth: float  #: of the way from the camera to behind the stage, or through the middle of the bounds
+    holds_camera: bool
+    centre: Array = field(default_factory=lambda: np.zeros(3))
+    half: Array = field(default_factory=lambda: np.zeros(3))  #: of its sizes along its own axes
+    turn: tuple[Array, float] = (np.array([0.0, 0.0, 1.0]), 0.0)  #: axis and angle [degrees]
+
+    @property
+    def ball(self) -> float:
+        """The radius of a ball of about the same size as bounds."""
+        around, within = _BALLS[self.bounds]
+        return 0.5 * (around * float(self.half.max()) + within * float(self.half.min()))
+
+
+def draw_media(draws: Draws, ranges: Ranges, camera: Array) -> list[Medium]:
+    """Return the media around a camera, an endless one first."""
+    kind = draws.pick(ranges["media"], "media")
+    inside = draws.pick(ranges["camera_inside"], "camera_inside") == "yes"
+    media = []
+    if kind != "bounded":
+        media.append(_endless(draws, ranges, camera))
+    if kind != "endless":
+        fewest, most = ranges["bounded_media"]
+        count = round(draws.between(fewest - 0.49, most + 0.49, name="bounded_media"))
+        media += _bounded(draws, ranges, camera, count=count, inside=inside, first=not media)
+    return media
+
+
+def _endless(draws: Draws, ranges: Ranges, camera: Array) -> Medium:
+    depth = draws.logarithmic(*ranges["optical_depth"], name="optical_depth")
+    filling = _filling(draws, draws.of("endless"), ranges, depth / (float(np.linalg.norm(camera)) + 1))
+    return Medium("endless", "endless", *filling, depth, True)
+
+
+def _filling(draws: Draws, stream: Draws, ranges: Ranges, mean: float) -> tuple[Array, bool, Array, str]:
+    """Return extinction, whether it is one, albedo and phase function; `draws` is the point, or the stream again."""
+    grey = draws.pick(ranges["extinctions"], "extinctions") == "one"
+    spread = stream.between(*ranges["colour_spread"])
+    offsets = np.array([stream.between(-1, 1) for _ in range(3)])
+    sigma = np.full(3, mean) if grey else mean * (1 + spread * (offsets - offsets.mean()))
+    middle = draws.between(*ranges["albedo"], name="albedo")
+    reach = 0.5 * min(middle - ranges["albedo"][0], ranges["albedo"][1] - middle)
+    albedo = np.array([middle + reach * stream.between(-1, 1) for _ in range(3)])
+    kind = draws.pick(ranges["phases"], "phase")
+    phase = {
+        "hg": f"hg:{draws.between(*ranges['g'], name='g')!r}",
+        "hg-draine": f"hg-draine:{draws.between(*ranges['droplets'], name='droplets')!r}",
+    }.get(kind, kind)
+    return sigma, grey, albedo, phase
+
+
+def _bounded(draws: Draws, ranges: Ranges, camera: Array, *, count: int, inside: bool, first: bool) -> list[Medium]:
+    media: list[Medium] = []
+    balls: list[tuple[Array, float]] = []
+    for number in range(count):
+        stream = draws.of(f"medium-{number}")
+        # The point speaks for the first medium of the scene; others are of the stream.
+        own = draws if first and number == 0 else stream
+        for _ in range(_TRIES):
+            # The first one's kind and size are of the point too; a stream has no names.
+            kind = (draws if number == 0 else stream).pick(ranges["bounds_kinds"], "bounds_kind")
+            around, within = _BALLS[kind]
+            size = (draws if number == 0 else stream).logarithmic(*ranges["bounds"], name="bounds")
+            holds_camera = inside and number == 0
+            if holds_camera:
+                centre = (1 - stream.between(0.23, 0.67)) * camera + 0.31 * stream.in_ball()
+                size = max(size, float(np.linalg.norm(centre - camera)) * stream.between(1.17, 2.1) / within)
+            elif number == 0:
+                centre = 0.37 * stream.in_ball()
+            else:
+                centre, size = 1.9 * stream.in_ball(), 0.47 * size
+            stretch = np.array([stream.between(1.0, 1.37) for _ in range(3)]) if kind != "sphere" else np.ones(3)
+            half = size * stretch
+            if not holds_camera:
+                # The camera stays outside of the ball around it.
+                most = (float(np.linalg.norm(camera - centre)) - 0.11) / (around * float(half.max()))
+                half = half * min(1.0, most)
+            ball = around * float(half.max())
+            if ball > 0.05 and all(np.linalg.norm(centre - other) > ball + radius + 0.01 for other, radius in balls):
+                break
+        else:
+            continue
+        balls.append((centre, ball))
+        depth = own.logarithmic(*ranges["optical_depth"], name="optical_depth")
+        filling = _filling(own, stream, ranges, depth / (2 * float(half.mean())))
+        turn = stream.vector(), stream.between(3.0, 177.0)
+        name = f"medium-{len(media) + 1 + (not first)}"
+        media.append(Medium(name, kind, *filling, depth, holds_camera, centre, half, turn))
+    return media
+
+
+def optical_depths(media: list[Medium], start: Array, end: Array) -> Array:
+    """Return the optical depths of segments, with balls in place of the bounds.
+
+    Parameters
+    ----------
+    media
+        As `draw_media` returned them.
+    start, end
+        Ends of the segments, (..., 3).
+
+    Returns
+    -------
+    array
+        By channel, (..., 3).
+    """
+    way = end - start
+    length = np.linalg.norm(way, axis=-1)
+    depth = np.zeros((*length.shape, 3))
+    outside = length.copy()
+    for medium in media:
+        if medium.bounds != "endless":
+            chord = _chord(medium, start, way, length)
+            outside -= chord
+            depth += chord[..., None] * medium.sigma_t
+    for medium in media:
+        if medium.bounds == "endless":
+            depth += np.maximum(outside, 0)[..., None] * medium.sigma_t
+    return depth
+
+
+def _chord(medium: Medium, start: Array, way: Array, length: Array) -> Array:
+    """Return how much of segments lies in the ball of a medium."""
+    square = np.maximum(length**2, 1e-30)
+    from_centre = start - medium.centre
+    middle = -np.sum(from_centre * way, axis=-1) / square
+    closest = np.sum((from_centre + middle[..., None] * way) ** 2, axis=-1)
+    reach = np.sqrt(np.maximum(medium.ball**2 - closest, 0) / square)
+    return length * np.maximum(np.minimum(middle + reach, 1) - np.maximum(middle - reach, 0), 0)
+
+
+@dataclass(frozen=True)
+class Ways:
+    """Points along some rays of the camera, in radii of the stage, and what light scattered there comes through."""
+
+    points: Array  #: (rays, steps, 3)
+    directions: Array  #: (rays, 3)
+    weights: Array  #: length of the steps times the transmittance to the camera, (rays, steps, 3)
+
+
+def ways(media: list[Medium], camera: Array, target: Array, reach: float) -> Ways:
+    """Return five rays about the middle of the image, each up to `reach` radii of the stage."""
+    forward = (target - camera) / np.linalg.norm(target - camera)
+    left = np.cross(forward, [0.0, 0.0, 1.0])
+    left /= np.linalg.norm(left)
+    up = np.cross(left, forward)
+    directions = np.stack([forward, *(forward + 0.13 * side for side in (left, -left, up, -up))])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    edges = reach * (np.arange(_STEPS + 1) / _STEPS) ** 2
+    middle, lengths = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
+    points = camera + middle[:, None] * directions[:, None]
+    depth = optical_depths(media, np.broadcast_to(camera, points.shape), points)
+    return Ways(points, directions, lengths[:, None] * np.exp(-depth))
+
+
+def unit_airlight(media: list[Medium], seen: Ways, light: Array, *, directional: bool) -> float:
+    """Return the largest airlight of a light of unit intensity, or of unit irradiance, over rays and channels.
+
+    Parameters
+    ----------
+    light
+        Where it is, or with `directional` a point very far away from which it comes, (3,).
+    directional
+        Whether its light does not spread.
+    """
+    toward = light - seen.points
+    distance = np.linalg.norm(toward, axis=-1)
+    depth = optical_depths(media, seen.points, np.broadcast_to(light, seen.points.shape))
+    spread = np.ones_like(distance) if directional else 1 / np.maximum(distance, _NEAR) ** 2
+    cosine = -np.sum(toward * seen.directions[:, None], axis=-1) / np.maximum(distance, 1e-12)
+    total = np.zeros(seen.points.shape)
+    taken = np.zeros(distance.shape, dtype=bool)
+    for medium in sorted(media, key=lambda each: each.bounds == "endless"):
+        inside = (
+            np.linalg.norm(seen.points - medium.centre, axis=-1) < medium.ball if medium.bounds != "endless" else ~taken
+        )
+        inside &= ~taken
+        taken |= inside
+        phase = phase_from_words(medium.phase)(np.clip(cosine, -1, 1)) / (4 * np.pi)
+        total += (inside * phase * spread)[..., None] * (medium.sigma_t * medium.albedo)
+    return float((total * np.exp(-depth) * seen.weights).sum(axis=1).max())
