@@ -10,37 +10,43 @@ from typing import Any
 
 import numpy as np
 
+from realtime.frame.renderer import frame_renderer, render_frame
+from realtime.methods.registry import METHODS
+from realtime.scene.read_scene import Scene, read_scene
+from reference.quadrature.image import quadrature_image
+from reference.scene.read import read_truth
+from validation.study.configuration import find_kernel
+
 _FRAMES: dict[Any, Any] = {}
 
 
-def read(scene: dict[str, Any], precision: str = "single") -> Any:
-    """Return the scene of a dictionary."""
+def read(scene: Any, precision: str = "single") -> Scene:
+    """Return the scene of a dictionary or of Mitsuba; one that was read as it is."""
     import mitsuba as mi
 
-    from realtime.scene.read_scene import read_scene
+    scene = mi.load_dict(scene) if isinstance(scene, dict) else scene
+    return scene if isinstance(scene, Scene) else read_scene(scene, precision)
 
-    return read_scene(mi.load_dict(scene), precision)
+
+def renderer(scene: Any, method: Any, *, kernel: str = "exact", precision: str = "single", **options: Any):
+    """Return the frame renderer of a method, or of its name, for anything that `read` takes."""
+    method = METHODS[method] if isinstance(method, str) else method
+    return frame_renderer(read(scene, precision), method, kernel=find_kernel(kernel), **options)
 
 
-def frame(scene: dict[str, Any], method: str, *, kernel: str = "exact", precision: str = "single", **parameters: Any):
-    """Return the frame of a method; not for tests that replace a part of the code."""
-    from realtime.frame.renderer import frame_renderer, render_frame
-    from realtime.kernels.registry import KERNELS
-    from realtime.methods.registry import METHODS
+def render(scene: Any, method: Any = "unshadowed", **options: Any):
+    """Return a frame; `options` as of `renderer`."""
+    return render_frame(renderer(scene, method, **options))
 
-    def rendered():
-        function = KERNELS[kernel].function
-        return render_frame(frame_renderer(read(scene, precision), METHODS[method], kernel=function, **parameters))
 
-    return _once(("frame", scene, method, kernel, precision, parameters), rendered)
+def frame(scene: dict[str, Any], method: str = "unshadowed", **options: Any):
+    """Return a frame as `render` does, once in a process; not for tests that replace a part of the code."""
+    return _once(("frame", scene, method, options), lambda: render(scene, method, **options))
 
 
 def truth(scene: dict[str, Any]):
     """Return the image of the quadrature reference, which shares no code with the methods."""
     import mitsuba as mi
-
-    from reference.quadrature.image import quadrature_image
-    from reference.scene.read import read_truth
 
     return _once(("truth", scene), lambda: quadrature_image(read_truth(mi.load_dict(scene)), edges="geometry"))
 

@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from tests.helpers.frames import read, render
 from tests.helpers.scenes import spot, tiny_scene
 
 SIZE = (48, 36)
@@ -71,26 +72,10 @@ def loaded_scene(name="light beside the view", **changes):
     return mi.load_dict(tiny_scene(size=changes.pop("size", SIZE), **(SCENES[name][0]() | changes)))
 
 
-def renderer_of(loaded, method="light-volumes", precision="single", **parameters):
-    from realtime.frame.renderer import frame_renderer
-    from realtime.kernels.registry import KERNELS
-    from realtime.methods.registry import METHODS
-    from realtime.scene.read_scene import read_scene
-
-    kernel = KERNELS["exact"].function
-    return frame_renderer(read_scene(loaded, precision), METHODS[method], kernel=kernel, **parameters)
-
-
-def render(loaded, method="light-volumes", precision="single", **parameters):
-    from realtime.frame.renderer import render_frame
-
-    return render_frame(renderer_of(loaded, method, precision, **parameters))
-
-
 def render_both(loaded, precision="single", **parameters):
     """Render the same height field, as published, by both evaluations."""
     shared = {"precision": precision, "walls": "slanted"} | parameters
-    return [render(loaded, evaluation=evaluation, **shared) for evaluation in EVALUATIONS]
+    return [render(loaded, "light-volumes", evaluation=evaluation, **shared) for evaluation in EVALUATIONS]
 
 
 def differ(image, expected):
@@ -100,12 +85,11 @@ def differ(image, expected):
 
 def twin_of(loaded, frame, size, precision="single", *, walls="slanted"):
     """Return the airlight of the map that a frame was rendered with, by another route."""
-    from realtime.scene.read_scene import read_scene
     from realtime.shadow_maps.shadow_map import cast_shadow_map
     from reference.scene.read import read_truth
     from tests.evidence.oracles.light_volume import oracle_airlight, traced_walls
 
-    scene = read_scene(loaded, precision)
+    scene = read(loaded, precision)
     maps = [cast_shadow_map(scene.geometry, light, size) for light in scene.lights]
     numbers = traced_walls(scene, maps) if walls == "upright" else None
     return oracle_airlight(read_truth(loaded), maps, distance=frame.distance, walls=numbers)

@@ -47,9 +47,10 @@ def plank() -> dict[str, Any]:
     return cube(centre=PLANK_AT, sides=PLANK_SIDES, sigma_t=1.7, g=0.0)
 
 
-def fog_sphere(**medium: Any) -> dict[str, Any]:
-    shape = {"type": "sphere", "center": list(SPHERE_AT), "radius": SPHERE_RADIUS}
-    return bounded_medium(shape, (0.9, 0.5, 0.7), (0.9, 0.4, 0.3), **medium)
+def fog_sphere(centre=SPHERE_AT, radius=SPHERE_RADIUS, sigma_t: Any = (0.9, 0.5, 0.7), **medium: Any) -> dict[str, Any]:
+    return bounded_medium(
+        {"type": "sphere", "center": list(centre), "radius": radius}, sigma_t, (0.9, 0.4, 0.3), **medium
+    )
 
 
 def shaded(*, size=(16, 12), **changes: Any) -> dict[str, Any]:
@@ -57,30 +58,6 @@ def shaded(*, size=(16, 12), **changes: Any) -> dict[str, Any]:
     solid = {"type": "sphere", "center": [0.33, 0.27, 1.35], "radius": 0.29}
     things = {"lamp": sun(), "cube": cube(), "solid": solid, "floor": tiny_scene()["floor"]}
     return clear_scene(size=size, **(things | changes))
-
-
-def read(scene: dict[str, Any], precision: str = "double"):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-
-    return read_scene(mi.load_dict(scene), precision)
-
-
-def render(scene, method="unshadowed", *, precision="double", **parameters):
-    """Render a dictionary, or what `read` made of one."""
-    from realtime.frame.renderer import frame_renderer, render_frame
-    from realtime.kernels.registry import KERNELS
-    from realtime.methods.registry import METHODS
-
-    chosen = METHODS[method]
-    kernel = KERNELS["exact"].function
-    scene = read(scene, precision) if isinstance(scene, dict) else scene
-    return render_frame(frame_renderer(scene, chosen, kernel=kernel, **parameters))
-
-
-def relative_rmse(image, reference) -> float:
-    return float(np.sqrt(np.mean((np.asarray(image, dtype=np.float64) - reference) ** 2)) / np.mean(reference))
 
 
 def rays(scene) -> tuple[Array, Array]:
@@ -104,8 +81,8 @@ def plank_part() -> airlight_sum.Body:
     return box_part(PLANK_AT, PLANK_SIDES, 1.7, 0.0)
 
 
-def sphere_part() -> airlight_sum.Body:
-    chord, isotropic = airlight_sum.ball(SPHERE_AT, SPHERE_RADIUS), airlight_sum.henyey_greenstein(0.0)
+def sphere_part(centre=SPHERE_AT, radius=SPHERE_RADIUS) -> airlight_sum.Body:
+    chord, isotropic = airlight_sum.ball(centre, radius), airlight_sum.henyey_greenstein(0.0)
     return airlight_sum.Body(chord, np.array([0.9, 0.5, 0.7]), np.array([0.9, 0.4, 0.3]), isotropic)
 
 

@@ -2,64 +2,21 @@
 """Airlight in bounded media: against sums over small steps, limits with a known answer, and marching."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from tests.helpers import airlight_sum
+from tests.helpers import airlight_sum, frames
+from tests.helpers.frames import relative_rmse
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
-from validation.scenes.meshes import box, placed, rotation
-from validation.scenes.parts import medium_boundary
+from tests.helpers.sunlit import box_part, cube, fog_sphere, sphere_part
 
-TURN = rotation((0.4, 1.0, 0.1), 33.0)
-SIDES = np.array([1.1, 0.9, 1.4])
-
-
-def fog_sphere(centre=(-0.8, 0.4, 0.7), radius=0.6, sigma_t=(0.9, 0.5, 0.7), **medium):
-    return bounded_medium(
-        {"type": "sphere", "center": list(centre), "radius": radius}, sigma_t, (0.9, 0.4, 0.3), **medium
-    )
-
-
-def cube(centre=(0.9, 0.5, 0.6), *, sigma_t=1.1, phase=None):
-    medium = {
-        "type": "homogeneous",
-        "sigma_t": sigma_t,
-        "albedo": {"type": "rgb", "value": [0.2, 0.5, 0.9]},
-        "phase": phase or {"type": "hg", "g": 0.4},
-    }
-    return medium_boundary("cube", placed(box(tuple(SIDES)), centre, TURN), medium)
-
-
-def render(scene, method="unshadowed", *, precision="double", **parameters):
-    import mitsuba as mi
-
-    from realtime.frame.renderer import frame_renderer, render_frame
-    from realtime.kernels.registry import KERNELS
-    from realtime.methods.registry import METHODS
-    from realtime.scene.read_scene import read_scene
-
-    chosen = METHODS[method]
-    kernel = KERNELS["exact"].function
-    read = read_scene(mi.load_dict(scene), precision)
-    return render_frame(frame_renderer(read, chosen, kernel=kernel, **parameters))
-
-
-def relative_rmse(image, expected):
-    return np.sqrt(np.mean((np.asarray(image, dtype=np.float64) - expected) ** 2)) / np.mean(expected)
-
-
-ISOTROPIC = airlight_sum.henyey_greenstein(0.0)
-SPHERE = airlight_sum.Body(
-    airlight_sum.ball((-0.8, 0.4, 0.7), 0.6), np.array([0.9, 0.5, 0.7]), np.array([0.9, 0.4, 0.3]), ISOTROPIC
-)
-CUBE = airlight_sum.Body(
-    airlight_sum.box((0.9, 0.5, 0.6), 0.5 * SIDES, TURN),
-    np.full(3, 1.1),
-    np.array([0.2, 0.5, 0.9]),
-    airlight_sum.henyey_greenstein(0.4),
-)
+SPHERE_AT, RADIUS = (-0.8, 0.4, 0.7), 0.6
+CUBE_AT = (0.9, 0.5, 0.6)
+SPHERE, CUBE = sphere_part(SPHERE_AT, RADIUS), box_part(CUBE_AT)
+render = partial(frames.render, precision="double")
 
 
 def truth_of(scene):
@@ -87,7 +44,7 @@ def summed(scene, parts, *, steps=500, **how):
 )
 def test_two_media_against_sums_over_small_steps(variant, lamp):
     light = tiny_scene()["lamp"] | {"position": list(lamp)}
-    scene = clear_scene(lamp=light, ball=fog_sphere(), cube=cube())
+    scene = clear_scene(lamp=light, ball=fog_sphere(SPHERE_AT, RADIUS), cube=cube(centre=CUBE_AT))
     expected = summed(scene, [SPHERE, CUBE])
     # Segments are cut where the edges of the box bend the leg's length: 1e-5 is left, of the steps of the sums.
     assert relative_rmse(render(scene).airlight, expected) < 3e-5
@@ -97,7 +54,7 @@ def test_two_media_against_sums_over_small_steps(variant, lamp):
 @pytest.mark.claim("mean-distance-of-the-paper", tolerance="relative RMSE 1e-4")
 def test_the_mean_distance_of_the_paper_is_a_constant_in_the_exponent(variant):
     """With R for the light's leg the sum over the chord has one factor more, exp(-sigma_t R)."""
-    scene = clear_scene(ball=fog_sphere(sigma_t=0.7))
+    scene = clear_scene(ball=fog_sphere(SPHERE_AT, RADIUS, sigma_t=0.7))
     airlight = render(scene, "shadow-planes", media="paper").airlight
 
     part = replace(SPHERE, sigma_t=np.full(3, 0.7))
@@ -109,10 +66,10 @@ def test_the_mean_distance_of_the_paper_is_a_constant_in_the_exponent(variant):
 def test_surfaces_are_seen_and_lit_through_bounded_media(variant):
     """A floor with and without a medium between: the ratio is the transmittance of both legs."""
     floor = tiny_scene()["floor"]
-    seen = render(clear_scene(floor=floor, ball=fog_sphere()))
-    clear = render(clear_scene(floor=floor, ball=fog_sphere(sigma_t=0.0)))
+    seen = render(clear_scene(floor=floor, ball=fog_sphere(SPHERE_AT, RADIUS)))
+    clear = render(clear_scene(floor=floor, ball=fog_sphere(SPHERE_AT, RADIUS, sigma_t=0.0)))
     assert np.array_equal(seen.distance, clear.distance)
-    truth = truth_of(clear_scene(floor=floor, ball=fog_sphere()))
+    truth = truth_of(clear_scene(floor=floor, ball=fog_sphere(SPHERE_AT, RADIUS)))
     distance = seen.distance.ravel()
     hit = np.isfinite(distance) & (clear.surface[..., 0].ravel() > 0)
     point = truth.origin + distance[hit, None] * truth.direction[hit]
@@ -132,7 +89,7 @@ def test_surfaces_are_seen_and_lit_through_bounded_media(variant):
 
 
 def test_an_ambient_field_fills_bounded_media(variant):
-    scene = clear_scene(ball=fog_sphere(sigma_t=0.7))
+    scene = clear_scene(ball=fog_sphere(SPHERE_AT, RADIUS, sigma_t=0.7))
     gain = render(scene, "shadow-planes", ambient=0.3).airlight - render(scene, "shadow-planes").airlight
     truth = truth_of(scene)
     near, far = SPHERE.chord(truth.origin, truth.direction)
@@ -144,8 +101,8 @@ def test_an_ambient_field_fills_bounded_media(variant):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        (lambda: {"ball": fog_sphere(), "other": fog_sphere(centre=(-0.5, 0.4, 0.7))}, "overlap"),
-        (lambda: {"ball": fog_sphere(centre=(0.2, -4.1, 1.3))}, "inside of shape"),
+        (lambda: {"ball": fog_sphere(SPHERE_AT, RADIUS), "other": fog_sphere((-0.5, 0.4, 0.7), RADIUS)}, "overlap"),
+        (lambda: {"ball": fog_sphere((0.2, -4.1, 1.3), RADIUS)}, "inside of shape"),
         (lambda: {"disk": bounded_medium({"type": "disk"}, 0.5, (0.5, 0.5, 0.5))}, "is a Disk"),
     ],
 )

@@ -6,6 +6,7 @@ import pytest
 
 from realtime.errors import InputError
 from tests.helpers import airlight_sum
+from tests.helpers.frames import read, relative_rmse, render
 from tests.helpers.scenes import clear_scene, tiny_scene
 from tests.helpers.sunlit import (
     ALONG,
@@ -16,9 +17,6 @@ from tests.helpers.sunlit import (
     plank,
     plank_part,
     rays,
-    read,
-    relative_rmse,
-    render,
     shaded,
     sphere_part,
     summed,
@@ -48,7 +46,7 @@ def test_a_box_under_light_from_above_has_a_closed_form(variant, precision):
     sides, centre, sigma, g = np.array([1.5, 2.0, 1.25]), np.array([0.25, 0.5, 0.75]), 0.8125, 0.4
     fog = cube(centre=tuple(centre), sides=sides, turn=np.eye(3), sigma_t=sigma, g=g)
     scene = read(clear_scene(lamp=sun((0, 0, -1)), cube=fog), precision)
-    airlight = render(scene).airlight.reshape(-1, 3)
+    airlight = render(scene, precision="double").airlight.reshape(-1, 3)
 
     origin, direction = rays(scene)
     with np.errstate(divide="ignore"):
@@ -85,10 +83,10 @@ CASES = {
 def test_bounded_media_against_sums_over_small_steps(variant, case):
     shapes, parts, along = CASES[case]
     scene = clear_scene(size=SMALL, lamp=sun(along), **{name: make() for name, make in shapes.items()})
-    expected = summed(read(scene), [make() for make in parts], along=along)
+    expected = summed(read(scene, "double"), [make() for make in parts], along=along)
     # Steps across the edges of the other medium's shade: 1e-4 of a chord, on few of the rays. Corners of media are
     # float32 numbers, 1e-7.
-    assert relative_rmse(render(scene).airlight, expected) < 1e-5
+    assert relative_rmse(render(scene, precision="double").airlight, expected) < 1e-5
     assert relative_rmse(render(scene, precision="single").airlight, expected) < 3e-5
 
 
@@ -112,10 +110,10 @@ def test_media_of_many_planes_have_nodes(variant):
 
     scene = clear_scene(size=SMALL, lamp=sun(), many=medium_boundary("many", (vertices, faces), medium))
     part = airlight_sum.Body(chord, np.full(3, 1.3), np.full(3, 0.7), airlight_sum.henyey_greenstein(0.0))
-    expected = summed(read(scene), [part], steps=1000)
+    expected = summed(read(scene, "double"), [part], steps=1000)
     assert np.any(expected > 0)
     # Kinks of the leg at 80 facets, between nodes that are spread over the chord.
-    assert relative_rmse(render(scene).airlight, expected) < 1e-3
+    assert relative_rmse(render(scene, precision="double").airlight, expected) < 1e-3
     assert relative_rmse(render(scene, precision="single").airlight, expected) < 1e-3
 
 
@@ -124,9 +122,9 @@ def test_a_ray_along_the_light(variant):
     axis = unit(ALONG)
     sensor = look(np.asarray(CUBE_AT) - 4 * axis, CUBE_AT, size=(5, 5))
     scene = clear_scene(sensor=sensor, lamp=sun(), cube=cube(), ball=fog_sphere())
-    expected = summed(read(scene), [box_part(), sphere_part()])
+    expected = summed(read(scene, "double"), [box_part(), sphere_part()])
     for method in ("unshadowed", "light-volumes"):
-        airlight = render(scene, method).airlight
+        airlight = render(scene, method, precision="double").airlight
         assert airlight[2, 2].min() > 0
         assert airlight[2, 2] == pytest.approx(expected[2, 2], rel=1e-5)
         assert relative_rmse(airlight, expected) < 1e-5
@@ -134,8 +132,8 @@ def test_a_ray_along_the_light(variant):
 
 def test_surfaces_have_lambert_s_law_and_both_legs(variant):
     scene = shaded(solid=None, cube=None, ball=fog_sphere())
-    frame = render(scene)
-    origin, direction = rays(read(scene))
+    frame = render(scene, precision="double")
+    origin, direction = rays(read(scene, "double"))
     distance = frame.distance.ravel()
     seen = np.isfinite(distance)
     point = origin + distance[seen, None] * direction[seen]

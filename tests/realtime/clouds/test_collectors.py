@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 
 from realtime.numerics.aligned import aligned_array
-from tests.helpers.sunlit import clear_scene, cube, read, sun, unit
+from tests.helpers.frames import read
+from tests.helpers.scenes import clear_scene
+from tests.helpers.sunlit import cube, sun, unit
 from validation.scenes.meshes import box, rotation
 from validation.scenes.parts import medium_boundary
 
@@ -21,7 +23,7 @@ def _map(direction, *, sides=SLAB, turn=SLAB_TURN, size=256):
     from realtime.clouds.light_maps.pyramid import light_map
 
     entry = cube(centre=tuple(MIDDLE), sides=sides, turn=turn)
-    scene = read(clear_scene(lamp=sun(direction), cube=entry), "single")
+    scene = read(clear_scene(lamp=sun(direction), cube=entry))
     return light_map([mi.load_dict({"type": "scene", "cloud": entry})], scene.lights[0], size)
 
 
@@ -121,7 +123,7 @@ def _wedge(axis):
     below = vertices[:, 2] < 0
     vertices[:, 2] = np.where(below, -WEDGE_HEIGHT - WEDGE_SLOPE * vertices[:, 0], 0.0)
     entry = medium_boundary("wedge", (vertices + np.array([0.0, 9.4, 0.0]), faces), {"type": "homogeneous"})
-    scene = read(clear_scene(lamp=sun(axis), cube=entry), "single")
+    scene = read(clear_scene(lamp=sun(axis), cube=entry))
     return light_map([mi.load_dict({"type": "scene", "cloud": entry})], scene.lights[0], 256)
 
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from realtime.numerics.aligned import aligned_array
-from tests.helpers.sunlit import ALONG, SIDES, clear_scene, cube, read, sun, unit
+from tests.helpers.frames import read
+from tests.helpers.scenes import clear_scene
+from tests.helpers.sunlit import ALONG, SIDES, cube, sun, unit
 from tests.helpers.sunlit import CUBE_AT as MIDDLE
 
 SIZE = 64

@@ -15,7 +15,7 @@ from realtime.methods.registry import METHODS
 from realtime.scene.animate import coloured_light, read_objects, thicker_medium, turned_light, turned_objects
 from realtime.scene.read_scene import Scene, read_scene
 from tests.helpers.scenes import clear_scene, tiny_scene
-from tests.realtime.bounded_media.test_airlight import cube
+from tests.helpers.sunlit import cube
 
 STILL = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
 TURN = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
@@ -47,7 +47,11 @@ def cube_of_fog() -> Scene:
 
     turned = mi.ScalarTransform4f().translate([0.7, 0.4, 0.5]).rotate([1, 2, 3], 40).scale(0.17)
     caster = {"type": "cube", "to_world": turned}
-    return read_scene(mi.load_dict(clear_scene(size=(32, 24), cube=cube(), caster=caster, floor=tiny_scene()["floor"])))
+    return read_scene(
+        mi.load_dict(
+            clear_scene(size=(32, 24), cube=cube(centre=(0.9, 0.5, 0.6)), caster=caster, floor=tiny_scene()["floor"])
+        )
+    )
 
 
 def frames(scene: Scene, steps, share: float = 0.1):

@@ -8,16 +8,15 @@ import pytest
 
 from realtime.area_lights.shape import turned_area_light
 from realtime.frame.incremental import next_frame
-from realtime.frame.renderer import frame_renderer, image_frame, light_groups, render_frame, run_stages
-from realtime.kernels.registry import KERNELS
+from realtime.frame.renderer import image_frame, light_groups, render_frame, run_stages
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.method import Method
 from realtime.methods.registry import METHODS
 from realtime.scene.animate import with_area_lights
 from realtime.scene.light_points import with_light_points
-from realtime.scene.read_scene import read_scene
+from tests.helpers import frames
 from tests.helpers.area_lamps import area_lamp, lit_by
-from tests.helpers.frames import relative_rmse
+from tests.helpers.frames import read, relative_rmse
 from tests.helpers.scenes import tiny_scene
 from tests.helpers.sunlit import fog_sphere, shaded
 from validation.scenes.meshes import rotation
@@ -33,14 +32,7 @@ CLOSE = {
 
 
 def scene_of(precision="single", **changes):
-    import mitsuba as mi
-
-    return read_scene(mi.load_dict(lit_by(**({"changes": {"size": SIZE}} | changes))), precision)
-
-
-def renderer_of(scene, name, **parameters):
-    method = METHODS[name]
-    return frame_renderer(scene, method, kernel=KERNELS["exact"].function, **parameters)
+    return read(lit_by(**({"changes": {"size": SIZE}} | changes)), precision)
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +43,7 @@ def one_by_one(variant):
     lit = with_light_points(scene, 5, "sobol")
     for point in lit.lights:
         alone = replace(scene, lights=(replace(point, source=None),), area_lights=())
-        frame = render_frame(renderer_of(alone, "ray-march", steps=600))
+        frame = frames.render(alone, "ray-march", steps=600)
         airlight, surface = airlight + frame.airlight, surface + frame.surface
     return airlight, surface
 
@@ -59,7 +51,7 @@ def one_by_one(variant):
 @pytest.mark.parametrize("name", CLOSE)
 def test_every_method_renders_the_points_of_a_light(variant, one_by_one, name):
     parameters, bound = CLOSE[name]
-    frame = render_frame(renderer_of(scene_of(), name, points=5, pattern="sobol", **parameters))
+    frame = frames.render(scene_of(), name, points=5, pattern="sobol", **parameters)
     assert relative_rmse(frame.airlight, one_by_one[0]) < bound
     assert relative_rmse(frame.surface, one_by_one[1]) < (0.1 if name == "light-volumes" else 1e-4)
 
@@ -73,16 +65,16 @@ def _two_spots():
     lamps = {"hard": spot | bright | {"beam_width": 37.0}, "soft": spot | bright | {"beam_width": 11.0}}
     turned = mi.ScalarTransform4f().translate([0.63, 0.47, 1.63]).rotate([1, 2, 3], 37).scale(0.07)
     solid = {"type": "cube", "to_world": turned}
-    return read_scene(mi.load_dict(shaded(size=(16, 12), lamp=None, pearl=fog_sphere(), solid=solid, **lamps)))
+    return read(shaded(size=(16, 12), lamp=None, pearl=fog_sphere(), solid=solid, **lamps))
 
 
 def test_many_lights_one_by_one_are_all_at_once(variant):
     """Each light has code of its own in one kernel, or kernels of their own: the sum is the same to rounding."""
     scene = _two_spots()
-    kernel, method = KERNELS["exact"].function, METHODS["unshadowed"]
-    apart = frame_renderer(scene, method, kernel=kernel)
+    method = METHODS["unshadowed"]
+    apart = frames.renderer(scene, method)
     assert len(light_groups(apart)) == len(scene.lights) == 2
-    one = frame_renderer(scene, replace(method, lights_at_once=lambda parameters: True), kernel=kernel)
+    one = frames.renderer(scene, replace(method, lights_at_once=lambda parameters: True))
     assert len(light_groups(one)) == 1
     wanted, frame = render_frame(one), render_frame(apart)
     np.testing.assert_allclose(frame.airlight, wanted.airlight, rtol=1e-5, atol=1e-5 * wanted.airlight.mean())
@@ -102,11 +94,9 @@ def test_a_black_lamp_shadows_others_and_not_itself(variant):
         screen = area_lamp("disk", size=0.3, material=material) | {
             "to_world": mi.ScalarTransform4f().look_at([0.75, 0.6, 1.5], [0.1, 0.1, -3.0], [0, 1, 0]).scale(0.3)
         }
-        scene = read_scene(
-            mi.load_dict(lit_by(changes={"size": SIZE}) | {"lamp": tiny_scene()["lamp"], "screen": screen})
-        )
+        scene = read(lit_by(changes={"size": SIZE}) | {"lamp": tiny_scene()["lamp"], "screen": screen})
         return [
-            render_frame(renderer_of(scene, name, points=2, **parameters))
+            frames.render(scene, name, points=2, **parameters)
             for name, parameters in (("shadow-planes", {}), ("ray-march", {"steps": 1000}))
         ]
 
@@ -125,12 +115,12 @@ def test_what_a_method_shows_of_no_light_is_added_once(variant):
 
     method = Method("veil", render, "a veil", "none", uses_kernel=lambda parameters: False)
     scene = scene_of(changes={"size": (16, 12), "ball": None, "floor": None})
-    frame = render_frame(frame_renderer(scene, method, points=4))
+    frame = frames.render(scene, method, points=4)
     np.testing.assert_allclose(frame.surface, 0.125, rtol=1e-6)
     light = scene.area_lights[0]
     np.testing.assert_allclose(frame.airlight[0, 0], light.radiance * light.area, rtol=1e-5)
     at_once = replace(method, lights_at_once=lambda parameters: True)
-    again = render_frame(frame_renderer(scene, at_once, points=4))
+    again = frames.render(scene, at_once, points=4)
     np.testing.assert_allclose(again.surface, frame.surface, rtol=1e-6)
     np.testing.assert_allclose(again.airlight, frame.airlight, rtol=1e-6)
 
@@ -142,17 +132,17 @@ def test_what_a_method_shows_of_no_light_is_added_once(variant):
 def test_the_next_frame_is_that_of_the_moved_light(variant, name, material):
     parameters = {"steps": 20} if name == "ray-march" else {"map": 64} if name == "light-volumes" else {}
     scene = scene_of(kind="disk", size=0.31, material=material, changes={"size": SIZE})
-    renderer = renderer_of(scene, name, points=3, **parameters)
+    drawn = frames.renderer(scene, name, points=3, **parameters)
     about = np.array([0.1, 0.1, 0.0])
     still = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
-    stages, cache = next_frame(renderer, scene, None, **still)
-    np.testing.assert_array_equal(image_frame(renderer, stages).airlight, render_frame(renderer).airlight)
-    again, cache = next_frame(renderer, scene, cache, **still)
+    stages, cache = next_frame(drawn, scene, None, **still)
+    np.testing.assert_array_equal(image_frame(drawn, stages).airlight, render_frame(drawn).airlight)
+    again, cache = next_frame(drawn, scene, cache, **still)
     np.testing.assert_array_equal(np.array(again[2]), np.array(stages[2]))
     turned = turned_area_light(scene.area_lights[0], about, rotation((0, 0, 1), 40.0))
     moved = with_area_lights(scene, [turned])
-    stages, cache = next_frame(renderer, moved, cache, **(still | {"light_moved": True}))
-    afresh = renderer_of(moved, name, points=3, **parameters)
+    stages, cache = next_frame(drawn, moved, cache, **(still | {"light_moved": True}))
+    afresh = frames.renderer(moved, name, points=3, **parameters)
     wanted = run_stages(afresh, afresh.prepare(moved))
     for got, expected in zip(stages, wanted, strict=True):
         np.testing.assert_allclose(np.array(got), np.array(expected), rtol=1e-5, atol=1e-6)

@@ -6,8 +6,8 @@ import pytest
 from scipy.integrate import quad
 
 from realtime.errors import InputError
-from realtime.kernels.exact import exact
-from realtime.methods.registry import FOG_METHODS, METHODS
+from realtime.methods.registry import FOG_METHODS
+from tests.helpers import frames
 from tests.helpers.scenes import tiny_scene
 
 
@@ -15,17 +15,13 @@ def render(method, *, position, size=(9, 9), changes=None, **parameters):
     """Render a scene whose camera looks along +y, its middle pixel along the axis."""
     import mitsuba as mi
 
-    from realtime.frame.renderer import frame_renderer, render_frame
-    from realtime.scene.read_scene import read_scene
-
     scene = tiny_scene(size=size, floor=None)
     scene["sensor"]["to_world"] = mi.ScalarTransform4f().look_at([0, -5, 1], [0, 0, 1], [0, 0, 1])
     scene["lamp"]["position"] = position
     scene |= {"ball": {"type": "cube", "to_world": mi.ScalarTransform4f().translate([2, 3, 0]).scale(0.3)}} | (
         changes or {}
     )
-    chosen = METHODS[method]
-    return render_frame(frame_renderer(read_scene(mi.load_dict(scene)), chosen, kernel=exact, **parameters))
+    return frames.render(scene, method, **parameters)
 
 
 @pytest.mark.claim("light-on-a-ray-refused")

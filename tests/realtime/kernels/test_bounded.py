@@ -8,20 +8,15 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from tests.helpers import frames
+from tests.helpers.frames import relative_rmse
 from tests.helpers.scenes import bounded_medium, clear_scene
 
 CENTRE, RADIUS, SIGMA, MEAN = np.array([-0.2, 0.4, 0.7]), 0.6, 0.7, 1.2 * 0.6
 
 
 def render(scene, kernel, **parameters):
-    import mitsuba as mi
-
-    from realtime.frame.renderer import render_frame
-    from realtime.scene.read_scene import read_scene
-    from validation.study.configuration import configuration, prepared
-
-    read = read_scene(mi.load_dict(scene), "double")
-    return render_frame(prepared(read, configuration("shadow-planes", kernel, parameters))).airlight
+    return frames.render(scene, "shadow-planes", kernel=kernel, precision="double", **parameters).airlight
 
 
 def ball(**phase):
@@ -65,10 +60,6 @@ def meant(x, r, foot, height, enter):
 def printed(x, r, foot, height, enter):
     # (sin theta + 1)/cos theta with theta the angle at the light from the foot.
     return SIGMA * (foot + MEAN - enter + MEAN * (r + x - foot) / height)
-
-
-def relative_rmse(values, expected):
-    return np.sqrt(np.mean((values - expected) ** 2)) / np.mean(expected)
 
 
 @pytest.mark.claim("polynomial-of-bounded-media", tolerance="relative RMSE 1e-4 of nodes and of degree 25")

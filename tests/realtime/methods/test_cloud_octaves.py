@@ -2,6 +2,7 @@
 """Claim: octaves are what their formula says; clouds dim what lies behind and below them; others refuse clouds."""
 
 from dataclasses import replace
+from functools import partial
 
 import mitsuba as mi
 import numpy as np
@@ -17,6 +18,7 @@ from realtime.scene.animate import thicker_medium
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import DROPLETS, SUN, cloud, cloud_scene, loaded, ring
+from tests.helpers.frames import render
 from validation.scenes.meshes import box, grid, placed
 from validation.scenes.parts import mitsuba_mesh
 
@@ -27,9 +29,7 @@ SKY = {"type": "constant", "radiance": {"type": "rgb", "value": [0.13, 0.22, 0.4
 SIGMA = 0.0363
 
 
-def rendered(scene, *, precision="single", extra_layers=False, **parameters):
-    read = read_scene(scene, precision)
-    return render_frame(frame_renderer(read, OCTAVES, extra_layers=extra_layers, **parameters))
+rendered = partial(render, method=OCTAVES)
 
 
 def directions(scene):

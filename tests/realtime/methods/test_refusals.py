@@ -4,7 +4,8 @@
 import pytest
 
 from realtime.errors import InputError
-from tests.helpers.lamps import lamp_scene, renderer
+from tests.helpers.frames import renderer
+from tests.helpers.lamps import lamp_scene
 
 
 @pytest.mark.parametrize(
@@ -25,5 +26,5 @@ from tests.helpers.lamps import lamp_scene, renderer
 def test_parameters_that_cannot_be_are_refused_by_name(variant, method, parameters, message):
     scene = lamp_scene(size=(18, 12), ball=None)
     with pytest.raises(InputError, match=message) as caught:
-        renderer(scene, method, kernel="exact" if method != "soft-shafts" else None, **parameters)
+        renderer(scene, method, **parameters)
     assert "\n" not in str(caught.value)

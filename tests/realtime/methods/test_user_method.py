@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from realtime.frame.renderer import frame_renderer, render_frame
+from realtime.frame.renderer import frame_renderer
 from realtime.methods.registry import find_method
 from realtime.numerics.recorded import Frozen
+from tests.helpers import frames
 from tests.helpers.scenes import tiny_scene
 
 SOURCE = """
@@ -79,18 +80,8 @@ def own(tmp_path):
 @pytest.fixture
 def render(own, variant):
     """Render the tiny scene by a method of that file."""
-    import mitsuba as mi
-
-    from realtime.kernels.registry import KERNELS
-    from realtime.scene.read_scene import read_scene
-
-    scene = read_scene(mi.load_dict(tiny_scene()))
-
-    def rendered(name, **parameters):
-        renderer = frame_renderer(scene, find_method(f"{own}:{name}"), kernel=KERNELS["exact"].function, **parameters)
-        return render_frame(renderer).airlight
-
-    return rendered
+    scene = frames.read(tiny_scene())
+    return lambda name, **parameters: frames.render(scene, find_method(f"{own}:{name}"), **parameters).airlight
 
 
 @pytest.mark.claim("own-method-parameters")

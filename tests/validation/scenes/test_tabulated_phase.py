@@ -50,7 +50,7 @@ def test_methods_and_truth_see_the_same_fog_of_droplets(variant):
     from realtime.scene.read_scene import read_scene
     from reference.quadrature.image import quadrature_image
     from reference.scene.read import read_truth
-    from tests.helpers.light_frames import render
+    from tests.helpers.frames import render
     from validation.scenes.parts import tabulated_phase
 
     scene = fog_of(tabulated_phase("mie", 2001))

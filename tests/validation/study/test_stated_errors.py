@@ -7,7 +7,7 @@ import pytest
 
 from realtime.scene.read_scene import read_scene
 from reference.scene.read import read_truth
-from tests.helpers.light_frames import render
+from tests.helpers.frames import render
 from tests.helpers.scenes import bounded_medium
 from validation.estimates.quadrature import truth_image
 from validation.scenes.parts import camera, fog, point_light, tabulated_phase

@@ -16,12 +16,11 @@ from realtime.clouds.bounds.surfaces import cloud_surfaces
 from realtime.clouds.hypertexture.light_depths import light_depths, marched_leg
 from realtime.clouds.hypertexture.lit_surface import dense_surface
 from realtime.clouds.hypertexture.march import marched_depths
-from realtime.frame.renderer import frame_renderer, render_frame
-from realtime.methods.registry import METHODS
 from realtime.numerics.aligned import aligned_array
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import SUN, TURN, cloud, cloud_scene, crossings, dense, linear_between, ring
+from tests.helpers.frames import render
 from validation.scenes.meshes import box, placed
 
 pytestmark = pytest.mark.usefixtures("variant")
@@ -71,8 +70,7 @@ def even_and_homogeneous(**parts):
 
 
 def rendered(scene, name, precision="single", **parameters):
-    method = METHODS[name]
-    return render_frame(frame_renderer(read_scene(scene, precision), method, extra_layers=True, **parameters))
+    return render(scene, name, precision=precision, extra_layers=True, **parameters)
 
 
 def rays_of(scene, precision="single"):

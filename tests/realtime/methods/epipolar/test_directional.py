@@ -6,7 +6,7 @@ Claim: the error falls as the shadow map and the slices grow, to that of the sam
 
 import pytest
 
-from tests.helpers.sunlit import read, relative_rmse, render
+from tests.helpers.frames import read, relative_rmse, render
 from tests.realtime.methods.shadow_planes.test_directional import scenes
 
 FINE = {"sampling": "pixels", "slices": 6000}
@@ -20,7 +20,7 @@ def test_against_the_truth(variant, name):
 
     scene = scenes()[name]
     truth = truth_image(mi.load_dict(scene)).airlight
-    loaded = read(scene, "single")
+    loaded = read(scene)
     errors = [relative_rmse(render(loaded, "min-max", map=size, **FINE).airlight, truth) for size in (64, 1024)]
     # A texel of the slanted walls at every jump, in a shadow that takes a fair part of the light.
     assert errors[1] < min(0.05, 0.4 * errors[0])

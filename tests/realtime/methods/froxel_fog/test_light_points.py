@@ -8,15 +8,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.area_lamps import lit_by
-from tests.helpers.frames import read, relative_rmse
-
-
-def frame(scene, method="froxel-fog", **parameters):
-    from realtime.frame.renderer import frame_renderer, render_frame
-    from realtime.kernels.registry import KERNELS
-    from realtime.methods.registry import METHODS
-
-    return render_frame(frame_renderer(scene, METHODS[method], kernel=KERNELS["exact"].function, **parameters))
+from tests.helpers.frames import read, relative_rmse, render
 
 
 @pytest.mark.slow
@@ -26,10 +18,11 @@ def test_the_error_falls_with_the_grid_under_a_light_with_extent(variant):
     from validation.scenes.loading import load_scene
 
     scene = read_scene(load_scene("penumbra-plane", (80, 60)).scene)
-    exact = frame(scene, "shadow-planes", points=4).airlight
+    exact = render(scene, "shadow-planes", points=4).airlight
     sizes = np.array([8, 16, 32, 64])
     errors = [
-        relative_rmse(frame(scene, points=4, width=2 * n, height=n, slices=n).airlight, exact) for n in sizes.tolist()
+        relative_rmse(render(scene, "froxel-fog", points=4, width=2 * n, height=n, slices=n).airlight, exact)
+        for n in sizes.tolist()
     ]
     assert -np.polyfit(np.log(sizes), np.log(errors), 1)[0] > 0.7, errors
     assert errors[-1] < 0.05
@@ -38,10 +31,10 @@ def test_the_error_falls_with_the_grid_under_a_light_with_extent(variant):
 @pytest.mark.parametrize("kind", ["disk", "sphere"])
 def test_surfaces_are_those_of_other_methods_and_airlight_nearly(variant, kind):
     scene = read(lit_by(kind))
-    froxels = frame(scene, points=3, width=32, height=24, slices=96, shadow="ray")
-    marched = frame(scene, "ray-march", points=3, steps=400)
+    froxels = render(scene, "froxel-fog", points=3, width=32, height=24, slices=96, shadow="ray")
+    marched = render(scene, "ray-march", points=3, steps=400)
     np.testing.assert_allclose(froxels.surface, marched.surface, rtol=1e-4, atol=1e-5 * marched.surface.mean())
     relative = np.abs(froxels.airlight - marched.airlight) / marched.airlight.mean()
     assert np.median(relative) < 0.03
-    mapped = frame(scene, points=3, width=32, height=24, slices=96, map=512)
+    mapped = render(scene, "froxel-fog", points=3, width=32, height=24, slices=96, map=512)
     assert np.median(np.abs(mapped.airlight - froxels.airlight) / froxels.airlight.mean()) < 0.003

@@ -4,7 +4,8 @@
 import numpy as np
 import pytest
 
-from tests.helpers.sunlit import box_part, read, relative_rmse, render, shaded, summed
+from tests.helpers.frames import read, relative_rmse, render
+from tests.helpers.sunlit import box_part, shaded, summed
 
 
 def height_field(scene, size):
@@ -34,7 +35,7 @@ def height_field(scene, size):
 @pytest.mark.claim("directional-light-volumes", tolerance="relative RMSE 2e-4: the steps' own")
 def test_the_walk_against_steps_through_the_height_field(variant):
     """The same map, met by a sum over 10 000 steps of every ray in NumPy."""
-    scene, size = read(shaded(size=(12, 8))), 64
+    scene, size = read(shaded(size=(12, 8)), "double"), 64
     frame = render(scene, "light-volumes", map=size, walls="slanted")
     walked, distance = frame.airlight, frame.distance
     expected = summed(scene, [box_part()], distance=distance, lit=height_field(scene, size))
@@ -51,4 +52,4 @@ def test_a_map_of_rays_that_miss_all_media(variant):
 
     scene["sensor"] |= {"to_world": mi.ScalarTransform4f().look_at([0.2, -4.1, 1.3], [0.1, -9.0, 4.6], [0, 0, 1])}
     for method, parameters in (("ray-march", {"shadow": "map"}), ("light-volumes", {})):
-        assert np.all(render(scene, method, precision="single", **parameters).airlight == 0)
+        assert np.all(render(scene, method, **parameters).airlight == 0)

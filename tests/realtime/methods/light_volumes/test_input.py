@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from tests.helpers.light_frames import EVALUATIONS, loaded_scene, render, renderer_of
+from tests.helpers.frames import render, renderer
+from tests.helpers.light_frames import EVALUATIONS, loaded_scene
 from tests.helpers.scenes import bounded_medium, clear_scene
 
 
@@ -15,8 +16,8 @@ def test_a_mesh_is_for_media_without_bounds(variant):
     smoke = bounded_medium({"type": "sphere", "center": [0.1, 0.2, 0.9], "radius": 0.4}, 0.7, (0.9, 0.8, 0.7))
     loaded = mi.load_dict(clear_scene(cloud=smoke))
     with pytest.raises(InputError, match=r"evaluation=mesh: the scene has a medium with bounds.*evaluation=walk"):
-        renderer_of(loaded, evaluation="mesh")
-    assert np.max(render(loaded, map=16).airlight) > 0
+        renderer(loaded, "light-volumes", evaluation="mesh")
+    assert np.max(render(loaded, "light-volumes", map=16).airlight) > 0
 
 
 @pytest.mark.claim("memory-before-it-is-taken")
@@ -34,5 +35,5 @@ def test_memory_is_counted_before_it_is_taken(variant, monkeypatch, evaluation):
         patch.setattr(realtime.methods.light_volumes.method, "cast_shadow_map", never)
         message = r"map: 4096 texels for 1 light\(s\): needs [0-9.]+ GB of memory, this machine has 1 GB; use a smaller"
         with pytest.raises(InputError, match=message):
-            renderer_of(loaded, map=4096, evaluation=evaluation)
-    render(loaded, map=64, evaluation=evaluation)
+            renderer(loaded, "light-volumes", map=4096, evaluation=evaluation)
+    render(loaded, "light-volumes", map=64, evaluation=evaluation)

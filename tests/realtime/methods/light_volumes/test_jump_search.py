@@ -4,7 +4,8 @@
 import numpy as np
 import pytest
 
-from tests.helpers.light_frames import lamp, loaded_scene, render
+from tests.helpers.frames import render
+from tests.helpers.light_frames import lamp, loaded_scene
 from tests.helpers.scenes import tiny_scene
 
 LAMP = (0.13, -0.07, 2.9)
@@ -88,7 +89,7 @@ def test_a_shadow_of_straight_edges_is_known_to_a_fraction_of_a_texel(variant):
     loaded = mi.load_dict(description)
 
     def error(walls):
-        airlight = render(loaded, map=16, walls=walls).airlight
+        airlight = render(loaded, "light-volumes", map=16, walls=walls).airlight
         return np.sqrt(np.mean((airlight - truth) ** 2)) / np.mean(truth)
 
     assert error("upright") < 0.15 * error("slanted")

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.helpers.frames import render, renderer
 from tests.helpers.light_frames import (
     EVALUATIONS,
     GRID,
@@ -17,9 +18,7 @@ from tests.helpers.light_frames import (
     differ,
     lamp,
     loaded_scene,
-    render,
     render_both,
-    renderer_of,
     twin_of,
 )
 from tests.helpers.scenes import spot
@@ -38,7 +37,9 @@ SHARES = {"soft spot": 0.994, "three lights": 0.998}
 def test_frames_are_exact_with_respect_to_the_map(variant, name, walls):
     """Walked and drawn; with walls over a texel, or with those that the rays of the map found, which are walked."""
     loaded, size = loaded_scene(name), SCENES[name][1]
-    frames = render_both(loaded, "single", map=size) if walls == "slanted" else [render(loaded, map=size)]
+    frames = (
+        render_both(loaded, "single", map=size) if walls == "slanted" else [render(loaded, "light-volumes", map=size)]
+    )
     wanted = twin_of(loaded, frames[0], size, "single", walls=walls)
     assert np.max(wanted) > 5e-4
     for frame in frames:
@@ -65,11 +66,11 @@ def test_lists_that_overflow_change_nothing(variant, monkeypatch, rooms):
     import realtime.methods.light_volumes.tile_lists
 
     loaded = loaded_scene("fence")
-    wanted = render(loaded, map=64).airlight
+    wanted = render(loaded, "light-volumes", map=64).airlight
     monkeypatch.setattr(realtime.methods.light_volumes.tile_lists, "_TILE_ROOM", rooms[0])
     monkeypatch.setattr(realtime.methods.light_volumes.tile_lists, "_BLOCK_ROOM", rooms[1])
     # Larger squares begin elsewhere on the line: rounding.
-    assert differ(render(loaded, map=64).airlight, wanted) < 2e-6
+    assert differ(render(loaded, "light-volumes", map=64).airlight, wanted) < 2e-6
 
 
 @pytest.mark.parametrize("axis", [0, 2])
@@ -84,7 +85,7 @@ def test_rays_on_the_border_of_two_faces_are_lit_once(variant, axis, evaluation)
     loaded = loaded_scene(**changes)
     wanted = render(loaded, "unshadowed").airlight
     # Three faces have nodes of their own: within the kernel's 5e-6.
-    assert render(loaded, map=64, evaluation=evaluation).airlight == pytest.approx(wanted, rel=1e-5)
+    assert render(loaded, "light-volumes", map=64, evaluation=evaluation).airlight == pytest.approx(wanted, rel=1e-5)
 
 
 HEIGHTS = (0.0, 0.15, 0.4, 0.7, 1.9)  # inverse depths [1/m]; few, so that many texels are flat
@@ -100,7 +101,7 @@ def renderers(kind, view):
     changes = camera(*VIEWS[view], size=(13, 9)) | ({"lamp": spot(cutoff=50.0, beam=50.0)} if kind == "spot" else {})
     loaded = loaded_scene(**changes)
     both = [
-        renderer_of(loaded, precision="double", map=SMALL, evaluation=evaluation, walls="slanted")
+        renderer(loaded, "light-volumes", precision="double", map=SMALL, evaluation=evaluation, walls="slanted")
         for evaluation in EVALUATIONS
     ]
     scene = both[0].scene

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.helpers.sunlit import plank, read, relative_rmse, render, shaded, sun
+from tests.helpers.frames import read, relative_rmse, render
+from tests.helpers.sunlit import plank, shaded, sun
 from validation.scenes.meshes import box, placed
 from validation.scenes.parts import mitsuba_mesh
 
@@ -44,10 +45,10 @@ def test_against_the_truth(variant, name):
 
     scene = scenes()[name]
     truth = truth_image(mi.load_dict(scene)).airlight
-    loaded = read(scene)
+    loaded = read(scene, "double")
     unshadowed = render(loaded).airlight
     assert relative_rmse(unshadowed, truth) > 0.02  # there is a shadow
     # The panels of two media leave 3e-6 without any shadow; the rest is the truth's rays, cast in float32.
     allowed = 1e-5 if name == "two media" else 2e-6
     assert relative_rmse(render(loaded, "shadow-planes").airlight, truth) < allowed
-    assert relative_rmse(render(scene, "shadow-planes", precision="single").airlight, truth) < 5e-5
+    assert relative_rmse(render(scene, "shadow-planes").airlight, truth) < 5e-5

@@ -6,7 +6,8 @@ import pytest
 
 from realtime.errors import InputError
 from tests.helpers.casters import ALL, SOUND
-from tests.helpers.light_frames import camera, coloured_fog, lamp, render
+from tests.helpers.frames import render
+from tests.helpers.light_frames import camera, coloured_fog, lamp
 from tests.helpers.scenes import spot, tiny_scene
 from validation.scenes.parts import mitsuba_mesh
 

@@ -4,24 +4,18 @@
 Protects the claims that the buffer holds whole frames, and that media are drawn one by one with Gamma at vertices.
 """
 
+from functools import partial
+
 import numpy as np
 import pytest
 
+from tests.helpers import frames
 from tests.helpers.casters import closed_sphere
 from tests.helpers.frames import relative_rmse
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 from validation.scenes.parts import mitsuba_mesh
 
-
-def render(scene, kernel="exact", *, precision="double", **parameters):
-    import mitsuba as mi
-
-    from realtime.frame.renderer import render_frame
-    from realtime.scene.read_scene import read_scene
-    from validation.study.configuration import configuration, prepared
-
-    read = read_scene(mi.load_dict(scene), precision)
-    return render_frame(prepared(read, configuration("shadow-planes", kernel, parameters)))
+render = partial(frames.render, method="shadow-planes", precision="double")
 
 
 def caster(centre=(0.55, 0.2, 1.35), radius=0.28):
@@ -89,6 +83,6 @@ def test_without_casters_in_view_a_medium_is_its_end_less_its_entry(variant):
     """Two media, one before the other: Gamma at exit and entry, and what absorbs before as a factor of the ray."""
     media = {"ball": fog((0.1, -0.9, 0.7), 0.4), "behind": fog((0.2, 0.9, 0.8), 0.5, sigma=0.6)}
     scene = clear_scene(**media, caster=caster(centre=(0.3, 0.1, -30.0)))
-    pixel = render(scene, "taylor").airlight
-    vertex = render(scene, "taylor", evaluation="vertex", order="paper").airlight
+    pixel = render(scene, kernel="taylor").airlight
+    vertex = render(scene, kernel="taylor", evaluation="vertex", order="paper").airlight
     assert relative_rmse(vertex, pixel) < 1e-6

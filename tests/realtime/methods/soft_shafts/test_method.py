@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from realtime.frame.renderer import render_frame
-from tests.helpers.frames import relative_rmse
-from tests.helpers.lamps import frame, lamp_scene
+from tests.helpers.frames import frame, relative_rmse
+from tests.helpers.lamps import lamp_scene
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 
 NONE = {"filter": "none", "surfaces": "ray"}
@@ -22,8 +22,8 @@ def test_without_filter_it_is_the_sum_of_its_points(variant, shape):
         "to_world": mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).rotate([1, 2, 3], 31).scale(0.33),
     }
     scene = lamp_scene(shape, size=(40, 32), ball=box)
-    exact = frame(scene, "shadow-planes", kernel="exact", points=3, pattern="ring")
-    ours = frame(scene, points=3, pattern="ring", steps=400, shadow="ray", spacing="equiangular", **NONE)
+    exact = frame(scene, "shadow-planes", points=3, pattern="ring")
+    ours = frame(scene, "soft-shafts", points=3, pattern="ring", steps=400, shadow="ray", spacing="equiangular", **NONE)
     assert relative_rmse(ours.airlight, exact.airlight) < 2e-3
     # Shadow rays and planes may differ in pixels on an edge.
     assert np.mean(np.abs(ours.surface - exact.surface) > 1e-5) < 0.02
@@ -37,7 +37,7 @@ def test_ordinary_lights_are_one_point(variant):
     scenes = [tiny_scene(), tiny_scene(lamp=spot(beam=20.0)), tiny_scene(**clear), tiny_scene(lamp=sun, **clear)]
     for scene in scenes:
         march = frame(scene, "ray-march", steps=40)
-        ours = frame(scene, steps=40, shadow="ray", spacing="equiangular", **NONE)
+        ours = frame(scene, "soft-shafts", steps=40, shadow="ray", spacing="equiangular", **NONE)
         np.testing.assert_allclose(ours.airlight, march.airlight, rtol=2e-4, atol=1e-6)
         np.testing.assert_allclose(ours.surface, march.surface, atol=1e-6)
 
@@ -48,16 +48,18 @@ def test_a_light_with_extent_in_bounded_media_is_the_sum_of_its_points(variant):
     scene = lamp_scene(fog=None, body=body, sensor=sensor)
     march = frame(scene, "ray-march", steps=40, points=3)
     for shadow, tolerance in (("ray", 1e-3), ("map", 0.05)):
-        ours = frame(scene, points=3, pattern="sobol", steps=40, shadow=shadow, spacing="equiangular", **NONE)
+        ours = frame(
+            scene, "soft-shafts", points=3, pattern="sobol", steps=40, shadow=shadow, spacing="equiangular", **NONE
+        )
         assert relative_rmse(ours.airlight, march.airlight) < tolerance
 
 
 def test_maps_tend_to_rays(variant):
     scene = lamp_scene(size=(40, 32))
-    rays = frame(scene, points=3, shadow="ray", **NONE)
+    rays = frame(scene, "soft-shafts", points=3, shadow="ray", **NONE)
     errors = [
         (relative_rmse(ours.airlight, rays.airlight), relative_rmse(ours.surface, rays.surface))
-        for ours in (frame(scene, points=3, filter="none", map=map) for map in (64, 1024))
+        for ours in (frame(scene, "soft-shafts", points=3, filter="none", map=map) for map in (64, 1024))
     ]
     assert errors[1][0] < 0.25 * errors[0][0] < 0.1
     assert errors[1][1] < 0.5 * errors[0][1]
@@ -67,8 +69,10 @@ def test_few_pixels_are_interpolated(variant):
     """Linear between pixels: without surfaces the error falls as the square of their distance, but next to the lamp."""
     scene = lamp_scene(size=(48, 32), ball=None, floor=None)
     settings = {"points": 3, "steps": 64, "spacing": "equiangular"} | NONE
-    whole = frame(scene, **settings).airlight
-    errors = [np.median(np.abs(frame(scene, scale=scale, **settings).airlight / whole - 1)) for scale in (2, 4)]
+    whole = frame(scene, "soft-shafts", **settings).airlight
+    errors = [
+        np.median(np.abs(frame(scene, "soft-shafts", scale=scale, **settings).airlight / whole - 1)) for scale in (2, 4)
+    ]
     assert errors[0] < 0.3 * errors[1]
     assert errors[1] < 0.01
 
@@ -76,9 +80,9 @@ def test_few_pixels_are_interpolated(variant):
 def test_pixels_share_points_and_steps(variant):
     """The mean over a tile of 4 x 4 is that of sixteen points and 16 x 8 steps where nothing changes in it."""
     scene = lamp_scene(size=(48, 32), ball=None)
-    many = frame(scene, points=16, steps=128, spacing="equiangular", **NONE)
-    shared = frame(scene, points=16, steps=8, spacing="equiangular", interleave=True, hz=1.0, **NONE)
-    alone = frame(scene, points=16, steps=8, spacing="equiangular", **NONE)
+    many = frame(scene, "soft-shafts", points=16, steps=128, spacing="equiangular", **NONE)
+    shared = frame(scene, "soft-shafts", points=16, steps=8, spacing="equiangular", interleave=True, hz=1.0, **NONE)
+    alone = frame(scene, "soft-shafts", points=16, steps=8, spacing="equiangular", **NONE)
     inner = slice(4, -4), slice(4, -4)
     errors = [relative_rmse(image.airlight[inner], many.airlight[inner]) for image in (shared, alone)]
     assert errors[0] < 0.02
