@@ -2,7 +2,10 @@
 """Scenes of boxes that tests share, and the rays of an image as the search for lit intervals takes them."""
 
 import numpy as np
+from numpy.typing import NDArray
 
+from reference.visibility.lit_intervals import _shadow_rays, _visible
+from reference.visibility.random_checks import Visible
 from tests.helpers.scenes import tiny_scene
 
 
@@ -40,3 +43,15 @@ def box_scene(**changes):
     """A scene of polygons: the sphere of the tiny scene replaced by boxes."""
     boxes = {"tower": box((0.1, 0.1, 0.7), (0.43, 0.37, 1.4)), "beam": box((0.6, 0.3, 1.1), (0.9, 0.11, 0.13))}
     return tiny_scene(ball=None, **boxes, **changes)
+
+
+Array = NDArray[np.float64]
+
+
+def visibility_test(scene, position: Array, rays: tuple[Array, Array, Array]) -> Visible:
+    """Return a function (ray numbers, angles) -> whether the light at `position` reaches those points.
+
+    The shadow rays start at the light, where nothing is close, and stop twenty float32 roundings before the point: a
+    point on a surface must not be blocked by that surface.
+    """
+    return _visible(scene, _shadow_rays(position, rays))

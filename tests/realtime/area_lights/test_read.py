@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from tests.helpers.area_lamps import area_lamp
+from tests.helpers.lamps import area_lamp
 from tests.helpers.scenes import tiny_scene
 
 

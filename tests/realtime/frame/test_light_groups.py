@@ -15,8 +15,8 @@ from realtime.methods.registry import METHODS
 from realtime.scene.animate import with_area_lights
 from realtime.scene.light_points import with_light_points
 from tests.helpers import frames
-from tests.helpers.area_lamps import area_lamp, lit_by
 from tests.helpers.frames import read, relative_rmse
+from tests.helpers.lamps import area_lamp, lit_by
 from tests.helpers.scenes import tiny_scene
 from tests.helpers.sunlit import fog_sphere, shaded
 from validation.scenes.meshes import rotation

@@ -14,8 +14,8 @@ import pytest
 
 from realtime.methods.registry import METHODS
 from reports.machine.environment import activate
-from tests.helpers.area_lamps import lit_by
 from tests.helpers.clouds import cloud_scene
+from tests.helpers.lamps import lit_by
 from tests.helpers.round_trips import round_trips
 from tests.helpers.scenes import spot
 from tests.helpers.sunlit import plank, shaded

@@ -59,7 +59,7 @@ def test_wrong_geometry_is_found_and_left_in_doubt(variant):
     from reference.visibility.lit_intervals import point_leg
     from reference.visibility.random_checks import checked_geometry
     from reference.visibility.triangles import geometric_intervals
-    from tests.helpers.visibility import visibility_test
+    from tests.helpers.polygons import visibility_test
 
     truth, light, rays, ends = setup(box_scene())
     shapes = read_shapes(truth.occluders)

@@ -83,7 +83,7 @@ def test_random_shadow_rays_contradict_nothing(variant, place):
     from reference.visibility.lit_intervals import lit_intervals, point_leg
     from reference.visibility.random_checks import checked_geometry
     from reference.visibility.triangles import EXACT_EDGE, geometric_intervals
-    from tests.helpers.visibility import visibility_test
+    from tests.helpers.polygons import visibility_test
 
     shells = {
         "light": {"type": "sphere", "center": [0.8, 0.8, 1.7], "radius": 0.6},

@@ -8,7 +8,7 @@ from tests.helpers.scenes import tiny_scene
 
 def shadow_rays_disagree(truth, lamp, rays, ends, intervals, count=400):
     """Return how many random shadow rays contradict the intervals further than 1e-5 rad from an edge."""
-    from tests.helpers.visibility import visibility_test
+    from tests.helpers.polygons import visibility_test
 
     used = np.flatnonzero(ends[1] > ends[0])
     ray = np.repeat(used, count)
@@ -62,7 +62,7 @@ def test_a_needle_is_found_where_regular_samples_step_over_it(variant):
 
     from reference.scene.read import read_truth
     from reference.visibility.triangles import geometric_intervals
-    from tests.helpers.visibility import visibility_test
+    from tests.helpers.polygons import visibility_test
 
     width = 2e-4
     scene = tiny_scene(ball=None, floor=None, needle=box((0.3, -0.1, 0.9), (width, width, 8.0)))

@@ -10,8 +10,23 @@ from reports.page.filters import DASH
 from reports.page.render import SCRIPTS, render_page
 from reports.tables.methods import fastest_table
 from tests.helpers.page import DATA, Page, engine_image, report_data, write_files
-from tests.helpers.published import PAPERS, STABILITY
 from tests.helpers.reports import growth_record, refused
+
+_ERRORS = {"rays": 77, "refused": 5, "median": 1.5e-7, "p99": 2.5e-6, "max": 4.5e-6}
+_ERRORS |= {"nan": 0, "infinite": 0, "negative": 2}
+STABILITY = [
+    {
+        "kernel": "my-kernel",
+        "broken": ["law of scale"],
+        "sets": [{"name": "certified", "single": {"all": _ERRORS}, "double": {"all": _ERRORS}}],
+    }
+]
+
+_CLAIM = {"paper": "biri", "item": "eq. 0", "words": "a claim of words", "verdict": "not reproduced"}
+_CLAIM |= {"published": None, "measured": 3.0, "low": 2.5, "high": 3.5, "unit": "times", "why": "at most 1: so"}
+_RATE = {"item": "Fig. 0", "words": "a rate", "verdict": None, "published": 23.0, "unit": "frames/s", "why": ""}
+PAPERS = [_CLAIM, _CLAIM | _RATE]
+
 
 EVIL = "</script><script>alert('1')</script> & \"q\" $x^2$ {{ 7 * 7 }}"
 

@@ -1,25 +1,61 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The images in a page: what is decoded is what the files hold, to the bound of the code, whatever the limit."""
 
+import zlib
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
 from reports.page.image_cache import page_images
 from reports.page.image_codec import (
     DIFFERENCE_BITS,
+    GRADIENT,
+    INFINITE,
+    LEFT,
+    NAN,
     PRECISIONS,
     REFERENCE_BITS,
+    Array,
+    Codes,
+    Packed,
     difference_codes,
     pack_planes,
     reference_codes,
     reference_values,
 )
-from tests.helpers.decoding import decode_planes, difference_values
 from tests.helpers.page import images, report_data, write_files
+
+
+def difference_values(codes: Codes, k: float, s: float) -> Array:
+    """Return the relative differences that the codes of `difference_codes` stand for, in the same shape."""
+    values = s * np.sinh(codes / k)
+    values = np.where(codes == INFINITE, np.inf, np.where(codes == -INFINITE, -np.inf, values))
+    return np.where(codes == NAN, np.nan, values)
+
+
+def decode_planes(packed: Packed, size: tuple[int, int], bits: int) -> Codes:
+    """Return the codes, (height, width, planes); those of 16 bits with their sign."""
+    width, height = size
+    raw = np.frombuffer(zlib.decompress(packed.data), np.uint8).astype(np.int64)
+    decoded: list[NDArray[np.int64]] = []
+    for part, (relative, predictor) in zip(np.split(raw, len(packed.planes)), packed.planes):
+        zigzag = sum(byte << 8 * place for place, byte in enumerate(np.split(part, bits // 8)))
+        residual = np.where(zigzag & 1, -(zigzag + 1) // 2, zigzag // 2).reshape(height, width)
+        if predictor == LEFT:
+            residual = np.cumsum(residual, axis=1)
+        elif predictor == GRADIENT:
+            residual = np.cumsum(np.cumsum(residual, axis=1), axis=0)
+        codes = residual + decoded[0] if relative else residual
+        decoded.append(np.asarray(codes % (1 << bits), dtype=np.int64))
+    planes = np.stack(decoded, axis=-1)
+    if bits == DIFFERENCE_BITS:
+        planes = np.where(planes >> (bits - 1), planes - (1 << bits), planes)
+    return planes.astype(np.int32)
 
 
 @given(st.lists(st.floats(width=32), min_size=1, max_size=12))

@@ -7,8 +7,8 @@ Protects the claim on the order of convergence in `penumbra-plane`.
 import numpy as np
 import pytest
 
-from tests.helpers.area_lamps import lit_by
 from tests.helpers.frames import read, relative_rmse, render
+from tests.helpers.lamps import lit_by
 
 
 @pytest.mark.slow
