@@ -83,24 +83,6 @@ def test_commands_and_options_that_documents_name_exist():
     assert found > 40
 
 
-#: Not the field's words, or old ones; the pages say reference, area light, penumbra, unbounded, vacuum, again, needs.
-OTHER_WORDS = (
-    r"anew|mends?|whoever|wherefrom|stairs|dimmed|dims|half-shadows?|lights? with extent|light points?|clear air|"
-    r"endless|legs?|ground truth|refuted|planted"
-)
-
-
-def test_pages_use_the_words_of_the_field():
-    """Code is left out; no sentence begins with a word that makes the reader wait for its subject."""
-    found = []
-    for document in [ROOT / "README.md", *DOCS.glob("*.md")]:
-        prose = re.sub(r"^```.*?^```|`[^`]+`", "", document.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
-        found += [(document.name, word) for word in re.findall(rf"\b(?:{OTHER_WORDS})\b", prose, flags=re.IGNORECASE)]
-        begins = re.findall(r"(?:^|[.:!?] )((?:Of|Wanted|So|Beside) \w+)", prose, flags=re.MULTILINE)
-        found += [(document.name, words) for words in begins]
-    assert found == []
-
-
 def test_links_of_the_readme_lead_somewhere():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     targets = [target for target in re.findall(r"\]\(([^)\s]+)\)", text) if not re.match(r"https?:", target)]

@@ -7,8 +7,8 @@ and standard error follow from the batches as a renderer's do. Then
 
 * without a bias (`calibrate`) each test must reject as often as its level says, the intervals must hold the truth as
   often as they say, and the p-values of many comparisons must be uniform (Kolmogorov and Smirnov);
-* with a bias (`check_power`) the share of comparisons that find it must be the power that each of them predicts from
-  its own standard error.
+* with a bias (`power_and_finds`) the share of comparisons that find it must be the power that each of them predicts
+  from its own standard error.
 
 **How far this holds.** Batch means of path tracers are skewed. With errors of a batch that are log-normal with the
 logarithmic deviation s, the count of rejected pixels is the first to break, from s = 0.5 on (a skewness of 1.7). Blocks
@@ -56,98 +56,54 @@ class Experiment:
     seed: int = 1  #: of the random numbers
 
 
-@dataclass(frozen=True)
-class Calibration:
-    """How often the tests of `validation.statistics.comparison` reject images that agree: shares of the runs."""
-
-    runs: int
-    pixels: int
-    batches: int
-    pixel_alarms: float  #: with a pixel rejected at Sidak's level
-    block_alarms: float
-    exceeding: float  #: of values, below the 1 % level
-    exceeding_alarms: float  #: with `exceeding_p` below 1 %: at most 1 %, as a number is discrete
-    uniformity_alarms: float
-    coverage: float  #: whose 95 % interval holds the truth, from the standard errors
-    coverage_batches: float  #: from the batch means
-    bias_uniformity: float  #: Kolmogorov and Smirnov's p-value that the runs' `relative_bias_p` are uniform
-    uniformity_uniformity: float  #: and their `uniformity_p`
-
-    def problems(self, level: float = 1e-4) -> tuple[str, ...]:
-        """Name what is not as it should be, each judged by its binomial law at a level; empty if all is well."""
-        expected = {
-            "pixel_alarms": LEVEL,
-            "block_alarms": LEVEL,
-            "exceeding": LEVEL,
-            "uniformity_alarms": LEVEL,
-            "coverage": 0.95,
-            "coverage_batches": 0.95,
-        }
-        departures = []
-        for name, share in expected.items():
-            trials = self.runs * self.pixels if name == "exceeding" else self.runs
-            low, high = share_interval(share, trials, level)
-            if not low <= getattr(self, name) <= high:
-                departures.append(f"{name} is {getattr(self, name):.4g}, expected {share:g} ({low:.4g} to {high:.4g})")
-        if self.exceeding_alarms > share_interval(LEVEL, self.runs, level)[1]:
-            departures.append(f"exceeding_alarms is {self.exceeding_alarms:.4g}, expected at most {LEVEL:g}")
-        for name in ("bias_uniformity", "uniformity_uniformity"):
-            if getattr(self, name) < level:
-                departures.append(f"{name} is {getattr(self, name):.2g}")
-        return tuple(departures)
+#: What each rate of `calibrate` must be; `exceeding_alarms` at most that, as a count is discrete.
+EXPECTED = {
+    "pixel_alarms": LEVEL,  # with a pixel rejected at Sidak's level
+    "block_alarms": LEVEL,
+    "exceeding": LEVEL,  # values below the level
+    "exceeding_alarms": LEVEL,  # with `exceeding_p` below it
+    "uniformity_alarms": LEVEL,
+    "coverage": 0.95,  # whose 95 % interval holds the truth, from the standard errors
+    "coverage_batches": 0.95,  # from the batch means
+}
 
 
-@dataclass(frozen=True)
-class PowerCheck:
-    """How often an injected bias was found, and how often the comparisons themselves said that it would be."""
-
-    bias: float
-    detectable: float
-    predicted: float
-    measured: float
-    runs: int
-
-    @property
-    def agrees(self) -> bool:
-        """Whether the share lies where the prediction's binomial law has it with probability 1 - 1e-4."""
-        low, high = share_interval(self.predicted, self.runs, 1e-4)
-        return low <= self.measured <= high
-
-
-def calibrate(experiment: Experiment, *, spread: float = 0.3) -> Calibration:
-    """Compare many images that agree, and count."""
+def calibrate(experiment: Experiment, *, spread: float = 0.3) -> dict[str, float]:
+    """Compare many images that agree, and return rates, and how likely the p-values are to be uniform."""
     comparisons = _comparisons(experiment, 0.0, spread)
 
-    def covered(name: str) -> float:
-        return float(np.mean([getattr(s, name)[0] <= 0 <= getattr(s, name)[1] for s in comparisons]))
+    def rate(event: Callable[[Statistics], bool]) -> float:
+        return float(np.mean([event(each) for each in comparisons]))
 
-    return Calibration(
-        runs=experiment.runs,
-        pixels=experiment.size**2,
-        batches=experiment.batches,
-        pixel_alarms=float(np.mean([s.rejected > 0 for s in comparisons])),
-        block_alarms=float(np.mean([s.rejected_blocks > 0 for s in comparisons])),
-        exceeding=sum(s.exceeding for s in comparisons) / sum(s.tested for s in comparisons),
-        exceeding_alarms=float(np.mean([s.exceeding_p < LEVEL for s in comparisons])),
-        uniformity_alarms=float(np.mean([s.uniformity_p < LEVEL for s in comparisons])),
-        coverage=covered("relative_bias_ci"),
-        coverage_batches=covered("relative_bias_ci_batches"),
-        bias_uniformity=uniformity_p(np.array([s.relative_bias_p for s in comparisons])),
-        uniformity_uniformity=uniformity_p(np.array([s.uniformity_p for s in comparisons])),
-    )
+    return {
+        "pixel_alarms": rate(lambda s: s.rejected > 0),
+        "block_alarms": rate(lambda s: s.rejected_blocks > 0),
+        "exceeding": sum(s.exceeding for s in comparisons) / sum(s.tested for s in comparisons),
+        "exceeding_alarms": rate(lambda s: s.exceeding_p < LEVEL),
+        "uniformity_alarms": rate(lambda s: s.uniformity_p < LEVEL),
+        "coverage": rate(lambda s: s.relative_bias_ci[0] <= 0 <= s.relative_bias_ci[1]),
+        "coverage_batches": rate(lambda s: s.relative_bias_ci_batches[0] <= 0 <= s.relative_bias_ci_batches[1]),
+        "bias_uniformity": uniformity_p(np.array([s.relative_bias_p for s in comparisons])),
+        "uniformity_uniformity": uniformity_p(np.array([s.uniformity_p for s in comparisons])),
+    }
 
 
-def check_power(bias: float, experiment: Experiment, *, spread: float) -> PowerCheck:
-    """Inject a bias into many images, and compare the share that finds it with the power that was predicted."""
+def problems(rates: dict[str, float], experiment: Experiment, level: float = 1e-4) -> dict[str, float]:
+    """Return the rates that are not as they should be, each judged by its binomial law at a level."""
+    wrong = {name: rates[name] for name in ("bias_uniformity", "uniformity_uniformity") if rates[name] < level}
+    for name, expected in EXPECTED.items():
+        trials = experiment.runs * experiment.size**2 if name == "exceeding" else experiment.runs
+        low, high = share_interval(expected, trials, level)
+        if not (name == "exceeding_alarms" or low <= rates[name]) or rates[name] > high:
+            wrong[name] = rates[name]
+    return wrong
+
+
+def power_and_finds(bias: float, experiment: Experiment, *, spread: float) -> tuple[float, float]:
+    """Inject a bias into many images; return the mean power that was predicted, and the share that found it."""
     comparisons = _comparisons(experiment, bias, spread)
     predicted = [power(bias / s.relative_bias_se, s.relative_bias_freedom) for s in comparisons]
-    return PowerCheck(
-        bias=bias,
-        detectable=float(np.mean([s.detectable_bias for s in comparisons])),
-        predicted=float(np.mean(predicted)),
-        measured=float(np.mean([s.relative_bias_p < 0.05 for s in comparisons])),
-        runs=experiment.runs,
-    )
+    return float(np.mean(predicted)), float(np.mean([s.relative_bias_p < 0.05 for s in comparisons]))
 
 
 def spread_to_detect(bias: float, experiment: Experiment) -> float:

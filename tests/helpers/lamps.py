@@ -5,7 +5,6 @@ from typing import Any
 
 from tests.helpers.scenes import tiny_scene
 
-
 BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0, 0.0, 0.0]}}
 
 

@@ -98,13 +98,6 @@ def test_bench_measures_names_functions_and_configurations(variant):
     assert "unshadowed (taylor)" in table._repr_html_()
 
 
-def test_bench_refuses_what_is_not_known_before_any_work(variant):
-    with pytest.raises(airlight.InputError, match="did you mean 'unshadowed'"):
-        airlight.bench("open-fog", "unshadow")
-    with pytest.raises(airlight.InputError, match="did you mean 'open-fog'"):
-        airlight.bench(["open-fog", "openfog"], "unshadowed", size=TINY)
-
-
 def test_report_hands_on_what_it_was_given(variant, tmp_path, monkeypatch):
     given = {}
 

@@ -87,24 +87,6 @@ def test_what_hangs_is_stopped_and_its_process_too(cluster, hang):
 
 @pytest.mark.slow
 @pytest.mark.claim("sweeps-lose-nothing", tolerance="none: every task has one outcome, with its value")
-def test_what_belongs_together_is_done_when_all_workers_are_killed_at_once(cluster):
-    """A sweep that was timed in one process waited for ever: Dask kept its tasks for a worker that was gone."""
-    first = Task("truth", tasks.square, (3, 0.1))
-    group = Group(tuple(Task(f"c{n}", tasks.add, (n * n - 9, 0.2)) for n in range(20)), first, together=True)
-
-    def kill():
-        for pid in cluster.client.run(os.getpid, on_error="ignore").values():
-            os.kill(pid, signal.SIGKILL)
-
-    thread = threading.Timer(1.0, kill)
-    thread.start()
-    ended = outcomes(cluster, group, retries=30, patience=60.0)
-    thread.join()
-    assert {name: each.value for name, each in ended.items()} == {f"c{n}": n * n for n in range(20)}
-
-
-@pytest.mark.slow
-@pytest.mark.claim("sweeps-lose-nothing", tolerance="none: every task has one outcome, with its value")
 def test_twenty_kills_during_two_hundred_tasks(cluster):
     """Claim: no task is lost or counted twice when workers are killed at any moment."""
     killed = []
