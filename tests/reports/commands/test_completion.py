@@ -23,39 +23,18 @@ def test_names_are_those_of_the_registries():
     assert completion.kernel_names() == list(KERNELS)
 
 
-def _completed(line: str, *python: str, **variables: str) -> list[str]:
-    """Return what bash is told for a line whose last word is being typed."""
-    words = line.split(" ")
-    environment = os.environ | {
-        "_AIRLIGHT_COMPLETE": "complete_bash",
-        "COMP_WORDS": line.replace(" ", "\n"),
-        "COMP_CWORD": str(len(words) - 1),
-    }
-    command = [sys.executable, *python, str(ROOT / "airlight.py")]
-    ran = subprocess.run(command, env=environment | variables, capture_output=True, text=True, timeout=60)
-    assert (ran.returncode, ran.stderr) == (0, ""), ran.stderr
-    return ran.stdout.split()
-
-
 @pytest.mark.claim("completion")
-def test_bash_is_told_what_fits():
-    assert _completed("airlight report --method shad") == ["shadow-planes"]
-
-
-@pytest.mark.claim("completion")
-def test_completion_imports_nothing_heavy():
-    """Ends in an error if it does: modules that cannot be imported stand before those that can."""
+@pytest.mark.parametrize(("line", "told"), [("report --method shad", "shadow-planes"), ("render hal", "hall")])
+def test_bash_is_told_what_fits_and_nothing_heavy_is_imported(line, told):
+    """Ends in an error if it is: modules that cannot be imported stand before those that can."""
     program = (
         "import sys, runpy\n"
         "for name in ('mitsuba', 'drjit', 'numpy', 'scipy', 'matplotlib', 'OpenEXR'): sys.modules[name] = None\n"
         f"sys.path.insert(0, {str(ROOT)!r}); sys.argv = ['airlight']\n"
         "runpy.run_module('airlight', run_name='__main__')\n"
     )
-    environment = os.environ | {
-        "_AIRLIGHT_COMPLETE": "complete_bash",
-        "COMP_WORDS": "airlight\nrender\nhal",
-        "COMP_CWORD": "2",
-    }
+    words = ["airlight", *line.split(" ")]
+    asked = {"_AIRLIGHT_COMPLETE": "complete_bash", "COMP_WORDS": "\n".join(words), "COMP_CWORD": str(len(words) - 1)}
     command = [sys.executable, "-c", program]
-    ran = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60)
-    assert (ran.stdout.split(), ran.returncode) == (["hall"], 0), ran.stderr
+    ran = subprocess.run(command, env=os.environ | asked, capture_output=True, text=True, timeout=60)
+    assert (ran.stdout.split(), ran.returncode) == ([told], 0), ran.stderr
