@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Phase functions: mean 1, mean cosine, orientation, the same in mpmath, and refusals."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -78,8 +79,6 @@ def test_half_angle_form_keeps_the_digits_of_a_sharp_lobe():
 
 @pytest.fixture
 def scalar_mitsuba():
-    import mitsuba as mi
-
     before = mi.variant()
     mi.set_variant("scalar_rgb")
     yield mi

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -108,7 +109,6 @@ def fog(tmp_path):
 @pytest.mark.claim("own-method")
 def test_the_worked_method_is_measured_like_a_built_in_one(fog, variant):
     """Steps in the angle without shifts are `ray-march`; twice as many come closer to the truth."""
-    import mitsuba as mi
 
     from realtime.scene.read_scene import read_scene
     from validation.estimates.quadrature import truth_image
@@ -135,7 +135,6 @@ def test_the_worked_method_is_measured_like_a_built_in_one(fog, variant):
 
 @pytest.mark.claim("own-method")
 def test_the_plain_method_returns_what_the_page_says(fog, variant):
-    import mitsuba as mi
 
     from realtime.frame.renderer import render_frame
     from realtime.scene.read_scene import read_scene

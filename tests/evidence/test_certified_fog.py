@@ -8,9 +8,12 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from reference.quadrature.image import quadrature_image
+from reference.scene.read import read_truth
 from tests.evidence.certified.fog import certify_pixel, directions, scene_data
 from tests.evidence.certified.model import FogBox, FogScreen, load_fog, mitsuba_dict
 from tests.evidence.certified.scenes import fog_scenes
@@ -52,8 +55,6 @@ def bound(scene):
 
 def truth_of(scene):
     """Read the file's Mitsuba scene; its lights must be those of the file, bit by bit."""
-    from reference.scene.read import read_truth
-
     truth = read_truth(load_fog(scene["mitsuba"]))
     for light, given in zip(truth.lights, scene["lights"], strict=True):
         assert np.array_equal(light.intensity, np.array(given["intensity"], dtype=float))
@@ -88,8 +89,6 @@ def corners(shape):
 
 @pytest.mark.claim("certified-fog-inputs")
 def test_corners_are_exact_in_mitsuba(variant):
-    import mitsuba as mi
-
     for scene in fog_scenes():
         # Mitsuba merges meshes of one material, and then screens are among them.
         parameters = [mi.traverse(shape) for shape in load_fog(mitsuba_dict(scene)).shapes()]
@@ -122,8 +121,6 @@ def test_all_rays_come_out_the_same(certified, name):
 @pytest.mark.parametrize("name", NAMES)
 def test_quadrature_agrees_within_its_own_bound(variant, certified, name):
     """The route that shares nothing: lit intervals of triangles and spheres in a plane, Kronrod's panels in float64."""
-    from reference.quadrature.image import quadrature_image
-
     image = quadrature_image(truth_of(certified[name]))
     value = radiance(certified[name])
     difference = np.abs(image.airlight.reshape(-1, 3) - value)

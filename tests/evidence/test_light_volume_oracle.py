@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from analytic.geometry import foot_and_height
 from analytic.panels import airlight_segments
+from realtime.scene.read_scene import read_scene
 from realtime.shadow_maps.projection import Projection
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
 from reference.scene.read import read_truth
@@ -15,8 +17,6 @@ from validation.metrics.errors import error_metrics
 
 
 def maps_of(scene, size):
-    from realtime.scene.read_scene import read_scene
-
     read = read_scene(scene)
     return [cast_shadow_map(read.geometry, light, size) for light in read.lights]
 
@@ -33,8 +33,6 @@ def variations():
 
 def twin_error(description, size):
     """Return the error of the twin of a scene against the truth."""
-    import mitsuba as mi
-
     scene = mi.load_dict(description)
     return error_metrics(truth_image(scene).airlight, oracle_airlight(read_truth(scene), maps_of(scene, size)))
 
@@ -63,8 +61,6 @@ def plane_below(depth, size):
 @pytest.mark.parametrize("surface", [np.inf, 3.7])
 def test_shadow_of_a_plane_is_exact(variant, level, surface):
     """Rays that start at 1.3 m are lit where they are above the plane, up to the visible surface."""
-    import mitsuba as mi
-
     truth = read_truth(mi.load_dict(tiny_scene(size=(24, 18), ball=None, floor=None)))
     light, direction = truth.lights[0], truth.direction
     airlight = oracle_airlight(

@@ -3,6 +3,9 @@
 
 from pathlib import Path
 
+from realtime.kernels.exact import exact
+from realtime.methods.unshadowed import unshadowed
+
 ROOT = Path(__file__).resolve().parents[2]
 TINY = (16, 12)
 FUNCTIONS = ("load_scene", "render", "reference", "compare", "integrate", "bench", "report")
@@ -10,13 +13,9 @@ FUNCTIONS = ("load_scene", "render", "reference", "compare", "integrate", "bench
 
 def brighter(view, *, kernel=None, times=2.0):
     """A method of one's own: all of the airlight, unshadowed, times something."""
-    from realtime.methods.unshadowed import unshadowed
-
     return times * unshadowed(view, kernel=kernel)
 
 
 def third(geometry, x0, x1, medium, light):
     """A kernel of one's own."""
-    from realtime.kernels.exact import exact
-
     return exact(geometry, x0, x1, medium, light) / 3

@@ -3,6 +3,7 @@
 
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 
 from reference.quadrature.area_airlight import AreaAirlight, area_airlight
@@ -32,8 +33,6 @@ def fog(sigma_t=0.21, albedo=0.83) -> dict[str, Any]:
 
 def lit_scene(*, size=(4, 3), to_world=None, medium=None, **shapes: Any):
     """Return a Mitsuba scene with a camera in fog, looking along z from the origin by default."""
-    import mitsuba as mi
-
     medium = fog() if medium is None else medium
     sensor = {
         "type": "perspective",
@@ -47,8 +46,6 @@ def lit_scene(*, size=(4, 3), to_world=None, medium=None, **shapes: Any):
 
 def turned(place, angle, scale):
     """Return a transformation that scales, turns by an angle [degrees] and moves to a place."""
-    import mitsuba as mi
-
     return mi.ScalarTransform4f().translate(list(place)).rotate([0.8, 0.6, 0.0], angle).scale(list(scale))
 
 
@@ -64,8 +61,6 @@ def ball(**changes: Any) -> dict[str, Any]:
 
 def lit_room(light, *, size=(5, 4), medium=None, empty=False, **shapes: Any) -> TruthScene:
     """Return a floor with a leaning block and a ball under a light, seen from the side, or the light alone."""
-    import mitsuba as mi
-
     usual = {
         "floor": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(5.1), "bsdf": GREY},
         "block": {"type": "cube", "to_world": turned((0.4, 0.2, 0.9), 27, (0.4, 0.2, 0.3)), "bsdf": GREY},

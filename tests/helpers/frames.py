@@ -8,6 +8,7 @@ of Mitsuba, such as meshes, has no description to find its frame by, and is rend
 from collections.abc import Mapping
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 
 from realtime.frame.renderer import frame_renderer, render_frame
@@ -22,8 +23,6 @@ _FRAMES: dict[Any, Any] = {}
 
 def read(scene: Any, precision: str = "single") -> Scene:
     """Return the scene of a dictionary or of Mitsuba; one that was read as it is."""
-    import mitsuba as mi
-
     scene = mi.load_dict(scene) if isinstance(scene, dict) else scene
     return scene if isinstance(scene, Scene) else read_scene(scene, precision)
 
@@ -46,8 +45,6 @@ def frame(scene: dict[str, Any], method: str = "unshadowed", **options: Any):
 
 def truth(scene: dict[str, Any]):
     """Return the image of the quadrature reference, which shares no code with the methods."""
-    import mitsuba as mi
-
     return _once(("truth", scene), lambda: quadrature_image(read_truth(mi.load_dict(scene)), edges="geometry"))
 
 

@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scenes and frames for the tests of light volumes."""
 
+import mitsuba as mi
 import numpy as np
 
+from realtime.shadow_maps.shadow_map import cast_shadow_map
+from reference.scene.read import read_truth
+from tests.evidence.oracles.light_volume import oracle_airlight, traced_walls
 from tests.helpers.frames import read, render
 from tests.helpers.scenes import spot, tiny_scene
 
@@ -15,15 +19,12 @@ def lamp(*position):
 
 
 def camera(origin, target, *, size=SIZE, up=(0, 0, 1)):
-    import mitsuba as mi
-
     look = mi.ScalarTransform4f().look_at(list(origin), list(target), list(up))
     return {"sensor": tiny_scene(size=size)["sensor"] | {"to_world": look}}
 
 
 def bars(count=14):
     """Bars between the light and the rays of a camera that looks along them."""
-    import mitsuba as mi
 
     def bar(number):
         place = mi.ScalarTransform4f().translate([-1.6 + 0.25 * number, 0.9, 1.0])
@@ -67,8 +68,6 @@ SCENES = {
 
 
 def loaded_scene(name="light beside the view", **changes):
-    import mitsuba as mi
-
     return mi.load_dict(tiny_scene(size=changes.pop("size", SIZE), **(SCENES[name][0]() | changes)))
 
 
@@ -85,10 +84,6 @@ def differ(image, expected):
 
 def twin_of(loaded, frame, size, precision="single", *, walls="slanted"):
     """Return the airlight of the map that a frame was rendered with, by another route."""
-    from realtime.shadow_maps.shadow_map import cast_shadow_map
-    from reference.scene.read import read_truth
-    from tests.evidence.oracles.light_volume import oracle_airlight, traced_walls
-
     scene = read(loaded, precision)
     maps = [cast_shadow_map(scene.geometry, light, size) for light in scene.lights]
     numbers = traced_walls(scene, maps) if walls == "upright" else None

@@ -3,7 +3,9 @@
 
 import numpy as np
 
-from realtime.methods.shadow_planes.plane_table import index_planes, light_basis
+from realtime.methods.shadow_planes.plane_table import NUMBER, index_planes, light_basis
+from realtime.methods.shadow_planes.sweep import ray_planes
+from realtime.numerics.array_types import array_types
 from realtime.numerics.diamond_angle import host_diamond_angle
 from realtime.scene.mesh_adjacency import make_casters
 from tests.helpers.casters import ALL
@@ -19,8 +21,6 @@ def casters_of(*names):
 
 def index_of(casters, light=LIGHT, camera=CAMERA, precision="single", *, order="exact"):
     """Return the index of the shadow planes of all components."""
-    from realtime.numerics.array_types import array_types
-
     used = np.ones(len(casters.closed), dtype=bool)
     light, camera = np.asarray(light, dtype=float), np.asarray(camera, dtype=float)
     return index_planes(casters, light, camera, used=used, types=array_types(precision), order=order)
@@ -97,8 +97,6 @@ def lit_lengths(index, ways, end, *, weight=lambda x: x):
 
 def listed_planes(index, rays):
     """Return by ray the numbers of the planes of its wedge that it may cross, in order."""
-    from realtime.methods.shadow_planes.plane_table import NUMBER
-
     entries = np.array(index.entries)
     places = zip(np.array(rays.first), np.array(rays.count))
     return [entries[first : first + count] & NUMBER for first, count in places]
@@ -106,8 +104,6 @@ def listed_planes(index, rays):
 
 def rays_of(index, ways, end=None):
     """Return the rays of a walk up to a distance `end`, without an end by default."""
-    from realtime.methods.shadow_planes.sweep import ray_planes
-
     Float = type(index.distance)
     ray_end = Float(0) if end is None else index.distance / Float(np.asarray(end, dtype=np.float64))
     return ray_planes(index, *(Float(np.ascontiguousarray(part)) for part in ways.T), ray_end=ray_end)

@@ -1,21 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scenes of boxes that tests share, and the rays of an image as the search for lit intervals takes them."""
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.geometry import foot_and_height
+from reference.quadrature.surface import surface_hits
+from reference.visibility.exact_distance import exact_distance
 from reference.visibility.lit_intervals import _shadow_rays, _visible
 from reference.visibility.random_checks import Visible
+from reference.visibility.spot_cone import cone_interval, perpendicular
 from tests.helpers.scenes import tiny_scene
 
 
 def rays_of(truth, light=0):
     """Return the rays of an image, and where they begin and end as angles at a light."""
-    from analytic.geometry import foot_and_height
-    from reference.quadrature.surface import surface_hits
-    from reference.visibility.exact_distance import exact_distance
-    from reference.visibility.spot_cone import cone_interval, perpendicular
-
     lamp, direction = truth.lights[light], truth.direction
     foot, height = foot_and_height(np.broadcast_to(truth.origin, direction.shape), direction, lamp.position)
     normal = perpendicular(truth.origin, direction, lamp)
@@ -33,8 +33,6 @@ def lit_lengths(intervals, ends):
 
 def box(centre, size, **changes):
     """Return a box whose sides are parallel to the axes."""
-    import mitsuba as mi
-
     transform = mi.ScalarTransform4f().translate(list(centre)).scale([0.5 * s for s in size])
     return {"type": "cube", "to_world": transform} | changes
 

@@ -8,6 +8,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
+import realtime.numerics.host_numbers as host_numbers
+
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("realtime", "validation", "reports")
 
@@ -19,10 +24,7 @@ def round_trips() -> Iterator[Counter[str]]:
     Dr.Jit forbids what waits in any other way (`dr.JitFlag.ForbidSynchronization`): that raises. The processor takes
     the way of a GPU where the two differ, `realtime.numerics.host_numbers`.
     """
-    import drjit as dr
     import pytest
-
-    import realtime.numerics.host_numbers as host_numbers
 
     trips: Counter[str] = Counter()
     inside = False
@@ -57,9 +59,6 @@ def round_trips() -> Iterator[Counter[str]]:
 
 def _flat_types() -> list[type]:
     """Return the types of arrays without rows of the backend in use, with and without derivatives."""
-    import drjit as dr
-    import mitsuba as mi
-
     named = {kind for name in dir(mi) if isinstance(kind := getattr(mi, name), type)}
     plain = {dr.detached_t(kind) for kind in named if dr.is_array_v(kind)}
     return sorted(
@@ -74,8 +73,6 @@ def _flat_types() -> list[type]:
 
 def _on_device(value: Any) -> bool:
     """Return whether reading a value asks the device; a literal is known without it."""
-    import drjit as dr
-
     if dr.depth_v(value) > 1:
         return any(_on_device(component) for component in value)
     return bool(dr.is_jit_v(value) and value.state != dr.VarState.Literal)

@@ -3,11 +3,11 @@
 
 from typing import Any
 
+import mitsuba as mi
+
 
 def tiny_scene(*, size=(16, 12), **changes: Any) -> dict[str, Any]:
     """Return a sphere over a floor in fog, lit by a point light; `changes` replace or (with None) remove entries."""
-    import mitsuba as mi
-
     scene: dict[str, Any] = {
         "type": "scene",
         "fog": {
@@ -45,8 +45,6 @@ def tiny_scene(*, size=(16, 12), **changes: Any) -> dict[str, Any]:
 
 def spot(*, cutoff=33.0, beam=33.0) -> dict[str, Any]:
     """Return a spot light above the sphere."""
-    import mitsuba as mi
-
     return {
         "type": "spot",
         "to_world": mi.ScalarTransform4f().look_at([0.7, -0.3, 2.6], [0.1, 0.1, 0.4], [0, 1, 0]),

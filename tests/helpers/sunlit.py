@@ -3,9 +3,12 @@
 
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from realtime.scene.camera import ray_directions
 from tests.helpers import airlight_sum
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 from validation.scenes.meshes import box, placed, rotation
@@ -62,10 +65,6 @@ def shaded(*, size=(16, 12), **changes: Any) -> dict[str, Any]:
 
 def rays(scene) -> tuple[Array, Array]:
     """Return the camera's place and the directions of all pixels in the order of the image."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.scene.camera import ray_directions
 
     camera = scene.camera
     direction, _ = ray_directions(camera, dr.arange(mi.UInt32, camera.width * camera.height))

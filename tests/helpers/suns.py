@@ -3,6 +3,7 @@
 
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 
 from tests.helpers import airlight_sum
@@ -28,8 +29,6 @@ PEARL = np.array([0.5, 0.1875, 0.59375]), 0.4375  # centre, radius
 
 def brick(sigma_t: Any = (0.9, 0.5, 0.2), albedo=(0.9, 0.4, 0.3), **medium: Any) -> dict[str, Any]:
     """Return a box of fog."""
-    import mitsuba as mi
-
     at = mi.ScalarTransform4f().translate(BRICK[0].tolist()).scale(BRICK[1].tolist())
     return bounded_medium({"type": "cube", "to_world": at}, sigma_t, albedo, **medium)
 

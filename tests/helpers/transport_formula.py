@@ -8,6 +8,8 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
+import realtime.methods.cloud_collectors as method
+
 WEIGHTS = [0.02, 0.04, 0.03, 0.01, 0.05, 0.03, 0.02, 0.06]
 
 
@@ -32,7 +34,6 @@ class Formula:
 
 def use_formula(monkeypatch) -> None:
     """Let `cloud-collectors` ask the formula, whatever its transport."""
-    import realtime.methods.cloud_collectors as method
 
     def on_device(tables, types):
         weights = types.scalar(WEIGHTS)

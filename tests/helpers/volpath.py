@@ -3,17 +3,17 @@
 
 import numpy as np
 
+from reference.monte_carlo.batches import merged
+from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.quadrature.image import quadrature_image
+from reference.scene.shadow_epsilon import measure_shadow_epsilon
+
 
 def assert_volpath_agrees(truth, *, batches, least_precision):
     """Trace batches of 256 samples a pixel: the pooled bias of each layer and channel is within four standard errors.
 
     The standard errors are below `least_precision`, relative; the shadow-ray epsilon is corrected.
     """
-    from reference.monte_carlo.batches import merged
-    from reference.monte_carlo.volpath.integrator import volpath_batch
-    from reference.quadrature.image import quadrature_image
-    from reference.scene.shadow_epsilon import measure_shadow_epsilon
-
     expected = quadrature_image(truth, shadow_scale=1 - measure_shadow_epsilon())
     traced = volpath_batch(truth, 100, 256)
     for seed in range(101, 100 + batches):

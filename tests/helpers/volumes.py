@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Small closed meshes and cameras for the tests of light volumes."""
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from realtime.methods.light_volumes.published.mesh import VolumeMesh
+from realtime.scene.camera import Camera, pixel_grid
 
 WIDTH, HEIGHT = 11, 8
 
@@ -27,10 +30,6 @@ def simple_camera():
 
 def opaque_camera(size, vectors):
     """Return a camera of these vectors, in float64; all such cameras share their kernels, as the product's do."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.scene.camera import Camera, pixel_grid
 
     arrays = [mi.Vector3d(*map(float, vector)) for vector in vectors]
     dr.make_opaque(arrays)

@@ -1,10 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`single-scatter` and volpath under directional lights, against the quadrature, and what all of them refuse."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
+from scipy.stats import t
 
 from analytic.errors import InputError
+from reference.monte_carlo.batches import merged
+from reference.monte_carlo.single_scatter.directional_sampling import sample_stretch
+from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+from reference.monte_carlo.single_scatter.scene_data import read_task
+from reference.quadrature.image import quadrature_image
+from reference.scene.read import read_truth
 from tests.helpers.scenes import tiny_scene
 from tests.helpers.suns import ball_over_floor, brick, pearl, sun, sunny
 from tests.helpers.volpath import assert_volpath_agrees
@@ -14,12 +22,6 @@ HG = {"phase": {"type": "hg", "g": 0.6}}
 
 def traced(scene, batches, samples=64):
     """Return quadrature image and batches of single-scatter."""
-    import mitsuba as mi
-
-    from reference.monte_carlo.batches import merged
-    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-    from reference.quadrature.image import quadrature_image
-    from reference.scene.read import read_truth
 
     truth = read_truth(mi.load_dict(scene))
     done = single_scatter_batch(truth, 0, samples)
@@ -60,8 +62,6 @@ def test_single_scatter_agrees_with_the_quadrature(variant, name):
     Expected: each pixel within its error at a family level of 1e-4, pooled bias within four standard errors, and those
     below 0.1 %; surfaces to single precision.
     """
-    from scipy.stats import t
-
     image, batches = traced(CASES[name](), 32)
     expected = image.airlight.reshape(-1, 3)
     mean, error = batches.mean[0], batches.standard_error[0]
@@ -82,9 +82,6 @@ def test_single_scatter_agrees_with_the_quadrature(variant, name):
 @pytest.mark.claim("sampled-distances")
 def test_sampled_distances_have_their_density(variant):
     """The mean of 1/density over the samples is the length; the density is below 1/(2 length) nowhere."""
-    import mitsuba as mi
-
-    from reference.monte_carlo.single_scatter.directional_sampling import sample_stretch
 
     count = 4096
     u = mi.Float((np.arange(count) + 0.5) / count)
@@ -105,9 +102,6 @@ def test_volpath_agrees(variant, name):
 
     Its shadow rays end at twice the radius of the scene's bounding sphere, less the epsilon: beyond all media.
     """
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
 
     assert_volpath_agrees(read_truth(mi.load_dict(CASES[name]())), batches=16, least_precision=0.03)
 
@@ -116,10 +110,6 @@ def test_volpath_agrees(variant, name):
 @pytest.mark.parametrize("estimator", ["quadrature", "single-scatter"])
 @pytest.mark.parametrize("bounded", [False, True], ids=["fog alone", "a body in fog"])
 def test_medium_without_bounds_is_refused(variant, estimator, bounded):
-    import mitsuba as mi
-
-    from reference.monte_carlo.single_scatter.scene_data import read_task
-    from reference.scene.read import read_truth
 
     body = {"brick": brick() | {"exterior": {"type": "ref", "id": "fog"}}} if bounded else {}
     scene = mi.load_dict(tiny_scene(lamp=None, sun=sun(), **body))

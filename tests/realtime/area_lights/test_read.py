@@ -1,18 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lights with extent are read as they are, and what no method can render is refused by the name of the shape."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from realtime.errors import InputError
+from realtime.scene.read_scene import read_scene
 from tests.helpers.lamps import area_lamp
 from tests.helpers.scenes import tiny_scene
 
 
 def read(**changes):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
 
     return read_scene(mi.load_dict(tiny_scene(**changes)))
 
@@ -46,8 +45,6 @@ def test_a_lamp_of_null_is_nothing_but_light(variant):
 
 
 def _sheared():
-    import mitsuba as mi
-
     return mi.ScalarTransform4f(np.array([[1, 0.3, 0, 0.5], [0, 1, 0, 0.7], [0, 0, 1, 1.9], [0, 0, 0, 1]]))
 
 

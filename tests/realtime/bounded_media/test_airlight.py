@@ -4,14 +4,21 @@
 from dataclasses import replace
 from functools import partial
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from realtime.errors import InputError
+from realtime.frame.renderer import render_frame
+from realtime.scene.read_scene import read_scene
+from reference.scene.read import read_truth
 from tests.helpers import airlight_sum, frames
 from tests.helpers.frames import relative_rmse
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 from tests.helpers.sunlit import box_part, cube, fog_sphere, sphere_part
+from validation.estimates.quadrature import truth_image
+from validation.scenes.loading import load_scene
+from validation.study.configuration import configuration, prepared
 
 SPHERE_AT, RADIUS = (-0.8, 0.4, 0.7), 0.6
 CUBE_AT = (0.9, 0.5, 0.6)
@@ -20,9 +27,6 @@ render = partial(frames.render, precision="double")
 
 
 def truth_of(scene):
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
 
     return read_truth(mi.load_dict(scene))
 
@@ -126,12 +130,6 @@ def test_random_scenes_against_the_truth(variant, scene, bound):
     Legs graze spheres in the fog around them (2: 9e-5); light from infinity bends at the 72 facets of two bodies (84:
     1.7e-3); legs pass edges of boxes on their way to fog and other boxes (146: 1.2e-3).
     """
-    from realtime.frame.renderer import render_frame
-    from realtime.scene.read_scene import read_scene
-    from validation.estimates.quadrature import truth_image
-    from validation.scenes.loading import load_scene
-    from validation.study.configuration import configuration, prepared
-
     loaded = load_scene(scene, (64, 48)).scene
     truth = truth_image(loaded).airlight
     frame = render_frame(prepared(read_scene(loaded), configuration("shadow-planes")))

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Airlight of a directional light in bounded media: against a closed form, sums over small steps, and its laws."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from realtime.errors import InputError
+from realtime.scene.convex_bounds import mesh_bounds
 from tests.helpers import airlight_sum
 from tests.helpers.frames import read, relative_rmse, render
 from tests.helpers.scenes import clear_scene, tiny_scene
@@ -23,14 +25,13 @@ from tests.helpers.sunlit import (
     sun,
     unit,
 )
-from validation.scenes.meshes import rotation
+from validation.scenes.meshes import icosphere, rotation
+from validation.scenes.parts import medium_boundary
 
 SMALL = (8, 6)
 
 
 def look(origin, target, *, size=SMALL, up=(0, 0, 1)):
-    import mitsuba as mi
-
     place = mi.ScalarTransform4f().look_at(list(origin), list(target), list(up))
     sensor = {key: entry for key, entry in tiny_scene(size=size)["sensor"].items() if key != "medium"}
     return sensor | {"to_world": place}
@@ -92,10 +93,6 @@ def test_bounded_media_against_sums_over_small_steps(variant, case):
 
 def test_media_of_many_planes_have_nodes(variant):
     """A faceted sphere of 80 planes: the bends within the nodes are small."""
-    from realtime.scene.convex_bounds import mesh_bounds
-    from validation.scenes.meshes import icosphere
-    from validation.scenes.parts import medium_boundary
-
     medium = {"type": "homogeneous", "sigma_t": 1.3, "albedo": 0.7}
     vertices, faces = icosphere(1)
     vertices = vertices + np.array([0.0, 0.0, 0.6])

@@ -5,8 +5,16 @@ import drjit as dr
 import numpy as np
 import pytest
 
+from realtime.bounded_media.convex_clip import seen_from
+from realtime.bounded_media.panels import MediumSegment, medium_integral
 from realtime.numerics.aligned import aligned_array
+from realtime.numerics.array_types import array_types
+from realtime.rays.ray_light import ray_geometry
 from realtime.scene.convex_bounds import mesh_bounds
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium
+from realtime.scene.phase import named_phase
+from realtime.scene.read_media import make_bounded_medium
 from tests.helpers.kernel_values import opaque, phase_of
 from validation.scenes.meshes import gem, placed, prism, rotation
 
@@ -25,12 +33,6 @@ def bounds_of(name):
 
 
 def seen_medium(name, light, precision="double"):
-    from realtime.bounded_media.convex_clip import seen_from
-    from realtime.numerics.array_types import array_types
-    from realtime.scene.medium import Medium
-    from realtime.scene.phase import named_phase
-    from realtime.scene.read_media import make_bounded_medium
-
     types = array_types(precision)
     medium = Medium((types.scalar(1.0),), types.color(1.0), named_phase("isotropic"))
     bounded_medium = make_bounded_medium(medium, bounds_of(name), types)
@@ -61,11 +63,6 @@ def least_of_all(name, light, v):
 
 def segments(name, light, phase, *, sigma_t, precision="double"):
     """Return chords of a medium, a part of each for every other one, with all that their integrals need."""
-    from realtime.bounded_media.panels import MediumSegment
-    from realtime.rays.ray_light import ray_geometry
-    from realtime.scene.lights import Light
-    from realtime.scene.medium import Medium
-
     seen, types = seen_medium(name, light, precision)
     start, direction, low, high = lines_in(name, light)
     part = np.where(np.arange(len(low)) % 2, 0.37, 1.0) * (high - low)
@@ -92,8 +89,6 @@ def segments(name, light, phase, *, sigma_t, precision="double"):
 
 
 def integral(segment, x0, x1):
-    from realtime.bounded_media.panels import medium_integral
-
     return np.array(medium_integral(segment, x0, x1).x, dtype=np.float64)
 
 

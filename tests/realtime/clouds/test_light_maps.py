@@ -2,9 +2,13 @@
 """Light maps of clouds: heights and normals of the lit side, means over the cloud alone, and nothing that is not finite
 beside it."""
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.clouds.light_maps.pyramid import filtered_map, filtered_surface, slope_normals
+from realtime.clouds.light_maps.surfaces import LitSurfaces, cast_surfaces
 from realtime.numerics.aligned import aligned_array
 from tests.helpers.frames import read
 from tests.helpers.scenes import clear_scene
@@ -15,10 +19,6 @@ SIZE = 64
 
 
 def _cube_map(precision="single", *, size=SIZE, direction=ALONG, slopes=True):
-    import mitsuba as mi
-
-    from realtime.clouds.light_maps.pyramid import filtered_map
-    from realtime.clouds.light_maps.surfaces import cast_surfaces
 
     scene = read(clear_scene(lamp=sun(direction), cube=cube()), precision)
     cloud = mi.load_dict({"type": "scene", "cloud": cube()})
@@ -27,8 +27,6 @@ def _cube_map(precision="single", *, size=SIZE, direction=ALONG, slopes=True):
 
 
 def _vectors(points):
-    import mitsuba as mi
-
     columns = np.asarray(points, dtype=np.float64).reshape(-1, 3).T
     return mi.Vector3f(*(aligned_array(mi.Float, column) for column in columns))
 
@@ -36,10 +34,6 @@ def _vectors(points):
 @pytest.mark.claim("collector-slopes", tolerance="1e-4 of the cosine, against 0.05 by unit normals")
 def test_normals_of_levels_are_those_of_mean_slopes(variant):
     """Through a saw tooth whose steep sides hide, the mean plane is level: its unit normals lean towards the light."""
-    import mitsuba as mi
-
-    from realtime.clouds.light_maps.pyramid import filtered_map, filtered_surface
-    from realtime.clouds.light_maps.surfaces import LitSurfaces
 
     scene = read(clear_scene(lamp=sun((0.0, 0.0, -1.0)), cube=cube()), "single")
     basis = filtered_map([_saw()], scene.lights[0], slopes=False).projection.basis
@@ -58,9 +52,6 @@ def test_normals_of_levels_are_those_of_mean_slopes(variant):
 
 def _saw(width=1.0):
     """Return a surface that rises by a texel's width a texel, eight texels long, and falls back in a step."""
-    import mitsuba as mi
-
-    from realtime.clouds.light_maps.surfaces import LitSurfaces
 
     count = SIZE * SIZE
     column = np.arange(count) % SIZE
@@ -78,9 +69,6 @@ def _saw(width=1.0):
 @pytest.mark.parametrize("slopes", [True, False])
 def test_levels_are_means_over_the_cloud_alone(variant, slopes):
     """A premultiplied mean leaves out what lies beside the cloud, and knows where the rest is."""
-    import mitsuba as mi
-
-    from realtime.clouds.light_maps.pyramid import filtered_surface, slope_normals
 
     surfaces, light_map = _cube_map(slopes=slopes)
     in_rows = np.argsort(np.array(surfaces.place))
@@ -118,10 +106,6 @@ def test_levels_are_means_over_the_cloud_alone(variant, slopes):
 @pytest.mark.parametrize("width", [0.0, 0.03, 0.4, 50.0])
 def test_beside_the_cloud_is_what_is_nearest_of_it(variant, width):
     """Past the silhouette A = 0: there is no mean, and yet a surface."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.clouds.light_maps.pyramid import filtered_surface
 
     _, light_map = _cube_map()
     rng = np.random.default_rng(7)

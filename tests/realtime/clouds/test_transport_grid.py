@@ -3,8 +3,12 @@
 
 from types import SimpleNamespace
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 
+from realtime.clouds.canonical.angular import ENTRIES
+from realtime.clouds.collectors.transport_grid import transport_grid
 from realtime.numerics.aligned import aligned_array
 
 SETS = 2
@@ -12,7 +16,6 @@ SETS = 2
 
 def _formula(types):
     """Return a look-up that is smooth in the coordinates of the tables, with steep light and long displacements."""
-    import drjit as dr
 
     class Formula:
         angular = (types.scalar([1.0]),)
@@ -29,18 +32,13 @@ def _formula(types):
 
 
 def _both(points):
-    import mitsuba as mi
-
-    from realtime.clouds.canonical.angular import ENTRIES
-    from realtime.clouds.collectors.transport_grid import transport_grid
 
     look_up = _formula(SimpleNamespace(scalar=mi.Float))
     grid = transport_grid(look_up, np.ones((SETS, ENTRIES)), SETS)
     arguments = [aligned_array(mi.Float, np.asarray(column)) for column in points]
-    return [
-        [[np.array(value) for value in transport(number, *arguments)] for number in range(SETS)]
-        for transport in (look_up, grid)
-    ]
+    values = [[transport(number, *arguments) for number in range(SETS)] for transport in (look_up, grid)]
+    dr.eval(values)
+    return [[[np.array(value) for value in of_set] for of_set in of_transport] for of_transport in values]
 
 
 def _points(count=3000, seed=5):

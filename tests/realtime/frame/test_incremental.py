@@ -3,6 +3,8 @@
 
 from dataclasses import replace
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -12,10 +14,19 @@ from realtime.kernels.registry import KERNELS
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.method import never
 from realtime.methods.registry import METHODS
-from realtime.scene.animate import coloured_light, read_objects, thicker_medium, turned_light, turned_objects
+from realtime.scene.animate import (
+    closed_shapes,
+    coloured_light,
+    read_objects,
+    thicker_medium,
+    turned_light,
+    turned_objects,
+)
+from realtime.scene.mesh_adjacency import read_casters
 from realtime.scene.read_scene import Scene, read_scene
 from tests.helpers.scenes import clear_scene, tiny_scene
 from tests.helpers.sunlit import cube
+from validation.scenes.loading import load_scene
 
 STILL = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
 TURN = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
@@ -29,22 +40,16 @@ def made(scene: Scene, method: str, **parameters) -> FrameRenderer:
 
 
 def built_in(name: str) -> Scene:
-    from validation.scenes.loading import load_scene
-
     return read_scene(load_scene(name, (32, 24)).scene)
 
 
 def sphere_scene() -> Scene:
     """A scene whose surfaces Mitsuba is asked for."""
-    import mitsuba as mi
-
     return read_scene(mi.load_dict(tiny_scene(size=(32, 24))))
 
 
 def cube_of_fog() -> Scene:
     """A cube of fog beside a caster, over a floor; the kernels of `three-media` take ten times as long to compile."""
-    import mitsuba as mi
-
     turned = mi.ScalarTransform4f().translate([0.7, 0.4, 0.5]).rotate([1, 2, 3], 40).scale(0.17)
     caster = {"type": "cube", "to_world": turned}
     return read_scene(
@@ -56,9 +61,6 @@ def cube_of_fog() -> Scene:
 
 def frames(scene: Scene, steps, share: float = 0.1):
     """Yield the scene after each step, and what moved."""
-    from realtime.scene.animate import closed_shapes
-    from realtime.scene.mesh_adjacency import read_casters
-
     objects = read_objects(scene, closed_shapes(read_casters(scene.geometry))) if "objects" in steps else None
     turn = np.eye(3)
     for step in steps:
@@ -82,8 +84,6 @@ def frames(scene: Scene, steps, share: float = 0.1):
 
 
 def aside(camera):
-    import drjit as dr
-
     origin = type(camera.origin)(camera.origin + 0.03 * camera.forward + 9 * camera.left)
     dr.make_opaque(origin)
     return replace(camera, origin=origin)

@@ -3,6 +3,7 @@
 
 from dataclasses import replace
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -58,8 +59,6 @@ def test_every_method_renders_the_points_of_a_light(variant, one_by_one, name):
 
 def _two_spots():
     """Return a scene with a hard and a soft spot in bounded media."""
-    import mitsuba as mi
-
     spot = {"type": "spot", "to_world": mi.ScalarTransform4f().look_at([1.3, -0.7, 2.1], [0.1, 0.2, 0.3], [0, 0, 1])}
     bright = {"intensity": {"type": "rgb", "value": [9.1, 7.3, 5.9]}, "cutoff_angle": 37.0}
     lamps = {"hard": spot | bright | {"beam_width": 37.0}, "soft": spot | bright | {"beam_width": 11.0}}
@@ -88,7 +87,6 @@ def test_many_lights_one_by_one_are_all_at_once(variant):
 
 def test_a_black_lamp_shadows_others_and_not_itself(variant):
     """A disk before the point light of the scene: what is behind it gets its own light alone."""
-    import mitsuba as mi
 
     def frames(material):
         screen = area_lamp("disk", size=0.3, material=material) | {

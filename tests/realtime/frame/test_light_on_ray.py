@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Protects the claim that no frame holds what is not finite, and that a light on a ray is refused by its distance."""
 
+from types import SimpleNamespace
+
+import mitsuba as mi
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
 from realtime.errors import InputError
+from realtime.frame.light_on_ray import check_radiance
 from realtime.methods.registry import FOG_METHODS
 from tests.helpers import frames
 from tests.helpers.scenes import tiny_scene
@@ -13,8 +17,6 @@ from tests.helpers.scenes import tiny_scene
 
 def render(method, *, position, size=(9, 9), changes=None, **parameters):
     """Render a scene whose camera looks along +y, its middle pixel along the axis."""
-    import mitsuba as mi
-
     scene = tiny_scene(size=size, floor=None)
     scene["sensor"]["to_world"] = mi.ScalarTransform4f().look_at([0, -5, 1], [0, 0, 1], [0, 0, 1])
     scene["lamp"]["position"] = position
@@ -35,8 +37,6 @@ def test_a_light_at_the_camera_or_on_a_ray_is_refused_by_its_distance(variant, m
 @pytest.mark.parametrize("position", [[0.0, -9.0, 1.0], [0.0, 9.0, 1.0], [1e-4, 0.0, 1.0], [0.0, -4.999, 1.03]])
 def test_a_light_on_the_line_of_a_ray_but_not_on_it_is_rendered(variant, position):
     """Behind the camera, behind a wall, a little aside."""
-    import mitsuba as mi
-
     wall = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0, 4, 1]).scale(0.5)}
     frame = render("unshadowed", position=position, changes={"wall": wall})
     assert np.isfinite(frame.airlight).all()
@@ -62,9 +62,6 @@ def test_a_ray_straight_away_from_a_light_has_its_airlight(variant, method, para
 
 
 def test_what_is_not_finite_is_refused_whatever_the_reason():
-    from types import SimpleNamespace
-
-    from realtime.frame.light_on_ray import check_radiance
 
     values = np.ones((2, 3, 3))
     values[1, 2, 0] = np.nan

@@ -1,10 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Large images are rendered in parts: the same pixels, with what a frame needs beside them that of a part."""
 
+from dataclasses import replace
+
+import mitsuba as mi
 import numpy as np
 import pytest
 
+import realtime.frame.renderer as module
+from realtime.frame.incremental import next_frame
+from realtime.frame.renderer import frame_renderer
+from realtime.kernels.registry import KERNELS
+from realtime.methods.registry import METHODS as REGISTRY
+from realtime.scene.animate import coloured_light, turned_light
+from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
+from validation.scenes.loading import resize
+from validation.scenes.meshes import rotation
+from validation.scenes.parts import area_lamp
+from validation.study.frame_times import timed_image
 
 # No method sees the rays of another part, and a part begins where a block of tiles does: the same bits.
 METHODS = {
@@ -14,11 +28,6 @@ METHODS = {
 
 
 def scene(*, lamp=False):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-    from validation.scenes.loading import resize
-    from validation.scenes.parts import area_lamp
 
     disk = area_lamp("disk", (0.31, -0.57, 1.93), (0.13, 0.29, -1.0), 0.17, (5.3, 4.9, 4.1))
     lamps = {"lamp": disk} if lamp else {}
@@ -29,10 +38,6 @@ def scene(*, lamp=False):
 
 
 def renderer(name):
-    from realtime.frame.renderer import frame_renderer
-    from realtime.kernels.registry import KERNELS
-    from realtime.methods.registry import METHODS as REGISTRY
-
     method = REGISTRY[name.partition(",")[0]]
     return frame_renderer(scene(lamp="disk" in name), method, kernel=KERNELS["exact"].function, **METHODS[name])
 
@@ -48,14 +53,6 @@ def same(frame, other):
 @pytest.mark.parametrize("name", METHODS)
 def test_frames_of_an_animation_are_the_same_in_parts(name, variant, monkeypatch):
     """What is shaded again by a frame that follows is shaded in parts too; the state is one for all parts."""
-    from dataclasses import replace
-
-    import realtime.frame.renderer as module
-    from realtime.frame.incremental import next_frame
-    from realtime.scene.animate import coloured_light, turned_light
-    from validation.scenes.meshes import rotation
-    from validation.study.frame_times import timed_image
-
     made = renderer(name)
     read, turn = made.scene, rotation([0.3, 0.9, -0.2], 11.0)
     turned = replace(read, lights=tuple(turned_light(light, np.array([0.1, 0.2, 0.3]), turn) for light in read.lights))

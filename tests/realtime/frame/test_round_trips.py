@@ -10,9 +10,14 @@ from concurrent.futures import Executor, ProcessPoolExecutor
 from multiprocessing import get_context
 from typing import Any
 
+import mitsuba as mi
 import pytest
 
+from realtime.frame.incremental import next_frame
+from realtime.frame.renderer import frame_renderer
+from realtime.kernels.registry import KERNELS
 from realtime.methods.registry import METHODS
+from realtime.scene.read_scene import read_scene
 from reports.machine.environment import activate
 from tests.helpers.clouds import cloud_scene
 from tests.helpers.lamps import lit_by
@@ -82,12 +87,6 @@ def waits_in_clouds(method: str) -> dict[str, Counter[str]]:
 
 def waits_of_frames(scene: dict[str, Any], method: str) -> dict[str, Counter[str]]:
     """By what moved, the waits of a frame that has been rendered before."""
-    import mitsuba as mi
-
-    from realtime.frame.incremental import next_frame
-    from realtime.frame.renderer import frame_renderer
-    from realtime.kernels.registry import KERNELS
-    from realtime.scene.read_scene import read_scene
 
     read = read_scene(mi.load_dict(scene))
     points = {"points": POINTS} if read.area_lights else {}

@@ -1,8 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Filters of images are their definition, let nothing leak across an edge in depth, and give numbers everywhere."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
+
+from realtime.image_filters.bilateral import bilateral
+from realtime.image_filters.guides import Guide, depth_guide
+from realtime.image_filters.levels import bilateral_of_levels
+from realtime.image_filters.raster import Raster
+from realtime.image_filters.separable import separable
+from realtime.image_filters.tile_average import tile_average
 
 
 def slow_bilateral(image, *, hd, guides=(), support=3.0):
@@ -49,8 +57,6 @@ def noise(levels=LEVELS, seed=7):
 
 
 def as_lanes(image):
-    import mitsuba as mi
-
     return mi.Float(np.ascontiguousarray(image, dtype=np.float32).ravel())
 
 
@@ -60,14 +66,6 @@ def as_image(lanes):
 
 def filtered(name, image, *, hd=1.7, hr=0.5, depth=None, support=3.0):
     """Run a filter by its name on an image (height, width)."""
-    import mitsuba as mi
-
-    from realtime.image_filters.bilateral import bilateral
-    from realtime.image_filters.guides import Guide, depth_guide
-    from realtime.image_filters.levels import bilateral_of_levels
-    from realtime.image_filters.raster import Raster
-    from realtime.image_filters.separable import separable
-    from realtime.image_filters.tile_average import tile_average
 
     raster, lanes = Raster(WIDTH, HEIGHT), as_lanes(image)
     own = () if np.isinf(hr) else (Guide(lanes, hr),)
@@ -120,10 +118,6 @@ def test_sky_and_zero_depth_give_numbers(variant, name):
 
 
 def test_levels_leave_out_what_is_not_there(variant):
-    import mitsuba as mi
-
-    from realtime.image_filters.levels import bilateral_of_levels
-    from realtime.image_filters.raster import Raster
 
     image, there = noise(), np.random.default_rng(9).uniform(size=(HEIGHT, WIDTH)) < 0.7
     lanes = bilateral_of_levels(
@@ -137,10 +131,6 @@ def test_levels_leave_out_what_is_not_there(variant):
 
 def test_a_width_by_pixel_counts_the_taps_of_each_pixel(variant):
     """Where the width is that of one pixel, so is the result of the Gaussian of this width along one row."""
-    import mitsuba as mi
-
-    from realtime.image_filters.raster import Raster
-    from realtime.image_filters.separable import separable
 
     row = np.random.default_rng(8).uniform(size=40)
     widths = np.where(np.arange(40) < 20, 0.8, 2.5)

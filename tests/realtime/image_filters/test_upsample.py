@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Up-sampling with a depth test: bilinear on a surface, nothing across its edge, and the nearest depth elsewhere."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
+
+from realtime.image_filters.guides import Guide, depth_guide
+from realtime.image_filters.raster import Raster
+from realtime.image_filters.upsample import small_pixels, upsample
 
 WIDTH, HEIGHT = 24, 16
 
 
 def upsampled(image, depth, scale):
     """Take every `scale`-th pixel of an image and interpolate them again."""
-    import mitsuba as mi
-
-    from realtime.image_filters.guides import Guide, depth_guide
-    from realtime.image_filters.raster import Raster
-    from realtime.image_filters.upsample import small_pixels, upsample
 
     large, small = Raster(WIDTH, HEIGHT), Raster(WIDTH // scale, HEIGHT // scale)
     pixel = np.array(small_pixels(small, scale, WIDTH))

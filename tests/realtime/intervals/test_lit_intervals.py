@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Whatever the boundaries and whenever intervals are added, the sum is that over the lit intervals."""
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from realtime.intervals.lit_intervals import add_waiting, close_interval, no_intervals, open_interval, sum_at_end
 from realtime.numerics.aligned import aligned_array
 
 RAYS, STEPS = 24, 7
@@ -32,16 +35,10 @@ def expected(layers, places, gains):
 
 
 def integral(a, b):
-    import mitsuba as mi
-
     return mi.Vector3f(b - a, b * b - a * a, 1)
 
 
 def start(layers, places):
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.intervals.lit_intervals import no_intervals
 
     columns = [aligned_array(mi.Float, column) for column in places.T]
     return aligned_array(mi.Float, layers), columns, no_intervals(dr.zeros(mi.Vector3f, RAYS), columns[0])
@@ -58,10 +55,6 @@ def check(total, layers, places, gains):
 @given(layers=arrays(np.int64, RAYS, elements=st.integers(-1, 2)), places=PLACES, gains=GAINS, due=WAITS)
 def test_intervals_that_wait_as_long_as_they_may(variant, layers, places, gains, due):
     """As shadow planes use it: until another one closes, or until it is due; the rest at the end of the ray."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.intervals.lit_intervals import add_waiting, close_interval, sum_at_end
 
     over, columns, intervals = start(layers, places)
     opened = columns[0]
@@ -80,9 +73,6 @@ def test_intervals_that_wait_as_long_as_they_may(variant, layers, places, gains,
 @given(layers=arrays(np.int64, RAYS, elements=st.integers(-1, 2)), places=PLACES, gains=GAINS)
 def test_intervals_that_are_added_at_once(variant, layers, places, gains):
     """As min-max uses it: what is lit to the end closes there."""
-    import mitsuba as mi
-
-    from realtime.intervals.lit_intervals import add_waiting, close_interval, open_interval
 
     over, columns, intervals = start(layers, places)
     for step in range(STEPS):

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The queue holds the nearest crossings in order, whatever comes: ties, infinities, too many."""
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from realtime.intervals.nearest_crossings import exchange, filled, insert
 from realtime.numerics.aligned import aligned_array
 
 RAYS, COUNT, PLACES = 16, 9, 4
@@ -21,12 +24,11 @@ def in_order(keys, *, larger):
 
 
 def columns(keys):
-    import mitsuba as mi
-
     return [aligned_array(mi.Float, column) for column in keys.T]
 
 
 def rows(values):
+    """Read arrays; all that a test reads is evaluated together before, in one kernel."""
     return np.stack([np.array(value) for value in values], axis=1)
 
 
@@ -35,15 +37,13 @@ def rows(values):
 @settings(deadline=None, max_examples=50)
 @given(keys=KEYS)
 def test_the_nearest_are_kept_in_order_and_the_others_come_out(variant, larger, keys):
-    import mitsuba as mi
-
-    from realtime.intervals.nearest_crossings import filled, insert
 
     none = 0.0 if larger else np.inf
     queue, out = filled(none, PLACES, mi.Float, RAYS), []
     for number, key in enumerate(columns(keys)):
         queue, *left = insert(queue, key, mi.Float(number + 1), larger_is_nearer=larger)
         out.append(left)
+    dr.eval(queue, out)
     order = in_order(keys, larger=larger)
     wanted = np.take_along_axis(keys, order, axis=1)
     kept, gains = rows(queue.key), rows(queue.gain)
@@ -61,9 +61,6 @@ def test_the_nearest_are_kept_in_order_and_the_others_come_out(variant, larger, 
 @settings(deadline=None, max_examples=50)
 @given(keys=KEYS, shift=arrays(np.int64, (RAYS, COUNT), elements=st.integers(0, PLACES)))
 def test_exchange_mends_an_order_that_is_wrong_by_no_more_than_its_places(variant, larger, keys, shift):
-    import mitsuba as mi
-
-    from realtime.intervals.nearest_crossings import exchange, filled
 
     keys = np.take_along_axis(keys, in_order(keys, larger=larger), axis=1)
     # Each comes at most PLACES later than in order, so none waits for more than these.
@@ -74,4 +71,5 @@ def test_exchange_mends_an_order_that_is_wrong_by_no_more_than_its_places(varian
     for key in columns(np.take_along_axis(keys, late, axis=1)) + [mi.Float(last)] * PLACES:
         queue, nearest, _ = exchange(queue, key, mi.Float(0), larger_is_nearer=larger)
         out.append(nearest)
+    dr.eval(out)
     np.testing.assert_array_equal(rows(out[PLACES:]), keys)

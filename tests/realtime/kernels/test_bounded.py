@@ -4,10 +4,12 @@
 Protects the claim that both forms of the equation are runnable by the polynomial and by nodes.
 """
 
+import mitsuba as mi
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from reference.scene.read import read_truth
 from tests.helpers import frames
 from tests.helpers.frames import relative_rmse
 from tests.helpers.scenes import bounded_medium, clear_scene
@@ -26,9 +28,6 @@ def ball(**phase):
 
 def by_hand(scene, exponent, p):
     """Integrate exp(-exponent(x, r, foot, height, enter)) p/r^2 over every chord by adaptive quadrature."""
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
 
     truth = read_truth(mi.load_dict(scene))
     light = truth.lights[0]

@@ -3,14 +3,19 @@
 
 from dataclasses import dataclass
 
+import mitsuba as mi
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
 from realtime.errors import InputError
+from realtime.frame.renderer import frame_renderer, render_frame
 from realtime.kernels.registry import KERNELS
+from realtime.methods.registry import METHODS
 from realtime.scene.phase import Phase
+from realtime.scene.read_scene import read_scene
 from tests.helpers.kernel_values import RAY, kernel_values
+from tests.helpers.scenes import tiny_scene
 
 REFUSED = {"table", "table-tail", "closed-form", "taylor", "taylor-printed"}
 
@@ -81,12 +86,6 @@ def test_a_light_beside_the_segment_on_the_ray(variant, name):
 @pytest.mark.parametrize("method", ["unshadowed", "light-volumes"])
 def test_a_refusal_from_the_body_of_a_loop_stays_one(variant, method):
     """Dr.Jit wraps what is raised there: `random:13` ended `airlight render` with a traceback."""
-    import mitsuba as mi
-
-    from realtime.frame.renderer import frame_renderer, render_frame
-    from realtime.methods.registry import METHODS
-    from realtime.scene.read_scene import read_scene
-    from tests.helpers.scenes import tiny_scene
 
     entries = tiny_scene()
     fog = entries["fog"] | {"phase": {"type": "tabphase", "values": "1.1, 0.4, 1.7"}}

@@ -3,9 +3,18 @@
 
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.clouds.canonical.scene_phase import share_of_peak
+from realtime.frame.incremental import next_frame
+from realtime.frame.renderer import frame_renderer, image_frame, render_frame
+from realtime.methods.registry import METHODS
+from realtime.numerics.array_types import array_types
+from realtime.scene.camera import ray_directions
+from realtime.scene.phase import HenyeyGreenstein
+from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import DROPLETS, cloud, cloud_scene, ring
 from tests.helpers.transport_formula import WEIGHTS, Formula, use_formula
 from validation.scenes.meshes import box, placed, rotation
@@ -50,18 +59,11 @@ def _scene(scale=1.0, *, size=(16, 12), **parts):
 
 
 def _renderer(scene, precision="single", **parameters):
-    import mitsuba as mi
-
-    from realtime.frame.renderer import frame_renderer
-    from realtime.methods.registry import METHODS
-    from realtime.scene.read_scene import read_scene
 
     return frame_renderer(read_scene(mi.load_dict(scene), precision), METHODS["cloud-collectors"], **parameters)
 
 
 def _frame(scene, precision="single", **parameters):
-    from realtime.frame.renderer import render_frame
-
     return render_frame(_renderer(scene, precision, **parameters))
 
 
@@ -72,10 +74,6 @@ def _airlight(scene, precision="single", **parameters):
 
 
 def _rays(scene, precision="single"):
-    import mitsuba as mi
-
-    from realtime.scene.camera import ray_directions
-    from realtime.scene.read_scene import read_scene
 
     camera = read_scene(mi.load_dict(scene), precision).camera
     pixels = mi.UInt32(np.arange(camera.width * camera.height))
@@ -130,11 +128,6 @@ def test_coloured_clouds_are_three_grey_ones(variant):
 
 def test_the_peak_lowers_the_density(variant):
     """The share of the peak is what the slab loses in thickness; the printed half is more."""
-    import mitsuba as mi
-
-    from realtime.clouds.canonical.scene_phase import share_of_peak
-    from realtime.numerics.array_types import array_types
-    from realtime.scene.phase import HenyeyGreenstein
 
     share = share_of_peak(HenyeyGreenstein(mi.Float(0.85)), array_types("single"))
     thin = _slab(medium=DROPLETS | {"sigma_t": (1 - share) * EXTINCTION})
@@ -151,7 +144,6 @@ def test_a_camera_in_the_cloud_is_its_point(variant):
     normal = np.asarray(TURN)[:, 2]
     inside = MIDDLE + (0.5 * THICKNESS - depth) * normal
     medium = {"type": "homogeneous", "id": "fog", **{k: v for k, v in DROPLETS.items() if k != "type"}}
-    import mitsuba as mi
 
     held = mi.load_dict(medium)
     from tests.helpers.clouds import cloud_of
@@ -177,14 +169,11 @@ def test_a_camera_in_the_cloud_is_its_point(variant):
 @pytest.mark.claim("collector-frames", tolerance="2e-3 of the mean")
 def test_the_last_frame_s_collectors_go_on(variant):
     """Three steps a frame end where forty end."""
-    from realtime.frame.incremental import next_frame
-
     scene = cloud_scene((64, 48), origin=(30.83, -400.91, 57.03), sun=_sun(ALONG), ring=cloud("ring", ring()))
     whole = _airlight(scene, iterations=40, tolerance=0.0, **WHOLE)
     options = {"peak": "full", "tolerance": 0.0, "extra_layers": True} | WHOLE
     renderer = _renderer(scene, start="previous", iterations=3, **options)
     still = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
-    from realtime.frame.renderer import image_frame
 
     cache, errors = None, []
     for _ in range(30):

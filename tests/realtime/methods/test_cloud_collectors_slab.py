@@ -5,9 +5,19 @@ The exact radiance is that of `realtime.clouds.slab_orders`, which DISORT checks
 made for thicknesses and suns about those of the slab alone: those of all would take minutes.
 """
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+import realtime.clouds.collectors.transport_grid as grid
+import realtime.methods.cloud_collectors as method
+from realtime.clouds.canonical import coordinates
+from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
+from realtime.clouds.slab_orders.radiance import slab_radiance
+from realtime.frame.renderer import frame_renderer, render_frame
+from realtime.methods.registry import METHODS
+from realtime.scene.camera import ray_directions
+from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import DROPLETS, cloud
 from validation.scenes.meshes import box, placed
 from validation.scenes.parts import camera
@@ -20,18 +30,8 @@ AXIS = np.array([0.517, 0.211, -0.829]) / np.linalg.norm([0.517, 0.211, -0.829])
 @pytest.mark.claim("collector-slab", tolerance="2 % RMSE of the mean: linear entries of the grid")
 @pytest.mark.parametrize("peak", ["matched", "full"])
 def test_a_slab_is_exact_to_two_percent(variant, monkeypatch, peak):
-    import mitsuba as mi
 
-    import realtime.clouds.collectors.transport_grid as grid
-    import realtime.methods.cloud_collectors as method
-    from realtime.clouds.canonical import coordinates
     from realtime.clouds.canonical.tables import Grid, canonical_tables
-    from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
-    from realtime.clouds.slab_orders.radiance import slab_radiance
-    from realtime.frame.renderer import frame_renderer, render_frame
-    from realtime.methods.registry import METHODS
-    from realtime.scene.camera import ray_directions
-    from realtime.scene.read_scene import read_scene
 
     for name, value in (("THINNEST", 3.0), ("THICKEST", 4.8), ("LOWEST_SUN", 0.7)):
         monkeypatch.setattr(coordinates, name, value)

@@ -4,6 +4,7 @@
 from dataclasses import replace
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -14,6 +15,7 @@ from realtime.methods.interface.layers import Layers
 from realtime.scene.animate import coloured_light
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
+from tests.helpers.veil import VEIL
 from validation.study.configuration import configuration, prepared
 
 SIZE = 24, 16
@@ -23,15 +25,11 @@ NAME = "tests.helpers.veil:VEIL"
 
 @pytest.fixture
 def scene(variant):
-    import mitsuba as mi
-
     return read_scene(mi.load_dict(tiny_scene(size=SIZE)))
 
 
 @pytest.fixture
 def veil(variant):
-    from tests.helpers.veil import VEIL
-
     return VEIL
 
 

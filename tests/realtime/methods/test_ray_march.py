@@ -4,9 +4,11 @@
 Protects the claim that `sum=transitions` is that baseline: no error without shadows, order 1 with them.
 """
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from reference.scene.read import read_truth
 from tests.helpers.frames import frame, relative_rmse
 from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 
@@ -24,9 +26,6 @@ def lit_by_hand(points, light, centre, radius):
 
 def runs_by_hand(scene, distance, steps, spacing):
     """Add up, cell by cell, twelve Gauss nodes of the integrand where the middle of the cell is lit."""
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
 
     truth = read_truth(mi.load_dict(scene))
     light, centre, radius = truth.lights[0], np.array(scene["ball"]["center"]), scene["ball"]["radius"]

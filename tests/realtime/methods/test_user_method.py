@@ -3,6 +3,7 @@
 
 import re
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -10,6 +11,7 @@ from realtime.errors import InputError
 from realtime.frame.renderer import frame_renderer
 from realtime.methods.registry import find_method
 from realtime.numerics.recorded import Frozen
+from realtime.scene.read_scene import read_scene
 from tests.helpers import frames
 from tests.helpers.scenes import tiny_scene
 
@@ -187,9 +189,6 @@ def test_faults_in_the_file_are_told_with_their_line(tmp_path, monkeypatch):
 
 @pytest.mark.claim("own-method-frozen")
 def test_only_a_method_that_says_so_is_frozen(own, variant):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
 
     scene = read_scene(mi.load_dict(tiny_scene()))
     assert not isinstance(frame_renderer(scene, find_method(f"{own}:constant")).render, Frozen)

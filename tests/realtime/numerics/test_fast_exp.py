@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
+import mitsuba as mi
 import numpy as np
+
+from realtime.numerics.fast_exp import WIDEST, exp2_bounded, exp_bounded, sinh_bounded
 
 
 def test_relative_error_over_the_stated_range(variant):
-    import mitsuba as mi
-
-    from realtime.numerics.fast_exp import exp_bounded
 
     x = np.linspace(-87, 88, 2_000_001).astype(np.float32)
     value = np.array(exp_bounded(mi.Float(x)), dtype=np.float64)
@@ -13,9 +13,6 @@ def test_relative_error_over_the_stated_range(variant):
 
 
 def test_power_of_two_over_the_stated_range(variant):
-    import mitsuba as mi
-
-    from realtime.numerics.fast_exp import exp2_bounded
 
     x = np.linspace(-125, 125, 1_000_001).astype(np.float32)
     value = np.array(exp2_bounded(mi.Float(x)), dtype=np.float64)
@@ -23,9 +20,6 @@ def test_power_of_two_over_the_stated_range(variant):
 
 
 def test_hyperbolic_sine_over_the_stated_range(variant):
-    import mitsuba as mi
-
-    from realtime.numerics.fast_exp import WIDEST, sinh_bounded
 
     y = np.append(np.linspace(-WIDEST, WIDEST, 100_000), np.geomspace(1e-30, 1, 1000)).astype(np.float32)
     value = np.array(sinh_bounded(mi.Float(y)), dtype=np.float64)

@@ -2,8 +2,18 @@
 import gc
 from dataclasses import replace
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
+
+from realtime.frame.renderer import frame_renderer, run_stages
+from realtime.kernels.registry import KERNELS
+from realtime.methods.registry import METHODS
+from realtime.numerics.recorded import Frozen
+from realtime.scene.animate import read_objects, turned_objects
+from realtime.scene.read_scene import read_scene
+from validation.scenes.loading import load_scene
 
 
 @pytest.fixture
@@ -15,10 +25,6 @@ def collecting():
 
 def test_nothing_is_collected_during_a_call(variant, collecting):
     """A scene that is freed while a frame is recorded ends the process."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.numerics.recorded import Frozen
 
     seen = []
 
@@ -39,14 +45,6 @@ def test_a_frame_whose_objects_move_is_recorded_at_most_twice(variant):
 
     The second recording is for vertices that are aligned, after Mitsuba's own, which need not be.
     """
-    import drjit as dr
-
-    from realtime.frame.renderer import frame_renderer, run_stages
-    from realtime.kernels.registry import KERNELS
-    from realtime.methods.registry import METHODS
-    from realtime.scene.animate import read_objects, turned_objects
-    from realtime.scene.read_scene import read_scene
-    from validation.scenes.loading import load_scene
 
     scene = read_scene(load_scene("two-pens", (16, 12)).scene)
     renderer = frame_renderer(scene, METHODS["unshadowed"], kernel=KERNELS["exact"].function)

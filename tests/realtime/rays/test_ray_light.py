@@ -4,18 +4,17 @@
 import numpy as np
 import pytest
 
+from realtime.numerics.array_types import array_types
+from realtime.rays.ray_light import falloff, ray_geometry
+from realtime.scene.lights import Light, spot_fields, with_low
 from tests.helpers.kernel_values import opaque, vectors
 
 
 def point_light(types, position):
-    from realtime.scene.lights import Light
-
     return opaque(Light(vectors(types, position), types.color(1)))
 
 
 def spot_light(types, position, axis, degrees):
-    from realtime.scene.lights import Light, spot_fields
-
     angle = float(np.deg2rad(degrees))
     fields = spot_fields(np.asarray(axis) / np.linalg.norm(axis), angle, angle, types)
     return opaque(Light(vectors(types, position), types.color(1), **fields))
@@ -24,10 +23,6 @@ def spot_light(types, position, axis, degrees):
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_rounding_of_light_and_direction_is_no_height(variant, kind):
     """Where light - origin and direction are rounded, their low parts make up for it: 1e-7 m of a height of 1e-4 m."""
-    from realtime.numerics.array_types import array_types
-    from realtime.rays.ray_light import ray_geometry
-    from realtime.scene.lights import with_low
-
     types = array_types()
     rng = np.random.default_rng(8)
     light, origin = (with_low(place, types)[0] for place in ((1.237, -2.519, 3.751), (-0.33, 0.71, 0.123)))
@@ -52,9 +47,6 @@ def test_rays_parallel_to_a_line_on_the_cone(variant, sine, cosine):
 
     The other root is infinite, or at 1e7 m by the rounding of sine and cosine.
     """
-    from realtime.numerics.array_types import array_types
-    from realtime.rays.ray_light import ray_geometry
-
     types = array_types()
     light = spot_light(types, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), np.rad2deg(np.arcsin(sine)))
     assert np.array(light.cos_cutoff)[0] == np.float32(cosine)
@@ -74,10 +66,6 @@ def test_rays_parallel_to_a_line_on_the_cone(variant, sine, cosine):
 @pytest.mark.parametrize(("cutoff", "beam"), [(3.0, 2.0), (33.0, 0.0), (70.0, 69.0)])
 def test_falloff_near_the_axis_and_the_edge(variant, cutoff, beam):
     """Against the angle from the cross product in float64; an arc cosine in float32 is off by 3e-4 near the axis."""
-    from realtime.numerics.array_types import array_types
-    from realtime.rays.ray_light import falloff, ray_geometry
-    from realtime.scene.lights import Light, spot_fields, with_low
-
     types = array_types()
     rng = np.random.default_rng(12)
     light, origin = (with_low(place, types)[0] for place in ((1.237, -2.519, 3.751), (-0.33, 0.71, 0.123)))

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from mpmath import mp
 
+from realtime.numerics.array_types import array_types
+from realtime.rays.ray_light import ray_geometry
+from realtime.scene.lights import Light, spot_fields, with_low
 from tests.helpers.kernel_values import opaque, vectors
 
 # Rounded to float32; their difference is not.
@@ -58,10 +61,6 @@ def exact_interval(direction, angle):
 
 def ends_of(direction, degrees, precision):
     """Return `enter` and `leave` of rays as computed and as they are, their feet and heights."""
-    from realtime.numerics.array_types import array_types
-    from realtime.rays.ray_light import ray_geometry
-    from realtime.scene.lights import Light, spot_fields, with_low
-
     types = array_types(precision)
     angle = float(np.deg2rad(degrees))
     fields = spot_fields(AXIS, angle, angle, types)

@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 from dataclasses import replace
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.frame.renderer import render_frame
 from realtime.scene.animate import coloured_light, read_objects, turned_light, turned_objects
+from realtime.scene.read_scene import read_scene
+from tests.helpers.clouds import cloud, cloud_scene, ring
+from validation.scenes.loading import load_scene
 from validation.scenes.meshes import rotation
+from validation.study.configuration import configuration, prepared
 
 
 def host(array) -> np.ndarray:
@@ -14,9 +20,6 @@ def host(array) -> np.ndarray:
 
 @pytest.fixture
 def pens(variant):
-    from realtime.scene.read_scene import read_scene
-    from validation.scenes.loading import load_scene
-
     return read_scene(load_scene("two-pens", (16, 12)).scene)
 
 
@@ -33,10 +36,6 @@ def leaves(light) -> dict[str, np.ndarray]:
 
 def in_sun_and_sky(turn: float, colour: list[float]):
     """The scene with a light of each kind, read anew with all of them turned and coloured; a sky does not turn."""
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-    from tests.helpers.clouds import cloud, cloud_scene, ring
 
     def world(first, second):
         about = mi.ScalarTransform4f().translate([0.1, 0.2, 0]).rotate([0, 0, 1], turn).translate([-0.1, -0.2, 0])
@@ -83,10 +82,6 @@ def test_moved_lights_of_every_kind_are_those_of_the_scene_read_anew(variant):
 
 def test_moved_objects_render_as_a_scene_read_anew(pens):
     """Frozen functions recorded before the move, against a renderer made after it."""
-    from realtime.frame.renderer import render_frame
-    from realtime.scene.read_scene import read_scene
-    from validation.study.configuration import configuration, prepared
-
     renderer = prepared(pens, configuration("shadow-planes"))
     before = render_frame(renderer)
     moved = turned_objects(pens, read_objects(pens, ["pens"]), rotation((0, 0, 1), 71.0))

@@ -1,8 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 from types import SimpleNamespace
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
+
+from realtime.frame.renderer import render_frame
+from realtime.numerics.array_types import array_types
+from realtime.scene.camera import pixel_grid, ray_directions, resized_camera, row_and_column
+from realtime.scene.read_scene import _read_camera, read_scene
+from validation.scenes.loading import load_scene
+from validation.study.configuration import configuration, prepared
 
 
 @pytest.mark.claim("pixel-centre", tolerance="5e-7: Mitsuba's float32 matrices")
@@ -11,11 +20,6 @@ import pytest
     [((64, 48), "x", None), ((37, 53), "y", None), ((37, 53), "smaller", (10, 31)), ((64, 48), "smaller", (10, 31))],
 )
 def test_rays_are_those_of_mitsuba(variant, size, axis, pixels):
-    import mitsuba as mi
-
-    from realtime.numerics.array_types import array_types
-    from realtime.scene.camera import ray_directions, resized_camera
-    from realtime.scene.read_scene import _read_camera
 
     sensor = {
         "type": "perspective",
@@ -38,11 +42,6 @@ def test_rays_are_those_of_mitsuba(variant, size, axis, pixels):
 
 def test_aim_is_kept_to_twice_the_digits(variant):
     """Single precision with its low part against double precision: the angle between the two."""
-    import mitsuba as mi
-
-    from realtime.numerics.array_types import array_types
-    from realtime.scene.camera import ray_directions
-    from realtime.scene.read_scene import _read_camera
 
     matrix = mi.ScalarTransform4f().look_at([1.3, -2.1, 0.7], [0.2, 0.4, 0.9], [0.1, 0.2, 1.0])
     film = {"type": "hdrfilm", "width": 801, "height": 601}
@@ -64,9 +63,6 @@ def test_rows_and_columns_are_those_of_a_division(variant, width):
 
     Setup: pixels next to the ends of rows, where it would show, up to the last that is allowed, and random ones.
     """
-    import mitsuba as mi
-
-    from realtime.scene.camera import pixel_grid, row_and_column
 
     most = (1 << 31) - 1
     generator = np.random.default_rng(7)
@@ -81,12 +77,6 @@ def test_rows_and_columns_are_those_of_a_division(variant, width):
 
 def test_one_kernel_serves_images_of_all_sizes(variant):
     """Rationale: a kernel that holds the size of an image is compiled anew for each, for half a second and more."""
-    import drjit as dr
-
-    from realtime.frame.renderer import render_frame
-    from realtime.scene.read_scene import read_scene
-    from validation.scenes.loading import load_scene
-    from validation.study.configuration import configuration, prepared
 
     launched = []
     for size in ((64, 48), (96, 80)):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 from collections import Counter
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -81,15 +82,11 @@ def test_seams_are_closed_and_shapes_kept_apart():
 
 @pytest.mark.claim("shapes-without-edges-refused")
 def test_shapes_without_triangles_are_refused_by_name(variant):
-    import mitsuba as mi
-
     with pytest.raises(InputError, match=r"shape 'ball' is a Sphere.*replace it by a mesh"):
         read_casters(mi.load_dict(tiny_scene()))
 
 
 def test_what_lets_light_pass_casts_no_shadow(variant):
-    import mitsuba as mi
-
     veil = {"type": "cube", "to_world": mi.ScalarTransform4f().scale(0.3), "bsdf": {"type": "null"}}
     casters = read_casters(mi.load_dict(tiny_scene(ball=None, veil=veil)))
     assert casters.none == 2

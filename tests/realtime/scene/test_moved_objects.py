@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Shapes that moved: images are those of a file with the same shapes there."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.frame.renderer import render_frame
 from realtime.scene.animate import read_objects, turned_objects
+from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
-from validation.scenes.meshes import rotation
+from validation.scenes.meshes import grid, icosphere, rotation
+from validation.scenes.parts import mitsuba_mesh
+from validation.study.configuration import configuration, prepared
+from validation.study.subdivision import bumpy
 
 TURN = rotation((0.3, -0.2, 1), 71.0)
 
@@ -16,10 +22,6 @@ def bumpy_ball(turn=None, *, normals: bool):
 
     Its normals, if it has any, are arbitrary and not those that Mitsuba would compute.
     """
-    import mitsuba as mi
-
-    from validation.scenes.meshes import icosphere
-    from validation.study.subdivision import bumpy
 
     sphere, faces = icosphere(3)
     vertices = 0.31 * bumpy(sphere, np.full(3, -1.0), 3.5) * (1.0, 0.6, 1.3) + np.array([0.13, -0.07, 0.73])
@@ -37,25 +39,16 @@ def bumpy_ball(turn=None, *, normals: bool):
 
 
 def floor():
-    from validation.scenes.meshes import grid
-    from validation.scenes.parts import mitsuba_mesh
-
     return mitsuba_mesh("floor", grid((-3.1, -3.3, -0.03), (6.7, 0, 0), (0, 6.1, 0), (2, 2)), (0.5, 0.6, 0.4))
 
 
 def read(turn=None, *, normals: bool = False):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
 
     parts = {"ball": bumpy_ball(turn, normals=normals), "floor": floor()}
     return read_scene(mi.load_dict(tiny_scene(size=(48, 36), **parts)))
 
 
 def image(scene, method: str, parameters):
-    from realtime.frame.renderer import render_frame
-    from validation.study.configuration import configuration, prepared
-
     return render_frame(prepared(scene, configuration(method, None, parameters)))
 
 

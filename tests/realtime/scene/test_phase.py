@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from analytic.phase import PhaseFunction, phase_from_words
+from realtime.scene.phase import evaluate, named_phase
+
 
 def phases():
-    from realtime.scene.phase import named_phase
-
     yield "isotropic", 0.0, named_phase("isotropic")
     yield "rayleigh", 0.0, named_phase("rayleigh")
     yield "hazy", 0.0, named_phase("hazy")
@@ -17,10 +19,6 @@ def phases():
 @pytest.mark.claim("phase-two-sides", tolerance="1e-5 relative: float32")
 def test_against_the_analytic_side(variant):
     """The same functions written twice, in float32 here and in float64 there."""
-    import mitsuba as mi
-
-    from analytic.phase import PhaseFunction
-    from realtime.scene.phase import evaluate
 
     cosine = np.linspace(-1, 1, 2001).astype(np.float32)
     for name, g, phase in phases():
@@ -41,10 +39,6 @@ def test_against_the_analytic_side(variant):
     ],
 )
 def test_droplets_are_those_of_the_analytic_side(variant, words):
-    import mitsuba as mi
-
-    from analytic.phase import phase_from_words
-    from realtime.scene.phase import named_phase
 
     angle = np.concatenate([np.linspace(0.1, np.pi, 700), np.geomspace(1e-4, 0.08, 80)])
     down = np.sin(0.5 * angle) ** 2

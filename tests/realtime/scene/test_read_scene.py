@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from realtime.errors import InputError
+from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 
 
 def read(**changes):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
 
     return read_scene(mi.load_dict(tiny_scene(**changes)))
 
@@ -31,9 +30,6 @@ def test_reads_what_the_scene_holds(variant):
 @pytest.mark.parametrize("names", [("a.b", "a-b"), ("Sphere-2", ""), ("", "Sphere-1"), ("", ""), ("a.b.c", "a-b.c")])
 def test_every_opaque_shape_stays_whatever_its_name(variant, names):
     """Mitsuba's dictionaries have keys without dots, each once; beside a boundary the opaque shapes are a new scene."""
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
 
     bounded = bounded_medium({"type": "cube"}, 0.3, (0.9, 0.9, 0.9))
     scene = clear_scene(first={"type": "sphere"}, second={"type": "sphere", "center": [5.0, 0.0, 0.0]}, box=bounded)

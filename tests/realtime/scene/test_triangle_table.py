@@ -1,19 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
+from dataclasses import replace
+
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.frame.renderer import frame_renderer, render_frame
+from realtime.methods.registry import METHODS
+from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
 
 
 def shaded(scene, *, table: bool):
     """Render the surfaces of a scene with its table of triangles, or with Mitsuba's interactions."""
-    from dataclasses import replace
-
-    import mitsuba as mi
-
-    from realtime.frame.renderer import frame_renderer, render_frame
-    from realtime.methods.registry import METHODS
-    from realtime.scene.read_scene import read_scene
 
     read = read_scene(mi.load_dict(scene))
     return read, render_frame(
@@ -23,8 +22,6 @@ def shaded(scene, *, table: bool):
 
 def mesh_scene(**changes):
     """Return a scene of meshes only, seen from inside a box that is lit from both sides or from one."""
-    import mitsuba as mi
-
     frame = mi.ScalarTransform4f().translate([0.1, 0.3, 0.4]).rotate([0.36, 0.48, 0.8], 37).scale(0.37)
     surface = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.3, 0.5, 0.7]}}
     both = {"type": "twosided", "inner": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.6, 0.2, 0.4]}}}
@@ -47,8 +44,6 @@ def test_the_table_shades_as_mitsuba_does(variant):
 @pytest.mark.parametrize("tilt", [0.4, 0.0])
 def test_normals_of_corners_are_interpolated(variant, tilt):
     """A corner's normal leans over: shading is smooth, with normals of unit length between the corners."""
-    import mitsuba as mi
-
     flake = mi.Mesh("flake", 3, 1, has_vertex_normals=True)
     parameters = mi.traverse(flake)
     parameters["vertex_positions"] = [-1.5, -1.5, 0.2, 1.5, -1.5, 0.2, 0, 1.5, 0.2]

@@ -1,18 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """In maps over hemispheres a plane never shadows itself."""
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 
+from realtime.methods.soft_shafts.light_sources import source_state
+from realtime.scene.light_points import with_light_points
+from realtime.scene.read_scene import read_scene
 from tests.helpers.lamps import lamp_scene
 
 
 def test_a_plane_never_shadows_itself(variant):
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.methods.soft_shafts.light_sources import source_state
-    from realtime.scene.light_points import with_light_points
-    from realtime.scene.read_scene import read_scene
 
     scene = with_light_points(read_scene(mi.load_dict(lamp_scene(ball=None))), 3, "ring")
     state = source_state(scene.geometry, list(scene.lights), 64, with_maps=True)

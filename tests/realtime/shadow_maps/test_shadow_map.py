@@ -1,19 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A shadow map is never read outside; that it says what rays say is seen in frames, `tests/realtime/frame`."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.scene.read_scene import read_scene
+from realtime.shadow_maps.shadow_map import cast_shadow_map, lit_in_map
 from tests.helpers.scenes import spot, tiny_scene
 
 
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_a_look_up_stays_in_the_map_whatever_the_point(variant, kind):
     """At the light itself a place on a face is no number: a load from there ended the process."""
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-    from realtime.shadow_maps.shadow_map import cast_shadow_map, lit_in_map
 
     scene = read_scene(mi.load_dict(tiny_scene(**({"lamp": spot()} if kind == "spot" else {}))))
     light = scene.lights[0]

@@ -4,6 +4,8 @@
 from dataclasses import dataclass
 from types import SimpleNamespace
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
@@ -15,6 +17,8 @@ from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.method import Method, always, never
 from realtime.methods.registry import METHODS
 from realtime.parameters import Parameters
+from realtime.scene.camera import tiled_pixels
+from realtime.scene.read_scene import read_scene
 from realtime.tiles.adaptive_sampling import between_corners, tile_corners
 from realtime.tiles.adaptive_sampling import tolerance as tolerance_parameter
 from tests.helpers.scenes import tiny_scene
@@ -24,10 +28,6 @@ SIZE = 48, 32
 
 def image_of(function, tolerance, *, depth=None, lit=None):
     """Return the image of a function of column and row between corners, and how many pixels were computed."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.scene.camera import tiled_pixels
 
     width, height = SIZE
     pixel = mi.UInt32(tiled_pixels(width, height))
@@ -131,9 +131,6 @@ def test_frames_err_by_about_the_tolerance(variant, method, parameters):
 
 
 def frame(method, parameters, size=(96, 72)):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
 
     chosen = METHODS[method]
     turned = mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).rotate([1, 2, 3], 40).scale(0.33)
@@ -151,9 +148,6 @@ class LayeredParameters(Parameters):
 
 def test_every_layer_is_interpolated(variant):
     """Layers that are smooth over the image, and a mask that is not."""
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
 
     def smooth(view, state, lists, *, kernel, parameters):
         across, up = view.direction.x, view.direction.z

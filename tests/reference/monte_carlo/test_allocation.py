@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Where samples go: laws of the counts, and of a path tracer that follows them."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -43,8 +44,6 @@ def test_the_mean_is_the_same_and_spreads_less(variant):
     less than 4 of their standard errors (1 in 16 000 by chance), and a smaller error of the image mean for the
     airlight.
     """
-    import mitsuba as mi
-
     truth = read_truth(mi.load_dict(tiny_scene(size=(12, 9))))
     shape = (truth.height, truth.width)
     masks = {layer: np.ones(shape, dtype=bool) for layer in LAYERS}
@@ -72,8 +71,6 @@ def test_the_mean_is_the_same_and_spreads_less(variant):
 
 def test_counts_are_those_of_each_pixel(variant):
     """A pixel with as many samples as it had in a batch of its own scene has the same law; one part or many agree."""
-    import mitsuba as mi
-
     truth = read_truth(mi.load_dict(tiny_scene(size=(4, 3))))
     counts = np.stack([np.arange(1, 13), np.arange(12, 0, -1)]).astype(np.uint32)
     batch = volpath_batch(truth, 5, 8, counts=counts)

@@ -1,9 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`single-scatter` and `volpath` under lights with extent, against closed forms and against one another."""
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from reference.monte_carlo.batches import merged
+from reference.monte_carlo.single_scatter.area_sampling import read_area, sample_evenly, sample_point
+from reference.monte_carlo.single_scatter.estimator import ray_light
+from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+from reference.monte_carlo.single_scatter.scene_data import read_task
+from reference.monte_carlo.single_scatter.stretches import double_ray
+from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.scene.read import read_truth
 from tests.helpers.area_lights import BLACK, NULL, lamp, lit_scene
 from tests.helpers.scenes import tiny_scene
 
@@ -20,8 +30,6 @@ SPHERES = (
 
 
 def _at(place, target, scale):
-    import mitsuba as mi
-
     return mi.ScalarTransform4f().look_at(list(place), list(target), [0, 0, 1]) @ mi.ScalarTransform4f().scale(scale)
 
 
@@ -33,9 +41,6 @@ def _lamp(kind, bsdf, *, in_view=False):
 
 
 def _truth(**changes):
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
 
     scene = tiny_scene(**changes)
     if changes.get("fog", scene) is None:
@@ -44,8 +49,6 @@ def _truth(**changes):
 
 
 def _run(batch, truth, samples, batches=_BATCHES):
-    from reference.monte_carlo.batches import merged
-
     done = batch(truth, 0, samples)
     for seed in range(1, batches):
         done = merged(done, batch(truth, seed, samples))
@@ -68,12 +71,6 @@ def test_sphere_light_has_the_certified_airlight(variant, sphere, bsdf):
 
     Setup: 30 000 estimates of one ray of 5 m that a small disk ends, 64 samples each.
     """
-    import drjit as dr
-    import mitsuba as mi
-
-    from reference.monte_carlo.single_scatter.estimator import ray_light
-    from reference.monte_carlo.single_scatter.scene_data import read_task
-    from reference.monte_carlo.single_scatter.stretches import double_ray
 
     sigma_t, height, radius, expected = sphere
     end = mi.ScalarTransform4f().translate([3.0, 0.0, 0.0]).rotate([0, 1, 0], 90).scale(0.01)
@@ -115,9 +112,6 @@ def test_both_estimators_agree(variant, name):
     Setup: ball and floor, 16 x 12 pixels, 24 batches of 256 samples, the light in the picture or not.
     Expected: airlight and surface pooled within four standard errors, and 0.05 % for the shadow-ray epsilon.
     """
-    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-    from reference.monte_carlo.volpath.integrator import volpath_batch
-
     kind, bsdf, in_view = _CASES[name]["lamp"]
     truth = _truth(lamp=_lamp(kind, bsdf, in_view=in_view))
     ours, theirs = (_run(batch, truth, 256) for batch in (single_scatter_batch, volpath_batch))
@@ -134,10 +128,6 @@ def test_both_estimators_agree(variant, name):
 )
 def test_surfaces_are_those_of_mitsubas_direct_integrator(variant, kind):
     """Rationale: without fog, Mitsuba's `direct` is a third way to the light on surfaces."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 
     fog = tiny_scene()["fog"] | {"sigma_t": 0.0}
     truth = _truth(lamp=_lamp(kind, BLACK), fog=fog)
@@ -165,9 +155,6 @@ def test_density_of_points_on_a_light(variant, kind):
     Setup: rays that meet the light, pass beside it and along its edge; a million points each.
     Expected: the mean of 1/density over any part of the light is the area of that part, within four standard errors.
     """
-    import mitsuba as mi
-
-    from reference.monte_carlo.single_scatter.area_sampling import read_area, sample_evenly, sample_point
 
     scene = lit_scene(lamp=_lamp(kind, BLACK))
     light = read_area(scene.emitters()[0])

@@ -3,6 +3,7 @@
 
 from functools import partial
 
+import mitsuba as mi
 import numpy as np
 import pytest
 from scipy.special import roots_legendre
@@ -98,8 +99,6 @@ def test_surfaces_by_many_shadow_rays(variant, kind):
 
 def test_a_lamp_that_cuts_the_floor(variant):
     """Half of a sphere is under the floor: what is above it is seen as if nothing were below."""
-    import mitsuba as mi
-
     low = lamp("sphere", center=[0.3, 0.4, 0.0], radius=0.4)
     place = np.array([[2.3, 0.4, 0.0], [-1.1, 1.7, 0.0]])
     floor = {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(5.1), "bsdf": GREY}

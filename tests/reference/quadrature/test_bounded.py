@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The airlight of point lights in bounded media, against a plain sum and what else leads to the same numbers."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from reference.quadrature.image import quadrature_image
+from reference.scene.read import read_truth
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 from tests.helpers.suns import CHORDS, brick, pearl, plain_airlight
 from tests.helpers.volpath import assert_volpath_agrees
@@ -16,10 +19,6 @@ FINE_TABLE = {
 
 
 def truth_and_image(scene, **settings):
-    import mitsuba as mi
-
-    from reference.quadrature.image import quadrature_image
-    from reference.scene.read import read_truth
 
     truth = read_truth(mi.load_dict(scene))
     return truth, quadrature_image(truth, **settings)
@@ -106,8 +105,6 @@ def test_leg_of_the_surface_is_darkened_too(variant):
 @pytest.mark.claim("bounded-media", tolerance="1e-8 relative")
 def test_camera_inside_of_a_body(variant):
     """What the camera in the box sees through its own medium: the same integral with the chord cut at 0."""
-    import mitsuba as mi
-
     scene = clear_scene(size=(12, 9), brick=brick(), pearl=pearl())
     to_world = mi.ScalarTransform4f().look_at([-0.6, 0.0, 0.7], [0.1, 0.3, 0.6], [0, 0, 1])
     inside = scene["brick"].pop("interior") | {"id": "mist"}
@@ -147,9 +144,6 @@ def test_agrees_with_volpath(variant, inside):
     Setup: brick and pearl, a sphere that casts a shadow through the pearl, a floor; 16 x 12 pixels, 16 batches of 256.
     Expected: pooled relative bias within four standard errors (a false alarm in 16 000 runs), which are below 3 %.
     """
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
 
     caster = tiny_scene()["ball"] | {"center": [0.7, 0.45, 1.2], "radius": 0.21}
     scene = clear_scene(

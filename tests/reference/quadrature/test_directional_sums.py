@@ -1,9 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The airlight of directional lights in bodies of media, against sums and closed forms that share nothing with it."""
 
+from dataclasses import replace
+
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from reference.quadrature.directional_sums import sum_directional
+from reference.quadrature.image import quadrature_image
+from reference.quadrature.ray_values import ray_values
+from reference.quadrature.segments import camera_segments, scattering_range
+from reference.scene.read import read_truth
+from reference.visibility.directional_casting import directional_intervals, edge_scale
+from reference.visibility.parallel_rays import parallel_rays
 from tests.helpers.suns import BRICK, CHORDS, brick, pearl, plain_airlight, sun, sunny
 
 HG = {"phase": {"type": "hg", "g": 0.6}}
@@ -11,10 +21,6 @@ TABLE = {"phase": {"type": "tabphase", "values": "0.5, 0.2, 0.4, 1.7"}}
 
 
 def truth_and_image(scene, **settings):
-    import mitsuba as mi
-
-    from reference.quadrature.image import quadrature_image
-    from reference.scene.read import read_truth
 
     truth = read_truth(mi.load_dict(scene))
     return truth, quadrature_image(truth, **settings)
@@ -60,9 +66,6 @@ def test_ray_through_a_box_in_closed_form(variant, way):
     From above: the leg of depth z below the upper face; along the ray both depths add up to that of the chord, or the
     leg is as long as the way of the view.
     """
-    from dataclasses import replace
-
-    from reference.quadrature.ray_values import ray_values
 
     origin, direction = np.array([-0.5, -2.0, 0.71875]), np.array([0.0, 1.0, 0.0])
     directions = {"across": [0.0, 0.0, -1.0], "with the ray": [0.0, 1.0, 0.0], "against it": [0.0, -1.0, 0.0]}
@@ -89,13 +92,6 @@ def test_ray_through_a_box_in_closed_form(variant, way):
 @pytest.mark.claim("directional-truth", tolerance="2e-9 relative")
 def test_panels_give_the_closed_form(variant):
     """Two ways to integrate the same pieces, of a polyhedron: Kronrod's rule and the exponential."""
-    import mitsuba as mi
-
-    from reference.quadrature.directional_sums import sum_directional
-    from reference.quadrature.segments import camera_segments, scattering_range
-    from reference.scene.read import read_truth
-    from reference.visibility.directional_casting import directional_intervals, edge_scale
-    from reference.visibility.parallel_rays import parallel_rays
 
     caster = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([-0.6, 0.1, 1.4]).scale([0.1, 0.3, 0.05])}
     truth = read_truth(mi.load_dict(sunny(brick=brick((0.71, 0.3, 0.02), scale=9.7), caster=caster, size=(32, 24))))
@@ -139,8 +135,6 @@ def test_shadow_of_a_sphere_in_fog(variant):
 
 def test_surface_is_dimmed_by_the_bodies_before_it_and_above(variant):
     """The floor below the sphere of fog: E cos albedo/pi, less the chords of the leg and of the view."""
-    import mitsuba as mi
-
     floor = {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(6.3), "bsdf": {"type": "diffuse"}}
     truth, image = truth_and_image(sunny(pearl=pearl(), floor=floor))
     distance = image.distance.reshape(-1)

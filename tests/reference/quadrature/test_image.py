@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
+from reference.quadrature.image import quadrature_image
+from reference.scene.read import read_truth
 from tests.helpers.scenes import spot, tiny_scene
 
 
 def truth_of(samples=256, **changes):
-    import mitsuba as mi
-
-    from reference.quadrature.image import quadrature_image
-    from reference.scene.read import read_truth
 
     truth = read_truth(mi.load_dict(tiny_scene(**changes)))
     return truth, quadrature_image(truth, samples=samples)
@@ -18,8 +19,6 @@ def truth_of(samples=256, **changes):
 @pytest.mark.claim("radiance", "attenuation-and-falloff", tolerance="1e-9 relative")
 def test_unshadowed_pixels_are_the_adaptive_integral(variant):
     """Against scipy's adaptive quadrature of the distance form, pixel by pixel."""
-    from scipy.integrate import quad
-
     truth, image = truth_of(ball=None, floor=None, size=(4, 3))
     light, sigma_t = truth.lights[0], truth.medium.sigma_t[0]
     for pixel, direction in enumerate(truth.direction):
@@ -73,11 +72,6 @@ def test_shadow_of_a_sphere_against_its_closed_form(variant):
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_surface_is_mitsubas_direct_integrator(variant, kind):
     """In a vacuum the lit surface is what Mitsuba's `direct` integrator renders at the pixel centres."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from reference.quadrature.image import quadrature_image
-    from reference.scene.read import read_truth
 
     changes = {} if kind == "point" else {"lamp": spot(beam=20.0)}
     scene = mi.load_dict(tiny_scene(fog=tiny_scene()["fog"] | {"sigma_t": 0.0}, **changes))

@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 from dataclasses import replace
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from reference.quadrature.image import quadrature_image
+from reference.quadrature.pixel_area import area_image
+from reference.quadrature.ray_values import ray_values
+from reference.scene.camera import film_directions
+from reference.scene.read import read_truth
 from tests.helpers.polygons import box_scene
 from tests.helpers.scenes import tiny_scene
 
 
 def truth_of(scene):
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
 
     return read_truth(mi.load_dict(scene))
 
@@ -22,9 +25,6 @@ def brute_force(truth, n, regular=False):
     Regular points would all be wrong the same way where an edge runs along the rows; close to a light they are better,
     where a random one may come too close.
     """
-    from reference.quadrature.ray_values import ray_values
-    from reference.scene.camera import film_directions
-
     row, column = np.divmod(np.arange(truth.width * truth.height), truth.width)
     y, x = np.divmod(np.arange(n * n), n)
     u, v = (0.5, 0.5) if regular else np.random.default_rng(11).random((2, len(row), n * n))
@@ -39,10 +39,6 @@ def brute_force(truth, n, regular=False):
 @pytest.mark.claim("pixel-area", tolerance="1e-4 relative, the tolerance asked for")
 def test_smooth_fog_is_the_integral_over_the_pixel(variant):
     """Gauss's product rule with 12 x 12 points, converged for what is smooth: the light is out of view."""
-    from reference.quadrature.pixel_area import area_image
-    from reference.quadrature.ray_values import ray_values
-    from reference.scene.camera import film_directions
-
     lamp = {"type": "point", "position": [3.9, 0.7, 3.9], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
     truth = truth_of(tiny_scene(ball=None, floor=None, lamp=lamp, size=(4, 3)))
     node, weight = np.polynomial.legendre.leggauss(12)
@@ -62,8 +58,6 @@ def test_smooth_fog_is_the_integral_over_the_pixel(variant):
 @pytest.mark.claim("pixel-area", tolerance="2e-3 relative beside the bound")
 @pytest.mark.parametrize("scene", [tiny_scene, box_scene], ids=["ball", "boxes"])
 def test_edges_against_brute_force(variant, scene):
-    from reference.quadrature.image import quadrature_image
-
     truth = truth_of(scene(size=(8, 6)))
     image = quadrature_image(truth, samples=64, pixel="area")
     airlight, surface, brightest = brute_force(truth, 24)
@@ -84,8 +78,6 @@ def test_edges_against_brute_force(variant, scene):
 
 def test_a_light_in_the_middle_of_a_pixel_has_a_finite_mean(variant):
     """The ray through the centre meets the light; the mean over the area is what the one over r leaves."""
-    from reference.quadrature.image import quadrature_image
-
     truth = truth_of(tiny_scene(ball=None, floor=None, size=(3, 3)))
     light = truth.lights[0]
     middle = truth.origin + 2.7 * truth.direction[4]

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from reference.quadrature.segments import AMBIENT, camera_segments, optical_depth, scattering_range
+from reference.scene.read import read_truth
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 
 FOG = {"type": "homogeneous", "id": "fog", "sigma_t": 0.11, "albedo": 0.6, "has_spectral_extinction": False}
 
 
 def shapes(**extra):
-    import mitsuba as mi
-
     turn = mi.ScalarTransform4f().translate([-0.5, 0.1, 0.5]).rotate([0, 0, 1], 27.0).scale([0.31, 0.43, 0.37])
     return {
         "brick": bounded_medium({"type": "cube", "to_world": turn} | extra, (0.9, 0.5, 0.2), (0.9, 0.4, 0.3)),
@@ -21,9 +21,6 @@ def shapes(**extra):
 
 
 def truth_of(*, ambient=False, **changes):
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
 
     if not ambient:
         return read_truth(mi.load_dict(clear_scene(size=(9, 7), **shapes(), **changes)))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lights with extent are read as they are, and what has no truth is refused by the name of its shape."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -10,8 +11,6 @@ from tests.helpers.area_lights import NULL, lamp, lit_scene
 
 
 def placed(scale=(0.5, 0.25, 1.0), turn=37.0, move=(0.1, 0.2, 3.0)):
-    import mitsuba as mi
-
     return mi.ScalarTransform4f().translate(list(move)).rotate([0.6, 0.0, 0.8], turn).scale(list(scale))
 
 
@@ -20,8 +19,6 @@ def light_of(**shape):
 
 
 def test_rectangle_has_its_sides_normal_and_power(variant):
-    import mitsuba as mi
-
     light = light_of(kind="rectangle", to_world=placed())
     assert (light.kind, light.name, light.opaque) == ("rectangle", "lamp", True)
     assert light.centre == pytest.approx([0.1, 0.2, 3.0], rel=1e-6)
@@ -35,8 +32,6 @@ def test_rectangle_has_its_sides_normal_and_power(variant):
 @pytest.mark.parametrize("kind", ["rectangle", "disk"])
 @pytest.mark.parametrize("change", [{}, {"flip_normals": True}, {"mirror": (-1, 1, 1)}, {"mirror": (1, 1, -1)}])
 def test_normal_is_that_of_the_side_that_mitsuba_lets_emit(variant, kind, change):
-    import mitsuba as mi
-
     mirror = np.array(change.get("mirror", (1, 1, 1)))
     shape = {"flip_normals": True} if "flip_normals" in change else {}
     scene = lit_scene(lamp=lamp(kind, to_world=placed(scale=(0.5 * mirror).tolist()), **shape))
@@ -57,8 +52,6 @@ def test_disk_and_sphere_have_radius_area_and_power(variant):
 
 
 def refused():
-    import mitsuba as mi
-
     texture = {"type": "bitmap", "bitmap": mi.Bitmap(np.ones((2, 2, 3), dtype=np.float32)), "raw": True}
     shear = np.eye(4)
     shear[0, 1] = 0.3

@@ -1,24 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: clouds are read from closed meshes alone; what has no place among them is refused by name."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from analytic.errors import InputError
+from reference.scene.clouds import read_clouds
 from validation.scenes.meshes import box, icosphere, joined, placed, scaled, torus
+from validation.scenes.parts import camera, fog, medium_boundary, mitsuba_mesh, point_light, sky, sun
 
 
 def cloud(mesh, name="puff"):
-    from validation.scenes.parts import fog, medium_boundary
-
     return medium_boundary(name, mesh, fog(0.7, (0.9, 0.9, 0.9)))
 
 
 def read(**parts):
-    import mitsuba as mi
-
-    from reference.scene.clouds import read_clouds
-    from validation.scenes.parts import camera, sun
 
     usual = {
         "sensor": camera((0.3, -7.1, 0.7), (0, 0, 0), fov=41.0, size=(4, 3), in_fog=False),
@@ -60,8 +57,6 @@ def test_crossing_and_nested_clouds_are_refused(variant):
 
 
 def test_other_lights_and_scenes_without_clouds_are_refused(variant):
-    from validation.scenes.parts import mitsuba_mesh, point_light, sky
-
     ball = icosphere(1)
     with pytest.raises(InputError, match="light 'lamp' is a PointLight; clouds are lit by"):
         read(puff=cloud(ball), lamp=point_light((0, 0, 4), (1.0, 1.1, 1.2)))

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from analytic.errors import InputError
 from reference.scene.convex_bounds import Polyhedron, overlap, read_bounds
+from reference.scene.read import read_truth
 from tests.helpers.scenes import bounded_medium, clear_scene
 from tests.helpers.shapes import bounds_of, box, sphere
 
@@ -11,8 +13,6 @@ GREY = (0.7, 0.7, 0.7)
 
 
 def mesh(vertices, faces):
-    import mitsuba as mi
-
     properties = mi.Properties()
     properties["mesh_bsdf"] = mi.load_dict({"type": "null"})
     properties["interior"] = mi.load_dict({"type": "homogeneous", "sigma_t": 0.3, "albedo": 0.5})
@@ -108,9 +108,6 @@ AMBIENT = {"type": "homogeneous", "sigma_t": 0.2, "albedo": 0.5}
     ],
 )
 def test_refused_scenes(variant, changes, message):
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
 
     with pytest.raises(InputError, match=message):
         read_truth(mi.load_dict(clear_scene(size=(4, 3), **changes())))

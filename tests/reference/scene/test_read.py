@@ -1,18 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from analytic.errors import InputError
+from realtime.scene.camera import ray_directions
+from realtime.scene.read_scene import read_scene
+from reference.scene.read import read_truth
 from tests.helpers.scenes import spot, tiny_scene
 
 
 def test_both_sides_read_the_same_scene(variant):
     """The truth and the methods under test read a scene by routes of their own; the numbers must be the same."""
-    import mitsuba as mi
-
-    from realtime.scene.camera import ray_directions
-    from realtime.scene.read_scene import read_scene
-    from reference.scene.read import read_truth
 
     fog = tiny_scene()["fog"] | {"scale": 1.7, "phase": {"type": "hg", "g": -0.31}}
     scene = mi.load_dict(tiny_scene(fog=fog, spot=spot(cutoff=31.0, beam=17.0)))
@@ -33,9 +32,6 @@ def test_both_sides_read_the_same_scene(variant):
 
 @pytest.mark.claim("pixel-centre", tolerance="5e-7: Mitsuba's float32 matrices")
 def test_rays_are_those_of_mitsuba(variant):
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
 
     scene = mi.load_dict(tiny_scene(size=(33, 21)))
     truth = read_truth(scene)
@@ -51,9 +47,6 @@ def test_rays_are_those_of_mitsuba(variant):
     [({"lamp": None}, "no light"), ({"lamp": None, "sky": {"type": "constant"}}, "light 'sky' of type 'constant'")],
 )
 def test_refusals(variant, changes, message):
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
 
     with pytest.raises(InputError, match=message):
         read_truth(mi.load_dict(tiny_scene(**changes)))

@@ -14,6 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch
+from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.quadrature.image import quadrature_image
 from reference.storage import kept as module
 from reference.storage.kept import (
     Spent,
@@ -29,6 +33,14 @@ from reference.storage.kept import (
     stopwatch,
     store,
 )
+from validation.estimates.multiple_scattering import multiple_scattering_share
+from validation.kernels.rays import _truth
+from validation.kernels.stability import stability
+from validation.metrics.flip import flip_hdr
+from validation.study.growth import study_scaling
+from validation.study.reference import sampled_reference
+from validation.study.run import run
+from validation.study.scene import _image_measured, _measured, check_reference
 
 pytestmark = pytest.mark.usefixtures("own_cache")
 
@@ -178,19 +190,7 @@ def test_code_is_the_same_wherever_it_lies_and_in_every_process(folder, tmp_path
 
 def functions():
     """What computes each kind of what is kept, and a module of which it takes numbers."""
-    from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch
-    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-    from reference.monte_carlo.volpath.integrator import volpath_batch
-    from reference.quadrature.image import quadrature_image
     from reports.page.image_index import packed_scene
-    from validation.estimates.multiple_scattering import multiple_scattering_share
-    from validation.kernels.rays import _truth
-    from validation.kernels.stability import stability
-    from validation.metrics.flip import flip_hdr
-    from validation.study.growth import study_scaling
-    from validation.study.reference import sampled_reference
-    from validation.study.run import run
-    from validation.study.scene import _image_measured, _measured, check_reference
 
     quadrature = "reference.quadrature.segments"
     return {

@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import mitsuba as mi
+
 from reference.storage.scene_digest import scene_digest
 from tests.helpers.scenes import spot, tiny_scene
 
@@ -13,8 +15,6 @@ ROOT = Path(__file__).resolve().parents[3]
 
 
 def load(**changes):
-    import mitsuba as mi
-
     return mi.load_dict(tiny_scene(size=(5, 4), **changes))
 
 
@@ -65,8 +65,6 @@ UNNAMED = """<scene version="3.0.0">
 
 def test_digest_is_the_same_at_every_load_and_in_another_process(variant):
     """Names by address, hash seeds and set order must not enter."""
-    import mitsuba as mi
-
     first = mi.load_string(UNNAMED)
     keep = [mi.load_dict({"type": "sphere"}) for _ in range(7)]  # so that the next scene lies elsewhere in memory
     second = mi.load_string(UNNAMED)

@@ -3,17 +3,22 @@
 
 from dataclasses import replace
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+import reference.visibility.directional_casting as module
+from reference.quadrature.segments import camera_segments, scattering_range
+from reference.quadrature.surface import surface_hits
+from reference.scene.directional_light import DirectionalLight
+from reference.scene.read import read_truth
+from reference.scene.shapes import Shapes
+from reference.visibility.parallel_rays import parallel_rays
 from tests.helpers.suns import ball_over_floor, brick, sunny
 
 
 def random_rays(count, seed, towards):
     """Return rays from the origin in all directions, looked at between 0.1 and 5 m."""
-    from reference.scene.directional_light import DirectionalLight
-    from reference.visibility.parallel_rays import parallel_rays
-
     direction = np.random.default_rng(seed).normal(size=(count, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     light = DirectionalLight(-np.asarray(towards), np.ones(3), None)
@@ -63,7 +68,6 @@ def hits_spheres(point, towards, spheres):
 @pytest.mark.parametrize("towards", [(0.3, -0.5, 0.7), (0.0, 0.0, 1.0), (-0.9, 0.02, 0.0)])
 def test_random_points_by_the_definition(towards):
     """Triangles and spheres all around the camera, one sphere around it: points far from an edge are lit or not."""
-    from reference.scene.shapes import Shapes
     from reference.visibility.directional_geometry import parallel_intervals
 
     towards, generator = unit(towards), np.random.default_rng(4)
@@ -82,10 +86,7 @@ def test_random_points_by_the_definition(towards):
 @pytest.mark.claim("directional-truth", tolerance="1e-13")
 def test_one_triangle_in_closed_form():
     """Light, triangle and ray in one plane: z - y cot for the corners, the crossing where it goes through the ray."""
-    from reference.scene.directional_light import DirectionalLight
-    from reference.scene.shapes import Shapes
     from reference.visibility.directional_geometry import parallel_intervals
-    from reference.visibility.parallel_rays import parallel_rays
 
     light = DirectionalLight(unit([-3.0, 0.0, -4.0]), np.ones(3), None)  # cot = 3/4 for a ray along x
     rays = parallel_rays(np.zeros(3), np.array([[1.0, 0, 0]]), light, (np.zeros(1), np.array([10.0])))
@@ -105,8 +106,6 @@ def test_one_triangle_in_closed_form():
 
 
 def scene_of_many(**changes):
-    import mitsuba as mi
-
     slats = {
         f"slat{k}": {
             "type": "cube",
@@ -120,12 +119,6 @@ def scene_of_many(**changes):
 
 
 def rays_and_truth(scene):
-    import mitsuba as mi
-
-    from reference.quadrature.segments import camera_segments, scattering_range
-    from reference.quadrature.surface import surface_hits
-    from reference.scene.read import read_truth
-    from reference.visibility.parallel_rays import parallel_rays
 
     truth = read_truth(mi.load_dict(scene))
     span = scattering_range(camera_segments(truth, surface_hits(truth).distance))
@@ -134,7 +127,6 @@ def rays_and_truth(scene):
 
 def test_wrong_geometry_is_left_in_doubt(variant, monkeypatch):
     """Were slats forgotten, the check would tell, and the bound of the image would grow."""
-    import reference.visibility.directional_casting as module
     from reference.visibility.directional_geometry import parallel_intervals
 
     truth, rays = rays_and_truth(scene_of_many(size=(48, 36)))

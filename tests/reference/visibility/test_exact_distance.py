@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: the distance to a visible triangle or sphere is exact to float64, whatever rays were cast in float32."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from reference.quadrature.surface import surface_hits
+from reference.scene.read import read_truth
+from reference.scene.shapes import read_shapes
+from reference.visibility.exact_distance import exact_distance
 from tests.helpers.scenes import tiny_scene
 
 
 def test_distance_to_a_plane_is_exact(variant):
-    import mitsuba as mi
-
-    from reference.quadrature.surface import surface_hits
-    from reference.scene.read import read_truth
-    from reference.visibility.exact_distance import exact_distance
 
     truth = read_truth(mi.load_dict(tiny_scene(ball=None)))
     hits = surface_hits(truth)
@@ -26,12 +26,6 @@ def test_distance_to_a_plane_is_exact(variant):
 @pytest.mark.parametrize("inside", [False, True], ids=["outside", "inside"])
 def test_distance_to_a_sphere_is_exact(variant, inside):
     """The points lie on the sphere in float64, and they are those that were cast."""
-    import mitsuba as mi
-
-    from reference.quadrature.surface import surface_hits
-    from reference.scene.read import read_truth
-    from reference.scene.shapes import read_shapes
-    from reference.visibility.exact_distance import exact_distance
 
     sphere = {"type": "sphere", "center": [0.1, -3.9, 1.2], "radius": 1.9} if inside else tiny_scene()["ball"]
     truth = read_truth(mi.load_dict(tiny_scene(ball=sphere, floor=None)))

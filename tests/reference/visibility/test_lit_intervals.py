@@ -1,18 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
 from dataclasses import replace
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+import reference.quadrature.light_airlight as light_airlight
+import reference.quadrature.ray_values as quadrature
 from analytic.errors import InputError
-from tests.helpers.polygons import box_scene, rays_of
+from reference.quadrature.image import quadrature_image
+from reference.scene.read import read_truth
+from reference.scene.shapes import Shapes, read_shapes
+from reference.visibility.lit_intervals import point_leg
+from reference.visibility.random_checks import checked_geometry
+from reference.visibility.triangles import EXACT_EDGE, geometric_intervals
+from tests.helpers.polygons import box_scene, rays_of, visibility_test
 from tests.helpers.scenes import tiny_scene
+from validation.scenes.loading import load_scene
 
 
 def setup(scene):
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
 
     truth = read_truth(mi.load_dict(scene))
     return truth, *rays_of(truth)
@@ -26,7 +33,6 @@ def cylinder(**changes):
 @pytest.mark.claim("exact-shadows")
 def test_polygons_and_balls_are_exact_and_other_shapes_are_cast(variant):
     from reference.visibility.lit_intervals import lit_intervals
-    from reference.visibility.triangles import EXACT_EDGE
 
     for scene in (tiny_scene(), box_scene()):
         truth, light, rays, ends = setup(scene)
@@ -55,12 +61,6 @@ def test_certificate_of_both_routes_is_clean(variant):
 @pytest.mark.claim("shadow-ray-certificate")
 def test_wrong_geometry_is_found_and_left_in_doubt(variant):
     """Intervals from which one box is missing contradict the shadow rays, and the test of all triangles."""
-    from reference.scene.shapes import Shapes, read_shapes
-    from reference.visibility.lit_intervals import point_leg
-    from reference.visibility.random_checks import checked_geometry
-    from reference.visibility.triangles import geometric_intervals
-    from tests.helpers.polygons import visibility_test
-
     truth, light, rays, ends = setup(box_scene())
     shapes = read_shapes(truth.occluders)
     wrong = geometric_intervals(truth, light, rays, ends=ends, shapes=Shapes(shapes.triangles[12:]))
@@ -85,9 +85,6 @@ def test_wrong_geometry_is_found_and_left_in_doubt(variant):
 
 @pytest.mark.claim("shadow-ray-certificate")
 def test_doubt_widens_the_bound(variant, monkeypatch):
-    import reference.quadrature.light_airlight as light_airlight
-    import reference.quadrature.ray_values as quadrature
-
     truth, light, rays, _ = setup(box_scene())
     plain = quadrature.ray_values(truth)
     compute = light_airlight.lit_intervals
@@ -113,10 +110,6 @@ def test_doubt_widens_the_bound(variant, monkeypatch):
 @pytest.mark.claim("bound-in-every-pixel", tolerance="1e-5 relative")
 def test_a_built_in_scene_is_certain_to_1e_minus_5(variant):
     """The figure to reach, at a size for tests: every bound below 1e-5 of its pixel, and nothing contradicted."""
-    from reference.quadrature.image import quadrature_image
-    from reference.scene.read import read_truth
-    from validation.scenes.loading import load_scene
-
     image = quadrature_image(read_truth(load_scene("colonnade", size=(32, 24)).scene))
     reached = image.airlight_bound < 1e-5 * image.airlight
     assert np.mean(reached[image.airlight > 0]) > 0.999

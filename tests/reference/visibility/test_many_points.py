@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lit intervals for many points at once are those for one point after another."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+import reference.visibility.many_points as module
 from reference.quadrature.light_points import PointPlan, light_points, square_points
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_truth
@@ -20,8 +22,6 @@ GREY = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.6, 0.5, 0.
 @pytest.fixture
 def crowded(variant):
     """A lamp before a few dozen boxes and balls, without a floor: some rays are endless."""
-    import mitsuba as mi
-
     transform = mi.ScalarTransform4f
     draw = np.random.default_rng(5).uniform
     shapes = {}
@@ -83,8 +83,6 @@ def test_the_shadow_rays_agree_and_notice_a_fault(crowded):
 def test_no_blocker_is_left_out(crowded):
     """With every shape for every ray the intervals are the same, so what was left out was in nobody's way."""
     from dataclasses import replace
-
-    import reference.visibility.many_points as module
 
     lit, _, arrays, distance, known = intervals_of(crowded, 64)
     n, triangles, spheres = len(distance), len(known.shapes.triangles), len(known.shapes.radius)

@@ -1,8 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
+import mitsuba as mi
 import numpy as np
 import pytest
 
-from tests.helpers.polygons import rays_of
+from reference.scene.read import read_truth
+from reference.scene.shapes import read_shapes
+from reference.visibility.lit_intervals import lit_intervals, point_leg
+from reference.visibility.random_checks import checked_geometry
+from reference.visibility.spheres import sphere_shadows
+from reference.visibility.triangles import EXACT_EDGE, geometric_intervals
+from tests.helpers.polygons import rays_of, visibility_test
 from tests.helpers.scenes import tiny_scene
 
 
@@ -32,8 +39,6 @@ def surface_crossed(point, centre, radius):
 @pytest.mark.parametrize("radius", [0.02, 0.7, 1.69, 1.71, 3.0], ids=["small", "plain", "close", "inside", "large"])
 def test_samples_against_the_definition(radius):
     """Random points of random rays; the light is 1.7 from the centre, so in the last two it is inside of the sphere."""
-    from reference.visibility.spheres import sphere_shadows
-
     centre = np.array([0.5, 1.5, np.sqrt(1.7**2 - 2.5)])
     direction, normal, height = random_rays(3000, 5)
     ray, low, high = sphere_shadows((centre[None], np.array([radius])), direction, normal, height)
@@ -55,8 +60,6 @@ def test_samples_against_the_definition(radius):
 
 def test_in_the_plane_of_the_centre():
     """Sphere, ray and light in one plane: tangents at asin(R/D), and a ray through it enters where it should."""
-    from reference.visibility.spheres import sphere_shadows
-
     direction, normal = np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 1.0, 0.0]])
     centre = np.array([[0.0, 1.0, 0.5]])
     ray, low, high = sphere_shadows((centre, np.array([0.3])), direction, normal, np.array([5.0]))
@@ -75,15 +78,6 @@ def test_in_the_plane_of_the_centre():
 def test_random_shadow_rays_contradict_nothing(variant, place):
     """Spheres, one around the light, the camera or both of them: no shadow ray of Mitsuba says otherwise."""
     from dataclasses import replace
-
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
-    from reference.scene.shapes import read_shapes
-    from reference.visibility.lit_intervals import lit_intervals, point_leg
-    from reference.visibility.random_checks import checked_geometry
-    from reference.visibility.triangles import EXACT_EDGE, geometric_intervals
-    from tests.helpers.polygons import visibility_test
 
     shells = {
         "light": {"type": "sphere", "center": [0.8, 0.8, 1.7], "radius": 0.6},

@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
+
+from reference.scene.read import TruthLight, read_truth
+from reference.visibility.spot_cone import cone_interval, falloff, perpendicular
+from tests.helpers.scenes import spot, tiny_scene
 
 
 @pytest.mark.claim("spot-falloff")
 @pytest.mark.parametrize("degrees", [2.0, 31.0, 78.0, 89.5])
 def test_interval_against_sampling(degrees):
-    from reference.scene.read import TruthLight
-    from reference.visibility.spot_cone import cone_interval, perpendicular
-
     rng = np.random.default_rng(13)
     axis = np.array([0.3, -0.8, 0.5]) / np.linalg.norm([0.3, -0.8, 0.5])
     angle = np.deg2rad(degrees)
@@ -29,12 +32,6 @@ def test_interval_against_sampling(degrees):
 
 @pytest.mark.claim("spot-falloff", tolerance="2e-5: acos of a float32 cosine")
 def test_profile_is_that_of_mitsuba(variant):
-    import drjit as dr
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
-    from reference.visibility.spot_cone import falloff, perpendicular
-    from tests.helpers.scenes import spot, tiny_scene
 
     scene = mi.load_dict(tiny_scene(lamp=spot(cutoff=37.0, beam=14.0)))
     truth = read_truth(scene)

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Where Mitsuba starts its shadow rays: edges that move, and the exact test that says so."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_truth
 from reference.scene.shapes import read_shapes
 from reference.visibility.surface_shadows import reached_by_shadow_rays, segments_blocked
@@ -15,8 +17,6 @@ NEAR, FAR = 2e-5, 1e-3  # from the edge of the shadow: less and more than half o
 
 def half_covered_floor():
     """A floor whose left is shadowed: the edge of a roof at x = 0, one above it, has its shadow at x = -1/2."""
-    import mitsuba as mi
-
     to_roof = mi.ScalarTransform4f().translate([-2, 0, 1]).scale([2, 3, 1])
     return mi.load_dict(
         {
@@ -28,8 +28,6 @@ def half_covered_floor():
 
 
 def on_the_floor(scene, x):
-    import mitsuba as mi
-
     point = mi.Point3f(mi.Float(x), 0.1, 0.4)  # below the roof
     return scene.ray_intersect(mi.Ray3f(point, mi.Vector3f(0, 0, -1)))
 
@@ -48,8 +46,6 @@ def test_edges_of_shadows_move(variant):
 
 def test_segments_are_blocked_as_rays_are(variant):
     """Against Mitsuba's rays, among triangles and spheres of all sizes; float32 errs on edges, one in a million."""
-    import mitsuba as mi
-
     scene = mi.load_dict(tiny_scene())
     shapes = read_shapes(read_truth(scene).occluders)
     random = np.random.default_rng(5)
@@ -66,9 +62,6 @@ def test_segments_are_blocked_as_rays_are(variant):
 @pytest.mark.claim("shadow-rays-start-off-the-surface")
 def test_the_truth_of_a_renderer_with_an_epsilon_has_its_edges(variant):
     """A camera that sees nothing but the band between the two edges: lit in the truth, dark for such a renderer."""
-    import mitsuba as mi
-
-    from reference.quadrature.image import quadrature_image
 
     to_roof = mi.ScalarTransform4f().translate([-2, 0, 1]).scale([2, 3, 1])
     camera = mi.ScalarTransform4f().look_at(

@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
+import mitsuba as mi
 import numpy as np
 import pytest
 
-from tests.helpers.polygons import box, box_scene, lit_lengths, rays_of
+from reference.scene.read import read_truth
+from reference.scene.shapes import Shapes
+from reference.visibility.lit_intervals import lit_intervals
+from reference.visibility.triangles import geometric_intervals
+from tests.helpers.polygons import box, box_scene, lit_lengths, rays_of, visibility_test
 from tests.helpers.scenes import tiny_scene
+from validation.scenes.loading import load_scene
 
 
 def shadow_rays_disagree(truth, lamp, rays, ends, intervals, count=400):
     """Return how many random shadow rays contradict the intervals further than 1e-5 rad from an edge."""
-    from tests.helpers.polygons import visibility_test
-
     used = np.flatnonzero(ends[1] > ends[0])
     ray = np.repeat(used, count)
     theta = ends[0][ray] + (ends[1] - ends[0])[ray] * np.random.default_rng(7).random(len(ray))
@@ -25,10 +29,6 @@ def shadow_rays_disagree(truth, lamp, rays, ends, intervals, count=400):
 @pytest.mark.claim("exact-shadows")
 @pytest.mark.parametrize("name", ["colonnade", "two-pens"])
 def test_shadow_rays_agree_with_the_geometry_of_built_in_scenes(variant, name):
-    from reference.scene.read import read_truth
-    from reference.visibility.triangles import geometric_intervals
-    from validation.scenes.loading import load_scene
-
     truth = read_truth(load_scene(name, size=(24, 18)).scene)
     light, rays, ends = rays_of(truth)
     intervals = geometric_intervals(truth, light, rays, ends=ends)
@@ -39,11 +39,6 @@ def test_shadow_rays_agree_with_the_geometry_of_built_in_scenes(variant, name):
 @pytest.mark.claim("cast-shadows", tolerance="2e-5, median 1e-6: where shadow rays stop")
 def test_edges_by_geometry_are_those_by_bisection(variant):
     """Two routes that share no code: edge by edge within the rounding of a float32 shadow ray."""
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
-    from reference.visibility.lit_intervals import lit_intervals
-    from reference.visibility.triangles import geometric_intervals
 
     truth = read_truth(mi.load_dict(box_scene()))
     light, rays, ends = rays_of(truth)
@@ -58,11 +53,6 @@ def test_edges_by_geometry_are_those_by_bisection(variant):
 @pytest.mark.claim("exact-shadows")
 def test_a_needle_is_found_where_regular_samples_step_over_it(variant):
     """Its shadow in closed form: the two sides of a box that is seen from the light, in one plane."""
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
-    from reference.visibility.triangles import geometric_intervals
-    from tests.helpers.polygons import visibility_test
 
     width = 2e-4
     scene = tiny_scene(ball=None, floor=None, needle=box((0.3, -0.1, 0.9), (width, width, 8.0)))
@@ -95,11 +85,6 @@ def test_a_needle_is_found_where_regular_samples_step_over_it(variant):
 @pytest.mark.claim("exact-shadows", tolerance="1e-12")
 def test_one_triangle_against_its_closed_form(variant):
     """Light, triangle and ray in one plane: the angles of the two corners as seen from the light."""
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
-    from reference.scene.shapes import Shapes
-    from reference.visibility.triangles import geometric_intervals
 
     truth = read_truth(mi.load_dict(tiny_scene(ball=None, floor=None, size=(1, 1))))
     light, (direction, normal, height), ends = rays_of(truth)

@@ -4,6 +4,7 @@
 import doctest
 import importlib
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -27,8 +28,6 @@ def test_examples_of_the_docstrings(module, variant):
 
 
 def test_a_scene_by_name_dictionary_mitsuba_scene_and_again(variant):
-    import mitsuba as mi
-
     scene = airlight.load_scene("open-fog", "16x12")
     assert scene.size == TINY
     assert scene.name == "open-fog"

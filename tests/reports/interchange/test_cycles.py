@@ -3,6 +3,7 @@
 
 import math
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -12,8 +13,6 @@ from validation.scenes.loading import LoadedScene, load_scene
 
 
 def properties(**changes):
-    import mitsuba as mi
-
     described = describe_scene(LoadedScene("tiny", mi.load_dict(tiny_scene(**changes)), "A tiny scene.", ""))
     return described, described["properties"]["Cycles"]
 

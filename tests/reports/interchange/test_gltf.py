@@ -2,6 +2,7 @@
 import json
 import struct
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -13,8 +14,6 @@ from validation.scenes.loading import LoadedScene, load_scene
 
 
 def loaded(**changes):
-    import mitsuba as mi
-
     return LoadedScene("tiny", mi.load_dict(tiny_scene(**changes)), "A tiny scene.", "")
 
 
@@ -70,8 +69,6 @@ def project(document, points):
 @pytest.mark.claim("gltf", tolerance="1e-6: float32")
 @pytest.mark.parametrize("up", [(0, 0, 1), (0.1, -1, 0.2)])
 def test_vertices_are_in_the_image_where_mitsuba_has_them(variant, tmp_path, up):
-    import mitsuba as mi
-
     sensor = tiny_scene(size=(40, 24))["sensor"]
     view = mi.ScalarTransform4f().look_at([0.2, -4.1, 1.3], [0.1, 0.2, 0.6], list(up))
     cube = loaded(
@@ -147,8 +144,6 @@ def test_lights_are_those_of_the_scene(variant, tmp_path):
 )
 def test_shapes_become_meshes_that_lie_on_them(variant, kind, mirrored, flipped):
     """Rays of Mitsuba meet shape and mesh at the same place, with normals on the same side."""
-    import mitsuba as mi
-
     place = mi.ScalarTransform4f().translate([0.3, 0.2, -0.1]).rotate([0.6, 0, 0.8], 40).scale(0.7)
     place = place.scale([1, 1, -1 if mirrored else 1])
     entry = {"type": kind, "to_world": place} | ({"flip_normals": True} if flipped else {})
@@ -193,8 +188,6 @@ def test_shapes_become_meshes_that_lie_on_them(variant, kind, mirrored, flipped)
 )
 def test_a_light_with_extent_is_a_mesh_that_emits_from_the_side_of_its_normal(variant, tmp_path, kind, flipped):
     """Rationale: core glTF has no such light; faces run counter-clockwise seen from where it shines."""
-    import mitsuba as mi
-
     scale = {"rectangle": [0.5, 0.3, 1.0], "sphere": [0.3] * 3}[kind]
     transform = mi.ScalarTransform4f().look_at([0.9, 0.7, 1.9], [0.1, -0.5, 0.4], [0, 0, 1]).scale(scale)
     light = lamp(kind, radiance=(5.0, 4.0, 2.5), to_world=transform, flip_normals=flipped)

@@ -2,6 +2,7 @@
 import json
 import math
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -14,15 +15,11 @@ from validation.scenes.registry import FOG_SCENES
 
 
 def described(**changes):
-    import mitsuba as mi
-
     return describe_scene(LoadedScene("tiny", mi.load_dict(tiny_scene(**changes)), "A tiny scene.", ""))
 
 
 @pytest.mark.claim("pixel-centre", tolerance="5e-7: Mitsuba's float32 matrices")
 def test_camera_is_enough_to_make_mitsubas_rays(variant):
-    import mitsuba as mi
-
     camera = described(size=(16, 12))["camera"]
     forward, right, up = (np.array(camera[name]) for name in ("forward", "right", "up"))
     tangents = [np.tan(0.5 * np.deg2rad(camera[f"fov_{way}"])) for way in ("horizontal", "vertical")]
@@ -85,8 +82,6 @@ def test_a_light_at_infinity_has_a_direction_and_no_place(variant):
 )
 def test_lights_with_extent_have_radiance_power_and_luminous_flux(variant, kind, scale, area):
     """Rationale: power pi Le A, and 683 lm/W times 0.2126 R + 0.7152 G + 0.0722 B, here by hand."""
-    import mitsuba as mi
-
     transform = mi.ScalarTransform4f().look_at([0.9, 0.7, 1.9], [0.1, -0.5, 0.4], [0, 0, 1]).scale(scale)
     found = described(lamp=lamp(kind, radiance=(5.0, 4.0, 3.0), to_world=transform))
     (light,) = found["lights"]

@@ -2,6 +2,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import mitsuba as mi
 import pytest
 
 from reference.scene.read import read_truth
@@ -18,8 +19,6 @@ BUDGET = {"margin": 0.02, "batches": 40, "samples": 64}
 
 @pytest.fixture(scope="module")
 def scene(variant):
-    import mitsuba as mi
-
     return mi.load_dict(tiny_scene(size=(24, 18)))
 
 

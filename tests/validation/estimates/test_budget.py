@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """When a Monte Carlo run ends."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from analytic.errors import InputError
 from reference.monte_carlo.batches import Batches
+from reference.quadrature.surface import surface_hits
+from reference.scene.read import read_truth
 from tests.helpers.scenes import tiny_scene
+from validation.estimates.agreement import MASK_PIXELS, pixel_angle
 from validation.estimates.budget import Budget, batch_plan, near_light, relative_errors
+from validation.estimates.quadrature import truth_image
 
 
 @pytest.mark.parametrize(
@@ -58,12 +63,6 @@ def test_errors_by_hand():
 @pytest.mark.claim("pixels-beside-a-light")
 def test_pixels_beside_a_light_are_those_that_the_truth_names(variant):
     """The same pixels as from the quadrature's own angles; a light in view, one behind us, one in the sphere."""
-    import mitsuba as mi
-
-    from reference.quadrature.surface import surface_hits
-    from reference.scene.read import read_truth
-    from validation.estimates.agreement import MASK_PIXELS, pixel_angle
-    from validation.estimates.quadrature import truth_image
 
     behind = {"type": "point", "position": [0.3, -6.0, 1.1]}
     hidden = {"type": "point", "position": [0.1, 0.3, 0.65]}

@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from validation.estimates.images import cloud_orders
+from validation.estimates.budget import Budget
+from validation.estimates.images import cloud_orders, monte_carlo_reference
+from validation.scenes.loading import load_scene
 
 
 def test_sets_are_disjoint():
@@ -19,10 +21,6 @@ def test_sets_are_disjoint():
 
 
 def test_a_reference_has_the_layers_and_is_kept(variant, tmp_path, monkeypatch):
-    from validation.estimates.budget import Budget
-    from validation.estimates.images import monte_carlo_reference
-    from validation.scenes.loading import load_scene
-
     monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path))
     loaded = load_scene("ring", (8, 6))
     orders = cloud_orders("1,2-inf")

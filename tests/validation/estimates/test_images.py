@@ -3,6 +3,7 @@
 
 from types import SimpleNamespace
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -25,7 +26,6 @@ def clock(monkeypatch):
 @pytest.fixture
 def loaded(variant, monkeypatch, own_cache, clock):
     """A scene whose batches are random numbers of relative deviation 0.4, and take a second each."""
-    import mitsuba as mi
 
     import validation.estimates.monte_carlo
 

@@ -3,17 +3,19 @@
 
 from dataclasses import replace
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+import validation.estimates.quadrature as module
 from analytic.errors import InputError
 from tests.helpers.scenes import spot, tiny_scene
+from validation.estimates.monte_carlo import monte_carlo_batches
+from validation.estimates.quadrature import truth_image
 
 
 def scene_with(position, *, size=(9, 9), **changes):
     """Return a scene whose camera looks along +y, its middle pixel along the axis."""
-    import mitsuba as mi
-
     scene = tiny_scene(size=size, floor=None, ball=None)
     scene["sensor"]["to_world"] = mi.ScalarTransform4f().look_at([0, -5, 1], [0, 0, 1], [0, 0, 1])
     if position is not None:
@@ -23,8 +25,6 @@ def scene_with(position, *, size=(9, 9), **changes):
 
 def truths(scene):
     """Return what gives the truth by each estimator."""
-    from validation.estimates.monte_carlo import monte_carlo_batches
-    from validation.estimates.quadrature import truth_image
 
     def sampled(estimator):
         return lambda: monte_carlo_batches(scene, estimator, batches=2, samples=1).batches.mean
@@ -41,9 +41,6 @@ def test_every_estimator_refuses_a_light_at_the_camera_or_on_a_ray(variant, posi
 
 
 def test_a_spot_on_a_ray_is_refused_where_the_ray_is_in_its_cone(variant):
-    import mitsuba as mi
-
-    from validation.estimates.quadrature import truth_image
 
     def lamp(target):
         place = mi.ScalarTransform4f().look_at([0, 0, 1], target, [0, 0, 1])
@@ -56,8 +53,6 @@ def test_a_spot_on_a_ray_is_refused_where_the_ray_is_in_its_cone(variant):
 
 
 def test_the_mean_over_pixels_is_finite_where_a_centre_meets_a_light(variant):
-    from validation.estimates.quadrature import truth_image
-
     means = truth_image(scene_with([0.0, 0.0, 1.0], size=(3, 3)), pixel="area").airlight
     assert np.isfinite(means).all()
     assert means[1, 1].min() > means[0, 0].max()
@@ -66,8 +61,6 @@ def test_the_mean_over_pixels_is_finite_where_a_centre_meets_a_light(variant):
 
 
 def test_a_truth_that_is_not_finite_is_refused_and_not_kept(variant, own_cache, monkeypatch):
-    import validation.estimates.quadrature as module
-
     scene = scene_with([1.0, 0.0, 1.0], size=(4, 3))
     whole = module.quadrature_image
 

@@ -5,6 +5,7 @@ import errno
 import time
 from dataclasses import fields
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -20,8 +21,6 @@ from validation.estimates.monte_carlo import BLOCK, monte_carlo_batches
 
 @pytest.fixture
 def scene(variant):
-    import mitsuba as mi
-
     return mi.load_dict(tiny_scene(size=(4, 3)))
 
 

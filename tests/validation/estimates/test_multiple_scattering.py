@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The share of multiple scattering."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -11,8 +12,6 @@ from validation.estimates.multiple_scattering import left_out, multiple_scatteri
 
 
 def scene(albedo=0.9, sigma_t=0.31, **changes):
-    import mitsuba as mi
-
     fog = {"albedo": {"type": "rgb", "value": [albedo] * 3}, "sigma_t": sigma_t}
     return mi.load_dict(tiny_scene(size=(8, 6), fog=tiny_scene()["fog"] | fog, **changes))
 

@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 from dataclasses import fields
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from reference.quadrature import area_airlight
+from tests.helpers.area_lights import lamp, lit_scene
 from tests.helpers.scenes import tiny_scene
+from validation.estimates.images import layered_truth
 from validation.estimates.quadrature import truth_image, truth_of_pixels
+from validation.scenes.loading import LoadedScene
 
 
 @pytest.fixture
 def scene(variant):
-    import mitsuba as mi
-
     return mi.load_dict(tiny_scene(size=(8, 6)))
 
 
@@ -47,8 +50,6 @@ def test_second_call_reads_the_same_numbers(scene, own_cache, computed):
 
 def test_other_phase_function_has_another_truth(scene, own_cache, computed):
     """The phase function has no parameters that a key could see; an isotropic truth would pass for it."""
-    import mitsuba as mi
-
     fog = tiny_scene()["fog"] | {"phase": {"type": "rayleigh"}}
     plain = truth_image(scene, samples=32)
     rayleigh = truth_image(mi.load_dict(tiny_scene(size=(8, 6), fog=fog)), samples=32)
@@ -66,17 +67,11 @@ def test_the_truth_of_some_pixels_is_that_of_the_image(scene, own_cache):
 
 @pytest.fixture
 def loaded(scene):
-    from validation.scenes.loading import LoadedScene
-
     return LoadedScene("tiny", scene, "A tiny scene.", "")
 
 
 @pytest.mark.claim("area-light-goes-on")
 def test_truth_of_an_area_light_goes_on_where_it_was_interrupted(own_cache, monkeypatch):
-    from reference.quadrature import area_airlight
-    from tests.helpers.area_lights import lamp, lit_scene
-    from validation.estimates.images import layered_truth
-
     scene = lit_scene(size=(2, 2), lamp=lamp("sphere", center=[0.3, 0.2, 3.0], radius=0.4))
     done, compute = [], area_airlight._sums_over
 

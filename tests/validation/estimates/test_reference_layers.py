@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One image of another renderer has one reference: Mitsuba's own image of a visible light is our total."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -16,8 +17,6 @@ from validation.statistics.comparison import Estimate, compare_statistics
 
 def test_the_total_of_a_seen_light_is_what_mitsuba_shows(variant):
     """Without albedo a pixel inside the light is Le exp(-sigma_t x): volpath's paths see the light or are absorbed."""
-    import mitsuba as mi
-
     place = mi.ScalarTransform4f().translate([0.0, 0.0, 2.5]).rotate([1, 0, 0], 180).scale([5.1, 4.7, 1.0])
     scene = lit_scene(size=(3, 2), medium=fog(0.21, 0.0), lamp=lamp(to_world=place, bsdf=NULL))
     seen = read_truth(scene)

@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 from validation.kernels.biri_misprints import printed_against_derived, relative_errors
+from validation.kernels.rays import wide_rays
 
 
 @pytest.fixture(scope="module")
@@ -22,8 +23,6 @@ def test_the_print_costs_accuracy_near_the_foot(accuracies, phase):
 
 
 def test_values_that_are_not_finite_count_as_wrong(variant):
-    from validation.kernels.rays import wide_rays
-
     def broken(geometry, x0, x1, medium, light):
         return 0 * geometry.foot / 0
 

@@ -3,11 +3,13 @@
 
 from dataclasses import replace
 
+import drjit as dr
 import numpy as np
 import pytest
 
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
+from realtime.kernels.quadrature import quadrature
 from validation.kernels.errors import errors_by_group, groups
 from validation.kernels.rays import hard_rays, slivers, table
 from validation.kernels.stability import GENERATED, gamma_difference, kernel_stability
@@ -15,8 +17,6 @@ from validation.kernels.values import Values, evaluate_cases, take
 
 
 def gauss(geometry, x0, x1, medium, light):
-    from realtime.kernels.quadrature import quadrature
-
     return quadrature(geometry, x0, x1, medium, light, nodes=8)
 
 
@@ -67,9 +67,6 @@ def test_small_relative_mistake_is_found_where_it_is(variant):
     """One part in a thousand, only for rays whose light is behind the camera."""
 
     def wrong_behind(geometry, x0, x1, medium, light):
-        import drjit as dr
-
-        from realtime.kernels.quadrature import quadrature
 
         J = quadrature(geometry, x0, x1, medium, light, nodes=16)
         return dr.select(geometry.foot < 0, 1.001 * J, J)
@@ -95,8 +92,6 @@ def test_kernel_that_claims_to_be_exact_is_held_to_it(variant):
 
 def test_negative_and_missing_values_break_the_claim(variant):
     def bad(geometry, x0, x1, medium, light):
-        import drjit as dr
-
         J = gauss(geometry, x0, x1, medium, light)
         return dr.select(geometry.foot < 0, -J, dr.select(x0 > 0, dr.nan, J))
 

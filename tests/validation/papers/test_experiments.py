@@ -4,16 +4,21 @@
 import numpy as np
 import pytest
 
+from realtime.scene.read_scene import read_scene
 from tests.validation.papers.test_claims import JUDGED, key, measured
+from validation.papers import billeter_tables, biri_tables, soft_shafts
+from validation.papers.biri_tables import STAGES, fractions
 from validation.papers.claims import claims, taken, verdict
 from validation.papers.experiments import EXPERIMENTS
+from validation.papers.formulas import _annex, _cloud_equations, _droplets
+from validation.papers.scattering import fitted_constant, left_over
+from validation.papers.stencil import drawn
+from validation.scenes.loading import load_scene
 from validation.study.clock import Timing
 
 
 def test_a_stencil_of_one_ray_by_hand():
     """Two shadows that overlap, [0.2, 0.5] and [0.4, 0.7]: lit are 0.2 before and 0.3 behind them."""
-    from validation.papers.stencil import drawn
-
     shadows = [(0.2, 0.5), (0.4, 0.7)]
     # Back to front by 5.1.5: 1, less 0.7, then 0.5 is not drawn, 0.4 neither, and 0.2 more: 1 - 0.7 + 0.2.
     assert drawn(shadows, -1) == pytest.approx(0.5)
@@ -22,8 +27,6 @@ def test_a_stencil_of_one_ray_by_hand():
 
 
 def test_printed_formulas_by_hand():
-    from validation.papers.formulas import _annex, _cloud_equations, _droplets
-
     annex = _annex()
     # Printed a^2 - a for (a^2 - a)/2: of the largest derived value it has twice, wherever that is.
     assert annex["isotropic c2"] == pytest.approx(2)
@@ -40,8 +43,6 @@ def test_printed_formulas_by_hand():
 
 def test_fractions_of_stages_have_intervals():
     """Six works of 1, 2, 3, 5, 1 and 13 ms, each 10 % sure: planes take 13 - 3, sorting 5 - 1 + 1 ms of 21."""
-    from validation.papers.biri_tables import STAGES, fractions
-
     times = [Timing(ms, 0.9 * ms, 1.1 * ms, 5) for ms in (1.0, 2.0, 3.0, 5.0, 1.0, 13.0)]
     found = fractions(times)
     assert [found[name][0] for name in STAGES] == pytest.approx([100 * ms / 21 for ms in (1, 2, 3, 5, 10)])
@@ -53,18 +54,12 @@ def test_fractions_of_stages_have_intervals():
 
 def test_the_penumbra_leaves_out_what_sees_all_of_the_light(variant):
     """Fractions are of the same points with and without occluders: where no bar stands between, they are 1 exactly."""
-    from realtime.scene.read_scene import read_scene
-    from validation.papers import soft_shafts
-    from validation.scenes.loading import load_scene
-
     scene = read_scene(load_scene("fence", (40, 32)).scene)
     found = soft_shafts.penumbra(scene)
     assert 5 < found.sum() < 0.3 * found.size
 
 
 def test_what_a_constant_leaves_of_two_noisy_images():
-    from validation.papers.scattering import fitted_constant, left_over
-
     random = np.random.default_rng(1)
     fog = random.uniform(1, 2, 100_000)
     first, second = (3 * fog + random.normal(size=fog.size) for _ in range(2))
@@ -95,8 +90,6 @@ def asked(name):
 @pytest.mark.slow
 def test_small_tables_have_every_figure_that_claims_ask_for(variant, monkeypatch):
     """Tables take minutes at the published sizes; here each is as small as it can be, and no rate is looked at."""
-    from validation.papers import billeter_tables, biri_tables, soft_shafts
-
     assert asked("biri tables") <= set(biri_tables.biri_tables(scale=0.04, seconds=0.0))
     assert asked("soft shafts") <= set(soft_shafts.soft_shafts((40, 32), seconds=0.0))
     monkeypatch.setattr(billeter_tables, "_SECONDS", 0.0)

@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 from dataclasses import replace
 
+import drjit as dr
 import numpy as np
 import pytest
 
 from realtime.frame.incremental import next_frame
 from realtime.methods.registry import FOG_METHODS
+from realtime.scene.read_scene import read_scene
 from validation.scenes.animation import animate, moved_parts
+from validation.scenes.loading import load_scene
+from validation.study.configuration import configuration, prepared
 
 
 def host(array) -> np.ndarray:
@@ -14,9 +18,6 @@ def host(array) -> np.ndarray:
 
 
 def read(name):
-    from realtime.scene.read_scene import read_scene
-    from validation.scenes.loading import load_scene
-
     loaded = load_scene(name, (16, 12))
     return read_scene(loaded.scene), loaded.animation
 
@@ -54,9 +55,6 @@ def test_lights_circle_at_one_height_and_come_back(variant, name):
 )
 def test_frames_record_nothing_and_compile_nothing(variant, name, moves, method):
     """From the second frame on every kernel is replayed; what moves is data."""
-    import drjit as dr
-
-    from validation.study.configuration import configuration, prepared
 
     scene, animation = read(name)
     parameters = {"points": 4} if scene.area_lights else {}
@@ -81,8 +79,6 @@ def test_frames_record_nothing_and_compile_nothing(variant, name, moves, method)
 )
 def test_what_stands_still_is_kept(variant, moves, casts, prepared_frames):
     """Four frames: camera rays are cast again where objects move alone, planes are found again where the light does."""
-    from validation.study.configuration import configuration, prepared
-
     scene, animation = read("two-pens")
     animation = replace(animation, moves=moves)
     renderer = prepared(scene, configuration("shadow-planes"))

@@ -3,11 +3,16 @@
 
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from validation.scenes.loading import load_scene
+from realtime.errors import InputError as RealtimeInputError
+from realtime.scene.read_scene import read_scene
+from reference.quadrature.image import quadrature_image
+from reference.scene.read import read_truth
+from validation.scenes.loading import LoadedScene, load_scene
 
 COEFFICIENTS = '<float name="sigma_t" value="0.23"/><float name="albedo" value="0.83"/>'
 FOG = f'<medium type="homogeneous" id="fog">{COEFFICIENTS}</medium>'
@@ -41,9 +46,6 @@ def load(variant, tmp_path):
 
 
 def image(scene):
-    from reference.quadrature.image import quadrature_image
-    from reference.scene.read import read_truth
-
     truth = quadrature_image(read_truth(scene))
     return np.stack([truth.airlight, truth.surface])
 
@@ -108,8 +110,6 @@ def test_instances_give_the_image_of_shapes_written_out(load):
 @pytest.mark.parametrize("turn", ["", '<boolean name="flip_normals" value="true"/>'])
 def test_a_lamp_on_a_quad_of_two_triangles_is_the_rectangle(load, tmp_path, turn):
     """The corners run round the quad, as modelling programs write them; the side that shines is the mesh's."""
-    from reference.scene.read import read_truth
-
     (tmp_path / "quad.obj").write_text("v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3\nf 1 3 4\n")
     mesh = '<string name="filename" value="quad.obj"/>' + turn + GLOW
     quad, rectangle = (load(shape(plugin, inside)) for plugin, inside in (("obj", mesh), ("rectangle", turn + GLOW)))
@@ -120,8 +120,6 @@ def test_a_lamp_on_a_quad_of_two_triangles_is_the_rectangle(load, tmp_path, turn
 
 def test_a_lamp_on_a_box_is_its_six_sides(load):
     """Each of them a light with extent of its own, shining outwards; together they send what the box sends."""
-    from reference.scene.read import read_truth
-
     lights = read_truth(load(shape("cube", GLOW, size=0.3))).area
     assert sorted(light.name for light in lights) == [f"thing-{number}" for number in range(1, 7)]
     outwards = [light.normal @ (light.centre - (0.1, 0.1, 0.7)) for light in lights]
@@ -142,9 +140,6 @@ def test_a_lamp_that_reflects_is_lit_like_any_surface(load):
 
 
 def test_a_background_is_seen_through_the_fog_and_lights_nothing(load):
-    from reference.quadrature.image import quadrature_image
-    from reference.scene.read import read_truth
-
     box = shape("cube", NULL + '<ref name="interior" id="fog"/>', name="box", size=1.1)
     sky = '<emitter type="constant" id="sky"><rgb name="radiance" value="0.2, 0.3, 0.4"/></emitter>'
     scene = load(LAMP, box, sky, camera=CAMERA.format(""))
@@ -159,8 +154,6 @@ def test_a_background_is_seen_through_the_fog_and_lights_nothing(load):
 
 @pytest.mark.parametrize("version", ["0.5.0", "0.6.0", "3.0.0"])
 def test_scattering_and_absorption_become_extinction_and_albedo(load, capfd, version):
-    from reference.scene.read import read_truth
-
     media = """<medium type="homogeneous" id="fog-{2}"><rgb name="sigma{0}" value="0.15, 1.5, 0.14"/>
     <rgb name="sigma{1}" value="0.02, 0.5, 0.03"/><float name="scale" value="0.5"/></medium>"""
     old = version < "3"
@@ -231,11 +224,6 @@ def test_what_no_command_takes_is_refused_by_its_name(load, words):
 @pytest.mark.parametrize("coefficient", ["albedo", "sigma_t"])
 def test_a_coefficient_on_a_grid_is_refused_by_both_readers(load, tmp_path, coefficient):
     """Mitsuba calls a medium homogeneous whose albedo differs from place to place."""
-    import mitsuba as mi
-
-    from realtime.errors import InputError as RealtimeInputError
-    from realtime.scene.read_scene import read_scene
-    from reference.scene.read import read_truth
 
     mi.VolumeGrid(np.linspace(0.1, 0.9, 8, dtype=np.float32).reshape(2, 2, 2, 1)).write(str(tmp_path / "grid.vol"))
     other = {"albedo": "sigma_t", "sigma_t": "albedo"}[coefficient]
@@ -266,11 +254,7 @@ def test_every_plugin_of_mitsuba_is_taken_or_refused_in_one_line(load):
     """By all readers, one plugin at a time, with Mitsuba's defaults where it has some."""
     from pathlib import Path
 
-    import mitsuba as mi
-
-    from realtime.errors import InputError as RealtimeInputError
     from reports.interchange.scene import describe_scene
-    from validation.scenes.loading import LoadedScene
 
     kinds = ("Sensor", "Emitter", "Shape", "BSDF", "Medium", "PhaseFunction")
     folder = Path(mi.__file__).parent / "plugins"

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import re
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from analytic.errors import InputError
+from realtime.scene.read_scene import read_scene
+from reference.scene.read import read_truth
 from validation.scenes.loading import load_scene, parse_size
 
 SMALL = """<scene version="3.0.0">
@@ -83,10 +86,6 @@ def test_size_is_read():
 @pytest.mark.parametrize("size", [(16, 12), (31, 12), (9, 40), (1, 1)])
 def test_resized_scene_has_the_rays_of_one_built_at_that_size(variant, small_file, size):
     """For Mitsuba's own rays and for both readers."""
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-    from reference.scene.read import read_truth
 
     text = SMALL.replace('value="16"', f'value="{size[0]}"').replace('value="12"', f'value="{size[1]}"')
     expected = mi.load_string(text)

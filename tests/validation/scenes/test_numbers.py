@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Protects that a number of which no finite image can come is refused by name, in every place of a scene."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from analytic.errors import InputError
+from realtime.errors import InputError as RealtimeInputError
+from realtime.scene.read_scene import read_scene
+from reference.scene.read import read_truth
 from tests.helpers.bad_inputs import cloud, scene
 from validation.scenes.loading import load_scene
 
@@ -32,7 +36,6 @@ def test_an_odd_number_is_refused_by_its_name(variant, tmp_path, place):
 
 
 def test_the_python_interface_checks_scenes_that_are_built(variant):
-    import mitsuba as mi
 
     import airlight
 
@@ -43,10 +46,6 @@ def test_the_python_interface_checks_scenes_that_are_built(variant):
 
 def test_overlapping_media_are_named(variant, tmp_path):
     """Without an id they were called ''."""
-    from realtime.errors import InputError as RealtimeInputError
-    from realtime.scene.read_scene import read_scene
-    from reference.scene.read import read_truth
-
     loaded = load(tmp_path, scene(extra=cloud(name="") + cloud(name="")))
     for read in (read_scene, read_truth):
         with pytest.raises((InputError, RealtimeInputError), match=r"shapes 'sphere-\d' and 'sphere-\d'"):
@@ -62,9 +61,6 @@ def test_deep_elements_are_refused(variant, tmp_path):
 
 def test_no_opaque_shape_without_a_name_is_lost_beside_bounded_media(variant):
     """A dictionary with one key for all of them kept the last alone."""
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
 
     text = scene(extra='<shape type="rectangle"/><shape type="cube"/>' + cloud())
     read = read_scene(mi.load_string(text))

@@ -4,9 +4,22 @@
 import tomllib
 from functools import cache
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.frame.renderer import frame_renderer, render_frame
+from realtime.kernels.registry import KERNELS
+from realtime.methods.registry import METHODS
+from realtime.scene.read_scene import read_scene
+from reference.quadrature.segments import camera_segments, scattering_range
+from reference.quadrature.surface import surface_hits
+from reference.scene.read import read_truth
+from reference.storage.scene_digest import scene_digest
+from reference.visibility.directional_casting import directional_intervals
+from reference.visibility.parallel_rays import parallel_rays
+from validation.estimates.quadrature import truth_image
+from validation.scenes.loading import load_scene
 from validation.scenes.registry import FILES, FOG_SCENES, SCENES
 
 #: As the records say.
@@ -18,17 +31,12 @@ COSTLY = ("cumulus", "cumulus-detail", "stratocumulus")  # seconds to build
 @cache
 def loaded(name):
     """A scene, built once for all tests that only look at it."""
-    from validation.scenes.loading import load_scene
-
     return load_scene(name, (8, 6))
 
 
 @pytest.mark.parametrize("name", FOG_SCENES)
 def test_methods_and_truth_can_read_every_scene_alike(variant, name):
     """The two readers share no code: that they agree says that both are right."""
-    from realtime.scene.read_scene import read_scene
-    from reference.scene.read import read_truth
-
     built = loaded(name)
     scene, truth = read_scene(built.scene), read_truth(built.scene)
     assert built.name == name
@@ -68,8 +76,6 @@ def _check_lights(scene, truth):
 )
 def test_no_number_of_a_scene_is_round(variant, name):
     """A constant of the code must not hide behind a 1 or a 2 of the scene."""
-    import mitsuba as mi
-
     parameters = mi.traverse(loaded(name).scene)
     light = ("intensity.value", "irradiance.value", "radiance.value", "position")
     endings = ("albedo.value.value", "x_fov", "reflectance.value", *light)
@@ -90,9 +96,6 @@ def test_no_number_of_a_scene_is_round(variant, name):
     ],
 )
 def test_scenes_are_the_same_at_every_call(variant, name):
-    from reference.storage.scene_digest import scene_digest
-    from validation.scenes.loading import load_scene
-
     assert scene_digest(load_scene(name, (8, 6)).scene) == scene_digest(loaded(name).scene)
 
 
@@ -103,13 +106,6 @@ def test_scenes_have_as_many_triangles_as_their_records_say(variant, name):
 
 def test_sun_comes_in_by_the_windows_alone(variant):
     """Lit parts of rays lead back to a pane: what the wall's openings let through, in coordinates of the wall."""
-    from reference.quadrature.segments import camera_segments, scattering_range
-    from reference.quadrature.surface import surface_hits
-    from reference.scene.read import read_truth
-    from reference.visibility.directional_casting import directional_intervals
-    from reference.visibility.parallel_rays import parallel_rays
-    from validation.scenes.loading import load_scene
-
     truth = read_truth(load_scene("windows", (40, 30)).scene)
     wall = tomllib.loads(FILES[0].read_text())["windows"]["shapes"][1]
     left, front = wall["corner"][:2]
@@ -128,12 +124,6 @@ def test_sun_comes_in_by_the_windows_alone(variant):
 
 def frame_of(name, method, *, kernel=None, **parameters):
     """Return a small frame of a scene."""
-    from realtime.frame.renderer import frame_renderer, render_frame
-    from realtime.kernels.registry import KERNELS
-    from realtime.methods.registry import METHODS
-    from realtime.scene.read_scene import read_scene
-    from validation.scenes.loading import load_scene
-
     function = KERNELS[kernel].function if kernel else None
     scene = read_scene(load_scene(name, (24, 18)).scene)
     return render_frame(frame_renderer(scene, METHODS[method], kernel=function, **parameters))
@@ -143,9 +133,6 @@ def frame_of(name, method, *, kernel=None, **parameters):
 @pytest.mark.parametrize("name", ["omni-box", "tangle"])
 def test_shadows_take_most_of_some_pixels_and_little_of_others(variant, name):
     """By the truth against the same frame without volumetric shadows; and marching finds the same shadows."""
-    from validation.estimates.quadrature import truth_image
-    from validation.scenes.loading import load_scene
-
     truth = truth_image(load_scene(name, (24, 18)).scene).airlight[..., 1]
     kept = truth / frame_of(name, "unshadowed", kernel="exact").airlight[..., 1]
     assert kept.max() < 1 + 1e-5  # shadows add nothing; float32 keeps 1e-6

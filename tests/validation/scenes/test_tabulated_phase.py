@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A scene has Mie's phase function by a table: what the table keeps of it, and that all readers see the same."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from analytic.droplets import optics
+from realtime.scene.phase import PeakedTable
+from realtime.scene.read_scene import read_scene
+from reference.quadrature.image import quadrature_image
+from reference.scene.read import read_truth
+from tests.helpers.frames import render
+from validation.estimates.agreement import agreements
+from validation.scenes.parts import camera, fog, point_light, tabulated_phase
 
 
 def table(words, values):
-    from validation.scenes.parts import tabulated_phase
-
     text = tabulated_phase(words, values)["values"]
     return np.array([float(word) for word in text.split(",")])
 
@@ -30,9 +36,6 @@ def test_a_table_keeps_the_light_of_the_peak(variant):
 
 
 def fog_of(phase, size=(8, 6)):
-    import mitsuba as mi
-
-    from validation.scenes.parts import camera, fog, point_light
 
     return mi.load_dict(
         {
@@ -46,13 +49,6 @@ def fog_of(phase, size=(8, 6)):
 
 @pytest.mark.claim("droplets-in-scenes", tolerance="2e-3 relative: kernels integrate across the kinks of the table")
 def test_methods_and_truth_see_the_same_fog_of_droplets(variant):
-    from realtime.scene.phase import PeakedTable
-    from realtime.scene.read_scene import read_scene
-    from reference.quadrature.image import quadrature_image
-    from reference.scene.read import read_truth
-    from tests.helpers.frames import render
-    from validation.scenes.parts import tabulated_phase
-
     scene = fog_of(tabulated_phase("mie", 2001))
     assert isinstance(read_scene(scene).medium.phase, PeakedTable)
     truth = quadrature_image(read_truth(scene), samples=16).airlight.reshape(-1)
@@ -63,9 +59,6 @@ def test_methods_and_truth_see_the_same_fog_of_droplets(variant):
 @pytest.mark.claim("droplets-in-scenes", tolerance="1 % bias of Mitsuba's sampling, by its own interval")
 @pytest.mark.statistical
 def test_mitsuba_sees_the_same_fog_of_droplets(variant):
-    from validation.estimates.agreement import agreements
-    from validation.scenes.parts import tabulated_phase
-
     margins = {"single-scatter": 0.01, "volpath": 0.01}
     agreed = agreements(fog_of(tabulated_phase("mie", 2001), size=(16, 12)), margins, batches=2048)
     assert len(agreed) == len(margins)

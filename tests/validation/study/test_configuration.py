@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import re
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from analytic.errors import InputError
+from realtime.frame.renderer import render_frame
 from realtime.kernels.registry import KERNELS
 from realtime.methods.registry import FOG_METHODS
+from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
 from validation.study.configuration import (
     QUICK,
@@ -73,10 +76,6 @@ def test_a_setting_given_twice_is_refused_unless_both_say_the_same():
 
 
 def test_kernels_of_ones_own_come_through_the_same_door(variant):
-    import mitsuba as mi
-
-    from realtime.frame.renderer import render_frame
-    from realtime.scene.read_scene import read_scene
 
     scene = read_scene(mi.load_dict(tiny_scene(ball=None)))
     own, built_in = (

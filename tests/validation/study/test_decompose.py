@@ -4,19 +4,18 @@
 Protects the claim on `airlight bench --decompose`.
 """
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
+from validation.estimates.quadrature import truth_image
+from validation.study.configuration import configuration
+from validation.study.decompose import decompose
 
 
 def split(method, kernel=None, *, size=(24, 20), render=None, **parameters):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-    from validation.estimates.quadrature import truth_image
-    from validation.study.configuration import configuration
-    from validation.study.decompose import decompose
 
     cube = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).scale(0.3)}
     lamp = {"type": "point", "position": [0.3, 0.4, 3.1], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}

@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: times are medians with quartiles, after warm-up, in turns; a slow frame is timed a few times."""
 
+import mitsuba as mi
 import pytest
 
+from realtime.frame.renderer import frame_renderer
+from realtime.methods.registry import METHODS
+from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
+from validation.study import frame_times as timing
 from validation.study.clock import time_in_turns, time_repeated
 from validation.study.frame_times import time_frame
 
@@ -56,11 +61,6 @@ def test_works_are_timed_in_turns(clock):
 
 @pytest.fixture(scope="module")
 def renderer(variant):
-    import mitsuba as mi
-
-    from realtime.frame.renderer import frame_renderer
-    from realtime.methods.registry import METHODS
-    from realtime.scene.read_scene import read_scene
 
     scene = read_scene(mi.load_dict(tiny_scene(size=(16, 12))))
     return frame_renderer(scene, METHODS["ray-march"], steps=8, shadow="map", map=16)
@@ -85,12 +85,6 @@ def test_every_stage_of_a_frame_is_timed(renderer):
 @pytest.mark.parametrize(("spent", "turns"), [(0.0, 1), (1e6, 5)])
 def test_a_slow_frame_is_timed_a_few_times(variant, monkeypatch, spent, turns):
     """A frame that takes minutes must not be rendered thirty times."""
-    import mitsuba as mi
-
-    from realtime.frame.renderer import frame_renderer
-    from realtime.methods.registry import METHODS
-    from realtime.scene.read_scene import read_scene
-    from validation.study import frame_times as timing
 
     monkeypatch.setattr(timing, "_TURNS", spent)
     scene = read_scene(mi.load_dict(tiny_scene(size=(16, 12))))

@@ -5,20 +5,19 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
+from validation.study.clock import Timing
+from validation.study.configuration import configuration
+from validation.study.growth import Cost, growth, study_scaling
+from validation.study.ladders import ladder
 
 
 def costs(works, times):
-    from validation.study.clock import Timing
-    from validation.study.growth import Cost
-
     made = [Timing(time, 0.9 * time, 1.1 * time, 7) for time in times]
     return [Cost(work, time, time, time, time, None) for work, time in zip(works, made)]
 
 
 @pytest.mark.parametrize("exponent", [0.0, 0.37, 1.0, 1.7])
 def test_a_power_is_found_and_is_no_cliff(exponent):
-    from validation.study.growth import growth
-
     works = [1000 * 4**level for level in range(5)]
     found = growth("map", "light_moved", costs(works, [7.3 * work**exponent for work in works]))
     assert found.exponent == pytest.approx(exponent, abs=1e-12)
@@ -28,8 +27,6 @@ def test_a_power_is_found_and_is_no_cliff(exponent):
 
 def test_a_jump_is_a_cliff():
     """The times of shadow planes before their wedges: 17 times the time for 4 times the triangles."""
-    from validation.study.growth import growth
-
     works = [20480, 81920, 327680, 1310720, 5242880]
     found = growth("triangles", "frame", costs(works, [57, 81, 128, 2148, 5645]))
     assert found.cliff
@@ -51,17 +48,11 @@ def test_a_jump_is_a_cliff():
     ],
 )
 def test_what_a_scene_does_not_have_is_refused(kind, scene, why, variant):
-    from validation.study.ladders import ladder
-
     with pytest.raises(InputError, match=why):
         ladder(kind, scene, (24, 18))
 
 
 def test_a_study_measures_every_step_and_says_who_refuses(variant):
-    from validation.study.configuration import configuration
-    from validation.study.growth import study_scaling
-    from validation.study.ladders import ladder
-
     steps = ladder("map", "sphere-spot", (24, 18))[:2]
     told = []
     found = study_scaling(

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import math
 
+import mitsuba as mi
 import pytest
 
 from analytic.errors import InputError
@@ -12,8 +13,6 @@ MARCH = {"steps": 1000, "shadow": "map"}
 
 
 def small_scene(**changes):
-    import mitsuba as mi
-
     return mi.load_dict(tiny_scene(size=(32, 24), **changes))
 
 

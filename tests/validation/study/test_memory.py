@@ -6,11 +6,11 @@ import sys
 import numpy as np
 import pytest
 
+from validation.study.clock import peak_memory
+
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux lets a process forget an earlier peak")
 def test_the_peak_is_that_of_what_was_held_together(variant):
-    from validation.study.clock import peak_memory
-
     def work(mebibytes):
         held = np.ones(mebibytes * 2**17)
         assert held.sum() > 0

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from validation.estimates import agreement
 from validation.study.scene import check_reference, open_scene
 from validation.study.study import Checks, Study
 
@@ -14,7 +15,6 @@ CHECKS = Checks((8, 6), {"volpath": 0.5}, {"volpath": 8})
 @pytest.mark.slow
 def test_without_patience_the_clock_decides_nothing(variant, own_cache, monkeypatch):
     """Two runs, one of them on a machine so busy that hours pass between two batches: the same samples."""
-    from validation.estimates import agreement
 
     def checked(**changes):
         study = replace(TINY, checks=replace(CHECKS, **changes))

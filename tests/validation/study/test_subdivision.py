@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Subdivided meshes are closed where they were; their bumps have more silhouettes as triangles shrink."""
 
+import mitsuba as mi
 import pytest
 
 from analytic.errors import InputError
+from realtime.scene.read_scene import read_scene
+from tests.helpers.scenes import tiny_scene
+from validation.study.subdivision import subdivided, triangles_of
 
 
 def test_a_scene_keeps_what_has_no_triangles_to_cut(variant):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-    from tests.helpers.scenes import tiny_scene
-    from validation.study.subdivision import subdivided, triangles_of
 
     box = mi.ScalarTransform4f().translate([0.13, 0.17, 0.71]).scale(0.37)
     scene = mi.load_dict(tiny_scene(block={"type": "cube", "to_world": box}))

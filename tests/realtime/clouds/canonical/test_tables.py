@@ -15,6 +15,7 @@ from realtime.clouds.canonical.tables import Grid, canonical_tables
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
 from realtime.numerics.array_types import array_types
 from tests.helpers.canonical_errors import look_up_errors, looked_up_points, random_points, transport_at
+from validation.slab.phases import phase_pair
 
 PHASE, ALBEDO = HenyeyGreensteinPhase(0.5), 0.95
 GRID = Grid(thicknesses=21, depths=13, suns=5, directions=17, azimuths=8)
@@ -73,8 +74,6 @@ def test_at_entries_look_ups_are_the_computation(look_up):
 @pytest.mark.slow
 @pytest.mark.claim("clouds-tables-figure", tolerance="1 % of T and 2 % of sigma in c at 95 % of 2000 points, each set")
 def test_whole_tables_keep_to_their_figure(variant):
-    from validation.slab.phases import phase_pair
-
     phase = phase_pair("mie-modified").deterministic
     tables = canonical_tables(phase, 1.0)
     assert tables.size <= 32e6

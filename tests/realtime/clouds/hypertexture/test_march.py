@@ -12,6 +12,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+import realtime.methods.cloud_collectors as method
 from realtime.clouds.bounds.surfaces import cloud_surfaces
 from realtime.clouds.hypertexture.light_depths import light_depths, marched_leg
 from realtime.clouds.hypertexture.lit_surface import dense_surface
@@ -33,8 +34,6 @@ SKY = {"type": "constant", "radiance": {"type": "rgb", "value": [0.07, 0.11, 0.1
 
 @pytest.fixture(autouse=True)
 def transport(monkeypatch):
-    import realtime.methods.cloud_collectors as method
-
     def formula(number, t, d, mu, cos_phi, sin_phi, mu_l):
         return (
             (2 + mu) * mu_l * t / (1 + t) * dr.exp(-0.1 * d) / (3 + type(t)(number)),

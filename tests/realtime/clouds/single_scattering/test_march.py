@@ -6,6 +6,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.clouds.bounds import stretches
 from realtime.clouds.bounds.surfaces import cloud_surfaces
 from realtime.clouds.single_scattering.march import Beam, cloud_rays, exact_leg, scattered
 from realtime.clouds.single_scattering.opacity import opacity, printed_opacity
@@ -78,6 +79,7 @@ def marched(scene, origin, direction, *, steps, scales=(1.0,), printed=False):
     ones = tuple((mi.Float(1),) for _ in scales)
     beam = Beam(mi.Color3f(1), tuple(mi.Float(scale) for scale in scales), ones, leg, None)
     (octaves,) = scattered(path, [beam], steps=steps, printed=printed)
+    dr.eval(octaves)
     return [np.array(octave, dtype=np.float64).T for octave in octaves]
 
 
@@ -99,8 +101,6 @@ def test_order_one_with_64_steps(few):
 
 def test_stretches_that_are_not_kept_are_found_again(monkeypatch):
     """Rays cross the ring twice: with one kept stretch the other is looked for after the first was marched."""
-    from realtime.clouds.bounds import stretches
-
     random = np.random.default_rng(5)
     ends = random.uniform(-130, 130, (2, 300, 3))
     direction = ends[1] - ends[0]

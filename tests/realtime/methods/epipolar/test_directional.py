@@ -4,19 +4,18 @@
 Claim: the error falls as the shadow map and the slices grow, to that of the same map without slices.
 """
 
+import mitsuba as mi
 import pytest
 
 from tests.helpers.frames import read, relative_rmse, render
 from tests.realtime.methods.shadow_planes.test_directional import scenes
+from validation.estimates.quadrature import truth_image
 
 FINE = {"sampling": "pixels", "slices": 6000}
 
 
 @pytest.mark.parametrize("name", ["aslant", "along the view"])
 def test_against_the_truth(variant, name):
-    import mitsuba as mi
-
-    from validation.estimates.quadrature import truth_image
 
     scene = scenes()[name]
     truth = truth_image(mi.load_dict(scene)).airlight

@@ -4,9 +4,13 @@
 import numpy as np
 import pytest
 
+from realtime.frame.renderer import render_frame
+from realtime.scene.read_scene import read_scene
 from tests.helpers.frames import frame, relative_rmse, truth
 from tests.helpers.light_frames import SIZE, camera, coloured_fog, lamp
 from tests.helpers.scenes import spot, tiny_scene
+from validation.scenes.loading import load_scene
+from validation.study.configuration import configuration, prepared
 
 MAP = 256
 CHANGES = {
@@ -74,11 +78,6 @@ def test_samples_converge_to_all_pixels(variant, change):
 @pytest.mark.claim("a-lit-share")
 def test_no_pixel_is_brighter_than_without_shadows(variant):
     """Lights in view and sharp phase functions: shares of a rough estimate made an image 363 times too bright."""
-    from realtime.frame.renderer import render_frame
-    from realtime.scene.read_scene import read_scene
-    from validation.scenes.loading import load_scene
-    from validation.study.configuration import configuration, prepared
-
     scene = read_scene(load_scene("random:427", (80, 60)).scene)
     image, bare = (
         np.asarray(render_frame(prepared(scene, configuration(method, None, {}))).airlight)

@@ -1,9 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Slices, their height maps, trees and samples, each against brute force in NumPy."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.methods.epipolar.min_max_tree import slice_heights
+from realtime.methods.epipolar.slices import image_point, image_slices, neighbour, pixel_number, slice_coordinate
+from realtime.methods.epipolar.walk import sum_lit_intervals
+from realtime.rays.ray_light import RayGeometry
+from realtime.scene.read_scene import read_scene
+from realtime.shadow_maps.shadow_map import cast_shadow_map, inverse_depth
 from tests.helpers.scenes import tiny_scene
 
 SIZE = (40, 30)
@@ -21,9 +28,6 @@ PLACES = {
 
 
 def read(position, *, kind="point", **changes):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
 
     look = mi.ScalarTransform4f().look_at([0, 0, 0], [0, 1, 0], [0, 0, 1])
     lamp = {"type": "point", "position": list(position), "intensity": 1.0}
@@ -42,17 +46,12 @@ def vectors(value):
 
 
 def slices_of(scene, count=24):
-    from realtime.methods.epipolar.slices import image_slices
-
     return image_slices(scene.camera, scene.lights[0], count)
 
 
 @pytest.mark.claim("slices-by-the-border", tolerance="1e-4 relative")
 @pytest.mark.parametrize("place", PLACES)
 def test_slices_leave_at_equal_steps_and_reach_every_pixel(variant, place):
-    import mitsuba as mi
-
-    from realtime.methods.epipolar.slices import image_point, neighbour, pixel_number, slice_coordinate
 
     scene = read(PLACES[place])
     slices, camera = slices_of(scene, 200), scene.camera
@@ -79,9 +78,6 @@ def test_slices_leave_at_equal_steps_and_reach_every_pixel(variant, place):
 
 
 def height_maps(scene, size=32, count=24):
-    from realtime.methods.epipolar.min_max_tree import slice_heights
-    from realtime.shadow_maps.shadow_map import cast_shadow_map, inverse_depth
-
     light = scene.lights[0]
     shadow_map = cast_shadow_map(scene.geometry, light, size)
     return slice_heights(shadow_map, inverse_depth(shadow_map), slices_of(scene, count), light)
@@ -118,10 +114,6 @@ def test_the_tree_holds_the_bounds(variant, kind):
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_lit_pieces_are_those_of_many_points(variant, kind):
     """A ray of the slice looked at point by point in float64: where is it, and what does the map hold there?"""
-    import mitsuba as mi
-
-    from realtime.methods.epipolar.walk import sum_lit_intervals
-    from realtime.rays.ray_light import RayGeometry
 
     scene = read((0.4, 1.9, 1.9), kind=kind)
     heights = height_maps(scene, size=32)

@@ -6,6 +6,7 @@ Protects the claim on ghosts under a moving light.
 
 from dataclasses import replace
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -22,8 +23,6 @@ GRID = {"width": 24, "height": 18, "slices": 24, "far": 6.1}
 
 
 def scene(**changes):
-    import mitsuba as mi
-
     return read_scene(mi.load_dict(tiny_scene(size=(24, 18), lamp=lamp_above()) | changes))
 
 

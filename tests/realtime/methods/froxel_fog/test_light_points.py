@@ -7,16 +7,15 @@ Protects the claim on the order of convergence in `penumbra-plane`.
 import numpy as np
 import pytest
 
+from realtime.scene.read_scene import read_scene
 from tests.helpers.frames import read, relative_rmse, render
 from tests.helpers.lamps import lit_by
+from validation.scenes.loading import load_scene
 
 
 @pytest.mark.slow
 @pytest.mark.claim("froxel-order", tolerance="at least 0.7 from four grids, a factor of eight apart")
 def test_the_error_falls_with_the_grid_under_a_light_with_extent(variant):
-    from realtime.scene.read_scene import read_scene
-    from validation.scenes.loading import load_scene
-
     scene = read_scene(load_scene("penumbra-plane", (80, 60)).scene)
     exact = render(scene, "shadow-planes", points=4).airlight
     sizes = np.array([8, 16, 32, 64])

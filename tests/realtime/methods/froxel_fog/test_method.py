@@ -6,9 +6,14 @@ Protects the claims on the integral within a slice, on the limit of fine grids, 
 
 from types import SimpleNamespace
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.methods.froxel_fog.accumulation import accumulated
+from realtime.methods.froxel_fog.grid import Grid
+from reference.scene.read import read_truth
 from tests.helpers import probes
 from tests.helpers.frames import frame, read, relative_rmse, truth
 from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
@@ -44,9 +49,6 @@ def hazy(sigma_t=(0.11, 0.37, 0.93)):
 
 def by_hand(scene, *, width, height, slices, near, far):
     """Do what the method does in NumPy, from the formulas of its documentation; no shadows, no bounds."""
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
 
     truth = read_truth(mi.load_dict(scene))
     matrix = np.array(mi.load_dict(scene).sensors()[0].world_transform().matrix, dtype=float).reshape(4, 4)
@@ -109,11 +111,6 @@ def test_the_sums_are_those_of_plain_numpy(variant):
 @pytest.mark.parametrize("sigma_t", [1e-9, 0.003, 0.9, 37.0])
 @pytest.mark.parametrize("slices", [1, 5])
 def test_slices_of_constant_light_add_up_to_the_closed_form(variant, sigma_t, slices):
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.methods.froxel_fog.accumulation import accumulated
-    from realtime.methods.froxel_fog.grid import Grid
 
     scene = read(tiny_scene(size=(2, 2)), "double")
     grid = Grid(2, 1, slices, scene.camera, mi.Float64(3.1), mi.Float64(0.7))

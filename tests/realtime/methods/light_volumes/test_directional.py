@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: the light volume of a directional light is that of its map."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.shadow_maps.shadow_map import cast_shadow_map
 from tests.helpers.frames import read, relative_rmse, render
 from tests.helpers.sunlit import box_part, shaded, summed
 
 
 def height_field(scene, size):
     """Return the function that tells whether points are lit by the triangles over the texels of a map."""
-    from realtime.shadow_maps.shadow_map import cast_shadow_map
-
     shadow_map = cast_shadow_map(scene.geometry, scene.lights[0], size)
     vectors = scene.lights[0].position, *shadow_map.projection.basis
     position, across, up, axis = (np.array(vector, dtype=float).ravel() for vector in vectors)
@@ -48,8 +48,6 @@ def test_the_walk_against_steps_through_the_height_field(variant):
 def test_a_map_of_rays_that_miss_all_media(variant):
     """A camera that looks away from the media: points at infinity have no place in a map."""
     scene = shaded(size=(8, 8), floor=None)
-    import mitsuba as mi
-
     scene["sensor"] |= {"to_world": mi.ScalarTransform4f().look_at([0.2, -4.1, 1.3], [0.1, -9.0, 4.6], [0, 0, 1])}
     for method, parameters in (("ray-march", {"shadow": "map"}), ("light-volumes", {})):
         assert np.all(render(scene, method, **parameters).airlight == 0)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What light volumes refuse, and what they take of memory."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -11,8 +12,6 @@ from tests.helpers.scenes import bounded_medium, clear_scene
 
 
 def test_a_mesh_is_for_media_without_bounds(variant):
-    import mitsuba as mi
-
     smoke = bounded_medium({"type": "sphere", "center": [0.1, 0.2, 0.9], "radius": 0.4}, 0.7, (0.9, 0.8, 0.7))
     loaded = mi.load_dict(clear_scene(cloud=smoke))
     with pytest.raises(InputError, match=r"evaluation=mesh: the scene has a medium with bounds.*evaluation=walk"):

@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Walls between the samples of a shadow map: where they stand, and what they are worth."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.methods.light_volumes.jump_search import _JUMP, with_walls
+from realtime.methods.light_volumes.texel_walls import PLACES
+from realtime.scene.read_scene import read_scene
+from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
+from realtime.shadow_maps.shadow_map import cast_shadow_map
 from tests.helpers.frames import render
 from tests.helpers.light_frames import lamp, loaded_scene
 from tests.helpers.scenes import tiny_scene
+from validation.estimates.quadrature import truth_image
 
 LAMP = (0.13, -0.07, 2.9)
 FLAT = {"ball": None, "lamp": lamp(*LAMP)}
@@ -14,12 +21,6 @@ FLAT = {"ball": None, "lamp": lamp(*LAMP)}
 
 def walled(loaded, size, precision="single"):
     """Return the heights of a scene's first light with walls, and the walls' places by face, row, column and side."""
-    from realtime.methods.light_volumes.jump_search import with_walls
-    from realtime.methods.light_volumes.texel_walls import PLACES
-    from realtime.scene.read_scene import read_scene
-    from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
-    from realtime.shadow_maps.shadow_map import cast_shadow_map
-
     scene = read_scene(loaded, precision)
     heights = inverse_depth_field(cast_shadow_map(scene.geometry, scene.lights[0], size))
     walled_field = with_walls(heights, scene.geometry, scene.lights[0])
@@ -32,8 +33,6 @@ def walled(loaded, size, precision="single"):
 
 def plate(x, y, z=1.1, half=0.6):
     """Return a level square whose sides have the given distances from the lamp's axis on the low side."""
-    import mitsuba as mi
-
     place = mi.ScalarTransform4f().translate([LAMP[0] + x + half, LAMP[1] + y + half, z])
     return {"type": "rectangle", "to_world": place.scale([half, half, 1])}
 
@@ -42,8 +41,6 @@ def plate(x, y, z=1.1, half=0.6):
 @pytest.mark.parametrize(("size", "precision"), [(16, "double"), (64, "single")])
 def test_walls_stand_where_the_edges_of_a_plate_are(variant, size, precision):
     """They are lines of constant u and v in the face below: known to half a place."""
-    from realtime.methods.light_volumes.texel_walls import PLACES
-
     x, y, z, half = -0.31, -0.47, 1.1, 0.6
     _, places = walled(loaded_scene(**FLAT, plate=plate(x, y, z, half)), size, precision)
     depth = LAMP[2] - z
@@ -64,9 +61,6 @@ def test_walls_stand_where_the_edges_of_a_plate_are(variant, size, precision):
 @pytest.mark.claim("upright-walls")
 def test_slopes_are_no_walls(variant):
     """A floor that rays meet at a grazing angle is as steep as a jump between two samples, and bends nowhere."""
-    import mitsuba as mi
-
-    from realtime.methods.light_volumes.jump_search import _JUMP
 
     ground = {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale([400, 400, 1])}
     heights, places = walled(loaded_scene(ball=None, floor=ground, lamp=lamp(*LAMP)), 32)
@@ -80,9 +74,6 @@ def test_slopes_are_no_walls(variant):
 @pytest.mark.claim("upright-walls")
 def test_a_shadow_of_straight_edges_is_known_to_a_fraction_of_a_texel(variant):
     """The frame against the truth: what is left are the corners, and a 64th of a texel."""
-    import mitsuba as mi
-
-    from validation.estimates.quadrature import truth_image
 
     description = tiny_scene(size=(40, 30), **FLAT, plate=plate(-0.31, -0.47))
     truth = truth_image(mi.load_dict(description)).airlight

@@ -4,11 +4,19 @@
 from dataclasses import replace
 from functools import cache
 
+import mitsuba as mi
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from realtime.frame.renderer import image_frame, run_stages
+from realtime.methods.light_volumes.published.mesh import volume_mesh
+from realtime.methods.light_volumes.texel_walls import PLACES, walled_heights
+from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
+from realtime.shadow_maps.shadow_map import cast_shadow_map, inverse_depth
+from reference.scene.read import read_truth
+from tests.evidence.oracles.light_volume import oracle_airlight
 from tests.helpers.frames import render, renderer
 from tests.helpers.light_frames import (
     EVALUATIONS,
@@ -96,8 +104,6 @@ SMALL = 4  # texels
 @cache
 def renderers(kind, view):
     """Return a scene, its renderers in float64, and a map to replace the values of."""
-    from realtime.shadow_maps.shadow_map import cast_shadow_map
-
     changes = camera(*VIEWS[view], size=(13, 9)) | ({"lamp": spot(cutoff=50.0, beam=50.0)} if kind == "spot" else {})
     loaded = loaded_scene(**changes)
     both = [
@@ -121,9 +127,6 @@ def vertices_of(shadow_map):
 
 def with_heights(shadow_map, heights):
     """Return a map that has these inverse depths at its corners."""
-    import mitsuba as mi
-
-    from realtime.shadow_maps.shadow_map import inverse_depth
 
     length = np.array(inverse_depth(replace(shadow_map, distance=mi.Float64(np.ones(len(heights))))))
     with np.errstate(divide="ignore"):
@@ -136,12 +139,6 @@ def with_heights(shadow_map, heights):
 @given(data=st.data())
 def test_any_map(variant, kind, data):
     """Whatever the heights: three routes to the same volume."""
-    from realtime.frame.renderer import image_frame, run_stages
-    from realtime.methods.light_volumes.published.mesh import volume_mesh
-    from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
-    from reference.scene.read import read_truth
-    from tests.evidence.oracles.light_volume import oracle_airlight
-
     loaded, (walk, mesh), shadow_map = renderers(kind, data.draw(st.integers(0, len(VIEWS) - 1)))
     vertex = vertices_of(shadow_map)
     count = int(np.max(vertex)) + 1
@@ -158,8 +155,6 @@ def test_any_map(variant, kind, data):
 
 def any_walls(rng, faces, share):
     """Return the numbers of walls of texels of which a share of the sides has one, anywhere."""
-    from realtime.methods.light_volumes.texel_walls import PLACES
-
     level, upright = rng.integers(1, PLACES + 1, (2, faces, SMALL + 1, SMALL + 1), dtype=np.uint32)
     level[rng.random(level.shape) >= share] = 0
     upright[rng.random(upright.shape) >= share] = 0
@@ -173,13 +168,6 @@ def any_walls(rng, faces, share):
 @given(data=st.data())
 def test_any_walls_in_any_map(variant, kind, data):
     """Wherever walls stand, on any number of a texel's sides, between heights that jump or do not."""
-    import mitsuba as mi
-
-    from realtime.frame.renderer import image_frame, run_stages
-    from realtime.methods.light_volumes.texel_walls import walled_heights
-    from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
-    from reference.scene.read import read_truth
-    from tests.evidence.oracles.light_volume import oracle_airlight
 
     loaded, (walk, _), shadow_map = renderers(kind, data.draw(st.integers(0, len(VIEWS) - 1)))
     vertex = vertices_of(shadow_map)
@@ -198,8 +186,6 @@ def test_any_walls_in_any_map(variant, kind, data):
 @pytest.mark.claim("enclosed-light")
 @pytest.mark.parametrize(("shape", "kind"), [("sphere", "point"), ("cube", "spot")])
 def test_a_light_inside_a_closed_occluder_lights_nothing_outside(variant, shape, kind):
-    import mitsuba as mi
-
     place = mi.ScalarTransform4f().translate([0.11, 0.13, 0.72]).rotate([0.3, 1, 0.2], 17).scale(0.39)
     inside = [0.173, 0.052, 0.781]
     light = {"to_world": mi.ScalarTransform4f().look_at(inside, [0, 1, 2], [1, 0, 0])}

@@ -7,11 +7,13 @@ bisects its lit intervals and shares nothing with this side.
 
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from tests.helpers.frames import read, relative_rmse, render
 from tests.helpers.sunlit import plank, shaded, sun
+from validation.estimates.quadrature import truth_image
 from validation.scenes.meshes import box, placed
 from validation.scenes.parts import mitsuba_mesh
 
@@ -39,9 +41,6 @@ def scenes() -> dict[str, dict[str, Any]]:
 
 @pytest.mark.parametrize("name", ["two media", "parallel to edges"])
 def test_against_the_truth(variant, name):
-    import mitsuba as mi
-
-    from validation.estimates.quadrature import truth_image
 
     scene = scenes()[name]
     truth = truth_image(mi.load_dict(scene)).airlight

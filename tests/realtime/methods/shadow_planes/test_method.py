@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Frames of shadow planes against the quadrature truth on exact geometry, which shares no code with them."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from realtime.errors import InputError
+from reference.quadrature.image import quadrature_image
+from reference.scene.read import read_truth
 from tests.helpers.casters import ALL, SOUND
 from tests.helpers.frames import render
 from tests.helpers.light_frames import camera, coloured_fog, lamp
@@ -29,8 +32,6 @@ CHANGES = {
 
 
 def scene_with(mesh, *, size=(24, 18), **changes):
-    import mitsuba as mi
-
     scene = tiny_scene(ball=None, **changes)
     film = scene["sensor"]["film"] | {"width": size[0], "height": size[1]}
     scene["sensor"] = scene["sensor"] | {"film": film}
@@ -41,9 +42,6 @@ def scene_with(mesh, *, size=(24, 18), **changes):
 
 
 def truth(scene):
-    from reference.quadrature.image import quadrature_image
-    from reference.scene.read import read_truth
-
     return quadrature_image(read_truth(scene), edges="geometry")
 
 
@@ -106,7 +104,5 @@ def test_ambient_light_is_added_by_its_formula(variant):
 
 @pytest.mark.claim("shapes-without-edges-refused")
 def test_shapes_without_triangles_are_refused_by_name(variant):
-    import mitsuba as mi
-
     with pytest.raises(InputError, match="shape 'ball' is a Sphere"):
         render(mi.load_dict(tiny_scene()), "shadow-planes")

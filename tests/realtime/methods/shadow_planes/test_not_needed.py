@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: what a scene does not need costs nothing. No time can say it better than the same kernels and planes."""
 
+import drjit as dr
 import pytest
 
 from realtime.frame.renderer import run_stages
@@ -11,8 +12,6 @@ from validation.study.configuration import Configuration, prepared
 
 def kernels(renderer):
     """The kernels of a replayed frame: what each is by its hash, and how many lanes it has."""
-    import drjit as dr
-
     ready = renderer.prepare(renderer.scene)
     run_stages(renderer, ready)
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):

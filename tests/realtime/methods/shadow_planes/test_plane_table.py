@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from realtime.methods.shadow_planes.plane_table import layers_between, light_basis
 from realtime.scene.mesh_adjacency import make_casters
+from validation.scenes.meshes import grid
 
 
 def count_between(casters, light, camera):
@@ -53,8 +54,6 @@ def test_layers_between_light_and_camera(seed, components):
 @pytest.mark.claim("no-ray-slips-through")
 def test_axis_through_edges_and_vertices_counts_each_layer_once():
     """The axis runs through edges and vertices of a grid: of the triangles there one counts."""
-    from validation.scenes.meshes import grid
-
     casters = make_casters([("grid", *grid((-1, -1, 0), (2, 0, 0), (0, 2, 0), (4, 4)))])
     used = np.ones(1, dtype=bool)
     for x, y in ((0, 0), (0.5, 0.5), (0.25, 0), (0, 0.25), (0.25, 0.25), (0.1, 0.3)):

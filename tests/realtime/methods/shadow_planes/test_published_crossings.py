@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The published orders of planes and the buffer of 8 bits do what the paper says."""
 
+import drjit as dr
 import numpy as np
 import pytest
 
@@ -10,8 +11,6 @@ from tests.helpers.planes import bundles, casters_of, crossings, index_of, lit_l
 
 def added_up(index, ways, end, *, order, buffer=None):
     """The sum of 1 - exp(-x) over the crossings."""
-    import drjit as dr
-
     Float = type(index.distance)
     gammas = (lambda plane, ray, x: 1 - dr.exp(-x)), (lambda x: 1 - dr.exp(-x))
     distance = Float(np.asarray(end, dtype=np.float64))

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+import realtime.methods.shadow_planes.published_mesh as module
 from tests.helpers import frames
 from tests.helpers.casters import closed_sphere
 from tests.helpers.frames import relative_rmse
@@ -62,8 +63,6 @@ def test_the_buffer_holds_surfaces_and_all_lights_pass_by_pass(variant):
 @pytest.mark.claim("media-at-vertices", tolerance="errors fall to 0.4 with a quarter of the spacing")
 def test_vertices_in_a_medium_converge_to_pixels(variant, monkeypatch):
     """One convex caster before a sphere of fog."""
-    import realtime.methods.shadow_planes.published_mesh as module
-
     scene = clear_scene(ball=fog((0.1, 0.0, 0.4), 0.8), caster=caster())
     pixel = render(scene, media="exact").airlight
     errors = []

@@ -4,14 +4,15 @@
 import numpy as np
 import pytest
 
+import realtime.methods.shadow_planes.published_mesh as module
+from realtime.frame.renderer import render_frame
+from realtime.scene.read_scene import read_scene
+from validation.scenes.loading import load_scene
+from validation.study.configuration import configuration, prepared
+
 
 def frame(parameters):
     """A frame of the sphere under the spot."""
-    from realtime.frame.renderer import render_frame
-    from realtime.scene.read_scene import read_scene
-    from validation.scenes.loading import load_scene
-    from validation.study.configuration import configuration, prepared
-
     scene = load_scene("sphere-spot", (64, 48)).scene
     return render_frame(prepared(read_scene(scene), configuration("shadow-planes", None, parameters)))
 
@@ -32,8 +33,6 @@ def test_many_edges_are_the_cone_itself_and_fewer_are_darker_by_the_square(varia
 @pytest.mark.claim("cone-at-vertices", tolerance="second order in the logarithm of the ratio of rows")
 def test_a_cone_is_meshed_from_the_light_to_the_camera(variant, monkeypatch):
     """Rows at equal ratios: the error falls as the square of the logarithm of the ratio, near the light too."""
-    import realtime.methods.shadow_planes.published_mesh as module
-
     pixel = frame({"cone": 32, "order": "paper"}).airlight
     errors = []
     for rows, ratio in ((16, 1.5), (32, 1.5**0.5)):

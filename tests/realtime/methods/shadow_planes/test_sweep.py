@@ -4,9 +4,12 @@
 import itertools
 from dataclasses import replace
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.methods.shadow_planes.sweep import sum_lit_intervals
 from tests.helpers.planes import CAMERA, LIGHT, bundles, casters_of, index_of, lit_lengths, rays_of
 
 CAMERAS = {"in the light": CAMERA, "in shadow": -0.7 * LIGHT, "among the casters": np.array([0.1, -0.05, 0.31])}
@@ -15,9 +18,6 @@ NAMES = ["torus", "open cylinder", "Moebius strip"]
 
 def walked(index, ways, end, *, begin=0.0):
     """The sum over lit segments of 1 - exp(-x), and whether the light reaches the end."""
-    import drjit as dr
-
-    from realtime.methods.shadow_planes.sweep import sum_lit_intervals
 
     Float = type(index.distance)
     rays = rays_of(index, ways, end)
@@ -55,9 +55,6 @@ def test_lit_segments_are_those_between_the_crossings(variant, name, camera):
 @pytest.mark.parametrize("order", ["shuffled", "backwards", "two changed", "five at a time backwards"])
 def test_rays_notice_an_order_that_is_wrong(variant, order):
     """And find their segments with a longer queue, or by selection."""
-    import drjit as dr
-    import mitsuba as mi
-
     index = index_of(casters_of("torus", "open cylinder", "crossing spheres"))
     ways = bundles(960, spread=0.01)
     end = np.full(len(ways), np.inf)

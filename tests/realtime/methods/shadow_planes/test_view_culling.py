@@ -1,19 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """No caster is left out whose shadow is seen."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from realtime.methods.shadow_planes.silhouettes import components_in_view
+from realtime.scene.camera import read_camera
 from realtime.scene.mesh_adjacency import make_casters
+from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
 
 
 def camera_at(origin, target, size=(40, 30)):
-    import mitsuba as mi
-
-    from realtime.scene.camera import read_camera
-    from realtime.scene.read_scene import read_scene
 
     scene = tiny_scene(size=size, ball=None, floor=None)
     look = mi.ScalarTransform4f().look_at(list(origin), list(target), [0.1, 0.3, 1])

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The wedge of a ray holds every plane that the ray crosses."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.methods.shadow_planes.plane_table import planes_of_rays
 from tests.helpers.planes import CAMERA, LIGHT, bundles, casters_of, crossings, index_of, listed_planes, rays_of
 
 NAMES = ["torus", "crossing spheres", "open cylinder", "Moebius strip", "mixed winding", "boxes sharing an edge"]
@@ -32,9 +34,6 @@ def test_wedges_hold_every_plane_that_a_ray_crosses(variant, name, camera):
 
 def test_wedges_stay_in_the_index_whatever_the_azimuth(variant):
     """The azimuth about a light that is at the camera is no number: a load from wedge 2^32 - 1 ended the process."""
-    import mitsuba as mi
-
-    from realtime.methods.shadow_planes.plane_table import planes_of_rays
 
     index = index_of(casters_of("torus"))
     azimuths = mi.Float([np.nan, np.inf, -np.inf, 1e30, -1e30, 0.5])

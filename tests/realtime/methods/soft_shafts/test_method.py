@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Soft shafts are the sum of their light points, less what steps, scale, sharing and filters take from it."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from realtime.frame.renderer import render_frame
+from realtime.scene.read_scene import read_scene
 from tests.helpers.frames import frame, relative_rmse
 from tests.helpers.lamps import lamp_scene
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
+from validation.estimates.quadrature import truth_image
+from validation.scenes.loading import load_scene
+from validation.study.configuration import configuration, prepared
 
 NONE = {"filter": "none", "surfaces": "ray"}
 
@@ -15,8 +20,6 @@ NONE = {"filter": "none", "surfaces": "ray"}
 @pytest.mark.claim("soft-shafts-sum-of-points", tolerance="2e-3 relative RMSE: 400 steps")
 @pytest.mark.parametrize("shape", ["disk", "sphere"])
 def test_without_filter_it_is_the_sum_of_its_points(variant, shape):
-    import mitsuba as mi
-
     box = {
         "type": "cube",
         "to_world": mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).rotate([1, 2, 3], 31).scale(0.33),
@@ -91,11 +94,6 @@ def test_pixels_share_points_and_steps(variant):
 
 @pytest.mark.claim("soft-shafts-steps", tolerance="half of the light; 2 % of it")
 def test_equal_steps_miss_the_peak_next_to_a_light_and_equal_angles_do_not(variant):
-    from realtime.scene.read_scene import read_scene
-    from validation.estimates.quadrature import truth_image
-    from validation.scenes.loading import load_scene
-    from validation.study.configuration import configuration, prepared
-
     loaded = load_scene("random:1", (80, 60)).scene
     truth, scene = truth_image(loaded).airlight.mean(), read_scene(loaded)
 

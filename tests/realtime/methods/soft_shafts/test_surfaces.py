@@ -1,8 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The width of a penumbra is that of similar triangles, and the filter for N levels is as wide as serves them best."""
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
+
+from realtime.image_filters.guides import depth_guide
+from realtime.image_filters.raster import Raster
+from realtime.methods.soft_shafts.surfaces import AUTO_WIDTH, few_pixels, penumbra_width
+from realtime.numerics.array_types import two_numbers
+from realtime.scene.read_scene import read_scene
+from tests.helpers.scenes import tiny_scene
 
 
 def staircase_error(width, levels, hd):
@@ -21,8 +30,6 @@ def staircase_error(width, levels, hd):
 @pytest.mark.parametrize("levels", [3, 5, 16])
 @pytest.mark.parametrize("width", [32, 128])
 def test_the_automatic_width_is_nearly_the_best(variant, levels, width):
-    from realtime.methods.soft_shafts.surfaces import AUTO_WIDTH
-
     widths = np.geomspace(0.1, 1.0, 30) * width / levels
     least = min(staircase_error(width, levels, hd) for hd in widths)
     own = staircase_error(width, levels, AUTO_WIDTH * width / levels)
@@ -33,15 +40,6 @@ def test_the_automatic_width_is_nearly_the_best(variant, levels, width):
 @pytest.mark.parametrize("ratios", [(0.7,), (0.2, 0.8)])
 def test_the_width_of_a_penumbra_follows_from_similar_triangles(variant, ratios):
     """Bars over a floor: w = L (d_r - d_b) / d_b, over the size of a pixel there; of two the geometric mean."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.image_filters.guides import depth_guide
-    from realtime.image_filters.raster import Raster
-    from realtime.methods.soft_shafts.surfaces import few_pixels, penumbra_width
-    from realtime.numerics.array_types import two_numbers
-    from realtime.scene.read_scene import read_scene
-    from tests.helpers.scenes import tiny_scene
 
     camera = read_scene(mi.load_dict(tiny_scene(size=(160, 120)))).camera
     raster, distance = Raster(160, 120), dr.full(mi.Float, 3.0, 160 * 120)

@@ -4,8 +4,18 @@
 import math
 from functools import reduce
 
+import mitsuba as mi
 import numpy as np
 import pytest
+
+from analytic.errors import InputError
+from reference.monte_carlo.batches import merged
+from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch
+from reference.monte_carlo.cloud_paths.opacity import seen_clouds
+from reference.scene.clouds import read_clouds
+from tests.helpers.clouds import DROPLETS, SUN, cloud, cloud_scene, dense, length_inside, linear_between
+from validation.scenes.meshes import box, placed
+from validation.scenes.parts import sky
 
 LOW, HIGH = np.array([-91.3, -73.9, -52.7]), np.array([111.7, 79.3, 61.1])
 ROUGH = np.random.default_rng(5).random((9, 8, 7)) ** 3
@@ -13,12 +23,6 @@ SETS = [("1", (1, 1)), ("2", (2, 2)), ("3-4", (3, 4)), ("5-inf", (5, math.inf))]
 
 
 def clouds_of(medium=None, **parts):
-    import mitsuba as mi
-
-    from reference.scene.clouds import read_clouds
-    from tests.helpers.clouds import SUN, cloud, cloud_scene
-    from validation.scenes.meshes import box, placed
-    from validation.scenes.parts import sky
 
     mesh = placed(box(tuple(HIGH - LOW - 2.6)), tuple(0.5 * (LOW + HIGH)))
     scene = cloud_scene(sun=SUN, sky=sky((0.06, 0.11, 0.2)), box=cloud("box", mesh, medium), **parts)
@@ -26,16 +30,10 @@ def clouds_of(medium=None, **parts):
 
 
 def rough(**changes):
-    from tests.helpers.clouds import dense
-
     return dense(changes.pop("values", ROUGH), LOW, HIGH, **{"sigma_t": 0.0517, "albedo": 0.96} | changes)
 
 
 def paths(clouds, batches, sets, samples=256, first=0):
-    from reference.monte_carlo.batches import merged
-    from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch
-    from reference.monte_carlo.cloud_paths.opacity import seen_clouds
-
     seen = seen_clouds(clouds).meets
     seeds = range(first, first + batches)
     return reduce(merged, (cloud_paths_batch(clouds, seed, samples, sets=sets, seen=seen) for seed in seeds))
@@ -59,8 +57,6 @@ def check_equal(first, second):
 )
 def test_an_even_grid_is_a_homogeneous_cloud(variant):
     """Half the largest density everywhere but in a corner without cloud: flights end where nothing is."""
-    from tests.helpers.clouds import DROPLETS
-
     values = np.full((40, 40, 40), 0.5)
     values[0, 0, 0] = 1.0  # beyond the box but for a share of 1e-5 of a voxel
     even = paths(clouds_of(rough(values=values)), 24, SETS)
@@ -69,10 +65,6 @@ def test_an_even_grid_is_a_homogeneous_cloud(variant):
 
 
 def test_opacity_is_the_sum_over_the_grid(variant):
-    from reference.monte_carlo.cloud_paths.opacity import seen_clouds
-    from tests.helpers.clouds import length_inside, linear_between
-    from validation.scenes.meshes import box, placed
-
     clouds = clouds_of(rough())
     mesh = placed(box(tuple(HIGH - LOW - 2.6)), tuple(0.5 * (LOW + HIGH)))
     seen = seen_clouds(clouds)
@@ -91,9 +83,6 @@ def test_opacity_is_the_sum_over_the_grid(variant):
 
 @pytest.mark.claim("hypertexture-refused", tolerance="none: an error and its words")
 def test_what_is_no_density_is_refused_by_name(variant):
-    import mitsuba as mi
-
-    from analytic.errors import InputError
 
     wrong = ROUGH.copy()
     wrong[3, 2, 1] = -1e-3

@@ -5,18 +5,26 @@ import math
 from dataclasses import replace
 from functools import reduce
 
+import mitsuba as mi
 import numpy as np
 import pytest
-from scipy.stats import chi2, norm
+from scipy.stats import chi2, norm, t
+
+from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
+from realtime.clouds.slab_orders.radiance import slab_radiance
+from reference.monte_carlo.batches import merged
+from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch
+from reference.monte_carlo.cloud_paths.opacity import seen_clouds
+from reference.monte_carlo.volpath.orders import volpath_orders_batch
+from reference.scene.clouds import read_clouds
+from validation.scenes.loading import load_scene
+from validation.scenes.meshes import grid
+from validation.scenes.parts import camera, mitsuba_mesh, sky, sun
 
 SETS = [("1", (1, 1)), ("2", (2, 2)), ("3-4", (3, 4)), ("5-inf", (5, math.inf))]
 
 
 def paths(clouds, count, samples, sets=SETS, first=0):
-    from reference.monte_carlo.batches import merged
-    from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch
-    from reference.monte_carlo.cloud_paths.opacity import seen_clouds
-
     seen = seen_clouds(clouds).meets
     return reduce(
         merged, (cloud_paths_batch(clouds, seed, samples, sets=sets, seen=seen) for seed in range(first, first + count))
@@ -41,9 +49,6 @@ def ball(sigma_t, albedo, phase, centre=(0.0, 0.0, 0.0), radius=1.3):
 
 
 def scene(**parts):
-    import mitsuba as mi
-
-    from validation.scenes.parts import camera, sun
 
     usual = {
         "type": "scene",
@@ -54,9 +59,6 @@ def scene(**parts):
 
 
 def scenes():
-    from validation.scenes.meshes import grid
-    from validation.scenes.parts import mitsuba_mesh, sky, sun
-
     hg = {"type": "hg", "g": 0.6}
     ground = mitsuba_mesh("ground", grid((-9, -9, -1.7), (18, 0, 0), (0, 18, 0), (1, 1)), (0.7, 0.5, 0.3))
     block = mitsuba_mesh("block", grid((0.0, -0.6, -0.6), (1.1, 0.2, 0), (0.1, 0.0, 1.1), (1, 1)), (0.6, 0.6, 0.2))
@@ -104,10 +106,6 @@ def z_of(first, second, layer):
 )
 def test_every_order_is_that_of_volpath(variant, name):
     """Sky, several suns and clouds, phase functions, colours, and surfaces below and within clouds."""
-    from reference.monte_carlo.batches import merged
-    from reference.monte_carlo.volpath.orders import volpath_orders_batch
-    from reference.scene.clouds import read_clouds
-
     clouds = read_clouds(scene(**scenes()[name]))
     sets, batches = [("1", (1, 1)), ("2-inf", (2, math.inf))], 32  # few sets: each compiles a kernel of Mitsuba
     ours = paths(clouds, batches, 256, sets)
@@ -128,9 +126,6 @@ def slab_rays():
 
 def slab_clouds():
     """Return the built-in slab, seen along `slab_rays`."""
-    from reference.scene.clouds import read_clouds
-    from validation.scenes.loading import load_scene
-
     clouds = read_clouds(load_scene("cloud-slab", (4, 3)).scene)
     travels = clouds.suns[0].direction
     forward = travels[:2] / np.linalg.norm(travels[:2])
@@ -144,9 +139,6 @@ def slab_clouds():
 
 def slab_truth(clouds):
     """Return the radiance of the slab along `slab_rays`; another test holds `slab_radiance` against DISORT."""
-    from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
-    from realtime.clouds.slab_orders.radiance import slab_radiance
-
     cloud, sun = clouds.clouds[0], clouds.suns[0]
     tau, g = float(cloud.sigma_t[1]) * 291.7, cloud.phase.g
     directions = [(mu, math.radians(phi)) for mu, phi in slab_rays()]
@@ -178,8 +170,6 @@ def test_the_slab_is_that_of_disort(variant):
 )
 def test_standard_errors_cover_the_truth_as_often_as_they_say(variant):
     """24 runs of 12 directions: 288 intervals, of which 88.7 % to 98 % hold by chance at a level of 1e-4 or so."""
-    from scipy.stats import t
-
     clouds = slab_clouds()
     truth = slab_truth(clouds)[:, 1]
     held = []
@@ -207,8 +197,6 @@ def test_order_one_is_its_integral(variant):
 
 
 def test_layers_add_up_and_seeds_give_the_same_numbers(variant):
-    from reference.scene.clouds import read_clouds
-
     loaded = scene(cloud=ball((1.1,) * 3, (1.0,) * 3, {"type": "isotropic"}))
     clouds = read_clouds(loaded)
     one, two = paths(clouds, 2, 16), paths(clouds, 2, 16)

@@ -3,8 +3,16 @@
 
 import math
 
+import mitsuba as mi
 import numpy as np
 import pytest
+
+from reference.monte_carlo.cloud_paths.integrator import SIDE
+from reference.monte_carlo.cloud_paths.tables import walk_scene
+from reference.monte_carlo.cloud_paths.walk import Targets, walk
+from reference.scene.clouds import read_clouds
+from validation.scenes.parts import sun as light
+from validation.scenes.registry import SCENES
 
 COLUMNS = 32
 PERIODS, WIDTH, THICKNESS = 9, 500.0, 250.0  #: of the cloud, widths [m]
@@ -18,10 +26,6 @@ CONSENSUS = {
 
 def lit_from(sun):
     """Return the scene with the sun at a zenith angle [degrees]."""
-    import mitsuba as mi
-
-    from validation.scenes.parts import sun as light
-    from validation.scenes.registry import SCENES
 
     angle = math.radians(sun)
     own = {"sun": light((math.sin(angle), 0.0, -math.cos(angle)), (math.pi,) * 3)}
@@ -30,8 +34,6 @@ def lit_from(sun):
 
 def rays_from_above(paths, seed):
     """Return rays into the middle period, as many in each column, that gather a flux: by the cosine law."""
-    import mitsuba as mi
-
     random = np.random.default_rng(seed)
     x = (np.arange(paths) % COLUMNS + random.random(paths)) * (500.0 / COLUMNS)
     cosine, azimuth = np.sqrt(random.random(paths)), 2 * np.pi * random.random(paths)
@@ -47,12 +49,6 @@ def reflectance(radiance, sun):
 
 
 def by_walk(scene, paths, seed):
-    import mitsuba as mi
-
-    from reference.monte_carlo.cloud_paths.integrator import SIDE
-    from reference.monte_carlo.cloud_paths.tables import walk_scene
-    from reference.monte_carlo.cloud_paths.walk import Targets, walk
-    from reference.scene.clouds import read_clouds
 
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, paths)
@@ -65,8 +61,6 @@ def by_walk(scene, paths, seed):
 
 def as_grid(scene):
     """Return the cloud as one box of a `heterogeneous` medium: `volpath` would leap over the gaps between boxes."""
-    import mitsuba as mi
-
     grid = np.tile([THIN / THICKNESS, THICK / THICKNESS], PERIODS).astype(np.float32).reshape(1, 1, 2 * PERIODS, 1)
     to_world = mi.ScalarTransform4f().translate([-(PERIODS // 2) * WIDTH, -1200.0, 0.0])
     to_world = to_world @ mi.ScalarTransform4f().scale([PERIODS * WIDTH, 2400.0, THICKNESS])
@@ -95,8 +89,6 @@ def as_grid(scene):
 
 
 def by_volpath(scene, paths, seed):
-    import mitsuba as mi
-
     scene = as_grid(scene)
     integrator = mi.load_dict({"type": "volpath", "max_depth": -1, "rr_depth": 1 << 20})
     sampler = mi.load_dict({"type": "independent"})

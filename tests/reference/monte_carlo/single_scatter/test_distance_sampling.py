@@ -6,11 +6,22 @@ that are short, endless, thin or many mean free paths thick, and the spans that 
 """
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
 from realtime.numerics.aligned import aligned_array
+from reference.monte_carlo.single_scatter import distance_sampling as ds
+from reference.monte_carlo.single_scatter.distance_sampling import (
+    Span,
+    _terms,
+    closest_approach,
+    cone_ends,
+    equi_angular_range,
+    mixture_of,
+    sample_distance,
+)
 
 SPANS = {  # height, start, length, extinctions
     "light ahead": (0.7, -3.1, 7.3, [0.31]),
@@ -32,42 +43,29 @@ CELLS = 101
 
 
 def _span(case):
-    import mitsuba as mi
-
-    from reference.monte_carlo.single_scatter.distance_sampling import Span
 
     height, start, length, _ = SPANS[case]
     return Span(*(dr.opaque(mi.Float64, value) for value in (height, start, length)))
 
 
 def _mixture(case):
-    import mitsuba as mi
-
-    from reference.monte_carlo.single_scatter.distance_sampling import mixture_of
 
     return mixture_of(_span(case), [dr.opaque(mi.Float64, rate) for rate in SPANS[case][3]])
 
 
 def equi_angular_pdf(y, span):
     """Return the density of `equi_angular` at y [1/m]."""
-    from reference.monte_carlo.single_scatter.distance_sampling import equi_angular_range
-
     s = span.start + y
     return span.height / (equi_angular_range(span) * (span.height * span.height + s * s))
 
 
 def mixture_cdf(y, mixture):
     """Return the probability that `sample_distance` stays below y."""
-    from reference.monte_carlo.single_scatter.distance_sampling import _terms
-
     return sum(cdf for cdf, _ in _terms(y, mixture))
 
 
 def _technique(case, name):
     """Return a sampler of u and a density of y of one technique."""
-    import mitsuba as mi
-
-    from reference.monte_carlo.single_scatter import distance_sampling as ds
 
     if name == "equi-angular":
         return lambda u: ds.equi_angular(u, _span(case)), lambda y: equi_angular_pdf(y, _span(case))
@@ -80,8 +78,6 @@ def _technique(case, name):
 
 def _edges(case, sample):
     """Return cells that hold about equal shares of the samples and of the length, to the end of the span."""
-    import mitsuba as mi
-
     length = SPANS[case][2]
     shares = np.array(sample(aligned_array(mi.Float64, np.arange(1, CELLS) / CELLS)), dtype=np.float64)
     return np.concatenate([[0.0], np.unique(shares), [length]])
@@ -89,8 +85,6 @@ def _edges(case, sample):
 
 def _probabilities(edges, density):
     """Integrate a density over cells by the tanh-sinh rule, whose nodes crowd at the ends, where the peaks are."""
-    import mitsuba as mi
-
     step = 0.05
     k = step * np.arange(-80, 81)
     v = 1 / (1 + np.exp(-np.pi * np.sinh(k)))
@@ -106,8 +100,6 @@ def _probabilities(edges, density):
 
 
 def _p_value(case, name, *, sample=None, density=None, seed=0):
-    import mitsuba as mi
-
     own_sample, own_density = _technique(case, name)
     sample, density = sample or own_sample, density or own_density
     edges = _edges(case, own_sample)
@@ -145,9 +137,6 @@ def test_mixture_is_inverted(variant):
 
     Setup: random spans over many orders of magnitude, endless ones among them.
     """
-    import mitsuba as mi
-
-    from reference.monte_carlo.single_scatter.distance_sampling import Span, mixture_of, sample_distance
 
     rng = np.random.default_rng(5)
     n = 20000
@@ -173,9 +162,6 @@ def test_spots_cone_is_covered(variant):
 
     Setup: random rays and cones; points on the ray inside the cone, by the angle to the axis in plain NumPy.
     """
-    import mitsuba as mi
-
-    from reference.monte_carlo.single_scatter.distance_sampling import closest_approach, cone_ends
 
     rng = np.random.default_rng(11)
     n = 400

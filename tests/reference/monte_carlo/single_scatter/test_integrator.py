@@ -1,9 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The integrator `single-scatter` against everything that leads to the same radiance without its code."""
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
+from scipy.stats import t
 
+from analytic.errors import InputError
+from reference.monte_carlo.batches import merged
+from reference.monte_carlo.single_scatter.estimator import ray_light
+from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+from reference.monte_carlo.single_scatter.scene_data import read_task
+from reference.monte_carlo.single_scatter.stretches import double_ray
+from reference.quadrature.image import quadrature_image
+from reference.scene.read import read_truth
 from tests.helpers import airlight_sum
 from tests.helpers.scenes import spot, tiny_scene
 
@@ -11,16 +22,10 @@ _BATCHES = 32
 
 
 def _load(**changes):
-    import mitsuba as mi
-
     return mi.load_dict(tiny_scene(**changes))
 
 
 def _run(scene, *, samples=64, first_seed=0, batches=_BATCHES):
-    from reference.monte_carlo.batches import merged
-    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-    from reference.scene.read import read_truth
-
     truth = read_truth(scene)
     done = single_scatter_batch(truth, first_seed, samples)
     for seed in range(first_seed + 1, first_seed + batches):
@@ -30,12 +35,6 @@ def _run(scene, *, samples=64, first_seed=0, batches=_BATCHES):
 
 def _along(scene, origin, direction, *, samples, seed, medium=None):
     """Return airlight and surface along rays, (rays, 3) each."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from reference.monte_carlo.single_scatter.estimator import ray_light
-    from reference.monte_carlo.single_scatter.scene_data import read_task
-    from reference.monte_carlo.single_scatter.stretches import double_ray
 
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, len(direction))
@@ -52,8 +51,6 @@ def _mean_and_error(scene, origin, direction, *, medium=None, batches=24, sample
 
 def _assert_agrees(mean, error, expected, *, batches, largest_error):
     """Assert that no value is off by more than chance, family level 1e-4, and that the run could have seen a bias."""
-    from scipy.stats import t
-
     lit = expected > 0
     assert np.all(mean[~lit] == 0)
     # Rounding in single precision: 3e-6 of a value, to be seen where the sampling error is smaller still.
@@ -97,9 +94,6 @@ def test_agrees_with_the_quadrature(variant, name):
     Expected: each pixel within its error at a family level of 1e-4, pooled bias within four standard errors, and those
     below 0.1 %; surfaces, which need no sampling, to the rounding of single precision.
     """
-    from reference.quadrature.image import quadrature_image
-    from reference.scene.read import read_truth
-
     scene = _load(**_case(name))
     truth = quadrature_image(read_truth(scene))
     batches = _run(scene)
@@ -118,8 +112,6 @@ def test_agrees_with_the_quadrature(variant, name):
 
 def _box_and_sphere(lamp):
     """Return a scene of two bounded media, coloured fog in a box and grey fog in a sphere, over a wall, with a lamp."""
-    import mitsuba as mi
-
     transform = mi.ScalarTransform4f()
     return mi.load_dict(
         {
@@ -240,8 +232,5 @@ def test_enclosed_light_gives_exactly_zero(variant):
     ],
 )
 def test_unsupported_scenes_are_refused_by_name(variant, changes, words):
-    from analytic.errors import InputError
-    from reference.monte_carlo.single_scatter.scene_data import read_task
-
     with pytest.raises(InputError, match=words):
         read_task(_load(**changes), None, 1)

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
+import drjit as dr
+import mitsuba as mi
 import pytest
 
+from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.scene.read import read_truth
 from tests.helpers.scenes import tiny_scene
 from tests.helpers.volpath import assert_volpath_agrees
 
 
 @pytest.fixture(scope="module")
 def truth(variant):
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
 
     return read_truth(mi.load_dict(tiny_scene()))
 
@@ -22,9 +23,6 @@ def test_one_kernel_serves_any_number_of_samples(truth):
 
 def _large_kernels(truth, *, samples, seed=0):
     """Return the hashes of the kernels of a batch that trace paths, in the order of their launches."""
-    import drjit as dr
-
-    from reference.monte_carlo.volpath.integrator import volpath_batch
 
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
         dr.kernel_history_clear()
@@ -41,9 +39,6 @@ def test_agrees_with_the_quadrature(variant, colour):
     Setup: sphere and floor, 16 x 12 pixels, 32 batches of 256 samples, shadow-ray epsilon corrected.
     Expected: pooled relative bias within four standard errors (a false alarm in 16 000 runs), which are below 2 %.
     """
-    import mitsuba as mi
-
-    from reference.scene.read import read_truth
 
     fog = tiny_scene()["fog"]
     if colour == "coloured":

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The published mesh of a light volume is closed, whatever its levels of detail."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.methods.light_volumes.published.mesh import volume_mesh
+from realtime.scene.read_scene import read_scene
+from realtime.shadow_maps.shadow_map import cast_shadow_map
 from tests.helpers.scenes import spot, tiny_scene
 
 
 def map_of(kind: str, size: int):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-    from realtime.shadow_maps.shadow_map import cast_shadow_map
 
     scene = read_scene(mi.load_dict(tiny_scene(**({"lamp": spot()} if kind == "spot" else {}))))
     return cast_shadow_map(scene.geometry, scene.lights[0], size), scene.lights[0]
@@ -33,8 +33,6 @@ def assert_closed(mesh):
 @pytest.mark.parametrize("size", [4, 32])
 @pytest.mark.parametrize("tessellation", ["static", "adaptive"])
 def test_mesh_is_closed(variant, kind, size, tessellation):
-    from realtime.methods.light_volumes.published.mesh import volume_mesh
-
     shadow_map, light = map_of(kind, size)
     mesh = volume_mesh(shadow_map, light, tessellation=tessellation)
     assert_closed(mesh)

@@ -7,6 +7,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from realtime.methods.light_volumes.published.mesh import VolumeMesh
+from realtime.methods.light_volumes.published.raster import signed_crossings
 from tests.helpers.volumes import light_pyramid, make_camera, simple_camera, tetrahedron
 
 
@@ -30,8 +31,6 @@ def winding_number(mesh: VolumeMesh, point) -> int | None:
 
 
 def check_signs(mesh: VolumeMesh, camera) -> None:
-    from realtime.methods.light_volumes.published.raster import signed_crossings
-
     inside = winding_number(mesh, np.array(camera.origin).ravel())
     if inside is None:
         return
