@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from validation.scenes.meshes import rotation
 from validation.scenes.random.ranges import ranges_from
 from validation.scenes.random.scene import draw_stage
 
@@ -32,8 +33,6 @@ def test_no_caster_holds_the_camera_or_a_light_unless_meant_to(scenes):
 
 
 def test_all_lie_on_one_side_of_floor_and_wall(scenes):
-    from validation.scenes.meshes import rotation
-
     for drawn in scenes:
         near = [light.position for light in drawn.lights if light.kind != "directional"]
         for caster in drawn.casters:

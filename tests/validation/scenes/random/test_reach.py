@@ -3,9 +3,11 @@
 
 from dataclasses import replace
 
+import mitsuba as mi
 import numpy as np
 
 from validation.scenes.meshes import grid
+from validation.scenes.parts import mitsuba_mesh
 from validation.scenes.random.lights import Light
 from validation.scenes.random.ranges import ranges_from
 from validation.scenes.random.scene import Camera, draw_stage, reach
@@ -13,9 +15,6 @@ from validation.scenes.random.scene import Camera, draw_stage, reach
 
 def found(*meshes):
     """What light reaches of a stage about the origin of radius 1 under a lamp, with casters."""
-    import mitsuba as mi
-
-    from validation.scenes.parts import mitsuba_mesh
 
     camera = Camera(np.array([0.0, -4.0, 0.1]), np.zeros(3), 47.0, "endless", False)
     lamp = Light("light-1", "point", np.array([0.0, 0.3, 5.0]), np.zeros(3), np.ones(3), 1.0)
