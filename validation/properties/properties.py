@@ -1,116 +1,110 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The properties of a scene by name: finite numbers, none of which depends on a unit of length."""
+"""Properties of a scene: numbers that say what it holds. Sweeps keep them beside errors and times.
 
+Distances are shares of others, so that none depends on the unit of length. A share of light is that of 6144 points on a
+grid of camera rays.
+"""
+
+from collections.abc import Callable, Mapping
+
+import drjit as dr
+import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
+from realtime.errors import InputError
+from realtime.methods.shadow_planes.silhouettes import silhouette
+from realtime.scene.mesh_adjacency import read_casters
+from realtime.scene.phase import Phase
 from realtime.scene.read_scene import Scene
-from validation.properties.lights import caster_properties
-from validation.properties.media import optical_depth, phase_properties
-from validation.properties.view import LightPlace, SeenView, light_places, lit_points, see
+from validation.properties.view import SeenView, optical_depth, see
 
-Array = NDArray[np.float64]
+_COSINES = 4096
+
+#: Each with its words, and how it follows from what the camera sees.
+PROPERTIES: Mapping[str, tuple[str, Callable[[SeenView], float]]] = {
+    "lights": ("number of lights", lambda view: len(view.lights)),
+    "points": ("number of point lights", lambda view: _count(view, "point")),
+    "spots": ("number of spot lights", lambda view: _count(view, "spot")),
+    "directionals": ("number of directional lights", lambda view: _count(view, "directional")),
+    "areas": ("number of area lights", lambda view: _count(view, "area")),
+    "light_size": ("size of the largest area light from the middle of the view", lambda view: _light_size(view)),
+    "light_nearest": ("distance of the nearest light", lambda view: _light_nearest(view)),
+    "bounded": ("number of bounded media", lambda view: len(view.scene.medium.bounded_media)),
+    "optical_depth": ("optical depth", lambda view: float(optical_depth(view.scene, view.origin, view.ends).mean())),
+    "optical_depth_light": ("optical depth from the light", lambda view: _light_depth(view)),
+    "mean_cosine": ("mean cosine of scattering", lambda view: _mean_cosine(view.scene)),
+    "surface_share": ("share of pixels with surfaces", lambda view: float(np.isfinite(view.depth).mean())),
+    "lit_share": ("share of lit points", lambda view: float(view.lit.mean())),
+    "shadow_edges": ("shadow edges along a ray", lambda view: float(np.diff(view.lit).sum(axis=(0, 3)).mean())),
+    "triangles": ("number of triangles", lambda view: sum(each.face_count() for each in _meshes(view.scene))),
+    "silhouettes": ("silhouette edges", lambda view: _silhouettes(view)),
+    "pixels": ("pixels", lambda view: view.scene.camera.width * view.scene.camera.height),
+}
 
 
 def scene_properties(scene: Scene) -> dict[str, float]:
-    """Return what a scene holds.
-
-    Parameters
-    ----------
-    scene
-        As `realtime.scene.read_scene.read_scene` returned it, at the size of its image.
-
-    Returns
-    -------
-    dict
-        By name. Lights: `lights`, `points`, `spots`, `directionals`, `areas`, `soft_spots` (whether there are any),
-        `light_size` (the largest half angle at which a light with extent is seen from the middle of the view [rad]),
-        `light_nearest` (the distance from the camera of the nearest light that has a place, over the median depth),
-        `light_ray` (the least distance of such a light to a ray of the image, over its distance from the camera),
-        `lights_seen` (how many are in the image, unless a surface hides them). Media: `extinctions` (1 or 3),
-        `endless`, `bounded`, `facets` of bounds, `inside` (whether the camera is in a bounded medium), `optical_depth`
-        and `optical_depth_most` of the rays, `optical_depth_light` from the middle of the view to the nearest light,
-        `mean_cosine`, `forward`. Surfaces and shadows: those of `caster_properties`, `surface_share` of the pixels,
-        `depth_edges` (mean difference of the logarithm of neighbouring depths), `lit_share` of the points on rays,
-        `shadow_edges` (mean number of changes between light and shadow along a ray, of all lights together),
-        `shadow_edges_across` (mean share of points that another light reaches than the next ray's). Image: `pixels`.
-    """
-    lights = light_places(scene)
-    view = see(scene, lights)
-    properties = _light_properties(lights, view)
-    properties |= _medium_properties(scene, lights, view)
-    properties |= caster_properties(scene, lights)
-    properties |= _shadow_properties(scene, lights, view)
-    features = scene.features
-    properties["soft_spots"] = float(features.soft_spots)
-    properties["pixels"] = float(scene.camera.width * scene.camera.height)
-    return {name: float(value) for name, value in sorted(properties.items())}
+    """Return the properties of a scene by name, as `realtime.scene.read_scene.read_scene` returned it."""
+    view = see(scene)
+    return {name: float(value(view)) for name, (_, value) in sorted(PROPERTIES.items())}
 
 
-def _light_properties(lights: list[LightPlace], view: SeenView) -> dict[str, float]:
-    kinds = [light.kind for light in lights]
-    depth = float(np.median(view.ends))
-    near = [light for light in lights if light.kind != "directional"]
-    middle = view.origin + 0.5 * depth * view.directions[view.depth.shape[0] // 2, view.depth.shape[1] // 2]
-    sizes = [np.arctan2(light.radius, np.linalg.norm(light.place - middle)) for light in near if light.kind == "area"]
-    distances = [float(np.linalg.norm(light.place - view.origin)) for light in near]
-    misses = [_miss(light, view) for light in near]
-    pixel = float(np.median(np.linalg.norm(np.diff(view.directions, axis=1), axis=-1)))
-    return {
-        "lights": float(len(lights)),
-        "points": float(kinds.count("point")),
-        "spots": float(kinds.count("spot")),
-        "directionals": float(kinds.count("directional")),
-        "areas": float(kinds.count("area")),
-        "light_size": float(max(sizes, default=0.0)),
-        # A light from infinity is nearest at infinity: a hundred depths stand for it.
-        "light_nearest": min([distance / depth for distance in distances], default=100.0),
-        "light_ray": float(min(misses, default=1.0)),
-        "lights_seen": float(sum(miss < pixel for miss in misses)),
-    }
+def _count(view: SeenView, kind: str) -> int:
+    return sum(light.kind == kind for light in view.lights)
 
 
-def _miss(light: LightPlace, view: SeenView) -> float:
-    """Return the least distance of a light to the rays, over its distance from the camera."""
-    way = light.place - view.origin
-    length = float(np.linalg.norm(way))
-    along = np.clip(view.directions @ way, 0, view.ends)
-    nearest = np.linalg.norm(way - along[..., None] * view.directions, axis=-1)
-    return float(np.clip(nearest.min() / max(length, 1e-30), 1e-4, 1.0))
-
-
-def _medium_properties(scene: Scene, lights: list[LightPlace], view: SeenView) -> dict[str, float]:
-    medium = scene.medium
-    ends = view.origin + view.ends[..., None] * view.directions
-    depths = optical_depth(scene, np.broadcast_to(view.origin, ends.shape), ends)
-    middle = view.origin + 0.5 * float(np.median(view.ends)) * view.directions[len(ends) // 2, ends.shape[1] // 2]
-    places = [middle + light.place * view.reach if light.kind == "directional" else light.place for light in lights]
-    inside = any(
-        np.linalg.norm(view.origin - np.array(each.centre, dtype=np.float64).ravel()) < float(each.radius[0])
-        for each in medium.bounded_media
+def _light_size(view: SeenView) -> float:
+    """Return the largest half angle at which an area light is seen from the middle of the view [rad]."""
+    areas = [light for light in view.lights if light.kind == "area"]
+    return max(
+        (float(np.arctan2(each.radius, np.linalg.norm(each.place - view.middle))) for each in areas), default=0.0
     )
-    return {
-        "extinctions": float(len(medium.sigma_t)),
-        "endless": float(not medium.clear),
-        "bounded": float(len(medium.bounded_media)),
-        "facets": float(sum(each.count for each in medium.bounded_media)),
-        "inside": float(inside),
-        "optical_depth": float(depths.mean()),
-        "optical_depth_most": float(depths.max()),
-        "optical_depth_light": float(min(optical_depth(scene, middle, place) for place in places)),
-        **phase_properties(scene),
-    }
 
 
-def _shadow_properties(scene: Scene, lights: list[LightPlace], view: SeenView) -> dict[str, float]:
-    lit = [lit_points(scene.geometry, light, view.points) for light in lights]
-    along = sum(np.diff(each.astype(np.int8), axis=2).astype(bool).sum(axis=2).mean() for each in lit)
-    across = sum(np.diff(each.astype(np.int8), axis=1).astype(bool).mean() for each in lit)
-    depth = np.log(view.ends)
-    return {
-        "surface_share": float(np.isfinite(view.depth).mean()),
-        "depth_edges": float(np.abs(np.diff(depth, axis=1)).mean()) if depth.shape[1] > 1 else 0.0,
-        "lit_share": float(np.mean([each.mean() for each in lit])),
-        "shadow_edges": float(along),
-        "shadow_edges_across": float(across),
-    }
+def _light_nearest(view: SeenView) -> float:
+    """Return the least distance of a light from the camera over the median depth, 100 where all are at infinity."""
+    near = [light.place for light in view.lights if light.kind != "directional"]
+    return min((float(np.linalg.norm(place - view.origin)) / view.median for place in near), default=100.0)
+
+
+def _light_depth(view: SeenView) -> float:
+    """Return the least optical depth from the middle of the view to a light."""
+    directional = [light.kind == "directional" for light in view.lights]
+    places = [
+        view.middle + light.place * view.reach if far else light.place
+        for light, far in zip(view.lights, directional, strict=True)
+    ]
+    return min(float(optical_depth(view.scene, view.middle, place)) for place in places)
+
+
+def _mean_cosine(scene: Scene) -> float:
+    """Return the mean cosine of the phase function that is farthest from isotropic."""
+    media = [bounded.medium for bounded in scene.medium.bounded_media]
+    phases = [medium.phase for medium in ([] if scene.medium.clear else [scene.medium]) + media]
+    return max((_cosine_of(phase) for phase in phases), key=abs, default=0.0)
+
+
+def _cosine_of(phase: Phase) -> float:
+    if phase.constant:
+        return 0.0
+    # Denser forward, where lobes are: cos = 1 - 2 s^3.
+    s = (np.arange(_COSINES) + 0.5) / _COSINES
+    cosine, weight = 1 - 2 * s**3, 6 * s**2 / _COSINES
+    values = np.array(phase.evaluate(mi.Float(cosine)), dtype=np.float64)
+    dr.sync_thread()
+    return float(np.sum(weight * values * cosine) / np.sum(weight * values))
+
+
+def _meshes(scene: Scene) -> list:
+    lamps = {light.name for light in scene.area_lights}
+    return [shape for shape in scene.geometry.shapes() if shape.is_mesh() and shape.id() not in lamps]
+
+
+def _silhouettes(view: SeenView) -> float:
+    """Return the silhouette edges of all lights together, 0 where shapes have none."""
+    try:
+        casters = read_casters(view.scene.geometry, view.scene.area_lights)
+    except InputError:
+        return 0.0
+    weights = [0.0 if light.kind == "directional" else 1.0 for light in view.lights]
+    ends = [np.append(light.place, weight) for light, weight in zip(view.lights, weights, strict=True)]
+    return float(sum(len(silhouette(casters, end).edges) for end in ends))

@@ -2,6 +2,7 @@
 """What the camera sees of a scene: depths along a grid of rays, and which points on them the lights reach."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import drjit as dr
@@ -9,7 +10,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.scene.camera import Camera, read_camera, resized_camera
+from realtime.scene.camera import read_camera, resized_camera
+from realtime.scene.medium import BoundedMedium, Medium
 from realtime.scene.read_scene import Scene
 
 Array = NDArray[np.float64]
@@ -40,28 +42,51 @@ class LightPlace:
 
 @dataclass(frozen=True)
 class SeenView:
-    """A grid of camera rays."""
+    """A grid of camera rays in a scene."""
 
+    scene: Scene
+    lights: tuple[LightPlace, ...]
     origin: Array  #: (3,) [m]
     directions: Array  #: unit vectors, (rows, columns, 3)
     depth: Array  #: distance of the surface, infinite where there is none, (rows, columns) [m]
     reach: float  #: how far rays without a surface are followed [m]
 
     @property
-    def ends(self) -> Array:
-        """Where rays end, (rows, columns) [m]."""
+    def lengths(self) -> Array:
+        """Lengths of the rays, (rows, columns) [m]."""
         return np.minimum(self.depth, self.reach)
+
+    @property
+    def ends(self) -> Array:
+        """Where rays end, (rows, columns, 3) [m]."""
+        return self.origin + self.lengths[..., None] * self.directions
 
     @property
     def points(self) -> Array:
         """Points in the middle of equal steps, (rows, columns, STEPS, 3) [m]."""
         share = (np.arange(STEPS) + 0.5) / STEPS
-        return self.origin + (self.ends[..., None] * share)[..., None] * self.directions[:, :, None]
+        return self.origin + (self.lengths[..., None] * share)[..., None] * self.directions[:, :, None]
+
+    @cached_property
+    def lit(self) -> NDArray[np.bool_]:
+        """Which of the points each light reaches, (lights, rows, columns, STEPS)."""
+        return np.array([lit_points(self.scene.geometry, light, self.points) for light in self.lights])
+
+    @property
+    def median(self) -> float:
+        """The median length of the rays [m]."""
+        return float(np.median(self.lengths))
+
+    @property
+    def middle(self) -> Array:
+        """A point half of the median length ahead, (3,) [m]."""
+        rows, columns = self.depth.shape
+        return np.asarray(self.origin + 0.5 * self.median * self.directions[rows // 2, columns // 2])
 
 
-def light_places(scene: Scene) -> list[LightPlace]:
-    """Return the lights of a scene, those with extent last."""
-    places = []
+def light_places(scene: Scene) -> tuple[LightPlace, ...]:
+    """Return the lights of a scene, area lights last."""
+    places: list[LightPlace] = []
     for light in scene.lights:
         if light.extent is not None:
             places.append(LightPlace("directional", -_host(light.axis)))
@@ -75,31 +100,28 @@ def light_places(scene: Scene) -> list[LightPlace]:
         flat = None if wide.kind == "sphere" else wide.normal
         radius = float(np.linalg.norm(wide.across + wide.up)) if wide.kind == "rectangle" else wide.radius
         places.append(LightPlace("area", wide.middle, radius, flat))
-    return places
+    return tuple(places)
 
 
 def _host(vector: Any) -> Array:
     return np.array(vector, dtype=np.float64).ravel()
 
 
-def grid_camera(scene: Scene, grid: tuple[int, int] = GRID) -> Camera:
-    """Return the camera of a scene with a pixel for each ray of a grid, or its own where these are fewer."""
-    return resized_camera(scene.camera, min(grid[0], scene.camera.width), min(grid[1], scene.camera.height))
-
-
-def see(scene: Scene, lights: list[LightPlace]) -> SeenView:
+def see(scene: Scene) -> SeenView:
     """Cast a grid of camera rays; those that meet nothing are followed as far as all lights and bounds lie."""
-    camera = read_camera(grid_camera(scene))
+    grid = min(GRID[0], scene.camera.width), min(GRID[1], scene.camera.height)
+    camera = read_camera(resized_camera(scene.camera, *grid))
     across = (0.5 * (camera.width - 1) - np.arange(camera.width))[None, :, None] * camera.left
     upwards = (0.5 * (camera.height - 1) - np.arange(camera.height))[:, None, None] * camera.up
     directions = camera.forward + across + upwards
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
     depth = distance(scene.geometry, np.broadcast_to(camera.origin, directions.shape), directions)
+    lights = light_places(scene)
     far = [float(np.linalg.norm(light.place - camera.origin)) for light in lights if light.kind != "directional"]
     for bounded in scene.medium.bounded_media:
         far.append(float(np.linalg.norm(_host(bounded.centre) - camera.origin)) + float(bounded.radius[0]))
     far += [float(value) for value in depth[np.isfinite(depth)]]
-    return SeenView(camera.origin, directions, depth, 1.5 * max(far, default=1.0))
+    return SeenView(scene, lights, camera.origin, directions, depth, 1.5 * max(far, default=1.0))
 
 
 def _rays(origin: Array, direction: Array, longest: Array | None = None) -> Any:
@@ -129,3 +151,30 @@ def lit_points(geometry: Any, light: LightPlace, points: Array) -> NDArray[np.bo
         blocked = geometry.ray_test(_rays(start, unit, np.maximum(longest, 0)))
         lit &= ~np.array(blocked, dtype=bool).reshape(lit.shape)
     return lit
+
+
+def _mean_extinction(medium: Medium) -> float:
+    """Return the mean extinction of the channels [1/m]."""
+    return float(np.mean([float(sigma_t[0]) for sigma_t in medium.sigma_t]))
+
+
+def optical_depth(scene: Scene, start: Array, end: Array) -> Array:
+    """Return the optical depth of segments, the mean of the channels; start and end (..., 3) [m]."""
+    way = end - start
+    length = np.linalg.norm(way, axis=-1)
+    outside, depth = length.copy(), np.zeros(length.shape)
+    for bounded in scene.medium.bounded_media:
+        chord = _chord(bounded, start, way, length)
+        outside = outside - chord
+        depth += chord * _mean_extinction(bounded.medium)
+    return depth + np.maximum(outside, 0) * _mean_extinction(scene.medium)
+
+
+def _chord(bounded: BoundedMedium, start: Array, way: Array, length: Array) -> Array:
+    centre, radius = np.array(bounded.centre, dtype=np.float64).ravel(), float(bounded.radius[0])
+    square = np.maximum(length**2, 1e-30)
+    from_centre = start - centre
+    middle = -np.sum(from_centre * way, axis=-1) / square
+    closest = np.sum((from_centre + middle[..., None] * way) ** 2, axis=-1)
+    reach = np.sqrt(np.maximum(radius**2 - closest, 0) / square)
+    return length * np.maximum(np.minimum(middle + reach, 1) - np.maximum(middle - reach, 0), 0)
