@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What becomes of each scene file of a folder: taken, or refused with which words."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from analytic.errors import InputError
+from realtime.errors import InputError as RealtimeInputError
+from reports.interchange.scene import describe_scene
+from reports.machine.mitsuba_log import collected_notes
+from reports.tables.table import Column, Table, table
+from validation.scenes.loading import load_scene
+
+COLUMNS = (
+    Column("file", "file", words=True),
+    Column("outcome", "", words=True),
+    Column("words", "notes, or what stands in the way", words=True, long=True),
+)
+
+
+@dataclass(frozen=True)
+class FileOutcome:
+    """What became of a file."""
+
+    file: str  #: within the folder
+    outcome: str  #: 'taken', 'refused', or 'failed' where the program did not see why
+    words: str  #: notes of a file that was taken, else what stands in the way
+
+
+def describe_folder(folder: Path) -> list[FileOutcome]:
+    """Return what `describe` makes of each XML file in a folder and its folders.
+
+    Raises
+    ------
+    InputError
+        For a folder without XML files.
+    """
+    files = sorted(folder.rglob("*.xml"))
+    if not files:
+        raise InputError(f"scene: the folder {folder} holds no .xml file; wanted Mitsuba scene files")
+    return [_outcome(path, folder) for path in files]
+
+
+def _outcome(path: Path, folder: Path) -> FileOutcome:
+    name = path.relative_to(folder).as_posix()
+    try:
+        with collected_notes() as notes:
+            notes += describe_scene(load_scene(str(path)))["notes"]
+        return FileOutcome(name, "taken", "; ".join(dict.fromkeys(notes)))
+    except (InputError, RealtimeInputError) as reason:
+        return FileOutcome(name, "refused", str(reason).replace(str(path), path.name))
+    except Exception as error:  # a fault of the program, which a log of many files shall show and outlive
+        return FileOutcome(name, "failed", f"{type(error).__name__}: {' '.join(str(error).split())}")
+
+
+def folder_table(outcomes: list[FileOutcome]) -> Table:
+    """Return the log as a table."""
+    counts = {word: sum(each.outcome == word for each in outcomes) for word in ("taken", "refused", "failed")}
+    summed = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
+    return table(f"{len(outcomes)} scene files: {summed}", COLUMNS, [asdict(each) for each in outcomes])
+
+
+def folder_data(folder: Path, outcomes: list[FileOutcome]) -> dict[str, Any]:
+    """Return the log for JSON."""
+    return {"folder": str(folder), "files": [asdict(each) for each in outcomes]}
