@@ -4,7 +4,6 @@
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.views import MediaViews, media_views
 from realtime.errors import InputError
 from realtime.frame.surface import visible_triangle
 from realtime.methods.interface.view import View
@@ -27,7 +26,6 @@ def frame_view(
     lights: tuple[Light, ...],
     layout: Layout | None = None,
     tile: PerRay | None = None,
-    views: MediaViews | None = None,
 ) -> View:
     """Return what a method is given for some pixels; `distance` [m] is that to the visible surface.
 
@@ -38,10 +36,8 @@ def frame_view(
     shown = {"features": features, "geometry": geometry, "medium": medium, "lights": lights}
 
     def part():
-        # The planes of bounded media are written to a table, which no branch may do: so before there are parts.
-        views = media_views(medium, lights, camera.origin) if features.bounded else None
         return lambda pixel, distance, tile, layout: frame_view(
-            camera, pixel, distance, layout=layout, tile=tile, views=views, **shown
+            camera, pixel, distance, layout=layout, tile=tile, **shown
         )
 
     return View(
@@ -60,7 +56,6 @@ def frame_view(
         rays=_rays(camera, pixel),
         visible_triangle=lambda: visible_triangle(geometry, camera.origin, direction),
         part=part,
-        media_views=views,
     )
 
 

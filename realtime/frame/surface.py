@@ -6,7 +6,7 @@ Biri, Arques, Michelin 2006, section 5.1.2, with the extinction to the eye of eq
     L = rho I cos(theta_p) / (pi r_p^2) exp(-sigma_t r_p) exp(-sigma_t distance),
 
 zero where a shadow ray is blocked; of a directional light rho E cos(theta_p) / pi arrives at once. With bounded media
-both exponents are sums over the media that the two legs cross (`realtime.bounded_media.ray_segments`). A one-sided
+both exponents are sums over the media that the two legs cross (`realtime.bounded_media.pieces`). A one-sided
 surface is black from behind, as in Mitsuba's `diffuse`.
 """
 
@@ -17,7 +17,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.ray_segments import path_transmittance
+from realtime.bounded_media.pieces import path_transmittance
 from realtime.numerics.array_types import Metres, PerRay
 from realtime.numerics.fast_exp import exp_bounded
 from realtime.rays.ray_light import falloff, ray_geometry
@@ -137,7 +137,7 @@ def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light,
         What the light crosses and where it comes from.
     depths
         With bounded media, the optical depths of the camera rays, from
-        `realtime.bounded_media.ray_segments.optical_depths`.
+        `realtime.bounded_media.pieces.optical_depths`.
     shadows
         Whether to cast shadow rays; a method that finds out otherwise what is lit leaves them to that.
     """

@@ -12,7 +12,7 @@ from typing import Any
 
 import drjit as dr
 
-from realtime.bounded_media.ray_segments import camera_insides, optical_depths
+from realtime.bounded_media.pieces import camera_insides, optical_depths
 from realtime.frame.surface import Cast, cast_rays, lit_by_points, lit_surface, visible_surface
 from realtime.numerics.recorded import Frozen
 from realtime.scene.camera import ray_directions

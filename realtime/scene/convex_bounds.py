@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 
 _OUTWARDS = "normals that point outwards: change flip_normals, which a mirrored to_world of a mesh asks for too"
 _FLAT = 1e-5  # relative to the size of the body
+CELLS = 8  #: of directions along each axis, by which walks over the facets find a place to begin
 _SOME = 64  # triangles by which most shapes that are not convex are told at once
 _SAMPLES = 1 << 16  # pairs of points for the mean distance: its standard error is 0.2 %
 
@@ -159,6 +160,17 @@ def plane_neighbours(bounds: Bounds) -> NDArray[np.uint32]:
     for number, row in enumerate(rows):
         table[number, : len(row)] = row
     return table
+
+
+def radial_planes(bounds: Bounds) -> NDArray[np.uint32]:
+    """Return by cell of directions from the centre a plane that is met there; cells are `CELLS` along each axis."""
+    places = (np.arange(CELLS) + 0.5) * (2 / CELLS) - 1
+    z, y, x = np.meshgrid(places, places, places, indexing="ij")
+    along = np.stack([x, y, z], axis=-1).reshape(-1, 3) @ bounds.normals.T
+    distance = bounds.offsets - bounds.normals @ bounds.centre
+    with np.errstate(divide="ignore"):
+        at = np.where(along > 0, distance / along, np.inf)
+    return at.argmin(axis=1).astype(np.uint32)
 
 
 def holds(bounds: Bounds, point: Array) -> bool:

@@ -133,8 +133,8 @@ def _spheres(bounded_medium: BoundedMedium) -> Array:
     whole = np.array([[*centre, radius]])
     if bounded_medium.planes is None or bounded_medium.count > _FEW_PLANES:
         return whole
-    *normal, offsets = (np.array(column, dtype=np.float64).ravel() for column in bounded_medium.planes)
-    normals = np.column_stack(normal)
+    planes = np.array(bounded_medium.planes, dtype=np.float64).reshape(-1, 4)
+    normals, offsets = planes[:, :3], planes[:, 3] + planes[:, :3] @ centre
     corners = []
     for three in combinations(range(bounded_medium.count), 3):
         matrix = normals[list(three)]

@@ -28,13 +28,15 @@ class BoundedMedium:
     """A homogeneous medium within convex bounds (`realtime.scene.convex_bounds`)."""
 
     medium: Medium
-    planes: tuple[Any, ...] | None  #: components of the outward normals and offsets of half spaces; None for a sphere
+    planes: Any  #: four numbers a half space: its outward normal, and its distance from `centre` [m]; None for a sphere
     count: int  #: half spaces
     centre: Any  #: of the sphere, or of one that holds the medium [m]
     radius: Any  #: of that sphere [m]
     mean_distance: Any  #: R, see `realtime.scene.convex_bounds.mean_distance` [m]
     neighbours: Any = None  #: `sides` numbers a half space: planes that share an edge with it, or itself; None: sphere
+    beside: Any = None  #: `planes` of the neighbours
     sides: int = 0
+    starts: Any = None  #: by cell of directions a half space, see `realtime.scene.convex_bounds.radial_planes`
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,16 @@ from realtime.errors import InputError
 from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import ArrayTypes
 from realtime.scene.closed_mesh import ClosedMesh, check_bodies, encloses
-from realtime.scene.convex_bounds import Bounds, holds, mean_distance, overlap, plane_neighbours, read_bounds, touches
+from realtime.scene.convex_bounds import (
+    Bounds,
+    holds,
+    mean_distance,
+    overlap,
+    plane_neighbours,
+    radial_planes,
+    read_bounds,
+    touches,
+)
 from realtime.scene.density import DensityGrid, density_on_device, read_density
 from realtime.scene.medium import BoundedMedium, Clouds, Medium
 from realtime.scene.named_shapes import scene_of
@@ -229,11 +238,16 @@ def make_bounded_medium(medium: Medium, bounds: Bounds, types: ArrayTypes) -> Bo
     bounded_medium = BoundedMedium(medium, None, len(bounds.offsets), centre, radius, distance)
     if bounds.is_sphere:
         return bounded_medium
-    planes = tuple(aligned_array(types.scalar, column) for column in (*bounds.normals.T, bounds.offsets))
+    distances = bounds.offsets - bounds.normals @ bounds.centre
+    rows = np.column_stack([bounds.normals, distances])
     table = plane_neighbours(bounds)
     neighbours = aligned_array(mi.UInt32, table.ravel().astype(np.uint32))
-    dr.eval(neighbours, *planes)
-    return replace(bounded_medium, planes=planes, neighbours=neighbours, sides=table.shape[1])
+    starts = aligned_array(mi.UInt32, radial_planes(bounds))
+    planes, beside = (aligned_array(types.scalar, part.ravel()) for part in (rows, rows[table]))
+    dr.eval(neighbours, planes, beside, starts)
+    return replace(
+        bounded_medium, planes=planes, neighbours=neighbours, beside=beside, sides=table.shape[1], starts=starts
+    )
 
 
 def _clear(types: ArrayTypes) -> Medium:

@@ -29,7 +29,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.ray_segments import Piece
+from realtime.bounded_media.pieces import Piece
 from realtime.methods.froxel_fog.grid import Grid, trilinear
 from realtime.methods.froxel_fog.media import piece_length
 from realtime.methods.interface.view import View

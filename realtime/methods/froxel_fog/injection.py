@@ -23,7 +23,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.ray_segments import Piece, path_transmittance
+from realtime.bounded_media.pieces import Piece, path_transmittance
 from realtime.methods.froxel_fog.grid import Grid
 from realtime.methods.froxel_fog.light_points import LightPointTable
 from realtime.methods.froxel_fog.media import piece_length

@@ -9,7 +9,7 @@ from typing import Any
 
 import drjit as dr
 
-from realtime.bounded_media.ray_segments import Piece, camera_pieces
+from realtime.bounded_media.pieces import Piece, camera_pieces
 from realtime.methods.froxel_fog.grid import Grid
 from realtime.methods.interface.view import View
 from realtime.numerics.array_types import Metres
@@ -20,8 +20,7 @@ def column_pieces(view: View, grid: Grid, column: Any) -> tuple[Piece, ...]:
     if not view.features.bounded:
         return ()
     ray = grid.column_ray(column)
-    seen = view.media_views.camera if view.media_views else None
-    pieces = camera_pieces(view.medium, view.origin, ray * dr.rsqrt(dr.squared_norm(ray)), seen)
+    pieces = camera_pieces(view.medium, view.origin, ray * dr.rsqrt(dr.squared_norm(ray)))
     dr.eval([(piece.begin, piece.end) for piece in pieces])
     return pieces
 

@@ -4,7 +4,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from realtime.bounded_media.airlight import LitRay
+from realtime.bounded_media.airlight import MediaRay
 from realtime.kernels.registry import airlight_integral, gamma
 from realtime.methods.interface.view import View, bounded_radiance, radiance
 from realtime.rays.ray_light import RayGeometry, ray_geometry
@@ -18,7 +18,7 @@ def integral_type(view: View) -> Any:
 
 
 def ray_airlight(
-    view: View, light: Light, kernel, media: LitRay | None = None, *, geometry: Any = None
+    view: View, light: Light, kernel, media: MediaRay | None = None, *, geometry: Any = None
 ) -> "RayAirlight":
     """Return the airlight of a light along the rays of a view; `media` where they are bounded, `geometry` if known."""
     if geometry is None:
@@ -34,7 +34,7 @@ class RayAirlight:
     light: Light
     geometry: RayGeometry
     kernel: Any
-    media: LitRay | None  #: where media are bounded
+    media: MediaRay | None  #: where media are bounded
 
     @property
     def segment(self) -> tuple[Any, Any]:

@@ -21,7 +21,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.airlight import LitRay
+from realtime.bounded_media.airlight import MediaRay
 from realtime.methods.interface.view import View
 from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff, ray_geometry
 from realtime.scene.lights import Light
@@ -58,7 +58,7 @@ def equal_angles(foot: Any, height: Any, x0: Any, x1: Any) -> EqualAngles:
 
 
 def marched_integral(
-    view: View, light: Light, media: LitRay | None, *, steps: int, spacing: str, lit: Callable[[Any], Any]
+    view: View, light: Light, media: MediaRay | None, *, steps: int, spacing: str, lit: Callable[[Any], Any]
 ) -> Any:
     """Return the airlight integral of a light along every ray by midpoint steps.
 
@@ -94,7 +94,7 @@ def marched_integral(
     return _march(view, light, geometry, (x0, x1), steps=steps, spacing=spacing, lit=lit, media=media)
 
 
-def within(media: LitRay, x0, x1) -> tuple[Any, Any]:
+def within(media: MediaRay, x0, x1) -> tuple[Any, Any]:
     """Return the part of a segment [m] from the first to the last bounded medium; 0 and 0 where a ray meets none.
 
     An endless ray that meets none would begin at infinity, where a map has no place and a step no length.
@@ -109,7 +109,7 @@ def within(media: LitRay, x0, x1) -> tuple[Any, Any]:
 
 
 def _march(
-    view: View, light: Light, geometry: RayGeometry, segment, *, steps: int, spacing: str, lit, media: LitRay | None
+    view: View, light: Light, geometry: RayGeometry, segment, *, steps: int, spacing: str, lit, media: MediaRay | None
 ):
     """Sum the steps of every ray in one loop, so that the kernel does not grow with their number."""
     x0, x1 = segment
@@ -146,7 +146,7 @@ def _march(
     return total * width
 
 
-def _march_parallel(view: View, media: LitRay, segment, *, steps: int, lit):
+def _march_parallel(view: View, media: MediaRay, segment, *, steps: int, lit):
     """Sum equal steps of every ray under a directional light; see `_march`."""
     x0, x1 = segment
     Float = type(view.distance)

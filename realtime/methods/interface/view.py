@@ -7,9 +7,8 @@ from typing import Any
 
 import drjit as dr
 
-from realtime.bounded_media.airlight import LitRay, PlacedRay, check_form, lit_ray
-from realtime.bounded_media.ray_segments import camera_pieces
-from realtime.bounded_media.views import MediaViews
+from realtime.bounded_media.airlight import MediaRay, check_form, lit_ray
+from realtime.bounded_media.pieces import camera_pieces
 from realtime.errors import InputError
 from realtime.kernels.bounded import ConstantLeg, bounded_form
 from realtime.numerics.array_types import Metres, PerRay
@@ -43,7 +42,6 @@ class View:
     rays: Callable[[Any], tuple[Any, Any]]  #: lanes -> the directions of their rays, and their low parts
     visible_triangle: Callable[[], tuple[Any, Any, Any]]  #: -> corners [m], barycentric weights, whether there is one
     part: Callable[[], Callable[..., "View"]]  #: -> (pixel, distance, tile, layout) -> the view of some of the rays
-    media_views: MediaViews | None = None  #: of bounded media, where they are known before the rays
     surfaces: tuple[PerRay, ...] | None = (
         None  #: by light, what the visible surface sends back unshadowed, for a method that provides visibility
     )
@@ -58,7 +56,7 @@ def radiance(medium: Medium, light: Light, integral):
     return medium.albedo * light.intensity * (sigma_t * (integral * (0.25 * dr.inv_pi)))
 
 
-def rays_in_media(view: View, form: str = "kernel", *, kernel: Any = None) -> tuple[LitRay, ...]:
+def rays_in_media(view: View, form: str = "kernel", *, kernel: Any = None) -> tuple[MediaRay, ...]:
     """Return the rays of a view in bounded media, by light.
 
     Parameters
@@ -77,14 +75,11 @@ def rays_in_media(view: View, form: str = "kernel", *, kernel: Any = None) -> tu
         For what a published form refuses.
     """
     polynomial = media_polynomial(kernel)
-    pieces = camera_pieces(
-        view.medium, view.origin, view.direction, view.media_views.camera if view.media_views else None
-    )
+    pieces = camera_pieces(view.medium, view.origin, view.direction)
     place = {"origin": view.origin, "direction": view.direction, "low": view.direction_low}
-    light_views = view.media_views.lights if view.media_views else [None] * len(view.lights)
     return tuple(
-        _ray_in_media(view.medium, light, place, pieces=pieces, form=form, views=views, polynomial=polynomial)
-        for light, views in zip(view.lights, light_views, strict=True)
+        _ray_in_media(view.medium, light, place, pieces=pieces, form=form, polynomial=polynomial)
+        for light in view.lights
     )
 
 
@@ -98,7 +93,7 @@ def media_polynomial(kernel: Any) -> Any:
 
 def _ray_in_media(
     medium: Medium, light: Light, place: dict[str, Any], *, form: str, polynomial: Any, **known
-) -> LitRay:
+) -> MediaRay:
     if form == "kernel":
         form = "exact" if polynomial is None or not light.w else "paper"
         if form != "exact" and not medium.clear:
@@ -111,7 +106,7 @@ def _ray_in_media(
     if form == "exact":
         return lit_ray(medium, light, **place, form=form, **known)
     ray = lit_ray(medium, light, **place, form=form, polynomial=polynomial, **known)
-    if polynomial is not None and isinstance(ray, PlacedRay):
+    if polynomial is not None:
         # What it refuses must be raised here, not in a branch. Nothing is computed that nobody reads.
         zero = type(ray.geometry.height)(0)
         for bounded in medium.bounded_media:

@@ -28,7 +28,7 @@ from functools import partial
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.airlight import FORMS, LitRay, PlacedRay, ambient_radiance
+from realtime.bounded_media.airlight import FORMS, MediaRay, ambient_radiance
 from realtime.errors import InputError
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
@@ -242,7 +242,7 @@ def shadow_planes(
     """
     total = type(view.medium.albedo)(0)
     lit = []
-    in_media: tuple[LitRay, ...] = ()
+    in_media: tuple[MediaRay, ...] = ()
     if view.features.bounded:
         if parameters.evaluation == "vertex":
             check_vertices(view)
@@ -306,7 +306,7 @@ def _drawn(
 ):
     """Add up the Gammas of one light, in a buffer or not, and say whether it reaches the surface."""
     view, media = airlight.view, airlight.media
-    if not isinstance(media, PlacedRay) or parameters.evaluation == "pixel":
+    if media is None or parameters.evaluation == "pixel":
         gammas = _gammas(planes[0], airlight, parameters=parameters, cone=cone)
         return sum_crossings(*planes, view.distance, gammas, order=parameters.order, buffer=buffer, start=start)
     media = replace(media, light=airlight.light, geometry=airlight.geometry)
@@ -334,13 +334,13 @@ def _fog_of(number: int, parameters: ShadowPlaneParameters) -> float:
     return parameters.ambient if number == 0 else 0.0
 
 
-def _with_surface(view: View, buffer: Buffer, total, surface, ambient: float, in_media: tuple[LitRay, ...]):
+def _with_surface(view: View, buffer: Buffer, total, surface, ambient: float, in_media: tuple[MediaRay, ...]):
     """Return the buffer after stage 2 of a light."""
     total = buffer.stored(total + surface)
     return buffer.stored(total + _ambient_fog(view, ambient, in_media)) if ambient else total
 
 
-def _ambient_fog(view: View, ambient: float, in_media: tuple[LitRay, ...]):
+def _ambient_fog(view: View, ambient: float, in_media: tuple[MediaRay, ...]):
     """Return the radiance of a constant light field in the media [W/(m^2 sr)]."""
     if in_media:
         return ambient_radiance(in_media[0].pieces, view.distance, ambient)

@@ -30,9 +30,8 @@ from typing import Any
 
 import drjit as dr
 
-from realtime.bounded_media.airlight import PlacedRay, lit_ray
-from realtime.bounded_media.ray_segments import Piece, camera_pieces
-from realtime.bounded_media.views import MediaViews, media_views
+from realtime.bounded_media.airlight import MediaRay, lit_ray
+from realtime.bounded_media.pieces import Piece, camera_pieces
 from realtime.errors import InputError
 from realtime.methods.interface.view import View, bounded_radiance
 from realtime.methods.shadow_planes.plane_table import PlaneIndex
@@ -57,7 +56,7 @@ def check_vertices(view: View) -> None:
 
 def sum_in_media(
     view: View,
-    media: PlacedRay,
+    media: MediaRay,
     index: PlaneIndex,
     rays: RayPlanes,
     *,
@@ -82,7 +81,6 @@ def sum_in_media(
     start
         What is in the buffer before, or 0.
     """
-    views = media_views(view.medium, (media.light,), view.origin)
     triangle = view.visible_triangle()
     Color, total = type(view.medium.albedo), start
     for number in range(len(view.medium.bounded_media)):
@@ -97,7 +95,7 @@ def sum_in_media(
             return dr.select(meets, factor * bounded_radiance(own.light, own.gamma(x)), 0)
 
         def at_vertex(point, number=number):
-            return _vertex_gamma(view, media, views, number, point)
+            return _vertex_gamma(view, media, number, point)
 
         on_planes = mesh_gamma(view, index, media.light, kernel=None, rows=rows, cone=cone, gamma_of=at_vertex)
 
@@ -118,19 +116,19 @@ def sum_in_media(
     return total
 
 
-def _alone(media: PlacedRay, piece: Piece, begin) -> Piece:
+def _alone(media: MediaRay, piece: Piece, begin) -> Piece:
     """Return a piece without what absorbs before it; the published forms continue it without end."""
     none = tuple(type(begin)(0) for _ in piece.before)
     end = piece.end if media.form == "exact" else type(begin)(dr.inf)
     return replace(piece, begin=begin, end=end, before=none)
 
 
-def _vertex_gamma(view: View, media: PlacedRay, views: MediaViews, number: int, point) -> Any:
+def _vertex_gamma(view: View, media: MediaRay, number: int, point) -> Any:
     """Return the radiance of Gamma of one medium up to points [W/(m^2 sr)]."""
     offset = point - view.origin
     distance = dr.norm(offset)
     direction = offset / distance
-    piece = camera_pieces(view.medium, view.origin, direction, views.camera)[number]
+    piece = camera_pieces(view.medium, view.origin, direction)[number]
     begin = piece.begin
     if media.form != "exact":
         toward = view.medium.bounded_media[number].centre - view.origin
@@ -143,8 +141,6 @@ def _vertex_gamma(view: View, media: PlacedRay, views: MediaViews, number: int, 
         direction=direction,
         pieces=pieces,
         form=media.form,
-        views=views.lights[0],
         polynomial=media.polynomial,
     )
-    assert isinstance(ray, PlacedRay)
     return bounded_radiance(media.light, ray.gamma(distance))

@@ -5,15 +5,14 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from realtime.bounded_media.convex_clip import seen_from
-from realtime.bounded_media.panels import MediumSegment, medium_integral
+from realtime.bounded_media.airlight import lit_ray
+from realtime.bounded_media.pieces import camera_pieces
 from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import array_types
-from realtime.rays.ray_light import ray_geometry
 from realtime.scene.convex_bounds import mesh_bounds
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
-from realtime.scene.phase import named_phase
+from realtime.scene.phase import Isotropic
 from realtime.scene.read_media import make_bounded_medium
 from tests.helpers.kernel_values import opaque, phase_of
 from validation.scenes.meshes import gem, placed, prism, rotation
@@ -30,13 +29,6 @@ SOLIDS = {
 def bounds_of(name):
     vertices, faces = placed(SOLIDS[name], CENTRE, TURN)
     return mesh_bounds(name, vertices.astype(np.float32).astype(np.float64), faces)
-
-
-def seen_medium(name, light, precision="double"):
-    types = array_types(precision)
-    medium = Medium((types.scalar(1.0),), types.color(1.0), named_phase("isotropic"))
-    bounded_medium = make_bounded_medium(medium, bounds_of(name), types)
-    return seen_from(bounded_medium, opaque(types.vector(*(float(c) for c in light)))), types
 
 
 def lines_in(name, light, *, count=400, seed=5):
@@ -61,35 +53,18 @@ def least_of_all(name, light, v):
     return u[..., room < 0].min(axis=-1, initial=np.inf), u[..., room > 0].max(axis=-1)
 
 
-def segments(name, light, phase, *, sigma_t, precision="double"):
-    """Return chords of a medium, a part of each for every other one, with all that their integrals need."""
-    seen, types = seen_medium(name, light, precision)
+def chords(name, light, g, *, sigma_t, precision):
+    """Return rays through the medium with one light, and chords of it: a part of each for every other one."""
+    types = array_types(precision)
     start, direction, low, high = lines_in(name, light)
     part = np.where(np.arange(len(low)) % 2, 0.37, 1.0) * (high - low)
-    kind, g = phase
-    medium = opaque(Medium((types.scalar(sigma_t),), types.color(1.0), phase_of(kind, g, types.scalar)))
+    inner = opaque(Medium((types.scalar(sigma_t),), types.color(1.0), phase_of("hg", g, types.scalar)))
+    body = make_bounded_medium(inner, bounds_of(name), types)
+    medium = Medium((dr.opaque(types.scalar, 0.0),), types.color(0.0), Isotropic(), (body,), clear=True)
     lamp = opaque(Light(types.vector(*(float(c) for c in light)), types.color(1.0)))
-    v0, d = (types.vector(*(aligned_array(types.scalar, c) for c in v.T)) for v in (start, direction))
-    from realtime.bounded_media.facet_walk import entry_planes
-
-    x0 = aligned_array(types.scalar, low)
-    segment = MediumSegment(
-        medium=medium,
-        around=None,
-        light=lamp,
-        geometry=ray_geometry(lamp.position + v0, d, lamp),
-        start=v0,
-        direction=d,
-        begin=x0,
-        before=(dr.opaque(types.scalar, 0.0),),
-        seen=seen,
-        planes=entry_planes(seen),
-    )
-    return segment, x0, aligned_array(types.scalar, low + part)
-
-
-def integral(segment, x0, x1):
-    return np.array(medium_integral(segment, x0, x1).x, dtype=np.float64)
+    origin, d = (types.vector(*(aligned_array(types.scalar, c) for c in v.T)) for v in (start + light, direction))
+    ray = lit_ray(medium, lamp, origin=origin, direction=d, pieces=camera_pieces(medium, origin, d))
+    return ray, aligned_array(types.scalar, low), aligned_array(types.scalar, low + part)
 
 
 @pytest.mark.parametrize("name", ["gem", "column"])
@@ -97,8 +72,8 @@ def test_panels_against_a_sum_over_small_steps(variant, name):
     """What the leg leaves before the medium by the least of all planes; midpoints of 8000 steps."""
     light, sigma_t = np.array([1.7, 0.4, 2.9]), 1.3
     for precision, close in (("double", 1e-6), ("single", 2e-5)):
-        segment, x0, x1 = segments(name, light, ("hg", 0.6), sigma_t=sigma_t, precision=precision)
-        panels = integral(segment, x0, x1)
+        rays, x0, x1 = chords(name, light, 0.6, sigma_t=sigma_t, precision=precision)
+        panels = np.array(rays.airlight(x0, x1).x, dtype=np.float64)
         start, direction, low, _ = lines_in(name, light)
         begin, end = np.array(x0, dtype=np.float64), np.array(x1, dtype=np.float64)
         for ray in range(0, len(low), 41):

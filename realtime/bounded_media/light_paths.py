@@ -1,0 +1,394 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How much of the paths from a light to the points of a ray lies in a convex medium.
+
+A light is a homogeneous position L with w = 1, a place, or w = 0, against the direction of its rays
+(`realtime.scene.lights`). The path from the point P is P + t D, D = L - w P, up to t = 1 or without end. It crosses
+the plane n . P = c of a half space at
+
+    t = e/(1 + w e),     e = (c - n . P)/N,     N = n . L - w c.
+
+e rises with t. Where N > 0 the light comes in through the plane, and the path is in the half space up to e, from P on;
+where N < 0 it is so beyond e. With
+
+    e_0 = max(0, max e over the planes with N < 0),     e_1 = max(0, min e over those with N > 0)
+
+the path has in the medium the length max(0, e_1 - e_0) |D|/((1 + w e_0)(1 + w e_1)). Nothing cancels but e itself.
+
+e is linear in P: along a ray P = o + x d it is a line, c + s x, for a light at any place. The least of some lines and
+the largest of others, the *envelopes*, bend where another line takes over, and the length bends there, where one of
+the two is 0, and where they meet. The least of lines is concave: beyond a place only steeper falling lines can take
+over from the one that is least there, and the first of them to cross it does. One pass over the planes finds it.
+
+The facets through which the light comes in tile the medium as the light sees it. So a path that meets the medium has
+its plane by going from facet to facet while a neighbour has less: on the straight way from a point of the facet k to
+that of the path, the neighbour beyond the edge where k is left has less from there on, since the difference is linear.
+Where no neighbour on the light's side has less, and none on the other has more, the crossing lies in the facet.
+Otherwise the path misses the medium, and e_0 > e_1 says so. The walk begins at the facet in the direction, from the
+medium's centre, of the place where the path crosses the sphere around it. For points within the medium the next plane
+along a ray shares an edge with the last one, too.
+
+A camera ray is the path of a light at infinity in its direction, from its origin.
+
+**Spheres.** With C and R the middle and the radius, p = P - C and M = L - w C, p x D = p x M is linear in x too. The
+path is nearest to C at the distance b = -p . D/|D| from P, and half its chord is q, q^2 = R^2 - |p x M|^2/|D|^2.
+Paths graze the sphere where
+
+    |p x M|^2 = R^2 |D|^2,     with the discriminant (|M|^2 - w R^2)(R^2 |D x d|^2 - (M . (p x d))^2),
+
+whose second factor is one difference. Before and behind these points q rises like a root.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from realtime.numerics.array_types import four_numbers
+from realtime.scene.convex_bounds import CELLS
+from realtime.scene.lights import Light
+from realtime.scene.medium import BoundedMedium
+
+_FAR = 1e30  #: e of no plane
+_FEW = 16  #: planes that are read faster than walked over
+_UNROLLED = 4  #: neighbours of a plane, as many as facets of boxes have
+_STEEP, _LEAST, _MOST = 0.2, 0.002, 0.25  #: of the square of half a chord in a panel; panels over the radius
+
+
+@dataclass
+class Envelopes:
+    """The lines of the planes through which paths enter and leave a medium, near one place of the rays."""
+
+    least: tuple[Any, Any]  #: constant and slope [1/m] of the least e with N > 0
+    largest: tuple[Any, Any]  #: and of the largest with N < 0
+    planes: tuple[Any, Any]  #: the numbers of their planes
+
+    def ends(self, x) -> tuple[Any, Any]:
+        """Return e_0 and e_1 at a distance x [m]."""
+        return dr.maximum(_value(self.largest, x), 0), dr.maximum(_value(self.least, x), 0)
+
+    def crossing(self, x):
+        """Return the next distance beyond x at which the lines meet or one of them is 0, or infinity [m]."""
+        low, high = _value(self.largest, x), _value(self.least, x)
+        rising, falling = self.largest[1], self.least[1]
+        until = type(x)(dr.inf)
+        for gap, closing in ((high - low, rising - falling), (high, -falling), (low, -rising)):
+            ahead = gap / closing
+            until = dr.minimum(until, dr.select(ahead > 0, x + ahead, dr.inf))
+        return until
+
+
+@dataclass(frozen=True)
+class LightPaths:
+    """The paths from a light to the points of rays, and one bounded medium."""
+
+    bounded: BoundedMedium
+    w: float  #: 1 for a light at a place, 0 for one at infinity
+    toward: Any  #: M: from the medium's centre to the light [m], or the unit direction to it
+    start: Any  #: from the medium's centre to the origin of the rays [m]
+    direction: Any  #: unit directions of the rays, or 0 for points
+    active: Any = True  #: lanes in which paths may meet the medium
+    own: bool = False  #: whether the points lie within the medium
+
+    @property
+    def round(self) -> bool:
+        """Whether the medium is a sphere."""
+        return self.bounded.planes is None
+
+    def away(self, x):
+        """Return D [m] from the points at x."""
+        return self.toward - dr.fma(self.direction, x, self.start) if self.w else self.toward
+
+    def length(self, envelopes: Envelopes | None, x, r):
+        """Return the length within the medium of the paths to x [m]; `r` is |D|, and spheres have no envelopes."""
+        if envelopes is None:
+            point, away = dr.fma(self.direction, x, self.start), self.away(x)
+            square = dr.squared_norm(away)
+            nearest = -dr.dot(point, away) / r
+            half = dr.square(self.bounded.radius) - dr.squared_norm(dr.cross(point, self.toward)) / square
+            half = dr.sqrt(dr.maximum(half, 0))
+            last = dr.minimum(nearest + half, r) if self.w else nearest + half
+            length = dr.maximum(last - dr.maximum(nearest - half, 0), 0)
+        else:
+            first, last = envelopes.ends(x)
+            length = dr.maximum(last - first, 0)
+            if self.w:
+                length = r * (length / (1 + last)) / (1 + first)
+        return dr.select(self.active, length, 0)
+
+    def length_at(self, x, r):
+        """Return `length` for points by themselves."""
+        return self.length(None if self.round else self._walk(x), x, r)
+
+    def ends_at(self, x):
+        """Return e_0 and e_1 of a polyhedron for points by themselves."""
+        return self._walk(x).ends(x)
+
+    def envelopes_at(self, x) -> Envelopes | None:
+        """Return the envelopes at a distance x [m]; None for a sphere."""
+        if self.round:
+            return None
+        return self._walk(x) if self.own else self._over_planes(self._none(x), self._tighter(x), self.active)
+
+    def _none(self, x) -> Envelopes:
+        width = dr.width(x, self.start, self.direction, self.toward, self.active)
+        far, flat, number = dr.full(type(x), _FAR, width), dr.zeros(type(x), width), dr.zeros(mi.UInt32, width)
+        return Envelopes((far, flat), (-far, flat + 0), (number, number + 0))
+
+    def _tighter(self, x):
+        """Return the step that takes a plane for an envelope at x if it has less, or more."""
+
+        def step(number, line, found):
+            value = dr.fma(line[1], x, line[0])
+            less = line[2] & (value < _value(found.least, x))
+            more = ~line[2] & (value > _value(found.largest, x))
+            return _replaced(found, number, line, less, more)
+
+        return step
+
+    def _walk(self, x) -> Envelopes:
+        """Return the envelopes of paths to x that meet the medium, from facet to facet; others have e_0 > e_1.
+
+        Of points within the medium only the plane of the least is looked for.
+        """
+        step, sides = self._tighter(x), 1 if self.own else 2
+        if self.bounded.count <= _FEW:
+            return self._over_planes(self._none(x), step, self.active)
+        point, away = dr.fma(self.direction, x, self.start), self.away(x)
+        length, radius = dr.norm(away), self.bounded.radius
+        away = away / length
+        nearest = -dr.dot(point, away)
+        half = dr.sqrt(dr.maximum(dr.square(radius) - dr.squared_norm(dr.cross(point, away)), 0))
+        found = self._none(x)
+        for side, end in enumerate((nearest + half, nearest - half)[:sides]):
+            number = self._plane_towards(dr.fma(away, end, point) / radius)
+            found = replace(found, planes=(number, number))
+            found = self._descend(step(number, self._line(self.bounded.planes, number, self.active), found), step, side)
+        # The walk may begin on the other side, with no neighbour on its own.
+        lost = found.least[0] == _FAR
+        lost = lost if self.own else lost | (found.largest[0] == -_FAR)
+        return self._over_planes(found, step, self.active & lost)
+
+    def _descend(self, found: Envelopes, step: Callable[..., Any], side: int) -> Envelopes:
+        """Go from facet to facet while a neighbour has a tighter plane of one side: 0 for the least, 1 the largest."""
+
+        def further(turn, searches, found):
+            after = self._over_neighbours(found.planes[side], found, step)
+            return turn + 1, searches & (after.planes[side] != found.planes[side]), after
+
+        width = dr.width(found.least[0])
+        *_, found = dr.while_loop(
+            state=(dr.zeros(mi.UInt32, width), dr.full(mi.Bool, True, width) & self.active, found),
+            cond=lambda turn, searches, found: searches & (turn < self.bounded.count),
+            body=further,
+            labels=("turn", "searches", "found"),
+        )
+        return found
+
+    def _plane_towards(self, direction):
+        """Return the number of a plane that is met in about a direction from the medium's centre."""
+        column, row, layer = (
+            mi.UInt32(dr.clip(dr.fma(part, 0.5 * CELLS, 0.5 * CELLS), 0, CELLS - 1)) for part in direction
+        )
+        return dr.gather(mi.UInt32, self.bounded.starts, (layer * CELLS + row) * CELLS + column, self.active)
+
+    def next_change(self, envelopes: Envelopes, x) -> tuple[tuple[Any, Any], Envelopes]:
+        """Return where other lines take over from the least and the largest at x [m], and these lines.
+
+        `x` is at least a rounding error `beyond` the last change: so each is met once.
+        """
+        low, high = _value(envelopes.least, x), _value(envelopes.largest, x)
+
+        def step(number, line, state):
+            until_low, until_high, after = state
+            constant, slope, facing = line
+            value = dr.fma(slope, x, constant)
+            nearing = dr.select(facing, envelopes.least[1] - slope, slope - envelopes.largest[1])
+            # Below 0 where rounding has let a crossing pass: the earliest is still the next of the envelope.
+            gap = dr.select(facing, value - low, high - value)
+            at = dr.select(nearing > 0, x + gap / nearing, dr.inf)
+            less, more = facing & (at < until_low), ~facing & (at < until_high)
+            after = _replaced(after, number, line, less, more)
+            return dr.select(less, at, until_low), dr.select(more, at, until_high), after
+
+        never = dr.full(type(x), dr.inf, dr.width(x, low))
+        state = never, never + 0, envelopes
+        if self.own:
+            until_low, until_high, after = self._over_neighbours(envelopes.planes[0], state, step)
+        else:
+            until_low, until_high, after = self._over_planes(state, step, self.active)
+        return (until_low, until_high), after
+
+    def steepness(self, envelopes: Envelopes | None, x, r):
+        """Return |d length/dx| at most [1], and the longest panel from x on, as far as this medium says [m]."""
+        Float = type(x)
+        if envelopes is None:
+            longest = dr.select(self.active, self._smooth_chord(x), dr.inf)
+            return dr.select(self.active, Float(1), 0), longest
+        first, last = envelopes.ends(x)
+        meets = self.active & (last > first)
+        w = self.w
+        rising = dr.abs(envelopes.least[1]) / (1 + w * last)
+        rising += dr.select(first > 0, dr.abs(envelopes.largest[1]) / (1 + w * first), 0)
+        rising = dr.select(meets, rising, 0)
+        return dr.select(meets, w + r * rising, 0), (0.5 / rising if w else Float(dr.inf))
+
+    def _smooth_chord(self, x):
+        """Return the length in which q^2 changes by a share of it: q is a root of it [m].
+
+        With f = |p x M|^2/|D|^2 it is R^2 - f, and over a length t f changes by
+
+            (2 ((p x M) . (d x M) + w f D . d) t + (|d x M|^2 - w f) t^2)/|D - w t d|^2,
+
+        whose divisor is taken for |D|^2: panels end before it changes by much. The second term counts where the first
+        is none: where a segment begins with the longest chord of its paths.
+        """
+        radius, away, w = self.bounded.radius, self.away(x), self.w
+        cross = dr.cross(dr.fma(self.direction, x, self.start), self.toward)
+        turned, square = dr.cross(self.direction, self.toward), dr.squared_norm(away)
+        distance = dr.squared_norm(cross) / square
+        rate = dr.abs(2 * (dr.dot(cross, turned) + w * distance * dr.dot(away, self.direction)) / square)
+        bend = dr.abs(dr.squared_norm(turned) - w * distance) / square
+        change = _STEEP * dr.maximum(radius * radius - distance, 0)
+        length = 2 * change / (rate + dr.sqrt(dr.fma(rate, rate, 4 * bend * change)))
+        return dr.select(change > 0, dr.clip(length, _LEAST * radius, _MOST * radius), dr.inf)
+
+    def grazed_at(self) -> tuple[Any, ...]:
+        """Return where the points lie whose paths graze a sphere: two distances or infinity [m]; () for planes."""
+        if not self.round:
+            return ()
+        w, toward, start, direction = self.w, self.toward, self.start, self.direction
+        square = dr.square(self.bounded.radius)
+        away = toward - start if w else toward
+        distance = dr.norm(toward)
+        outside = (distance - self.bounded.radius) * (distance + self.bounded.radius) if w else type(distance)(1)
+        cross, turned = dr.cross(start, toward), dr.cross(direction, toward)
+        inner = square * dr.squared_norm(dr.cross(away, direction))
+        inner = outside * (inner - dr.square(dr.dot(toward, dr.cross(start, direction))))
+        half = dr.fma(w * square, dr.dot(away, direction), dr.dot(cross, turned))
+        t = -(half + dr.mulsign(dr.sqrt(dr.maximum(inner, 0)), half))
+        ends = (
+            t / dr.fma(-w, square, dr.squared_norm(turned)),
+            (dr.squared_norm(cross) - square * dr.squared_norm(away)) / t,
+        )
+        there = self.active & (inner > 0)
+        return tuple(dr.select(there & dr.isfinite(x), x, dr.inf) for x in ends)
+
+    def near_segment(self, x0, x1):
+        """Return whether paths to points of a segment may meet the medium; never False where one does.
+
+        They fill a triangle, or a strip without end, in the plane of ray and light. The medium's sphere may lie beside
+        that plane, behind the ray, before the first path or beyond the last.
+        """
+        first, last = self.away(x0), self.away(x1)
+        point0, point1 = (dr.fma(self.direction, x, self.start) for x in (x0, x1))
+        plane = dr.cross(self.direction, first)
+        beyond = dr.square(1.001 * self.bounded.radius)
+
+        def outside(point, normal):
+            # The medium's centre is the origin: `normal` points out of the triangle.
+            height = dr.dot(point, normal)
+            return (height < 0) & (dr.square(height) > beyond * dr.squared_norm(normal))
+
+        beside = dr.square(dr.dot(point0, plane)) > beyond * dr.squared_norm(plane)
+        behind = outside(point0, dr.cross(self.direction, plane))
+        before = outside(point0, dr.cross(plane, first))
+        after = outside(point1, dr.cross(last, plane))
+        return ~(beside | behind | before | after)
+
+    def near_points(self):
+        """Return whether the paths to the origins of the rays may meet the medium; never False where one does."""
+        away = self.away(type(self.start.x)(0))
+        square, along = dr.squared_norm(away), -dr.dot(self.start, away)
+        beyond = dr.square(1.001 * self.bounded.radius)
+        nearest = dr.maximum(along / square, 0)
+        nearest = dr.minimum(nearest, 1) if self.w else nearest
+        return dr.squared_norm(dr.fma(away, nearest, self.start)) < beyond
+
+    def _line(self, planes, number, active):
+        """Return e of a plane along the rays, constant and slope, and whether the light comes in through it."""
+        values = dr.gather(four_numbers(type(self.start.x)), planes, number, active)
+        normal, offset = values.xyz, values.w
+        facing = dr.dot(normal, self.toward) - self.w * offset
+        # A plane along the light is tilted a little.
+        tilt = 16 * dr.epsilon(type(facing)) * (self.bounded.radius if self.w else 1)
+        facing = dr.mulsign(dr.maximum(dr.abs(facing), tilt), facing)
+        scale = dr.rcp(facing)
+        return (offset - dr.dot(normal, self.start)) * scale, -dr.dot(normal, self.direction) * scale, facing > 0
+
+    def _over_planes(self, state, step: Callable[..., Any], active):
+        """Return what becomes of a state by step(number, line, state) over the planes."""
+        _, state = dr.while_loop(
+            state=(mi.UInt32(0), state),
+            cond=lambda number, state: active & (number < self.bounded.count),
+            body=lambda number, state: (
+                number + 1,
+                step(number, self._line(self.bounded.planes, number, active), state),
+            ),
+            labels=("number", "state"),
+        )
+        return state
+
+    def _over_neighbours(self, plane, state, step: Callable[..., Any]):
+        """Return what becomes of a state over the planes that share an edge with one."""
+        sides = self.bounded.sides
+
+        def at(side, state):
+            place = plane * sides + side
+            number = dr.gather(mi.UInt32, self.bounded.neighbours, place, self.active)
+            return step(number, self._line(self.bounded.beside, place, self.active), state)
+
+        if sides <= _UNROLLED:
+            for side in range(sides):
+                state = at(side, state)
+            return state
+        _, state = dr.while_loop(
+            state=(mi.UInt32(0), state),
+            cond=lambda side, state: side < sides,
+            body=lambda side, state: (side + 1, at(side, state)),
+            labels=("side", "state"),
+        )
+        return state
+
+
+def homogeneous_vector(light: Light, point):
+    """Return L - w P: from a point to the light [m], or the direction to a light at infinity."""
+    return light.position - point if light.w else -light.axis
+
+
+def beyond(x):
+    """Return a distance a rounding error beyond x [m]: there the line counts that took over at x."""
+    return x + 64 * dr.epsilon(type(x)) * (x + 1)
+
+
+def chord(bounded: BoundedMedium, origin, direction) -> tuple[Any, Any]:
+    """Return where rays enter and leave a medium [m], both infinite where they miss it; from within, 0 and the end.
+
+    `origin` [m] is one for all lanes, `direction` unit vectors.
+    """
+    start = origin - bounded.centre
+    nearest, across = -dr.dot(start, direction), dr.norm(dr.cross(start, direction))
+    if bounded.planes is None:
+        half = dr.sqrt(dr.maximum((bounded.radius - across) * (bounded.radius + across), 0))
+        begin, end = dr.maximum(nearest - half, 0), nearest + half
+    else:
+        near = (across < 1.001 * bounded.radius) & (nearest > -1.001 * bounded.radius)
+        path = LightPaths(bounded, 0.0, direction, start, dr.zeros(type(direction)), near)
+        begin, end = path.ends_at(type(across)(0))
+        end = dr.select(near, end, 0)
+    hit = end > begin
+    return dr.select(hit, begin, dr.inf), dr.select(hit, end, dr.inf)
+
+
+def _value(line: tuple[Any, Any], x):
+    return dr.fma(line[1], x, line[0])
+
+
+def _replaced(found: Envelopes, number, line, less, more) -> Envelopes:
+    least, largest = (
+        (dr.select(chosen, line[0], old[0]), dr.select(chosen, line[1], old[1]))
+        for chosen, old in ((less, found.least), (more, found.largest))
+    )
+    planes = (dr.select(less, number, found.planes[0]), dr.select(more, number, found.planes[1]))
+    return Envelopes(least, largest, planes)
