@@ -46,7 +46,7 @@ def sweep(
             show_default=False,
         ),
     ] = None,
-    markdown: Annotated[bool, typer.Option("--markdown", help="With --from: print the digest in Markdown.")] = False,
+    markdown: Annotated[bool, typer.Option("--markdown", help="With --from: print the tables in Markdown.")] = False,
     json: Json = False,
 ) -> None:
     """Run every method over many scenes: a row of numbers each.
@@ -56,8 +56,8 @@ def sweep(
 
     Finished rows are kept: a run that was interrupted goes on where it was, and the same study twice computes nothing.
 
-    --from DIR writes what the rows say: DIR/sweep.html, figures, claims with their confidence as JSON, and a digest in
-    Markdown; with -o into another folder.
+    --from DIR writes what the rows say: DIR/sweep.html, figures, and claims with their confidence as JSON; with -o into
+    another folder.
 
     Exit status 1 if a cell failed, hung or aborted, or was left undone.
     """
@@ -72,7 +72,7 @@ def sweep(
         _say(redraw, output, [option for option, value in given.items() if value is not None], markdown, json)
         return
     if markdown:
-        raise InputError("--markdown: prints the digest of a sweep that is there; name its folder by --from DIR")
+        raise InputError("--markdown: prints the tables of a sweep that is there; name its folder by --from DIR")
     place = parse_place(cluster)
     _check_parquet()
     check_library()
@@ -99,16 +99,16 @@ def _say(source: Path, target: Path | None, others: list[str], markdown: bool, j
     if json and markdown:
         raise InputError("sweep: got both --json and --markdown; give one of them")
     _check_parquet()
-    from reports.sweep.digest import digest
+    from reports.sweep.page import write_sweep
     from reports.sweep.summary import headlines, to_json
-    from reports.sweep.tables import errors_table
-    from reports.sweep.write import write_sweep
+    from reports.sweep.tables import errors_table, speed_table
 
     said, page = write_sweep(source, target)
     if json:
         print_json(to_json(said))
     elif markdown:
-        print(digest(said), end="")
+        for table in (errors_table(said), speed_table(said)):
+            print_table(table, as_markdown=True)
     else:
         print("\n".join(f"- {each['kind']}: {sentence_in_text(each['text'])}" for each in headlines(said)))
         print_table(errors_table(said))

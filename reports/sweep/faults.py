@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What was refused and why, and what is wrong with rows whatever their error: of all rows, drawn scenes and named ones.
+"""What was refused and why, what is wrong with rows whatever their error, and the scenes with the largest errors.
+
+Refusals and faults are of all rows, drawn scenes and named ones.
 
 Reasons are counted after their numbers were taken out: "light 3 of 8" and "light 1 of 2" are one reason.
 """
@@ -12,7 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from reports.sweep.read import Sweep
-from reports.sweep.samples import FAULTS
+from reports.sweep.samples import FAULTS, Sample
+from validation.study.row import PROPERTY
+
+COUNT = 10  #: worst scenes of a configuration
 
 #: What may be wrong with an image: its name, the column that counts the pixels, and in words.
 CHECKS = (
@@ -109,3 +114,59 @@ def faults(sweep: Sweep) -> list[Fault]:
             whole = 0 if np.isnan(of[row]) else int(of[row])
             made.append(Fault(name, labels[row], scenes[row], int(pixels[row]), whole, commands[row] or ""))
     return made
+
+
+@dataclass(frozen=True)
+class Worst:
+    """A scene in which a configuration errs more than in others."""
+
+    key: str  #: of the row
+    scene: str
+    medium: str | None  #: changes to the scene's medium; None for its own
+    relative_rmse: float | None  #: None where the image has no finite pixel
+    p99: float | None
+    relative_bias: float | None
+    truth_error: float | None
+    nonfinite: int
+    properties: dict[str, float | None]
+    command: str
+
+
+def worst(sweep: Sweep, sample: Sample, properties: Sequence[str], count: int = COUNT) -> list[Worst]:
+    """Return the worst scenes of a configuration, the worst first; of equals the first of the sweep.
+
+    Parameters
+    ----------
+    sweep
+        Has the rows.
+    sample
+        Of the configuration.
+    properties
+        Which ones are told of each scene.
+    count
+        How many scenes.
+    """
+    errors = np.where(np.isnan(sample.errors), -np.inf, sample.errors)
+    order = np.lexsort((-errors, -sample.nonfinite.astype(bool).astype(float)))
+    places = [place for place in order if sample.measured[place]][:count]
+
+    def known(column: str, row: int) -> float | None:
+        value = float(sweep.numbers(column)[row])
+        return value if np.isfinite(value) else None
+
+    return [
+        Worst(
+            key=sweep.texts("key")[row],
+            scene=sample.scenes[place],
+            medium=sweep.texts("medium")[row],
+            relative_rmse=float(sample.errors[place]) if np.isfinite(sample.errors[place]) else None,
+            p99=known("error.p99", row),
+            relative_bias=known("error.relative_bias", row),
+            truth_error=known("reference.error", row),
+            nonfinite=int(sample.nonfinite[place]),
+            properties={name: known(f"{PROPERTY}{name}", row) for name in properties},
+            command=sweep.texts("command")[row] or "",
+        )
+        for place in places
+        for row in [sample.rows[place]]
+    ]

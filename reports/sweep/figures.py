@@ -11,11 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reports.page.chart import short
-from reports.plotting.colour_maps import signed_colours
 from reports.plotting.style import report_styles
 from reports.sweep.claims import TARGETS
-from reports.sweep.correlations import Correlation, sure
-from reports.sweep.properties import property_words
 from reports.sweep.read import Numbers
 from reports.sweep.samples import Sample
 from reports.sweep.summary import Summary
@@ -131,103 +128,11 @@ def medians(said: Summary) -> "Figure | None":
     return figure
 
 
-def clouds(said: Summary) -> "Figure | None":
-    """Return speed against error with every scene as a point: a panel a configuration, all others in grey behind it.
-
-    None if nothing was timed with the machine to itself.
-    """
-    shown = [sample for sample in said.samples if _points(sample)[0].size]
-    if not shown:
-        return None
-    figure, panels = _panels(len(shown), 1.9)
-    styles = _styles(said)
-    every = [np.concatenate(each) for each in zip(*(_points(sample) for sample in shown))]
-    for panel, sample in zip(panels, shown):
-        times, errors = _points(sample)
-        panel.plot(*every, ".", color=_GREY, markersize=1.2, alpha=0.35, markeredgewidth=0, rasterized=True, zorder=0)
-        colour = styles[sample.label]["color"]
-        panel.plot(times, errors, ".", color=colour, markersize=2.6, alpha=0.6, markeredgewidth=0, rasterized=True)
-        panel.plot(np.median(times), np.median(errors), "+", color="black", markersize=9, markeredgewidth=1.4)
-        panel.set(xscale="log", yscale="log")
-        panel.set_title(_cut(sample.name), fontsize=8, parse_math=False)
-        panel.grid(True, which="major", linewidth=0.4, alpha=0.5)
-    figure.supxlabel(TIME, fontsize=9)
-    figure.supylabel(ERROR, fontsize=9)
-    return figure
-
-
-def matrix(said: Summary) -> "Figure | None":
-    """Return the rank correlation of every property with the error of every configuration; None if there is none."""
-    from matplotlib.colors import ListedColormap
-
-    if not said.correlations:
-        return None
-    found = {(each.label, each.property): each for each in said.correlations}
-    labels = [sample for sample in said.samples if any(label == sample.label for label, _ in found)]
-    names = sorted({name for _, name in found}, key=lambda name: (-_weight(found, labels, name), name))
-    values = np.full((len(names), len(labels)), np.nan)
-    for (label, name), each in found.items():
-        values[names.index(name), [sample.label for sample in labels].index(label)] = each.r
-    figure = _figure(0.27 * len(names) + 1.9)
-    panel = figure.subplots()
-    colours = ListedColormap(signed_colours() / 255.0)
-    # The darkest ends of the map would swallow the numbers: +1 is at 60 % of an arm.
-    panel.imshow(values, cmap=colours, vmin=-1 / 0.6, vmax=1 / 0.6, aspect="auto")
-    for (label, name), each in found.items():
-        column = [sample.label for sample in labels].index(label)
-        certain = sure(each)
-        words = f"{each.r:+.2f}" if certain else "\N{MIDDLE DOT}"
-        dark = certain and abs(each.r) > 0.75
-        panel.text(
-            column, names.index(name), words, ha="center", va="center", fontsize=7, color="white" if dark else "black"
-        )
-    panel.set_xticks(
-        range(len(labels)), [_cut(s.name) for s in labels], rotation=35, ha="left", fontsize=8, parse_math=False
-    )
-    panel.set_yticks(range(len(names)), [property_words(name) for name in names], fontsize=8, parse_math=False)
-    panel.xaxis.tick_top()
-    panel.tick_params(length=0)
-    panel.spines[:].set_visible(False)
-    return figure
-
-
-def trends(said: Summary) -> "Figure | None":
-    """Return the error of each configuration over the property that goes with it most; None if none does for sure."""
-    shown = [(sample, said.strongest[sample.label][0]) for sample in said.samples if said.strongest[sample.label]]
-    if not shown:
-        return None
-    figure, panels = _panels(len(shown), 2.2)
-    styles = _styles(said)
-    for panel, (sample, strongest) in zip(panels, shown):
-        x, y = _pairs(said, sample, strongest.property)
-        panel.plot(
-            x,
-            y,
-            ".",
-            color=styles[sample.label]["color"],
-            markersize=2.6,
-            alpha=0.5,
-            markeredgewidth=0,
-            rasterized=True,
-        )
-        panel.plot(*_running(x, y), color="black", linewidth=1.4)
-        positive = bool((x > 0).all()) and x.max() > 30 * x.min()
-        panel.set(xscale="log" if positive else "linear", yscale="log")
-        panel.set_xlabel(property_words(strongest.property), fontsize=8, parse_math=False)
-        panel.set_title(f"{_cut(sample.name)}\n{strongest.r:+.2f}", fontsize=8, parse_math=False)
-        panel.grid(True, which="major", linewidth=0.4, alpha=0.5)
-    figure.supylabel(ERROR, fontsize=9)
-    return figure
-
-
 #: Every figure by its name: what draws it, and what its files and its place on the page are called.
 FIGURES: Mapping[str, Callable[[Summary], "Figure | None"]] = {
     "sweep-errors": distribution,
     "sweep-shares": shares,
     "sweep-medians": medians,
-    "sweep-speed": clouds,
-    "sweep-correlations": matrix,
-    "sweep-trends": trends,
 }
 
 
@@ -296,23 +201,6 @@ def _points(sample: Sample) -> tuple[Numbers, Numbers]:
     return sample.times[both], _within(sample.errors[both])
 
 
-def _pairs(said: Summary, sample: Sample, name: str) -> tuple[Numbers, Numbers]:
-    """Return a property and the error of the scenes that have both."""
-    x = said.sweep.property(name)[list(sample.rows)]
-    both = np.isfinite(x) & np.isfinite(sample.errors)
-    return x[both], _within(sample.errors[both])
-
-
-def _running(x: Numbers, y: Numbers) -> tuple[list[float], list[float]]:
-    """Return the median of y over groups of equally many neighbours in x; equal values of x are in one group."""
-    order = np.argsort(x, kind="stable")
-    groups = np.array_split(order, min(12, max(1, len(x) // 8)))
-    places: dict[float, list[float]] = {}
-    for group in groups:
-        places.setdefault(float(np.median(x[group])), []).extend(y[group].tolist())
-    return list(places), [float(np.median(values)) for values in places.values()]
-
-
 def _steps(sample: Sample, low: float, high: float) -> tuple[Numbers, Numbers]:
     """Return the share of the measured scenes within an error; what has no finite error is never within."""
     errors = np.sort(_errors(sample))
@@ -339,12 +227,6 @@ def _own(sample: Sample) -> str:
 def _cut(name: str) -> str:
     """Return a name that leaves room for a panel: that of a method of the user's own may be a path."""
     return short(name, 38)
-
-
-def _weight(found: Mapping[tuple[str, str], Correlation], labels: Sequence[Sample], name: str) -> float:
-    """Return the sum of squares of the correlations of a property: what goes with most errors stands above."""
-    own = (found.get((sample.label, name)) for sample in labels)
-    return sum(each.r**2 for each in own if each is not None)
 
 
 def _plain_times(panel: "Axes") -> None:

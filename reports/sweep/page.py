@@ -1,26 +1,68 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The page of a sweep: one HTML file that needs no network, made from the Parquet alone."""
+"""The files that say what a sweep says, made from its Parquet alone: its page, its figures and its claims.
+
+The page is one HTML file that needs no network.
+"""
 
 import base64
+import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from analytic.errors import InputError
+from reference.storage.files import ensure_folder, write_bytes, write_text
 from reports import __version__
+from reports.page.chart import svg_text
 from reports.page.filters import percent, unbroken
 from reports.page.render import page_environment, template_text
 from reports.page.tables import drawn, facts
 from reports.sweep import tables
 from reports.sweep.claims import TARGETS
-from reports.sweep.correlations import LEAST, NAMED, SAME
-from reports.sweep.properties import property_words
-from reports.sweep.summary import Summary, goes_with_words, headlines, sound_words
+from reports.sweep.correlations import LEAST, NAMED, SAME, property_words
+from reports.sweep.figures import drawn as drawn_figures
+from reports.sweep.figures import pdf_bytes
+from reports.sweep.read import read_sweep
+from reports.sweep.summary import Summary, goes_with_words, headlines, sound_words, summary_of, to_json
 
+PAGE, CLAIMS, FIGURES = "sweep.html", "sweep.json", "figures"  #: in the folder of a sweep
 PAGE_LIMIT = 20_000_000  #: bytes of a page
 
 _TABLES = ("errors", "speed", "refusals", "checks", "faults", "truths", "properties", "hosts")
+
+
+def write_sweep(source: Path, target: Path | None = None) -> tuple[Summary, Path]:
+    """Write what a sweep says, from its Parquet alone.
+
+    Parameters
+    ----------
+    source
+        The folder of a sweep, or its Parquet.
+    target
+        Folder of the files; the one with the Parquet by default.
+
+    Returns
+    -------
+    tuple
+        What the sweep says, and the path of its page.
+
+    Raises
+    ------
+    InputError
+        If there is no such Parquet, it cannot be used, or the folder cannot be written.
+    """
+    said = summary_of(read_sweep(source))
+    folder = ensure_folder(said.sweep.path.parent if target is None else target)
+    charts = {}
+    for name, figure in drawn_figures(said):
+        charts[name] = svg_text(figure, name)
+        write_text(folder / FIGURES / f"{name}.svg", charts[name])
+        write_bytes(folder / FIGURES / f"{name}.pdf", pdf_bytes(figure))
+    write_text(folder / CLAIMS, json.dumps(to_json(said), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    write_text(folder / PAGE, render_sweep(said, charts))
+    return said, folder / PAGE
 
 
 def render_sweep(said: Summary, charts: Mapping[str, str], *, limit: int = PAGE_LIMIT) -> str:

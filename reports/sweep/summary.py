@@ -3,18 +3,17 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from reports.sweep.claims import TARGETS, Claim, best_claims, claims, percent, written
-from reports.sweep.correlations import Correlation, correlations, sentences, strongest
-from reports.sweep.faults import Check, Fault, Reason, checks, faults, reasons
-from reports.sweep.properties import property_words
+from reports.sweep.correlations import Correlation, correlations, property_words, sentences, strongest
+from reports.sweep.faults import Check, Fault, Reason, Worst, checks, faults, reasons, worst
 from reports.sweep.read import Numbers, Sweep
 from reports.sweep.samples import FAULTS, Sample, drawn_at_random, fastest_counts, samples
-from reports.sweep.worst import Worst, worst
+from validation.metrics.errors import plain
 from validation.statistics.intervals import LEVEL, binomial_interval, quantile_interval
 
 SCHEMA = "airlight-sweep/1"
@@ -211,41 +210,28 @@ def sound_words(said: Summary) -> str:
 
 def to_json(said: Summary) -> dict[str, Any]:
     """Return everything as plain data, for `--json`; nothing in it is infinite or NaN."""
+    names = {sample.label: sample for sample in said.samples}
+    lists = ("correlations", "checks", "faults", "truths", "properties", "hosts")
     return {
         "schema": SCHEMA,
         "source": str(said.sweep.path),
-        "studies": list(said.studies),
         "rows": len(said.sweep),
         "superseded": said.sweep.superseded,
-        "statuses": dict(said.statuses),
-        "scenes": said.scenes,
         "drawn_at_random": said.drawn,
-        "named_scenes": said.named_scenes,
-        "timed_alone": said.timed_alone,
         "level": LEVEL,
-        "headlines": headlines(said),
-        "claims": [asdict(each) | {"share": each.share, "text": each.text} for each in said.claims],
-        "configurations": [_configuration(sample) for sample in said.samples],
-        "fastest": [
-            asdict(each)
-            | {"counts": {sample.label: count for sample, count in zip(said.samples, each.counts) if count}}
-            for each in said.fastest
-        ],
-        "correlations": [asdict(each) for each in said.correlations],
-        "goes_with": {
-            sample.label: [each.property for each in said.strongest[sample.label]] for sample in said.samples
+        **{
+            name: plain(getattr(said, name))
+            for name in ("studies", "statuses", "scenes", "named_scenes", "timed_alone")
         },
+        **{name: plain(getattr(said, name)) for name in ("timed_alone", "versions", "started", "worst", *lists)},
+        "headlines": headlines(said),
+        "claims": [plain(each) | {"share": each.share, "text": each.text} for each in said.claims],
+        "configurations": [_configuration(sample) for sample in said.samples],
+        "fastest": [plain(each) | {"counts": dict(zip(names, each.counts))} for each in said.fastest],
+        "goes_with": {label: [each.property for each in said.strongest[label]] for label in names},
         "goes_with_words": goes_with_words(said),
-        "worst": {label: [asdict(each) for each in several] for label, several in said.worst.items()},
-        "refusals": [asdict(each) for each in said.reasons if each.status == "refused"],
-        "not_done": [asdict(each) for each in said.reasons if each.status != "refused"],
-        "checks": [asdict(each) for each in said.checks],
-        "faults": [asdict(each) for each in said.faults],
-        "truths": [asdict(each) for each in said.truths],
-        "properties": [asdict(each) for each in said.properties],
-        "hosts": [asdict(each) for each in said.hosts],
-        "versions": {name: list(values) for name, values in said.versions.items()},
-        "started": None if said.started is None else list(said.started),
+        "refusals": [plain(each) for each in said.reasons if each.status == "refused"],
+        "not_done": [plain(each) for each in said.reasons if each.status != "refused"],
     }
 
 

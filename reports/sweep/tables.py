@@ -4,7 +4,7 @@
 import numpy as np
 
 from reports.sweep.claims import TARGETS, written
-from reports.sweep.properties import property_words
+from reports.sweep.correlations import property_words
 from reports.sweep.samples import FAULTS, UNTOLD
 from reports.sweep.summary import Summary, quantiles
 from reports.tables.table import Column, Measured, Name, Table, numbers, table, words

@@ -101,17 +101,16 @@ def test_bench_measures_names_functions_and_configurations(variant):
 def test_report_hands_on_what_it_was_given(variant, tmp_path, monkeypatch):
     given = {}
 
-    def write(folder, **options):
-        given.update(options, folder=folder)
+    def write(folder, study, **options):
+        given.update(options, folder=folder, study=study)
         return {"claims": [{"text": "so"}], "scenes": [], "created": ""}
 
     monkeypatch.setattr("reports.report.measure.write_report", write)
     report = airlight.report(tmp_path / "out", scenes=["open-fog"], methods=["min-max", brighter])
     assert report.folder == tmp_path / "out"
     assert report.claims == ("so",)
-    assert given["scenes"] == ["open-fog"]
-    assert given["effort"].name == "default"
-    names = [configuration.method.rpartition(":")[2] for configuration in given["configurations"]]
+    assert (given["study"].scenes, given["study"].name) == (("open-fog",), "default")
+    names = [configuration.method.rpartition(":")[2] for configuration in given["study"].configurations]
     assert names == ["min-max", "brighter"]
     with pytest.raises(airlight.InputError, match="did you mean 'full'"):
         airlight.report(tmp_path, effort="ful")
@@ -125,9 +124,8 @@ def test_a_report_without_options_is_the_commands(variant, tmp_path, monkeypatch
 
     given = []
 
-    def write(folder, **options):
-        given.append({name: options[name] for name in ("scenes", "effort", "images", "fresh")})
-        given[-1] |= {"configurations": list(options["configurations"])}
+    def write(folder, study, **options):
+        given.append({name: options[name] for name in ("images", "fresh")} | {"study": study})
         claims = [{"text": "so"}]
         return {"claims": claims, "scenes": [], "created": "", "seconds": 1, "kept": 0, "computed": 1, "measured": None}
 

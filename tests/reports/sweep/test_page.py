@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The page, the figures and the digest of a sweep, from its Parquet alone."""
+"""The page and the figures of a sweep, from its Parquet alone."""
 
 import json
 import re
@@ -8,12 +8,10 @@ import pytest
 
 from analytic.errors import InputError
 from reports.page.chart import svg_text
-from reports.sweep.digest import digest
 from reports.sweep.figures import FIGURES, drawn
-from reports.sweep.page import render_sweep
+from reports.sweep.page import render_sweep, write_sweep
 from reports.sweep.read import FILE, read_sweep
 from reports.sweep.summary import summary_of, to_json
-from reports.sweep.write import write_sweep
 from tests.helpers.page import Page
 from tests.helpers.sweeps import faulty_rows, row, write_rows
 
@@ -89,7 +87,6 @@ def test_sweeps_at_the_edges_have_their_page(tmp_path, several):
     assert "nan" not in re.findall(r"\b\w+\b", text)
     assert "inf" not in re.findall(r"\b\w+\b", text)
     assert json.loads(json.dumps(to_json(said), allow_nan=False))["rows"] == said.scenes == len(several)
-    assert digest(said)
 
 
 def test_names_and_reasons_are_words_and_never_html(tmp_path):
@@ -106,7 +103,7 @@ def test_names_and_reasons_are_words_and_never_html(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.claim("sweep-from-parquet")
-def test_all_is_written_from_the_parquet(tmp_path, said):
+def test_all_is_written_from_the_parquet(tmp_path):
     source = tmp_path / "in"
     source.mkdir()
     write_rows(source / FILE, faulty_rows())
@@ -114,6 +111,5 @@ def test_all_is_written_from_the_parquet(tmp_path, said):
     assert page == tmp_path / "out" / "sweep.html"
     written = {path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*.*")}
     figures = {f"figures/{name}.{suffix}" for name in FIGURES for suffix in ("pdf", "svg")}
-    assert written == {"sweep.html", "sweep.json", "sweep.md", *figures}
-    assert (tmp_path / "out" / "sweep.md").read_text() == digest(said)
+    assert written == {"sweep.html", "sweep.json", *figures}
     assert [path.name for path in source.iterdir()] == [FILE]
