@@ -6,17 +6,14 @@ Read in this order:
 - `scenes/`: the built-in scenes, animations, and the loading of scenes;
 - `metrics/`: errors of one image against another;
 - `statistics/`: tests for images with random errors, and the noise of errors and times;
-- `configurations/`: methods and kernels by name, and the timing of frames;
+- `clock.py`: times and memory of any work;
 - `estimates/`: the truth of a scene by each estimator, budgets, and the agreement of the estimators;
+- `study/`: scenes x sizes x changes x configurations: what each combination costs and how wrong it is;
 - `certified/`: files of certified values: twelve scenes of fog, and airlight integrals;
 - `kernels/`: errors, cost, convergence and stability of airlight kernels;
-- `frames/`: errors and cost of whole frames, scene by scene;
-- `scaling/`: what a method costs as its work grows;
 - `papers/`: the claims of papers as data, and the experiments that decide them;
 - `slab/`: a slab by order of scattering, on both sides;
-- `canonical/`: tables of light scattered in a slab, as frames look them up, against their computation;
-- `comparison/`: images from files and engines against the truth;
-- `sweep/`: studies of many scenes, and their rows.
+- `comparison/`: images from files and engines against the truth.
 
-`baselines/` holds what sweeps and `bench --scaling` measured once.
+`baselines/` holds what `bench --scaling` measured once.
 """

@@ -10,10 +10,9 @@ Both are measured in one run, batches taking turns, each kernel compiled before;
 stratified estimator gains from holding many samples, so their number is part of what is stated.
 """
 
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import partial, reduce
 
 import mitsuba as mi
 import numpy as np
@@ -23,6 +22,7 @@ from reference.monte_carlo.batches import LAYERS, Batches, merged
 from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 from reference.monte_carlo.volpath.integrator import volpath_batch
 from reference.scene.read import TruthScene, read_truth
+from validation.clock import Run, timed
 from validation.estimates.agreement import layer_masks
 from validation.estimates.quadrature import truth_image
 from validation.scenes.loading import resize
@@ -84,7 +84,7 @@ def efficiency(
     estimators
         Two by name: the function of one batch, and its samples a pixel. The first is expected to be the better one.
     expected
-        The layer's truth, (height, width, 3) [W/(m^2 sr)].
+        The layer's reference, (height, width, 3) [W/(m^2 sr)], not black.
     mask
         Pixels to compare, (height, width); all by default.
     batches
@@ -93,28 +93,15 @@ def efficiency(
     layer
         'airlight' or 'surface'.
     """
-    if len(estimators) != 2:
-        raise ValueError(f"estimators: got {len(estimators)}, wanted two to compare")
-    if batches < 4:
-        raise ValueError(f"batches: got {batches}, wanted at least 4 to estimate a variance and its error")
-    shape = expected.shape[:2]
-    chosen = np.ones(shape, dtype=bool) if mask is None else np.asarray(mask)
+    chosen = np.ones(expected.shape[:2], dtype=bool) if mask is None else np.asarray(mask)
     lit = chosen[..., None] & np.isfinite(expected) & (expected > 0)
-    if not lit.any():
-        raise ValueError(f"the layer '{layer}' of the scene is black: there is no relative error")
-    seconds: dict[str, list[float]] = {name: [] for name in estimators}
-    images: dict[str, list[Batches]] = {name: [] for name in estimators}
+    runs: dict[str, list[Run]] = {name: [] for name in estimators}
     for batch, samples in estimators.values():
         batch(truth, batches, samples)  # compiles the kernels; its seed is that of no other batch
     for seed in range(batches):
         for name, (batch, samples) in estimators.items():
-            start = time.perf_counter()
-            images[name].append(batch(truth, seed, samples))
-            seconds[name].append(time.perf_counter() - start)
-    costs = [
-        _cost(name, images[name], float(np.median(seconds[name])), (LAYERS.index(layer), expected, lit))
-        for name in estimators
-    ]
+            runs[name].append(timed(partial(batch, truth, seed, samples)))
+    costs = [_cost(name, each, (LAYERS.index(layer), expected, lit)) for name, each in runs.items()]
     return Efficiency(layer, int(lit.any(axis=2).sum()), int((~chosen).sum()), *costs)
 
 
@@ -150,12 +137,12 @@ def thin_fog(size: tuple[int, int]):
     return scene
 
 
-def _cost(name: str, runs: list[Batches], seconds: float, where: tuple[int, Array, NDArray[np.bool_]]) -> EstimatorCost:
-    half = len(runs) // 2
-    variances = [_variance(part, where) for part in (runs, runs[:half], runs[half:])]
-    spread = abs(variances[1] - variances[2]) / 2
-    whole = variances[0]
-    return EstimatorCost(name, runs[0].samples, len(runs), seconds, whole, spread / whole if whole > 0 else 0.0)
+def _cost(name: str, runs: Sequence[Run], where: tuple[int, Array, NDArray[np.bool_]]) -> EstimatorCost:
+    images, half = [run.value for run in runs], len(runs) // 2
+    whole, *halves = (_variance(part, where) for part in (images, images[:half], images[half:]))
+    spread = abs(halves[0] - halves[1]) / 2
+    seconds = 1e-3 * float(np.median([run.ms for run in runs]))
+    return EstimatorCost(name, images[0].samples, len(runs), seconds, whole, spread / whole if whole > 0 else 0.0)
 
 
 def _variance(runs: list[Batches], where: tuple[int, Array, NDArray[np.bool_]]) -> float:

@@ -25,10 +25,10 @@ from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
 from realtime.scene.phase import named_phase
+from validation.clock import Timing, time_repeated
 from validation.kernels.errors import relative_error
 from validation.kernels.rays import wide_rays
 from validation.kernels.values import TABLE, Kernel
-from validation.study.clock import Timing, time_repeated
 from validation.study.configuration import find_kernel, sized, split_name
 
 Progress = Callable[[int, int, str], None]

@@ -28,11 +28,11 @@ from realtime.scene.read_scene import Scene, read_scene
 from realtime.shadow_maps.shadow_map import cast_shadow_map
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import TruthScene, read_truth
+from validation.clock import time_repeated
 from validation.metrics.errors import error_metrics
 from validation.papers.measured import attempted, frame_within, milliseconds, rate
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.registry import SCENES
-from validation.study.clock import time_repeated
 from validation.study.configuration import configuration, prepared
 from validation.study.frame_times import moved_light
 

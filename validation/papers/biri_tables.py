@@ -36,11 +36,11 @@ from realtime.methods.shadow_planes.method import PlanePreparation
 from realtime.methods.shadow_planes.silhouettes import components_in_view, silhouette
 from realtime.scene.camera import read_camera
 from realtime.scene.read_scene import Scene, read_scene
+from validation.clock import Timing, time_in_turns
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import error_metrics
 from validation.papers.measured import milliseconds, rate
 from validation.scenes.loading import load_scene
-from validation.study.clock import Timing, time_in_turns
 from validation.study.configuration import Configuration, configuration, prepared
 from validation.study.frame_times import first_frame, moved_light
 

@@ -40,6 +40,7 @@ from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene, read_scene
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth
 from reference.scene.read import read_truth
+from validation.clock import time_in_turns
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import error_metrics
 from validation.papers.measured import milliseconds
@@ -48,7 +49,6 @@ from validation.scenes.meshes import lathe, placed
 from validation.scenes.parts import mitsuba_mesh
 from validation.scenes.registry import SCENES
 from validation.study import configuration as methods
-from validation.study.clock import time_in_turns
 from validation.study.frame_times import moved_light
 
 Array = NDArray[np.float64]

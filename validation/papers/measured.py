@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Times and refusals as figures of claims: a number with the ends of its interval, or why there is none."""
 
-import time
 from collections.abc import Callable
 from typing import Any
 
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeError
 from realtime.frame.renderer import Frame, FrameRenderer, render_frame
-from validation.study.clock import Timing
+from validation.clock import Timing, timed
 
 LIMIT = 30.0  #: frames that take longer are not measured [s]
 
@@ -31,11 +30,9 @@ def frame_within(renderer: FrameRenderer, limit: float = LIMIT) -> Frame:
     TimeoutError
         If the frame took longer than `limit` [s], compilation included.
     """
-    start = time.perf_counter()
-    frame = render_frame(renderer)
-    taken = time.perf_counter() - start
-    if taken > limit:
-        raise TimeoutError(f"a frame takes {taken:.0f} s, more than the limit of {limit:g} s")
+    frame, milliseconds, _ = timed(lambda: render_frame(renderer))
+    if milliseconds > 1e3 * limit:
+        raise TimeoutError(f"a frame takes {1e-3 * milliseconds:.0f} s, more than the limit of {limit:g} s")
     return frame
 
 

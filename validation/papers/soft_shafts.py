@@ -29,10 +29,10 @@ from numpy.typing import NDArray
 
 from realtime.frame.renderer import render_frame, run_cast_and_shade
 from realtime.scene.read_scene import Scene, read_scene
+from validation.clock import Timing, time_in_turns
 from validation.estimates.quadrature import truth_image
 from validation.papers.measured import rate
 from validation.scenes.loading import load_scene
-from validation.study.clock import Timing, time_in_turns
 from validation.study.configuration import SHARED_POINTS, Configuration, prepared
 from validation.study.frame_times import moved_light
 

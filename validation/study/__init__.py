@@ -6,19 +6,17 @@ A *study* says which scenes, methods and sizes; a *cell* is one combination of t
 Read in this order:
 
 - `configuration.py`: a method with its kernel and parameters, by the names that a user gives;
-- `clock.py`: times and memory of any work: the one clock;
+- `study.py`: a study from its TOML file, and its cells; those of reports are in `studies/`;
+- `row.py`: what comes of a cell: the columns of a row, with unit and meaning;
 - `frame_times.py`: the times of a frame and of its stages;
-- `cost.py`: what a command will take, and the question before it starts;
-- `run.py`: the time and the error of one configuration in one scene;
-- `scene.py`: all that a report asks of one scene, by effort;
-- `results.py`: results on disk, so that a report computes only what changed;
-- `row.py`: the columns of a row, their types and units: the one place;
-- `study.py`: a study from its TOML file, and its cells;
-- `reference.py`: the truth that the cells of an image share;
+- `reference.py`: the reference that the cells of an image share;
 - `stated_errors.py`: the errors that methods state for themselves;
-- `work.py`: a cell becomes a row;
+- `run.py`: a cell is rendered, timed and compared, and becomes a row;
+- `results.py`: results on disk, so that a study computes only what changed;
+- `scene.py`: the study of one scene: reference, checks, rows, images;
 - `keys.py`: what decides the numbers of a row, as a digest;
 - `rows.py`: finished rows on disk, and their Parquet;
+- `cost.py`: what a command will take, and the question before it starts;
 - `decompose.py`: the error of an image by its causes, which add up to it;
 - `maps.py`: error against the size of the shadow map, and the flicker of a light that moves;
 - `subdivision.py`: meshes with four times the triangles at each level;

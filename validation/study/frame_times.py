@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The times of a frame and of its stages, and of frames after light, objects or colours changed."""
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
@@ -29,7 +28,7 @@ from realtime.numerics.recorded import Frozen
 from realtime.scene.animate import Objects, read_objects, turned_objects
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import Scene
-from validation.study.clock import Timing, time_repeated, timed, timing_of
+from validation.clock import Timing, Took, stopwatch, time_repeated, timed, timing_of
 
 #: A frame that takes longer is timed stage by stage, in few frames [s]. Its spread matters little, and the usual thirty
 #: or more frames would take minutes.
@@ -220,11 +219,10 @@ def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
     objects = _objects(scene)
     steps = []
     for _ in range(turns):
-        times = [time.perf_counter()]
+        times, took = [0.0], stopwatch()
 
-        def done(times: list[float] = times) -> None:
-            dr.sync_thread()
-            times.append(time.perf_counter())
+        def done(times: list[float] = times, took: Callable[[], Took] = took) -> None:
+            times.append(took().ms)
 
         there = turned_objects(scene, objects, np.eye(3)) if objects else scene
         done()
@@ -245,7 +243,7 @@ def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
             done()
             of_parts += np.diff(times[-5:])
         steps.append([*np.diff(times[:3]), *of_parts])
-    move, prepare, surface, shade, in_tiles, rest = 1e3 * np.array(steps).T
+    move, prepare, surface, shade, in_tiles, rest = np.array(steps).T
     needed = renderer.method.prepared_from
     airlight = in_tiles + rest
     light_moved = prepare + surface + airlight

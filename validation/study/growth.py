@@ -22,7 +22,7 @@ from itertools import pairwise
 
 from realtime.errors import InputError
 from realtime.scene.read_scene import Scene
-from validation.study.clock import Timing, time_repeated
+from validation.clock import Timing, time_repeated
 from validation.study.configuration import Configuration, configuration, prepared
 from validation.study.frame_times import camera_rays
 from validation.study.ladders import Step

@@ -7,7 +7,6 @@ exceptions are the caller's: they are faults. Nothing here knows where it runs.
 
 import json
 import shlex
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -25,11 +24,11 @@ from realtime.methods.registry import find_method
 from realtime.numerics.recorded import Frozen
 from realtime.scene.read_scene import Scene, read_scene
 from reference.storage.exr import Image
+from validation.clock import largest_memory, peak_memory, stopwatch, timed
 from validation.metrics.colour import colour_difference
 from validation.metrics.errors import FLOOR, error_metrics
 from validation.metrics.flip import flip_hdr
 from validation.metrics.other_tools import published_errors
-from validation.study.clock import largest_memory, peak_memory, timed
 from validation.study.configuration import Configuration, prepared, rendered_lights
 from validation.study.frame_times import FrameTimes, brief_times, time_frame
 from validation.study.reference import Reference, load_cell
@@ -97,7 +96,7 @@ def run(
     tuple
         The row, without what only the caller knows (key, study, origin), and the frame, if there is one.
     """
-    begin, spent = time.perf_counter(), time.process_time()
+    took = stopwatch()
     if apart is not None and cell.chosen.own:
         try:
             done = apart(render_cell, cell, name=cell.chosen.method)
@@ -129,13 +128,8 @@ def run(
         )
         row = replace(row, picture=paint(known, shown))
     assert done.cost is not None
-    cost = replace(
-        done.cost,
-        lights=rendered_lights(scene, cell.chosen),
-        peak_mib=largest_memory(),
-        work_ms=1e3 * (time.perf_counter() - begin),
-        cpu_ms=1e3 * (time.process_time() - spent),
-    )
+    lights, (work_ms, cpu_ms) = rendered_lights(scene, cell.chosen), took()
+    cost = replace(done.cost, lights=lights, peak_mib=largest_memory(), work_ms=work_ms, cpu_ms=cpu_ms)
     return replace(row, cost=cost), done.frame
 
 
@@ -175,21 +169,18 @@ def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> Ren
     dr.sync_thread()
     dr.detail.malloc_clear_statistics()
     before = dr.detail.launch_stats()
-    begin = time.perf_counter()
     try:
-        renderer = prepared(scene, chosen)
-        reason = _too_long(renderer, cell, time.perf_counter() - begin)
+        renderer, making, _ = timed(partial(prepared, scene, chosen))
+        reason = _too_long(renderer, cell, 1e-3 * making)
         if reason:
             return Rendered(None, "left out", reason, knows_shadows=shadows)
-        begin = time.perf_counter()
-        frame = render_frame(renderer) if wanted.times == "stages" else unchecked_frame(renderer, _stages(renderer))
-        first = time.perf_counter() - begin
+        frame, first, _ = timed(partial(render_frame if wanted.times == "stages" else _unchecked, renderer))
     except InputError as error:
         return Rendered(None, "refused", str(error), knows_shadows=shadows)
     after = dr.detail.launch_stats()
     backend = dr.JitBackend.CUDA if (mi.variant() or "").startswith("cuda") else dr.JitBackend.LLVM
     watermark = int(dr.detail.malloc_watermark(backend))
-    cost = Cost(1e3 * first, None, after[0] - before[0], after[2] - before[2], watermark)
+    cost = Cost(making + first, None, after[0] - before[0], after[2] - before[2], watermark)
     done = Rendered(frame, cost=cost, knows_shadows=shadows)
     if wanted.times == "with":
         times, prepare = brief_times(renderer)
@@ -197,7 +188,7 @@ def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> Ren
     if wanted.times != "stages":
         return done
     notes = []
-    if timed_scene is not None and first > _LONG:
+    if timed_scene is not None and first > 1e3 * _LONG:
         timed_scene = None
         notes.append(f"timed at {scene.camera.width} x {scene.camera.height}: larger frames take minutes")
     if chosen.own and not isinstance(renderer.render, Frozen):
@@ -230,8 +221,9 @@ def layered_frame(name: str, chosen: Configuration, frame: Frame) -> Image:
     return Image({"airlight": frame.airlight, "surface": frame.surface, **frame.extra}, frame.distance, attributes)
 
 
-def _stages(renderer: FrameRenderer) -> Any:
-    return run_stages(renderer, renderer.prepare(renderer.scene))
+def _unchecked(renderer: FrameRenderer) -> Frame:
+    """Render a frame, one that is not finite too: its pixels are counted."""
+    return unchecked_frame(renderer, run_stages(renderer, renderer.prepare(renderer.scene)))
 
 
 def _timed_frame(renderer: FrameRenderer, took: list[float]) -> None:
@@ -276,10 +268,8 @@ def _too_long(renderer: FrameRenderer, cell: Cell, took: float) -> str | None:
     chosen, limit = cell.chosen, cell.measure.limit
     if limit is None or not (chosen.own or took * len(light_groups(renderer)) > _DOUBTFUL * limit):
         return None
-    begin = time.perf_counter()
-    states = renderer.prepare(renderer.scene)
-    dr.sync_thread()
-    preparation = time.perf_counter() - begin
+    states, milliseconds, _ = timed(lambda: renderer.prepare(renderer.scene))
+    preparation = 1e-3 * milliseconds
     if renderer.groups is not None:
         preparation *= len(states) / sum(state is not None for state in states)
     del states
@@ -290,9 +280,7 @@ def _too_long(renderer: FrameRenderer, cell: Cell, took: float) -> str | None:
         return None
     small, large = prepared(read_scene(load_cell(replace(cell, size=PROBE)).scene), chosen), renderer.scene.camera
     render_frame(small)
-    begin = time.perf_counter()
-    render_frame(small)
-    took = time.perf_counter() - begin
+    took = 1e-3 * timed(lambda: render_frame(small)).ms
     share = (large.width * large.height) / (PROBE[0] * PROBE[1])
     expected = preparation + max(0.0, took - preparation) * share
     if expected <= limit:

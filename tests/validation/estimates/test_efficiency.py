@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from reference.monte_carlo.batches import single_batch
-from validation.estimates import efficiency as efficiency_module
 from validation.estimates.efficiency import efficiency, efficiency_lines, scene_efficiency, thin_fog
 
 
@@ -20,7 +19,7 @@ EXPECTED = np.full((20, 30, 3), 2.0)
 def clock(monkeypatch):
     """A clock that only the estimators of these tests move [s]."""
     clock = SimpleNamespace(now=0.0)
-    monkeypatch.setattr(efficiency_module, "time", SimpleNamespace(perf_counter=lambda: clock.now))
+    monkeypatch.setattr("validation.clock.time", SimpleNamespace(perf_counter=lambda: clock.now, process_time=float))
     return clock
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from realtime.scene.read_scene import read_scene
 from tests.validation.papers.test_claims import JUDGED, key, measured
+from validation.clock import Timing
 from validation.papers import billeter_tables, biri_tables, soft_shafts
 from validation.papers.biri_tables import STAGES, fractions
 from validation.papers.claims import claims, taken, verdict
@@ -14,7 +15,6 @@ from validation.papers.formulas import _annex, _cloud_equations, _droplets
 from validation.papers.scattering import fitted_constant, left_over
 from validation.papers.stencil import drawn
 from validation.scenes.loading import load_scene
-from validation.study.clock import Timing
 
 
 def test_a_stencil_of_one_ray_by_hand():

@@ -8,8 +8,8 @@ from realtime.frame.renderer import frame_renderer
 from realtime.methods.registry import METHODS
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
+from validation.clock import time_in_turns, time_repeated
 from validation.study import frame_times as timing
-from validation.study.clock import time_in_turns, time_repeated
 from validation.study.frame_times import time_frame
 
 
@@ -38,7 +38,7 @@ class Clock:
 @pytest.fixture
 def clock(variant, monkeypatch):
     clock = Clock()
-    monkeypatch.setattr("validation.study.clock.time", clock)
+    monkeypatch.setattr("validation.clock.time", clock)
     return clock
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from validation.study.clock import Timing
+from validation.clock import Timing
 from validation.study.configuration import configuration
 from validation.study.growth import Cost, growth, study_scaling
 from validation.study.ladders import ladder

@@ -25,6 +25,13 @@ _MIB = 1024  # of the numbers in `status` [KiB]
 _FORGET = "5"  # what makes Linux forget the peak so far
 
 
+class Took(NamedTuple):
+    """What work took."""
+
+    ms: float  #: by the wall clock [ms]
+    cpu_ms: float  #: of the processors, of all threads [ms]
+
+
 class Run(NamedTuple):
     """What work gave, and what it took."""
 
@@ -44,12 +51,22 @@ class Timing:
     cpu_ms: float | None = column("processor", "ms", "least processor time, of all threads", default=None)
 
 
+def stopwatch() -> Callable[[], Took]:
+    """Return a function that says what was taken since now, until all arrays are ready."""
+    begin, spent = time.perf_counter(), time.process_time()
+
+    def took() -> Took:
+        dr.sync_thread()
+        return Took(1e3 * (time.perf_counter() - begin), 1e3 * (time.process_time() - spent))
+
+    return took
+
+
 def timed(work: Callable[[], Any]) -> Run:
     """Do some work and return what it gave, with the times until its arrays are ready."""
-    begin, spent = time.perf_counter(), time.process_time()
+    took = stopwatch()
     value = work()
-    dr.sync_thread()
-    return Run(value, 1e3 * (time.perf_counter() - begin), 1e3 * (time.process_time() - spent))
+    return Run(value, *took())
 
 
 def time_repeated(

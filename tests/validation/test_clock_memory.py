@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from validation.study.clock import peak_memory
+from validation.clock import peak_memory
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux lets a process forget an earlier peak")
