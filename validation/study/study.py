@@ -51,9 +51,9 @@ a study too (`validation/study/studies/`), which says more:
 
 import itertools
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -77,12 +77,9 @@ STUDIES = ("quick", "default", "full")
 GROWTH = ("size", "triangles", "lights", "media", "map")
 
 _FOLDER = Path(__file__).parent / "studies"
+Reader = Callable[[str, Any], Any]  # of a value, from what it is and what the file has
+
 _METHOD_SETS = ("all", "quick", "standard")
-_KEYS = (
-    *("name", "scenes", "random", "half", "sizes", "methods", "kernels", "parameters", "maps", "media", "metrics"),
-    *("flip", "times", "timed", "timed_size", "seconds", "slow", "frame_limit", "limit", "retries", "checks"),
-    *("stability", "growth"),
-)
 _LONGEST = 86400.0
 _MOST_RETRIES = 100
 _MOST_SCENES = 10_000_000
@@ -286,36 +283,20 @@ def parse_study(data: Mapping[str, Any], *, folder: Path = Path(), name: str = "
     InputError
         As `read_study`.
     """
-    _known("", data, _KEYS)
-    times = _one_of("times", data.get("times", "with"), TIMES)
-    if "timed" in data and times != "alone":
+    others = ("scenes", "random", "methods", "kernels", "maps", "parameters")
+    _known("", data, (*_STUDY, *_MEASURE, *others))
+    given, measure = _read("", data, _STUDY), _read("", data, _MEASURE)
+    times = measure.get("times", "with")
+    if "timed" in given and times != "alone":
         raise InputError(f'timed: it is of times = "alone", got times = "{times}"; leave one of them out')
     scenes = data.get("scenes", [])
-    named = tuple(FOG_SCENES) if scenes == "all" else tuple(_scene(item, folder) for item in _list("scenes", scenes, 0))
-    flip = data.get("flip", False)
+    one = partial(_scene, folder=folder)
     return Study(
-        name=_word("name", data.get("name", name)),
-        scenes=_once("scenes", named),
+        **{"name": name, **given},
+        scenes=tuple(FOG_SCENES) if scenes == "all" else _several(one, 0)("scenes", scenes),
         random=_random(data.get("random", {}), folder),
-        half=tuple(_word("half", item) for item in _list("half", data.get("half", []), 0)),
-        sizes=_once("sizes", tuple(_size("sizes", size) for size in _list("sizes", data.get("sizes", ["160x120"])))),
         configurations=_configurations(data),
-        media=_once("media", tuple(_medium(item) for item in _list("media", data.get("media", [{}])))),
-        measure=Measure(
-            times=times,
-            seconds=_number("seconds", data.get("seconds", 0.6), 0, _LONGEST, whole=False),
-            timed_size=_size("timed_size", data["timed_size"]) if "timed_size" in data else None,
-            slow=_number("slow", data["slow"], 0, _LONGEST, whole=False) if "slow" in data else None,
-            limit=_number("frame_limit", data["frame_limit"], 0, _LONGEST, False) if "frame_limit" in data else None,
-            every_metric=_one_of("metrics", data.get("metrics", "all"), ("usual", "all")) == "all",
-        ),
-        flip="kinds" if flip == "kinds" else "all" if _truth_value("flip", flip) else "none",
-        timed=_number("timed", data["timed"], 1, _MOST_SCENES) if "timed" in data else None,
-        limit=float(_number("limit", data.get("limit", 600), 1e-3, _LONGEST, whole=False)),
-        retries=_number("retries", data.get("retries", 3), 0, _MOST_RETRIES),
-        checks=_checks(_table("checks", data.get("checks", {}))),
-        stability=_number("stability", data.get("stability", 0), 0, _MOST_SCENES),
-        growth=tuple(_one_of("growth", kind, GROWTH) for kind in _list("growth", data.get("growth", []), 0)),
+        measure=Measure(**{_FIELDS.get(name, name): value for name, value in measure.items()}),
     )
 
 
@@ -325,42 +306,12 @@ def standard_study(name: str) -> Study:
     return read_study(_FOLDER / f"{name}.toml")
 
 
-def _checks(table: Mapping[str, Any]) -> Checks:
-    usual = Checks()
-    _known("checks.", table, [item.name for item in fields(Checks)])
-    margins, samples = (
-        {name: _number(f"checks.{what}.{name}", value, least, most, whole) for name, value in given.items()}
-        for what, given, least, most, whole in (
-            ("margins", _table("checks.margins", table.get("margins", usual.margins)), 0, 1, False),
-            ("samples", _table("checks.samples", table.get("samples", usual.samples)), 1, 256, True),
-        )
-    )
-    if margins.keys() != samples.keys():
-        raise InputError("checks: margins and samples name other estimators; name the same in both")
-    first, each = _list("checks.multiple", table.get("multiple", list(usual.multiple)), 2)[:2]
-    return Checks(
-        size=_size("checks.size", table["size"]) if "size" in table else usual.size,
-        margins=margins,
-        samples=samples,
-        batches=_number("checks.batches", table.get("batches", usual.batches), 2, 1 << 16),
-        multiple=(_number("checks.multiple", first, 2, 1 << 16), _number("checks.multiple", each, 1, 256)),
-        patience=_number("checks.patience", table["patience"], 0, _LONGEST, False) if "patience" in table else None,
-    )
-
-
-def _size(what: str, value: Any) -> tuple[int, int]:
-    size = parse_size(_word(what, value))
-    if not all(1 <= side <= 16384 for side in size):
-        raise InputError(f"{what}: got {size[0]}x{size[1]}, wanted at least 1x1 and at most 16384 pixels on a side")
-    return size
-
-
 def _configurations(data: Mapping[str, Any]) -> tuple[Configuration, ...]:
     """Return the combinations of methods, kernels, maps and parameters."""
     parameters = _table("parameters", data.get("parameters", {}))
     asked = data.get("methods", "all")
     if isinstance(asked, str):
-        _one_of("methods", asked, _METHOD_SETS)
+        _one_of("methods", asked, names=_METHOD_SETS)
         sets = {"quick": lambda: QUICK, "standard": lambda: chosen_configurations(list(FOG_METHODS))}
         standard = sets.get(asked, default_configurations)()
         if not (parameters or "kernels" in data or "maps" in data):
@@ -429,8 +380,8 @@ def map_side(chosen: Configuration) -> int | None:
     return int(known["map"]) if uses and isinstance(known["map"], int) else None
 
 
-def _scene(item: Any, folder: Path) -> str:
-    word = _word("scenes", item)
+def _scene(what: str, item: Any, *, folder: Path) -> str:
+    word = _word(what, item)
     if word in SCENES:
         if SCENES[word].clouds:
             raise InputError(f"scenes: {word} scatters light many times; a sweep is of single scattering, leave it out")
@@ -462,9 +413,9 @@ def _random(table: Any, folder: Path) -> RandomScenes:
     return drawn
 
 
-def _medium(item: Any) -> tuple[str, ...]:
+def _medium(what: str, item: Any) -> tuple[str, ...]:
     changes: dict[str, tuple[float, ...]] = {}
-    for name, value in _table("media", item).items():
+    for name, value in _table(what, item).items():
         if not name.partition(".")[0].startswith("medium"):
             raise InputError(f"media: got {name!r}, wanted medium.sigma_t, medium.albedo or medium.g; quote the name")
         numbers = value if isinstance(value, list) else [value]
@@ -498,15 +449,9 @@ def _word(what: str, value: Any) -> str:
     return value
 
 
-def _one_of(what: str, value: Any, names: Sequence[str]) -> str:
+def _one_of(what: str, value: Any, *, names: Sequence[str]) -> str:
     if value not in names:
         raise InputError(f"{what}: got {value!r}, wanted one of {', '.join(names)}")
-    return value
-
-
-def _truth_value(what: str, value: Any) -> bool:
-    if not isinstance(value, bool):
-        raise InputError(f"{what}: got {value!r}, wanted true or false")
     return value
 
 
@@ -522,3 +467,79 @@ def _once(what: str, items: tuple[Any, ...]) -> tuple[Any, ...]:
         if item in items[:number]:
             raise InputError(f"{what}: {item!r} is there twice; leave one out")
     return items
+
+
+def _read(prefix: str, data: Mapping[str, Any], readers: Mapping[str, Reader]) -> dict[str, Any]:
+    """Return the values that a table has of some names."""
+    return {name: read(prefix + name, data[name]) for name, read in readers.items() if name in data}
+
+
+def _several(read: Reader, least: int = 1) -> Reader:
+    return lambda what, value: _once(what, tuple(read(what, item) for item in _list(what, value, least)))
+
+
+def _by_name(read: Reader) -> Reader:
+    return lambda what, value: {name: read(f"{what}.{name}", each) for name, each in _table(what, value).items()}
+
+
+def _size(what: str, value: Any) -> tuple[int, int]:
+    size = parse_size(_word(what, value))
+    if not all(1 <= side <= 16384 for side in size):
+        raise InputError(f"{what}: got {size[0]}x{size[1]}, wanted at least 1x1 and at most 16384 pixels on a side")
+    return size
+
+
+def _flip(what: str, value: Any) -> str:
+    words = {True: "all", False: "none", "kinds": "kinds"}
+    if value not in words:
+        raise InputError(f'{what}: got {value!r}, wanted true, false or "kinds"')
+    return words[value]
+
+
+def _pair(what: str, value: Any) -> tuple[int, ...]:
+    return tuple(_number(what, each, 1, 1 << 16) for each in _list(what, value, 2)[:2])
+
+
+def _checks(what: str, value: Any) -> Checks:
+    table = _table(what, value)
+    _known(f"{what}.", table, tuple(_CHECKS))
+    checks = Checks(**_read(f"{what}.", table, _CHECKS))
+    if checks.margins.keys() != checks.samples.keys():
+        raise InputError(f"{what}: margins and samples name other estimators; name the same in both")
+    return checks
+
+
+_seconds = partial(_number, least=0, most=_LONGEST, whole=False)
+_count = partial(_number, least=0, most=_MOST_SCENES)
+
+#: What reads the values of a study file, of what is measured in it, and of how its references are checked.
+_STUDY: Mapping[str, Reader] = {
+    "name": _word,
+    "half": _several(_word, 0),
+    "sizes": _several(_size),
+    "media": _several(_medium),
+    "flip": _flip,
+    "timed": partial(_number, least=1, most=_MOST_SCENES),
+    "limit": partial(_number, least=1e-3, most=_LONGEST, whole=False),
+    "retries": partial(_number, least=0, most=_MOST_RETRIES),
+    "checks": _checks,
+    "stability": _count,
+    "growth": _several(partial(_one_of, names=GROWTH), 0),
+}
+_MEASURE: Mapping[str, Reader] = {
+    "times": partial(_one_of, names=TIMES),
+    "timed_size": _size,
+    "seconds": _seconds,
+    "slow": _seconds,
+    "frame_limit": _seconds,
+    "metrics": lambda what, value: _one_of(what, value, names=("usual", "all")) == "all",
+}
+_CHECKS: Mapping[str, Reader] = {
+    "size": _size,
+    "margins": _by_name(partial(_number, least=0, most=1, whole=False)),
+    "samples": _by_name(partial(_number, least=1, most=256)),
+    "batches": partial(_number, least=2, most=1 << 16),
+    "multiple": _pair,
+    "patience": _seconds,
+}
+_FIELDS = {"frame_limit": "limit", "metrics": "every_metric"}  # of `Measure`, where they are not as in the file
