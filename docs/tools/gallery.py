@@ -62,19 +62,10 @@ _METHOD_SCENES = {
 }
 #: Methods without a map of their errors: the truth of clouds takes hours without noise.
 _NO_ERROR = ("cloud-octaves", "cloud-collectors")
-#: Clouds in other lights and from elsewhere, by `cloud-collectors`: the scene, and what is changed in it.
+#: Clouds in other lights, by `cloud-collectors`: the scene, and what is changed in it.
 _VIEWS = {
     "cloud-noon": ("cumulus", ("light.direction=0.13,0.17,-0.98",)),
-    "cloud-dusk": ("cumulus", ("light.direction=0.93,0.34,-0.13", "light.irradiance=3.3,1.7,0.67")),
     "cloud-silver-lining": ("cumulus", ("light.direction=0.11,-0.95,-0.29",)),
-    "cloud-glory": (
-        "stratocumulus",
-        ("camera.origin=917,-791,2411", "camera.target=-194,-281,1090", "camera.fov=17"),
-    ),
-    "cloud-fogbow": (
-        "stratocumulus",
-        ("camera.origin=517,-491,1911", "camera.target=-594,19,590", "camera.fov=97"),
-    ),
 }
 TUTORIAL = "gate.xml"  #: the scene of docs/scene-to-figure.md, in which it stands
 STRIP = ("hall", "clutter", "three-media", "windows")  #: at the top of the README
