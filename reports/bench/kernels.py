@@ -24,4 +24,4 @@ def print_kernels(names: list[str] | None, *, phase: str | None, json: bool, mar
     if markdown:
         print_heading()
     print_tables(kernel_tables(measured["costs"], measured["levels"]), as_markdown=markdown)
-    print("ns/ray: the kernel alone by Dr.Jit's history, median; ~ is extrapolated from fewer steps.")
+    print("ns/ray: the kernel alone by Dr.Jit's history, median.")

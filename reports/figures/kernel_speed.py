@@ -69,14 +69,11 @@ def draw(folder: Path, column: str):
 
 
 def _line(panel, rows: list[dict[str, str]], family: str, statistic: str) -> None:
-    """Draw a kernel over its sizes; where no ray was timed the time is extrapolated, and the marker empty."""
+    """Draw a kernel over its sizes."""
     style = kernel_style(family)
-    shown = [(value(row, "ns"), value(row, statistic), row) for row in rows]
-    points = sorted((ns, error, row["rays"]) for ns, error, row in shown if ns and error is not None)
+    shown = [(value(row, "ns"), value(row, statistic)) for row in rows]
+    points = sorted((ns, error) for ns, error in shown if ns and error is not None)
     if not points:
         return
     times, errors = [point[0] for point in points], [min(max(point[1], _SHOWN[0]), _SHOWN[1]) for point in points]
     panel.plot(times, errors, label=family, linestyle="-", clip_on=False, zorder=3, **style)
-    guessed = [(ns, error) for ns, error, rays in zip(times, errors, (point[2] for point in points)) if rays == "0"]
-    if guessed:
-        panel.plot(*zip(*guessed), linestyle="none", **(style | {"fillstyle": "none", "markerfacecolor": "white"}))

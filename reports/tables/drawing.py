@@ -279,7 +279,7 @@ def _cell(value: Value, column: Column, style: _Style) -> str:
     if value is None:
         return style.dash
     if isinstance(value, Measured):
-        return ("~" if value.about else "") + written(value.median) + after
+        return written(value.median) + after
     if isinstance(value, Interval):
         return f"{written(value.low)}{style.between}{written(value.high)}{after}"
     if isinstance(value, Name):
@@ -407,8 +407,7 @@ def _latex_cell(row: Row, column: Column) -> str:
     value = row.values.get(column.key)
     if isinstance(value, Measured):
         median, below, above = map(_num, with_spread(value.median, value.low, value.high))
-        about = r"\sim" if value.about else ""
-        return rf"${about}{median}_{{-{below}}}^{{+{above}}}$"
+        return rf"${median}_{{-{below}}}^{{+{above}}}$"
     return _cell(value, column, replace(_LATEX_STYLE, zeros=not row.published))
 
 

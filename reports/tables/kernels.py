@@ -20,7 +20,6 @@ COSTS = (
     *numbers(nonfinite="not finite", how={"alarm": True}),
 )
 _STATISTICS = {"max": "maximum error", "p99": "99 % of the rays"}
-_FAMILIES = ("uniform", "table")
 
 
 def kernel_tables(costs: Iterable[Entry], levels: Iterable[Entry]) -> Iterator[Table]:
@@ -44,26 +43,16 @@ def _cost_row(cost: Entry, code: bool) -> Row:
     values: dict[str, Value] = {"kernel": Name(cost["kernel"]) if code else cost["kernel"]}
     if cost["refused"]:
         return Row(values, f"refused: {cost['refused']}")
-    about = not cost.get("rays", 1)
-    values |= {name: _spread(cost[name], about) for name in ("device", "wall")}
+    values |= {name: _spread(cost[name]) for name in ("device", "wall")}
     values |= {"rays": cost.get("rays") or None}
     return Row(values | {name: cost[name] for name in ("median", "p99", "max", "nonfinite")})
 
 
-def _spread(spread: Mapping[str, float] | None, about: bool) -> Measured | None:
-    return Measured(spread["median"], spread["low"], spread["high"], about) if spread else None
+def _spread(spread: Mapping[str, float] | None) -> Measured | None:
+    return Measured(spread["median"], spread["low"], spread["high"]) if spread else None
 
 
 def level_table(title: str, levels: Iterable[Entry]) -> Table:
-    """Return which kernel is cheapest at each error, and how much more others cost."""
-    columns = [Column("level", "error", digits=6), *words("cheapest"), Column("ns", "", "ns/ray")]
-    for family in _FAMILIES:
-        columns.append(Column(family, f"cheapest {family}", words=True))
-        columns.append(Column(f"{family}_ratio", "costs", after=" x"))
-    rows = []
-    for level in levels:
-        rivals = [
-            part for name in _FAMILIES for part in (level["rivals"].get(name) or "none", level["ratios"].get(name))
-        ]
-        rows.append((level["level"], level["cheapest"] or "none", level["ns"], *rivals))
-    return table(title, columns, rows)
+    """Return which kernel is cheapest at each error."""
+    columns = (Column("level", "error", digits=6), *words("cheapest"), Column("ns", "", "ns/ray"))
+    return table(title, columns, [(level["level"], level["cheapest"] or "none", level["ns"]) for level in levels])

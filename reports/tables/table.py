@@ -17,7 +17,6 @@ class Measured:
     median: float
     low: float  #: first quartile
     high: float  #: third quartile
-    about: bool = False  #: extrapolated, not measured in full
 
 
 @dataclass(frozen=True)

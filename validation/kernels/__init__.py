@@ -3,8 +3,7 @@
 
 Read in this order:
 
-- `underflow.py`: what a value may lose near the smallest numbers;
-- `errors.py`: relative errors on rays with a known J;
+- `errors.py`: relative errors on rays with a known J, and what a value may lose near the smallest numbers;
 - `values.py`: values of a kernel on tables of cases;
 - `cases.py`: kernels on certified cases;
 - `rays.py`: quasi-random rays with their truth;

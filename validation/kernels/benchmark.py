@@ -7,7 +7,8 @@ kernel alone) and from the wall clock (launch and replay included). Errors are o
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import drjit as dr
@@ -25,7 +26,7 @@ from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
 from realtime.scene.phase import named_phase
-from validation.clock import Timing, time_repeated
+from validation.clock import time_repeated
 from validation.kernels.errors import relative_error
 from validation.kernels.rays import wide_rays
 from validation.kernels.values import TABLE, Kernel
@@ -36,20 +37,17 @@ Progress = Callable[[int, int, str], None]
 RAYS = 480_000  # 800 x 600
 ERROR_RAYS = 6000
 LEVELS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
-RIVALS = ("uniform", "table")
 #: Phase functions with their g, the first with all sizes of all kernels, the others with the default sizes.
 PHASES = (("isotropic", 0.0), ("rayleigh", 0.0), ("hazy", 0.0), ("murky", 0.0), ("hg", 0.8))
 #: Sizes to try, by the name of the parameter.
 SIZES: dict[str, tuple[int, ...]] = {
     "nodes": (2, 4, 6, 8, 12, 16, 24, 32),
     "degree": (2, 4, 6, 8, 11, 15, 23, 31),
-    "steps": tuple(2**k for k in range(2, 19)),
+    "steps": tuple(2**k for k in range(2, 15)),
     "size": (32, 64, 128, 256, 512, 1024),
 }
 
-_LONGEST = 0.6  # seconds: work that would take longer is timed on fewer rays, but on enough to fill the device
-_FEWEST = 8  # times fewer at most; what would take longer still is extrapolated, if its cost is linear in its size
-_LINEAR = "steps"  # the parameter of marching, in which cost is linear
+_MOST_STEPS = 64  # of marching, timed on all rays; on fewer in proportion where there are more
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,7 @@ class KernelCost:
     size: int | None
     phase: str
     g: float
-    rays: int = 0  #: that were timed; 0 where the time is extrapolated from that of fewer steps
+    rays: int = 0  #: that were timed
     device: Spread | None = None  #: of the kernel alone
     wall: Spread | None = None  #: with launch and replay
     median: float | None = None
@@ -89,15 +87,13 @@ class KernelCost:
 
 @dataclass(frozen=True)
 class Level:
-    """The cheapest kernel whose error stays at or below a level, and how much more its rivals cost."""
+    """The cheapest kernel whose error stays at or below a level."""
 
     phase: str
     statistic: str  #: 'max' or 'p99'
     level: float
     cheapest: str | None
-    ns: float | None
-    rivals: dict[str, str | None]  #: family -> its cheapest kernel that reaches the level
-    ratios: dict[str, float | None]  #: family -> cost of that one over the cheapest; None where none reaches it
+    ns: float | None  #: its cost [ns a ray]
 
 
 @dataclass(frozen=True)
@@ -140,48 +136,33 @@ def bench_kernels(
         for done, (family, default, sizes) in enumerate(ladders):
             if progress is not None:
                 progress(number * len(ladders) + done, total, f"{family}, {phase}")
-            before = None
             for size in sizes if number == 0 else (default,):
-                before = measure(family, size, truth=truth, timed=timed, seconds=seconds, before=before)
-                if before.refused is None or size == default:  # a size that the kernel does not have is left out
-                    costs.append(before)
+                cost = measure(family, size, truth=truth, timed=timed, seconds=seconds)
+                if cost.refused is None or size == default:  # a size that the kernel does not have is left out
+                    costs.append(cost)
     return KernelBench(tuple(costs), speed_against_error(costs))
 
 
-def measure(
-    family: str,
-    size: int | None,
-    *,
-    truth: Cases,
-    timed: Cases,
-    seconds: float = 0.3,
-    before: KernelCost | None = None,
-) -> KernelCost:
-    """Measure one kernel of one size on rays of one phase function.
+def measure(family: str, size: int | None, *, truth: Cases, timed: Cases, seconds: float = 0.3) -> KernelCost:
+    """Measure the kernel 'family-size' on rays of one phase function.
 
     Parameters
     ----------
-    family, size
-        The kernel and the N of 'name-N'.
     truth
         Rays with known J, for the error.
     timed
         Rays to time.
     seconds
-        How long to time.
-    before
-        The same kernel at a smaller size: tells how long this size will take, where cost is linear in it.
+        How long to time [s].
     """
     name, phase, g = sized(family, size), truth.phase[0], float(truth.g[0])
     function = find_kernel(name)
+    rays = len(timed.x0)
+    if size is not None and family in KERNELS and next(iter(KERNELS[family].parameters), None) == "steps":
+        rays //= max(1, size // _MOST_STEPS)
     try:
         J = np.array(_frozen(function, truth)(), dtype=np.float64)
-        expected = _expected(before, size)
-        rays = _affordable(expected.ns if expected else None, len(timed.x0))
-        if rays == 0 and expected is not None:
-            device, wall = expected.device, expected.wall
-        else:
-            device, wall = times_per_ray(_frozen(function, timed, rays), rays, seconds)
+        device, wall = times_per_ray(_frozen(function, timed, rays), rays, seconds)
     except (InputError, RealtimeInputError) as reason:
         return KernelCost(name, family, size, phase, g, refused=str(reason))
     error = relative_error(J, np.asarray(truth.value), "single")
@@ -192,42 +173,21 @@ def measure(
 
 
 def speed_against_error(costs: Sequence[KernelCost]) -> tuple[Level, ...]:
-    """Return, for each phase function, statistic and error level, the cheapest kernel and what its rivals cost.
+    """Return the cheapest kernel for each phase function, statistic and error level.
 
     Kernels that gave values that are not finite reach no level.
     """
     levels = []
-    for phase in dict.fromkeys(cost.phase for cost in costs):
-        for statistic in ("max", "p99"):
-            for level in LEVELS:
-                good = [cost for cost in costs if cost.phase == phase and _reaches(cost, statistic, level)]
-                best = _cheapest(good)
-                rivals = {name: _cheapest([cost for cost in good if cost.family == name]) for name in RIVALS}
-                levels.append(
-                    Level(
-                        phase,
-                        statistic,
-                        level,
-                        best.kernel if best else None,
-                        best.ns if best else None,
-                        {name: rival.kernel if rival else None for name, rival in rivals.items()},
-                        {name: _ratio(rival, best) for name, rival in rivals.items()},
-                    )
-                )
+    for phase, statistic, level in product(dict.fromkeys(cost.phase for cost in costs), ("max", "p99"), LEVELS):
+        good = [cost for cost in costs if cost.phase == phase and _reaches(cost, statistic, level)]
+        best = min(good, key=lambda cost: cost.ns or 0.0, default=None)
+        levels.append(Level(phase, statistic, level, best.kernel if best else None, best.ns if best else None))
     return tuple(levels)
 
 
 def _reaches(cost: KernelCost, statistic: str, level: float) -> bool:
     error = getattr(cost, statistic)
     return cost.ns is not None and error is not None and not cost.nonfinite and error <= level
-
-
-def _cheapest(costs: Sequence[KernelCost]) -> KernelCost | None:
-    return min(costs, key=lambda cost: cost.ns or 0.0, default=None)
-
-
-def _ratio(rival: KernelCost | None, best: KernelCost | None) -> float | None:
-    return rival.ns / best.ns if rival and best and rival.ns and best.ns else None
 
 
 def _ladder(name: str) -> tuple[str, int | None, tuple[int | None, ...]]:
@@ -277,40 +237,8 @@ def _frozen(function: Kernel, cases: Cases, rays: int | None = None) -> Callable
     return work
 
 
-def _expected(before: KernelCost | None, size: int | None) -> KernelCost | None:
-    """Return what a larger size will cost, where that is linear in the size."""
-    if before is None or before.size is None or size is None or before.wall is None or ":" in before.family:
-        return None
-    if next(iter(KERNELS[before.family].parameters), None) != _LINEAR:
-        return None
-    scale = size / before.size
-    device, wall = (
-        None if old is None else Spread(old.median * scale, old.low * scale, old.high * scale, 0)
-        for old in (before.device, before.wall)
-    )
-    return replace(before, device=device, wall=wall)
-
-
-def _affordable(ns: float | None, wanted: int) -> int:
-    """Return on how many rays to time what costs `ns` a ray, 0 if that takes too long on any number."""
-    rays = wanted
-    while ns is not None and 1e-9 * ns * rays > _LONGEST:
-        rays //= 2
-    return rays if rays * _FEWEST >= wanted else 0
-
-
 def times_per_ray(work: Callable[[], Any], rays: int, seconds: float) -> tuple[Spread | None, Spread]:
-    """Return the time of the kernels alone, where the device tells it, and of the wall clock [ns a ray].
-
-    Parameters
-    ----------
-    work
-        Evaluates its results.
-    rays
-        How many it is about.
-    seconds
-        How long to time [s].
-    """
+    """Return the time of the compiled kernels alone, where the device tells it, and of the wall clock [ns a ray]."""
     wall = time_repeated(work, seconds=seconds)
     times: list[float] = []
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
@@ -323,8 +251,4 @@ def times_per_ray(work: Callable[[], Any], rays: int, seconds: float) -> tuple[S
     scale = 1e6 / rays
     low, median, high = (float(q) * scale for q in np.percentile(times, [25, 50, 75]))
     device = Spread(median, low, high, len(times)) if median > 0 else None
-    return device, _scaled(wall, scale)
-
-
-def _scaled(timing: Timing, scale: float) -> Spread:
-    return Spread(timing.median_ms * scale, timing.low_ms * scale, timing.high_ms * scale, timing.repetitions)
+    return device, Spread(wall.median_ms * scale, wall.low_ms * scale, wall.high_ms * scale, wall.repetitions)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from analytic.cases import Cases
 from analytic.errors import InputError
 from reference.storage.files import write_text
+from validation.kernels.errors import relative_error
 from validation.kernels.values import evaluate_rows
 from validation.study.configuration import find_kernel
 
@@ -19,7 +20,6 @@ Array = NDArray[np.float64]
 
 #: Largest number of a case in a precision: its square must be one too [m, 1/m].
 LARGEST = {"single": 1e18, "double": 1e150}
-_TINY = 1e-37  # below this float32 has no normal numbers: such values are compared in absolute terms
 
 
 def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
@@ -57,22 +57,7 @@ def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
 
 
 def check_results(cases: Cases, results: Array, kernel: str) -> None:
-    """Refuse results that are not finite, by the first row.
-
-    Parameters
-    ----------
-    cases
-        The cases.
-    results
-        J of every case [1/m], (n,).
-    kernel
-        The name of what gave them.
-
-    Raises
-    ------
-    InputError
-        If a result is not finite.
-    """
+    """Refuse results, (n,) [1/m], of a kernel that are not finite, by the first row."""
     wrong = ~np.isfinite(results)
     if wrong.any():
         row = int(np.argmax(wrong))
@@ -90,19 +75,11 @@ def _place(cases: Cases, row: int) -> str:
 
 
 def summary(cases: Cases, results: Array) -> dict[str, Any]:
-    """Return quantiles of the relative error against the certified values, where there are any.
-
-    Parameters
-    ----------
-    cases
-        The cases; with values, or there are no quantiles.
-    results
-        J of every case [1/m], (n,).
-    """
+    """Return quantiles of the relative error of results, (n,) [1/m], where the cases have values."""
     quantiles: dict[str, Any] = {"rows": len(results), "compared": 0, "nonfinite": int(np.sum(~np.isfinite(results)))}
     if cases.value is None:
         return quantiles
-    error = np.abs(results - cases.value) / np.maximum(np.abs(cases.value), _TINY)
+    error = relative_error(results, cases.value, "single")
     finite = np.isfinite(error)
     if not finite.any():
         return quantiles
@@ -113,17 +90,7 @@ def summary(cases: Cases, results: Array) -> dict[str, Any]:
 
 
 def write_results(cases: Cases, results: Array, target: Path) -> None:
-    """Write the rows of a file with a column `result`, whole or not at all.
-
-    Parameters
-    ----------
-    cases
-        As they were read.
-    results
-        J of every case [1/m], (n,).
-    target
-        The file to write.
-    """
+    """Write the rows of a file with their results [1/m] in a column `result`, whole or not at all."""
     kept = [k for k, name in enumerate(cases.header) if name != "result"]
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")

@@ -68,7 +68,7 @@ class Bar:
 
     Tables are left out, whose kinks no rule of fixed cost resolves, but not where values are NaN, infinite or negative.
     The quantiles describe the certified cases; how many generated rays are hard is a matter of taste. What a processor
-    flushes to zero on the way is no error: `validation.kernels.underflow` derives how much that can be.
+    flushes to zero on the way is no error: `validation.kernels.errors` derives how much that can be.
     """
 
     single_max: float = 3e-5  #: in float32, for |g| <= 0.9

@@ -37,19 +37,7 @@ class Values:
 
 
 def evaluate_cases(cases: Cases, function: Kernel, precision: str, **options: Any) -> Values:
-    """Return J of every case whose phase function the kernel accepts.
-
-    Parameters
-    ----------
-    cases
-        The cases; see `evaluate_rows`.
-    function
-        A kernel function.
-    precision
-        'single' or 'double'.
-    options
-        See `evaluate_rows`.
-    """
+    """Return J of every case whose phase function the kernel accepts, as `evaluate_rows` does."""
     names = np.asarray(cases.phase)
     results, accepted, refused = np.full(len(names), np.nan), np.ones(len(names), dtype=bool), {}
     for name in dict.fromkeys(cases.phase):
@@ -76,10 +64,7 @@ def evaluate_rows(
     Parameters
     ----------
     cases, rows
-        The cases and which of them; where they have rays, foot and height are computed from them in `precision`.
-    function
-        A kernel function.
-    precision
+        The cases and which of them; where they have rays, foot and height are computed from them in the precision,
         'single' or 'double'.
     table
         Values of the phase function 'tabulated', of mean 1.
