@@ -11,11 +11,9 @@ Read in this order:
 - `droplets.py`: the droplets of clouds and fog, their extinction and phase functions, full and modified;
 - `phase.py`: phase functions of mean 1 over the sphere;
 - `geometry.py`: foot and height of a ray over a light, and the changes of variables x, theta, q, w;
-- `certified.py`: the airlight integral to 15 digits and more, by two quadratures in mpmath that must agree;
 - `kronrod.py`: nodes and weights of the Gauss-Kronrod pair;
 - `panels.py`: the airlight integral of millions of segments, in NumPy, each with its error estimate;
 - `area_light.py`: closed forms for lights with extent;
 - `series.py`: the power series behind the polynomial of Biri 2006;
-- `cases.py`: tables of cases in CSV files;
-- `case_columns.py`: tables of cases from arrays in memory.
+- `cases.py`: tables of cases in CSV files or in memory.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tables of airlight integrals: one case a row, read from CSV, checked, and integrated.
+"""Tables of airlight integrals: one case a row, read from CSV or from arrays in memory, checked, and integrated.
 
 Two sets of columns are known, each in any order and beside others:
 
@@ -11,10 +11,11 @@ be missing. An x1 of `inf` is a ray that never ends.
 """
 
 import csv
-import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,9 @@ Array = NDArray[np.float64]
 
 _RAY = ("ox", "oy", "oz", "dx", "dy", "dz", "lx", "ly", "lz")
 _FOOT = ("t", "h")
+_NAMES = {"foot": "t", "height": "h"}  # the names of the design, and those of the files
+_VECTORS = {"origin": _RAY[:3], "direction": _RAY[3:6], "light": _RAY[6:]}
+_KNOWN = frozenset(("phase", "tag", "g", "x0", "x1", "sigma_t", "value", *_FOOT, *_RAY))
 
 
 @dataclass(frozen=True)
@@ -68,25 +72,55 @@ def read_cases(path: str | Path, *, phase: str | None = None) -> Cases:
         unknown phase function: the message names file, line (from 1, the header) and column.
     """
     header, lines = _read_text(Path(path))
-    if phase is None:
-        return checked_cases(Table(str(path), header, lines))
-    phase_from_words(phase)
-    if "phase" not in header:
-        header, lines = [*header, "phase"], [(number, [*cells, ""]) for number, cells in lines]
-    column = header.index("phase")
-    replaced = [(number, [*cells[:column], phase, *cells[column + 1 :]]) for number, cells in lines]
-    return replace(checked_cases(Table(str(path), header, replaced)), value=None)
+    columns = dict(zip(header, zip(*(cells for _, cells in lines), strict=True), strict=True))
+    if phase is not None:
+        phase_from_words(phase)
+        columns["phase"] = (phase,) * len(lines)
+    rows = tuple(zip(*columns.values(), strict=True))
+    cases = _checked(_Table(str(path), columns, tuple(number for number, _ in lines)), rows)
+    return cases if phase is None else replace(cases, value=None)
 
 
-def checked_cases(table: "Table") -> Cases:
-    """Return the cases of a table.
+def cases_from_columns(columns: Mapping[str, Any], *, name: str = "cases") -> tuple[Cases, tuple[int, ...]]:
+    """Return cases from columns in memory, and the shape that their values have together.
+
+    Parameters
+    ----------
+    columns
+        By name the columns of `analytic.cases`, of any shapes that broadcast together. `foot` and `height` may stand
+        for `t` and `h`, and `origin`, `direction` and `light`, (..., 3), for the coordinates of rays.
+    name
+        What messages call them; they count rows from 0.
 
     Raises
     ------
     InputError
-        As `read_cases` does.
+        As `read_cases`, and for columns whose shapes do not go together.
     """
-    header = table.header
+    given: dict[str, Any] = {}
+    for key, values in columns.items():
+        if key in _VECTORS:
+            given |= _coordinates(key, values, name)
+        else:
+            given[_NAMES.get(key, key)] = np.asarray(values)
+    known = {key: values for key, values in given.items() if key in _KNOWN}
+    try:
+        spread = np.broadcast_arrays(*known.values())
+    except ValueError:
+        shapes = ", ".join(f"{key} {values.shape}" for key, values in known.items())
+        raise InputError(
+            f"{name}: the columns have shapes that do not go together: {shapes}; give equal ones"
+        ) from None
+    shape = spread[0].shape if spread else ()
+    flat = {key: values.reshape(-1) for key, values in zip(known, spread)}
+    if not all(len(values) for values in flat.values()):
+        raise InputError(f"{name}: the columns are empty; give at least one case")
+    return _checked(_Table(name, flat)), shape
+
+
+def _checked(table: "_Table", rows: tuple[tuple[str, ...], ...] = ()) -> Cases:
+    """Return the cases of a table; `rows` are the text of all columns."""
+    header = tuple(table.columns)
     rays = "t" not in header and any(name in header for name in _RAY)
     table.require("phase", *(_RAY if rays else _FOOT), "x0", "x1", "sigma_t")
     columns = {name: table.numbers(name) for name in ("x0", "x1", "sigma_t", *(_RAY if rays else _FOOT))}
@@ -121,8 +155,8 @@ def checked_cases(table: "Table") -> Cases:
         origin,
         direction,
         light,
-        tuple(header),
-        tuple(tuple(cells) for _, cells in table.lines),
+        header,
+        rows,
     )
 
 
@@ -150,35 +184,43 @@ def _fault(words: str) -> str:
 
 
 @dataclass(frozen=True)
-class Table:
-    """The text of a table and where it came from, for messages."""
+class _Table:
+    """Columns and where they came from, for messages."""
 
-    name: str  #: path of the file
-    header: list[str]
-    lines: list[tuple[int, list[str]]]  #: number of the line in the file, cells
+    name: str  #: path of the file, or what messages call the columns
+    columns: Mapping[str, Any]  #: by name text or numbers, (rows,)
+    lines: tuple[int, ...] | None = None  #: number of each row's line in the file; None for columns from memory
 
     @property
     def count(self) -> int:
         """How many cases there are."""
-        return len(self.lines)
+        return len(next(iter(self.columns.values()))) if self.columns else 0
 
     def require(self, *names: str) -> None:
         """Refuse a table without these columns."""
-        missing = [name for name in names if name not in self.header]
-        if missing:
+        missing = [name for name in names if name not in self.columns]
+        if not missing:
+            return
+        known = ", ".join(self.columns) or "none"
+        if self.lines is not None:
             raise InputError(
-                f"{self.name}, line 1: no column '{missing[0]}'; the file has {', '.join(self.header)}: add it, the "
-                f"columns wanted are phase, x0, x1, sigma_t and either t, h or {', '.join(_RAY)}"
+                f"{self.name}, line 1: no column '{missing[0]}'; the file has {known}: add it, the columns wanted are "
+                f"phase, x0, x1, sigma_t and either t, h or {', '.join(_RAY)}"
             )
+        wanted = {key: word for word, key in _NAMES.items()}.get(missing[0], missing[0])
+        raise InputError(
+            f"{self.name}: no column '{wanted}'; got {known}; wanted phase, x0, x1, sigma_t and either foot and height "
+            "or origin, direction and light"
+        )
 
     def cells(self, name: str) -> list[str]:
         """Return the text of the column `name`, one entry for each row."""
-        column = self.header.index(name)
-        return [cells[column] for _, cells in self.lines]
+        return [str(value) for value in np.asarray(self.columns[name]).tolist()]
 
     def where(self, row: int, name: str) -> str:
         """Return the words for a message that name the cell of a row in the column `name`."""
-        return f"{self.name}, line {self.lines[row][0]}, column '{name}'"
+        place = f"row {row}" if self.lines is None else f"line {self.lines[row]}"
+        return f"{self.name}, {place}, column '{name}'"
 
     def numbers(self, name: str, *, infinite: bool = False) -> Array:
         """Return the column `name` as numbers, (rows,), finite but for `x1` and where `infinite` allows it.
@@ -186,17 +228,15 @@ class Table:
         Raises
         ------
         InputError
-            For a cell that is no number, or not finite, with its line and column.
+            For a cell that is no number, or not finite, with its place.
         """
-        values = np.empty(len(self.lines))
-        for row, cell in enumerate(self.cells(name)):
-            try:
-                values[row] = float(cell)
-            except ValueError:
-                raise InputError(f"{self.where(row, name)}: '{cell}' is not a number; write one") from None
-            fine = not math.isnan(values[row]) if infinite or name == "x1" else math.isfinite(values[row])
-            if not fine:
-                raise InputError(f"{self.where(row, name)}: {cell} is not finite; write a finite number")
+        try:
+            values = np.array(self.columns[name], dtype=np.float64)
+        except (TypeError, ValueError):
+            row = next((row for row, cell in enumerate(self.cells(name)) if not _is_number(cell)), 0)
+            raise InputError(f"{self.where(row, name)}: '{self.cells(name)[row]}' is not a number; write one") from None
+        fine = ~np.isnan(values) if infinite or name == "x1" else np.isfinite(values)
+        self.check(name, fine, "a finite number")
         return values
 
     def check(self, name: str, fine: NDArray[np.bool_], wanted: str) -> None:
@@ -209,8 +249,22 @@ class Table:
         """
         if not fine.all():
             row = int(np.argmin(fine))
-            given = self.cells(name)[row]
-            raise InputError(f"{self.where(row, name)}: {given} is out of range; wanted {wanted}")
+            raise InputError(f"{self.where(row, name)}: {self.cells(name)[row]} is out of range; wanted {wanted}")
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _coordinates(key: str, values: Any, name: str) -> dict[str, Array]:
+    vectors = np.asarray(values)
+    if vectors.ndim == 0 or vectors.shape[-1] != 3:
+        raise InputError(f"{name}, column '{key}': got an array of shape {vectors.shape}, wanted (..., 3)")
+    return {letter: vectors[..., number] for number, letter in enumerate(_VECTORS[key])}
 
 
 def _read_text(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:

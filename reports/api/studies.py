@@ -86,8 +86,7 @@ def integrate(
 
 
 def _cases(cases: Any) -> tuple["Cases", tuple[int, ...]]:
-    from analytic.case_columns import cases_from_columns
-    from analytic.cases import Cases, read_cases
+    from analytic.cases import Cases, cases_from_columns, read_cases
 
     if isinstance(cases, str | os.PathLike):
         cases = read_cases(Path(cases))

@@ -4,9 +4,9 @@
 import pytest
 from flint import arb, ctx
 
-from analytic.certified import integrate_certified
 from analytic.phase import PhaseFunction
 from tests.evidence.certified.airlight_integral import FILES, enclosure, read, value
+from tests.evidence.certified.integral import integrate_certified
 
 STRIDE = 25  # has no divisor in common with the 12 tags, so that all of them come by
 
@@ -44,7 +44,7 @@ def case(**changes):
 
 @pytest.mark.parametrize(("name", "g"), [("rayleigh", 0.0), ("hg", -0.9)])
 def test_an_endless_ray_agrees_with_quadratures_that_cut_it_elsewhere(name, g):
-    """The two quadratures of `analytic.certified` share no code with the program."""
+    """The two quadratures of `tests.evidence.certified.integral` share no code with the program."""
     row = case(phase=name, g=str(g), x1="inf", sigma_t="0.001")
     separate = integrate_certified(2.0, 0.5, 0.0, float("inf"), 0.001, PhaseFunction(name, g=g), digits=25)
     with ctx.workprec(128):

@@ -3,7 +3,7 @@
 
     python -m tests.evidence.certified.airlight_integral_droplets --write
 
-Each value is one on which two quadratures in mpmath agree (`analytic.certified`). The moments of Mie's phase functions
+Each value is one on which two quadratures in mpmath agree (`integral.py`). The moments of Mie's phase functions
 count as exact as float64 has them; a spline through their series, which `analytic.panels` takes, is 1e-8 off.
 """
 
@@ -13,8 +13,8 @@ import sys
 import numpy as np
 from mpmath import mp
 
-from analytic.certified import integrate_certified
 from analytic.phase import phase_from_words
+from tests.evidence.certified.integral import integrate_certified
 from validation.certified.files import FOLDER
 
 FILE = FOLDER / "airlight_integral_droplets.csv"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Write airlight_slopes.csv: derivatives of the airlight integral to 15 digits (`analytic.certified.certified_slopes`).
+"""Write airlight_slopes.csv: derivatives of the airlight integral to 15 digits (`integral.certified_slopes`).
 
 Run it in the root of a checkout: python -m tests.evidence.certified.airlight_slopes. It takes some minutes.
 """
@@ -9,8 +9,8 @@ import csv
 import numpy as np
 from mpmath import mp
 
-from analytic.certified import SLOPES, certified_slopes, integrate_certified
 from analytic.phase import PhaseFunction
+from tests.evidence.certified.integral import SLOPES, certified_slopes, integrate_certified
 from validation.certified.files import FOLDER
 
 COUNT = 40

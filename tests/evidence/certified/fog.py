@@ -8,7 +8,7 @@ The radiance of a ray is the sum over lights and lit intervals
     L = albedo sigma_t / (4 pi)  sum I J(x0, x1),
 
 with the intervals in closed form (`tests.evidence.certified.intervals`, 40 digits) and each J by two quadratures at two
-precisions that must agree to 15 digits (`analytic.certified`). All terms are positive, so the sum keeps those digits;
+precisions that must agree to 15 digits (`integral.py`). All terms are positive, so the sum keeps those digits;
 what is left of the error is the rounding to the 12 digits that are written, and that is the bound.
 
 In the outer part of a spot the intensity falls off with the angle beta from its axis. In the plane of ray and light the
@@ -27,8 +27,8 @@ from typing import Any
 
 from mpmath import mp, mpf
 
-from analytic.certified import integrate_certified
 from analytic.phase import PhaseFunction
+from tests.evidence.certified.integral import integrate_certified
 from tests.evidence.certified.intervals import (
     Number,
     Vector,

@@ -7,7 +7,6 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from analytic.certified import SLOPES, certified_slopes, integrate_certified
 from analytic.phase import PhaseFunction
 from realtime.errors import InputError
 from realtime.kernels.registry import KERNELS
@@ -17,6 +16,7 @@ from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
 from realtime.scene.phase import named_phase
+from tests.evidence.certified.integral import SLOPES, certified_slopes, integrate_certified
 
 PHASES = ("isotropic", "hg")
 

@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
-from analytic.certified import integrate_certified
 from analytic.phase import PHASE_NAMES, PhaseFunction
+from tests.evidence.certified.integral import integrate_certified
 from validation.kernels.rays import hard_rays, slivers, wide_rays
 from validation.kernels.values import TABLE
 

@@ -7,10 +7,10 @@ import math
 import pytest
 from mpmath import mpf, workdps
 
-import analytic.certified as module
-from analytic.certified import integrate_certified, isotropic_closed_form
+import tests.evidence.certified.integral as module
 from analytic.errors import InputError
 from analytic.phase import PhaseFunction
+from tests.evidence.certified.integral import integrate_certified, isotropic_closed_form
 
 ISOTROPIC = PhaseFunction("isotropic")
 
