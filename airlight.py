@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""airlight: how fast, accurate and stable is a real-time method for volumetric light?
+"""airlight: how fast, accurate and robust is a real-time method for volumetric light?
 
 The public Python API, re-exported from the packages that implement it, and the entry of the `airlight` command.
 Names are imported when they are first used, so that `airlight --help` imports neither Mitsuba nor SciPy.
 
 >>> import airlight
->>> truth = airlight.reference("open-fog", size=(32, 24))  # a built-in scene, or the path of a Mitsuba XML file
+>>> exact = airlight.reference("open-fog", size=(32, 24))  # a built-in scene, or the path of a Mitsuba XML file
 >>> frame = airlight.render("open-fog", "ray-march", size=(32, 24), steps=64)
->>> airlight.compare(truth, frame).metrics.relative_rmse < 0.01
+>>> airlight.compare(exact, frame).metrics.relative_rmse < 0.01
 True
 
-`load_scene`, `render`, `reference`, `compare`, `fit`, `integrate`, `bench`, `slab` and `report` are all that a notebook
-needs; the others are what these are made of.
+Every command is a function of the same name; the other names are what these are made of.
 """
 
 if __name__ == "__main__":  # before all that takes time: what a signal meets during an import ends in a traceback
@@ -35,44 +34,48 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from realtime.scene.read_scene import read_scene as read_scene
     from reference.storage.exr import read_exr as read_exr
     from reference.storage.exr import write_exr as write_exr
-    from reports.api.fit import fit as fit
-    from reports.api.images import compare as compare
-    from reports.api.images import load_scene as load_scene
-    from reports.api.images import render as render
+    from reports.api.compare import compare as compare
+    from reports.api.explore import describe as describe
+    from reports.api.explore import view as view
     from reports.api.reference import reference as reference
+    from reports.api.render import load_scene as load_scene
+    from reports.api.render import render as render
+    from reports.api.report import diff as diff
+    from reports.api.report import paper as paper
     from reports.api.report import report as report
-    from reports.api.slab import slab as slab
-    from reports.api.studies import bench as bench
-    from reports.api.studies import integrate as integrate
-    from reports.api.studies import paper as paper
+    from reports.api.sweep import sweep as sweep
+    from reports.commands.list import list_ as list
+    from reports.machine.doctor import doctor as doctor
     from reports.machine.environment import MissingError as MissingError
     from reports.machine.environment import activate as activate
     from reports.machine.environment import versions as versions
+    from reports.studies.registry import STUDIES as STUDIES
+    from reports.studies.registry import study as study
     from validation.certified.files import certified_data as certified_data
-    from validation.comparison.images import compare_files as compare_files
     from validation.estimates.budget import Budget as Budget
-    from validation.estimates.images import monte_carlo_reference as monte_carlo_reference
-    from validation.estimates.images import quadrature_reference as quadrature_reference
-    from validation.estimates.images import volpath_reference as volpath_reference
-    from validation.estimates.merge import merged_references as merged_references
     from validation.estimates.multiple_scattering import multiple_scattering_share as multiple_scattering_share
     from validation.metrics.errors import error_metrics as error_metrics
     from validation.scenes.registry import SCENES as SCENES
     from validation.study.configuration import configuration as configuration
     from validation.study.frame_times import time_frame as time_frame
 
-# name -> module; names that are missing here are not part of the API
+# name -> module, and the function there where it cannot have the name; what is missing here is not part of the API
 _API = {
-    "load_scene": "reports.api.images",
-    "render": "reports.api.images",
-    "reference": "reports.api.reference",
-    "compare": "reports.api.images",
-    "fit": "reports.api.fit",
-    "integrate": "reports.api.studies",
-    "bench": "reports.api.studies",
-    "paper": "reports.api.studies",
-    "slab": "reports.api.slab",
+    # the commands
+    "doctor": "reports.machine.doctor",
+    "list": "reports.commands.list:list_",
+    "render": "reports.api.render",
+    "view": "reports.api.explore",
     "report": "reports.api.report",
+    "diff": "reports.api.report",
+    "sweep": "reports.api.sweep",
+    "study": "reports.studies.registry",
+    "reference": "reports.api.reference",
+    "compare": "reports.api.compare",
+    "describe": "reports.api.explore",
+    "paper": "reports.api.report",
+    # scenes, what can be measured, and what the commands are made of
+    "load_scene": "reports.api.render",
     "InputError": "analytic.errors",
     "MissingError": "reports.machine.environment",
     "activate": "reports.machine.environment",
@@ -82,20 +85,16 @@ _API = {
     "Method": "realtime.methods.interface.method",
     "find_method": "realtime.methods.registry",
     "KERNELS": "realtime.kernels.registry",
+    "STUDIES": "reports.studies.registry",
     "configuration": "validation.study.configuration",
     "read_scene": "realtime.scene.read_scene",
     "frame_renderer": "realtime.frame.renderer",
     "render_frame": "realtime.frame.renderer",
     "time_frame": "validation.study.frame_times",
     "error_metrics": "validation.metrics.errors",
-    "quadrature_reference": "validation.estimates.images",
-    "volpath_reference": "validation.estimates.images",
-    "monte_carlo_reference": "validation.estimates.images",
     "Budget": "validation.estimates.budget",
-    "merged_references": "validation.estimates.merge",
     "multiple_scattering_share": "validation.estimates.multiple_scattering",
     "certified_data": "validation.certified.files",
-    "compare_files": "validation.comparison.images",
     "read_exr": "reference.storage.exr",
     "write_exr": "reference.storage.exr",
 }
@@ -106,7 +105,8 @@ __all__ = ["__version__", "main", *_API]
 def __getattr__(name: str) -> Any:
     if name not in _API:
         raise AttributeError(f"module 'airlight' has no attribute {name!r}")
-    return getattr(importlib.import_module(_API[name]), name)
+    module, _, own = _API[name].partition(":")
+    return getattr(importlib.import_module(module), own or name)
 
 
 def __dir__() -> list[str]:

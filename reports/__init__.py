@@ -7,16 +7,16 @@ Read in this order:
 - `data/`: report.json: its schema, writing, reading and claims;
 - `plotting/`: the style of charts, colour maps, pictures;
 - `tables/`: tables as data, and how they are drawn;
-- `interchange/`: descriptions of scenes for other renderers, glTF, frames of animations;
+- `interchange/`: descriptions of scenes for other renderers, glTF;
 - `diff/`: the comparison of two reports;
 - `page/`: the page of a report;
-- `figures/`: figures and tables for papers, one module each;
+- `figures/`: figures of a report and of the papers;
 - `report/`: measures what a report asks for and writes it;
 - `api/`: the functions of `import airlight` and their results;
-- `bench/`: what `airlight bench` prints;
+- `studies/`: `airlight study NAME`: a function each, with tables and a figure;
 - `view/`: the live view in the browser;
 - `sweep/`: what a sweep says, from its Parquet;
-- `commands/`: the commands, one module each.
+- `commands/`: the command line, made of these functions.
 """
 
 __version__ = "0.1.0"

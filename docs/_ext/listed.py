@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parts of pages that list what the program has: modules, names, commands, methods, kernels."""
 
-import importlib
 import inspect
 import re
 from collections.abc import Callable, Sequence
@@ -10,8 +9,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from reports.commands.list import list_
 from reports.tables.drawing import markdown
-from reports.tables.lists import kernel_list, method_list
 from reports.tables.table import Name, Row, Table
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -29,10 +28,14 @@ def table(headers: Sequence[str], rows: Sequence[Sequence[str]], words: int = 1)
 _RESULTS = (
     "reports.api.results.Rendering",
     "reports.api.results.Reference",
-    "reports.api.comparison.ImageComparison",
-    "reports.api.tables.Integrals",
-    "reports.api.tables.BenchTable",
-    "reports.api.tables.Report",
+    "reports.api.results.ImageComparison",
+    "reports.api.results.SceneComparison",
+    "reports.api.results.Fitted",
+    "reports.api.report.Report",
+    "reports.studies.result.Study",
+    "reports.studies.methods.MethodsStudy",
+    "reports.studies.kernels.Integrals",
+    "reports.studies.clouds.SlabStudy",
 )
 
 
@@ -52,7 +55,7 @@ def names() -> str:
     import airlight
 
     rows = [
-        (f"{{py:obj}}`{name} <{value.__module__}.{name}>`", _sentence(value))
+        (f"{{py:obj}}`{name} <{value.__module__}.{value.__name__}>`", _sentence(value))
         if _documented(value)
         else (f"`{name}`", f"see `{airlight._API[name]}`")
         for name, value in _public().items()
@@ -62,7 +65,7 @@ def names() -> str:
 
 def signatures() -> str:
     """Return the functions and classes of `import airlight` with their docstrings, and the results that they return."""
-    paths = {f"{value.__module__}.{name}": value for name, value in _public().items() if _documented(value)}
+    paths = {f"{each.__module__}.{each.__name__}": each for each in _public().values() if _documented(each)}
     classes = {path: inspect.isclass(value) for path, value in paths.items()} | dict.fromkeys(_RESULTS, True)
     shown = [
         f".. autoclass:: {path}\n   :members:" if is_class else f".. autofunction:: {path}"
@@ -84,7 +87,7 @@ def _cell(words: str) -> str:
 
 def methods() -> str:
     """Return the methods with links to their sections."""
-    shown = method_list().only("name", "what", "kernel", "shadows", "source")
+    shown = list_("methods").kinds["methods"].only("name", "what", "kernel", "shadows", "source")
     return markdown(_named(shown, lambda name: f"methods.md#{name}"))
 
 
@@ -131,19 +134,14 @@ def _parameter(item: Any) -> tuple[str, str]:
 
 def kernels() -> str:
     """Return the kernels."""
-    return markdown(_named(kernel_list()))
+    return markdown(_named(list_("kernels").kinds["kernels"]))
 
 
-def figures() -> str:
-    """Return the figures with what each shows and where its data come from."""
-    from reports.commands.figures import FIGURES
+def studies() -> str:
+    """Return the studies with what each measures."""
+    from reports.studies.registry import STUDIES, summary
 
-    rows = []
-    for name, (module, given) in FIGURES.items():
-        summary = importlib.import_module(f"reports.figures.{module}").SUMMARY
-        source = "a report" if "report" in given else "a report, or measured" if "published" in given else "measured"
-        rows.append((f"`{name}`", _cell(summary), source))
-    return table(("figure", "shows", "data from"), rows, 3)
+    return table(("study", "what it measures"), [(f"`{name}`", _cell(summary(name))) for name in STUDIES], 2)
 
 
 def sweep_columns() -> str:
@@ -164,53 +162,16 @@ def keys() -> str:
 
 @cache
 def commands() -> str:
-    """Return every sub-command with its arguments, options and words.
+    """Return every command and every study with its arguments, options and words."""
+    from reports.commands.main import command_names, help_of
 
-    Call it before autodoc reads a function: that puts the words of the source in place of default values.
-    """
-    import typer
-
-    from reports.commands.main import app
-
-    listed = typer.main.get_group(app).commands
-    return "\n".join(_command(name, command) for name, command in listed.items() if not command.hidden)
+    return "\n".join(_command(words, *help_of(words)) for words in command_names())
 
 
-def _command(name: str, command: Any) -> str:
-    words = [f"## airlight {name}", ""]
-    shown = [parameter for parameter in command.params if parameter.name not in ("help", "context")]
-    arguments = [parameter for parameter in shown if parameter.param_type_name == "argument"]
-    usage = " ".join(["airlight", name, *(_argument(argument) for argument in arguments), "[OPTIONS]"])
-    words += ["```text", usage, "```", "", _prose(inspect.cleandoc(command.help or "")), ""]
-    shown = [parameter for parameter in shown if not getattr(parameter, "hidden", False)]
-    rows = [(_option(parameter), _cell(parameter.help or "") + _default(parameter)) for parameter in shown]
-    if rows:
-        words.append(table(("", "what it does"), rows, 2))
-    return "\n".join(words)
-
-
-def _prose(words: str) -> str:
-    return "\n\n".join(_cell(paragraph) for paragraph in words.split("\n\n"))
-
-
-def _argument(argument: Any) -> str:
-    name = argument.metavar or argument.name.upper()
-    if " " in name:  # says by itself how many words there are
-        return name
-    several = f"{name}..." if argument.nargs == -1 else name
-    return several if argument.required else f"[{several}]"
-
-
-def _option(parameter: Any) -> str:
-    if parameter.param_type_name == "argument":
-        name = parameter.metavar or parameter.name.upper()
-        return "`{}`".format(name.replace("|", "\\|"))
-    return ", ".join(f"`{name}`" for name in [*parameter.opts, *parameter.secondary_opts])
-
-
-def _default(parameter: Any) -> str:
-    """Return what is added to an option's words: its default, where it has one that says something."""
-    value = parameter.default
-    if value is None or callable(value) or value in (False, (), []) or parameter.required:
-        return ""
-    return " On by default." if value is True else f" Default: `{value}`."
+def _command(words: Sequence[str], prose: str, usage: str, options: Sequence[tuple[str, str, str]]) -> str:
+    lines = [f"## airlight {' '.join(words)}", "", "```text", usage, "```", ""]
+    lines += ["\n\n".join(_cell(paragraph) for paragraph in prose.split("\n\n")), ""]
+    rows = [
+        (f"`{names}`", _cell(what) + (f" Default: `{default}`." if default else "")) for names, what, default in options
+    ]
+    return "\n".join([*lines, table(("", "what it does"), rows, 2)] if rows else lines)

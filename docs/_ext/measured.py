@@ -90,7 +90,7 @@ def kernel_costs(phase: str) -> str:
 
     kernels = data()["kernels"]
     if kernels is None:
-        return "No costs of kernels are at hand: `airlight bench --kernels` measures them."
+        return "No costs of kernels are at hand: `airlight study kernels` measures them."
     costs = []
     for cost in kernels["costs"]:
         default = next(iter(KERNELS[cost["family"]].parameters.values()), None) if cost["family"] in KERNELS else None

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Render a scene of airlight by Blender's Cycles, from what `airlight describe` says of it and nothing else.
 
-    airlight describe sphere-spot --size 160x120 --json --gltf sphere-spot.glb > sphere-spot.json
+    airlight describe sphere-spot --size 160x120 --json -o sphere-spot.glb > sphere-spot.json
     python3.11 render_cycles.py sphere-spot.json sphere-spot.glb sphere-spot.exr --samples 512
     airlight compare sphere-spot sphere-spot.exr
 
@@ -28,7 +28,7 @@ def main() -> None:
     """Read the command line and render."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("described", help="what `airlight describe SCENE --json` printed")
-    parser.add_argument("gltf", help="what `--gltf` wrote, for the meshes")
+    parser.add_argument("gltf", help="what `-o` wrote, for the meshes")
     parser.add_argument("output", help="the EXR file")
     parser.add_argument("--samples", type=int, default=512, help="paths per pixel")
     parser.add_argument("--layers", action="store_true", help="write a multi-layer file")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Render a scene of airlight by LuxCore, from what `airlight describe` says of it and nothing else.
 
-    airlight describe open-fog --size 160x120 --json --gltf open-fog.glb > open-fog.json
+    airlight describe open-fog --size 160x120 --json -o open-fog.glb > open-fog.json
     python render_luxcore.py open-fog.json open-fog.glb open-fog.exr --samples 4096
     airlight compare open-fog open-fog.exr
 
@@ -22,7 +22,7 @@ def main() -> None:
     """Read the command line and render."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("described", help="what `airlight describe SCENE --json` printed")
-    parser.add_argument("gltf", help="what `--gltf` wrote, for the meshes")
+    parser.add_argument("gltf", help="what `-o` wrote, for the meshes")
     parser.add_argument("output", help="the EXR file")
     parser.add_argument("--samples", type=int, default=4096, help="paths per pixel")
     chosen = parser.parse_args()

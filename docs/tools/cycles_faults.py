@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Render a scene of airlight by Cycles with a fault in it: as `render_cycles.py`, and one thing is set wrong.
 
-    airlight describe sphere-spot --size 160x120 --json --gltf sphere-spot.glb > sphere-spot.json
+    airlight describe sphere-spot --size 160x120 --json -o sphere-spot.glb > sphere-spot.json
     python3.11 cycles_faults.py sphere-spot.json sphere-spot.glb folder --samples 256 --faults no-shadow g-lobe
     airlight compare sphere-spot folder/no-shadow.exr --diagnose
 
@@ -32,7 +32,7 @@ def main() -> None:
     """Read the command line and render."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("described", nargs="?", help="what `airlight describe SCENE --json` printed")
-    parser.add_argument("gltf", nargs="?", help="what `--gltf` wrote, for the meshes")
+    parser.add_argument("gltf", nargs="?", help="what `-o` wrote, for the meshes")
     parser.add_argument("folder", nargs="?", help="where the EXR files go")
     parser.add_argument("--faults", nargs="*", choices=FAULTS, help="those that the scene can have, by default")
     parser.add_argument("--samples", type=int, default=256, help="paths per pixel")

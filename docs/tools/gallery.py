@@ -97,7 +97,7 @@ class Picture:
         words = [f"airlight render {self.scene} --method {self.method}", *(f"--set {word}" for word in self.settings)]
         words += [f"--change {word}" for word in self.changes]
         words += [f"--size {width}x{height}", f"--samples {self.samples}" if self.samples > 1 else ""]
-        return " ".join([*filter(None, words), f"--preview {self.scene.removesuffix('.xml')}.png"])
+        return " ".join([*filter(None, words), f"-o {self.scene.removesuffix('.xml')}.png"])
 
 
 def scene_picture(scene: str) -> Picture:

@@ -58,7 +58,8 @@ def exact(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
     endless ones and those of length 0 included, and |g| < 1. Where the ray meets the light (height 0) on the segment,
     its ends included, the integral is infinite, and so is the result.
 
-    Largest relative error found on the certified cases: see `airlight integrate`; in float32 below 3e-5 for |g| <= 0.9.
+    Largest relative error found on the certified cases: see `airlight study integrals`; in float32 below 3e-5 for
+    |g| <= 0.9.
     A tabulated phase function is integrated across its kinks, which is wrong by up to a quarter of the largest second
     difference of its values, relative to them: 7e-4 was found with 513 values of "murky", 1.8e-3 with 129. Where a
     spot's intensity falls off between beam and cut-off, the segment is cut into three; those that are empty cost

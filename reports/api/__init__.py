@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The functions of `import airlight` and their results, for scripts and notebooks.
+"""The public functions, which are the commands too, and their results.
 
 Read in this order:
 
 - `inputs.py`: what the functions take, and the one exception
-- `html.py`: pieces of HTML for notebooks
-- `results.py`: images as results
-- `comparison.py`: a comparison as a result
-- `tables.py`: tables and reports as results
-- `images.py`: `load_scene`, `render`, `compare`
+- `scenes.py`: scenes as results
+- `results.py`: images and comparisons as results
+- `render.py`: `load_scene`, `render`, and which configurations are asked for
 - `reference.py`: `reference`
-- `fit.py`: `fit`
-- `studies.py`: `integrate`, `bench`
-- `slab.py`: `slab`
-- `report.py`: `report`
+- `compare.py`: `compare`, with `--diagnose` and `--fit`
+- `report.py`: `report`, `diff`, `paper`
+- `sweep.py`: `sweep`
+- `explore.py`: `describe`, `view`
 """

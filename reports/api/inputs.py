@@ -1,66 +1,62 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Arguments of the Python API (scenes, images, progress), and the one exception that its functions raise."""
+"""What the public functions take, from Python and from the command line, and the one exception that they raise.
+
+A type has two meanings. For a reader and for mypy it is what Python may give. At run time it is what a command line
+gives, a word or several, from which `reports.commands.main` makes the command of a function.
+"""
 
 import functools
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
 
 from analytic.errors import InputError
-from realtime.errors import InputError as RealtimeInputError
-from validation.scenes.loading import LoadedScene, load_scene, name_shapes, parse_size, resize
-from validation.scenes.numbers import check_numbers
+from reports.machine.progress import progress_bar
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from reference.storage.exr import Image
     from reports.api.results import LayeredImage
+    from validation.scenes.loading import LoadedScene
+    from validation.study.configuration import Configuration
 
-#: A built-in name, the path of a Mitsuba XML file, a Mitsuba dictionary, an `mi.Scene`, or what `load_scene` returned.
-SceneLike = str | os.PathLike[str] | Mapping[str, Any] | LoadedScene | Any
-#: Width and height [pixels], or both as 'WxH'.
-Size = tuple[int, int] | str
-#: Called with (share done, what); True shows a bar on the error stream, None nothing.
-Progress = Callable[[float, str], None] | bool | None
-#: A result of `render` or `reference`, the path of an EXR file, layers that were read from one, or an array.
-ImageLike: TypeAlias = "LayeredImage | Image | str | os.PathLike[str] | ArrayLike"
+    #: A built-in name, random:SEED, the path of a Mitsuba XML file, a Mitsuba dictionary, an `mi.Scene`, or what
+    #: `load_scene` returned.
+    SceneLike: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | LoadedScene | Any
+    Scenes: TypeAlias = SceneLike | Sequence[SceneLike]
+    #: A name, 'module:function', 'file.py:function', a function, or a method with its kernel and parameters.
+    MethodLike: TypeAlias = str | Callable[..., Any] | Configuration
+    Methods: TypeAlias = MethodLike | Sequence[MethodLike]
+    #: A name, such a name with '-N', 'module:function', or a function at the top of a module.
+    KernelLike: TypeAlias = str | Callable[..., Any]
+    Kernels: TypeAlias = KernelLike | Sequence[KernelLike]
+    #: Width and height [pixels], or both as 'WxH'.
+    Size: TypeAlias = tuple[int, int] | str
+    #: Called with (fraction done, what); True shows a bar on the error stream, None nothing.
+    Progress: TypeAlias = Callable[[float, str], None] | bool | None
+    #: A result of `render` or `reference`, the path of an EXR file, layers that were read from one, or an array.
+    ImageLike: TypeAlias = LayeredImage | Image | str | os.PathLike[str] | ArrayLike
+    #: Pixels that may take part, (height, width) of truth values, or an EXR file that is 0 in those to leave out.
+    Mask: TypeAlias = ArrayLike | str | os.PathLike[str]
+    #: Values by name, or words NAME=VALUE.
+    Values: TypeAlias = Mapping[str, Any] | Sequence[str] | str
+    Words: TypeAlias = str | Sequence[Any]
+    File: TypeAlias = str | os.PathLike[str]
+    Files: TypeAlias = File | Sequence[File]
+else:
+    SceneLike = MethodLike = KernelLike = Size = ImageLike = Words = str
+    Scenes = Methods = Kernels = Values = Sequence[str]
+    Progress = bool
+    Mask = File = Path
+    Files = Sequence[Path]
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class OpenScene(LoadedScene):
-    """A scene that is ready to be rendered."""
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height of its image [pixels]."""
-        width, height = self.scene.sensors()[0].film().crop_size()
-        return int(width), int(height)
-
-    def plan(self) -> dict[str, str]:
-        """Return the features that the scene needs, in words; raises InputError if no method can render it."""
-        return dict(_described(self)[0])
-
-    def _repr_html_(self) -> str:
-        from reports.api.html import block, paragraph, table
-
-        try:
-            words, notes = _described(self)
-        except InputError as reason:
-            words, notes = {"refused": str(reason)}, ()
-        rows = [("size", "{} x {}".format(*self.size)), *words.items()]
-        rows += [("answers to", self.published)] if self.published else []
-        return block(self.name, paragraph(" ".join([self.purpose, *notes])), table(rows))
-
-    def __repr__(self) -> str:
-        return "OpenScene({}, {} x {})".format(self.name, *self.size)
 
 
 def one_error(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -70,79 +66,80 @@ def one_error(function: Callable[_P, _R]) -> Callable[_P, _R]:
     def wrapped(*arguments: _P.args, **named: _P.kwargs) -> _R:
         try:
             return function(*arguments, **named)
-        except RealtimeInputError as error:
-            raise InputError(str(error)) from error
+        except Exception as error:
+            from realtime.errors import InputError as RealtimeInputError
+
+            if isinstance(error, RealtimeInputError):
+                raise InputError(str(error)) from error
+            raise
 
     return wrapped
 
 
-def opened(scene: SceneLike, size: Size | None = None) -> OpenScene:
-    """Return a scene at a size, its own by default; a scene that was loaded before is left as it is.
+@functools.cache
+def scene_names() -> tuple[str, ...]:
+    """Return the names of the built-in scenes, without Mitsuba, which their registry imports."""
+    files = (Path(__file__).resolve().parents[2] / "validation" / "scenes").glob("*.toml")
+    return tuple(sorted(name for file in files for name in tomllib.loads(file.read_text(encoding="utf-8"))))
+
+
+def several(things: Any) -> list[Any]:
+    """Return one or several as a list, nothing for None."""
+    if things is None:
+        return []
+    return list(things) if isinstance(things, list | tuple) else [things]
+
+
+def listed(name: str, words: Any) -> list[str]:
+    """Return the words of a list, or of a text with commas between them.
 
     Raises
     ------
     InputError
-        If `scene` is not a scene, or is already loaded at another size.
+        If one of them is empty.
     """
-    from reports.machine.environment import activate
-
-    activate()
-    pixels = _pixels(size)
-    if isinstance(scene, Mapping):
-        return _from_dictionary(scene, pixels)
-    if isinstance(scene, str | os.PathLike):
-        return _as_open(load_scene(os.fspath(scene), pixels))
-    loaded = _as_open(scene) if isinstance(scene, LoadedScene) else _from_mitsuba(scene)
-    if pixels not in (None, loaded.size):
-        # The user may have changed the scene since; loading it again in silence would undo that.
-        raise InputError(
-            "size: got {}x{} for a scene that is loaded already, at {}x{}; give its name, path or dictionary with the "
-            "size, or load it at that size".format(*pixels, *loaded.size)
-        )
-    return loaded
+    parts = words.split(",") if isinstance(words, str) else [str(word) for word in words]
+    parts = [part.strip() for part in parts]
+    if not all(parts):
+        raise InputError(f"{name}: got {words!r}, wanted names with commas between them, none of them empty")
+    return parts
 
 
-def as_image(image: Any, layer: str, name: str) -> tuple["Image", str]:
-    """Return layers, among them the one of that name, and what to call the image.
-
-    Parameters
-    ----------
-    image
-        See `ImageLike`; an array, (height, width[, 3]), becomes the layer.
-    layer
-        The layer that will be looked at.
-    name
-        What to call an image that has no name of its own.
+def pixels_of(size: Any) -> tuple[int, int] | None:
+    """Return a size as width and height [pixels], None for None.
 
     Raises
     ------
     InputError
-        If an array is not of numbers, or a file has no such layer.
+        For anything else than two whole numbers or 'WxH'.
     """
-    import numpy as np
+    if size is None or isinstance(size, str):
+        from validation.scenes.loading import parse_size
 
-    from reference.storage.exr import Image, read_exr
-    from reference.storage.exr import layer as image_layer
-    from reports.api.results import LayeredImage
-
-    if isinstance(image, LayeredImage):
-        return image.with_total(), image.title
-    if isinstance(image, str | os.PathLike):
-        read = read_exr(image)
-        image_layer(read, layer, image)  # a message about a missing layer then names the file
-        return read, Path(image).name
-    if isinstance(image, Image):
-        return image, name
-    values = np.asarray(image)
-    if values.dtype.kind not in "fiu":
-        raise InputError(
-            f"{name}: got {type(image).__name__}, wanted what render or reference return, a path, or numbers (height, "
-            "width, 3)"
-        )
-    return Image({layer: values}), name
+        return None if size is None else parse_size(size)
+    try:
+        width, height = size
+        if not (int(width) == width and int(height) == height):
+            raise ValueError
+    except (TypeError, ValueError):
+        raise InputError(f"size: got {size!r}, wanted (width, height) in pixels, for example (800, 600)") from None
+    return int(width), int(height)
 
 
-def kernel_name(kernel: str | Callable[..., Any] | None) -> str | None:
+def changes_of(change: Any) -> dict[str, tuple[float, ...]]:
+    """Return what differs from the scene as it is, by name."""
+    from validation.scenes.changes import parse_changes
+
+    if isinstance(change, Mapping):
+        change = [f"{name}={_numbers(value)}" for name, value in change.items()]
+    return parse_changes(several(change))
+
+
+def _numbers(value: Any) -> str:
+    return ",".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
+
+
+def kernel_name(kernel: Any) -> str | None:
     """Return the name of a kernel: of a function 'module:function', by which it can be imported again.
 
     Raises
@@ -161,75 +158,17 @@ def kernel_name(kernel: str | Callable[..., Any] | None) -> str | None:
 
 
 @contextmanager
-def telling(progress: Progress, title: str) -> Iterator[Callable[[float, str], None]]:
-    """Yield a function (share done, what) that calls `progress`, or does nothing where it is None."""
+def telling(progress: Any, title: str) -> Iterator[Callable[[float, str], None]]:
+    """Yield a function (fraction done, what) that calls `progress`, shows a bar for True, or does nothing for None."""
     if progress is True:
-        from reports.machine.progress import progress_bar
-
         with progress_bar(title) as callback:
             yield callback
-    elif callable(progress):
-        yield progress
     else:
-        yield lambda share, what: None
+        yield progress if callable(progress) else lambda fraction, what: None
 
 
-def _pixels(size: Size | None) -> tuple[int, int] | None:
-    if size is None or isinstance(size, str):
-        return None if size is None else parse_size(size)
-    try:
-        width, height = size
-        if not (int(width) == width and int(height) == height):
-            raise ValueError
-    except (TypeError, ValueError):
-        raise InputError(f"size: got {size!r}, wanted (width, height) in pixels, for example (800, 600)") from None
-    return int(width), int(height)
-
-
-def _as_open(loaded: LoadedScene) -> OpenScene:
-    if isinstance(loaded, OpenScene):
-        return loaded
-    return OpenScene(loaded.name, loaded.scene, loaded.purpose, loaded.published, loaded.path, loaded.animation)
-
-
-def _from_dictionary(scene: Mapping[str, Any], pixels: tuple[int, int] | None) -> OpenScene:
-    import mitsuba as mi
-
-    try:
-        built = mi.load_dict(dict(scene))
-    except Exception as error:  # Mitsuba reports every kind of bad input as a RuntimeError, Python plugins as anything
-        raise InputError(f"scene: Mitsuba cannot build the dictionary: {' '.join(str(error).split())}") from error
-    loaded = _from_mitsuba(built)
-    if pixels is not None:
-        resize(built, pixels)
-    return loaded
-
-
-def _from_mitsuba(scene: Any) -> OpenScene:
-    import mitsuba as mi
-
-    if not isinstance(scene, mi.Scene):
-        kind = type(scene)
-        if kind.__name__ == "Scene" and kind.__module__.split(".")[0] == "mitsuba":
-            raise InputError(
-                f"scene: got a Mitsuba scene of another variant than {mi.variant()}; call airlight.activate() before "
-                "you build it"
-            )
-        raise InputError(
-            f"scene: got {kind.__name__}, wanted a name, the path of a Mitsuba XML file, a Mitsuba dictionary of the "
-            "type 'scene', or a scene that is loaded"
-        )
-    if not scene.sensors():
-        raise InputError("scene: it has no sensor; add one of the type 'perspective'")
-    name_shapes(scene)
-    check_numbers(scene)
-    return OpenScene("scene", scene, "The user's own scene.", "")
-
-
-@one_error
-def _described(loaded: OpenScene) -> tuple[dict[str, str], tuple[str, ...]]:
-    from realtime.scene.features import describe
-    from realtime.scene.read_scene import read_scene
-
-    features = read_scene(loaded.scene).features
-    return describe(features), features.notes
+def note(progress: Any, notes: Sequence[str]) -> None:
+    """Say on the error stream what a user should know before the work begins, where a bar may be shown too."""
+    if progress is True:
+        for words in notes:
+            print(f"airlight: note: {words}", file=sys.stderr)

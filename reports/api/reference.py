@@ -1,18 +1,34 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The Python API for the truth of a scene, by the certified integral or by samples."""
+"""`airlight.reference`: the reference of a scene, by the certified integral or by samples, here or on workers."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from analytic.errors import InputError, nearest
-from reports.api.inputs import OpenScene, Progress, SceneLike, Size, one_error, opened, telling
+from reports.api.inputs import (
+    Files,
+    Progress,
+    SceneLike,
+    Size,
+    Values,
+    changes_of,
+    note,
+    one_error,
+    pixels_of,
+    several,
+    telling,
+)
 
 if TYPE_CHECKING:
     from reports.api.results import Reference
+    from reports.cluster.connect import Cluster
     from validation.estimates.budget import Budget
+    from validation.scenes.loading import LoadedScene
 
 USUAL_SAMPLES = 2048  #: samples a pixel of a sampling estimator without a budget
 USUAL_CLOUD_SAMPLES = 256  #: of one that traces clouds
+_ESTIMATORS = ("quadrature", "single-scatter", "volpath", "cloud-paths")
 
 
 @one_error
@@ -20,6 +36,7 @@ def reference(
     scene: SceneLike,
     estimator: Literal["quadrature", "single-scatter", "volpath", "cloud-paths"] = "quadrature",
     *,
+    change: Values = (),
     size: Size | None = None,
     pixel: Literal["centre", "area"] = "centre",
     samples: int | None = None,
@@ -28,80 +45,177 @@ def reference(
     target: Literal["pooled", "worst"] = "pooled",
     seed: int = 0,
     orders: str | None = None,
+    merge: Files = (),
+    cluster: str | None = None,
+    force: bool = False,
     progress: Progress = None,
 ) -> "Reference":
-    """Compute the truth of a scene, with its error; what was computed before comes from the cache.
+    """Compute the reference of a scene, with its error.
+
+    It is written as layered EXR. Finished batches are cached: a Monte Carlo run continues from them, after an
+    interruption or with more samples. `--cluster` spreads batches over workers; the file is the same, byte for byte.
+    Exit status 1 if the error that was asked for was not reached.
 
     Parameters
     ----------
     scene
-        See `load_scene`.
+        A built-in scene, random:SEED or a Mitsuba XML file; from Python also what `load_scene` takes or returns.
     estimator
-        'quadrature', with a bound of the error in every pixel; or by random samples, with standard errors,
-        'single-scatter' and 'volpath'; of clouds, whose light is scattered many times, 'cloud-paths'.
+        quadrature, with a bound of the error in every pixel; or by random samples, with standard errors,
+        single-scatter and volpath; for clouds, whose light is scattered many times, cloud-paths.
+    change
+        A camera, light or medium unlike the scene's, such as medium.sigma_t=0.1; may be given several times.
     size
-        Width and height [pixels], or 'WxH'; the scene's own by default.
+        Width and height [pixels], or WxH; the scene's own by default.
     pixel
-        Of the quadrature: the radiance at a pixel's 'centre', or the mean over its 'area'.
-    samples, error, seconds
-        When an estimator that samples stops: at so many samples a pixel (2048 where none of the three is given, 256
-        of clouds), at a relative standard error, or after a time [s].
+        Of the quadrature: the radiance at a pixel's centre, or the mean over its area.
+    samples
+        Of an estimator that samples: so many a pixel, at least 64; 2048 by default, 256 for clouds.
+    error
+        Of an estimator that samples: go on to this relative standard error, such as 0.001.
+    seconds
+        Of an estimator that samples: go on for so long [s].
     target
-        Whether `error` is that of the image, 'pooled', or of its 'worst' pixel.
+        Whether `error` is that of the image, pooled, or of its worst pixel.
     seed
         Of the first batch of samples; the others count up.
     orders
-        Of clouds, by 'cloud-paths' and 'volpath': layers by order of scattering, such as '1,2,3-4,5-inf'; 'sets', which
-        'cloud-paths' has by itself, are those of `airlight reference`, 'all' is none.
+        For clouds, by cloud-paths and volpath: layers by order of scattering, such as 1,2,3-4,5-inf; 'sets', the
+        default of cloud-paths, are those of Bouthors 2008, 'all' is none.
+    merge
+        Merge the samples of these files with those of the scene, in place of tracing: Monte Carlo references of the
+        scene by one estimator with different seeds; may be given several times.
+    cluster
+        Let workers compute: local[:N] processes, tcp://HOST:PORT or tls://HOST:PORT of a Dask scheduler, or its
+        scheduler file. A tcp scheduler authenticates nobody and its workers run what they are sent: use it only on a
+        network that you trust; tls takes the certificates of Dask's configuration.
+    force
+        Start also what will take more than an hour, or more memory than there is.
     progress
-        Called with (share done, what); True shows a bar.
+        Called with (fraction done, what); True shows a bar.
 
     Raises
     ------
     InputError
-        For what the estimator has no use for, and more than one of `samples`, `error` and `seconds`.
+        For what the estimator does not use, and more than one of `samples`, `error` and `seconds`.
 
     Examples
     --------
     >>> import airlight
-    >>> truth = airlight.reference("open-fog", size=(32, 24))
-    >>> truth.relative_error < 1e-6
+    >>> exact = airlight.reference("open-fog", size=(32, 24))
+    >>> exact.relative_error < 1e-6
     True
     >>> traced = airlight.reference("open-fog", "single-scatter", size=(32, 24), samples=64)
     >>> traced.standard_error.shape
     (24, 32, 3)
     """
-    known = ("quadrature", "single-scatter", "volpath", "cloud-paths")
-    if estimator not in known:
-        raise InputError(f"estimator: got {estimator!r}, wanted one of {', '.join(known)}" + nearest(estimator, known))
-    if orders is not None and estimator not in ("volpath", "cloud-paths"):
-        raise InputError(f"orders: {estimator} knows single scattering alone; take 'cloud-paths' or 'volpath'")
-    given = {"samples": samples, "error": error, "seconds": seconds}
-    if estimator == "quadrature":
-        named = [name for name, value in given.items() if value is not None]
-        if named:
-            others = "'single-scatter', 'volpath' and 'cloud-paths'"
-            raise InputError(f"{named[0]}: is for {others}; leave it out, or take one of these")
-        with telling(progress, "quadrature") as callback:
-            return _quadrature(opened(scene, size), pixel, callback)
-    if pixel != "centre":
+    files = [Path(path) for path in several(merge)]
+    budgets = {"samples": samples, "error": error, "seconds": seconds}
+    given = [name for name, value in budgets.items() if value is not None]
+    if files:
+        others = [*given, *(["cluster"] if cluster else []), *(["change"] if change else [])]
+        if others:
+            raise InputError(f"merge: traces nothing; leave out {', '.join(others)}")
+        return _merged(str(scene), files)
+    if estimator not in _ESTIMATORS:
         raise InputError(
-            f"pixel: got {pixel!r}, but {estimator} traces pixel centres; leave it out or take 'quadrature'"
+            f"estimator: got {estimator!r}, wanted one of {', '.join(_ESTIMATORS)}" + nearest(estimator, _ESTIMATORS)
         )
+    if orders is not None and estimator not in ("volpath", "cloud-paths"):
+        raise InputError(f"orders: {estimator} knows single scattering alone; take cloud-paths or volpath")
+    place = None
+    if cluster is not None:
+        from reports.cluster.connect import parse_place
+
+        if seconds is not None:
+            raise InputError("seconds: how many batches workers trace in a time is chance; give samples with a cluster")
+        if not isinstance(scene, str):
+            raise InputError("cluster: workers load a scene by its name or path; give that")
+        place = parse_place(cluster)
+    budget = None
     wanted = orders or ("sets" if estimator == "cloud-paths" else None)
-    budget = _budget(given, target, usual=USUAL_SAMPLES if wanted is None else USUAL_CLOUD_SAMPLES)
-    with telling(progress, estimator) as callback:
-        return _sampled(opened(scene, size), estimator, budget, seed=seed, orders=wanted, callback=callback)
+    if estimator != "quadrature":
+        if pixel != "centre":
+            raise InputError(
+                f"pixel: got {pixel!r}, but {estimator} traces pixel centres; leave it out or take quadrature"
+            )
+        budget = _budget(budgets, target, usual=USUAL_SAMPLES if wanted is None else USUAL_CLOUD_SAMPLES)
+    elif given:
+        raise InputError(f"{given[0]}: is for {', '.join(_ESTIMATORS[1:])}; leave it out, or take one of these")
+    changes = changes_of(change)
+    from reports.machine.environment import activate
+
+    activate()
+    from realtime.scene.features import scene_notes
+    from reports.api.scenes import opened
+
+    loaded = opened(scene, pixels_of(size), changes)
+    note(progress, scene_notes(loaded.scene))
+    _check_work(loaded, estimator, pixel, budget, clouds=wanted is not None, force=force)
+
+    def compute(tell: Callable[[float, str], None], workers: "Cluster | None" = None) -> "Reference":
+        elsewhere = None
+        if workers is not None:
+            elsewhere = _elsewhere(workers, loaded, changes, estimator, pixel=pixel, budget=budget, orders=wanted)
+        if budget is None:
+            return _quadrature(loaded, pixel, tell)
+        return _sampled(loaded, estimator, budget, seed=seed, orders=wanted, tell=tell, elsewhere=elsewhere)
+
+    with telling(progress, f"{loaded.name}: {estimator}") as tell:
+        if place is None:
+            return compute(tell)
+        from reports.cluster.connect import connected
+
+        with connected(place) as workers:
+            return compute(tell, workers)
 
 
-def _quadrature(loaded: OpenScene, pixel: str, callback: Callable[[float, str], None]) -> "Reference":
+def _check_work(loaded: Any, estimator: str, pixel: str, budget: "Budget | None", *, clouds: bool, force: bool) -> None:
+    from validation.study.cost import check_work, sampled_work, truth_work
+
+    size = loaded.size if loaded.scene.sensors() else (1, 1)
+    if budget is None:
+        area = 16 if pixel == "area" else 1  # rays in a pixel
+        work = truth_work(size, lights=len(loaded.scene.emitters()), images=area)
+    else:
+        work = sampled_work(size, budget.samples or 64, clouds=clouds)
+    check_work(f"reference {loaded.name}, {size[0]} x {size[1]}, {estimator}", [work], force=force)
+
+
+def _elsewhere(
+    workers: "Cluster",
+    loaded: "LoadedScene",
+    changes: Any,
+    estimator: str,
+    *,
+    pixel: str,
+    budget: "Budget | None",
+    orders: str | None,
+) -> Any:
+    """Let workers compute what is not in the cache: a quadrature at once, batches as they are asked for."""
+    from reports.cluster.references import Picture, bring_truths, tracing
+    from validation.estimates.budget import batch_plan
+    from validation.estimates.images import cloud_orders
+
+    width, height = (int(side) for side in loaded.scene.sensors()[0].film().size())
+    picture = Picture.of(str(loaded.path.resolve() if loaded.path else loaded.name), (width, height), changes)
+    if budget is None:
+        bring_truths(workers, [picture], pixel=pixel)
+        return None
+    batches, samples = batch_plan(budget, width * height)
+    known = None if budget.samples is None else batches
+    chosen = cloud_orders(orders) if orders else None
+    return tracing(workers, picture, estimator, samples=samples, batches=known, orders=chosen)
+
+
+def _quadrature(loaded: "LoadedScene", pixel: str, tell: Callable[[float, str], None]) -> "Reference":
     import numpy as np
 
     from reports.api.results import Reference, sealed
     from validation.estimates.images import whole_truth
     from validation.estimates.quadrature import truth_image
 
-    truth = truth_image(loaded.scene, pixel=pixel, progress=lambda done, total, what: callback(done / total, what))
+    truth = truth_image(loaded.scene, pixel=pixel, progress=lambda done, total, what: tell(done / total, what))
     finite = np.isfinite(truth.airlight)
     mean = float(truth.airlight[finite].mean()) if finite.any() else 0.0
     counts = ("transitions", "checked", "disagreements", "refined", "left")
@@ -115,29 +229,54 @@ def _quadrature(loaded: OpenScene, pixel: str, callback: Callable[[float, str], 
 
 
 def _sampled(
-    loaded: OpenScene,
+    loaded: "LoadedScene",
     estimator: str,
     budget: "Budget",
     *,
     seed: int,
     orders: str | None,
-    callback: Callable[[float, str], None],
+    tell: Callable[[float, str], None],
+    elsewhere: Any,
 ) -> "Reference":
     from reports.api.results import Reference, sealed
     from validation.estimates.images import cloud_orders, monte_carlo_reference
 
     chosen = cloud_orders(orders) if orders else None
-    estimate = monte_carlo_reference(loaded, estimator, budget=budget, seed=seed, orders=chosen, progress=callback)
-    attributes = {name.removeprefix("airlight:"): value for name, value in estimate.image.attributes.items()}
-    details: dict[str, Any] = {name: attributes[name] for name in ("spp", "batches", "seeds")}
-    details |= {"cached": estimate.cached, "masked": estimate.masked, "reached": estimate.reached}
+    found = monte_carlo_reference(
+        loaded, estimator, budget=budget, seed=seed, orders=chosen, progress=tell, elsewhere=elsewhere
+    )
+    counted = {"cached": found.cached, "damaged": found.damaged, "masked": found.masked}
+    errors = {"pooled_error": found.errors.pooled, "worst_error": found.errors.worst, "reached": found.reached}
     return Reference(
         scene=loaded.name,
-        image=sealed(estimate.image),
+        image=sealed(found.image),
         estimator=estimator,
-        relative_error=getattr(estimate.errors, budget.target),
-        details=details,
+        relative_error=getattr(found.errors, budget.target),
+        details=_batches(found.image.attributes) | counted | errors,
     )
+
+
+def _merged(scene: str, files: list[Path]) -> "Reference":
+    """Return the samples of several files together, computed from their single precision."""
+    from reference.storage.exr import read_exr
+    from reports.api.results import Reference, sealed
+    from validation.estimates.merge import merged_references
+
+    image = merged_references([(str(path), read_exr(path)) for path in files])
+    made = str(image.attributes["airlight:scene"])
+    if made != Path(scene).stem and made != scene:
+        raise InputError(f"merge: the files are of the scene {made}, got {scene}; name that one")
+    return Reference(
+        scene=made,
+        image=sealed(image),
+        estimator=str(image.attributes["airlight:estimator"]),
+        relative_error=float("nan"),
+        details=_batches(image.attributes),
+    )
+
+
+def _batches(attributes: Any) -> dict[str, Any]:
+    return {name: attributes[f"airlight:{name}"] for name in ("spp", "batch_spp", "batches", "seeds")}
 
 
 def _budget(given: dict[str, Any], target: Any, *, usual: int) -> "Budget":

@@ -1,87 +1,470 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The Python API for the error report."""
+"""`airlight.report`, `airlight.diff` and `airlight.paper`: the error report, two of them compared, claims of papers."""
 
 import os
-from collections.abc import Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+import shlex
+import sys
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 from analytic.errors import InputError, nearest
-from reports.api.inputs import Progress, one_error, telling
-from reports.api.studies import MethodLike, chosen_methods, several
+from reports.api.inputs import File, Kernels, Methods, Progress, Scenes, Values, note, one_error, several, telling
+from reports.machine.own_process import LIMIT
+from reports.tables.drawing import html, sentence_in_text
+from reports.tables.record import Result, block, bullets
+from reports.tables.table import Table
 
 if TYPE_CHECKING:
-    from reports.api.tables import Report
+    from reports.diff.compare import Difference
+
+FOLDER = "airlight-report"  #: where a report is written by default
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Report(Result):
+    """An error report that was written."""
+
+    folder: Path
+    data: Mapping[str, Any]  #: the content of report.json
+    done: str = ""  #: how much was measured, in words
+    figures: tuple[str, ...] = ()  #: files of figures that were written
+
+    @property
+    def page(self) -> Path:
+        """The HTML page."""
+        return self.folder / "report.html"
+
+    @property
+    def claims(self) -> tuple[str, ...]:
+        """The sentences at the top of the page."""
+        return tuple(claim["text"] for claim in self.data["claims"])
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether no check speaks against the reference, and at least one confirms each layer."""
+        from reports.data.claims import confirmed
+
+        return confirmed(self.data["scenes"])
+
+    @property
+    def faults(self) -> Sequence[str]:
+        """What user methods did wrong."""
+        from reports.data.own_faults import own_faults
+
+        return own_faults(self.data)
+
+    @property
+    def passed(self) -> bool:
+        """Whether the reference is confirmed and no user method is at fault."""
+        return self.confirmed and not self.faults
+
+    def to_dict(self) -> Mapping[str, Any]:
+        """Return the content of report.json."""
+        return self.data
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """The fastest method within an error."""
+        from reports.tables.methods import fastest_table
+
+        return [fastest_table(self.data["scenes"])] if self.data["scenes"] else []
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """Where it was written."""
+        count = len(self.data["scenes"])
+        page = f"{self.page}: {count} scene{'' if count == 1 else 's'}, {self.done}"
+        return [page, *self.figures]
+
+    def text(self, *, width: int | None = None, styled: bool = False) -> str:
+        """Return the claims, the table and where it was written."""
+        claims = "".join(f"- {sentence_in_text(claim)}\n" for claim in self.claims)
+        return claims + super().text(width=width, styled=styled).replace("\n\n", "\n")
+
+    @property
+    def title(self) -> str:
+        """The scenes and the date."""
+        return f"{', '.join(scene['name'] for scene in self.data['scenes'])}, {self.data['created']}"
+
+    def _repr_html_(self) -> str:
+        link = f'<p><a href="{_address(self.page)}">{self.page}</a></p>'
+        return block(f"Report on {self.title}", bullets(self.claims), *map(html, self.tables), link)
+
+    def __repr__(self) -> str:
+        return f"Report({str(self.folder)!r}, {len(self.data['scenes'])} scenes)"
+
+
+def _address(page: Path) -> str:
+    """Return the address of a page, relative inside the current folder: a notebook shows only files below it."""
+    try:
+        return page.resolve().relative_to(Path(os.getcwd()).resolve()).as_posix()
+    except ValueError:
+        return page.resolve().as_uri()
 
 
 @one_error
 def report(
-    folder: str | os.PathLike[str] = "airlight-report",
+    scenes: Scenes = (),
     *,
-    scenes: Sequence[str] | None = None,
-    methods: "Sequence[MethodLike] | None" = None,
-    effort: Literal["quick", "default", "full"] = "default",
-    images: str | os.PathLike[str] | None = None,
+    quick: bool = False,
+    full: bool = False,
+    method: Methods = (),
+    kernel: Kernels = (),
+    settings: Values = (),
+    images: File | None = None,
+    output: File | None = None,
+    from_: File | None = None,
+    figures: Literal["single", "double"] | None = None,
     fresh: bool = False,
+    method_limit: float = LIMIT,
+    cluster: str | None = None,
+    force: bool = False,
     progress: Progress = None,
-) -> "Report":
-    """Measure methods in scenes and write the error report: one page, its data, EXR files and pictures.
+) -> Report:
+    """Measure methods in scenes and write the report, one page.
+
+    The page is report.html; beside it lie report.json and each image as EXR and PNG.
+
+    Results that this machine measured before, with the same code and scenes, come from the cache. Exit status 1 if
+    single-scatter or volpath does not confirm the reference within the margin, or a user method is at fault: the report
+    says what became of it.
 
     Parameters
     ----------
-    folder
-        Where it is written.
     scenes
-        Built-in names and paths of Mitsuba XML files; those of `airlight report` by default.
-    methods
-        As for `bench`; those of `airlight report` by default.
-    effort
-        'quick' (some minutes), 'default' or 'full' (an hour), as the options of `airlight report`. What was measured
-        before, with the same sources on the same machine, is not measured again.
+        Built-in scenes, random:SEED and Mitsuba XML files, four with `--quick`, eleven by default; or a study, a TOML
+        file as of `airlight sweep`.
+    quick
+        Few scenes, small images: some minutes.
+    full
+        Large images, many samples, all tables: an hour.
+    method
+        A method of `airlight list methods`, a user method as MODULE:FUNCTION or FILE.py:FUNCTION, or 'all', the
+        default; may be given several times. From Python also functions and `airlight.configuration(...)`.
+    kernel
+        Airlight kernel of the methods; may be given several times.
+    settings
+        NAME=VALUE, a parameter of each method that `--method` names; may be given several times.
     images
-        A folder with EXR files that another renderer wrote, SCENE.exr or SCENE.NAME.exr, to be judged too.
+        Folder with your engine's images, SCENE.exr or SCENE.NAME.exr, judged against the reference.
+    output
+        Folder of the report; airlight-report by default.
+    from_
+        Draw the page of this report.json again, without measuring; what `--method` names is shown in the strip.
+    figures
+        Also write figures and a LaTeX table for a paper, for a column of this width.
     fresh
-        Measure again what was kept.
+        Measure again what is cached by earlier runs.
+    method_limit
+        A user method that is named is stopped after so long in a scene [s].
+    cluster
+        Let workers compute references and their checks: local[:N] processes, tcp://HOST:PORT or tls://HOST:PORT of a
+        Dask scheduler, or its scheduler file. A tcp scheduler authenticates nobody and its workers run what they are
+        sent: use it only on a network that you trust.
+    force
+        Start also what will take more than an hour, or more memory than there is.
     progress
-        Called with (share done, what); True shows a bar.
+        Called with (fraction done, what); True shows a bar.
 
     Raises
     ------
     InputError
         For what cannot be used, before the work begins.
-    KeyboardInterrupt
-        At Ctrl-C; the next report goes on from there.
 
     Examples
     --------
     >>> import airlight
-    >>> report = airlight.report("my-report", scenes=["open-fog"], methods=["unshadowed"])  # doctest: +SKIP
+    >>> report = airlight.report("open-fog", method="unshadowed", output="my-report")  # doctest: +SKIP
     >>> report.claims[0]  # doctest: +SKIP
-    'The truth is confirmed by our own Mitsuba integrator in 1 of 1 comparisons: ...'
+    'The reference is confirmed by our own Mitsuba integrator in 1 of 1 comparisons: ...'
     """
+    if from_ is not None:
+        measures = {"quick": quick, "full": full, "kernel": kernel, "set": settings, "images": images, "fresh": fresh}
+        measures |= {"method_limit": method_limit != LIMIT, "cluster": cluster, "force": force}
+        if figures is None:
+            measures |= {"a scene": scenes, "method": method}
+        for name, value in measures.items():
+            if value not in (None, False, (), []):
+                raise InputError(f"report: got from together with {name}; from measures nothing, leave that out")
+        return _redrawn(Path(from_), output, figures, several(scenes), [str(each) for each in several(method)])
+    if quick and full:
+        raise InputError("report: got both quick and full; give one of them, or neither for the default")
+    effort = "quick" if quick else "full" if full else "default"
+    target = Path(FOLDER if output is None else output)
+    how = {"images": images, "fresh": fresh, "method_limit": method_limit, "cluster": cluster, "force": force}
+    asked = (several(scenes), several(method), several(kernel), settings)
+    data = _measured(target, effort, *asked, progress=progress, **how)
+    written = _figures(target, figures, [], []) if figures else ()
+    return Report(folder=target, data=data, done=_done(data), figures=written)
+
+
+def _figures(folder: Path, column: str, scenes: list[str], labels: list[str]) -> tuple[str, ...]:
+    from reports.figures.report import write_figures
+
+    return write_figures(folder, column, scene=scenes[0] if scenes else None, labels=labels or None)
+
+
+def _redrawn(path: Path, output: Any, figures: str | None, scenes: list[str], labels: list[str]) -> Report:
+    """Draw the page of a report again, and its figures."""
+    from reports.data.reader import load_report, redraw_report
+
+    if len(scenes) > 1:
+        raise InputError("report: the strip shows one scene; name one of them")
+    data, folder = load_report(path)
+    target = Path(output or folder)
+    redraw_report(data, folder, target)
+    written = _figures(target, figures, scenes, labels) if figures else ()
+    return Report(folder=target, data=data, done="drawn again", figures=written)
+
+
+def _measured(
+    target: Path,
+    effort: str,
+    scenes: list[Any],
+    methods: list[Any],
+    kernels: list[Any],
+    settings: Any,
+    *,
+    images: Any,
+    fresh: bool,
+    method_limit: float,
+    cluster: str | None,
+    force: bool,
+    progress: Any,
+) -> dict[str, Any]:
+    """Measure and write a report; unusable input is refused before the work begins."""
+    import gc
+
     from reference.storage.files import ensure_folder
-    from reports.api.tables import Report
+    from reports.cluster.connect import check_library, connected, parse_place
     from reports.machine.environment import activate
+
+    place = None if cluster is None else parse_place(cluster)
+    if place is not None:
+        check_library()
+    activate()
+    from reports.api.render import asked_configurations
     from reports.report.asked import notes_on, scenes_of_images
     from reports.report.measure import write_report
-    from validation.study.study import STUDIES, standard_study
+    from validation.comparison.engine_images import images_size
+    from validation.study.cost import check_work, frame_work, truth_work
+    from validation.study.study import RandomScenes, read_study, standard_study
 
-    if effort not in STUDIES:
-        raise InputError(f"effort: got {effort!r}, wanted one of {', '.join(STUDIES)}" + nearest(effort, STUDIES))
-    target = ensure_folder(folder)
-    activate()
-    study = standard_study(effort)
-    chosen = study.configurations if methods is None else chosen_methods(methods)
-    asked = None if scenes is None else [os.fspath(path) for path in several(scenes)]
-    names, shown = scenes_of_images(asked, images, study.scenes)
-    notes_on(names)  # refuses a scene that cannot be read, before the work; the notes stand in report.json
-    with telling(progress, "report") as callback:
-        data = write_report(
+    study, asked = standard_study(effort), [os.fspath(path) for path in scenes]
+    if len(asked) == 1 and asked[0].endswith(".toml"):
+        study, asked = read_study(Path(asked[0])), []
+    names, shown = scenes_of_images(asked or None, images, tuple(study.scene_names()))
+    chosen, apart = asked_configurations(methods, kernels, settings, usual=study.configurations, limit=method_limit)
+    if methods and all(isinstance(name, str) and ":" in name for name in methods):
+        note(progress, ["what --method names is measured alone; --method all adds the built-in methods"])
+    note(progress, notes_on(names))
+    ensure_folder(target)  # not before the scenes are known to be right: a mistake leaves no empty folder
+    # The sizes of an effort are known to be right; those of images are the user's.
+    sizes = [images_size(tuple(several)) for several in shown.values()]
+    works = [truth_work(size) for size in sizes]
+    works += [frame_work(size, steps=100, frames=8 * len(chosen)) for size in sizes]
+    check_work("report --images", works, force=force)
+    gc.freeze()  # modules live as long as the process: what looks for garbage before each frame need not look there
+    typed = shlex.join(["airlight", *sys.argv[1:]])
+    command = typed if progress is True else f"airlight.report(output={str(target)!r}, ..)"
+    with ExitStack() as stack, telling(progress, "report") as tell:
+        return write_report(
             target,
-            replace(study, scenes=tuple(names), configurations=chosen),
+            replace(study, scenes=tuple(names), random=RandomScenes(), configurations=tuple(chosen)),
             images=shown,
-            command=f"airlight.report({os.fspath(folder)!r}, ..)",
+            command=command,
             fresh=fresh,
-            progress=callback,
+            method_limit=method_limit if apart else None,
+            progress=tell,
+            cluster=None if place is None else stack.enter_context(connected(place)),
         )
-    return Report(folder=target, data=data)
+
+
+def _done(data: Mapping[str, Any]) -> str:
+    """Say how long it took, and how much of it had been measured before."""
+    seconds, kept, computed = data["seconds"], data["kept"], data["computed"]
+    if not kept:
+        return f"{computed} results in {seconds:.0f} s"
+    when = data["measured"]
+    rest = f"{kept} of {kept + computed}" if computed else f"all {kept}"
+    return (
+        f"{seconds:.0f} s: {rest} results cached by earlier runs, measured from {when['first']} to {when['last']}; "
+        "--fresh measures again"
+    )
+
+
+@dataclass(frozen=True, repr=False)
+class ReportDifference(Result):
+    """What differs between two reports."""
+
+    difference: "Difference"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `airlight diff --json` prints."""
+        return self.difference.to_json()
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing is worse."""
+        return not self.difference.worse
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """The findings, the worse ones first."""
+        from reports.diff.compare import difference_tables
+
+        return difference_tables(self.difference)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """Findings without numbers, and what could be seen."""
+        from reports.diff.compare import difference_lines
+
+        return difference_lines(self.difference)
+
+
+def diff(
+    old: File,
+    new: File,
+    *,
+    error_tolerance: float = 0.02,
+    time_tolerance: float = 0.25,
+    times: bool = True,
+    common: bool = False,
+) -> ReportDifference:
+    """Compare two reports: what got slower or less accurate.
+
+    Also what got better, what is new and what is gone.
+
+    Errors have little noise: they may change by a relative band, or by float32 rounding. Times have much: the quartiles
+    of both reports tell how busy the machine was, and a change must show in all stages that share it. Between two
+    machines, times are compared relative to the median of all. Exit status 1 if anything is worse, gone, newly refused
+    or no longer finite, or if the reference is no longer confirmed.
+
+    Parameters
+    ----------
+    old
+        report.json, or its folder, to compare with.
+    new
+        report.json, or its folder, to judge.
+    error_tolerance
+        Relative change of an error that is noise; that of a maximum is twice as wide.
+    time_tolerance
+        Relative change of a time that is noise, on a quiet machine.
+    times
+        Compare times too.
+    common
+        Compare what both reports hold; what is missing from the new one is no loss.
+    """
+    from reports.data.reader import read_report
+    from reports.diff.compare import compare_reports
+
+    tolerance = time_tolerance if times else None
+    reports = read_report(Path(old)), read_report(Path(new))
+    return ReportDifference(
+        compare_reports(*reports, error_tolerance=error_tolerance, time_tolerance=tolerance, common=common)
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PaperClaims(Result):
+    """The claims of papers with their verdicts."""
+
+    rows: tuple[Mapping[str, Any], ...]  #: as they stand under `papers` of report.json
+    left_out: int  #: claims that need images
+    numbers: bool = False  #: whether numbers without a verdict are shown
+    environment: Mapping[str, Any] | None = None
+    figures: tuple[str, ...] = ()  #: files that were written
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `airlight paper --json` prints."""
+        from validation.study.results import date
+
+        rows = list(self.rows)
+        return {"measured": date(), "environment": self.environment, "papers": rows, "left_out": self.left_out}
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """A table of verdicts for each paper, and of numbers."""
+        from reports.tables.papers import number_tables, verdict_tables
+
+        return [*verdict_tables(self.rows), *(number_tables(self.rows) if self.numbers else [])]
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """How many claims have each verdict."""
+        lines = [f"{self.title}."]
+        if self.left_out:
+            lines.append(f"{self.left_out} more rows need images: leave out --quick.")
+        return [*lines, *self.figures]
+
+    @property
+    def title(self) -> str:
+        """How many claims have each verdict."""
+        from reports.tables.papers import count_words
+
+        return count_words([row for row in self.rows if row["verdict"] is not None])
+
+
+@one_error
+def paper(
+    name: str | None = None,
+    *,
+    numbers: bool = False,
+    figures: File | None = None,
+    quick: bool = False,
+    fresh: bool = False,
+    progress: Progress = None,
+) -> PaperClaims:
+    """Give a verdict on every claim of the papers.
+
+    Equations, figures, tables and sentences: published beside measured. A verdict is reproduced, not reproduced,
+    differs (it depends on the machine or on a scene of ours) or impossible. Each is computed from what this command
+    measures, or from what is cached by an earlier run; all take an hour or so.
+
+    Parameters
+    ----------
+    name
+        biri, billeter, ali or bouthors; all by default.
+    numbers
+        Show the numbers without a verdict too: rates of graphics cards beside ours.
+    figures
+        Also draw the pictures of the papers in our scenes, PDF and PNG with their data, into this folder.
+    quick
+        Only the claims that need no image; of figures small ones.
+    fresh
+        Measure again what was cached by earlier runs.
+    progress
+        Called with (fraction done, what); True shows a bar.
+
+    Raises
+    ------
+    InputError
+        For an unknown paper.
+    """
+    import time
+
+    from reference.storage.kept import fresh_results
+    from reports.machine.environment import activate, describe_environment
+    from reports.report.others import measure_claims
+    from validation.papers.claims import claims, papers
+
+    if name is not None and name not in papers():
+        raise InputError(f"paper: got {name!r}, wanted one of {', '.join(papers())}" + nearest(name, papers()))
+    chosen = [claim for claim in claims() if name in (None, claim.paper)]
+    activate()
+    with telling(progress, "paper") as tell, fresh_results(time.time() if fresh else None):
+        rows = measure_claims(chosen, quick=quick, progress=tell)
+    written: tuple[str, ...] = ()
+    if figures is not None:
+        from reports.figures.papers import write_figures
+
+        with telling(progress, "figures") as tell:
+            written = write_figures(Path(figures), name, rows, quick=quick, progress=tell)
+    return PaperClaims(tuple(rows), len(chosen) - len(rows), numbers, describe_environment(), written)

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images as results of the Python API: frozen, NumPy arrays where one is wanted, pictures in a notebook.
+"""Images as results: frozen, NumPy arrays where one is wanted, pictures in a notebook, words on a terminal.
 
 Arrays are (height, width, 3) of linear RGB radiance [W/(m^2 sr)], the first row at the top, and read-only. They keep
 the precision of what made them: float32 from a method in single precision, float64 from one in double and from the
 truth, whose error is far below what float32 can hold; `.numpy(numpy.float32)` converts.
 """
 
+import json
 import math
 import os
-from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -21,7 +22,28 @@ from numpy.typing import DTypeLike, NDArray
 from analytic.errors import InputError
 from reference.storage.exr import TOTAL, Image
 from reference.storage.exr import layer as image_layer
-from reports.tables.table import number
+from reports.plotting.pictures import (
+    ERROR_CEILING,
+    ERROR_FLOOR,
+    ToneCurve,
+    error_map,
+    exposure,
+    png_bytes,
+    preview,
+    tone_curve,
+    tone_mapped,
+    write_png,
+)
+from reports.tables.methods import rate_words
+from reports.tables.record import Result
+from reports.tables.table import Column, Interval, Table, number, table
+from validation.comparison.engine_compare import EngineComparison
+from validation.comparison.images import Comparison
+from validation.diagnosis.diagnose import Diagnosis
+from validation.diagnosis.diagnosis_text import diagnosis_lines
+from validation.fit.fit import Fit
+from validation.fit.fit_text import fit_lines
+from validation.metrics.errors import FLOOR, Metrics, colours, plain
 from validation.study.frame_times import FrameTimes
 
 Array = NDArray[np.floating]
@@ -41,7 +63,7 @@ def read_only(values: Any) -> Array:
     return view
 
 
-class Pictured(ABC):
+class Pictured(Result):
     """A result that a notebook shows as a PNG picture."""
 
     @abstractmethod
@@ -50,8 +72,6 @@ class Pictured(ABC):
 
     @cached_property
     def _png(self) -> bytes:
-        from reports.plotting.pictures import png_bytes
-
         return png_bytes(self.picture())
 
     def _repr_png_(self) -> bytes:
@@ -124,7 +144,6 @@ class LayeredImage(Pictured):
         exposure
             Stops: the radiance is multiplied by 2 to this power. By default one that suits the total.
         """
-        from reports.plotting.pictures import tone_mapped
         from validation.metrics.colour import auto_exposure
 
         stops = auto_exposure(self.total) if exposure is None else exposure
@@ -132,27 +151,32 @@ class LayeredImage(Pictured):
         return tone_mapped(radiance, 2.0**stops)
 
     def save(self, path: str | os.PathLike[str], exposure: float | None = None) -> Path:
-        """Write the layers as EXR or the picture of the total as PNG, by the suffix of the path; return the path.
+        """Write the layers as EXR or a picture of the total as PNG, by the suffix of the path; return the path.
+
+        Parameters
+        ----------
+        path
+            Ends in .exr or .png.
+        exposure
+            Of the picture [stops], linear up to white; by default it goes through a tone curve that suits it, see
+            `reports.plotting.pictures.tone_curve`.
 
         Raises
         ------
         InputError
             For another suffix, or if the file cannot be written.
         """
-        from reference.storage.exr import write_exr
-        from reports.machine.environment import stamped
-        from reports.plotting.pictures import write_png
-
         target = Path(path)
-        if target.suffix.lower() == ".exr":
-            write_exr(target, stamped(self.image))
-        elif target.suffix.lower() == ".png":
+        if exposure is not None and target.suffix.lower() == ".png":
             write_png(target, self.picture(exposure=exposure))
         else:
-            raise InputError(
-                f"save: got {str(path)!r}, wanted a path that ends with .exr (all layers) or .png (picture)"
-            )
+            write_image(target, self.image, total=self.total)
         return target
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """Facts on the image."""
+        return [f"{name}: {words}" for name, words in self.facts().items()]
 
     def facts(self) -> dict[str, str]:
         """Return facts on the image, in words, by name."""
@@ -165,15 +189,14 @@ class LayeredImage(Pictured):
         return self.scene
 
     def _repr_html_(self) -> str:
-        from reports.api.html import block, picture, table
-        from reports.plotting.pictures import png_bytes
+        from reports.tables.record import block, facts_table, picture
 
         title = self.title
         shown = [picture(self._png, self.size[0], alt=f"{title}, all light", caption="all light")]
         if np.any(self.surface):
             png = png_bytes(self.picture("airlight"))
             shown.append(picture(png, self.size[0], alt=f"{title}, the airlight", caption="airlight"))
-        return block(title, *shown, table(list(self.facts().items())))
+        return block(title, *shown, facts_table(list(self.facts().items())))
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.title}, {self.size[0]} x {self.size[1]})"
@@ -191,6 +214,9 @@ class Rendering(LayeredImage):
     plan: Mapping[str, str]  #: what the scene needs of a method, in words
     notes: tuple[str, ...] = ()  #: notes on the scene
     times: FrameTimes | None = None  #: what a frame costs, if that was measured
+    samples: int = 1  #: rays a pixel
+    device: str = ""  #: where it was rendered
+    files: tuple[str, ...] = ()  #: that were written
 
     def facts(self) -> dict[str, str]:
         """Return facts on the frame, in words, by name."""
@@ -204,6 +230,40 @@ class Rendering(LayeredImage):
             facts["after the light moved"] = f"{number(self.times.medians['light_moved'])} ms"
         return facts | ({"notes": " ".join(self.notes)} if self.notes else {})
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `airlight render --json` prints: the times are there if they were measured [ms]."""
+        data: dict[str, Any] = {"scene": self.scene, "method": self.label, "size": list(self.size)}
+        if self.times is not None:
+            times = self.times.medians
+            data["stages"] = [{"name": name, "ms": times.pop(name)} for name in ("surface", "airlight")]
+            data |= {f"{name}_ms": time for name, time in times.items()} | {"fps": 1000 / times["frame"]}
+        curve = self._curve().words if any(name.lower().endswith(".png") for name in self.files) else None
+        made = {"samples": self.samples, "tone_curve": curve, "files": list(self.files), "device": self.device}
+        return data | made
+
+    def _curve(self) -> ToneCurve:
+        return tone_curve(self.total)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """What it costs, and which files were written."""
+        lines = [f"{self.title}" + ("" if self.times else "; --timed measures what a frame costs")]
+        if self.times is not None:
+            ms = {name: f"{time:.3g} ms" for name, time in self.times.medians.items()}
+            lines += [
+                f"  {ms['frame']} a frame ({rate_words(self.times.frame.median_ms)}): surface {ms['surface']}, "
+                f"airlight {ms['airlight']}",
+                f"  {ms['light_moved']} after the light moved, {ms['objects_moved']} after objects moved",
+                f"  camera rays cached: {ms['light_moved_camera_kept']} after the light moved, {ms['colours_changed']} "
+                "after only medium or colours changed",
+                f"  {self.device}",
+            ]
+        data = self.to_dict()
+        lines += [f"  picture: {data['tone_curve']}"] if data["tone_curve"] else []
+        if self.samples > 1:
+            lines.append(f"  {self.samples} rays a pixel: a picture; a method's error is measured at pixel centres")
+        return [*lines, *_written(self.files, self.size)]
+
     @property
     def title(self) -> str:
         """Title of the frame."""
@@ -212,7 +272,7 @@ class Rendering(LayeredImage):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Reference(LayeredImage):
-    """The truth of a scene, with its error."""
+    """The reference of a scene, with its error."""
 
     estimator: str  #: 'quadrature', 'single-scatter', 'volpath' or 'cloud-paths'
     relative_error: float  #: of the airlight: the mean bound over the mean, or the relative standard error of the image
@@ -235,8 +295,44 @@ class Reference(LayeredImage):
         """The standard error of the surface [W/(m^2 sr)], (height, width, 3); None for the quadrature."""
         return self.image.layers.get("surface_se")
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `airlight reference --json` prints, without the files."""
+        means = {name: layer.mean(axis=(0, 1)).tolist() for name, layer in self.image.layers.items()}
+        return plain({"scene": self.scene, "estimator": self.estimator, "means": means, **self.details})
+
+    @property
+    def passed(self) -> bool:
+        """Whether the error that was asked for was reached."""
+        return self.details.get("reached") is not False
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """Its means and its error."""
+        lines = [self.title]
+        for name, mean in self.to_dict()["means"].items():
+            unit = "" if name == "opacity" else " W/(m^2 sr)"
+            lines.append(f"  {name}: mean {', '.join(f'{value:.6g}' for value in mean)}{unit}")
+        made = self.details
+        if "batches" not in made:
+            return lines
+        batches = int(made["batches"])
+        lines.append(f"  {made['spp']} samples a pixel in {batches} batches, seeds {made['seeds']}")
+        if made.get("cached"):
+            lines.append(f"  {made['cached']} of {batches} batches from the cache")
+        if made.get("damaged"):
+            files = "file" if made["damaged"] == 1 else "files"
+            lines.append(f"  {made['damaged']} damaged {files} of the cache traced again")
+        if "pooled_error" in made:
+            left_out = f"; {made['masked']} pixels beside a light left out" if made["masked"] else ""
+            worst = f"{100 * made['worst_error']:.3g} % of the worst pixel"
+            lines.append(f"  standard error {100 * made['pooled_error']:.3g} % of the image, {worst}{left_out}")
+        if batches < 32:
+            known = 100 / (2 * (batches - 1)) ** 0.5
+            lines.append(f"  a standard error from {batches} batches is known to {known:.0f} % only")
+        return lines if self.passed else [*lines, "  the target error was not reached"]
+
     def facts(self) -> dict[str, str]:
-        """Return facts on the truth, in words, by name."""
+        """Return facts on the reference, in words, by name."""
         kind = "mean bound of the airlight's error" if self.bound is not None else "standard error of the image"
         error = {kind: f"{number(100 * self.relative_error)} %"} if math.isfinite(self.relative_error) else {}
         words = {name.replace("_", " "): str(value) for name, value in self.details.items() if value is not None}
@@ -244,8 +340,338 @@ class Reference(LayeredImage):
 
     @property
     def title(self) -> str:
-        """Title of the truth."""
-        return f"{self.scene}, the truth by {self.estimator}"
+        """Title of the reference."""
+        return f"{self.scene}, the reference by {self.estimator}"
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class ImageComparison(Comparison, Pictured):
+    """How far an image is from a reference: the numbers of `airlight compare`, and the images."""
+
+    reference: Array  #: the layer of the reference, (height, width[, channels]) [W/(m^2 sr)]
+    test: Array  #: the same layer of the image under test
+    names: tuple[str, str] = ("the reference", "the test image")
+    files: tuple[tuple[str, str], ...] = ()  #: differences that were written, and what they show
+
+    @property
+    def passed(self) -> bool:
+        """Whether the test image has no fault; `failures` names the faults."""
+        return not self.failures
+
+    @cached_property
+    def error(self) -> Array:
+        """The signed relative error (test - ref) / max(ref, 0.001 mean(ref)), of the shape of the images."""
+        reference, test = (np.asarray(values, dtype=np.float64) for values in (self.reference, self.test))
+        finite = np.isfinite(reference) & np.isfinite(test)
+        mean = float(reference[finite].mean()) if finite.any() else math.nan
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return read_only((test - reference) / np.maximum(reference, FLOOR * mean))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `airlight compare --json` prints."""
+        return self.to_json() | _differences(self.files)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The numbers, a line for each group."""
+        return [self.summary(), *_difference_lines(self.files)]
+
+    def numpy(self, dtype: DTypeLike | None = None) -> Array:
+        """Return `error` as an array of one's own, which can be written to."""
+        return np.array(self.error, dtype=dtype)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Array:
+        return as_array(self.error, dtype, copy)
+
+    def picture(self) -> NDArray[np.uint8]:
+        """Return the map of the signed relative error, see `reports.plotting.pictures.error_map`, (height, width,
+        3).
+        """
+        reference, test = self._colours()
+        return error_map(reference, test)
+
+    def _colours(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        shape = (*self.reference.shape[:2], -1)
+        reference, test = (np.asarray(v, dtype=np.float64).reshape(shape) for v in (self.reference, self.test))
+        return colours(reference), colours(test)
+
+    def _repr_html_(self) -> str:
+        from reports.tables.record import block, bullets, facts_table, picture
+
+        reference, test = self._colours()
+        factor, width = exposure(reference), reference.shape[1]
+        shown = [
+            picture(png_bytes(tone_mapped(values, factor)), width, alt=f"{name}, {self.layer}", caption=name)
+            for name, values in zip(self.names, (reference, test))
+        ]
+        scale = f"relative error: blue too dark, red too bright, logarithmic from {ERROR_FLOOR:g} to {ERROR_CEILING:g}"
+        shown.append(picture(self._png, width, alt=f"signed relative error of the {self.layer}", caption=scale))
+        return block(
+            self.title, *shown, facts_table(self._rows()), bullets([f"failed: {why}" for why in self.failures])
+        )
+
+    def _rows(self) -> list[tuple[str, str]]:
+        m = self.metrics
+        rows = [
+            ("relative RMSE", _percent(m.relative_rmse)),
+            ("relative bias", _percent(m.relative_bias)),
+            ("relative error, median, 99 %, largest", f"{number(m.p50)}, {number(m.p99)}, {number(m.max)}"),
+            ("pixels, masked, not finite, negative", f"{m.pixels}, {self.masked}, {m.nonfinite}, {m.negative}"),
+        ]
+        if self.statistics is not None:
+            low, high = self.statistics.relative_bias_ci
+            rows.append(("95 % interval of the bias", f"{_percent(low)} to {_percent(high)}"))
+            rows.append(("bias that would have been detected", _percent(self.statistics.detectable_bias)))
+        if self.flip is not None:
+            rows.append(("HDR-FLIP", f"none: {self.flip.note}" if self.flip.value is None else number(self.flip.value)))
+        return rows
+
+    @property
+    def title(self) -> str:
+        """What is compared with what."""
+        return f"{self.layer} of {self.names[1]} against {self.names[0]}"
+
+    def __repr__(self) -> str:
+        m = self.metrics
+        verdict = "passed" if self.passed else f"failed: {'; '.join(self.failures)}"
+        return (
+            f"ImageComparison({self.title}: relative RMSE {m.relative_rmse:.3g}, "
+            f"relative bias {m.relative_bias:.3g}, {verdict})"
+        )
+
+
+@dataclass(frozen=True, repr=False)
+class SceneComparison(Result):
+    """How far an image is from the reference of a scene."""
+
+    compared: EngineComparison
+    files: tuple[tuple[str, str], ...] = ()  #: differences that were written, and what they show
+
+    @property
+    def title(self) -> str:
+        """What is compared with what."""
+        return f"{self.compared.layer} of {self.compared.path} against {self.compared.scene}"
+
+    @property
+    def passed(self) -> bool:
+        """Whether the image has no fault."""
+        return not self.compared.failures
+
+    @property
+    def metrics(self) -> Metrics:
+        """The errors."""
+        return self.compared.comparison.metrics
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `airlight compare SCENE --json` prints."""
+        return self.compared.to_json() | _differences(self.files)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The numbers, a line for each group."""
+        return [*self.compared.summary().split("\n"), *_difference_lines(self.files)]
+
+
+@dataclass(frozen=True, repr=False)
+class Diagnosed(Result):
+    """What is wrong with an image of a scene."""
+
+    diagnosis: Diagnosis
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `airlight compare SCENE --diagnose --json` prints."""
+        return self.diagnosis.to_json()
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The faults, ranked by evidence."""
+        return diagnosis_lines(self.diagnosis)
+
+
+_FITTED = (
+    Column("name", "parameter", words=True),
+    Column("value", "value", digits=6),
+    Column("interval", "95 % interval", digits=6),
+    Column("scene", "in the scene", digits=6),
+)
+
+
+@dataclass(frozen=True, repr=False)
+class Fitted(Result):
+    """The parameters of the fog that explain an image."""
+
+    fit: Fit
+
+    def __getitem__(self, name: str) -> Mapping[str, Any]:
+        """Return 'value', 'low', 'high' and 'scene' of a parameter; lists where its channels differ."""
+        parameters: dict[str, Any] = self.to_dict()["parameters"]
+        return parameters[name]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `airlight compare SCENE --fit NAMES --json` prints."""
+        numbers: dict[str, Any] = json.loads(json.dumps(self.fit.to_json()))
+        return numbers
+
+    @property
+    def title(self) -> str:
+        """What was fitted."""
+        values = ", ".join(f"{each.name}={each.value:.6g}" for each in self.fit.parameters)
+        return f"{self.fit.path} as {self.fit.scene}: {values}; relative RMSE left {self.fit.residual:.3g}"
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """The parameters with their intervals; channels have a row each."""
+        rows: list[dict[str, Any]] = []
+        for name, each in self.to_dict()["parameters"].items():
+            word, colon, place = name.partition(":")
+            several = {"": each}
+            if isinstance(each["value"], list):
+                several = {f".{c}": {key: value[i] for key, value in each.items()} for i, c in enumerate("rgb")}
+            for channel, of_it in several.items():
+                ends = Interval.of((of_it["low"], of_it["high"]))
+                rows.append({**of_it, "name": f"{word}{channel}{colon}{place}", "interval": ends})
+        return [table("Parameters that explain the image", _FITTED, rows)]
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """What the image cannot tell apart, and what is left over."""
+        return fit_lines(self.fit)
+
+
+def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None) -> str:
+    """Write how a test image differs from a reference, whole or not at all; return in words what the file shows.
+
+    Parameters
+    ----------
+    path
+        Ends in .exr: test - reference [W/(m^2 sr)] in R, G, B, and (test - reference) / max(reference, 0.001
+        mean(reference)) in the layer `relative`. Ends in .png: the latter in the false colours of a report,
+        `reports.plotting.pictures.error_map`.
+    reference, test
+        Radiance [W/(m^2 sr)], (height, width, 3).
+    kept
+        Pixels to show, truth values (height, width); all by default. The others, and in EXR files also those that are
+        not finite, have no difference.
+    """
+    reference, test = (np.asarray(values, dtype=np.float64) for values in (reference, test))
+    if kept is not None:
+        test = np.where(np.asarray(kept)[..., None], test, reference)
+    if path.suffix.lower() == ".png":
+        write_png(path, error_map(reference, test))
+        return (
+            f"signed relative error, blue too dark, red too bright, from {ERROR_FLOOR:g} (white) to {ERROR_CEILING:g}"
+        )
+    from reference.storage.exr import write_exr
+
+    finite = np.isfinite(reference) & np.isfinite(test)
+    difference = np.subtract(test, reference, out=np.zeros_like(test), where=finite)
+    seen = finite if kept is None else finite & np.asarray(kept)[..., None]
+    mean = float(reference[seen].mean()) if seen.any() else 0.0
+    floor = np.maximum(np.where(finite, reference, 0), FLOOR * mean)
+    relative = np.divide(difference, floor, out=np.zeros_like(test), where=floor > 0)
+    attributes: dict[str, str | int | float] = {
+        "airlight:difference": "test - reference",
+        "airlight:not_finite": int((~finite.all(axis=-1)).sum()),
+    }
+    write_exr(path, Image({"total": difference, "relative": relative}, attributes=attributes))
+    return "test - reference in R, G, B, over the reference in the layer relative"
+
+
+def _differences(files: Sequence[tuple[str, str]]) -> dict[str, Any]:
+    return {"difference": files[-1][0]} if files else {}
+
+
+def _difference_lines(files: Sequence[tuple[str, str]]) -> list[str]:
+    return [f"wrote            {path}: {shown}" for path, shown in files]
+
+
+def _percent(value: float) -> str:
+    return f"{number(100 * value)} %"
+
+
+@dataclass(frozen=True, repr=False, kw_only=True)
+class Animation(Result):
+    """The frames of an animation, which were written as files, and what they cost."""
+
+    scene: str
+    method: str
+    size: tuple[int, int]  #: [pixels]
+    frames: int
+    moves: tuple[str, ...]  #: what moves
+    move_ms: float  #: median of the frames after the first
+    render_ms: float  #: the same
+    recordings: Mapping[str, int]  #: how often each stage was compiled
+    device: str
+    files: tuple[str, ...]
+
+    @property
+    def title(self) -> str:
+        """What was rendered."""
+        return f"{self.scene}, {self.method}: {self.frames} frames, {' and '.join(self.moves)} moving"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `airlight render --frames --json` prints."""
+        listed = {"size": list(self.size), "moves": list(self.moves), "files": list(self.files)}
+        return dict(vars(self)) | listed | {"frame_ms": self.move_ms + self.render_ms}
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """What it costs, and which files were written."""
+        frame = self.move_ms + self.render_ms
+        lines = [self.title]
+        lines.append(
+            f"  {frame:.3g} ms a frame ({rate_words(frame)}): {self.move_ms:.3g} ms to move, {self.render_ms:.3g} ms "
+            f"to render, reusing what stood still; {self.device}"
+        )
+        for ending in dict.fromkeys(Path(path).suffix for path in self.files):
+            files = [path for path in self.files if path.endswith(ending)]
+            size = " x ".join(map(str, self.size))
+            lines.append(f"wrote {files[0]} to {files[-1]}: {len(files)} files, {size} pixels")
+        return lines
+
+
+@dataclass(frozen=True, repr=False)
+class Plan(Result):
+    """What a scene needs of a method."""
+
+    features: Mapping[str, str]  #: by name, in words
+    notes: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `airlight render --plan --json` prints."""
+        return {"plan": dict(self.features), "notes": list(self.notes)}
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The features and the notes."""
+        return [*(f"{name}: {words}" for name, words in self.features.items()), *self.notes]
+
+
+def write_image(path: Path, image: Image, curve: ToneCurve | None = None, *, total: Array | None = None) -> None:
+    """Write layers as EXR, or their total as PNG through a tone curve; by default one that suits it.
+
+    Raises
+    ------
+    InputError
+        For another ending.
+    """
+    from reference.storage.exr import write_exr
+    from reports.machine.environment import stamped
+
+    if path.suffix.lower() == ".exr":
+        write_exr(path, stamped(image))
+    elif path.suffix.lower() == ".png":
+        light = image.layers["airlight"] + image.layers["surface"] if total is None else total
+        write_png(path, preview(np.asarray(light, dtype=np.float64), curve or tone_curve(light)))
+    else:
+        raise InputError(f"save: got {str(path)!r}, wanted a path that ends with .exr (all layers) or .png (picture)")
+
+
+def _written(files: Sequence[str], size: tuple[int, int]) -> list[str]:
+    shown = " x ".join(map(str, size))
+    what = {True: "airlight, surface, their sum, depth", False: "a picture"}
+    lines = [f"wrote {path}: {what[path.lower().endswith('.exr')]}, {shown} pixels" for path in files]
+    return lines or ["nothing written: -o NAME.png writes a picture, -o NAME.exr the layers"]
 
 
 def as_array(values: Array, dtype: DTypeLike | None, copy: bool | None) -> Array:

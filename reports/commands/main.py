@@ -1,121 +1,272 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command line.
+"""The command line: each command is the public function of `airlight` of the same name.
 
-Each sub-command is a function in a module `reports/commands/*.py` that imports nothing heavy at the top: Mitsuba,
-Dr.Jit, NumPy, SciPy and matplotlib are imported inside the function, after the arguments were read. So `--help`
-answers at once, and a mistake in the arguments costs no start-up. To add a command, write such a module and add the
-function to its panel in `_PANELS`.
+Cyclopts reads a function's signature and its docstring, so that the docstring is the help. What is added here is said
+of all commands alike: --json and --markdown print the result's data and tables, -o writes it to files. A command
+returns a result (`reports.tables.record`), which is printed and decides the exit status. To add a command, write a
+public function in `reports/api/`, name it in `airlight.py`, and add it to its panel in `_PANELS`.
+
+Modules of commands import nothing heavy at the top, so that `--help` answers at once.
 """
 
 import errno
+import inspect
 import os
+import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+import cyclopts
+import docstring_parser
+from cyclopts import App, Group, Parameter
 
 from reports import __version__
-from reports.commands.bench import bench
-from reports.commands.cache import cache
-from reports.commands.clouds import clouds
-from reports.commands.compare import compare
-from reports.commands.completion import one_of
-from reports.commands.describe import describe
-from reports.commands.diff import diff
-from reports.commands.doctor import doctor
-from reports.commands.figures import figures
-from reports.commands.fit import fit
-from reports.commands.help import HelpfulCommand, HelpfulGroup
-from reports.commands.integrate import integrate
-from reports.commands.lists import list_
-from reports.commands.maps import maps
-from reports.commands.merge import merge
-from reports.commands.paper import paper
-from reports.commands.reference import reference
-from reports.commands.render import render
-from reports.commands.report import report
-from reports.commands.slab import slab
-from reports.commands.stability import stability
-from reports.commands.sweep import sweep
+from reports.api.compare import compare
+from reports.api.explore import describe, view
+from reports.api.inputs import Files
+from reports.api.reference import reference
+from reports.api.render import render
+from reports.api.report import diff, paper, report
+from reports.api.sweep import sweep
+from reports.commands.list import list_
 from reports.commands.test import run_tests
-from reports.commands.view import view
+from reports.machine.doctor import doctor
 from reports.machine.environment import (
     VARIANT_VARIABLE,
-    VARIANTS,
     MissingError,
     check_variant,
     install_line,
     missing_packages,
 )
-from reports.tables.terminal import colours_wanted
+from reports.studies.registry import STUDIES, find_study
+from reports.studies.registry import study as run_study
+from reports.tables.record import Result
+from reports.tables.terminal import colours_wanted, print_json, terminal_width
 
 DONE, FAILED, WRONG_INPUT, MISSING = 0, 1, 2, 3
 
 #: The panels of --help, by what one wants to do, and their commands in its order.
-_PANELS: dict[str, tuple[Callable[..., None], ...]] = {
-    "Start": (doctor, list_, render, view, cache),
-    "Measure": (report, diff, bench, sweep, maps, stability),
-    "Images": (reference, compare, fit, merge, describe, integrate, slab, clouds),
-    "Papers": (paper, figures),
+_PANELS: Mapping[str, tuple[Callable[..., Any], ...]] = {
+    "Start": (doctor, list_, render, view),
+    "Measure": (report, diff, sweep, run_study),
+    "Images": (reference, compare, describe),
+    "Papers": (paper,),
     "Develop": (run_tests,),
 }
-_NAMES = {list_: "list", run_tests: "test"}  #: where the function cannot have the name
-_EPILOG = f"""
-**Environment**
+_NAMES = {list_: "list", run_tests: "test", run_study: "study"}  #: where the function cannot have the name
+_EPILOGUE = f"""Environment
 
-`{VARIANT_VARIABLE}` does what `--variant` does.
+{VARIANT_VARIABLE}, or --variant NAME before the command: where kernels run, \
+cuda_ad_rgb or llvm_ad_rgb; the first that works by default.
 
-`AIRLIGHT_CACHE_DIR` is the folder of what is kept between runs, `~/.cache/airlight` by default;
-`AIRLIGHT_CACHE_SIZE` is how large it may become, `4GiB` by default. See `airlight cache --help`.
+AIRLIGHT_CACHE_DIR is the folder of what is cached between runs, ~/.cache/airlight by default; \
+AIRLIGHT_CACHE_SIZE is how large it may become, 4GiB by default. See airlight doctor.
 
-`NO_COLOR` turns off colours and bold letters.
+NO_COLOR turns off colours and bold letters.
 
-**Exit status** 0 done, 1 a check failed, 2 wrong usage or input, 3 something is missing on this machine.
+Exit status: 0 done, 1 a check failed, 2 wrong usage or input, 3 something is missing on this machine.
 """
-
-app = typer.Typer(
-    name="airlight",
-    cls=HelpfulGroup,
-    help="How fast, how accurate and how stable is a real-time method for volumetric light, against a ground truth "
-    "that can be trusted?",
-    epilog=_EPILOG.strip(),
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,  # `reports.commands.help` draws
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
-)
-for _panel, _commands in _PANELS.items():
-    for _command in _commands:
-        # Typer hands unknown arguments of `test` on to pytest.
-        _more = {"allow_extra_args": True, "ignore_unknown_options": True} if _command is run_tests else None
-        app.command(_NAMES.get(_command), cls=HelpfulCommand, rich_help_panel=_panel, context_settings=_more)(_command)
+_SET = Annotated[
+    Sequence[str],
+    Parameter(name="--set", help="NAME=VALUE, a parameter of the method; may be given several times."),
+]
+_JSON = Annotated[bool, Parameter(name="--json", help="Print JSON.")]
+_MARKDOWN = Annotated[bool, Parameter(name="--markdown", help="Print tables for a README, dated.")]
+_OUTPUT = Annotated[Files, Parameter(name=("--output", "-o"), help="A file to write; may be given several times.")]
+_SPELT = {"output": ("--output", "-o"), "settings": "--set"}  #: options that are not written as their parameter
+_ENDINGS = {reference: (".exr",)}  #: of what -o writes, where it is not a study
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
-        print(f"airlight {__version__}")
-        raise typer.Exit()
+def _shown_default(value: Any) -> Any:
+    """Return what the help says of a default, nothing of one that says nothing."""
+    return None if value in (None, False, (), "") else ", ".join(value) if isinstance(value, tuple) else str(value)
 
 
-@app.callback()
-def _global_options(
-    variant: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="Where kernels run: cuda_ad_rgb or llvm_ad_rgb; the first that works by default.",
-            autocompletion=one_of(*VARIANTS),
-        ),
-    ] = None,
-    version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
-    ] = False,
-) -> None:
-    if variant is not None:
-        check_variant(variant)
-        os.environ[VARIANT_VARIABLE] = (
-            variant  # for `reports.machine.environment.activate`, here and in child processes
-        )
+def _command(function: Callable[..., Any], *, markdown: bool, endings: Sequence[str] = ()) -> Callable[..., int]:
+    """Return a function as a command: with options for its output, without what only Python can give."""
+    own = inspect.signature(function).parameters
+    scope = inspect.unwrap(function).__globals__
+    words = {each.arg_name: _plain(each.description) for each in docstring_parser.parse(function.__doc__ or "").params}
+    positional, named = [], []
+    for at, each in enumerate(own.values()):
+        kind, annotation, default = inspect.Parameter.KEYWORD_ONLY, each.annotation, each.default
+        if each.name == "progress":
+            continue
+        if each.kind is inspect.Parameter.VAR_KEYWORD:
+            named.append(inspect.Parameter("settings", kind, annotation=_SET, default=()))
+            continue
+        if isinstance(annotation, str):
+            annotation = eval(annotation, scope)  # our own source, see `reports.api.inputs`
+        if isinstance(default, tuple) and all(isinstance(side, int) for side in default) and default:  # a size
+            default = "x".join(map(str, default))
+        how: dict[str, Any] = {"help": words.get(each.name, "")}
+        if each.kind is inspect.Parameter.VAR_POSITIONAL:
+            kind, how["allow_leading_hyphen"] = each.kind, True
+        elif each.kind is not kind and (at == 0 or default is inspect.Parameter.empty):
+            kind = inspect.Parameter.POSITIONAL_ONLY
+        elif each.name in _SPELT:
+            how["name"] = _SPELT[each.name]
+        elif default is True:
+            how["negative"] = f"--no-{each.name}"
+        shown = each.replace(kind=kind, annotation=Annotated[annotation, Parameter(**how)], default=default)
+        (named if kind is inspect.Parameter.KEYWORD_ONLY else positional).append(shown)
+    extra = {"output": _OUTPUT} if endings else {}
+    if function not in (view, run_tests):
+        extra |= {"json": _JSON, "markdown": _MARKDOWN} if markdown else {"json": _JSON}
+    for name, annotation in extra.items():
+        default = () if name == "output" else False
+        named.append(inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=annotation, default=default))
+
+    def command(*arguments: Any, **options: Any) -> int:
+        printed = {name: options.pop(name, False) for name in ("json", "markdown") if name in extra}
+        files = [Path(path) for path in options.pop("output", ())] if endings else []
+        settings = options.pop("settings", ()) if "settings" not in own else ()
+        if settings:
+            from validation.study.configuration import parse_settings
+
+            options |= parse_settings(list(settings))
+        if "progress" in own:
+            options["progress"] = True
+        _check_files(files, endings)
+        result = function(*arguments, **options)
+        for path in files:
+            result.save(path)
+        return result if isinstance(result, int) else _printed(result, files, **printed)
+
+    command.__signature__ = inspect.Signature([*positional, *named])  # type: ignore[attr-defined]
+    return command
+
+
+def _plain(words: str | None) -> str:
+    """Return words of a docstring for a terminal: paragraphs as lines, no backticks, nothing of what Python can do."""
+    paragraphs = [" ".join(each.split()) for each in (words or "").split("\n\n")]
+    return re.sub(r"[;.] [Ff]rom Python [^.]*(\.[^ ][^.]*)*\.", ".", "\n\n".join(paragraphs)).replace("`", "")
+
+
+def _help(function: Callable[..., Any], *, whole: bool) -> str:
+    """Return the help of a function, or its first sentence."""
+    description = inspect.getdoc(function) or ""
+    description = re.split(r"\n\n[A-Z][a-z]+\n---", description)[0]
+    return _plain(description if whole else description.split("\n\n")[0])
+
+
+def _check_files(files: Sequence[Path], endings: Sequence[str]) -> None:
+    """Refuse files that cannot be written, before any work."""
+    from analytic.errors import InputError
+    from reference.storage.files import ensure_writable
+
+    for path in files:
+        if path.suffix.lower() not in endings:
+            raise InputError(f"output: got {str(path)!r}, wanted a name that ends in {', '.join(endings)}")
+        ensure_writable(path)
+
+
+def _printed(result: Result | None, files: Sequence[Path], *, json: bool = False, markdown: bool = False) -> int:
+    """Print a result, and return the exit status."""
+    if result is None:
+        return DONE
+    if json and markdown:
+        from analytic.errors import InputError
+
+        raise InputError("got both --json and --markdown; give one of them")
+    if json:
+        data = result.to_dict()
+        print_json({**data, "output": str(files[-1])} if files and isinstance(data, dict) else data)
+    elif markdown:
+        _print_markdown(result)
+    else:
+        width = terminal_width()
+        print(result.text(width=width, styled=width is not None and colours_wanted()), end="")
+        for path in files:
+            print(f"wrote {path}")
+    sys.stdout.flush()
+    for fault in result.faults:
+        print(f"airlight: error: {fault}", file=sys.stderr)
+    return result.status
+
+
+def _print_markdown(result: Any) -> None:
+    import time
+
+    from reports.machine.environment import describe_environment, machine_in_words
+    from reports.tables.drawing import markdown
+
+    print(f"{time.strftime('%Y-%m-%d')}, {machine_in_words(describe_environment())}.")
+    for table in result.tables:
+        print(f"\n{markdown(table)}", end="")
+
+
+def make_app(words: Sequence[str] = ()) -> App:
+    """Return the command line; only the command that is asked for is more than its name and its first sentence."""
+    how: dict[str, Any] = {
+        "help_format": "plaintext",
+        "default_parameter": Parameter(negative=(), show_default=_shown_default),
+        "version_flags": (),
+        "help_epilogue": "",
+    }
+    summary = "How fast, accurate and robust is a real-time method for volumetric light, against a checked reference?"
+    app = App(
+        name="airlight", help=summary, version=f"airlight {__version__}", suppress_keyboard_interrupt=False, **how
+    )
+    app.help_epilogue, app.version_flags = _EPILOGUE, ("--version",)
+    app["--help"].group = app["--version"].group = Group("Options", sort_key=99)
+    for number, (title, functions) in enumerate(_PANELS.items()):
+        group = Group(title, sort_key=number)
+        for at, function in enumerate(functions):
+            name = _NAMES.get(function, function.__name__)
+            asked = name in words[:1]
+            sub = App(name=name, help=_help(function, whole=asked), group=group, sort_key=at, **how)
+            if asked and function is run_study:
+                _add_studies(sub, words[1:])
+            elif asked:
+                made = _command(
+                    function, markdown=function in (describe, paper, sweep), endings=_ENDINGS.get(function, ())
+                )
+                sub.default(made)
+            app.command(sub)
+    return app
+
+
+def _add_studies(app: App, words: Sequence[str]) -> None:
+    """Add the studies to `airlight study`."""
+    from reports.studies.result import ENDINGS
+
+    group = Group("Studies", sort_key=0)
+    how = {"help_format": "plaintext", "default_parameter": app.default_parameter, "version_flags": ()}
+    for number, name in enumerate(STUDIES):
+        function = find_study(name)
+        asked = name in words[:1]
+        sub = App(name=name, help=_help(function, whole=asked), group=group, sort_key=number, **how)
+        if asked:
+            sub.default(_command(function, markdown=True, endings=ENDINGS))
+        app.command(sub)
+
+
+def command_names() -> list[tuple[str, ...]]:
+    """Return the words of every command and every study."""
+    names = [_NAMES.get(each, each.__name__) for several in _PANELS.values() for each in several]
+    return [*((name,) for name in names if name != "study"), *(("study", name) for name in STUDIES)]
+
+
+def help_of(words: Sequence[str]) -> tuple[str, str, list[tuple[str, str, str]]]:
+    """Return the prose of a command's help, its line of usage, and names, words and default of each option."""
+    app = make_app(words)
+    for word in words:
+        app = app[word]
+    arguments = app.assemble_argument_collection()
+    options, usage = [], ["airlight", *words]
+    for each in arguments:
+        if each.field_info.kind is inspect.Parameter.KEYWORD_ONLY:
+            name = ", ".join(dict.fromkeys(("--" + each.name.lstrip("-"), *each.names)))
+        else:
+            name = each.name.strip("-").upper()
+            usage.append(name if each.required else f"[{name}...]" if "str]" in str(each.hint) else f"[{name}]")
+        default = each.field_info.default
+        shown = None if each.required else _shown_default(default)
+        options.append((name, each.parameter.help or "", shown if shown and shown != "True" else ""))
+    return str(app.help), " ".join([*usage, "[OPTIONS]"]), options
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -124,17 +275,19 @@ def run(arguments: Sequence[str]) -> int:
     The user's mistakes, missing libraries and unusable files give one line on the error stream; any other exception
     is a fault of the program and keeps its traceback.
     """
-    command = typer.main.get_command(app)
-    plain: dict[str, Any] = {} if colours_wanted() else {"color": False}
     try:
         os.getcwd()
     except OSError:  # Dr.Jit ends the process over it
         return _fail("the current folder was deleted: change into another folder, then run this again", WRONG_INPUT)
     try:
-        status = command.main(list(arguments) or ["--help"], prog_name="airlight", standalone_mode=False, **plain)
+        words = _with_variant(list(arguments))
+        app = make_app(words)
+        status = app(words or ["--help"], exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
     except BrokenPipeError:  # the reader of the pipe has left
         return _drop_output(FAILED)
+    except KeyboardInterrupt:
+        return 130
     except MissingError as error:
         return _fail(str(error), MISSING)
     except OSError as error:
@@ -147,15 +300,24 @@ def run(arguments: Sequence[str]) -> int:
         if not packages:
             raise
         return _fail(f"system libraries are missing, install them with `{install_line(packages)}`", MISSING)
+    except cyclopts.CycloptsError as error:
+        path = " ".join(["airlight", *(error.command_chain or ())])
+        return _fail(f"{str(error).rstrip('.')} (see `{path} --help`)", WRONG_INPUT)
     except _input_errors() as error:
         return _fail(str(error), WRONG_INPUT)
-    except Exception as error:  # Typer's class for wrong usage is in a private module
-        if not hasattr(error, "format_message"):
-            raise
-        return _usage(error)
     if not arguments:
         return WRONG_INPUT
     return status if isinstance(status, int) else DONE
+
+
+def _with_variant(words: list[str]) -> list[str]:
+    """Take --variant from before the command, for `reports.machine.environment.activate` and child processes."""
+    if words and words[0].partition("=")[0] == "--variant":
+        _, equals, name = words.pop(0).partition("=")
+        name = name if equals else words.pop(0) if words else ""
+        check_variant(name)
+        os.environ[VARIANT_VARIABLE] = name
+    return words
 
 
 def _input_errors() -> tuple[type[Exception], ...]:
@@ -167,14 +329,6 @@ def _input_errors() -> tuple[type[Exception], ...]:
 def _fail(message: str, status: int) -> int:
     print(f"airlight: error: {' '.join(message.split())}", file=sys.stderr)
     return status
-
-
-def _usage(error) -> int:
-    """Report wrong usage: Typer's message, which names the nearest command, and where help is."""
-    message = error.format_message().rstrip(".")
-    context = getattr(error, "ctx", None)
-    path = context.command_path if context is not None else "airlight"
-    return _fail(f"{message} (see `{path} --help`)", WRONG_INPUT)
 
 
 def _drop_output(status: int) -> int:

@@ -2,45 +2,34 @@
 """`airlight test [PYTEST ARGUMENTS]`: the tests of this checkout."""
 
 import json
+import os
 import subprocess
+import sys
 import time
 from pathlib import Path
-from typing import Annotated
 from xml.etree import ElementTree
-
-import typer
 
 RECORD = "docs/data/full_run.json"  #: of the last run of all tiers, in the checkout
 
 
-def run_tests(
-    context: typer.Context,
-    everything: Annotated[
-        bool, typer.Option("--all", help="Also the slow and the statistical tests, injected faults and baselines.")
-    ] = False,
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            min=0,
-            metavar="N",
-            show_default=False,
-            help="Processes that share the tests; 0 for this one; 2 by default if there are two cores.",
-        ),
-    ] = None,
-) -> None:
+def run_tests(*arguments: str, all_: bool = False, workers: int | None = None) -> int:
     """Run the fast tests of the source checkout, or all tests.
-
-    Other arguments go to pytest; paths are relative to the checkout.
 
     The fast tests compile kernels quickly, unless AIRLIGHT_COMPILATION=full asks for what everything else runs. Images
     are the same bit for bit.
 
-    --all without arguments for pytest writes the date, the machine and the counts into docs/data/full_run.json. Exit
+    `--all` without arguments for pytest writes the date, the machine and the counts into docs/data/full_run.json. Exit
     status 1 if anything failed.
-    """
-    import os
-    import sys
 
+    Parameters
+    ----------
+    arguments
+        For pytest; paths are relative to the checkout.
+    all_
+        Also the slow and the statistical tests, injected faults and baselines.
+    workers
+        Processes that share the tests; 0 for this one; 2 by default if there are two cores.
+    """
     from reports.machine import quick_compilation
     from reports.machine.environment import MissingError, prepare, threads
 
@@ -53,13 +42,13 @@ def run_tests(
     shared = (2 if threads() > 1 else 0) if workers is None else workers
     sharing = ["-n", str(shared), "--dist", "worksteal"] if shared else []
     os.chdir(root)
-    if not everything and variant == "llvm_ad_rgb" and quick_compilation.VARIABLE not in os.environ:
+    if not all_ and variant == "llvm_ad_rgb" and quick_compilation.VARIABLE not in os.environ:
         os.environ.update(quick_compilation.settings())  # of processes that have not begun
-    tiers = [] if everything else ["-m", "not statistical and not slow"]
-    command = [sys.executable, "-m", "pytest", *sharing, *tiers, *context.args]
+    tiers = [] if all_ else ["-m", "not statistical and not slow"]
+    command = [sys.executable, "-m", "pytest", *sharing, *tiers, *arguments]
     sys.stdout.flush()
-    if everything and not context.args:
-        raise typer.Exit(_recorded(command, root, variant))
+    if all_ and not arguments:
+        return _recorded(command, root, variant)
     os.execv(sys.executable, command)
 
 

@@ -6,7 +6,6 @@
 Read in this order:
 
 - `json_files.py`: JSON files that a user names
-- `serialize.py`: results of studies as plain data
 - `own_faults.py`: what methods of the user's own did wrong
 - `claims.py`: the sentences at the top, from the numbers
 - `reader.py`: reads a report back, checks it, draws its page again

@@ -3,11 +3,6 @@
 
 Read in this order:
 
-- `finding.py`: one thing that differs
-- `errors.py`: errors, scene by scene and method by method
-- `times.py`: times, by the rules of `validation.statistics.noise`
-- `truth_and_claims.py`: truth, claims, broken kernels, missed faults, the fastest methods
-- `papers.py`: verdicts on the claims of papers
-- `compare.py`: all of these together, and how a report is read
-- `table.py`: what `airlight diff` prints
+- `times.py`: a finding; times, by the rules of `validation.statistics.noise`
+- `compare.py`: errors, references, claims, papers, and all of these together
 """

@@ -5,16 +5,30 @@ What counts as noise is derived in `validation.statistics.noise`. A finding is w
 makes the comparison fail, and so does what disappeared: a method that is no longer measured is no longer guarded.
 """
 
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from analytic.errors import InputError
-from reports.diff.errors import compare_methods
-from reports.diff.finding import Finding, Report
-from reports.diff.papers import compare_papers
-from reports.diff.times import TimeComparison, compare_times
-from reports.diff.truth_and_claims import compare_claims, compare_truth, compare_winners
-from validation.statistics.noise import ERROR_TOLERANCE, TIME_TOLERANCE
+from reports.data.claims import confirmed
+from reports.diff.times import Finding, Report, TimeComparison, compare_times
+from reports.tables.agreement import verdict
+from reports.tables.methods import TARGETS, fastest_within
+from reports.tables.scaling import TIMES, WORK, same_records
+from reports.tables.table import Column, Table, table, words
+from validation.statistics.noise import ERROR_TOLERANCE, FLOORS, TIME_TOLERANCE, error_band, other_power
+
+_ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative")
+#: Units of figures that depend on how busy the machine was: another verdict is a note.
+_TIMED = ("frames/s", "ms", "%", "times")
+_COLUMNS = (
+    Column("verdict", "", words=True),
+    *words("scene", "method", "what"),
+    Column("old", "old", digits=4),
+    Column("new", "new", digits=4),
+    Column("change", "change", words=True),
+)
+_BUSY = 1.25  # with a larger ratio of the quartiles the machine was not quiet
 
 
 @dataclass(frozen=True)
@@ -74,14 +88,14 @@ def compare_reports(
         if name not in after:
             findings.append(Finding(gone, name, "", "the scene is gone"))
             continue
-        findings += compare_truth(before[name], after[name], gone)
-        differences, count = compare_methods(before[name], after[name], tolerance=error_tolerance, gone=gone)
+        findings += _reference(before[name], after[name], gone)
+        differences, count = _methods(before[name], after[name], tolerance=error_tolerance, gone=gone)
         findings += differences
         compared += count
     findings += [Finding("note", name, "", "the scene is new") for name in after if name not in before]
     times = compare_times(old, new, tolerance=time_tolerance)
-    findings += [*times.findings, *compare_claims(old, new), *compare_winners(before, after)]
-    findings += compare_papers(old, new, gone)
+    findings += [*times.findings, *_whole(old, new), *_winners(before, after)]
+    findings += _papers(old, new, gone)
     if not compared and not times.compared:
         raise InputError(
             "reports: no number can be compared: no method of a scene was measured in both at one size; "
@@ -89,3 +103,250 @@ def compare_reports(
         )
     rank = {"worse": 0, "better": 1, "note": 2}
     return Difference(tuple(sorted(findings, key=lambda finding: rank[finding.verdict])), compared, times)
+
+
+# Errors, scene by scene and method by method
+
+
+def _methods(old: Report, new: Report, *, tolerance: float, gone: str) -> tuple[list[Finding], int]:
+    """Return the findings on the methods of a scene, and how many numbers were compared."""
+    name = old["name"]
+    before, after = ({entry["label"]: entry for entry in scene["methods"]} for scene in (old, new))
+    findings = [Finding(gone, name, label, "gone") for label in before if label not in after]
+    findings += [Finding("note", name, label, "new") for label in after if label not in before]
+    reason = _incomparable(old, new)
+    if reason:
+        findings.append(reason)
+    compared = 0
+    for label in [label for label in before if label in after]:
+        old_entry, new_entry = before[label], after[label]
+        if bool(old_entry["refused"]) != bool(new_entry["refused"]):
+            lost = new_entry["refused"]
+            words = f"refused: {lost}" if lost else "no longer refused"
+            # Leaving a method out for the time it takes is a decision of the user, not a fault.
+            decided = old_entry.get("left_out") or new_entry.get("left_out")
+            findings.append(Finding("note" if decided else "worse" if lost else "better", name, label, words))
+        elif old_entry.get("layer", "airlight") != new_entry.get("layer", "airlight"):
+            findings.append(Finding("note", name, label, "errors not compared: they are of different layers"))
+        elif reason is None:
+            for layer, key in (("", "error"), ("surface ", "surface_error")):
+                changes, count = _errors(old_entry.get(key), new_entry.get(key), tolerance, prefix=layer)
+                findings += [Finding(v, name, label, what, a, b) for v, what, a, b in changes]
+                compared += count
+            changes, count = _flip(old_entry, new_entry, tolerance)
+            findings += [Finding(v, name, label, what, a, b) for v, what, a, b in changes]
+            compared += count
+    return findings, compared
+
+
+def _incomparable(old: Report, new: Report) -> Finding | None:
+    """Say why the errors of a scene cannot be compared, None if they can."""
+    if old["size"] != new["size"]:
+        sizes = " and ".join("x".join(map(str, scene["size"])) for scene in (old, new))
+        return Finding("note", old["name"], "", f"errors not compared: the images are {sizes} pixels")
+    before, after = (scene["truth"]["mean"] for scene in (old, new))
+    if before is None or after is None:
+        return None
+    # Each bound limits the mean absolute error, so the means differ by at most the sum of both bounds.
+    bounds = sum(scene["truth"].get("relative_bound") or 0.0 for scene in (old, new))
+    if abs(after - before) > (bounds + FLOORS["mean"]) * abs(before):
+        words = "the truth moved (mean radiance): another scene by this name, or another truth; errors not compared"
+        return Finding("worse", old["name"], "", words, before, after)
+    return None
+
+
+Change = tuple[str, str, float | None, float | None]  # verdict, what, old, new
+
+
+def _errors(old: Report | None, new: Report | None, tolerance: float, *, prefix: str) -> tuple[list[Change], int]:
+    """Compare the errors of a configuration in one layer."""
+    if old is None or new is None:
+        return ([("worse", f"{prefix}error is gone", None, None)] if old else []), 0
+    changes: list[Change] = []
+    for name in _ERRORS:
+        before, after = old.get(name), new.get(name)
+        what = f"{prefix}{name}"
+        if before is None or after is None:
+            if before is not after:  # JSON writes NaN as null
+                changes.append(("worse" if after is None else "better", what, before, after))
+            continue
+        band = error_band(name, before, tolerance=tolerance, pixels=old["pixels"], rmse=old.get("relative_rmse") or 0.0)
+        grown = abs(after) - abs(before)
+        if abs(grown) > band:
+            changes.append(("worse" if grown > 0 else "better", what, before, after))
+    return changes, len(_ERRORS)
+
+
+def _flip(old: Report, new: Report, tolerance: float) -> tuple[list[Change], int]:
+    before, after = ((entry.get("flip") or {}).get("value") for entry in (old, new))
+    if before is None or after is None:
+        return [], 0
+    if abs(after - before) <= error_band("flip", before, tolerance=tolerance):
+        return [], 1
+    return [("worse" if after > before else "better", "HDR-FLIP", before, after)], 1
+
+
+# References, claims, kernels that break, times that grow, the fastest
+
+
+def _reference(old: Report, new: Report, gone: str) -> Iterator[Finding]:
+    """Compare the truth of a scene in two reports."""
+    name = old["name"]
+    if not confirmed([new]) and confirmed([old]):
+        yield Finding("worse", name, "", "the truth is no longer confirmed")
+    elif confirmed([new]) and not confirmed([old]):
+        yield Finding("better", name, "", "the truth is confirmed now")
+    for key, agreement in old["agreement"].items():
+        if key not in new["agreement"]:
+            yield Finding(gone, name, "", f"the comparison with {key} is gone")
+        elif verdict(agreement) is True and verdict(new["agreement"][key]) is None:
+            yield Finding("note", name, "", f"{key} ran out of time before it could confirm the truth")
+    if old["size"] == new["size"]:
+        for key in ("disagreements", "left"):
+            before, after = old["truth"].get(key), new["truth"].get(key)
+            if before is not None and after is not None and after > before:
+                yield Finding("worse", name, "", f"lit intervals of the truth: {key}", before, after)
+
+
+def _whole(old: Report, new: Report) -> Iterator[Finding]:
+    """Compare the parts that concern the whole report."""
+    yield from _claims(old, new)
+    yield from _stability(old, new)
+    yield from _growth(old, new)
+
+
+def _claims(old: Report, new: Report) -> Iterator[Finding]:
+    """Compare the verdicts at the top: of each kind, how many are bad."""
+    before, after = old["claims"], new["claims"]
+    for kind in dict.fromkeys(entry["kind"] for entry in (*before, *after)):
+        bad = [
+            [entry["text"] for entry in claims if entry["kind"] == kind and entry["good"] is False]
+            for claims in (before, after)
+        ]
+        if len(bad[1]) > len(bad[0]):
+            yield from (Finding("worse", "", "", f"claim: {text}") for text in bad[1] if text not in bad[0])
+        elif len(bad[1]) < len(bad[0]):
+            yield from (Finding("better", "", "", f"no longer: {text}") for text in bad[0] if text not in bad[1])
+
+
+def _stability(old: Report, new: Report) -> Iterator[Finding]:
+    """Compare which kernels break their bars."""
+    before, after = ({entry["kernel"]: entry["broken"] for entry in report["stability"]} for report in (old, new))
+    for kernel in before:
+        if kernel in after and after[kernel] and not before[kernel]:
+            yield Finding("worse", "", kernel, f"breaks its bar: {after[kernel][0]}")
+        elif kernel in after and before[kernel] and not after[kernel]:
+            yield Finding("better", "", kernel, "keeps its bars again")
+
+
+def _growth(old: Report, new: Report) -> Iterator[Finding]:
+    """Compare the powers of the work with which times grow."""
+    for before, after in same_records(old.get("scaling", ()), new.get("scaling", ())):
+        for name, growth in after["growth"].items():
+            if other_power(before["growth"][name], growth):
+                was, is_now = before["growth"][name]["exponent"], growth["exponent"]
+                what = f"the power of the {WORK[after['kind']]} with which {TIMES[name]} grows"
+                yield Finding("worse" if is_now > was else "better", after["scene"], after["label"], what, was, is_now)
+
+
+def _winners(before: Mapping[str, Report], after: Mapping[str, Report]) -> Iterator[Finding]:
+    """Return a note where another method is the fastest: no fault, as the noise may change the order."""
+    for name in [name for name in before if name in after]:
+        for target in TARGETS:
+            was, is_now = (_fastest(scene, target) for scene in (before[name], after[name]))
+            if was != is_now:
+                words = f"fastest within {100 * target:g} %: {was or 'none'} before, {is_now or 'none'} now"
+                yield Finding("note", name, "", words)
+
+
+def _fastest(scene: Report, target: float) -> str | None:
+    best = fastest_within(target, scene["methods"])
+    return best["label"] if best else None
+
+
+# Claims of papers
+
+
+def _papers(old: Report, new: Report, gone: str) -> Iterator[Finding]:
+    """Compare which claims are reproduced.
+
+    Parameters
+    ----------
+    old, new
+        The reports; one without rows, of an older version, is compared with nothing.
+    gone
+        What a row is that only the old report has: 'worse', or 'note'.
+    """
+    before, after = ({(row["paper"], row["item"]): row for row in report.get("papers", ())} for report in (old, new))
+    if not before or not after:
+        return
+    for (paper, item), row in before.items():
+        now = after.get((paper, item))
+        name = f"{paper}, {item}"
+        if now is None:
+            yield Finding(gone, "", "", f"{name}: the row is gone")
+        elif now["published"] != row["published"]:
+            yield Finding("worse", "", "", f"{name}: the published figure", row["published"], now["published"])
+        elif now["verdict"] != row["verdict"]:
+            what = f"{name}: {now['verdict']}, was {row['verdict']}"
+            yield Finding(_kind(row, now), "", "", what, row["measured"], now["measured"])
+
+
+def _kind(row: Report, now: Report) -> str:
+    if row["unit"] in _TIMED:
+        return "note"
+    if "reproduced" in (row["verdict"], now["verdict"]):
+        return "worse" if row["verdict"] == "reproduced" else "better"
+    return "note"
+
+
+# What is printed
+
+
+def difference_tables(difference: Difference) -> list[Table]:
+    """Return the findings that have numbers, the worse ones first."""
+    rows = [_row(finding) for finding in difference.findings if _has_row(finding)]
+    return [table("", _COLUMNS, rows)] if rows else []
+
+
+def difference_lines(difference: Difference) -> list[str]:
+    """Return the other findings, what could be seen of times, and how many are worse and better."""
+    lines = [
+        f"{finding.verdict}: {f'{finding.scene}: ' if finding.scene else ''}{finding.what}"
+        for finding in difference.findings
+        if not _has_row(finding)
+    ]
+    better = sum(finding.verdict == "better" for finding in difference.findings)
+    return [
+        *lines,
+        _times_line(difference),
+        f"{len(difference.worse)} worse, {better} better, {difference.errors} errors compared",
+    ]
+
+
+def _has_row(finding: Finding) -> bool:
+    return bool(finding.old is not None or finding.new is not None or finding.method)
+
+
+def _row(finding: Finding) -> tuple[str | float | None, ...]:
+    return (finding.verdict, finding.scene, finding.method, finding.what, finding.old, finding.new, _change(finding))
+
+
+def _change(finding: Finding) -> str:
+    """Return the change in percent, or as a factor where it is more than double or less than half."""
+    if finding.old is None or finding.new is None or finding.old == 0:
+        return ""
+    ratio = abs(finding.new / finding.old)
+    return f"{100 * (ratio - 1):+.1f} %" if 0.5 < ratio < 2 else f"x {ratio:.3g}"
+
+
+def _times_line(difference: Difference) -> str:
+    times = difference.times
+    if not times.compared:
+        return "times: none compared"
+    where = "one machine" if times.same_machine else "two machines, so beside the median of all frames"
+    busy = f"; the machine was busy (quartiles {times.spread:.2f} times apart)" if times.spread > _BUSY else ""
+    return (
+        f"times: {times.compared} configurations, {where}; all frames together {times.drift:.2f} times the old; "
+        f"the least slowdown that would be seen is {times.least:.2f} times{busy}"
+    )

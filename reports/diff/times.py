@@ -1,11 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The times of two reports compared, by the rules of `validation.statistics.noise`."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from reports.diff.finding import Finding, Report
 from validation.statistics.noise import SHORTEST, Times, drift, least_ratio, slower_stages, spread
+
+Report = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A difference between two reports."""
+
+    verdict: str  #: 'worse', 'better' or 'note'
+    scene: str  #: empty for what concerns the whole report
+    method: str  #: label of the configuration; empty for what concerns the scene
+    what: str  #: the number, or a sentence
+    old: float | None = None
+    new: float | None = None
+
 
 _MACHINE = ("processor", "threads", "variant", "device")
 

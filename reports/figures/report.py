@@ -1,33 +1,294 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What figures and tables read of a report: report.json, checked, without Mitsuba."""
+"""Figures of a report for papers: time against error, images with insets and error maps, a LaTeX table of methods.
 
-from collections.abc import Iterator
+They are drawn from report.json and the EXR files beside it, without Mitsuba.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from math import log10
 from pathlib import Path
 from typing import Any
 
-from reports.data.reader import read_report
+import numpy as np
 
-FOLDER = Path("airlight-report")  #: where `airlight report` writes unless told otherwise
+from analytic.errors import InputError, nearest
+from reference.storage.exr import layer as image_layer
+from reference.storage.exr import read_exr
+from reference.storage.files import write_text
+from reports.data.json_files import read_json
+from reports.data.reader import load_report
+from reports.plotting.figure import ENDINGS, new_figure, save_figure, show_picture
+from reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure, tone_mapped
+from reports.plotting.style import COLOURS, WIDTHS, report_styles
+from reports.tables.drawing import latex
+from reports.tables.methods import method_row, methods_table
+from reports.tables.table import Row, number
+
+_TIMES = ("frame", "light_moved", "objects_moved")
+_ERRORS = ("relative_rmse", "relative_bias", "p99")
+_MOST = 4  # most methods beside the reference
+_INSET = 6  # shorter side of an image over the side of an inset
+_FRAMES = (COLOURS["orange"], COLOURS["sky"])
 
 
-def report_origin(folder: Path | str, data: dict[str, Any]) -> dict[str, Any]:
-    """Return the date and machine of a report, for `reports.figures.files.write_data`."""
-    return {
-        "report": {"created": data["created"], "command": data["command"], "folder": Path(folder).name},
-        "environment": data["environment"],
-    }
+def write_figures(
+    folder: Path, column: str, *, scene: str | None = None, labels: Sequence[str] | None = None
+) -> tuple[str, ...]:
+    """Write the figures of a report into its folder; return the names of the files.
+
+    Parameters
+    ----------
+    folder
+        Of the report.
+    column
+        'single' or 'double'.
+    scene, labels
+        What the strip of images shows: by default the first scene with shadows and the most accurate of each method.
+
+    Raises
+    ------
+    InputError
+        If the report has no such scene or method, or lacks an image.
+    """
+    data, place = load_report(folder)
+    _add_times(data["scenes"], place / "times.json")
+    drawn: dict[str, Callable[[str], Any]] = {}
+    if any(_timed(each) for each in data["scenes"]):
+        drawn["frame-speed"] = partial(draw_speed, data["scenes"])
+    if scene or labels or any(_shown(each, name) for each in data["scenes"] for name in ("airlight", "total")):
+        drawn["strip"] = partial(draw_strip, *_strip(data, place, scene, labels))
+    paths = [save_figure(folder / f"{name}{end}", draw, column) for name, draw in drawn.items() for end in ENDINGS]
+    write_text(folder / "methods-table.tex", latex_table(data["scenes"]))
+    return tuple(str(path) for path in (*paths, folder / "methods-table.tex"))
 
 
-def reported_papers(folder: Path | str | None) -> tuple[list[dict[str, Any]], dict[str, Any]]:
-    """Return the claims of papers in a report, and its origin as of `report_origin`; nothing without a report."""
-    if folder is None:
-        return [], {}
-    data = read_report(folder)
-    return data.get("papers") or [], report_origin(folder, data)
+def _add_times(scenes: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """Give images from elsewhere the times that were measured there: label -> median and quartiles [ms]."""
+    if not path.is_file():
+        return
+    wanted = 'what was measured elsewhere, such as {"engine": [4.2, 4.1, 4.4]}, median and quartiles in milliseconds'
+    times = read_json(path, wanted)
+    for entry in (entry for scene in scenes for entry in scene["methods"] if entry["kind"] == "image"):
+        if entry["label"] in times:
+            try:
+                median, low, high = map(float, times[entry["label"]])
+            except (TypeError, ValueError):
+                raise InputError(
+                    f"{path}: got {times[entry['label']]!r} for {entry['label']}; wanted {wanted}"
+                ) from None
+            entry["times"] = {"frame": {"median_ms": median, "low_ms": low, "high_ms": high}}
 
 
-def measured(scene: dict[str, Any], layer: str = "airlight") -> Iterator[dict[str, Any]]:
+def latex_table(scenes: Sequence[Mapping[str, Any]]) -> str:
+    """Return the LaTeX table of times and errors of every method in every scene."""
+    comment = (
+        "Times: medians with the distances to the quartiles, kernels compiled before.",
+        "Errors of the airlight against the quadrature reference; p99: quantile of |error| / max(ref, mean / 1000).",
+    )
+    tables = []
+    for scene in scenes:
+        bound = (scene["truth"] or {}).get("relative_bound")
+        known = f", reference known to {number(bound, 2, zeros=True)}" if bound else ""
+        about = "{} \N{MULTIPLICATION SIGN} {}".format(*scene["size"]) + known
+        rows = [_latex_row(entry) for entry in scene["methods"]]
+        tables.append(methods_table(scene["name"], rows, "label", *_TIMES, *_ERRORS, explanation=about))
+    return latex(tables, comment=comment)
+
+
+def _latex_row(entry: Mapping[str, Any]) -> Row:
+    if entry["refused"]:
+        return Row({"label": entry["label"]}, "refused")
+    keys = ("label", *_TIMES, *_ERRORS)
+    values = {key: value for key, value in method_row(entry).values.items() if key in keys}
+    bad = (entry["error"] or {}).get("nonfinite")
+    remarks = [] if entry.get("layer", "airlight") == "airlight" else [entry["layer"]]
+    return Row(values, remarks=(*remarks, *([f"{bad:.0f} pixels not finite"] if bad else [])))
+
+
+# Time against error
+
+
+def _timed(scene: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    return [entry for entry in _measured(scene) if entry["times"]]
+
+
+def draw_speed(scenes: Sequence[Mapping[str, Any]], column: str) -> Any:
+    """Return the time of a frame against the error of the airlight, a panel for each scene."""
+    timed = {scene["name"]: _timed(scene) for scene in scenes if _timed(scene)}
+    # Of all labels, also those without a point: variants are numbered as in the report, so that its page agrees.
+    there = {entry["label"] for entries in timed.values() for entry in entries}
+    styles = {label: style for label, style in report_styles(scenes).items() if label in there}
+    width, double = WIDTHS[column], column == "double"
+    across = min(len(timed), 3 if double else 1)
+    down = -(-len(timed) // across)
+    legend = -(-len(styles) // (3 if double else 1))
+    figure = new_figure(width, down * min(0.75 * width / across, 2.4) + 0.14 * legend + 0.1)
+    panels = figure.subplots(down, across, squeeze=False)
+    for panel, (name, entries) in zip(panels.flat, timed.items()):
+        for entry in entries:
+            frame, error = entry["times"]["frame"], entry["error"]["relative_rmse"]
+            if not error:  # an error of 0 has no place on a logarithmic axis
+                continue
+            middle = frame["median_ms"]
+            spread = [[middle - frame["low_ms"]], [frame["high_ms"] - middle]]
+            panel.errorbar([middle], [error], xerr=spread, linestyle="none", **styles[entry["label"]])
+        panel.set(xscale="log", yscale="log", xlabel="time of a frame [ms]")
+        panel.set_title(name, parse_math=False)  # a dollar in a file name must not begin a formula
+        plain_times(panel)
+    for panel in panels.flat[len(timed) :]:
+        panel.set_axis_off()
+    figure.supylabel("relative RMSE of the airlight [1]", fontsize="medium")
+    handles = [panels.flat[0].plot([], [], linestyle="none", **style)[0] for style in styles.values()]
+    figure.legend(handles, list(styles), loc="outside lower center", ncols=3 if double else 1)
+    return figure
+
+
+def plain_times(panel: Any) -> None:
+    """Name 1, 2 and 5 of each decade, in plain numbers: times often span less than one."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = panel.get_xlim()
+    panel.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if log10(high / low) < 1.7 else (1,)))
+    panel.xaxis.set_major_formatter(FuncFormatter(lambda value, position: f"{value:g}"))
+    panel.xaxis.set_minor_formatter(NullFormatter())
+
+
+# Images with insets: the two squares in which the methods are wrong the most
+
+
+def _measured(scene: Mapping[str, Any], layer: str = "airlight") -> Iterator[Mapping[str, Any]]:
     """Yield the methods of a scene that were not refused and whose error is of a layer."""
     for entry in scene["methods"]:
         if not entry["refused"] and entry["error"] and entry.get("layer", "airlight") == layer:
             yield entry
+
+
+def _strip(data: Mapping[str, Any], place: Path, name: str | None, labels: Sequence[str] | None) -> tuple[Any, ...]:
+    """Return the scene, the methods to show, and the images of the reference and of each."""
+    scene = _scene(data, name)
+    chosen = _chosen(scene, labels)
+    layer = chosen[0].get("layer", "airlight")
+    return scene["name"], chosen, [_pixels(place / each["files"]["exr"], layer) for each in (scene, *chosen)]
+
+
+def _scene(data: Mapping[str, Any], name: str | None) -> Mapping[str, Any]:
+    scenes = {scene["name"]: scene for scene in data["scenes"] if _shown(scene, "airlight") or _shown(scene, "total")}
+    if name is not None and name not in scenes:
+        raise InputError(f"scene: got {name!r}, wanted one of {', '.join(scenes)}" + nearest(name, scenes))
+    if not scenes:
+        raise InputError("the report has no scene with an image of a method: nothing to show")
+    shadowed = [scene for scene in scenes.values() if not str(scene["plan"].get("shadows", "none")).startswith("none")]
+    return scenes[name] if name else (shadowed or list(scenes.values()))[0]
+
+
+def _chosen(scene: Mapping[str, Any], wanted: Sequence[str] | None) -> list[Mapping[str, Any]]:
+    """Return the methods to show: those that were asked for, or the most accurate of each."""
+    known = {entry["label"]: entry for layer in ("airlight", "total") for entry in _shown(scene, layer)}
+    if wanted is None:
+        best: dict[str, Mapping[str, Any]] = {}
+        for entry in _shown(scene, "airlight") or _shown(scene, "total"):
+            if entry["method"] not in best or _rank(entry) < _rank(best[entry["method"]]):
+                best[entry["method"]] = entry
+        kept = sorted(best.values(), key=_rank)[:_MOST]
+        return [entry for entry in best.values() if entry in kept]
+    for label in wanted:
+        if label not in known:
+            names = "; ".join(known)
+            raise InputError(f"method: got {label!r}, wanted some of {names}" + nearest(label, known))
+    chosen = [known[label] for label in wanted]
+    if len({entry.get("layer", "airlight") for entry in chosen}) > 1:
+        raise InputError("method: got images with airlight and images without layers; show them in two figures")
+    return chosen
+
+
+def _shown(scene: Mapping[str, Any], layer: str) -> list[Mapping[str, Any]]:
+    """Return the methods of a scene that have an image."""
+    return [entry for entry in _measured(scene, layer) if entry["files"].get("exr")]
+
+
+def _rank(entry: Mapping[str, Any]) -> float:
+    error = entry["error"]["relative_rmse"]
+    return float("inf") if error is None or entry["error"]["nonfinite"] else error
+
+
+def _pixels(path: Path, name: str) -> Any:
+    return np.asarray(image_layer(read_exr(path), name, path), dtype=np.float64)
+
+
+def worst_squares(images: Sequence[Any], side: int) -> tuple[tuple[int, int], ...]:
+    """Return the corners (column, row) of two squares that do not overlap, with the largest errors of all methods.
+
+    Errors are divided by the largest of their method, so that every method counts.
+    """
+    reference = np.nan_to_num(images[0])
+    total = np.zeros(reference.shape[:2])
+    for image in images[1:]:
+        error = np.abs(np.nan_to_num(image) - reference).sum(axis=2)
+        total += error / max(error.max(), np.finfo(float).tiny)
+    sums = np.pad(total, ((1, 0), (1, 0))).cumsum(axis=0).cumsum(axis=1)
+    inside = sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]
+    corners = []
+    for _ in range(2):
+        row, column = (int(index) for index in np.unravel_index(int(inside.argmax()), inside.shape))
+        corners.append((column, row))
+        inside[max(0, row - side) : row + side, max(0, column - side) : column + side] = -1.0
+    return tuple(corners)
+
+
+def draw_strip(scene: str, methods: Sequence[Mapping[str, Any]], images: Sequence[Any], column: str) -> Any:
+    """Return reference and methods in one exposure, two insets of each, and the signed relative error."""
+    height, width = images[0].shape[:2]
+    side = max(4, min(height, width) // _INSET)
+    corners, factor = worst_squares(images, side), exposure(images[0])
+    wide, size = WIDTHS[column], 6 if column == "double" else 4.5
+    figure = new_figure(wide, wide / len(images) * (2 * height / width + 0.5) + 0.55)
+    grid = figure.add_gridspec(3, 2 * len(images), height_ratios=[height / width, 0.5, height / width])
+    for at, (entry, image) in enumerate(zip([None, *methods], images)):
+        picture = tone_mapped(image, factor)
+        panel = figure.add_subplot(grid[0, 2 * at : 2 * at + 2])
+        _show(panel, picture, _words(entry, scene), size)
+        for corner, colour, place in zip(corners, _FRAMES, (0, 1)):
+            _mark(panel, corner, side, colour)
+            inset = figure.add_subplot(grid[1, 2 * at + place])
+            _show(inset, picture[corner[1] : corner[1] + side, corner[0] : corner[0] + side], frame=colour)
+        below = figure.add_subplot(grid[2, 2 * at : 2 * at + 2])
+        if entry is None:
+            _scale(below, size)
+        else:
+            _show(below, error_map(images[0], image))
+    figure.set_layout_engine("constrained", w_pad=0.015, h_pad=0.015, wspace=0.0, hspace=0.0)
+    return figure
+
+
+def _words(entry: Mapping[str, Any] | None, scene: str) -> str:
+    """Return a label, broken before its parameters, with the error and the time."""
+    if entry is None:
+        return f"reference\n\n{scene}"
+    name, _, rest = entry["label"].partition(" (")
+    time = f", {number(entry['times']['frame']['median_ms'])} ms" if entry["times"] else ""
+    return "\n".join((name, rest.rstrip(")"), f"RMSE {entry['error']['relative_rmse']:.1e}{time}"))
+
+
+def _show(panel: Any, picture: Any, title: str = "", size: float = 6, frame: str | None = None) -> None:
+    show_picture(panel, picture, title, size)
+    for spine in panel.spines.values():
+        spine.set(edgecolor=frame or "black", linewidth=1.2 if frame else 0.4)
+
+
+def _mark(panel: Any, corner: tuple[int, int], side: int, colour: str) -> None:
+    from matplotlib.patches import Rectangle
+
+    place = (corner[0] - 0.5, corner[1] - 0.5)
+    panel.add_patch(Rectangle(place, side, side, fill=False, edgecolor=colour, linewidth=1.0))
+
+
+def _scale(panel: Any, size: float) -> None:
+    """Draw the colour scale of the error maps where the error of the reference would be."""
+    panel.set_axis_off()
+    bar = panel.inset_axes([0.06, 0.45, 0.88, 0.16])
+    bar.imshow(error_scale(), aspect="auto", extent=(-1, 1, 0, 1))
+    bar.set_yticks([])
+    bar.set_xticks([-1, 0, 1], [f"-{ERROR_CEILING:g}", f"±{ERROR_FLOOR:g}", f"+{ERROR_CEILING:g}"], fontsize=size)
+    bar.grid(False)
+    bar.set_title("relative error [1]", fontsize=size)

@@ -8,6 +8,5 @@ Read in this order:
 - `cycles.py`: these numbers as properties of Blender's module `bpy`
 - `meshes.py`: its shapes as triangles
 - `gltf.py`: the scene as glTF
-- `frames.py`: frames of an animation as files
-- `difference.py`: the difference of two images as an image
+- `words.py`: the scene as a table
 """

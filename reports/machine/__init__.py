@@ -11,8 +11,6 @@ Read in this order:
 - `gpu.py`: whether CUDA and OptiX work, and why not
 - `mitsuba_log.py`: Mitsuba's warnings on the error stream, each once
 - `environment.py`: chooses the variant; versions and processor
-- `probe.py`: one kernel in a process of its own
 - `own_process.py`: the user's own code, and kernels that compile quickly, in a process of their own
 - `doctor.py`: examines all of these
-- `printing.py`: how commands print the tables of one run
 """

@@ -1,7 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Examine the machine: every part that a kernel needs, then a kernel itself, in a process of its own.
+"""`airlight.doctor`: every part that a kernel needs, then a kernel itself, and what is cached between runs.
 
-A process of its own, because what can go wrong there ends the process: a libLLVM that aborts, a driver that crashes.
+The kernel has a process of its own, because what can go wrong there ends the process: a libLLVM that aborts, a driver
+that crashes.
+
+    python -m reports.machine.doctor
+
+prints what is missing, for the launcher: Debian's names of the packages, and what to type on this system.
 """
 
 import json
@@ -9,6 +14,9 @@ import os
 import signal
 import subprocess
 import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +24,8 @@ from reports.machine.environment import (
     VARIANT_VARIABLE,
     MissingError,
     atomic_problem,
+    install_line,
+    missing_packages,
     prepare,
     processor,
     threads,
@@ -23,8 +33,115 @@ from reports.machine.environment import (
 )
 from reports.machine.gpu import cuda_status, optix_status
 from reports.machine.llvm import find_llvm
+from reports.tables.record import Result
+from reports.tables.table import Table, table, words
 
 _PATIENCE = 180.0  # seconds for the first kernel; the first one on a GPU compiles OptiX's own
+
+
+@dataclass(frozen=True, repr=False)
+class Doctor(Result):
+    """What works on this machine, and what is cached."""
+
+    machine: Mapping[str, Any]  #: as `airlight doctor --json` prints it, without the cache
+    cache: Mapping[str, Any]
+
+    @property
+    def works(self) -> bool:
+        """Whether kernels run here."""
+        return bool(self.machine["works"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `airlight doctor --json` prints."""
+        return {**self.machine, "cache": dict(self.cache)}
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """What works, with details."""
+        return [table("", words("what", "works", "details"), _rows(self.machine))]
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The cache, and the verdict."""
+        cache = self.cache
+        size = f"{_size(cache['bytes'])} of at most {_size(cache['limit'])}"
+        lines = [f"cache {cache['folder']}: {cache['files']} files, {size}"]
+        lines += [f"  {kind}: {of['files']} files, {_size(of['bytes'])}" for kind, of in cache["kinds"].items()]
+        if "removed" in cache:
+            lines.append(f"  {cache['removed']} files removed, {_size(cache['freed'])} freed")
+        ready = "Everything that airlight needs works."
+        return [*lines, ready if self.works else f"Not ready: {self.machine['problem']}"]
+
+    @property
+    def passed(self) -> bool:
+        """Whether all files went, if the cache was to be cleared; the command has a status of its own for `works`."""
+        return "removed" not in self.cache or not self.cache["files"]
+
+    @property
+    def status(self) -> int:
+        """The exit status: 3 where no kernel can be run."""
+        return super().status if self.works else 3
+
+    @property
+    def title(self) -> str:
+        """Whether it works."""
+        return "ready" if self.works else str(self.machine["problem"])
+
+
+def doctor(*, clear_cache: bool = False) -> Doctor:
+    """Show what works on this machine, and how to fix what does not.
+
+    That is Python and its packages, LLVM, CUDA, OptiX, a test kernel in a process of its own, and the cache: finished
+    references and results lie in `~/.cache/airlight` (`$XDG_CACHE_HOME/airlight` where that is set).
+    `AIRLIGHT_CACHE_DIR` names another folder, `AIRLIGHT_CACHE_SIZE` another limit than 4 GiB (500MB, 20GiB; 0 keeps
+    nothing): above it the files that were used longest ago are removed.
+
+    Exit status 3 if no kernel can be run, 1 if a file of the cache could not be removed.
+
+    Parameters
+    ----------
+    clear_cache
+        Remove every file of the cache; what is needed is computed again.
+
+    Examples
+    --------
+    >>> import airlight
+    >>> airlight.doctor().works  # doctest: +SKIP
+    True
+    """
+    cache = _cache(clear=clear_cache)
+    return Doctor(diagnose(), cache)
+
+
+def _cache(*, clear: bool) -> dict[str, Any]:
+    """Return how much is cached, by kind, after everything is removed where that is asked for."""
+    from analytic.errors import InputError
+    from reference.storage.cache import cache_entries, cache_folder, cache_limit, clear_cache
+
+    folder = cache_folder()
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"the cache {folder} is not a folder; remove it, or name another by AIRLIGHT_CACHE_DIR")
+    removed = clear_cache() if clear else None
+    entries = cache_entries()
+    kinds = sorted({entry.kind for entry in entries})
+    sizes = {kind: [entry.size for entry in entries if entry.kind == kind] for kind in kinds}
+    data = {
+        "folder": str(folder),
+        "limit": cache_limit(),
+        "files": len(entries),
+        "bytes": sum(entry.size for entry in entries),
+        "kinds": {kind: {"files": len(each), "bytes": sum(each)} for kind, each in sizes.items()},
+    }
+    return data | ({"removed": removed[0], "freed": removed[1]} if removed is not None else {})
+
+
+def _size(size: float) -> str:
+    """Return a number of bytes in the unit that leaves the fewest digits."""
+    units = ["bytes", "KiB", "MiB", "GiB"]
+    while size >= 1024 and len(units) > 1:
+        size /= 1024
+        units.pop(0)
+    return f"{size:.0f} {units[0]}" if size >= 100 or units[0] == "bytes" else f"{size:.3g} {units[0]}"
 
 
 def diagnose() -> dict[str, Any]:
@@ -81,11 +198,11 @@ def diagnose() -> dict[str, Any]:
 
 
 def try_kernel(variant: str, patience: float = _PATIENCE) -> dict[str, Any]:
-    """Run a kernel in a process of its own (`reports.machine.probe`) and return what it found, or its ``problem``."""
+    """Run a kernel in a process of its own and return what it found, or its ``problem``."""
     root = str(Path(__file__).resolve().parents[2])
     paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
     environment = os.environ | {VARIANT_VARIABLE: variant, "PYTHONPATH": paths}
-    command = [sys.executable, "-m", "reports.machine.probe"]
+    command = [sys.executable, "-m", "reports.machine.doctor", "--probe"]
     try:
         ran = subprocess.run(command, capture_output=True, text=True, timeout=patience, env=environment, cwd="/")
     except subprocess.TimeoutExpired:
@@ -99,11 +216,7 @@ def try_kernel(variant: str, patience: float = _PATIENCE) -> dict[str, Any]:
     return {"problem": f"the test kernel in {variant} failed, {how}: {words[-1] if words else 'without a word'}"}
 
 
-def print_diagnosis(diagnosis: dict[str, Any]) -> None:
-    """Print a diagnosis as a table, plain where piped."""
-    from reports.tables.table import table, words
-    from reports.tables.terminal import print_table
-
+def _rows(diagnosis: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     kernel = diagnosis["kernel"] or {}
     rows = [
         ("Python", "yes", f"{diagnosis['versions']['python']}, {diagnosis['python']}"),
@@ -128,9 +241,51 @@ def print_diagnosis(diagnosis: dict[str, Any]) -> None:
         rows.append(("shadow-ray epsilon", "", f"{kernel['epsilon']:.4g}, relative; measured"))
     elif diagnosis["variant"]:
         rows.append(("test kernel", "no", "failed"))
-    print_table(table("", words("what", "works", "details"), rows))
-    print("Everything that airlight needs works." if diagnosis["works"] else f"Not ready: {diagnosis['problem']}")
+    return rows
 
 
 def _yes(works: bool) -> str:
     return "yes" if works else "no"
+
+
+def _probe() -> None:
+    """Cast a ray at a sphere in the chosen variant and check where it meets it."""
+    from reports.machine.environment import activate
+
+    start = time.perf_counter()
+    variant = activate()
+    import drjit as dr
+    import mitsuba as mi
+
+    from reference.scene.shadow_epsilon import measure_shadow_epsilon
+
+    scene = mi.load_dict({"type": "scene", "ball": {"type": "sphere", "radius": 0.5}})
+    towards = scene.ray_intersect(mi.Ray3f(mi.Point3f([0, 3], 0, -2), mi.Vector3f(0, 0, 1)))
+    distances = towards.t.numpy().tolist()
+    if abs(distances[0] - 1.5) > 1e-5 or distances[1] < 1e30:
+        sys.exit(f"wrong result: distances {distances}, wanted 1.5 and infinity")
+    facts = {
+        "variant": variant,
+        "threads": dr.thread_count(),
+        "library": _loaded_llvm(),
+        "epsilon": measure_shadow_epsilon(),
+        "seconds": time.perf_counter() - start,
+    }
+    print(json.dumps(facts))
+
+
+def _loaded_llvm() -> str | None:
+    """Return the libLLVM that this process really loaded, where the system tells."""
+    try:
+        lines = Path("/proc/self/maps").read_text().splitlines()
+    except OSError:
+        return None
+    return next((line.split(maxsplit=5)[5] for line in lines if "libLLVM" in line), None)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["--probe"]:
+        _probe()
+    else:
+        _missing = missing_packages()
+        print(" ".join(_missing), install_line(_missing) if _missing else "", sep="\n")

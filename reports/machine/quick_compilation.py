@@ -11,8 +11,8 @@ set through its C interface, `LLVMParseCommandLineOptions`:
 
 None of the passes may change a result: IEEE arithmetic stays as it is written. The tests compare images bit for bit.
 What it gains is in the column `cpu_ms` of two sweeps, with `times` of "none" and of "with"; what it costs is printed by
-`AIRLIGHT_COMPILATION=quick airlight bench`. No time that is published is of such kernels. They have a folder of their
-own in Dr.Jit's cache, as its keys do not know how a kernel was compiled.
+`AIRLIGHT_COMPILATION=quick airlight study methods`. No time that is published is of such kernels. They have a folder of
+their own in Dr.Jit's cache, as its keys do not know how a kernel was compiled.
 
 LLVM says of each pass that it does not run it, on the standard error. So that is passed on by a process that leaves
 this out: what is said before the process that compiles aborts is passed on too.

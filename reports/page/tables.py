@@ -9,11 +9,11 @@ from reports.page.filters import MARKS, words
 from reports.tables.agreement import agreement_table, trust_table, verdict
 from reports.tables.checks import left_out_table
 from reports.tables.drawing import html
+from reports.tables.kernels import stability_summary
 from reports.tables.methods import fastest_table, method_row, methods_table
 from reports.tables.papers import paper_tables
 from reports.tables.peers import published_as
 from reports.tables.scaling import scaling_tables
-from reports.tables.stability import summary_table
 from reports.tables.table import Column, Row, Table, table
 
 Data = Mapping[str, Any]
@@ -107,7 +107,7 @@ TABLES: dict[str, Callable[..., Any]] = {
     "methods_table": drawn(methods),
     "agreement_table": drawn(agreement),
     "trust_table": drawn(trust_table),
-    "stability_table": drawn(summary_table),
+    "stability_table": drawn(stability_summary),
     "scaling_tables": drawn(scaling_tables),
     "left_out_table": drawn(left_out_table),
     "seconds_table": drawn(seconds),

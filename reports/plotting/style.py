@@ -9,6 +9,7 @@ one method (its kernel, its parameters) keep colour and marker and differ by the
 Nothing heavy is imported at the top, and nothing is set: `figure_style` changes matplotlib's settings for a block.
 """
 
+import itertools
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -90,6 +91,12 @@ def kernel_style(kernel: str, variant: int = 0) -> dict[str, Any]:
     base, _, digits = kernel.rpartition("-")
     name = base if digits.isdecimal() and base in _KERNELS else kernel
     return _marker_style(*_KERNELS.get(name, _OTHER_KERNEL), variant)
+
+
+def scene_styles() -> Iterator[dict[str, Any]]:
+    """Yield matplotlib's properties of the lines of several scenes, one after the other."""
+    for colour, (_, marker) in itertools.cycle(zip(COLOURS, _KERNELS.values())):
+        yield _marker_style(colour, marker, 0)
 
 
 def truth_style() -> dict[str, Any]:

@@ -8,20 +8,13 @@ Read in this order:
 
 - `table.py`: the record, its values, and how a number becomes digits
 - `drawing.py`: the five ways to draw it
+- `record.py`: what every result of a public function knows: tables, words, data
 - `terminal.py`: how commands print tables and JSON
 - `methods.py`: what methods cost and how wrong they are; the fastest within an error
 - `papers.py`: verdicts on the claims of papers, and their numbers beside ours
 - `peers.py`: which configurations are a paper as published, errors included
 - `agreement.py`: the truth against Monte Carlo, the verdict, and the table of trust
 - `kernels.py`: costs, levels and orders of kernels
-- `stability.py`: where kernels and sums of shadow planes break
-- `decomposition.py`: errors by cause
-- `map_size.py`: error and flicker against the size of the shadow map
 - `scaling.py`: what methods cost as their work grows, and exponents
-- `slab.py`: a slab by order of scattering
-- `fit.py`: parameters that explain an image
-- `clouds.py`: tables of canonical transport and their errors
 - `checks.py`: the light that single scattering leaves out
-- `lists.py`: scenes, methods, kernels
-- `scene.py`: the description of a scene for another renderer
 """

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What kernels cost, and which is cheapest at each error: `bench --kernels`, documentation.
-
-The data are those that `airlight bench --kernels --json` prints.
-"""
+"""What kernels cost, which is cheapest at each error, and where they break: studies, the page, documentation."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
@@ -56,3 +53,23 @@ def level_table(title: str, levels: Iterable[Entry]) -> Table:
     """Return which kernel is cheapest at each error."""
     columns = (Column("level", "error", digits=6), *words("cheapest"), Column("ns", "", "ns/ray"))
     return table(title, columns, [(level["level"], level["cheapest"] or "none", level["ns"]) for level in levels])
+
+
+def stability_summary(found: Iterable[Entry]) -> Table:
+    """Return a row for each kernel and each set of rays, all of these together."""
+    columns = (
+        *words("kernel", set="rays"),
+        *numbers(rays="measured", refused=""),
+        *numbers(median="float32 median", p99="99 %", max="largest", how={"digits": 2}),
+        *numbers(odd="not finite or negative", how={"alarm": True}),
+        *numbers(double="float64 largest", how={"digits": 2}),
+    )
+
+    def row(kernel: Entry, rays: Entry) -> Entry:
+        single = rays["single"]["all"]
+        odd = single["nan"] + single["infinite"] + single["negative"]
+        largest = rays["double"]["all"]["max"]
+        return {**single, "kernel": kernel["kernel"], "set": rays["name"], "odd": odd, "double": largest}
+
+    rows = (row(kernel, rays) for kernel in found for rays in kernel["sets"])
+    return table("Robustness of the kernels", columns, rows, explanation="All rays of each set together.")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What methods cost and how wrong they are: the table of `airlight bench`, the page, the documentation and papers."""
+"""What methods cost and how wrong they are: a table of studies, the page, the documentation and papers."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace

@@ -7,7 +7,7 @@ from typing import Any
 from reports.tables.table import Column, Row, Table, measured, numbers, table, words
 from validation.statistics.noise import other_power
 
-Record = Mapping[str, Any]  #: a result of `airlight bench --scaling --json`
+Record = Mapping[str, Any]  #: a result of `airlight study scaling --json`
 
 WORK = {
     "size": "pixels",

@@ -192,7 +192,7 @@ def test_an_engine_that_knows_the_description_alone_is_called_right(
 ):
     python = interpreter(renderer)
     described, gltf, image = (tmp_path / f"{scene}.{ending}" for ending in ("json", "glb", "exr"))
-    assert run(["describe", scene, "--size", "80x60", "--json", "--gltf", str(gltf)]) == 0
+    assert run(["describe", scene, "--size", "80x60", "--json", "-o", str(gltf)]) == 0
     described.write_text(capsys.readouterr().out)
     script = str(DOCS / "examples" / f"render_{renderer}.py")
     command = [python, script, str(described), str(gltf), str(image), *options]

@@ -8,7 +8,7 @@ from realtime.methods.unshadowed import unshadowed
 
 ROOT = Path(__file__).resolve().parents[2]
 TINY = (16, 12)
-FUNCTIONS = ("load_scene", "render", "reference", "compare", "integrate", "bench", "report")
+FUNCTIONS = ("load_scene", "render", "reference", "compare", "study", "report")
 
 
 def brighter(view, *, kernel=None, times=2.0):

@@ -206,7 +206,7 @@ def area_lights(folder: Path) -> Iterator[tuple[str, str]]:
 
 
 def rows(folder: Path) -> Iterator[tuple[str, str]]:
-    """Yield tables for `airlight integrate` with an odd number in every column."""
+    """Yield tables for `airlight study integrals` with an odd number in every column."""
     header = "phase,g,t,h,x0,x1,sigma_t"
     usual = {"g": "0.3", "t": "1", "h": "0.5", "x0": "0", "x1": "2", "sigma_t": "0.2"}
     for column in usual:
@@ -223,14 +223,16 @@ def _orders(kind: str, path: Path) -> list[list[str]]:
     """Return what to do with an input."""
     out = path.parent
     if kind == "rows":
-        printed = [["integrate", str(path), "--precision", precision, "--json"] for precision in ("single", "double")]
-        return [*printed, ["integrate", str(path), "-o", str(out / "rows.csv")]]
-    sampled = ["--target-error", "0.3", "--estimator"]
+        printed = [
+            ["study", "integrals", str(path), "--precision", precision, "--json"] for precision in ("single", "double")
+        ]
+        return [*printed, ["study", "integrals", str(path), "-o", str(out / "rows.csv")]]
+    sampled = ["--error", "0.3", "--estimator"]
     orders = [
         ["describe", str(path), "--json"],
         ["reference", str(path), "--json", "-o", str(out / "truth.exr")],
         ["reference", str(path), "--json", "-o", str(out / "sampled.exr"), *sampled, "single-scatter"],
-        ["reference", str(path), "--json", "-o", str(out / "traced.exr"), "--spp", "64", "--estimator", "volpath"],
+        ["reference", str(path), "--json", "-o", str(out / "traced.exr"), "--samples", "64", "--estimator", "volpath"],
     ]
     for number, method in enumerate(
         ("ray-march", "ray-march", "unshadowed", "shadow-planes", "light-volumes", "min-max")

@@ -258,9 +258,9 @@ def _other_light(judged: JudgedLayer, fitting: list[TruthImage]) -> tuple[str, .
     if nearest == judged.holds or not GAIN**2 * errors[nearest] < min(errors[judged.holds], powers[nearest]):
         return ()
     if nearest == TOTAL:
-        return ("the image is all light: say --as total",)
+        return ("the image is all light: say --holds total",)
     channels = ", ".join(f"{nearest}.{channel}" for channel in "RGB")
-    return (f"the image is the {nearest} alone: name its channels {channels}, or say --as {nearest}",)
+    return (f"the image is the {nearest} alone: name its channels {channels}, or say --holds {nearest}",)
 
 
 def _mean_square(values: NDArray[np.floating]) -> float:

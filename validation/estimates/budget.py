@@ -51,7 +51,7 @@ class Budget:
     target: Target = "pooled"  #: which error
 
     def __post_init__(self) -> None:
-        given = {"--spp": self.samples, "--target-error": self.error, "--time-budget": self.seconds}
+        given = {"--samples": self.samples, "--error": self.error, "--seconds": self.seconds}
         named = [f"{name} {value:g}" for name, value in given.items() if value is not None]
         if len(named) != 1:
             raise InputError(f"got {' and '.join(named) or 'none'} of {', '.join(given)}; give one of them")
@@ -59,7 +59,7 @@ class Budget:
             if value is not None and not 0 < value < np.inf:
                 raise InputError(f"{name}: got {value:g}, wanted a positive number")
         if self.error is not None and self.error >= 1:
-            raise InputError(f"--target-error: got {self.error:g}, wanted less than 1; 0.01 is 1 %")
+            raise InputError(f"--error: got {self.error:g}, wanted less than 1; 0.01 is 1 %")
 
 
 def batch_plan(budget: Budget, pixels: int) -> tuple[int, int]:

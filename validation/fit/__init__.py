@@ -10,5 +10,5 @@ Read in this order:
 - `intervals.py`: the ends of intervals where an image is not linear in what is looked for;
 - `confounding.py`: which parameters an image does not tell apart;
 - `fit.py`: an image file against a scene;
-- `fit_text.py`: what `airlight fit` prints.
+- `fit_text.py`: what `airlight compare --fit` prints.
 """

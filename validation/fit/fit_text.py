@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What `airlight fit` prints beside the table of parameters."""
+"""What `airlight compare --fit` prints beside the table of parameters."""
 
 from validation.fit.fit import Confounded, Fit
 

@@ -3,7 +3,7 @@
 
 Where light passes and where it is hidden is found once, by the truth's own lit intervals. What is left is a sum over
 nodes on them in which extinction, albedo, phase function and intensities are free, and so are the laws that an engine
-may get wrong: `airlight fit` and `airlight compare --diagnose` search among these for what explains an image.
+may get wrong: `airlight compare --fit` and `airlight compare --diagnose` search among these for what explains an image.
 
 Read in this order:
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tables kept on disk, whole or not at all, in the folder and under the names that `airlight cache` lists.
+"""Tables kept on disk, whole or not at all, in the folder and under the names that `airlight doctor` lists.
 
 The folder is that of `reference/storage/cache.py`, which this side does not import: AIRLIGHT_CACHE_DIR, or `airlight`
 in the user's cache folder. A file that is damaged or from elsewhere counts as none. With AIRLIGHT_CACHE_SIZE=0 nothing

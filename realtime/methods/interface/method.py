@@ -79,7 +79,7 @@ class Method:
     #: parameter `tolerance`, `realtime.tiles.adaptive_sampling.tolerance`. None: it has not.
     by_rays: Callable[[Any], bool] | None = None
     #: ``error_causes(parameters, (width, height))``: the causes of its errors in an image of that size [pixels], in the
-    #: order in which `airlight bench --decompose` takes them away, one on top of the other.
+    #: order in which `airlight study decomposition` takes them away, one on top of the other.
     error_causes: Callable[[Any, tuple[int, int]], tuple[ErrorCause, ...]] = no_causes
     #: Parameters -> whether it is given all lights of a frame at once, the points of lights with extent among them. If
     #: not, and if it has no passes over the image, it is given one light point after another, and where there are many

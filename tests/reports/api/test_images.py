@@ -10,6 +10,7 @@ import pytest
 
 import airlight
 from tests.helpers.api import TINY, brighter, third
+from validation.estimates.quadrature import truth_image
 from validation.scenes.registry import SCENES
 
 
@@ -17,7 +18,7 @@ def gone(view):
     raise ZeroDivisionError("nothing there")
 
 
-@pytest.mark.parametrize("module", ["airlight", "reports.api.images", "reports.api.reference"])
+@pytest.mark.parametrize("module", ["airlight", "reports.api.render", "reports.api.compare", "reports.api.reference"])
 def test_examples_of_the_docstrings(module, variant):
     outcome = doctest.testmod(importlib.import_module(module))
     assert outcome.attempted
@@ -83,7 +84,7 @@ def test_the_truth_with_its_bound(variant, own_cache):
     told = []
     scene = airlight.load_scene("sphere-spot", TINY)
     truth = airlight.reference(scene, progress=lambda share, what: told.append((share, what)))
-    np.testing.assert_array_equal(truth.airlight, airlight.quadrature_reference(scene).layers["airlight"])
+    np.testing.assert_array_equal(truth.airlight, truth_image(scene.scene).airlight)
     assert truth.bound.shape == truth.airlight.shape == (12, 16, 3)
     assert truth.airlight.dtype == np.float64
     assert truth.standard_error is truth.surface_standard_error is None
@@ -152,7 +153,7 @@ SMALL = {"scene": "open-fog", "size": (8, 6)}
         ("render", SMALL | {"method": lambda view: 0}, "wanted a name or a function at the top of a module"),
         ("render", SMALL | {"precision": "half"}, "precision"),
         ("reference", SMALL | {"orders": "1,2-inf"}, "orders: quadrature knows single scattering alone"),
-        ("reference", SMALL | {"samples": 64}, "samples: is for 'single-scatter'"),
+        ("reference", SMALL | {"samples": 64}, "samples: is for single-scatter"),
         ("reference", SMALL | {"estimator": "volpath", "samples": 64, "seconds": 1}, "samples and seconds exclude"),
         ("reference", SMALL | {"pixel": "corner"}, "'centre' or 'area'"),
         ("bench", SMALL | {"methods": "unshadow"}, "did you mean 'unshadowed'"),

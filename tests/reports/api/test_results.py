@@ -10,9 +10,9 @@ from PIL import Image as Picture
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, read_exr
-from reports.api.images import compare
+from reports.api.compare import compare
 from reports.api.results import Reference, Rendering, sealed
-from reports.api.tables import BenchTable
+from reports.studies.methods import MethodsStudy
 
 
 def layered(scale=1.0, dtype=np.float32, **more):
@@ -83,12 +83,11 @@ def row(label, frame_ms, error, **more):
 def test_the_fastest_row_is_finite_and_within_the_error():
     refused = row("d", None, None, refused="no <lights>", nonfinite=None)
     rows = (row("a", 9.0, 1e-4), row("b", 2.0, 1e-4, nonfinite=3), row("c", 1.0, 0.2), refused)
-    benched = BenchTable(rows=rows, environment={"processor": "p", "threads": 2, "variant": "v"})
+    benched = MethodsStudy(name="methods", data={}, rows=rows)
     assert benched.fastest(0.01)["label"] == "a"
     assert benched.fastest(0.5)["label"] == "c"
     assert benched.fastest(1e-6) is None
     assert benched.fastest(0.5, scene="other") is None
     assert len(benched) == 4
     assert benched[1]["label"] == "b"
-    assert benched.to_dict()["label"] == ["a", "b", "c", "d"]
-    assert "no &lt;lights&gt;" in benched._repr_html_()
+    assert benched.columns()["label"] == ["a", "b", "c", "d"]

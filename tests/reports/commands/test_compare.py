@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+import airlight
 from reference.storage.exr import Image, read_exr, write_exr
 from reports.commands.main import run
 from validation.estimates.quadrature import truth_image
@@ -47,7 +48,7 @@ def test_the_margin_decides(files, capsys):
 
 def test_everything_at_once(files, capsys):
     images, mask = files
-    values = printed(capsys, *images, "--mask", mask, "--metrics", "all", "--flip", "--exposure", "-0.5")
+    values = printed(capsys, *images, "--mask", mask, "--all-metrics", "--flip", "--exposure", "-0.5")
     assert (values["pixels"], values["masked"]) == (14 * 20, 2 * 20)
     assert values["errors"]["values"] == 14 * 20 * 3
     assert values["errors_normalised"]["unit"] != 1
@@ -62,7 +63,7 @@ def test_a_scene_stands_in_place_of_the_reference(variant, tmp_path, capsys):
     path, difference = tmp_path / "open-fog.exr", tmp_path / "difference.exr"
     airlight = truth_image(load_scene("open-fog", (32, 24)).scene).airlight
     write_exr(path, Image({"airlight": airlight}))
-    values = printed(capsys, "open-fog", str(path), "--margin", "1e-6", "--difference", str(difference))
+    values = printed(capsys, "open-fog", str(path), "--margin", "1e-6", "-o", str(difference))
     assert (values["scene"], values["size"], values["hints"]) == ("open-fog", [32, 24], [])
     assert values["relative_rmse"] < 1e-6  # the file is float32
     assert np.abs(read_exr(difference).layers["relative"]).max() < 1e-5
@@ -82,7 +83,7 @@ def test_a_difference_is_written_as_values_and_as_a_picture(files, tmp_path, cap
 
     images, mask = files
     values, picture = tmp_path / "out" / "difference.exr", tmp_path / "difference.png"
-    assert printed(capsys, *images, "--difference", str(values), "--mask", mask)["difference"] == str(values)
+    assert printed(capsys, *images, "-o", str(values), "--mask", mask)["difference"] == str(values)
     reference, test = (read_exr(path).layers["airlight"].astype(float) for path in images)
     layers = read_exr(values).layers
     np.testing.assert_allclose(layers["total"][2:], (test - reference)[2:], atol=1e-6)
@@ -90,10 +91,29 @@ def test_a_difference_is_written_as_values_and_as_a_picture(files, tmp_path, cap
     relative = (test - reference) / np.maximum(reference, 1e-3 * mean)
     np.testing.assert_allclose(layers["relative"][2:], relative[2:], rtol=1e-4, atol=1e-6)
     assert not layers["total"][:2].any()
-    assert printed(capsys, *images, "--difference", str(picture))["difference"] == str(picture)
+    assert printed(capsys, *images, "-o", str(picture))["difference"] == str(picture)
     shown = np.asarray(Picture.open(picture))
     assert shown.shape == SHAPE
     red, blue = shown[..., 0].astype(int), shown[..., 2].astype(int)
     brighter = (relative > 0.005).all(axis=-1)
     assert brighter.any()
     assert (red > blue)[brighter].all()
+
+
+def test_the_command_and_python_find_the_fog_that_made_an_image(variant, tmp_path, capsys):
+    path = tmp_path / "fog.exr"
+    write_exr(path, Image({"airlight": truth_image(load_scene("open-fog", (32, 24)).scene).airlight}))
+    arguments = ["open-fog", str(path), "--fit", "sigma_t,intensity"]
+    data = printed(capsys, *arguments, "--start", "sigma_t=0.9")
+    assert {"parameters", "residual", "explained", "confounded"} <= set(data)
+    assert set(data["parameters"]) == {"sigma_t", "intensity"}
+    sigma_t = data["parameters"]["sigma_t"]
+    assert sigma_t["low"] < 0.173 < sigma_t["high"]
+    assert sigma_t["value"] == pytest.approx(0.173, rel=1e-4)
+    assert run(["compare", *arguments]) == 0
+    assert "95 % interval" in capsys.readouterr().out
+    fit = airlight.compare("open-fog", str(path), fit="sigma_t, intensity")
+    assert fit["sigma_t"]["value"] == pytest.approx(sigma_t["value"], rel=1e-4)
+    assert "<table" in fit._repr_html_()
+    with pytest.raises(airlight.InputError, match="did you mean"):
+        airlight.compare("open-fog", str(path), fit=["albdo"])

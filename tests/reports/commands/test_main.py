@@ -6,32 +6,28 @@ import os
 import re
 
 import pytest
-import typer
 
 import airlight
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
 from reports.commands import main as cli
 from reports.machine.environment import MissingError
+from reports.studies.registry import STUDIES
 
-_GROUP = typer.main.get_command(cli.app)
-_COMMANDS = list(_GROUP.commands)
-
-
-def _raising(error):
-    def doctor():
-        raise error
-
-    return doctor
+_COMMANDS = [["study"], *(["study", name] for name in STUDIES)]
+_COMMANDS += [[cli._NAMES.get(each, each.__name__)] for several in cli._PANELS.values() for each in several]
 
 
 @pytest.fixture
 def command_that_raises(monkeypatch):
-    """Return a function that makes `airlight doctor` raise an exception."""
+    """Return a function that makes `airlight list` raise an exception."""
 
     def arrange(error):
-        entry = next(command for command in cli.app.registered_commands if command.callback.__name__ == "doctor")
-        monkeypatch.setattr(entry, "callback", _raising(error))
+        def raising(what=None):
+            raise error
+
+        monkeypatch.setitem(cli._PANELS, "Start", (raising,))
+        monkeypatch.setitem(cli._NAMES, raising, "list")
 
     return arrange
 
@@ -51,7 +47,7 @@ def command_that_raises(monkeypatch):
 def test_expected_failures_give_one_line(error, status, words, command_that_raises, capfd, monkeypatch):
     monkeypatch.setattr(cli, "_drop_output", lambda status: status)  # it would silence pytest's own output
     command_that_raises(error)
-    assert cli.run(["doctor"]) == status
+    assert cli.run(["list"]) == status
     captured = capfd.readouterr()
     assert captured.out == ""
     assert words in captured.err
@@ -61,24 +57,24 @@ def test_expected_failures_give_one_line(error, status, words, command_that_rais
 def test_faults_of_the_program_keep_their_traceback(command_that_raises):
     command_that_raises(ValueError("not an InputError"))
     with pytest.raises(ValueError, match="not an InputError"):
-        cli.run(["doctor"])
+        cli.run(["list"])
 
 
 @pytest.mark.claim("documented-commands")
-@pytest.mark.parametrize("command", [None, *_COMMANDS])
+@pytest.mark.parametrize("command", [[], *_COMMANDS], ids=" ".join)
 def test_every_command_has_help_that_fits_80_columns(command, capfd, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
-    assert cli.run([*filter(None, [command]), "--help"]) == 0
+    assert cli.run([*command, "--help"]) == 0
     printed = capfd.readouterr().out
     assert max(map(len, printed.splitlines())) <= 80
-    assert not re.search(r"<\w+>|\[\[|…", printed)  # no types of Python, nothing in brackets twice, nothing cut off
+    assert not re.search(r"<\w+>|\[\[|…|from Python", printed)  # no types of Python, nothing cut off
     assert "Usage: airlight" in printed
     assert "`" not in printed  # code is drawn as code
 
 
 @pytest.mark.claim("no-color")
 def test_no_color_leaves_letters_alone_on_a_terminal(capsys, monkeypatch):
-    monkeypatch.setattr("reports.tables.terminal.terminal_width", lambda: 80)
+    monkeypatch.setattr(cli, "terminal_width", lambda: 80)
     for value, styled in (("", True), ("1", False)):
         monkeypatch.setenv("NO_COLOR", value)
         assert cli.run(["list", "kernels"]) == 0
@@ -88,7 +84,7 @@ def test_no_color_leaves_letters_alone_on_a_terminal(capsys, monkeypatch):
 def test_lists_have_one_command(capfd):
     assert cli.run(["list", "--json"]) == 0
     data = json.loads(capfd.readouterr().out)
-    assert list(data) == ["scenes", "methods", "kernels"]
+    assert list(data) == ["scenes", "methods", "kernels", "studies", "papers"]
     for name, rows in data.items():
         assert cli.run(["list", name, "--json"]) == 0
         assert json.loads(capfd.readouterr().out) == rows
@@ -96,7 +92,14 @@ def test_lists_have_one_command(capfd):
     printed = capfd.readouterr().out
     assert all(f"{name.capitalize()}\n" in printed for name in data)
     assert cli.run(["list", "scene"]) == 2
-    assert "did you mean 'scenes'" in capfd.readouterr().err
+    assert 'Did you mean "scenes"' in capfd.readouterr().err
+
+
+def test_names_of_scenes_without_mitsuba_are_those_of_the_registry():
+    from reports.api.inputs import scene_names
+    from validation.scenes.registry import SCENES
+
+    assert list(scene_names()) == sorted(SCENES)
 
 
 @pytest.mark.claim("variant")

@@ -26,18 +26,16 @@ def experiments(own_cache, monkeypatch):
     return ran
 
 
-def test_verdicts_tables_and_json(variant, experiments, tmp_path, capfd):
-    assert cli.run(["paper", "bouthors", "--tables", "-o", str(tmp_path / "claims.json")]) == 0
+def test_verdicts_tables_and_json(variant, experiments, capfd):
+    assert cli.run(["paper", "bouthors", "--numbers"]) == 0
     out = capfd.readouterr().out
     assert "not reproduced" in out
     assert "numbers beside ours" in out
     needed = ["formulas", "cloud slab", "cloud transport", "clouds", "cloud frames"]
     assert experiments == needed
-    written = json.loads((tmp_path / "claims.json").read_text())
     assert cli.run(["paper", "bouthors", "--json"]) == 0
     assert experiments == needed  # the second time nothing is measured
     printed = json.loads(capfd.readouterr().out)
-    assert printed["papers"] == written["papers"]
     rows = {row["item"]: row for row in printed["papers"]}
     assert (rows["eq. 1"]["verdict"], rows["eq. 5"]["verdict"]) == ("reproduced", "not reproduced")
     assert rows["9, stratocumulus of 130 000 triangles"]["verdict"] is None

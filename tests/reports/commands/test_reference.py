@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight reference` and `airlight merge`: what is kept, what is said of it, and what a stopped run leaves.
+"""`airlight reference`: what is kept, what is said of it, and what a stopped run leaves.
 
 Random numbers stand in the place of the tracer, as everything here is about files; `tests/reference` traces. The slow
 test at the end runs the command in a process of its own, with the tracer.
@@ -55,15 +55,15 @@ def summary(output, capfd, *arguments, **options):
 @pytest.mark.claim("runs-go-on", tolerance="none: equal bytes")
 def test_same_samples_and_seed_are_the_same_bytes(traced, tmp_path, monkeypatch, capfd):
     """From an empty cache, from a full one, and from one that holds more."""
-    first = summary(tmp_path / "a.exr", capfd, "--spp", "64", "--seed", "3")
-    second = summary(tmp_path / "b.exr", capfd, "--spp", "64", "--seed", "3")
+    first = summary(tmp_path / "a.exr", capfd, "--samples", "64", "--seed", "3")
+    second = summary(tmp_path / "b.exr", capfd, "--samples", "64", "--seed", "3")
     assert (first["cached"], second["cached"]) == (0, 32)
     attributes = read_exr(tmp_path / "a.exr").attributes
     expected = {"estimator": "volpath", "spp": 64, "batch_spp": 2, "batches": 32, "seed": 3, "seeds": "3-34"}
     assert {name: attributes[f"airlight:{name}"] for name in expected} == expected
     monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "other"))
-    run(tmp_path / "more.exr", "--spp", "72")
-    run(tmp_path / "c.exr", "--spp", "64", "--seed", "3")
+    run(tmp_path / "more.exr", "--samples", "72")
+    run(tmp_path / "c.exr", "--samples", "64", "--seed", "3")
     assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
     assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "c.exr").read_bytes()
     assert (tmp_path / "a.exr").read_bytes() != (tmp_path / "more.exr").read_bytes()
@@ -72,11 +72,11 @@ def test_same_samples_and_seed_are_the_same_bytes(traced, tmp_path, monkeypatch,
 @pytest.mark.claim("targets-of-a-run")
 def test_target_error_is_reached_and_no_more(traced, tmp_path, capfd):
     # A channel has 48 pixels: its mean is known to 1/sqrt(48 batches), to 2 % from 52 batches on.
-    reached = summary(tmp_path / "a.exr", capfd, "--target-error", "0.02")
+    reached = summary(tmp_path / "a.exr", capfd, "--error", "0.02")
     assert reached["reached"] is True
     assert reached["pooled_error"] <= 0.02
     assert reached["batches"] == 32 or reached["pooled_error"] > 0.02 * (1 - 8 / reached["batches"]) ** 0.5 * 0.9
-    again = summary(tmp_path / "b.exr", capfd, "--target-error", "0.02")
+    again = summary(tmp_path / "b.exr", capfd, "--error", "0.02")
     assert again["cached"] == reached["batches"]
     assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
 
@@ -91,17 +91,17 @@ def test_quadrature_needs_no_budget(variant, tmp_path, capfd):
 def test_a_stopped_run_goes_on_and_a_damaged_block_is_traced_again(traced, tmp_path, capfd):
     (tmp_path / "a.exr").write_text("an older file")
     traced.append(13)
-    run(tmp_path / "a.exr", "--spp", "64", status=130)
+    run(tmp_path / "a.exr", "--samples", "64", status=130)
     assert capfd.readouterr().out == ""
     assert (tmp_path / "a.exr").read_text() == "an older file"
     traced.clear()
-    run(tmp_path / "a.exr", "--spp", "64")
+    run(tmp_path / "a.exr", "--samples", "64")
     assert "13 of 32 batches from the cache" in capfd.readouterr().out
     path = next(cache_folder().glob("volpath-*/000008-000015.npz"))
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 16
     path.write_bytes(content)
-    mended = summary(tmp_path / "b.exr", capfd, "--spp", "64")
+    mended = summary(tmp_path / "b.exr", capfd, "--samples", "64")
     assert (mended["cached"], mended["damaged"]) == (24, 1)
     assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
 
@@ -111,19 +111,19 @@ def test_merged_files_of_two_machines(traced, tmp_path, monkeypatch, capfd):
     """Each with a cache of its own; together they are what one machine finds with all the seeds."""
     for name, seed in (("a", "0"), ("b", "32")):
         monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / name))
-        run(tmp_path / f"{name}.exr", "--spp", "64", "--seed", seed)
+        run(tmp_path / f"{name}.exr", "--samples", "64", "--seed", seed)
     capfd.readouterr()
-    files = [str(tmp_path / f"{name}.exr") for name in "ab"]
-    assert cli.run(["merge", *files, "-o", str(tmp_path / "m.exr"), "--json"]) == 0
+    files = [word for name in "ab" for word in ("--merge", str(tmp_path / f"{name}.exr"))]
+    assert cli.run(["reference", SCENE[0], *files, "-o", str(tmp_path / "m.exr"), "--json"]) == 0
     summed = json.loads(capfd.readouterr().out)
     assert (summed["seeds"], summed["batches"], summed["spp"]) == ("0-63", 64, 128)
-    run(tmp_path / "whole.exr", "--spp", "127")  # 64 batches of 2 as well
+    run(tmp_path / "whole.exr", "--samples", "127")  # 64 batches of 2 as well
     merged, whole = read_exr(tmp_path / "m.exr"), read_exr(tmp_path / "whole.exr")
     assert merged.attributes["airlight:seeds"] == whole.attributes["airlight:seeds"]
     for name, layer in whole.layers.items():
         # float32 means, and errors that come from differences of them: relative 6e-8 of the image
         np.testing.assert_allclose(merged.layers[name], layer, rtol=1e-5, atol=1e-6 * layer.max())
-    assert cli.run(["merge", files[0], files[0], "-o", str(tmp_path / "no.exr")]) == 2
+    assert cli.run(["reference", SCENE[0], *files[:2], *files[:2], "-o", str(tmp_path / "no.exr")]) == 2
     assert "share the seeds 0-31" in capfd.readouterr().err
     assert not (tmp_path / "no.exr").exists()
 
@@ -133,7 +133,7 @@ def test_merged_files_of_two_machines(traced, tmp_path, monkeypatch, capfd):
 def test_a_run_that_is_killed_loses_nothing(variant, tmp_path, capfd, own_cache):
     """The real tracer in a process, killed when the cache has three of its batches."""
     (tmp_path / "a.exr").write_text("an older file")
-    command = ["reference", *SCENE, "--estimator", "volpath", "-o", str(tmp_path / "a.exr"), "--spp", "400000"]
+    command = ["reference", *SCENE, "--estimator", "volpath", "-o", str(tmp_path / "a.exr"), "--samples", "400000"]
     code = f"import sys\nfrom reports.commands.main import run\nsys.exit(run({command!r}))"
     process = subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": str(ROOT)}, cwd=ROOT)
     while len(list(own_cache.glob("volpath-*/0*.npz"))) < 3 and process.poll() is None:
@@ -145,6 +145,6 @@ def test_a_run_that_is_killed_loses_nothing(variant, tmp_path, capfd, own_cache)
     names = [str(path.relative_to(own_cache).with_suffix("")) for path in own_cache.glob("volpath-*/0*.npz")]
     assert len(names) >= 3
     assert all(load_arrays(name) is not None for name in names)
-    resumed = summary(tmp_path / "b.exr", capfd, "--spp", "2048")
+    resumed = summary(tmp_path / "b.exr", capfd, "--samples", "2048")
     assert resumed["cached"] >= 3
     assert resumed["damaged"] == 0

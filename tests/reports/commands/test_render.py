@@ -21,7 +21,7 @@ def test_frames_are_numbered_files_that_differ_and_begin_as_the_scene_stands(var
     output, preview = tmp_path / "fog.exr", tmp_path / "fog.png"
     run("open-fog", *SMALL, "-o", str(tmp_path / "still" / "one.exr"))
     capfd.readouterr()
-    run("open-fog", *SMALL, "--frames", "3", "-o", str(output), "--preview", str(preview), "--json")
+    run("open-fog", *SMALL, "--frames", "3", "-o", str(output), "-o", str(preview), "--json")
     printed = json.loads(capfd.readouterr().out)
     names = [f"fog-000{number}.{kind}" for kind in ("exr", "png") for number in (1, 2, 3)]
     assert sorted(path.name for path in tmp_path.iterdir() if path.is_file()) == sorted(names)
@@ -40,25 +40,25 @@ def test_what_was_written_is_said_and_times_are_measured_only_if_asked(variant, 
     real = validation.study.frame_times.time_frame
     monkeypatch.setattr("validation.study.frame_times.time_frame", lambda *given: timed.append(1) or real(*given))
     layers, picture = str(tmp_path / "fog.exr"), str(tmp_path / "fog.png")
-    run("open-fog", *SMALL, "--samples", "4", "-o", layers, "--preview", picture)
+    run("open-fog", *SMALL, "--samples", "4", "-o", layers, "-o", picture)
     printed = capfd.readouterr().out
     assert f"wrote {layers}: airlight, surface, their sum, depth, 8 x 6 pixels\n" in printed
     assert f"wrote {picture}: a picture, 8 x 6 pixels\n" in printed
-    assert "4 rays a pixel: for looking at" in printed
+    assert "4 rays a pixel: a picture" in printed
     made = read_exr(layers).attributes
     assert (made["airlight:pixel"], made["airlight:samples"]) == ("area", "4")
     assert not timed
-    run("open-fog", *SMALL, "--json")
+    run("open-fog", *SMALL, "--timed", "--json")
     times = json.loads(capfd.readouterr().out)
     assert len(timed) == 1
     assert times["files"] == []
     measured = ("frame", "light_moved", "objects_moved", "light_moved_camera_kept", "colours_changed")
     assert all(times[f"{name}_ms"] > 0 for name in measured)
-    run("open-fog", *SMALL, "--time")
+    run("open-fog", *SMALL, "--timed")
     printed = capfd.readouterr().out
     assert len(timed) == 2
     assert "ms a frame" in printed
-    assert "nothing written: --preview NAME.png writes a picture, --output NAME.exr the layers\n" in printed
+    assert "nothing written: -o NAME.png writes a picture, -o NAME.exr the layers\n" in printed
 
 
 @pytest.mark.claim("flawed-meshes-warn")

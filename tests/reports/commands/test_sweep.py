@@ -95,7 +95,7 @@ def test_times_of_a_process_alone_are_added_to_the_errors_of_all(tmp_path):
 @pytest.mark.claim("references-from-clusters", tolerance="none: byte for byte")
 @pytest.mark.parametrize(
     "words",
-    [["--estimator", "single-scatter", "--spp", "1280"], ["--estimator", "quadrature"]],
+    [["--estimator", "single-scatter", "--samples", "1280"], ["--estimator", "quadrature"]],
     ids=lambda words: words[1],
 )
 def test_a_reference_from_a_cluster_has_the_same_bytes(tmp_path, words):

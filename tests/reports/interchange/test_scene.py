@@ -115,7 +115,7 @@ def test_power_of_a_spot_is_the_integral_of_its_falloff(beam, cutoff):
 
 def test_command_prints_json_and_writes_gltf(capsys, tmp_path):
     glb = tmp_path / "fog.glb"
-    assert run(["describe", "open-fog", "--size", "64x48", "--json", "--gltf", str(glb)]) == 0
+    assert run(["describe", "open-fog", "--size", "64x48", "--json", "-o", str(glb)]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert (printed["scene"], printed["camera"]["size"]) == ("open-fog", [64, 48])
     assert printed["gltf"]["bytes"] == glb.stat().st_size
@@ -124,5 +124,5 @@ def test_command_prints_json_and_writes_gltf(capsys, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FOG_SCENES)
 def test_every_built_in_scene_can_be_described_and_written(name, variant, tmp_path, capsys):
-    assert run(["describe", name, "--gltf", str(tmp_path / "scene.glb")]) == 0
+    assert run(["describe", name, "-o", str(tmp_path / "scene.glb")]) == 0
     assert "sigma_t" in capsys.readouterr().out

@@ -2,9 +2,13 @@
 """`airlight doctor`: whole, piped, and on machines where something is wrong."""
 
 import json
+import subprocess
+import sys
 
+import numpy as np
 import pytest
 
+from reference.storage.cache import store_arrays
 from reports.commands.main import run
 from reports.machine import doctor
 from reports.machine.environment import MissingError
@@ -56,12 +60,32 @@ def test_a_kernel_that_crashes_is_shown_and_crashes_nothing(code, words, monkeyp
     assert words in doctor.try_kernel("llvm_ad_rgb", patience=5.0 if "sleep" not in code else 0.5)["problem"]
 
 
-def test_the_launcher_gets_packages_and_a_line(monkeypatch, capsys):
-    monkeypatch.setattr("reports.machine.environment.missing_packages", lambda: [])
-    assert run(["doctor", "--missing"]) == 0
-    assert capsys.readouterr().out == "\n\n"
-    monkeypatch.setattr("reports.machine.environment.missing_packages", lambda: ["libllvm19", "libatomic1"])
-    run(["doctor", "--missing"])
-    packages, line = capsys.readouterr().out.splitlines()
-    assert packages == "libllvm19 libatomic1"
-    assert line
+@pytest.fixture
+def filled(own_cache):
+    for kind in ("quadrature", "report-truth", "report-method"):
+        for number in range(2):
+            store_arrays(f"{kind}-{number:032x}", {"a": np.zeros(2000)})
+    return own_cache
+
+
+def test_the_cache_is_shown_and_cleared(filled, monkeypatch):
+    monkeypatch.setattr(doctor, "diagnose", lambda: {"works": True})
+    monkeypatch.setenv("AIRLIGHT_CACHE_SIZE", "1GiB")
+    size = sum(path.stat().st_size for path in filled.rglob("*.npz"))
+    shown = doctor.doctor().cache
+    assert (shown["folder"], shown["limit"], shown["bytes"]) == (str(filled), 2**30, size)
+    assert {kind: of["files"] for kind, of in shown["kinds"].items()} == {
+        "quadrature": 2,
+        "report-method": 2,
+        "report-truth": 2,
+    }
+    cleared = doctor.doctor(clear_cache=True)
+    assert (cleared.cache["removed"], cleared.cache["freed"], cleared.cache["files"]) == (6, size, 0)
+    assert not list(filled.rglob("*.npz"))
+    assert cleared.passed
+
+
+def test_the_launcher_gets_packages_and_a_line():
+    ran = subprocess.run([sys.executable, "-m", "reports.machine.doctor"], capture_output=True, text=True, check=True)
+    packages, line = ran.stdout.splitlines()
+    assert bool(packages) == bool(line)

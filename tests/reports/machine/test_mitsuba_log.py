@@ -30,7 +30,7 @@ end_header
         ["describe"],
         ["render", "--method", "unshadowed", "-o", "frame.exr"],
         ["reference", "-o", "truth.exr"],
-        ["reference", "-o", "sampled.exr", "--estimator", "single-scatter", "--spp", "64"],
+        ["reference", "-o", "sampled.exr", "--estimator", "single-scatter", "--samples", "64"],
         ["compare", "truth.exr"],
     ],
     ids=lambda order: "-".join(order[:1] + order[-1:]),

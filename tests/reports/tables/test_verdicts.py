@@ -2,9 +2,7 @@
 """What tables decide: is a truth confirmed, what grew too steeply, what is wrong as published, which bar broke."""
 
 import pytest
-import typer
 
-from reports.commands.stability import stability
 from reports.tables.agreement import verdict
 from reports.tables.scaling import cliffs, grown, scaling_tables
 from tests.helpers.reports import agreement, growth_record
@@ -35,16 +33,3 @@ def test_jumps_and_higher_powers_than_before_are_found():
     costs, exponents = scaling_tables([growth_record(works=(), refused="method x: no")])
     assert costs.rows[0].reason == "refused: method x: no"
     assert exponents.rows == ()
-
-
-@pytest.mark.claim("exact-keeps-its-bar")
-def test_stability_fails_where_the_claim_is_broken(variant, monkeypatch, capsys):
-    from realtime.kernels.registry import KERNELS
-
-    stability(kernels="taylor", rays=64, json=False)
-    assert "BROKEN" not in capsys.readouterr().out
-    monkeypatch.setitem(KERNELS, "exact", KERNELS["taylor"])
-    with pytest.raises(typer.Exit) as caught:
-        stability(kernels="exact", rays=64, json=False)
-    assert caught.value.exit_code == 1
-    assert "BROKEN: exact, airlight_integral.csv: float32 maximum" in capsys.readouterr().out

@@ -7,7 +7,7 @@ import pytest
 from analytic.errors import InputError
 from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
-from reports.interchange.frames import STAGES
+from reports.api.render import STAGES
 from reports.view.live_scene import LiveScene
 from validation.scenes.loading import load_scene
 from validation.study.configuration import configuration, prepared

@@ -18,12 +18,12 @@ from validation.estimates.quadrature import truth_image
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({}, "got none of --spp, --target-error, --time-budget; give one"),
-        ({"samples": 64, "error": 0.01}, "got --spp 64 and --target-error 0.01 of"),
-        ({"error": 0.01, "seconds": 3.0}, "got --target-error 0.01 and --time-budget 3 of"),
-        ({"error": 0.0}, "--target-error: got 0, wanted a positive number"),
-        ({"seconds": -1.0}, "--time-budget: got -1"),
-        ({"error": 1.5}, "--target-error: got 1.5, wanted less than 1; 0.01 is 1 %"),
+        ({}, "got none of --samples, --error, --seconds; give one"),
+        ({"samples": 64, "error": 0.01}, "got --samples 64 and --error 0.01 of"),
+        ({"error": 0.01, "seconds": 3.0}, "got --error 0.01 and --seconds 3 of"),
+        ({"error": 0.0}, "--error: got 0, wanted a positive number"),
+        ({"seconds": -1.0}, "--seconds: got -1"),
+        ({"error": 1.5}, "--error: got 1.5, wanted less than 1; 0.01 is 1 %"),
     ],
 )
 def test_exactly_one_limit_is_wanted(given, words):

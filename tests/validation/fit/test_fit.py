@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight fit`: what explains an image, how sure that is, and what no image can tell."""
+"""`airlight compare --fit`: what explains an image, how sure that is, and what no image can tell."""
 
 import re
 from dataclasses import replace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: `airlight integrate` gives each row of a file its own value and says how wrong the values are."""
+"""Claim: `airlight study integrals` gives each row of a file its own value and says how wrong the values are."""
 
 import csv
 

@@ -30,9 +30,9 @@ def test_an_hour_and_the_memory_are_the_bounds(variant, monkeypatch):
     [
         ["render", "open-fog", "--size", "16384x16384"],
         ["render", "open-fog", "--size", "8x6", "--set", "steps=9999999999999"],
-        ["reference", "open-fog", "--estimator", "volpath", "--spp", "100000000000"],
-        ["bench", "open-fog", "--size", "16384x16384"],
-        ["maps", "sphere-spot", "--size", "16384x16384", "--sizes", "32"],
+        ["reference", "open-fog", "--estimator", "volpath", "--samples", "100000000000"],
+        ["study", "methods", "open-fog", "--size", "16384x16384"],
+        ["study", "map-size", "sphere-spot", "--size", "16384x16384", "--sizes", "32"],
     ],
     ids=" ".join,
 )

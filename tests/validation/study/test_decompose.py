@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The error of an image by its causes: the parts are what they are called, and add up to the whole.
 
-Protects the claim on `airlight bench --decompose`.
+Protects the claim on `airlight study decomposition`.
 """
 
 import mitsuba as mi

@@ -1,0 +1,325 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight.compare`: how far an image is from another or from a scene, what is wrong with it, which fog fits."""
+
+import dataclasses
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from analytic.errors import InputError, named_values
+from reports.api.inputs import (
+    Files,
+    ImageLike,
+    Mask,
+    Progress,
+    SceneLike,
+    Values,
+    Words,
+    listed,
+    one_error,
+    scene_names,
+    several,
+    telling,
+)
+
+if TYPE_CHECKING:
+    from reference.storage.exr import Image
+    from reports.api.results import Diagnosed, Fitted, ImageComparison, SceneComparison
+
+_ENDINGS = (".exr", ".png")
+
+
+@one_error
+def compare(
+    reference: "ImageLike | SceneLike",
+    test: ImageLike,
+    layer: str | None = None,
+    *,
+    holds: Literal["airlight", "surface", "total"] | None = None,
+    pixel: Literal["centre", "area"] | None = None,
+    mask: Mask | None = None,
+    margin: float | None = None,
+    by_order: bool = False,
+    all_metrics: bool = False,
+    flip: bool = False,
+    exposure: float | None = None,
+    diagnose: bool = False,
+    fit: Words | None = None,
+    start: Values = (),
+    output: Files = (),
+    progress: Progress = None,
+) -> "ImageComparison | SceneComparison | Diagnosed | Fitted":
+    """Compare an image with another, or with the reference of a scene.
+
+    Returns bias and error quantiles, statistics if there are standard errors, and with a scene also the best-fitting
+    factor, what may be wrong with the image as a whole, where most of the error lies, and whether the image is right.
+    Exit status 1 if the image has values that are negative or not finite, or if the bias is not shown to be within
+    the margin.
+
+    `--diagnose` predicts the image that each of some sixty faults would make, of medium, lights, camera and encoding,
+    and ranks them by evidence. `--fit` finds the parameters of the fog that explain the image, each with its 95 %
+    interval. See docs/your-engine.md.
+
+    Parameters
+    ----------
+    reference
+        What to compare with: an EXR file, or a scene (built-in or a Mitsuba XML file); from Python also what
+        `reference` or `render` returned, or an array (height, width, 3) [W/(m^2 sr)].
+    test
+        The image to judge, an EXR file; from Python also a result or an array.
+    layer
+        Layer to compare, 'airlight' by default; 'total' is R/G/B, the default with a scene where there is no airlight.
+    holds
+        With a scene: what the layer holds; what its name says by default.
+    pixel
+        With a scene: whether pixels are values at their centre or means over their area; by default what fits, which
+        takes several times as long.
+    mask
+        An EXR file that is 0 in pixels to leave out; from Python also truth values, (height, width).
+    margin
+        Largest relative bias that counts as agreement, such as 0.005; two images need standard errors for it.
+    by_order
+        Of two images: compare the layers by order of scattering too, such as airlight_3_4.
+    all_metrics
+        Also the errors by the formulas of other tools and the colour differences.
+    flip
+        Also HDR-FLIP, by the package flip-evaluator.
+    exposure
+        Of the colour differences and HDR-FLIP [stops]; from the reference by default.
+    diagnose
+        With a scene: say what is wrong with the image, in place of how far it is.
+    fit
+        With a scene: which parameters to fit, such as sigma_t,albedo (each also with .r, .g or .b), phase.g, intensity,
+        exposure, light.x, light.y, light.z; of one medium or light NAME as sigma_t:NAME.
+    start
+        With `fit`: NAME=VALUE to begin with; may be given several times, the scene's own by default.
+    output
+        Write the difference: a .png file shows the signed relative error of each pixel in false colours, an .exr file
+        has the values.
+    progress
+        Called with (fraction done, what); True shows a bar.
+
+    Raises
+    ------
+    InputError
+        If a layer is missing, sizes differ, a margin is given without standard errors, or options do not go together.
+
+    Examples
+    --------
+    >>> import airlight
+    >>> exact = airlight.reference("open-fog", size=(32, 24))
+    >>> frame = airlight.render("open-fog", "unshadowed", "exact", size=(32, 24))
+    >>> compared = airlight.compare(exact, frame)
+    >>> compared.metrics.relative_rmse < 1e-5
+    True
+    >>> compared.passed, compared.error.shape
+    (True, (24, 32, 3))
+    >>> fitted = airlight.compare("open-fog", exact, fit="sigma_t,intensity", start={"sigma_t": 1.0})
+    >>> abs(fitted["sigma_t"]["value"] / 0.173 - 1) < 1e-4
+    True
+    """
+    files = [Path(path) for path in several(output)]
+    scene = reference if _is_scene(reference) else None
+    if scene is None and _is_scene(test) and not Path(str(test)).is_file():
+        raise InputError(f"compare: the scene stands first: airlight compare {test} {reference}")
+    own = {"holds": holds, "pixel": pixel, "diagnose": diagnose or None, "fit": fit}
+    for name, value in own.items():
+        if value is not None and scene is None:
+            raise InputError(f"{name}: goes with a scene in the place of the reference; two images are what they are")
+    about = {"output": files or None, "margin": margin, "exposure": exposure, "by_order": by_order or None}
+    about |= {"flip": flip or None, "all_metrics": all_metrics or None}
+    given = [name for name, value in about.items() if value is not None]
+    if diagnose and fit is not None:
+        raise InputError("diagnose, fit: are two questions; give one of them")
+    if (diagnose or fit is not None) and given:
+        asked = "fit" if fit is not None else "diagnose"
+        raise InputError(f"{asked}: {', '.join(given)} is about a comparison; leave one out")
+    if diagnose and mask is not None:
+        raise InputError("diagnose: looks at all pixels; leave out the mask")
+    if start and fit is None:
+        raise InputError("start: is where a fit begins; add fit, such as --fit sigma_t,albedo")
+    if scene is not None and by_order:
+        raise InputError(
+            "by_order: compares two images; make the reference by airlight reference SCENE --estimator cloud-paths"
+        )
+    for path in files:
+        _check_difference(path)
+    if fit is not None:
+        return _fit(scene, test, fit, layer=layer, holds=holds, pixel=pixel, mask=mask, start=start, progress=progress)
+    options: dict[str, Any] = {
+        "mask": mask,
+        "margin": margin,
+        "all_metrics": all_metrics,
+        "flip": flip,
+        "exposure": exposure,
+    }
+    if scene is None:
+        return _two_images(reference, test, layer or "airlight", by_order=by_order, files=files, **options)
+    how = {"layer": layer, "holds": holds, "pixel": pixel}
+    with _as_file(test) as path:
+        from reference.storage.exr import read_exr
+        from reports.machine.environment import activate
+
+        read_exr(path)  # unreadable files are refused before Mitsuba starts
+        activate()
+        if diagnose:
+            return _diagnose(str(scene), path, progress=progress, **how)
+        return _with_scene(str(scene), path, files=files, progress=progress, **how, **options)
+
+
+def _is_scene(word: Any) -> bool:
+    """Return whether a word is meant as a scene: a built-in or random one, an XML file, or a name that no file has."""
+    if not isinstance(word, str | os.PathLike):
+        return False
+    path, name = Path(word), str(word)
+    known = name in scene_names() or name.startswith("random:")
+    return known or path.suffix.lower() == ".xml" or not (path.suffix or path.exists())
+
+
+def _check_difference(path: Path) -> None:
+    from reference.storage.files import ensure_writable
+
+    if path.suffix.lower() not in _ENDINGS:
+        raise InputError(f"output: got {str(path)!r}, wanted a name that ends in .exr (values) or .png (a picture)")
+    ensure_writable(path)
+
+
+@contextmanager
+def _as_file(image: Any) -> Iterator[Path]:
+    """Give the path of an image, which is written to a file for this if it is none."""
+    if isinstance(image, str | os.PathLike):
+        yield Path(image)
+        return
+    from reference.storage.exr import write_exr
+    from reference.storage.files import temporary_folder
+
+    layers, _ = as_image(image, "airlight", "the test image")
+    with temporary_folder() as folder:
+        write_exr(folder / "image.exr", layers, finite=False)
+        yield folder / "image.exr"
+
+
+def as_image(image: Any, layer: str, name: str) -> "tuple[Image, str]":
+    """Return layers, among them the one of that name, and what to call the image.
+
+    Parameters
+    ----------
+    image
+        See `ImageLike`; an array, (height, width[, 3]), becomes the layer.
+    layer
+        The layer that will be looked at.
+    name
+        What to call an image that has no name of its own.
+
+    Raises
+    ------
+    InputError
+        If an array is not of numbers, or a file has no such layer.
+    """
+    import numpy as np
+
+    from reference.storage.exr import Image, read_exr
+    from reference.storage.exr import layer as image_layer
+    from reports.api.results import LayeredImage
+
+    if isinstance(image, LayeredImage):
+        return image.with_total(), image.title
+    if isinstance(image, str | os.PathLike):
+        read = read_exr(image)
+        image_layer(read, layer, image)  # a message about a missing layer then names the file
+        return read, Path(image).name
+    if isinstance(image, Image):
+        return image, name
+    values = np.asarray(image)
+    if values.dtype.kind not in "fiu":
+        raise InputError(
+            f"{name}: got {type(image).__name__}, wanted what render or reference return, a path, or numbers (height, "
+            "width, 3)"
+        )
+    return Image({layer: values}), name
+
+
+def _mask(mask: Any) -> Any:
+    """Return truth values, (height, width), or None."""
+    import numpy as np
+
+    from validation.comparison.images import read_mask
+
+    if mask is None or not isinstance(mask, str | os.PathLike):
+        return None if mask is None else np.asarray(mask)
+    return read_mask(mask)
+
+
+def _two_images(
+    reference: Any, test: Any, layer: str, *, mask: Any, by_order: bool, files: list[Path], **options: Any
+) -> "ImageComparison":
+    from reference.storage.exr import layer as image_layer
+    from reports.api.results import ImageComparison, write_difference
+    from validation.comparison.images import compare_files, compare_images
+
+    exact, exact_name = as_image(reference, layer, "the reference")
+    tested, test_name = as_image(test, layer, "the test image")
+    chosen = _mask(mask)
+    if all(isinstance(image, str | os.PathLike) for image in (reference, test)):
+        file = None if mask is None or not isinstance(mask, str | os.PathLike) else mask
+        if mask is None or file is not None:
+            comparison = compare_files(reference, test, layer, mask=file, by_order=by_order, **options)
+        else:
+            comparison = compare_images(exact, tested, layer=layer, mask=chosen, **options)
+    elif by_order:
+        raise InputError("by_order: compares two files; save the images first")
+    else:
+        comparison = compare_images(exact, tested, layer=layer, mask=chosen, **options)
+    kept: dict[str, Any] = {field.name: getattr(comparison, field.name) for field in dataclasses.fields(comparison)}
+    kept |= {"reference": image_layer(exact, layer), "test": image_layer(tested, layer)}
+    said = tuple((str(path), write_difference(path, kept["reference"], kept["test"], kept=chosen)) for path in files)
+    return ImageComparison(**kept, names=(exact_name, test_name), files=said)
+
+
+def _with_scene(
+    scene: str, path: Path, *, mask: Any, files: list[Path], progress: Any, **options: Any
+) -> "SceneComparison":
+    from reports.api.results import SceneComparison, write_difference
+    from validation.comparison.engine_compare import compare_scene
+
+    if mask is not None and not isinstance(mask, str | os.PathLike):
+        raise InputError("mask: an image is compared with a scene under a mask that is an EXR file; save it first")
+    with telling(progress, "the reference") as tell:
+        compared = compare_scene(scene, path, mask=mask, progress=tell, **options)
+    images = compared.truth, compared.image
+    said = tuple((str(file), write_difference(file, *images, kept=_mask(mask))) for file in files)
+    return SceneComparison(compared, said)
+
+
+def _diagnose(scene: str, path: Path, *, progress: Any, **how: Any) -> "Diagnosed":
+    from reports.api.results import Diagnosed
+    from validation.diagnosis.diagnose import diagnose_file
+
+    with telling(progress, "diagnosis") as tell:
+        return Diagnosed(diagnose_file(path, scene, progress=tell, **how))
+
+
+def _fit(
+    scene: Any, image: Any, parameters: Any, *, layer: str | None, mask: Any, start: Any, progress: Any, **how: Any
+) -> "Fitted":
+    names = listed("fit", parameters)
+    words = [f"{name}={value}" for name, value in start.items()] if isinstance(start, Mapping) else several(start)
+    starts = named_values("start", words, float, "NAME=VALUE, such as sigma_t=0.1")
+    layers, name = as_image(image, layer or "airlight", "the image")  # before Mitsuba starts
+    from reports.machine.environment import activate
+
+    activate()
+    from reports.api.results import Fitted
+    from validation.comparison.engine_compare import scene_of_size
+    from validation.comparison.engine_layers import judged_layer
+    from validation.fit.fit import fit_image
+
+    size = judged_layer(layers, name, name=layer, holds=how["holds"]).size
+    loaded = scene_of_size(str(scene), size, name)
+    with telling(progress, "fit") as tell:
+        fitted = fit_image(
+            layers, loaded, names, path=name, layer=layer, mask=_mask(mask), starts=starts, progress=tell, **how
+        )
+    return Fitted(fitted)

@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight.describe` and `airlight.view`: a scene in numbers, a scene live."""
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from analytic.errors import InputError
+from reports.api.inputs import (
+    Files,
+    KernelLike,
+    MethodLike,
+    Progress,
+    SceneLike,
+    Size,
+    Values,
+    changes_of,
+    kernel_name,
+    note,
+    one_error,
+    pixels_of,
+    several,
+)
+from reports.tables.record import Result
+from reports.tables.table import Table
+
+
+@dataclass(frozen=True, repr=False)
+class Description(Result):
+    """All that another renderer needs to render a scene."""
+
+    described: Mapping[str, Any]
+    written: Mapping[str, Any] | None = None  #: the glTF file
+
+    @property
+    def title(self) -> str:
+        """The scene."""
+        return str(self.described["scene"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `airlight describe --json` prints."""
+        return {**self.described, **({} if self.written is None else {"gltf": self.written})}
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """A row for each number to set."""
+        from reports.interchange.words import description_table
+
+        return [description_table(self.described)]
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """How to judge the image."""
+        import shlex
+
+        command = shlex.join(["airlight", "compare", self.described["source"], self.described["file"]["name"]])
+        lines = [f"to judge it: {command}"]
+        if self.written is not None:
+            cut = ", ".join(self.written["tessellated"])
+            more = f"; cut into triangles: {cut}" if cut else ""
+            lines.append(f"{self.written['path']}: {self.written['triangles']} triangles{more}")
+        return lines
+
+
+@dataclass(frozen=True, repr=False)
+class FolderLog(Result):
+    """What becomes of each scene file of a folder."""
+
+    folder: Path
+    outcomes: Any  #: of `reports.interchange.folder.describe_folder`
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `airlight describe FOLDER --json` prints."""
+        from reports.interchange.folder import folder_data
+
+        return folder_data(self.folder, self.outcomes)
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """A row for each file."""
+        from reports.interchange.folder import folder_table
+
+        return [folder_table(self.outcomes)]
+
+
+@one_error
+def describe(
+    scene: SceneLike, *, size: Size | None = None, output: Files = (), progress: Progress = None
+) -> "Description | FolderLog":
+    """Describe all that another renderer needs to render a scene.
+
+    Its image can then be judged, by `airlight compare SCENE IMAGE.exr`. Camera, media, lights, surfaces, what the
+    pixels hold and what file to write. The glTF file has the same camera, lights and meshes; media are in its extras.
+
+    Parameters
+    ----------
+    scene
+        A built-in scene, random:SEED or a Mitsuba XML file; from Python also what `load_scene` takes or returns. Of a
+        folder it says what becomes of each .xml file in it: taken with which notes, or refused with which words.
+    size
+        Width and height [pixels], or WxH; the scene's own by default.
+    output
+        Write the scene as binary glTF 2.0, a .glb file.
+    progress
+        True says notes on the scene on the error stream.
+
+    Raises
+    ------
+    InputError
+        For a scene without a reference, with the name of what is in the way.
+    """
+    from reference.storage.files import ensure_writable
+
+    files = [Path(path) for path in several(output)]
+    for path in files:
+        if path.suffix.lower() != ".glb":
+            raise InputError(f"output: got {path}, wanted a name that ends in .glb, for example {path.stem}.glb")
+        ensure_writable(path)
+    from reports.machine.environment import activate
+
+    activate()
+    if isinstance(scene, str | os.PathLike) and Path(scene).is_dir():
+        from reports.interchange.folder import describe_folder
+
+        if size or files:
+            raise InputError(f"scene: got the folder {scene}; leave out size and output")
+        return FolderLog(Path(scene), describe_folder(Path(scene)))
+    from reports.api.scenes import opened
+    from reports.interchange.gltf import write_gltf
+    from reports.interchange.scene import describe_scene
+
+    loaded = opened(scene, size)
+    described = describe_scene(loaded)
+    written = [write_gltf(path, loaded) for path in files]
+    note(progress, described["notes"])
+    return Description(described, written[-1] if written else None)
+
+
+@one_error
+def view(
+    scene: SceneLike,
+    method: MethodLike = "shadow-planes",
+    kernel: KernelLike | None = None,
+    *,
+    change: Values = (),
+    size: Size = "640x480",
+    host: str = "127.0.0.1",
+    port: int = 0,
+    open_: bool = False,
+    **parameters: Any,
+) -> None:
+    """Show a scene live in the browser.
+
+    The mouse moves the camera; widgets change method, kernel, parameters, lights and media. The page shows what a frame
+    costs, stage by stage, and its error against the reference, which is computed while nothing moves. It also shows the
+    command that renders the same frame. Ctrl-C ends the view.
+
+    The address has a token: anyone who knows it may use the page, but can choose only built-in methods and kernels and
+    those that are named here. Beyond 127.0.0.1 it travels in clear text.
+
+    Parameters
+    ----------
+    scene
+        A built-in scene, random:SEED or a Mitsuba XML file.
+    method
+        A method of `airlight list methods`, or a user method as MODULE:FUNCTION or FILE.py:FUNCTION.
+    kernel
+        Airlight kernel, see `airlight list kernels`.
+    change
+        A camera, light or medium unlike the scene's, such as medium.sigma_t=0.1; may be given several times.
+    size
+        Width and height [pixels], or WxH.
+    host
+        The address to listen at.
+    port
+        The port to listen at; 0 is any free one.
+    open_
+        Open the page in the browser, too.
+    parameters
+        Parameters of the method.
+    """
+    from reports.view.server import Server, check_library
+
+    check_library()
+    if not 0 <= port <= 65535:
+        raise InputError(f"port: got {port}, wanted a number from 0 to 65535; 0 is any free one")
+    from reports.machine.environment import activate
+    from validation.study.configuration import configuration
+
+    chosen = configuration(method, kernel_name(kernel), parameters)  # type: ignore[arg-type]
+    changes, pixels = changes_of(change), pixels_of(size)
+    variant = activate()
+    from reports.view.session import Session
+    from reports.view.state import ViewState
+
+    assert pixels is not None
+    session = Session(ViewState(str(scene), pixels, chosen, changes), variant)
+    try:
+        try:
+            server = Server(host, port, opened=session.opened, told=session.told, closed=session.closed)
+        except OSError as error:
+            raise InputError(
+                f"host, port: cannot listen at {host}, port {port}: {error.strerror}; wanted an address of this "
+                "machine, and a port that is free: 0 finds one"
+            ) from error
+        server.start()
+        print(f"{server.address}\nCtrl-C ends the view.", flush=True)
+        if open_:
+            import webbrowser
+
+            webbrowser.open(server.address)
+        session.run()
+    finally:
+        session.truth.end()

@@ -1,0 +1,469 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight.load_scene` and `airlight.render`: a frame or an animation by a real-time method, and what it costs.
+
+A user's method that is named, 'module:function' or 'file.py:function', runs in a process of its own, which it may end
+or never leave. A function that Python gives runs here.
+"""
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from analytic.errors import InputError
+from reports.api.inputs import (
+    Files,
+    KernelLike,
+    MethodLike,
+    Progress,
+    SceneLike,
+    Size,
+    Values,
+    changes_of,
+    kernel_name,
+    note,
+    one_error,
+    pixels_of,
+    several,
+    telling,
+)
+from reports.machine.own_process import LIMIT
+
+if TYPE_CHECKING:
+    from reports.api.results import Animation, Plan, Rendering
+    from reports.api.scenes import OpenScene
+    from validation.study.configuration import Configuration
+
+_ENDINGS = (".exr", ".png")
+
+
+@one_error
+def load_scene(scene: SceneLike, size: Size | None = None) -> "OpenScene":
+    """Load a scene.
+
+    Parameters
+    ----------
+    scene
+        A built-in name (`airlight.SCENES`), random:SEED, the path of a Mitsuba XML file, a Mitsuba dictionary, or a
+        Mitsuba scene.
+    size
+        Width and height of its image [pixels], or 'WxH'; the scene's own by default.
+
+    Raises
+    ------
+    InputError
+        For what is no scene, or cannot be read.
+
+    Examples
+    --------
+    >>> import airlight
+    >>> scene = airlight.load_scene("open-fog", size=(32, 24))
+    >>> scene
+    OpenScene(open-fog, 32 x 24)
+    >>> scene.plan()["lights"]
+    '1 point'
+    """
+    from reports.machine.environment import activate
+
+    activate()
+    from reports.api.scenes import opened
+
+    return opened(scene, size)
+
+
+@one_error
+def render(
+    scene: SceneLike,
+    method: MethodLike = "ray-march",
+    kernel: KernelLike | None = None,
+    *,
+    change: Values = (),
+    size: Size | None = None,
+    precision: Literal["single", "double"] = "single",
+    samples: int = 1,
+    frames: int | None = None,
+    animate: str | None = None,
+    output: Files = (),
+    plan: bool = False,
+    timed: bool = False,
+    method_limit: float = LIMIT,
+    force: bool = False,
+    progress: Progress = None,
+    **parameters: Any,
+) -> "Rendering | Animation | Plan":
+    """Render a frame or an animation; say what a frame costs.
+
+    An animation is one turn: lights circle, objects turn, the medium's density swings, colours rotate. Each frame
+    recomputes only what depends on the motion. Ctrl-C keeps the finished frames.
+
+    Parameters
+    ----------
+    scene
+        A built-in scene, random:SEED or a Mitsuba XML file; from Python also what `load_scene` takes or returns.
+    method
+        A method of `airlight list methods`, or a user method as MODULE:FUNCTION or FILE.py:FUNCTION; from Python also
+        such a function itself, ``method(view, *, kernel=None, **parameters)``, from a module or a notebook.
+    kernel
+        Airlight kernel, see `airlight list kernels`; 'exact' for a method that calls one.
+    change
+        A camera, light or medium unlike the scene's, such as medium.sigma_t=0.1; may be given several times.
+    size
+        Width and height [pixels], or WxH; the scene's own by default.
+    precision
+        Of all that the method computes.
+    samples
+        Camera rays a pixel, for pictures without aliasing; a method's error is measured at pixel centres.
+    frames
+        Render an animation of so many frames, as NAME-0001.exr and so on.
+    animate
+        What moves: light, objects, medium, colour, or several with commas; the scene's animation by default.
+    output
+        A file to write, .exr for all layers or .png for a picture through a tone curve; may be given several times.
+    plan
+        Return what the scene needs of the method, and render nothing.
+    timed
+        Also measure what a frame costs, which takes some seconds.
+    method_limit
+        A user method that is named is stopped after so long [s].
+    force
+        Start also what will take more than an hour, or more memory than there is.
+    progress
+        Called with (fraction done, what); True shows a bar.
+    parameters
+        Parameters of the method, such as ``steps=64``.
+
+    Raises
+    ------
+    InputError
+        For what is not known, for what the method refuses, and for options that do not go together.
+
+    Examples
+    --------
+    >>> import airlight
+    >>> frame = airlight.render("open-fog", "ray-march", size=(32, 24), steps=64)
+    >>> frame
+    Rendering(open-fog by ray-march (steps=64), 32 x 24)
+    >>> frame.airlight.shape, frame.airlight.dtype.name
+    ((24, 32, 3), 'float32')
+    """
+    files = [Path(path) for path in several(output)]
+    _check(files, samples=samples, frames=frames, animate=animate, plan=plan, timed=timed)
+    from reports.machine.environment import activate
+
+    activate()  # a user's module may need a variant when it is imported
+    named = checked_configuration(method, kernel, parameters, limit=method_limit)
+    chosen, apart = named
+    pixels, changes = pixels_of(size), changes_of(change)
+    shown = progress if isinstance(progress, bool) else None
+    call: Any = _call
+    if apart and isinstance(scene, str):
+        from reports.machine.own_process import in_own_process
+
+        call, progress = partial(in_own_process, name=chosen.method, limit=method_limit), shown
+    if plan:
+        return call(_plan, scene, pixels, changes, precision, chosen)
+    how = (scene, pixels, changes, precision, chosen)
+    if frames is not None:
+        return call(_animation, *how, files, frames, animate, force, progress)
+    rendered: Rendering = call(_frame, *how, samples, timed, force, progress)
+    for path in files:
+        rendered.save(path)
+    return replace(rendered, files=tuple(map(str, files)))
+
+
+def _call(function: Any, *arguments: Any) -> Any:
+    return function(*arguments)
+
+
+def _check(
+    files: list[Path], *, samples: int, frames: int | None, animate: str | None, plan: bool, timed: bool
+) -> None:
+    """Refuse files that cannot be written, and options that do not go together, before any work."""
+    from reference.storage.files import ensure_writable
+
+    for name, value in (("samples", samples), ("frames", frames)):
+        if value is not None and value < 1:
+            raise InputError(f"{name}: got {value}, wanted 1 or more")
+    if plan and (files or frames is not None or samples > 1 or timed):
+        raise InputError("plan: renders nothing; leave out what is about an image")
+    if animate is not None and frames is None:
+        raise InputError("animate: got no number of frames; add frames, such as --frames 24")
+    if frames is not None and not files:
+        raise InputError("frames: got no place for the files; add an output, such as -o NAME.exr or -o NAME.png")
+    if frames is not None and samples > 1:
+        raise InputError("samples: got frames too, wanted one of them: animations have one ray a pixel")
+    if frames is not None and timed:
+        raise InputError("timed: got frames too, wanted one of them: an animation says what its frames cost")
+    for path in files:
+        if path.suffix.lower() not in _ENDINGS:
+            raise InputError(
+                f"output: got {str(path)!r}, wanted a name that ends in .exr (all layers) or .png (a picture)"
+            )
+        ensure_writable(path if frames is None else _numbered(path, 1, frames))
+
+
+def checked_configuration(
+    method: Any, kernel: Any = None, parameters: Any = None, *, limit: float = LIMIT
+) -> "tuple[Configuration, bool]":
+    """Return a configuration, checked, and whether its code is a user's that is named.
+
+    Such code is imported in a process of its own, never here.
+    """
+    from validation.study.configuration import Configuration, configuration
+
+    check_limit(limit)
+    if isinstance(method, Configuration):
+        return method, method.own
+    name = kernel_name(kernel)
+    apart = (isinstance(method, str) and ":" in method) or (isinstance(kernel, str) and ":" in kernel)
+    if not apart:
+        return configuration(method, name, parameters or {}), False
+    from reports.machine.own_process import in_own_process
+
+    return in_own_process(configuration, method, name, parameters or {}, name=method, limit=limit), True
+
+
+def check_limit(limit: float) -> None:
+    """Refuse a limit that nothing can keep."""
+    if not 0 < limit < float("inf"):
+        raise InputError(f"method_limit: got {limit:g}, wanted a time above 0, such as 300 [s]")
+
+
+def _frame(
+    scene: Any,
+    pixels: Any,
+    changes: Any,
+    precision: str,
+    chosen: "Configuration",
+    samples: int,
+    timed: bool,
+    force: bool,
+    progress: Progress,
+) -> "Rendering":
+    """Render a frame, and time it where that is asked for."""
+    import drjit as dr
+
+    from realtime.frame.samples import render_samples
+    from realtime.methods.registry import find_method
+    from realtime.scene.features import describe
+    from realtime.scene.read_scene import read_scene
+    from reports.api.results import Rendering, sealed
+    from reports.api.scenes import opened
+    from reports.machine.environment import activate
+    from validation.study.configuration import prepared
+    from validation.study.cost import TIMED
+    from validation.study.frame_times import time_frame
+    from validation.study.run import layered_frame
+
+    variant = activate()
+    loaded = opened(scene, pixels, changes)
+    read = read_scene(loaded.scene, precision)
+    _check_work(loaded.name, read, chosen, samples + (TIMED if timed else 0), force=force)
+    note(progress, read.features.notes)
+    layered = samples == 1 and bool(find_method(chosen.method).layers)
+    renderer = prepared(read, chosen, extra_layers=layered)
+    warnings = _warnings(renderer)
+    with telling(progress, f"{loaded.name}: {samples} rays a pixel") as tell:
+        frame = render_samples(renderer, samples, lambda done: tell(done, "the picture"))
+    image = layered_frame(loaded.name, chosen, frame)
+    if samples > 1:
+        made = {"airlight:pixel": "area", "airlight:samples": str(samples)}
+        image = replace(image, attributes=dict(image.attributes) | made)
+    return Rendering(
+        scene=loaded.name,
+        image=sealed(image),
+        method=chosen.method,
+        kernel=chosen.kernel,
+        parameters=dict(chosen.parameters),
+        label=chosen.label,
+        precision=precision,
+        plan=describe(read.features),
+        notes=(*read.features.notes, *warnings),
+        # The further layers of a method do not belong to what a frame costs.
+        times=time_frame(prepared(read, chosen) if layered else renderer) if timed else None,
+        samples=samples,
+        device=f"{variant}, {dr.thread_count()} threads",
+    )
+
+
+def _animation(
+    scene: Any,
+    pixels: Any,
+    changes: Any,
+    precision: str,
+    chosen: "Configuration",
+    files: list[Path],
+    frames: int,
+    moves: str | None,
+    force: bool,
+    progress: Progress,
+) -> "Animation":
+    """Render the frames of an animation and write each as soon as it is done."""
+    import time
+
+    import numpy as np
+
+    from realtime.methods.registry import find_method
+    from realtime.scene.read_scene import read_scene
+    from reports.api.results import Animation, write_image
+    from reports.api.scenes import opened
+    from reports.machine.environment import activate
+    from reports.plotting.pictures import tone_curve
+    from validation.scenes.animation import animate, moved_parts, parse_moves
+    from validation.study.configuration import prepared
+    from validation.study.frame_times import timed_image
+    from validation.study.run import layered_frame
+
+    variant = activate()
+    loaded = opened(scene, pixels, changes)
+    read = read_scene(loaded.scene, precision)
+    animation = loaded.animation if moves is None else replace(loaded.animation, moves=parse_moves(moves))
+    _check_work(loaded.name, read, chosen, frames, force=force)
+    note(progress, read.features.notes)
+    layered = any(path.suffix.lower() == ".exr" for path in files) and bool(find_method(chosen.method).layers)
+    renderer = prepared(read, chosen, extra_layers=layered)
+    _warnings(renderer)
+    costs: list[tuple[float, float]] = []
+    kept = curve = None  # all frames share the tone curve of the first, so that a light that fades looks it
+    start = time.perf_counter()
+    with telling(progress, f"{loaded.name}: {frames} frames") as tell:
+        for number, moved in enumerate(animate(renderer.scene, animation, frames), 1):
+            to_move = 1e3 * (time.perf_counter() - start)
+            frame, kept, to_render = timed_image(renderer, moved, kept, **moved_parts(animation))
+            costs.append((to_move, to_render))
+            curve = curve or tone_curve(frame.airlight + frame.surface)
+            for path in files:
+                write_image(_numbered(path, number, frames), layered_frame(loaded.name, chosen, frame), curve)
+            del frame  # the next one needs its room
+            tell(number / frames, f"frame {number} of {frames}")
+            start = time.perf_counter()
+    moving, rendering = (float(value) for value in np.median(np.array(costs[1:] or costs), axis=0))
+    return Animation(
+        scene=loaded.name,
+        method=chosen.label,
+        size=(read.camera.width, read.camera.height),
+        frames=frames,
+        moves=tuple(animation.moves),
+        move_ms=moving,
+        render_ms=rendering,
+        recordings={stage: getattr(getattr(renderer, stage), "n_recordings", 0) for stage in STAGES},
+        device=variant,
+        files=tuple(str(_numbered(path, number, frames)) for path in files for number in range(1, frames + 1)),
+    )
+
+
+STAGES = ("surface", "shade", "cull", "render", "passes")  #: the frozen functions of a `FrameRenderer`
+
+
+def _numbered(path: Path, number: int, frames: int) -> Path:
+    """Return name-0001.exr for name.exr; the first frame has the number 1."""
+    digits = max(4, len(str(frames)))
+    return path.with_name(f"{path.stem}-{number:0{digits}d}{path.suffix}")
+
+
+def _plan(scene: Any, pixels: Any, changes: Any, precision: str, chosen: "Configuration") -> "Plan":
+    """Return what a scene needs of a method."""
+    from realtime.methods.registry import find_method
+    from realtime.methods.shadow_planes.method import prepare_shadow_planes
+    from realtime.methods.shadow_planes.plane_counts import caster_plan, describe_casters
+    from realtime.parameters import values
+    from realtime.scene.features import describe
+    from realtime.scene.light_points import with_light_points
+    from realtime.scene.read_scene import read_scene
+    from reports.api.results import Plan
+    from reports.api.scenes import opened
+
+    read = read_scene(opened(scene, pixels, changes).scene, precision)
+    words, notes = describe(read.features), tuple(read.features.notes)
+    method = find_method(chosen.method)
+    if read.area_lights:
+        own = {name: value for name, value in chosen.parameters if name in values(method.light_points)}
+        points = replace(method.light_points, **own)
+        words["light points"] = f"{points.points} of each area light, {points.pattern}"
+        read = with_light_points(read, 1, "ring")  # the casters as the middle of each sees them
+    if method.prepare is prepare_shadow_planes:
+        casters = caster_plan(read)
+        words |= describe_casters(casters)
+        _warn(casters.warnings)
+    return Plan(words, notes)
+
+
+def _warnings(renderer: Any) -> tuple[str, ...]:
+    """Return the warnings on the casters of shadow planes, said on the error stream too."""
+    from realtime.methods.shadow_planes.method import PlanePreparation
+
+    stages = renderer.groups.of_point if renderer.groups is not None else renderer
+    if stages is None or not isinstance(stages.prepare, PlanePreparation):
+        return ()
+    _warn(stages.prepare.casters.warnings)
+    return tuple(stages.prepare.casters.warnings)
+
+
+def _warn(warnings: Any) -> None:
+    import sys
+
+    for warning in warnings:
+        print(f"airlight: warning: {warning}", file=sys.stderr)
+
+
+def _check_work(name: str, scene: Any, chosen: "Configuration", frames: int, *, force: bool) -> None:
+    from validation.study.configuration import rendered_lights
+    from validation.study.cost import check_work, frame_work, steps_of
+
+    size = scene.camera.width, scene.camera.height
+    marches = chosen.method == "ray-march" or "steps" in dict(chosen.parameters)
+    steps = steps_of(chosen.parameters) if marches else 0
+    work = frame_work(size, lights=rendered_lights(scene, chosen), steps=steps, frames=frames)
+    check_work(f"render {name}, {size[0]} x {size[1]}, {chosen.label}", [work], force=force)
+
+
+def asked_configurations(
+    methods: Any, kernels: Any, settings: Any, *, usual: Any = None, limit: float = LIMIT
+) -> "tuple[list[Configuration], bool]":
+    """Return what to measure, and whether all user code among it is named, so that it can run in other processes.
+
+    Parameters
+    ----------
+    methods
+        Names, functions and configurations; a name without kernel and settings stands for its standard configurations,
+        'all', the default, for those of every built-in method for fog.
+    kernels
+        For each of them, every method is measured.
+    settings
+        Parameters of every method, by name or as NAME=VALUE.
+    usual
+        Of 'all'; the standard configurations of every built-in method by default.
+    limit
+        Of user methods that are named [s].
+
+    Raises
+    ------
+    InputError
+        For unknown names, and for a kernel or a parameter that no method is named for.
+    """
+    from collections.abc import Mapping
+
+    from realtime.methods.registry import FOG_METHODS
+    from validation.study.configuration import Configuration, chosen_configurations, configuration, parse_settings
+
+    check_limit(limit)
+    given = dict(settings) if isinstance(settings, Mapping) else parse_settings(several(settings))
+    named_kernels = several(kernels)
+    option = "set" if given else "kernel" if named_kernels else ""
+    chosen: list[Configuration] = []
+    apart = True
+    for method in several(methods) or ["all"]:
+        if method == "all":
+            if option:
+                raise InputError(f"{option}: got no single method that it is for; name methods by --method")
+            chosen += chosen_configurations(list(FOG_METHODS)) if usual is None else usual
+        elif isinstance(method, Configuration):
+            chosen.append(method)
+        elif not isinstance(method, str):
+            chosen += [configuration(method, kernel_name(kernel), given) for kernel in named_kernels or (None,)]
+            apart = False
+        elif option or ":" in method:
+            chosen += [checked_configuration(method, k, given, limit=limit)[0] for k in named_kernels or (None,)]
+        else:
+            chosen += chosen_configurations([method])
+    return list(dict.fromkeys(chosen)), apart and not any(callable(kernel) for kernel in named_kernels)

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Scenes as results of the Python API, from whatever names one."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import mitsuba as mi
+
+from analytic.errors import InputError
+from reports.api.inputs import one_error, pixels_of
+from validation.scenes.loading import LoadedScene, load_scene, name_shapes, resize
+from validation.scenes.numbers import check_numbers
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OpenScene(LoadedScene):
+    """A scene that is ready to be rendered."""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of its image [pixels]."""
+        width, height = self.scene.sensors()[0].film().crop_size()
+        return int(width), int(height)
+
+    def plan(self) -> dict[str, str]:
+        """Return the features that the scene needs, in words; raises InputError if no method can render it."""
+        return dict(_described(self)[0])
+
+    def _repr_html_(self) -> str:
+        from reports.tables.record import block, facts_table, paragraph
+
+        try:
+            words, notes = _described(self)
+        except InputError as reason:
+            words, notes = {"refused": str(reason)}, ()
+        rows = [("size", "{} x {}".format(*self.size)), *words.items()]
+        rows += [("answers to", self.published)] if self.published else []
+        return block(self.name, paragraph(" ".join([self.purpose, *notes])), facts_table(rows))
+
+    def __repr__(self) -> str:
+        return "OpenScene({}, {} x {})".format(self.name, *self.size)
+
+
+def opened(scene: Any, size: Any = None, changes: Mapping[str, tuple[float, ...]] | None = None) -> OpenScene:
+    """Return a scene at a size, its own by default; a scene that was loaded before is left as it is.
+
+    Raises
+    ------
+    InputError
+        If `scene` is not a scene, or is already loaded at another size, or cannot be changed.
+    """
+    from reports.machine.environment import activate
+
+    activate()
+    pixels = pixels_of(size)
+    if isinstance(scene, str | os.PathLike):
+        return _as_open(load_scene(os.fspath(scene), pixels, changes or {}))
+    if changes:
+        raise InputError("change: is for a scene by name or path; change the scene that you have loaded yourself")
+    if isinstance(scene, Mapping):
+        return _from_dictionary(scene, pixels)
+    loaded = _as_open(scene) if isinstance(scene, LoadedScene) else _from_mitsuba(scene)
+    if pixels not in (None, loaded.size):
+        # The user may have changed the scene since; loading it again in silence would undo that.
+        raise InputError(
+            "size: got {}x{} for a scene that is loaded already, at {}x{}; give its name, path or dictionary with the "
+            "size, or load it at that size".format(*pixels, *loaded.size)
+        )
+    return loaded
+
+
+def _as_open(loaded: LoadedScene) -> OpenScene:
+    if isinstance(loaded, OpenScene):
+        return loaded
+    return OpenScene(loaded.name, loaded.scene, loaded.purpose, loaded.published, loaded.path, loaded.animation)
+
+
+def _from_dictionary(scene: Mapping[str, Any], pixels: tuple[int, int] | None) -> OpenScene:
+    try:
+        built = mi.load_dict(dict(scene))
+    except Exception as error:  # Mitsuba reports every kind of bad input as a RuntimeError, Python plugins as anything
+        raise InputError(f"scene: Mitsuba cannot build the dictionary: {' '.join(str(error).split())}") from error
+    loaded = _from_mitsuba(built)
+    if pixels is not None:
+        resize(built, pixels)
+    return loaded
+
+
+def _from_mitsuba(scene: Any) -> OpenScene:
+    if not isinstance(scene, mi.Scene):
+        kind = type(scene)
+        if kind.__name__ == "Scene" and kind.__module__.split(".")[0] == "mitsuba":
+            raise InputError(
+                f"scene: got a Mitsuba scene of another variant than {mi.variant()}; call airlight.activate() before "
+                "you build it"
+            )
+        raise InputError(
+            f"scene: got {kind.__name__}, wanted a name, the path of a Mitsuba XML file, a Mitsuba dictionary of the "
+            "type 'scene', or a scene that is loaded"
+        )
+    if not scene.sensors():
+        raise InputError("scene: it has no sensor; add one of the type 'perspective'")
+    name_shapes(scene)
+    check_numbers(scene)
+    return OpenScene("scene", scene, "The user's own scene.", "")
+
+
+@one_error
+def _described(loaded: OpenScene) -> tuple[dict[str, str], tuple[str, ...]]:
+    from realtime.scene.features import describe
+    from realtime.scene.read_scene import read_scene
+
+    features = read_scene(loaded.scene).features
+    return describe(features), features.notes

@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight.sweep`: many scenes, every method, on one machine or on a Dask cluster; and what the rows say."""
+
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from analytic.errors import InputError
+from reports.api.inputs import File, Progress, one_error, telling
+from reports.tables.drawing import sentence_in_text
+from reports.tables.record import Result
+from reports.tables.table import Table
+
+if TYPE_CHECKING:
+    from reports.cluster.connect import Place
+    from validation.study.keys import Made
+    from validation.study.rows import RowStore
+    from validation.study.study import Study
+
+_USUAL = 100  # random scenes of a study without a file
+_EVERY = 300.0  # between two times that the Parquet is written while rows come [s]
+
+
+@dataclass(frozen=True, repr=False)
+class SweepRun(Result):
+    """What became of the cells of a sweep."""
+
+    summary: Mapping[str, Any]
+
+    def to_dict(self) -> Mapping[str, Any]:
+        """Return what `airlight sweep --json` prints."""
+        return self.summary
+
+    @property
+    def passed(self) -> bool:
+        """Whether no cell failed, hung or aborted, and none is left."""
+        return not (self.summary["problems"] or self.summary["left"])
+
+    @property
+    def title(self) -> str:
+        """How many cells of how many scenes."""
+        said = self.summary
+        return f"{said['output']}: {said['cells']} cells of {said['scenes']} scenes"
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The counts, the problems and what to do next."""
+        said = self.summary
+        lines = [self.title, f"  {said['kept']} were there, {said['computed']} computed, {said['left']} left"]
+        lines += [f"  {said['timed_alone']} timed alone"] if said["timed_alone"] else []
+        lines += [f"  {status}: {number}" for status, number in sorted(said["counts"].items())]
+        for each in said["problems"]:
+            lines.append(f"  {each['status']}: {each['scene']}, {each['label']}: {each['reason']}")
+        lines += [f"  refused: {words}" for words in said["refused_workers"]]
+        if said["parquet"]:
+            lines += [f"  rows in {said['parquet']}", f"  what they say: airlight sweep --from {said['output']}"]
+        return lines
+
+
+@dataclass(frozen=True, repr=False)
+class SweepFindings(Result):
+    """What the rows of a sweep say."""
+
+    said: Any  #: `reports.sweep.summary.Summary`
+    page: Path
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `airlight sweep --from DIR --json` prints."""
+        from reports.sweep.summary import to_json
+
+        return to_json(self.said)
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """Errors and speed of configurations."""
+        from reports.sweep.tables import errors_table, speed_table
+
+        return [errors_table(self.said), speed_table(self.said)]
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The page, and of how many cells it is."""
+        return [
+            f"{self.page}: {self.said.scenes} scenes, {len(self.said.samples)} configurations, {len(self.said.sweep)} "
+            "cells"
+        ]
+
+    def text(self, *, width: int | None = None, styled: bool = False) -> str:
+        """Return the claims, the table and the page."""
+        from reports.sweep.summary import headlines
+
+        claims = "".join(f"- {each['kind']}: {sentence_in_text(each['text'])}\n" for each in headlines(self.said))
+        return claims + super().text(width=width, styled=styled)
+
+
+@one_error
+def sweep(
+    study: File | None = None,
+    *,
+    random: int | None = None,
+    cluster: str | None = None,
+    output: File | None = None,
+    again: bool = False,
+    from_: File | None = None,
+    progress: Progress = None,
+) -> SweepRun | SweepFindings:
+    """Run every method over many scenes: a row of numbers each.
+
+    A study names scenes, methods, kernels, parameters, media and sizes; every combination is a cell and becomes one
+    row of DIR/sweep.parquet. A process for each processor computes them unless `--cluster` says otherwise.
+
+    Finished rows are kept: a run that was interrupted goes on where it was, and the same study twice computes nothing.
+
+    `--from DIR` writes what the rows say: DIR/sweep.html, figures, and claims with their confidence as JSON; with -o
+    into another folder.
+
+    Exit status 1 if a cell failed, hung or aborted, or was left undone.
+
+    Parameters
+    ----------
+    study
+        A TOML file: what to sweep over, see docs/many-scenes.md.
+    random
+        So many random scenes; 100 without a study.
+    cluster
+        Let workers compute: local[:N] processes, tcp://HOST:PORT or tls://HOST:PORT of a Dask scheduler, or its
+        scheduler file. A tcp scheduler authenticates nobody and its workers run what they are sent: use it only on a
+        network that you trust; tls takes the certificates of Dask's configuration.
+    output
+        Folder of the rows; sweep-NAME by default.
+    again
+        Compute cells again that failed, hung or aborted; the others stay.
+    from_
+        Say what this sweep says: a page, figures and claims from its Parquet, without computing.
+    progress
+        Called with (fraction done, what); True shows a bar.
+    """
+    from reports.machine.environment import MissingError
+
+    try:
+        import pyarrow  # noqa: F401 - asked for here, before any work
+    except ImportError:
+        words = "sweeps need the package pyarrow: install it with `pip install '.[sweep]'` in a clone"
+        raise MissingError(words) from None
+    if from_ is not None:
+        given = {"a study": study, "random": random, "cluster": cluster, "again": again or None}
+        for name, value in given.items():
+            if value is not None:
+                raise InputError(f"sweep: got from together with {name}; from computes nothing, leave that out")
+        from reports.sweep.page import write_sweep
+
+        return SweepFindings(*write_sweep(Path(from_), None if output is None else Path(output)))
+    from reports.cluster.connect import check_library, parse_place
+    from reports.machine.environment import activate
+    from validation.study.rows import RowStore
+    from validation.study.study import default_study, read_study
+
+    place = parse_place(cluster)
+    check_library()
+    count = _USUAL if random is None else random
+    chosen = default_study(count) if study is None else read_study(Path(study), count=random)
+    folder = Path(output or f"sweep-{chosen.name}")
+    variant = activate()
+    with RowStore(folder) as store:
+        summary = _run(chosen, store, place, variant=variant, again=again, progress=progress)
+        summary["parquet"] = str(store.write_parquet()) if len(store) else None
+    return SweepRun(summary)
+
+
+def _run(
+    study: "Study", store: "RowStore", place: "Place", *, variant: str, again: bool, progress: Any
+) -> dict[str, Any]:
+    """Compute what is missing, add it to the store, and return what came of it."""
+    from reports import __version__
+    from reports.cluster.cells import cell_groups, row_without_numbers, timing_groups
+    from validation.study.keys import made_here, scene_identities
+
+    made, scenes = made_here(__version__, variant), scene_identities(study.scenes)
+    how: dict[str, Any] = {"store": store, "scenes": scenes}
+
+    def with_errors(cell: Any, key: str, outcome: Any) -> dict[str, Any]:
+        value = outcome.value if outcome.status == "done" else row_without_numbers(cell, key, outcome)
+        return value | {"study": study.name, "attempts": outcome.attempts}
+
+    def with_times(cell: Any, key: str, outcome: Any) -> dict[str, Any]:
+        return store.row(key) | (outcome.value if outcome.status == "done" else {})
+
+    # Images that nobody times are rendered once: their kernels compile longer than they run.
+    part = partial(_part, study, store, made=made, progress=progress)
+    parts = [
+        part(
+            place,
+            partial(cell_groups, again=again, **how),
+            with_errors,
+            quick=study.measure.times not in ("with", "stages"),
+        )
+    ]
+    if study.measure.times == "alone":
+        where = replace(place, workers=1) if place.workers else place
+        parts.append(part(where, partial(timing_groups, **how), with_times))
+    total = study.scene_count * study.cells_by_scene
+    counts = parts[0]["counts"]
+    return {
+        "study": study.name,
+        "scenes": study.scene_count,
+        "cells": total,
+        "kept": total - parts[0]["missing"],
+        "computed": sum(counts.values()) - counts["lost"],
+        "timed_alone": parts[1]["counts"]["done"] if len(parts) > 1 else 0,
+        "counts": dict(counts),
+        "left": sum(part["left"] for part in parts),
+        "problems": [problem for part in parts for problem in part["problems"]],
+        "refused_workers": [words for part in parts for words in part["refused_workers"]],
+        "output": str(store.folder),
+    }
+
+
+def _part(
+    study: "Study",
+    store: "RowStore",
+    place: "Place",
+    groups_of: Callable[..., Any],
+    row_from: Callable[..., dict[str, Any]],
+    *,
+    made: "Made",
+    progress: Any,
+    quick: bool = False,
+) -> dict[str, Any]:
+    """Run the groups of a study, and add a row for each outcome."""
+    from reports.cluster.connect import connected
+    from reports.cluster.run import run_groups
+    from validation.study.study import Cell
+
+    missing = sum(len(cells) for _, cells in groups_of(study, made))
+    counts: Counter[str] = Counter()
+    problems: list[dict[str, Any]] = []
+    refused: list[str] = []
+    open_cells: dict[str, Cell] = {}
+    written = time.monotonic()
+
+    def groups() -> Any:
+        for group, cells in groups_of(study, made):
+            open_cells.update(cells)
+            yield group
+
+    if not missing:
+        return {"counts": counts, "problems": problems, "refused_workers": refused, "left": 0, "missing": 0}
+    with connected(place, quick=quick) as cluster, telling(progress, f"sweep {study.name}") as tell:
+        for outcome in run_groups(cluster, groups(), made=made, retries=study.retries, refused=refused.append):
+            key = outcome.task.name
+            cell = open_cells.pop(key, None)
+            if cell is None:
+                continue  # the reference of an image: its cells say what came of it
+            if outcome.status != "lost":
+                store.add(row_from(cell, key, outcome))
+            counts[outcome.status if outcome.status != "done" else store.status(key) or "done"] += 1
+            if outcome.status not in ("done", "refused"):
+                what = {"scene": cell.scene, "label": cell.chosen.label, "status": outcome.status}
+                problems.append(what | {"reason": outcome.reason})
+            if time.monotonic() - written > _EVERY:
+                store.write_parquet()
+                written = time.monotonic()
+            done = sum(counts.values())
+            tell(done / missing, f"{done} of {missing} cells, {cell.scene}")
+    left = missing - sum(counts.values()) + counts["lost"]
+    return {"counts": counts, "problems": problems, "refused_workers": refused, "left": left, "missing": missing}

@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The pictures and curves of the papers again, in our scenes: for `airlight paper NAME --figures DIR`.
+
+Each figure is PDF and PNG, with its data as EXR files or CSV beside it.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from reference.storage.exr import Image, write_exr
+from reference.storage.files import ensure_folder, write_text
+from reports.machine.progress import Progress, part_of
+from reports.plotting.figure import ENDINGS, new_figure, picture_grid, save_figure
+from reports.plotting.pictures import exposure, tone_mapped
+from reports.plotting.style import COLOURS, WIDTHS
+from reports.tables.drawing import csv, latex
+from reports.tables.table import Column, Measured, numbers, table, words
+
+_UNITS = ("frames/s", "ms", "%")
+
+
+@dataclass(frozen=True)
+class PaperFigure:
+    """A figure and its data."""
+
+    draw: Callable[[str], Any]  #: returns it for a column
+    images: Mapping[str, Any] = field(default_factory=dict)  #: radiance by the name of its file
+    rows: Sequence[Mapping[str, Any]] = ()
+    tex: str = ""
+
+
+def write_figures(
+    folder: Path, paper: str | None, rows: Sequence[Mapping[str, Any]], *, quick: bool, progress: Progress
+) -> tuple[str, ...]:
+    """Draw the figures of a paper, or of all, into a folder; return the names of the files.
+
+    Parameters
+    ----------
+    folder
+        Where they go.
+    paper
+        Its name; None for all.
+    rows
+        Claims with their verdicts, see `validation.papers.claims.judged`.
+    quick
+        Smaller images of fewer samples.
+    progress
+        Called with (fraction done, what).
+    """
+    target = ensure_folder(folder)
+    chosen = {name: make for name, (of, make) in _FIGURES.items() if paper is None or paper in of}
+    shown = [row for row in rows if row["published"] is not None and row["measured"] and row["unit"] in _UNITS]
+    made = {"published": _published(shown)} if shown else {}
+    written: list[Path] = []
+    for at, (name, make) in enumerate(chosen.items()):
+        made[name] = make(quick, part_of(progress, at / len(chosen), (at + 1) / len(chosen), before=f"{name}, "))
+    for name, figure in made.items():
+        written += [save_figure(target / f"{name}{ending}", figure.draw) for ending in ENDINGS]
+        for file, radiance in figure.images.items():
+            written.append(target / f"{name}-{file}.exr")
+            write_exr(written[-1], Image({"total": radiance}))
+        if figure.rows:
+            written.append(target / f"{name}.csv")
+            write_text(written[-1], csv(table("", [Column(key, key) for key in figure.rows[0]], figure.rows)))
+        if figure.tex:
+            written.append(target / f"{name}.tex")
+            write_text(written[-1], figure.tex)
+    return tuple(map(str, written))
+
+
+def _grid(pictures: Sequence[tuple[str, Any]], across: int = 3) -> Callable[[str], Any]:
+    return lambda column: picture_grid(pictures, column, across=across)
+
+
+def _pictures(quick: bool, progress: Progress) -> PaperFigure:
+    """Return the pictures of Biri 2006 and Billeter 2010: a triptych, two lights, two tessellations."""
+    from validation.papers.pictures import tessellations, triptych, two_lights_image
+
+    size = (80, 60) if quick else (400, 300)
+    lit = triptych(size)
+    shared = exposure(list(lit.values())[2])
+    shown = [(f"Biri 2006, Fig. 1\n{label}", tone_mapped(image, shared)) for label, image in lit.items()]
+    images = {f"triptych-{at}": image for at, image in enumerate(lit.values())}
+    images["two-lights"] = two = two_lights_image(size)
+    shown.append(("Billeter 2010, Fig. 1\ntwo lights", tone_mapped(two, exposure(two))))
+    for name, side in tessellations(64 if quick else 256).items():
+        label = "quads by our filter" if name == "ours" else "by the plain Laplacian"
+        images[f"side-{name}"] = np.repeat(side[:, :, None], 3, axis=2)
+        shown.append((f"Billeter 2010, Fig. 8b\n{label}", np.log2(side[::-1])))  # by the side of the quads
+    return PaperFigure(_grid(shown), images)
+
+
+_SHAFTS = {
+    "R1": "R1: 150 samples",
+    "R2": "R2: 32",
+    "R3": "R3: 32, Gaussian",
+    "R4": "R4: 32, bilateral",
+    "shared points": "shared points",
+}
+
+
+def _shafts(quick: bool, progress: Progress) -> PaperFigure:
+    """Return Fig. 5.8 of Ali 2016 in `fence`: R1 to R4, the shared points, the reference, with errors and times."""
+    from realtime.scene.read_scene import read_scene
+    from validation.papers.soft_shafts import RENDERINGS, SCENE, VARIANTS, rendered, shafts_reference, timings
+    from validation.scenes.loading import load_scene
+
+    size = (80, 60) if quick else (200, 152)
+    progress(0.0, "the reference")
+    reference = shafts_reference(size)
+    scene = read_scene(load_scene(SCENE, size).scene)
+    chosen = {name: {**RENDERINGS, **VARIANTS}[name] for name in _SHAFTS}
+    times = timings(scene, chosen, 0.05 if quick else 0.6)
+    factor, shown, images, rows = exposure(reference.image), [], {}, []
+    for (name, values), time in zip(chosen.items(), times.values()):
+        image = rendered(scene, values)
+        images[name.replace(" ", "-")] = image
+        error = reference.error(image)
+        rows.append({"label": _SHAFTS[name], "error": error, "ms": time.median_ms})
+        title = f"{_SHAFTS[name]}\nerror {error:.3f}, {time.median_ms:.0f} ms"
+        shown.append((title, tone_mapped(image, factor)))
+    images["reference"] = reference.image
+    shown.append(("reference", tone_mapped(reference.image, factor)))
+    return PaperFigure(_grid(shown), images, rows)
+
+
+def _cloud_images(quick: bool, progress: Progress) -> PaperFigure:
+    """Return Figs 11 and 12 of Bouthors 2008: clouds by collectors above the same by light paths."""
+    from validation.papers.clouds import GAP, LOBES, RESULTS, SAMPLES, SIZE, pair_of, shown
+
+    size, samples = ((24, 18), 16) if quick else (SIZE, SAMPLES)
+    scenes = {name: "Fig. 12" for name in RESULTS} | {GAP: "Fig. 11a", LOBES: "Fig. 11b"}
+    above, below, images = [], [], {}
+    for at, (name, figure) in enumerate(scenes.items()):
+        part = part_of(progress, at / len(scenes), (at + 1) / len(scenes), before=f"{name}, ")
+        pair = pair_of(shown(name, size), samples, part)
+        factor = exposure(pair.image)
+        images |= {f"{name}-collectors": pair.image, f"{name}-light-paths": pair.reference}
+        above.append((f"{figure}, {name}\ncollectors", tone_mapped(pair.image, factor)))
+        below.append((f"{figure}, {name}\nlight paths", tone_mapped(pair.reference, factor)))
+    return PaperFigure(_grid([*above, *below], across=4), images)
+
+
+_ORDERS = ("2", "5-6", "13-18", "31-inf")  # that are drawn
+_WAYS = {
+    "exact": ("-", "blue", "computed"),
+    "table": (":", "green", "tables"),
+    "fit": ("--", "vermillion", "22 functions"),
+}
+
+
+def _cloud_transport(quick: bool, progress: Progress) -> PaperFigure:
+    """Return Fig. 8 of Bouthors 2008: the light that leaves a point of a slab by its direction, in three ways."""
+    from validation.papers.slab import transport_curves
+
+    rows = [
+        {key: curve[key] for key in ("thickness", "depth", "orders")} | dict(zip(("angle", *_WAYS), numbers))
+        for curve in transport_curves()
+        for numbers in zip(curve["angle"], *(curve[way] for way in _WAYS), strict=True)
+    ]
+
+    def draw(column: str) -> Any:
+        places = list(dict.fromkeys((row["thickness"], row["depth"]) for row in rows))
+        width, across = WIDTHS[column], 2 if column == "double" else 1
+        down = -(-len(places) // across)
+        figure = new_figure(width, 0.6 * down * width / across)
+        panels = figure.subplots(down, across, sharex=True, squeeze=False).ravel()
+        for panel, place in zip(panels, places):
+            for at, orders in enumerate(_ORDERS):
+                own = [row for row in rows if (row["thickness"], row["depth"], row["orders"]) == (*place, orders)]
+                lit = np.array([row["exact"] or 0.0 for row in own]) > 0
+                for way, (style, colour, label) in _WAYS.items():
+                    values = np.array([row[way] or 0.0 for row in own], dtype=float)
+                    curve = np.where(lit & (values > 0), values, np.nan)
+                    label = "" if at else label
+                    panel.plot([row["angle"] for row in own], curve, style, color=COLOURS[colour], label=label or None)
+            title = f"{place[0]:g} m thick, {place[1]:g} m deep, orders {', '.join(_ORDERS)}"
+            panel.set_title(title, fontsize=6)
+            panel.set(yscale="log", xlabel="zenith angle of the view [degrees]", ylabel="T [1/sr]")
+        panels[0].legend()
+        for panel in panels[len(places) :]:
+            panel.set_axis_off()
+        return figure
+
+    return PaperFigure(draw, rows=rows)
+
+
+def _published(rows: Sequence[Mapping[str, Any]]) -> PaperFigure:
+    """Return the numbers that papers print of times and fractions beside ours, a panel for each unit.
+
+    The machines are not the same: what can be compared are ratios within a paper.
+    """
+    panels: dict[str, list[Mapping[str, Any]]] = {}
+    for row in rows:
+        panels.setdefault(f"{row['paper']} [{row['unit']}]", []).append(row)
+
+    def draw(column: str) -> Any:
+        lines = [len(several) for several in panels.values()]
+        figure = new_figure(WIDTHS[column], 0.17 * sum(lines) + 0.5 * len(panels) + 0.3)
+        axes = figure.subplots(len(panels), 1, squeeze=False, height_ratios=lines)[:, 0]
+        for panel, (title, several) in zip(axes, panels.items()):
+            places = range(len(several))
+            printed, middle, low, high = (
+                [row[key] for row in several] for key in ("published", "measured", "low", "high")
+            )
+            panel.plot(printed, places, "|", color="black", markersize=8, markeredgewidth=1.4, label="published")
+            spread = [[m - a for m, a in zip(middle, low)], [b - m for m, b in zip(middle, high)]]
+            panel.errorbar(middle, places, xerr=spread, fmt="o", markersize=3, color=COLOURS["blue"], label="measured")
+            panel.set_yticks(places, [row["item"] for row in several])
+            panel.set(xscale="log", ylim=(len(several) - 0.5, -0.5), title=title)
+            panel.grid(False, axis="y")
+        figure.axes[0].legend(loc="best")
+        return figure
+
+    columns = (*words(item=""), *numbers("published", "measured"), *numbers("ratio", how={"digits": 2}))
+    tables = []
+    for title, several in panels.items():
+        cells = []
+        for row in several:
+            printed = row["published"]
+            shown = int(printed) if printed == int(printed) else printed  # the digits that were printed
+            ours = Measured(row["measured"], row["low"], row["high"])
+            cells.append((row["item"], shown, ours, row["measured"] / printed))
+        tables.append(table(title, columns, cells))
+    keys = ("paper", "item", "unit", "published", "measured", "low", "high", "why")
+    kept = [{key: row[key] for key in keys} for row in rows]
+    return PaperFigure(draw, rows=kept, tex=latex(tables, comment=("Medians with the distances to the quartiles.",)))
+
+
+#: Figures by name: of which papers, and what makes them.
+_FIGURES: Mapping[str, tuple[tuple[str, ...], Callable[[bool, Progress], PaperFigure]]] = {
+    "paper-images": (("biri", "billeter"), _pictures),
+    "shafts-strip": (("ali",), _shafts),
+    "cloud-images": (("bouthors",), _cloud_images),
+    "cloud-transport": (("bouthors",), _cloud_transport),
+}

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Figures for papers: an empty one, pictures in a grid, and how a figure becomes a file.
+
+What varies from run to run, such as the date, is in no file: the same numbers give the same bytes.
+"""
+
+import io
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from reference.storage.files import write_bytes
+from reports.plotting.style import WIDTHS, figure_style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Metadata without anything that differs from one run to the next.
+_METADATA: Mapping[str, dict[str, Any]] = {".pdf": {"CreationDate": None}, ".png": {"Software": None}}
+ENDINGS = tuple(_METADATA)
+
+
+def save_figure(path: Path, draw: Callable[[str], "Figure"], column: str = "double") -> Path:
+    """Write a figure as PDF or PNG, by the ending of the path; return the path.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    draw
+        Returns the figure for a column of `reports.plotting.style.WIDTHS`.
+    column
+        'single' or 'double'.
+    """
+    with figure_style(column):
+        buffer = io.BytesIO()
+        draw(column).savefig(buffer, format=path.suffix[1:], metadata=_METADATA[path.suffix])
+    write_bytes(path, buffer.getvalue())
+    return path
+
+
+def new_figure(width: float, height: float) -> "Figure":
+    """Return an empty figure of this size [inches], without overlaps, window or global state."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def name_sizes(panel: "Axes", sizes: Iterable[float]) -> None:
+    """Name these sizes along the axis and nothing else: what lies between powers of ten would overlap."""
+    from matplotlib.ticker import FixedLocator, NullLocator
+
+    shown = sorted(set(sizes))
+    panel.xaxis.set_major_locator(FixedLocator(shown))
+    panel.xaxis.set_minor_locator(NullLocator())
+    panel.set_xticklabels([f"{size:g}" for size in shown])
+
+
+def picture_grid(pictures: Sequence[tuple[str, Any]], column: str, *, across: int = 3) -> "Figure":
+    """Return a figure of pictures with titles, in rows.
+
+    Parameters
+    ----------
+    pictures
+        Titles and pictures, (height, width, 3) in 8 bits, or (height, width) for shades of grey.
+    column
+        Of `reports.plotting.style.WIDTHS`.
+    across
+        Pictures in a row.
+    """
+    wide, down = WIDTHS[column], -(-len(pictures) // across)
+    height, width = pictures[0][1].shape[:2]
+    figure = new_figure(wide, down * (wide / across * height / width + 0.36))
+    panels = figure.subplots(down, across, squeeze=False).ravel()
+    for panel in panels:
+        panel.set_axis_off()
+    for panel, (title, picture) in zip(panels, pictures):
+        show_picture(panel, picture, title, 6 if column == "double" else 4.5)
+    return figure
+
+
+def show_picture(panel: "Axes", picture: Any, title: str = "", size: float = 6) -> None:
+    """Show a picture in a panel without ticks, pixel by pixel."""
+    panel.imshow(picture, interpolation="nearest", cmap="gray" if picture.ndim == 2 else None)
+    panel.set(xticks=[], yticks=[])
+    panel.grid(False)
+    panel.set_title(title, fontsize=size, parse_math=False)  # a dollar in a name must not begin a formula

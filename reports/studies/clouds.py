@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Studies of clouds: a slab in sunlight by order of scattering, and the tables of canonical transport."""
+
+import json
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from analytic.errors import InputError
+from reports.api.inputs import Progress, Words, one_error, several, telling
+from reports.studies.result import Study
+from reports.tables.table import Column, Table, numbers, table, words
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    Depths: TypeAlias = Sequence[float] | str | None
+    Directions: TypeAlias = Sequence[tuple[float, float]] | str
+else:
+    Depths = Directions = str
+
+_SIDES = (("reflectance", "reflected", "blue"), ("transmittance", "transmitted", "vermillion"))
+_ORDERS = (
+    ("reflectance", "reflected"),
+    ("reflected_mean", "mean"),
+    ("reflected_rms", "rms"),
+    ("transmittance", "transmitted"),
+    ("transmitted_mean", "mean"),
+    ("transmitted_rms", "rms"),
+)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class SlabStudy(Study):
+    """The light of a slab by order of scattering.
+
+    A row for each set of orders has `orders` (its name), `reflectance`, `transmittance`, `reflected_mean`,
+    `reflected_rms`, `transmitted_mean`, `transmitted_rms` [mean free paths] and `fluence`, a row for each depth.
+    `data` has besides `orders` the `total` of all, with `reflectance`, `transmittance`, `flux` and `radiance`, the
+    estimated `error` of every number, and `photons`: the same by photons, with standard errors.
+    """
+
+    def __getitem__(self, name: Any) -> Mapping[str, Any]:
+        """Return the row of a set of orders by its name, such as '3-4', or of one order by its number."""
+        for row in self.rows:
+            if row["orders"] == str(name):
+                return row
+        raise KeyError(name)
+
+
+@one_error
+def slab(
+    tau: float,
+    sun: float,
+    *,
+    phase: str = "isotropic",
+    albedo: float = 1.0,
+    orders: Words = "sets",
+    depths: Depths | None = None,
+    directions: Directions = "",
+    photons: int = 0,
+    seed: int = 0,
+    force: bool = False,
+    progress: Progress = None,
+) -> SlabStudy:
+    """Compute the light of a slab in sunlight by order of scattering.
+
+    That is what it reflects and transmits, and where that light leaves it. Order n is light that was scattered n times.
+    Displacements are measured from the point of entry, horizontally: the mean along the direction in which the sun's
+    light travels, and rms, the root of the mean of x^2 + y^2. The numbers come from a deterministic computation with an
+    estimate of its error; `--photons` puts a random walk with standard errors beside them. See docs/the-reference.md.
+
+    Parameters
+    ----------
+    tau
+        Thickness of the slab [mean free paths], 1e-6 to 1e4.
+    sun
+        Zenith angle of the sun [degrees], from 0 to below 90.
+    phase
+        isotropic, hg:G, hg-draine:D, mie, mie-modified, or a CSV file of angles [degrees] and values.
+    albedo
+        Single-scattering albedo, 0 to 1.
+    orders
+        Orders, such as 1,2,3-4,31-inf; sets: those of Bouthors 2008; all: their sum.
+    depths
+        Where fluence, flux and radiance are wanted [mean free paths], with commas; top and bottom by default.
+    directions
+        Of the radiance, as MU:PHI with commas: mu positive upwards, phi [degrees] 0 forward.
+    photons
+        How many photons check the numbers.
+    seed
+        Of the photons.
+    force
+        Start also what will take more than an hour.
+    progress
+        Called with (fraction done, what); True shows a bar.
+
+    Examples
+    --------
+    >>> import airlight
+    >>> light = airlight.study("slab", 2.0, 30.0, phase="hg:0.75", albedo=0.9, orders=[1, 2])
+    >>> light["1"]["reflectance"] > 0
+    True
+    """
+    from validation.slab.light import expected_seconds, slab_numbers
+    from validation.slab.request import slab_request
+
+    if photons != int(photons) or photons == 1 or photons < 0:
+        raise InputError(f"photons: got {photons}, wanted a whole number from 2 on, for example 1000000")
+    if seed < 0:
+        raise InputError(f"seed: got {seed}, wanted a whole number from 0 on")
+    chosen = orders if isinstance(orders, str) else several(orders)
+    request = slab_request(
+        tau, sun, phase=os.fspath(phase), albedo=albedo, orders=chosen, depths=depths, directions=directions
+    )
+    hours = expected_seconds(request, int(photons)) / 3600
+    if hours > 1 and not force:
+        raise InputError(f"photons: {photons} photons would take about {hours:.1f} hours; give fewer, or --force")
+    with telling(progress, "slab") as tell:
+        record = json.loads(json.dumps(slab_numbers(request, photons=int(photons), seed=seed, progress=tell)))
+    total = record["total"]
+    worst = max(_relative_errors(record, record["error"]), default=0.0)
+    said = (
+        f"All orders: reflectance {total['reflectance']:.7g}, transmittance {total['transmittance']:.7g} (with the "
+        f"light that was never scattered). Largest relative error of all numbers, estimated: {worst:.1g}."
+    )
+    return SlabStudy(
+        name="slab",
+        data=record,
+        drawn=tuple(_slab_tables(record)),
+        said=(said,),
+        rows=tuple(record["orders"]),
+        draw=partial(_draw_slab, record),
+    )
+
+
+def _relative_errors(values: Any, errors: Any) -> Iterator[float]:
+    if isinstance(errors, Mapping):
+        for name in errors:
+            if name not in ("depth", "mu", "phi"):
+                yield from _relative_errors(values[name], errors[name])
+    elif isinstance(errors, list):
+        for pair in zip(values, errors, strict=True):
+            yield from _relative_errors(*pair)
+    elif isinstance(errors, float) and values:
+        yield errors / abs(values)
+
+
+def _slab_tables(record: Mapping[str, Any]) -> Iterator[Table]:
+    def by_order(title: str, rows: Any, digits: int = 6) -> Table:
+        columns = (*words("orders"), *(Column(key, heading, digits=digits) for key, heading in _ORDERS))
+        return table(title, columns, rows)
+
+    six = {"digits": 6}
+    yield by_order("By order; lengths in mean free paths", record["orders"])
+    photons = record.get("photons")
+    if photons:
+        yield by_order(f"By {photons['count']} photons", photons["orders"])
+        yield by_order("Standard errors of the photons", photons["standard_error"]["orders"], digits=2)
+    fluence = [{"orders": row["orders"], **each} for row in record["orders"] for each in row["fluence"]]
+    if fluence:
+        columns = (*words("orders"), *numbers("depth", "value", "mean", "rms", how=six))
+        yield table("Fluence for unit flux across the beam", columns, fluence)
+    total = record["total"]
+    if total["flux"]:
+        columns = numbers("depth", "up", "down", how=six)
+        yield table("Diffuse flux of all orders for a flux of pi across the beam", columns, total["flux"])
+    if total["radiance"]:
+        errors = record["error"]["total"]["radiance"]
+        rows = [{**row, "error": error["value"]} for row, error in zip(total["radiance"], errors, strict=True)]
+        columns = (*numbers("depth", "mu", "phi", "value", how=six), Column("error", "error", digits=2))
+        yield table("Radiance of all orders for a flux of pi across the beam", columns, rows)
+
+
+def _draw_slab(record: Mapping[str, Any], column: str) -> Any:
+    """Return what leaves a slab by order, and how far from the entry, computed and by photons."""
+    import numpy as np
+
+    from reports.plotting.figure import new_figure
+    from reports.plotting.style import COLOURS, WIDTHS, truth_style
+
+    rows, walked = record["orders"], record.get("photons")
+    width, double = WIDTHS[column], column == "double"
+    figure = new_figure(width, 0.42 * width if double else 1.5 * width)
+    fractions, lengths = figure.subplots(*((1, 2) if double else (2, 1)))
+    places = np.arange(len(rows))
+    dots = truth_style() | {"linestyle": "none", "marker": "o", "markersize": 2.5}
+
+    def values(of: Any, name: str) -> Any:
+        return np.array([np.nan if row[name] is None else row[name] for row in of], dtype=float)
+
+    def put(panel: Any, name: str, at: Any, label: str | None = None) -> None:
+        if walked:
+            errors = 2 * np.nan_to_num(values(walked["standard_error"]["orders"], name))
+            panel.errorbar(at, values(walked["orders"], name), errors, capsize=2, label=label, **dots)
+
+    for number, (share, side, colour) in enumerate(_SIDES):
+        at = places + 0.4 * number - 0.2
+        fractions.bar(at, values(rows, share), 0.38, color=COLOURS[colour], label=side)
+        put(fractions, share, at, "photons, ±2 standard errors" if number else None)
+        for kind, style in (("mean", "--"), ("rms", "-")):
+            name = f"{side}_{kind}"
+            lengths.plot(places, values(rows, name), style, color=COLOURS[colour], label=f"{side}, {kind}")
+            put(lengths, name, places)
+    for panel in (fractions, lengths):
+        panel.set_xticks(places, [row["orders"] for row in rows], rotation=45)
+        panel.set_xlabel("order of scattering")
+        panel.legend()
+    fractions.set_ylabel("fraction of the light [1]")
+    lengths.set_ylabel("distance from the entry [mean free paths]")
+    return figure
+
+
+@one_error
+def transport(phase: str = "mie-modified", *, albedo: float = 1.0, progress: Progress = None) -> Study:
+    """Make the tables of canonical transport that methods for clouds look up.
+
+    They hold light scattered in a slab by sets of orders, with where it entered: T, c and sigma. They are cached, so
+    that each phase function and albedo takes its minutes once. See docs/the-reference.md.
+
+    Parameters
+    ----------
+    phase
+        isotropic, hg:G, hg-draine:D, mie, mie-modified, or a CSV file of angles [degrees] and values.
+    albedo
+        Single-scattering albedo, 0 to 1.
+    progress
+        Called with (fraction done, what); True shows a bar.
+    """
+    from reports.machine.environment import activate
+
+    activate()
+    from validation.slab.canonical import canonical_record
+
+    with telling(progress, "transport") as tell:
+        record = canonical_record(phase, albedo, progress=tell)
+    columns = (*words("orders"), *numbers(coefficients="products", mb="MB"))
+    rows = [{**row, "mb": row["bytes"] / 1e6} for row in record["sets"]]
+    where = "from the cache" if record["kept"] else "made now"
+    said = (
+        f"{record['phase']}, albedo {record['albedo']:g}: {record['bytes'] / 1e6:.1f} MB, {where}; they took "
+        f"{record['seconds']:.0f} s to make."
+    )
+    drawn = table("Tables of the canonical transport by set of orders", columns, rows)
+    return Study(name="transport", data=record, drawn=(drawn,), said=(said,), rows=tuple(record["sets"]))

@@ -1,0 +1,515 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Studies of kernels: costs, errors over depth and angle, where they break, integrals of a file."""
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+from analytic.errors import InputError
+from reports.api.inputs import File, KernelLike, Kernels, Progress, kernel_name, one_error, several, telling
+from reports.machine.progress import counted
+from reports.studies.result import Study, with_environment
+from reports.tables.kernels import kernel_tables
+from reports.tables.table import Column, Table, number, numbers, table, words
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import DTypeLike, NDArray
+
+    from analytic.cases import Cases
+
+    CasesLike: TypeAlias = Mapping[str, Any] | Cases | File
+else:
+    CasesLike = File
+
+# What they cost
+
+_STATISTICS = {"median": "half of the rays", "p99": "99 % of the rays", "max": "worst ray"}
+_SHOWN = (1e-7, 10.0)  # errors; those outside are drawn at the edge
+
+
+@one_error
+def kernels(*, kernel: Kernels = (), phase: str | None = None, rays: int = 480_000, progress: Progress = None) -> Study:
+    """Time airlight kernels alone and measure their errors.
+
+    ns/ray: the kernel alone by Dr.Jit's history, median. The figure shows time against error in isotropic fog, a line
+    for each kernel over its sizes.
+
+    Parameters
+    ----------
+    kernel
+        A kernel of `airlight list kernels`; may be given several times, all by default.
+    phase
+        The only phase function, such as hg-draine:12 or mie:6.
+    rays
+        How many.
+    progress
+        Called with (fraction done, what); True shows a bar.
+    """
+    from analytic.phase import phase_from_words
+    from reports.machine.environment import activate
+
+    activate()
+    from validation.kernels.benchmark import PHASES, bench_kernels
+    from validation.metrics.errors import plain
+
+    phases = PHASES if phase is None else ((phase, phase_from_words(phase).g),)
+    named = [kernel_name(each) for each in several(kernel)] or None
+    with telling(progress, "kernels") as tell:
+        found = bench_kernels(named, phases=phases, rays=rays, progress=counted(tell))
+    data = plain(found)
+    drawn = kernel_tables(data["costs"], data["levels"])
+    said = ("ns/ray: the kernel alone by Dr.Jit's history, median.",)
+    shown = [cost for cost in data["costs"] if cost["phase"] == phases[0][0] and not cost["refused"]]
+    return Study(
+        name="kernels",
+        data=with_environment(kernels=data),
+        drawn=tuple(drawn),
+        said=said,
+        draw=partial(_draw_costs, shown),
+    )
+
+
+def _draw_costs(costs: Sequence[Mapping[str, Any]], column: str) -> Any:
+    """Return nanoseconds a ray against the error."""
+    from reports.plotting.figure import new_figure
+    from reports.plotting.style import WIDTHS, kernel_style
+
+    width, double = WIDTHS[column], column == "double"
+    figure = new_figure(width, 0.42 * width if double else 1.9 * width)
+    panels = figure.subplots(*((1, 3) if double else (3, 1)), sharex=True, sharey=True)
+    for panel, (statistic, title) in zip(panels, _STATISTICS.items()):
+        for family in dict.fromkeys(cost["family"] for cost in costs):
+            style = kernel_style(family)
+            points = sorted(
+                ((cost["device"] or cost["wall"])["median"], cost[statistic])
+                for cost in costs
+                if cost["family"] == family and (cost["device"] or cost["wall"]) and cost[statistic] is not None
+            )
+            times = [point[0] for point in points]
+            errors = [min(max(point[1], _SHOWN[0]), _SHOWN[1]) for point in points]
+            panel.plot(times, errors, label=family, linestyle="-", clip_on=False, zorder=3, **style)
+        panel.set(xscale="log", yscale="log", xlabel="time of a ray [ns]", title=title)
+        panel.set_ylim(0.6 * _SHOWN[0], 1.6 * _SHOWN[1])
+    for panel in panels if not double else panels[:1]:
+        panel.set_ylabel("relative error of J [1]")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=6 if double else 3)
+    return figure
+
+
+# Their errors over depth and angle
+
+_DEPTHS = (1e-3, 30.0)  # optical depth of the distance to the light
+_ANGLES = (0.5, 179.5)  # [degrees]
+_REACH = 2.0  # length of the segment over the distance to the light
+_FLOOR, _CEILING = 1e-7, 1.0  # ends of the colour scale: the rounding of float32, and no correct digit
+
+
+@one_error
+def kernel_errors(*, quick: bool = False, progress: Progress = None) -> Study:
+    """Measure the error of each kernel over the optical depth and the angle of a ray.
+
+    A ray is described by the distance d from the camera to the light, as optical depth sigma_t d, and by the angle
+    between the ray and the direction to the light. Its segment goes from the camera to 2 d. Kernels run in float32 with
+    their default sizes, in isotropic fog; they are compared with certified values.
+
+    Parameters
+    ----------
+    quick
+        Fewer rays.
+    progress
+        Called with (fraction done, what); True shows a bar.
+    """
+    from reports.machine.environment import activate
+
+    activate()
+    import numpy as np
+
+    from realtime.kernels.registry import KERNELS
+    from validation.kernels.errors import relative_error
+    from validation.kernels.values import evaluate_cases
+    from validation.study.configuration import find_kernel
+
+    cases, depth, angle = _grid_rays(*((24, 18) if quick else (48, 37)))
+    rows: list[dict[str, Any]] = []
+    with telling(progress, "kernel-errors") as tell:
+        for at, name in enumerate(KERNELS):
+            tell(at / len(KERNELS), name)
+            evaluated = evaluate_cases(cases, find_kernel(name), "single")
+            if not evaluated.accepted.any():
+                continue
+            error = relative_error(evaluated.J, np.asarray(cases.value), "single")
+            keys = ("kernel", "optical_depth", "angle_degrees", "relative_error")
+            rows += [dict(zip(keys, (name, *row))) for row in zip(depth.tolist(), angle.tolist(), error.tolist())]
+    largest = [
+        (name, *np.nanquantile([row["relative_error"] for row in rows if row["kernel"] == name], (0.5, 0.99, 1)))
+        for name in dict.fromkeys(row["kernel"] for row in rows)
+    ]
+    columns = (*words("kernel"), *numbers("median", p99="99 %", max="", how={"digits": 2}))
+    from validation.metrics.errors import plain
+
+    return Study(
+        name="kernel-errors",
+        data=with_environment(rays=plain(rows)),
+        drawn=(table(f"Relative errors of J on {len(depth)} rays, isotropic, float32", columns, largest),),
+        rows=tuple(rows),
+        draw=partial(_draw_errors, rows),
+    )
+
+
+def _grid_rays(columns: int, lines: int) -> tuple[Any, Any, Any]:
+    """Return rays on a grid, with the certified J, and the optical depth and angle [degrees] of each."""
+    import numpy as np
+
+    from validation.kernels.rays import table as ray_table
+    from validation.kernels.rays import with_truth
+
+    grid = np.meshgrid(np.geomspace(*_DEPTHS, columns), np.linspace(*_ANGLES, lines), indexing="ij")
+    depth, angle = (values.ravel() for values in grid)
+    foot, height = (
+        (depth * part).astype(np.float32).astype(np.float64)
+        for part in (np.cos(np.radians(angle)), np.sin(np.radians(angle)))
+    )
+    end = (_REACH * depth).astype(np.float32).astype(np.float64)
+    zero, ones = np.zeros_like(depth), np.ones_like(depth)
+    names, tags = np.full(len(depth), "isotropic"), np.full(len(depth), "grid")
+    cases = ray_table(names, zero, foot=foot, height=height, x0=zero, x1=end, sigma_t=ones, tags=tags)
+    return with_truth(cases), depth, angle
+
+
+def _draw_errors(rows: Sequence[Mapping[str, Any]], column: str) -> Any:
+    import numpy as np
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LogNorm
+
+    from reports.plotting.figure import new_figure
+    from reports.plotting.style import WIDTHS
+
+    names = list(dict.fromkeys(row["kernel"] for row in rows))
+    across = 4 if column == "double" else 3
+    down = -(-len(names) // across)
+    width = WIDTHS[column]
+    figure = new_figure(width, down * width / across * 0.85 + 0.35)
+    panels = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False)
+    norm = LogNorm(_FLOOR, _CEILING, clip=True)
+    for panel, name in zip(panels.flat, names):
+        own = [row for row in rows if row["kernel"] == name]
+        depth, angle, error = (
+            np.array([row[key] for row in own]) for key in ("optical_depth", "angle_degrees", "relative_error")
+        )
+        depths, angles = np.unique(depth), np.unique(angle)
+        grid = np.full((len(angles), len(depths)), np.nan)
+        grid[np.searchsorted(angles, angle), np.searchsorted(depths, depth)] = error
+        panel.set_facecolor("#ff00ff")  # shows where a kernel's value is not finite
+        shown = np.maximum(np.ma.masked_invalid(grid), _FLOOR)
+        panel.pcolormesh(depths, angles, shown, norm=norm, cmap="cividis", rasterized=True)
+        panel.set(xscale="log", yticks=[0, 45, 90, 135, 180], title=name)
+        panel.grid(False)
+    for panel in panels.flat[len(names) :]:
+        panel.set_axis_off()
+    figure.supxlabel("optical depth of the distance to the light [1]", fontsize="medium")
+    figure.supylabel("angle from the light [degrees]", fontsize="medium")
+    scale = {"label": "relative error of J [1]", "aspect": 40, "extend": "both", "shrink": 0.8}
+    figure.colorbar(ScalarMappable(norm, "cividis"), ax=panels, **scale)
+    return figure
+
+
+# Where they break, in the manner of Boost's accuracy reports: Max = 3.2ε (Mean = 0.4ε)
+
+_EPSILON = {"single": 2.0**-23, "double": 2.0**-52}
+_ALARM = {"alarm": True}
+
+
+@one_error
+def stability(*, kernel: Kernels = (), rays: int = 100_000, progress: Progress = None) -> Study:
+    """Look for rays on which kernels break.
+
+    Tries every kernel on certified values and on rays of every magnitude. Prints the ray of each largest error in the
+    format of `airlight study integrals`. Exit status 1 if a kernel that claims to be exact exceeds the error that it
+    claims.
+
+    Parameters
+    ----------
+    kernel
+        A kernel, 'name-N' or 'module:function'; may be given several times, all by default.
+    rays
+        How many are generated, from 64 to a million.
+    progress
+        Called with (fraction done, what); True shows a bar.
+    """
+    if not 64 <= rays <= 1_000_000:
+        raise InputError(f"rays: got {rays}, wanted a number from 64 to 1000000")
+    from reports.machine.environment import activate
+
+    activate()
+    from validation.kernels.stability import CERTIFIED, Bar
+    from validation.kernels.stability import stability as run
+    from validation.metrics.errors import plain
+
+    named = [kernel_name(each) or "" for each in several(kernel)] or None
+    with telling(progress, "stability") as tell:
+        found = run(named, count=rays, progress=counted(tell))
+    data = plain({"certified": CERTIFIED, "bar": Bar(), "kernels": found})
+    drawn = [each for one in data["kernels"] for each in _stability_tables(one)]
+    return Study(
+        name="stability",
+        data=with_environment(**data),
+        drawn=tuple(drawn),
+        said=tuple(line for one in data["kernels"] for line in _stability_lines(one)),
+        good=not any(one["broken"] for one in data["kernels"]),
+    )
+
+
+def _stability_tables(kernel: Mapping[str, Any]) -> Iterator[Table]:
+    claim = ", claims to be exact" if kernel["exact"] else ""
+    for rays in kernel["sets"]:
+        yield replace(_set_table(rays), title=f"{kernel['kernel']}{claim}, {rays['name']}")
+    yield replace(_gamma_table(kernel["gamma"]), title=f"{kernel['kernel']}: thin lit slivers far from the light")
+
+
+def _stability_lines(kernel: Mapping[str, Any]) -> Iterator[str]:
+    for phase, reason in kernel["refused"].items():
+        yield f"{kernel['kernel']} refuses {phase}: {reason}"
+    for rays in kernel["sets"]:
+        worst = [rays[precision]["all"]["worst"] for precision in ("single", "double")]
+        if any(worst):
+            yield f"worst rays of {kernel['kernel']}, float32 then float64:"
+            yield from (rays["columns"], *filter(None, worst))
+    yield from (f"BROKEN: {kernel['kernel']}, {reason}" for reason in kernel["broken"])
+
+
+def _set_table(rays: Mapping[str, Any]) -> Table:
+    """Return the errors of a kernel on one set of rays, by group."""
+    columns = (
+        *words(group="rays"),
+        *numbers(rays="count", refused=""),
+        *words(single="float32"),
+        *numbers("median", p99="99 %", odd="NaN/Inf/<0"),
+        *words(double="float64"),
+        *numbers(double_odd="NaN/Inf/<0", both="32 vs 64"),
+    )
+
+    def rows() -> Iterator[Mapping[str, Any]]:
+        for group, single in rays["single"].items():
+            double, both = rays["double"][group], rays["single_against_double"][group]["max"]
+            written = {"single": in_epsilons(single, "single"), "double": in_epsilons(double, "double")}
+            odd = {"odd": _odd(single), "double_odd": _odd(double)}
+            yield {**single, **written, **odd, "group": group, "refused": single["refused"] or "", "both": both}
+
+    about = "Relative errors; ε is 1.2e-7 in float32 and 2.2e-16 in float64, median and 99 % are of float32."
+    return table(rays["name"], columns, rows(), explanation=about)
+
+
+def in_epsilons(errors: Mapping[str, Any], precision: str) -> str:
+    """Return 'Max = 3.2ε (Mean = 0.4ε)', a dash where nothing was compared."""
+    if errors["max"] is None or errors["mean"] is None:
+        return "-"
+    epsilon = _EPSILON[precision]
+    return f"Max = {number(errors['max'] / epsilon)}ε (Mean = {number(errors['mean'] / epsilon)}ε)"
+
+
+def _odd(errors: Mapping[str, Any]) -> str:
+    counts = (errors["nan"], errors["infinite"], errors["negative"])
+    return "/".join(map(str, counts)) if any(counts) else ""
+
+
+def _gamma_table(by_precision: Mapping[str, Any]) -> Table:
+    """Return what is lost to cancellation where J is a difference of two Gammas."""
+    columns = (
+        *words(precision="slivers", direct="J(x0, x1)", difference="J(0, x1) - J(0, x0)"),
+        *numbers("median"),
+        *numbers("negative", how=_ALARM),
+        *words(rounding="in ε (J(0, x0) + J(0, x1))"),
+    )
+    rows = [
+        {
+            **study["difference"],
+            "precision": precision,
+            "direct": in_epsilons(study["direct"], precision),
+            "difference": in_epsilons(study["difference"], precision),
+            "rounding": f"Max = {number(study['max_rounding'])} (Median = {number(study['median_rounding'])})",
+        }
+        for precision, study in by_precision.items()
+    ]
+    return table("cancellation", columns, rows)
+
+
+# Integrals of a file
+
+_ROWS = 12  #: of integrals shown in a notebook
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Integrals(Study):
+    """The airlight integral of some cases by a kernel."""
+
+    J: "NDArray[np.float64]"  #: by the kernel [1/m], of the shape of the columns that were given
+    value: "NDArray[np.float64] | None"  #: certified, or as given by the file [1/m], of the same shape
+    kernel: str
+    precision: str  #: 'single' or 'double'
+    cases: "Cases"  #: the cases, one after the other
+
+    @property
+    def summary(self) -> Mapping[str, Any]:
+        """The number of rows and, with values to compare, the quantiles of the relative error."""
+        found: Mapping[str, Any] = self.data
+        return found
+
+    @property
+    def error(self) -> "NDArray[np.float64] | None":
+        """The signed relative error (J - value) / value; None where there is nothing to compare with."""
+        import numpy as np
+
+        if self.value is None:
+            return None
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(self.value == self.J, 0.0, (self.J - self.value) / np.abs(self.value))
+
+    def numpy(self, dtype: "DTypeLike | None" = None) -> "NDArray[Any]":
+        """Return J as an array of the caller's own, which can be written to."""
+        import numpy as np
+
+        return np.array(self.J, dtype=dtype)
+
+    def __array__(self, dtype: "DTypeLike | None" = None, copy: bool | None = None) -> "NDArray[Any]":
+        from reports.api.results import as_array
+
+        return as_array(self.J, dtype, copy)
+
+    def __len__(self) -> int:
+        return self.J.size
+
+    def columns(self) -> dict[str, list[Any]]:
+        """Return columns by name, a value for each case, as `pandas.DataFrame` takes them."""
+        import numpy as np
+
+        cases = self.cases
+        names = {"phase": cases.phase, "g": cases.g, "foot": cases.foot, "height": cases.height}
+        names |= {"x0": cases.x0, "x1": cases.x1, "sigma_t": cases.sigma_t, "J": self.J.reshape(-1)}
+        names |= {} if self.value is None else {"value": self.value.reshape(-1)}
+        return {name: np.asarray(values).tolist() for name, values in names.items()}
+
+    def save(self, path: Path | str, column: str = "double") -> Path:
+        """Write the rows with a column `result` (.csv), or what `Study.save` writes; return the path."""
+        if Path(path).suffix != ".csv":
+            return super().save(path, column)
+        from validation.kernels.cases import write_results
+
+        write_results(self.cases, self.J.reshape(-1), Path(path))
+        return Path(path)
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """The first integrals."""
+        data = {"": list(range(len(self)))} | self.columns()
+        left = len(self) - _ROWS
+        shown = [Column(name, name, digits=9) for name in data]
+        return [table("", shown, list(zip(*data.values()))[:_ROWS], explanation=f"and {left} more" if left > 0 else "")]
+
+    @property
+    def title(self) -> str:
+        """How many, by what, and how wrong."""
+        compared = self.summary.get("p50") is not None
+        errors = [f"{name} {self.summary[name]:.3g}" for name in ("p50", "p99", "max")] if compared else []
+        said = f"; relative error {', '.join(errors)}" if errors else ""
+        return f"{len(self)} integrals by {self.kernel} in {self.precision} precision{said}"
+
+    def text(self, *, width: int | None = None, styled: bool = False) -> str:
+        """Return how many there are and how wrong they are; the values where nothing is compared."""
+        found = self.summary
+        if not found["compared"]:
+            return "".join(f"{value:.9g}\n" for value in self.J.reshape(-1))
+        errors = ", ".join(f"{name} {found[name]:.3g}" for name in ("p50", "p99", "max"))
+        return (
+            f"{found['rows']} rows with {self.kernel} in {self.precision} precision\n"
+            f"relative error against `value`, {found['compared']} rows: {errors}; worst in row {found['worst_row']}\n"
+        )
+
+
+@one_error
+def integrals(
+    cases: CasesLike,
+    kernel: KernelLike = "exact",
+    *,
+    precision: Literal["single", "double"] = "single",
+    phase: str | None = None,
+    certify: bool = False,
+) -> Integrals:
+    """Integrate the airlight of each row of a CSV file by a kernel.
+
+    Rows that have a value are compared with it. Results that are not finite are refused, with the first row.
+
+    Parameters
+    ----------
+    cases
+        A CSV file with the columns of airlight_integral.csv; x1 may be inf. From Python also columns by name, of any
+        shapes that broadcast together: `phase` ('isotropic', 'rayleigh', 'hg' ..), `g` for 'hg', `x0`, `x1` [m],
+        `sigma_t` [1/m], and either `foot` and `height` [m] or `origin`, `direction` and `light`, (..., 3); or a data
+        frame with such columns.
+    kernel
+        Airlight kernel, see `airlight list kernels`.
+    precision
+        Of all that the kernel computes.
+    phase
+        Phase function of all rows, in place of the file's: hg:G, hg-draine:DIAMETER, mie:RADIUS:GAMMA:WAVELENGTH,
+        mie-modified, ...
+    certify
+        Also integrate by adaptive quadrature in float64, to 1e-10, and compare with that where no value is given.
+
+    Examples
+    --------
+    >>> import airlight, numpy as np
+    >>> rays = {"phase": "isotropic", "foot": np.linspace(-2, 2, 5), "height": 0.3, "x0": 0, "x1": np.inf}
+    >>> found = airlight.study("integrals", rays | {"sigma_t": 0.2}, "exact", certify=True)
+    >>> found.J.shape
+    (5,)
+    >>> bool(abs(found.error).max() < 1e-5)
+    True
+    """
+    from analytic.cases import integrate_cases as certified
+    from reports.machine.environment import activate
+
+    read, shape = _cases(cases, phase)
+    activate()
+    from validation.kernels.cases import check_results, integrate_cases, summary
+
+    named = kernel_name(kernel) or "exact"
+    J = integrate_cases(read, named, precision)
+    if isinstance(cases, str | os.PathLike):
+        check_results(read, J, named)
+    if certify and read.value is None:
+        read = replace(read, value=certified(read)[0])
+    return Integrals(
+        name="integrals",
+        data=summary(read, J),
+        J=_sealed(J, shape),
+        value=None if read.value is None else _sealed(read.value, shape),
+        kernel=named,
+        precision=precision,
+        cases=read,
+    )
+
+
+def _cases(cases: Any, phase: str | None) -> "tuple[Cases, tuple[int, ...]]":
+    from analytic.case_columns import cases_from_columns
+    from analytic.cases import Cases, read_cases
+
+    if isinstance(cases, str | os.PathLike):
+        cases = read_cases(Path(cases), phase=phase)
+    elif phase is not None:
+        raise InputError("phase: is for a file; give columns with the phase function that they have")
+    if isinstance(cases, Cases):
+        return cases, (len(cases.x0),)
+    if not isinstance(cases, Mapping) and not hasattr(cases, "keys"):
+        raise InputError(f"cases: got {type(cases).__name__}, wanted columns by name or the path of a CSV file")
+    return cases_from_columns({str(name): cases[name] for name in cases})
+
+
+def _sealed(values: Any, shape: tuple[int, ...]) -> Any:
+    shaped = values.reshape(shape)
+    shaped.flags.writeable = False
+    return shaped

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The studies by name, and `airlight.study`."""
+
+import importlib
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+from analytic.errors import InputError, nearest
+
+#: Study -> the module of its function, which has the same name; imported when one is asked for.
+STUDIES = {
+    "methods": "methods",
+    "decomposition": "methods",
+    "scaling": "methods",
+    "map-size": "methods",
+    "kernels": "kernels",
+    "kernel-errors": "kernels",
+    "stability": "kernels",
+    "integrals": "kernels",
+    "polynomials": "series",
+    "phase-functions": "series",
+    "estimators": "estimators",
+    "convergence": "estimators",
+    "z-distribution": "estimators",
+    "slab": "clouds",
+    "transport": "clouds",
+}
+
+
+def find_study(name: str) -> Callable[..., Any]:
+    """Return the function of a study.
+
+    Raises
+    ------
+    InputError
+        For an unknown study; the nearest is named.
+    """
+    if name not in STUDIES:
+        raise InputError(f"study: got {name!r}, wanted one of {', '.join(STUDIES)}" + nearest(name, STUDIES))
+    function: Callable[..., Any] = getattr(
+        importlib.import_module(f"reports.studies.{STUDIES[name]}"), name.replace("-", "_")
+    )
+    return function
+
+
+def summary(name: str) -> str:
+    """Return the first sentence of a study's help."""
+    return " ".join((inspect.getdoc(find_study(name)) or "").split("\n\n")[0].split())
+
+
+def study(name: str, *arguments: Any, **named: Any) -> Any:
+    """Run a study: measurements of methods, kernels and estimators, with tables and a figure.
+
+    `airlight study NAME --help` says what a study takes. It returns rows, tables
+    and data; `save`, or -o, writes tables (.csv, .tex, .md), data (.json) or the figure (.pdf, .png).
+
+    Parameters
+    ----------
+    name
+        Of `airlight list studies`.
+    arguments, named
+        What the study takes.
+
+    Raises
+    ------
+    InputError
+        For an unknown study, and what the study refuses.
+
+    Examples
+    --------
+    >>> import airlight
+    >>> airlight.study("phase-functions").data["g"] > 0.8
+    True
+    """
+    return find_study(name)(*arguments, **named)

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Studies of formulas: Biri's polynomials beside the kernel that they approximate, phase functions over the angle."""
+
+from functools import partial
+from typing import Any
+
+from analytic.errors import InputError
+from reports.api.inputs import one_error
+from reports.studies.result import Study
+from reports.tables.table import numbers, table, words
+
+_THICKNESSES = (0.1, 0.5, 2.0)
+_BIRI = ("isotropic", "rayleigh", "hazy", "murky")
+_CURVES = ("exact", "taylor", "taylor-printed")
+
+
+@one_error
+def polynomials(*, rays: int = 100_000) -> Study:
+    """Compare Biri's polynomials with the airlight kernel over the angle.
+
+    For each phase function of Biri 2006 and some a = sigma_t height:
+
+        f(theta) = exp(-a (tan(theta/2 + pi/4) - 1)) p(-sin theta),
+
+    exact, by the derived Taylor polynomial of degree 4 and by the one printed in the annex; and the fractions of rays
+    that the three kernels integrate to within 1 % and 10 %.
+
+    Parameters
+    ----------
+    rays
+        Quasi-random rays of which the fractions are counted, from 64 to a million.
+    """
+    if not 64 <= rays <= 1_000_000:
+        raise InputError(f"rays: got {rays}, wanted a number from 64 to 1000000")
+    from reports.machine.environment import activate
+
+    activate()
+    import numpy as np
+
+    from validation.kernels.biri_misprints import printed_against_derived
+
+    theta = np.linspace(-1.5, 1.5, 301)
+    rows = []
+    for phase in _BIRI:
+        for a in _THICKNESSES:
+            curves = _curves(phase, a, theta)
+            for values in zip(theta.tolist(), *(curves[name].tolist() for name in _CURVES)):
+                rows.append({"phase": phase, "a": a, **dict(zip(("theta", *_CURVES), values))})
+    names = ("phase", "region", "kernel", "rays", "within_1_percent", "within_10_percent")
+    within = [{name: getattr(each, name) for name in names} for each in printed_against_derived(rays)]
+    percent = {"percent": True}
+    columns = (
+        *words("phase", "region", "kernel"),
+        *numbers("rays"),
+        *numbers(within_1_percent="within 1 %", within_10_percent="within 10 %", how=percent),
+    )
+    drawn = table("Fractions of rays that a kernel integrates within an error", columns, within)
+    data = {"rays": rays, "within": within, "curves": rows}
+    return Study(name="polynomials", data=data, drawn=(drawn,), rows=tuple(rows), draw=partial(_draw_polynomials, rows))
+
+
+def _curves(phase: str, a: float, theta: Any) -> dict[str, Any]:
+    import numpy as np
+
+    from analytic.phase import PhaseFunction
+    from analytic.series import taylor_coefficients
+    from realtime.kernels.taylor_printed import printed_coefficients
+
+    function = PhaseFunction(phase)
+    exact = np.exp(-a * (np.tan(0.5 * theta + 0.25 * np.pi) - 1)) * function(-np.sin(theta))
+    derived = np.ravel(taylor_coefficients(a, function))
+    # The annex prints c0 to c2 and, for the isotropic case, c3 and c4; the others come from the derivation.
+    printed = [float(c) for c in printed_coefficients(a, phase)]
+    printed += list(derived[len(printed) :])
+    polynomials = {name: np.polyval(c[::-1], theta) for name, c in (("taylor", derived), ("taylor-printed", printed))}
+    return {"exact": exact, **polynomials}
+
+
+def _draw_polynomials(rows: list[dict[str, Any]], column: str) -> Any:
+    from reports.plotting.figure import new_figure
+    from reports.plotting.style import WIDTHS, kernel_style, truth_style
+
+    styles = {
+        "exact": truth_style(),
+        "taylor": {"color": kernel_style("taylor")["color"], "linestyle": "--"},
+        "taylor-printed": {"color": kernel_style("taylor-printed")["color"], "linestyle": ":"},
+    }
+    width = WIDTHS[column]
+    figure = new_figure(width, 0.95 * width if column == "double" else 1.15 * width)
+    panels = figure.subplots(len(_BIRI), len(_THICKNESSES), sharex=True, squeeze=False)
+    for line, phase in zip(panels, _BIRI):
+        for panel, a in zip(line, _THICKNESSES):
+            own = [row for row in rows if (row["phase"], row["a"]) == (phase, a)]
+            largest = max(row["exact"] for row in own)
+            for name, style in styles.items():
+                panel.plot([row["theta"] for row in own], [row[name] for row in own], label=name, **style)
+            panel.set_ylim(-0.25 * largest, 1.25 * largest)
+            panel.set_title(f"{phase}, a = {a:g}")
+    for panel in panels[-1]:
+        panel.set_xlabel("theta [rad]")
+    for line in panels:
+        line[0].set_ylabel("f(theta) [1]")
+    handles, labels = panels[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    return figure
+
+
+#: Curves by their words, with how they are drawn; '=' is the mean cosine of Mie's function.
+_PHASES: dict[str, dict[str, Any]] = {
+    "mie": {"color": "0.0", "linestyle": "-"},
+    "mie-modified": {"color": "0.55", "linestyle": "--"},
+    "hg-draine": {"color": "#0072b2", "linestyle": "-"},
+    "hg:=": {"color": "#009e73", "linestyle": "-"},
+    "hg:0.99": {"color": "#009e73", "linestyle": ":"},
+    "rayleigh": {"color": "#d55e00", "linestyle": "-."},
+}
+
+
+@one_error
+def phase_functions() -> Study:
+    """Compare phase functions of droplets with what stands in for them: Fig. 2 of Bouthors 2008."""
+    import numpy as np
+
+    from analytic.droplets import optics
+    from analytic.phase import phase_from_words
+
+    angle = np.concatenate([np.linspace(0, 10, 201), np.linspace(10, 180, 681)[1:]])
+    g = optics().g
+    down, up = np.sin(np.deg2rad(0.5 * angle)) ** 2, np.cos(np.deg2rad(0.5 * angle)) ** 2
+    values = {name: phase_from_words(name.replace("=", f"{g!r}")).from_half(down, up).tolist() for name in _PHASES}
+    rows = [dict(zip(("angle", *values), row)) for row in zip(angle.tolist(), *values.values())]
+    said = (f"Mean cosine of mie: {g:.6g}",)
+    data = {"g": g, "rows": rows}
+    return Study(name="phase-functions", data=data, said=said, rows=tuple(rows), draw=partial(_draw_phases, rows))
+
+
+def _draw_phases(rows: list[dict[str, Any]], column: str) -> Any:
+    from reports.plotting.figure import new_figure
+    from reports.plotting.style import WIDTHS
+
+    figure = new_figure(WIDTHS[column], 0.62 * WIDTHS[column])
+    panel = figure.subplots()
+    for name, style in _PHASES.items():
+        shown = [(row["angle"], row[name]) for row in rows if row[name] > 0]
+        label = "hg, g of mie" if name == "hg:=" else name.replace(":", ", g = ")
+        panel.plot(*zip(*shown), label=label, **style)
+    panel.set(yscale="log", xlim=(0, 180), xlabel="scattering angle [degrees]", ylabel="phase function, mean 1 [1]")
+    panel.legend()
+    return figure

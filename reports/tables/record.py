@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What public functions return: a result knows its tables, its words and its data.
+
+A terminal, a notebook, Markdown and JSON show the same result; `reports.commands.main` prints it, and ends with the
+status 1 where it did not pass.
+"""
+
+import base64
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+from reports.tables.drawing import html, sentence_in_html, text
+from reports.tables.table import Column, Table
+from reports.tables.table import table as make_table
+
+#: Pictures narrower than this are enlarged by a whole factor, so that single pixels can be seen [CSS pixels].
+_NARROW = 240
+
+
+class Result:
+    """What a function returns."""
+
+    @property
+    def title(self) -> str:
+        """What it is about."""
+        return ""
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """Its tables."""
+        return ()
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """Sentences that stand below the tables."""
+        return ()
+
+    @property
+    def faults(self) -> Sequence[str]:
+        """What is wrong, for the error stream."""
+        return ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether all that was checked is as it should be."""
+        return not self.faults
+
+    @property
+    def status(self) -> int:
+        """The exit status of a command that ends with it."""
+        return 0 if self.passed else 1
+
+    def to_dict(self) -> Any:
+        """Return its data, as JSON has them."""
+        raise NotImplementedError
+
+    def text(self, *, width: int | None = None, styled: bool = False) -> str:
+        """Return its tables and sentences for a terminal."""
+        drawn = [text(table, width=width, styled=styled) for table in self.tables]
+        lines = [*([""] if drawn and self.lines else []), *self.lines]
+        return "".join(drawn) + "".join(f"{line}\n" for line in lines)
+
+    def _repr_html_(self) -> str:
+        return block(self.title, *map(html, self.tables), bullets(self.lines))
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.title})"
+
+
+# Pieces of HTML for notebooks, without scripts.
+
+
+def block(title: str, *parts: str) -> str:
+    """Return a titled block; the title is plain text, the parts are HTML."""
+    return f'<div class="airlight"><p><strong>{escape(title)}</strong></p>{"".join(parts)}</div>'
+
+
+def paragraph(words: str) -> str:
+    """Return a paragraph of plain text."""
+    return f"<p>{escape(words)}</p>"
+
+
+def bullets(items: Sequence[str]) -> str:
+    """Return a list of sentences, in which what stands in backticks is code; nothing for no items."""
+    inside = "".join(f"<li>{sentence_in_html(item)}</li>" for item in items)
+    return f"<ul>{inside}</ul>" if items else ""
+
+
+def facts_table(rows: Sequence[Sequence[str]]) -> str:
+    """Return a table of names and their values."""
+    columns = (Column("name", "", words=True), Column("value", "", words=True))
+    return html(make_table("", columns, rows))
+
+
+def picture(png: bytes, width: int, *, alt: str, caption: str) -> str:
+    """Return a PNG file of that width [pixels] as a figure that carries it inside."""
+    times = max(1, -(-_NARROW // width))
+    style = "width:100%;height:auto" + (";image-rendering:pixelated" if times > 1 else "")
+    source = "data:image/png;base64," + base64.b64encode(png).decode("ascii")
+    return (
+        f'<figure style="display:inline-block;width:{times * width}px;max-width:100%;margin:0 1em 0.5em 0;'
+        'vertical-align:top">'
+        f'<img src="{source}" alt="{escape(alt)}" style="{style}">'
+        f"<figcaption>{escape(caption)}</figcaption></figure>"
+    )

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Studies of kernels, formulas, slabs and estimators: their numbers, their files, what ends with the status 1."""
+
+import csv
+import doctest
+import importlib
+import json
+
+import numpy as np
+import pytest
+
+import airlight
+from analytic.cases import read_cases
+from reports.commands import main as cli
+from reports.studies.registry import STUDIES
+from tests.helpers.api import third
+
+RAYS = {"phase": "isotropic", "foot": 0.5, "height": 0.3, "x0": 0.0, "x1": 1.0, "sigma_t": 0.3}
+
+
+@pytest.mark.parametrize("module", sorted({*STUDIES.values(), "registry"}))
+def test_examples_of_the_docstrings(module, variant):
+    assert not doctest.testmod(importlib.import_module(f"reports.studies.{module}")).failed
+
+
+# Integrals
+
+
+def test_integrals_of_a_file_and_of_its_columns(data_folder, variant):
+    path = data_folder / "airlight_integral.csv"
+    integrals = airlight.study("integrals", path)
+    assert integrals.summary["max"] < 4e-6  # the README's figure for the kernel `exact`
+    assert integrals.J.shape == (2004,)
+    cases = read_cases(path)
+    columns = {name: getattr(cases, name) for name in ("phase", "g", "foot", "height", "x0", "x1", "sigma_t", "value")}
+    again = airlight.study("integrals", columns)
+    np.testing.assert_array_equal(again.J, integrals.J)
+    np.testing.assert_array_equal(airlight.study("integrals", integrals.columns()).J, integrals.J)
+    assert np.nanmax(np.abs(again.error)) == pytest.approx(integrals.summary["max"])
+    assert "and 1992 more" in integrals._repr_html_()
+    assert not integrals.J.flags.writeable
+
+
+def test_integrals_have_the_shape_of_the_columns_and_a_certified_value(variant):
+    foot, height = np.linspace(-1, 2, 5)[:, None], np.array([0.1, 0.7, 2.0])
+    rays = {"phase": "hg", "g": 0.4, "foot": foot, "height": height, "x0": 0.0, "x1": np.inf, "sigma_t": 0.3}
+    integrals = airlight.study("integrals", rays, "quadrature-32", precision="double", certify=True)
+    assert integrals.J.shape == integrals.value.shape == integrals.error.shape == (5, 3)
+    assert np.abs(integrals.error).max() < 1e-4
+    assert np.asarray(integrals).shape == (5, 3)
+    own = airlight.study("integrals", rays, third, precision="double")
+    assert own.kernel.endswith(":third")
+    exact = airlight.study("integrals", rays, precision="double")
+    np.testing.assert_allclose(own.J, exact.J / 3, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"sigma_t": -1.0}, "column 'sigma_t': -1.0 is out of range"),
+        ({"foot": [1.0, 2.0], "height": [1.0, 2.0, 3.0]}, "shapes that do not go together"),
+        ({"phase": "hgg"}, "did you mean 'hg'"),
+    ],
+)
+def test_what_is_no_case_is_refused(change, words, variant):
+    assert airlight.study("integrals", RAYS).J > 0
+    with pytest.raises(airlight.InputError, match=words):
+        airlight.study("integrals", RAYS | change)
+    with pytest.raises(airlight.InputError, match=f"no column '{next(iter(change))}'"):
+        airlight.study("integrals", {name: value for name, value in RAYS.items() if name not in change})
+
+
+@pytest.mark.claim("droplets-by-name")
+def test_integrals_of_a_file_take_a_phase_function_by_words(variant, capfd, tmp_path):
+    from analytic.cases import integrate_cases
+
+    rays, written = tmp_path / "rays.csv", tmp_path / "results.csv"
+    rays.write_text("t,h,x0,x1,sigma_t,value\n1,0.5,0,3,0.2,7\n-1,0.25,0.5,inf,0.1,7\n")
+    assert cli.run(["study", "integrals", str(rays), "--phase", "hg-draine:12", "-o", str(written)]) == 0
+    assert "2 rows with exact" in capfd.readouterr().out
+    with written.open() as file:
+        results = list(csv.DictReader(file))
+    assert {row["phase"] for row in results} == {"hg-draine:12"}
+    expected, _ = integrate_cases(read_cases(rays, phase="hg-draine:12"))
+    assert [float(row["result"]) for row in results] == pytest.approx(expected, rel=1e-5)
+
+
+# Kernels
+
+
+@pytest.mark.claim("kernels-are-named-by-kernel")
+def test_kernels_are_named_by_an_option(variant, capfd, monkeypatch):
+    asked = []
+
+    def bench_kernels(names, **options):
+        asked.append(names)
+        return {"costs": [], "levels": []}
+
+    monkeypatch.setattr("validation.kernels.benchmark.bench_kernels", bench_kernels)
+    assert cli.run(["study", "kernels", "--kernel", "exact", "--kernel", "taylor-8", "--json"]) == 0
+    assert json.loads(capfd.readouterr().out)["kernels"] == {"costs": [], "levels": []}
+    assert cli.run(["study", "kernels", "--json"]) == 0
+    assert asked == [["exact", "taylor-8"], None]
+
+
+def test_kernel_errors_over_depth_and_angle(variant):
+    rows = airlight.study("kernel-errors", quick=True)
+    errors = {
+        name: np.array([row["relative_error"] for row in rows if row["kernel"] == name]) for name in ("exact", "taylor")
+    }
+    assert len(errors["exact"]) == 24 * 18
+    # float32 has 1.2e-7; the optical depth of 90 along the longest ray multiplies the rounding of the exponent.
+    assert errors["exact"].max() < 2e-5
+    assert np.median(errors["taylor"]) > 100 * errors["exact"].max()
+
+
+@pytest.mark.claim("exact-keeps-its-bar")
+def test_stability_fails_where_the_claim_is_broken(variant, monkeypatch, capsys):
+    from realtime.kernels.registry import KERNELS
+
+    assert airlight.study("stability", kernel="taylor", rays=64).passed
+    monkeypatch.setitem(KERNELS, "exact", KERNELS["taylor"])
+    assert cli.run(["study", "stability", "--kernel", "exact", "--rays", "64"]) == 1
+    assert "BROKEN: exact, airlight_integral.csv: float32 maximum" in capsys.readouterr().out
+
+
+# Formulas and slabs
+
+
+def test_curves_meet_at_the_foot_and_leave_it(variant, tmp_path):
+    """At theta = 0 all three are p(0); half a radian on, the derived polynomial is the closer one if isotropic."""
+    rows = airlight.study("polynomials", rays=256)
+    middle = [row for row in rows if row["theta"] == 0]
+    assert len(middle) == 12
+    for row in middle:
+        for name in ("taylor", "taylor-printed"):
+            assert row[name] == pytest.approx(row["exact"], rel=1e-7)
+    aside = next(r for r in rows if (r["phase"], r["a"]) == ("isotropic", 0.5) and abs(r["theta"] - 0.5) < 1e-9)
+    assert abs(aside["taylor"] - aside["exact"]) < 0.2 * abs(aside["taylor-printed"] - aside["exact"])
+    assert rows.save(tmp_path / "polynomials.csv").read_text().count("\n") == 1 + len(rows)
+    with pytest.raises(airlight.InputError, match="wanted a name that ends in"):
+        rows.save(tmp_path / "polynomials.txt")
+
+
+def test_slab_by_command_and_from_python(capfd):
+    slab = ["study", "slab", "2", "30", "--phase", "hg:0.75", "--albedo", "0.9", "--orders", "1", "--photons", "50"]
+    assert cli.run([*slab, "--json"]) == 0
+    data = json.loads(capfd.readouterr().out)
+    assert (data["tau"], data["sun"], data["albedo"], data["phase"]) == (2, 30, 0.9, "hg:0.75")
+    assert [row["orders"] for row in data["orders"]] == [row["orders"] for row in data["photons"]["orders"]] == ["1"]
+    assert data["error"]["orders"][0]["reflectance"] < 1e-6
+    light = airlight.study("slab", 2.0, 30.0, phase="hg:0.75", albedo=0.9, orders=[1], photons=50)
+    assert light.to_dict() == data
+    assert light[1]["reflectance"] == data["orders"][0]["reflectance"]
+    assert "<table" in light._repr_html_()
+    with pytest.raises(airlight.InputError, match="wavelength"):
+        airlight.study("slab", 2.0, 30.0, phase="mie:6:2:0.7")
+
+
+# Figures
+
+QUICK = {
+    "phase-functions": {},
+    "polynomials": {"rays": 64},
+    "map-size": {"scenes": "omni-box", "size": (16, 12), "sizes": "32,64"},
+    "kernels": {"kernel": "taylor", "phase": "isotropic", "rays": 3000},
+    "convergence": {"quick": True},
+    "slab": {"tau": 2, "sun": 30, "orders": "1,2", "photons": 50},
+}
+
+
+@pytest.mark.slow
+@pytest.mark.claim("figures-repeat", tolerance="none: equal bytes")
+@pytest.mark.parametrize("name", QUICK)
+def test_a_figure_is_drawn_twice_to_the_same_bytes(name, variant, tmp_path):
+    """What is embedded are TrueType fonts, no date."""
+    found = airlight.study(name, **QUICK[name])
+    first = found.save(tmp_path / "first.pdf", "single").read_bytes()
+    assert found.save(tmp_path / "again.pdf", "single").read_bytes() == first
+    assert first.startswith(b"%PDF")
+    assert b"/FontFile2" in first
+    assert b"/Type3" not in first
+    assert b"CreationDate" not in first
+
+
+@pytest.mark.statistical
+def test_z_follows_its_law(variant):
+    """Counts in bins against Student's law: chi-square; the seeds are fixed, the level is 1 in 10 000."""
+    from scipy.stats import chi2
+
+    found = airlight.study("z-distribution", quick=True)
+    rows = [row for row in found if row["estimator"] == "single-scatter"]
+    count, expected = (np.array([row[name] for row in rows]) for name in ("count", "expected"))
+    assert count.sum() == found.data["estimators"][0]["pixels"]
+    assert expected.sum() == pytest.approx(count.sum(), rel=1e-6)
+    large = expected >= 5
+    count, expected = (np.append(counts[large], counts[~large].sum()) for counts in (count, expected))
+    assert np.sum((count - expected) ** 2 / expected) < chi2.isf(1e-4, len(count) - 1)

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Studies of methods: what they measure, by command and from Python, and what ends with the status 1."""
+
+import json
+
+import numpy as np
+import pytest
+
+import airlight
+import validation.estimates.agreement
+from reports.commands import main as cli
+from tests.helpers.api import TINY, brighter
+from tests.helpers.reports import agreement, growth_record
+
+
+def printed(capfd, *arguments, status=0):
+    assert cli.run(["study", *arguments, "--json"]) == status
+    return json.loads(capfd.readouterr().out)
+
+
+def test_methods_are_measured_and_an_unconfirmed_reference_ends_with_1(variant, capfd, monkeypatch):
+    asked = []
+
+    def agreements(scene, margins, **options):
+        asked.append(dict(margins))
+        return {"volpath airlight": agreement(False)}
+
+    monkeypatch.setattr(validation.estimates.agreement, "agreements", agreements)
+    arguments = ["methods", "open-fog", "--method", "unshadowed", "--size", "16x12", "--margin", "0.002"]
+    (scene,) = printed(capfd, *arguments, status=1)["scenes"]
+    assert asked == [{"single-scatter": 0.0005, "volpath": 0.002}]  # the margin is that of volpath alone
+    assert {entry["method"] for entry in scene["methods"]} == {"unshadowed"}
+    assert all(entry["times"]["frame"]["median_ms"] > 0 for entry in scene["methods"])
+
+
+def test_python_gives_functions_and_configurations_and_gets_rows(variant):
+    told = []
+    table = airlight.study(
+        "methods",
+        airlight.load_scene("open-fog", TINY),
+        method=[airlight.configuration("unshadowed", "taylor"), brighter],
+        seconds=0.01,
+        progress=lambda fraction, what: told.append(fraction),
+    )
+    taylor, own = table
+    assert taylor["label"] == "unshadowed (taylor)"
+    exact = airlight.reference("open-fog", size=TINY).airlight
+    # Twice as bright: the error is the reference.
+    assert own["relative_rmse"] == pytest.approx(np.sqrt(np.mean(exact**2)) / exact.mean(), rel=1e-5)
+    assert own["relative_bias"] == pytest.approx(1.0, rel=1e-5)
+    for row in table:
+        assert row["scene"] == "open-fog"
+        assert 0 < row["frame_low_ms"] <= row["frame_ms"] <= row["frame_high_ms"]
+        assert row["refused"] is row["flip"] is None
+        assert row["nonfinite"] == row["negative"] == 0
+    columns = table.columns()
+    assert set(map(len, columns.values())) == {2}
+    assert columns["kernel"] == ["taylor", "exact"]
+    assert told == sorted(told)
+    assert "unshadowed (taylor)" in table._repr_html_()
+    with pytest.raises(airlight.InputError, match="did you mean 'unshadowed'"):
+        airlight.study("methods", "open-fog", method="unshadow")
+    with pytest.raises(airlight.InputError, match="did you mean 'open-fog'"):
+        airlight.study("methods", ["open-fog", "openfog"], method="unshadowed", size=TINY)
+
+
+@pytest.mark.claim("error-by-cause", tolerance="1e-5 of the largest error: rounding")
+def test_errors_by_cause_are_printed_and_drawn(variant, capfd, tmp_path):
+    """The parts add up to the whole; parameters are those that are set."""
+    arguments = ["decomposition", "open-fog", "--method", "froxel-fog", "--set", "slices=9", "--set", "width=8"]
+    (scene,) = printed(capfd, *arguments, "--size", "16x12", "-o", str(tmp_path / "parts.png"))["scenes"]
+    (entry,) = scene["methods"]
+    assert (scene["size"], entry["parameters"]) == ([16, 12], {"slices": 9, "width": 8})
+    assert sum(part["share"] for part in entry["parts"]) == pytest.approx(1, abs=1e-9)
+    assert sum(part["relative_bias"] for part in entry["parts"]) == pytest.approx(entry["whole"]["relative_bias"], 1e-5)
+    assert (tmp_path / "parts.png").stat().st_size > 10_000
+
+
+def test_scaling_that_grows_more_steeply_than_before_ends_with_1(variant, capfd, monkeypatch, tmp_path):
+    monkeypatch.setattr("validation.study.growth.study_scaling", lambda *given, **options: [growth_record()])
+    monkeypatch.setattr("reports.report.others.scaling_data", lambda name, size, found: found)
+    before = tmp_path / "before.json"
+    arguments = ["scaling", "sphere-spot", "--kinds", "size", "--method", "unshadowed", "--against", str(before)]
+    for exponent, status in ((0.47, 0), (0.1, 1)):
+        before.write_text(json.dumps({"scaling": [growth_record(exponent=exponent)]}))
+        assert printed(capfd, *arguments, status=status)["scaling"] == [growth_record()]
+
+
+def test_maps_print_errors_and_flicker_by_size(variant, capfd):
+    arguments = ["map-size", "omni-box", "--size", "16x12", "--sizes", "32,16", "--flicker", "--frames", "2"]
+    march = ["--method", "ray-march", "--set", "shadow=map", "--set", "steps=16"]
+    (scene,) = printed(capfd, *arguments, *march)["scenes"]
+    assert (scene["name"], scene["method"]) == ("omni-box", "ray-march (shadow=map, steps=16)")
+    assert scene["errors"]["sizes"] == scene["flicker"]["sizes"] == [16, 32]
+    assert all(metrics["relative_rmse"] > 0 for metrics in scene["errors"]["metrics"])
+    assert all(value > 0 for value in scene["flicker"]["flicker"])
+    assert scene["flicker"]["truth_change"] > 0
