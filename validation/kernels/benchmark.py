@@ -112,21 +112,10 @@ def bench_kernels(
     seconds: float = 0.3,
     progress: Progress | None = None,
 ) -> KernelBench:
-    """Measure kernels in all their sizes.
+    """Measure kernels, all of the registry by default: 'name' stands for all its sizes, 'name-N' for one.
 
-    Parameters
-    ----------
-    names
-        Kernels as in `validation.study.configuration.find_kernel`; 'name' stands for all its sizes, 'name-N'
-        for one. All of the registry by default.
-    phases
-        Phase functions with their g: the first with all sizes, the others with the default sizes.
-    rays
-        Number of rays that are timed.
-    seconds
-        How long each is timed [s].
-    progress
-        Called with (done, total, what) before every kernel.
+    Of the phase functions, with their g, the first is measured with all sizes, the others with the default sizes. So
+    many rays are timed for so many seconds each; progress is called with (done, total, what) before every kernel.
     """
     ladders = [_ladder(name) for name in names or KERNELS]
     total = len(ladders) * len(phases)
@@ -144,17 +133,7 @@ def bench_kernels(
 
 
 def measure(family: str, size: int | None, *, truth: Cases, timed: Cases, seconds: float = 0.3) -> KernelCost:
-    """Measure the kernel 'family-size' on rays of one phase function.
-
-    Parameters
-    ----------
-    truth
-        Rays with known J, for the error.
-    timed
-        Rays to time.
-    seconds
-        How long to time [s].
-    """
+    """Measure the kernel 'family-size': its error on rays with known J, its time on others, of one phase function."""
     name, phase, g = sized(family, size), truth.phase[0], float(truth.g[0])
     function = find_kernel(name)
     rays = len(timed.x0)

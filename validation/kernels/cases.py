@@ -23,21 +23,10 @@ LARGEST = {"single": 1e18, "double": 1e150}
 
 
 def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
-    """Return J of every case by a kernel, (cases,) [1/m].
+    """Return J of every case by a kernel, (cases,) [1/m], in 'single' or 'double' precision.
 
-    Parameters
-    ----------
-    cases
-        From `analytic.cases.read_cases`; where it has rays, foot and height are computed from them in `precision`.
-    kernel
-        See `validation.study.configuration.find_kernel`.
-    precision
-        'single' or 'double'.
-
-    Raises
-    ------
-    InputError
-        For a number that the precision cannot square, and for an unknown kernel.
+    Where cases have rays, foot and height are computed from them in the precision. A number that it cannot square and
+    an unknown kernel are refused.
     """
     function = find_kernel(kernel)
     for name in ("foot", "height", "x0", "x1", "sigma_t"):

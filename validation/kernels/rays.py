@@ -81,17 +81,7 @@ def slivers(count: int = 8192) -> Cases:
 
 
 def wide_rays(count: int, phase: str = "isotropic", g: float = 0.0, *, truth: bool = True) -> Cases:
-    """Return the set W (see the module) for one phase function, with the extinction 1/m.
-
-    Parameters
-    ----------
-    count
-        Number of rays.
-    phase, g
-        The phase function and its mean cosine [1].
-    truth
-        Whether to compute the true J [1/m]; it costs time, and timings need none.
-    """
+    """Return the set W (see the module) for one phase function, with the extinction 1/m, and with the true J or not."""
     u = _sobol(count, 3)
     distance = _log(u[:, 0], 1e-4, 60.0)
     angle = np.radians(1e-3 + (180.0 - 2e-3) * u[:, 1])
@@ -105,19 +95,7 @@ def wide_rays(count: int, phase: str = "isotropic", g: float = 0.0, *, truth: bo
 
 
 def table(phase, g, *, foot: Array, height: Array, x0: Array, x1: Array, sigma_t: Array, tags) -> Cases:
-    """Return columns as cases without values.
-
-    Parameters
-    ----------
-    phase, tags
-        Names of phase functions and kinds of cases, n each.
-    g
-        Mean cosines, (n,).
-    foot, height, x0, x1
-        (n,) each [m].
-    sigma_t
-        Extinction, (n,) [1/m].
-    """
+    """Return columns as cases without values: lengths [m], extinction [1/m], names of phase functions, and tags."""
     names, words = (tuple(str(cell) for cell in column) for column in (phase, tags))
     return Cases(names, np.asarray(g), foot, height, x0, x1, sigma_t, None, words, None, None, None, COLUMNS, ())
 

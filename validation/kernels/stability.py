@@ -86,17 +86,7 @@ def certified_files() -> tuple[Path, ...]:
 def stability(
     names: Sequence[str] | None = None, *, count: int = 100_000, progress: Progress | None = None
 ) -> list[KernelStability]:
-    """Study kernels on the certified and the generated rays.
-
-    Parameters
-    ----------
-    names
-        Kernels as in `validation.study.configuration.find_kernel`; all of the registry by default.
-    count
-        Number of generated rays.
-    progress
-        Called with (done, total, what) before every kernel.
-    """
+    """Study kernels, all of the registry by default, on the certified rays and on so many generated ones."""
     chosen = [(name, find_kernel(name)) for name in names or KERNELS]  # refuse a wrong name before any work
     sets = {path.name: read_cases(path) for path in certified_files()} | {GENERATED: hard_rays(count)}
     thin = slivers()

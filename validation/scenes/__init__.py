@@ -14,7 +14,6 @@ Read in this order:
 - `changes.py`: camera, lights and media of a scene changed by name;
 - `lobes.py`: isotropic media given a mean cosine;
 - `files`: scene files as people write them, made into what both readers take;
-- `loading.py`: a scene by its name or from a Mitsuba XML file;
-- `identity.py`: what a scene is, in keys of results;
+- `loading.py`: a scene by its name or from a Mitsuba XML file, and what it is in keys of results;
 - `animation.py`: the scenes of the frames of an animation.
 """

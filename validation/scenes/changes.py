@@ -59,13 +59,7 @@ def changeable(scene) -> dict[str, Changeable]:
 
 
 def parse_changes(words: Sequence[str]) -> dict[str, Values]:
-    """Return values by name from words of the form 'NAME=VALUE' or 'NAME=X,Y,Z'.
-
-    Raises
-    ------
-    InputError
-        As of `analytic.errors.named_values`.
-    """
+    """Return values by name from words of the form 'NAME=VALUE' or 'NAME=X,Y,Z'."""
     wanted = "NAME=NUMBER or NAME=X,Y,Z, for example medium.sigma_t=0.1"
     return named_values("--change", words, lambda text: tuple(float(number) for number in text.split(",")), wanted)
 
@@ -76,20 +70,9 @@ def change_words(changes: Mapping[str, Sequence[float]]) -> list[str]:
 
 
 def change_scene(scene, changes: Mapping[str, Sequence[float]]) -> None:
-    """Change a Mitsuba scene in place.
+    """Change an `mi.Scene` in place: values by name, see the module.
 
-    Parameters
-    ----------
-    scene
-        The `mi.Scene`.
-    changes
-        Values by name, see the module. What is not named stays.
-
-    Raises
-    ------
-    InputError
-        For a name that the scene does not have (the nearest is named), and a value that it cannot have. The scene is
-        as it was then.
+    A name that the scene does not have and a value that it cannot have are refused, and the scene is as it was.
     """
     known = changeable(scene)
     wanted = {name: _checked(name, values, known) for name, values in changes.items()}

@@ -66,16 +66,10 @@ def two_lobes() -> Mesh:
 
 
 def star_shaped(function: Callable[[Array], Array], centre: Array, reach: float, sphere: Mesh) -> Mesh:
-    """Return the outermost surface around a centre where a function changes its sign, by one radius a direction.
+    """Return the outermost surface around a centre, (3,), where a function changes its sign, by one radius a direction.
 
-    Parameters
-    ----------
-    function
-        Takes points, (n, 3) [m], and returns values, (n,), negative at the centre and positive at the `reach`.
-    centre, reach
-        A point (3,) and a radius that nothing exceeds [m].
-    sphere
-        The directions, unit vectors, and the triangles between them.
+    The function takes points, (n, 3) [m], and is negative at the centre and positive at the radius `reach` [m]. The
+    sphere gives the directions, unit vectors, and the triangles between them.
     """
     directions, faces = sphere
     radius = np.full(len(directions), reach)
@@ -93,19 +87,10 @@ def star_shaped(function: Callable[[Array], Array], centre: Array, reach: float,
 
 
 def between_heights(x: Array, y: Array, bottom: Array, top: Array) -> Mesh:
-    """Return the closed surface around what lies between two heights over a rectangle, upright at its border.
+    """Return the closed surface between two heights, (n, m) [m], over a rectangle, upright at its border.
 
-    Parameters
-    ----------
-    x, y
-        Ascending, (n,) and (m,) [m].
-    bottom, top
-        Heights, (n, m) each [m]; the top is above the bottom everywhere.
-
-    Returns
-    -------
-    mesh
-        4 (n - 1) (m - 1) + 4 (n + m - 2) triangles, counter-clockwise as seen from outside.
+    The lines x, (n,), and y, (m,) [m], ascend, and the top is above the bottom everywhere: 4 (n - 1) (m - 1) + 4 (n + m
+    - 2) triangles.
     """
     n, m = len(x), len(y)
     plane = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
@@ -126,16 +111,9 @@ def between_heights(x: Array, y: Array, bottom: Array, top: Array) -> Mesh:
 
 
 def lobes(centres: Array, radii: Array, blend: float) -> Callable[[Array], Array]:
-    """Return about the signed distance [m] from a union of spheres whose seams are filled.
+    """Return about the signed distance [m] from a union of spheres, centres (k, 3) and radii (k,) [m].
 
-    With d_i the distance from sphere i the value is -blend log(sum exp(-d_i/blend)).
-
-    Parameters
-    ----------
-    centres, radii
-        Of the spheres, (k, 3) and (k,) [m].
-    blend
-        Width of the seams [m].
+    With d_i the distance from sphere i it is -blend log(sum exp(-d_i/blend)): seams as wide as `blend` [m] are filled.
     """
 
     def distance(points: Array) -> Array:

@@ -83,12 +83,7 @@ def gradient_noise(points: Array, seed: int) -> Array:
 def octaves(points: Array, size: float, count: int, seed: int) -> Array:
     """Return noise at points (n, 3) [m], (n,), within -1 and 1.
 
-    Parameters
-    ----------
-    points
-        Where [m].
-    size
-        Of the cells of the first octave [m]; each one's are half as large, and count half as much, as the last one's.
+    The cells of the first octave have the `size` [m]; those of each next are half as large and count half as much.
     """
     weights = 0.5 ** np.arange(count)
     total = np.zeros(len(points))
@@ -113,15 +108,7 @@ def grid_points(low: Array, high: Array, counts: tuple[int, int, int]) -> Array:
 
 
 def inside(mesh: Mesh, points: Array) -> NDArray[np.bool_]:
-    """Return which points of a lattice lie within a closed mesh, (z, y, x).
-
-    Parameters
-    ----------
-    mesh
-        Closed, seen from outside counter-clockwise.
-    points
-        From `grid_points`, (z, y, x, 3) [m].
-    """
+    """Return which points of a lattice, as of `grid_points`, lie within a closed mesh, (z, y, x)."""
     vertices, faces = mesh
     x, y, z = points[0, 0, :, 0], points[0, :, 0, 1], points[:, 0, 0, 2]
     corners = vertices[faces]

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Loading of scenes by name or by path; input is checked before any work is done."""
 
+import hashlib
 import os
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -14,10 +16,12 @@ from xml.parsers import expat
 import mitsuba as mi
 
 from analytic.errors import InputError, nearest
+from reference.storage.scene_digest import scene_digest
 from validation.scenes.changes import change_scene, isotropic_media
 from validation.scenes.files.read import read_file
 from validation.scenes.lobes import scene_with_lobes
 from validation.scenes.numbers import check_numbers
+from validation.scenes.random.ranges import FILE as RANGES
 from validation.scenes.random.scene import PREFIX, is_random, random_parts, random_record
 from validation.scenes.registry import SCENES, Animation, SceneRecord
 
@@ -57,9 +61,7 @@ def load_scene(
     ------
     InputError
         For an unknown name, a missing or malformed file, a size that no image can have, and a change that the scene
-        cannot have. This function does not
-        check whether the methods or the truth support the scene: `realtime.scene.read_scene.read_scene` and
-        `reference.scene.read.read_truth` do.
+        cannot have. Whether methods and reference support the scene is checked when they read it.
     """
     record = find_record(name_or_path)
     path = Path()
@@ -84,13 +86,7 @@ def load_scene(
 
 
 def find_record(name: str) -> SceneRecord | None:
-    """Return the record of a built-in or random scene, None for what must be a path.
-
-    Raises
-    ------
-    InputError
-        For a random scene that cannot be drawn.
-    """
+    """Return the record of a built-in or random scene, None for what must be a path."""
     return random_record(name) if is_random(name) else SCENES.get(name)
 
 
@@ -101,14 +97,30 @@ def scene_stem(name_or_path: str) -> str:
     return Path(name_or_path).stem
 
 
-def parse_size(text: str) -> tuple[int, int]:
-    """Return width and height [pixels] from 'WIDTHxHEIGHT'.
+def scene_identity(scene: str) -> str:
+    """Return what a scene is: a name or seed with a digest of what it is made from, the digest of a file's scene."""
+    if scene in SCENES:
+        return f"{scene} {SCENES[scene].digest}"
+    if is_random(scene):
+        seed, given = random_parts(scene)
+        places = [RANGES, *(place for _, place in sorted(given.items()))]
+        files = [path for place in places for path in (sorted(place.iterdir()) if place.is_dir() else [place])]
+        stamps = tuple((path, path.stat().st_mtime_ns, path.stat().st_size) for path in files if path.is_file())
+        return f"{PREFIX}{seed} {sorted(given)} {_files_digest(stamps)}"
+    return scene_digest(load_scene(scene).scene)
 
-    Raises
-    ------
-    InputError
-        If the text has another form.
-    """
+
+@lru_cache(maxsize=8)
+def _files_digest(stamps: tuple[tuple[Path, int, int], ...]) -> str:
+    """Return a digest of files by their names and contents; a file that changed has another stamp."""
+    digest = hashlib.sha256()
+    for path, _, _ in stamps:
+        digest.update(f"|{path.name} ".encode() + hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Return width and height [pixels] from 'WIDTHxHEIGHT'."""
     match = re.fullmatch(r"(\d+)[xX](\d+)", text.strip())
     if not match:
         raise InputError(f"size: got {text!r}, wanted WIDTHxHEIGHT in pixels, for example 800x600")
@@ -191,20 +203,7 @@ def _check_depth(path: Path) -> None:
 
 
 def resize(scene, size: tuple[int, int]) -> None:
-    """Set the image size of all cameras of a Mitsuba scene.
-
-    Parameters
-    ----------
-    scene
-        The `mi.Scene`; it is changed in place.
-    size
-        Width and height [pixels].
-
-    Raises
-    ------
-    InputError
-        If a side is shorter than 1 or longer than 16384 pixels.
-    """
+    """Set the image size of all cameras of a Mitsuba scene in place, width and height [pixels]."""
     if not all(1 <= n <= _LARGEST for n in size):
         raise InputError(f"size: got {size[0]}x{size[1]}, wanted at least 1x1 and at most {_LARGEST} pixels on a side")
     for sensor in scene.sensors():

@@ -24,19 +24,9 @@ def scene_with_lobes(description: dict[str, Any], lobes: Mapping[str, float]):
 
 
 def give_lobes(state: Any, lobes: Mapping[str, float]) -> None:
-    """Give isotropic media of a parsed scene Henyey-Greenstein phase functions.
+    """Give isotropic media of a parsed scene Henyey-Greenstein phase functions, mean cosines by the ids of the media.
 
-    Parameters
-    ----------
-    state
-        As Mitsuba's parser returns it.
-    lobes
-        Mean cosine by the id of the medium.
-
-    Raises
-    ------
-    InputError
-        If a medium has no description of its own: it is part of a shape that was built before.
+    A medium that has no description of its own, as part of a shape that was built before, is refused.
     """
     for name, g in lobes.items():
         phase = _isotropic_phase(state, name)

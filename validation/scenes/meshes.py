@@ -47,10 +47,7 @@ def joined(meshes: Sequence[Mesh]) -> Mesh:
 def lathe(radius: ArrayLike, height: ArrayLike, sides: int) -> Mesh:
     """Return the closed surface of a profile turned about the z axis, 2 sides len(radius) triangles.
 
-    Parameters
-    ----------
-    radius, height
-        The profile from bottom to top, (n,) each [m]. Every radius is positive; fans close the ends.
+    Radii and heights go from bottom to top, (n,) each [m]. Every radius is positive; fans close the ends.
     """
     radius, height = np.asarray(radius, dtype=np.float64), np.asarray(height, dtype=np.float64)
     angle = 2 * np.pi * np.arange(sides) / sides
@@ -59,14 +56,10 @@ def lathe(radius: ArrayLike, height: ArrayLike, sides: int) -> Mesh:
 
 
 def skin(rings: ArrayLike, *, ring_of_rings: bool = False) -> Mesh:
-    """Return the closed surface through n rings of k points, 2 k n triangles with or without ends.
+    """Return the closed surface through n rings of k points, (n, k, 3) [m]: 2 k n triangles with or without ends.
 
-    Parameters
-    ----------
-    rings
-        (n, k, 3) [m]. Each ring runs counter-clockwise as seen from the next ring.
-    ring_of_rings
-        Whether the last ring is joined to the first. Otherwise fans about the mean of a ring close both ends.
+    Each ring runs counter-clockwise as seen from the next one. The last is joined to the first in a ring of rings;
+    otherwise fans about the mean of a ring close both ends.
     """
     rings = np.asarray(rings, dtype=np.float64)
     count, sides = rings.shape[:2]
@@ -88,14 +81,9 @@ def skin(rings: ArrayLike, *, ring_of_rings: bool = False) -> Mesh:
 
 
 def grid(corner: Sequence[float], across: Sequence[float], up: Sequence[float], cells: tuple[int, int]) -> Mesh:
-    """Return an open rectangle of 2 cells[0] cells[1] triangles; its normal is across x up.
+    """Return an open rectangle from a corner and the edges that start there [m]; its normal is across x up.
 
-    Parameters
-    ----------
-    corner, across, up
-        A corner and the two edges that start there, (3,) each [m].
-    cells
-        Number of cells along `across` and along `up`, two triangles each.
+    Along `across` and along `up` it has so many `cells` of two triangles.
     """
     n, m = cells
     u, v = np.meshgrid(np.arange(n + 1) / n, np.arange(m + 1) / m, indexing="ij")
@@ -168,15 +156,7 @@ def gem(sides: int, rings: int) -> Mesh:
 
 
 def torus(radius: float, thickness: float, cells: tuple[int, int]) -> Mesh:
-    """Return a torus about the z axis of 2 cells[0] cells[1] triangles.
-
-    Parameters
-    ----------
-    radius, thickness
-        Radii of the torus and of its tube [m].
-    cells
-        Number of cells round the axis, and round the tube.
-    """
+    """Return a torus about the z axis, with the radius of its tube [m]: cells around the axis and around the tube."""
     around = 2 * np.pi * np.arange(cells[0])[:, None] / cells[0]
     # Clockwise in (distance, height): then each ring is counter-clockwise as seen from the next one.
     across = -2 * np.pi * np.arange(cells[1])[None] / cells[1]
@@ -187,14 +167,9 @@ def torus(radius: float, thickness: float, cells: tuple[int, int]) -> Mesh:
 
 
 def prism(outline: ArrayLike, height: float) -> Mesh:
-    """Return an upright prism on z = 0 of 4 k triangles.
+    """Return an upright prism on z = 0 of 4 k triangles; its outline, (k, 2) [m], runs counter-clockwise.
 
-    Parameters
-    ----------
-    outline
-        (k, 2) [m], counter-clockwise and star-shaped about the mean of its points.
-    height
-        Height of the prism [m].
+    The outline is star-shaped about the mean of its points.
     """
     outline = np.asarray(outline, dtype=np.float64)
     return skin([np.column_stack([outline, np.full(len(outline), z)]) for z in (0.0, height)])
@@ -209,14 +184,7 @@ def star(inner: float, outer: float, points: int) -> NDArray[np.float64]:
 def arch(radii: tuple[float, float], depth: float, steps: int) -> Mesh:
     """Return half a ring of rectangular section in the plane y = 0, standing on z = 0: 8 (steps + 1) triangles.
 
-    Parameters
-    ----------
-    radii
-        Inner and outer radius [m].
-    depth
-        Along y [m].
-    steps
-        Number of segments of the half circle.
+    It has an inner and an outer radius and a depth along y [m], and so many segments.
     """
     inner, outer = radii
     section = np.array([[inner, -0.5], [outer, -0.5], [outer, 0.5], [inner, 0.5]]) * (1, depth)
@@ -226,13 +194,7 @@ def arch(radii: tuple[float, float], depth: float, steps: int) -> Mesh:
 
 
 def gable(corner: Sequence[float], across: Sequence[float], up: Sequence[float], cells: tuple[int, int]) -> Mesh:
-    """Return a wall with a gable of half its height: 2 cells[0] cells[1] + cells[0] triangles.
-
-    Parameters
-    ----------
-    corner, across, up, cells
-        Of the wall below the gable, (3,) each [m], see `validation.scenes.parts.grid`.
-    """
+    """Return the wall `grid` with a gable of half its height: 2 cells[0] cells[1] + cells[0] triangles."""
     vertices, faces = grid(corner, across, up, cells)
     apex = np.asarray(corner) + 0.5 * np.asarray(across) + 1.5 * np.asarray(up)
     eaves = np.arange(cells[0] + 1) * (cells[1] + 1) + cells[1]
@@ -389,16 +351,8 @@ def knot(turns: Sequence[int], radii: Sequence[float], thickness: float, cells: 
     The normal of the torus is perpendicular to every curve on it. So it orients the sections all the way round, and the
     last section joins the first without a seam.
 
-    Parameters
-    ----------
-    turns
-        About the axis of the torus and about its core, coprime.
-    radii
-        Of the core, and from the core to the middle of the tube [m].
-    thickness
-        Mean radius of the tube [m].
-    cells
-        Along and about the tube.
+    The turns about the axis of the torus and about its core are coprime; the radii are those of the core, and from it
+    to the middle of the tube [m]; cells are along and about the tube.
     """
     (about, across), (radius, core), (rings, sides) = turns, radii, cells
     t = 2 * np.pi * np.arange(rings)[:, None] / rings

@@ -27,18 +27,7 @@ _FLATTEST = 1e-9  # of one axis beside another
 
 
 def check_numbers(scene: Any) -> None:
-    """Refuse a scene with a number that no image can be computed from.
-
-    Parameters
-    ----------
-    scene
-        The `mi.Scene`.
-
-    Raises
-    ------
-    InputError
-        With the name of the part, what it has and what is wanted.
-    """
+    """Refuse an `mi.Scene` with a number that no image can be computed from, by the name of its part."""
     for name, plugin in _plugins(scene):
         parameters = mi.traverse(plugin)
         for key in parameters.keys():  # noqa: SIM118 - SceneParameters iterates over items

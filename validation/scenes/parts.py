@@ -25,12 +25,9 @@ def mesh_with_material(name: str, mesh: Mesh, material):
 
 
 def medium_boundary(name: str, mesh: Mesh, medium: Any, around: Any = None):
-    """Return a Mitsuba mesh of the material `null` around a medium, the boundary of a bounded medium.
+    """Return a Mitsuba mesh of the material `null` with a medium inside, and outside where that is not vacuum.
 
-    Parameters
-    ----------
-    medium, around
-        What is inside of it, and outside where that is no clear air: dictionaries or media of Mitsuba.
+    Media are dictionaries or Mitsuba's own.
     """
     inside = medium | {"id": f"{name}-medium"} if isinstance(medium, dict) else medium
     outside = {} if around is None else {"exterior": around}
@@ -53,15 +50,7 @@ def _mesh(name: str, mesh: Mesh, plugins: dict[str, Any]):
 def fog(
     sigma_t: float | Sequence[float], albedo: Sequence[float], phase: dict[str, Any] | None = None
 ) -> dict[str, Any]:
-    """Return a homogeneous medium with the id 'fog'.
-
-    Parameters
-    ----------
-    sigma_t
-        Extinction, grey or RGB [1/m].
-    phase
-        Dictionary of the phase function; isotropic by default.
-    """
+    """Return a homogeneous medium with the id 'fog', of grey or RGB extinction [1/m], isotropic by default."""
     grey = isinstance(sigma_t, float)
     channels = [sigma_t] if isinstance(sigma_t, float) else list(sigma_t)
     scale = max(channels)
@@ -92,17 +81,8 @@ def tabulated_phase(words: str, values: int = 2001) -> dict[str, Any]:
     0, and blurs a peak by a cell, which beside the forward direction is the angle acos(1 - 2/(values - 1)), 2.6 degrees
     for 2001 values and 0.8 for 20001. Mitsuba, truth and methods then agree on the table, blur included.
 
-    Parameters
-    ----------
-    words
-        The function, see `analytic.phase.phase_from_words`.
-    values
-        How many, at regularly spaced cosines; the truth of a scene takes a time in proportion.
-
-    Raises
-    ------
-    InputError
-        As `phase_from_words`, and for fewer than 2 values.
+    The words are those of `analytic.phase.phase_from_words`, the values lie at regularly spaced cosines; the reference
+    of a scene takes a time in proportion to their number.
     """
     if values < 2:
         raise InputError(f"the table of '{words}' has {values} values; wanted at least 2")
@@ -179,18 +159,10 @@ def area_lamp(
     size: float | Sequence[float],
     radiance: Sequence[float],
 ) -> dict[str, Any]:
-    """Return a black light with extent, of constant radiance.
+    """Return a black area light of constant RGB radiance [W/(m^2 sr)].
 
-    Parameters
-    ----------
-    shape
-        'rectangle' or 'disk', which shine on one side, or 'sphere'.
-    position, target
-        Its middle and a point that it faces, (3,) each [m].
-    size
-        The radius, or half of both sides of a rectangle [m].
-    radiance
-        RGB, (3,) [W/(m^2 sr)].
+    It is a 'rectangle' or 'disk', which shine on one side, or a 'sphere', its middle at a position, facing a target,
+    (3,) each [m]. The size is the radius, or half of both sides of a rectangle [m].
     """
     across, up = (size, size) if isinstance(size, float) else size
     turned = mi.ScalarTransform4f().look_at(origin=list(position), target=list(target), up=[0, 0, 1])
@@ -210,18 +182,9 @@ def camera(
     size: tuple[int, int],
     in_fog: bool = True,
 ) -> dict[str, Any]:
-    """Return a perspective sensor whose up is z.
+    """Return a perspective sensor at an origin that looks at a target, (3,) each [m]; its up is z.
 
-    Parameters
-    ----------
-    origin, target
-        Where the camera is and a point that it looks at, (3,) each [m].
-    fov
-        Horizontal field of view [degrees].
-    size
-        Width and height of the image [pixels].
-    in_fog
-        Whether the camera is in the medium with the id 'fog' or in clear air.
+    The field of view is horizontal [degrees], the size in pixels. The camera is in the medium 'fog' or in vacuum.
     """
     medium = {"medium": {"type": "ref", "id": "fog"}} if in_fog else {}
     return medium | {

@@ -8,7 +8,7 @@ from importlib.metadata import version
 
 from reference.storage.kept import key_of, source_digest
 from validation.properties.properties import scene_properties
-from validation.scenes.identity import scene_identity
+from validation.scenes.loading import scene_identity
 from validation.scenes.random.scene import is_random
 from validation.scenes.registry import SCENES
 from validation.study.configuration import user_code

@@ -30,8 +30,7 @@ from validation.estimates.multiple_scattering import multiple_scattering_share
 from validation.estimates.quadrature import has_truth, kept_truth, truth_image
 from validation.metrics.errors import plain
 from validation.metrics.flip import flip_hdr
-from validation.scenes.identity import scene_identity
-from validation.scenes.loading import LoadedScene, load_scene
+from validation.scenes.loading import LoadedScene, load_scene, scene_identity
 from validation.study.configuration import Configuration, rendered_lights, user_code
 from validation.study.cost import frame_work, sampled_work, steps_of, truth_work
 from validation.study.reference import of_image
