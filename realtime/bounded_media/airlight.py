@@ -66,7 +66,7 @@ from realtime.numerics.fast_exp import exp_bounded
 from realtime.numerics.gauss_legendre import unit_nodes
 from realtime.rays.ray_light import RayGeometry, falloff, ray_geometry, smooth_subsegments
 from realtime.scene.lights import Light
-from realtime.scene.medium import Medium, least_extinction
+from realtime.scene.medium import Medium, least_extinction, optical_reach
 
 FORMS = ("exact", "paper", "printed")
 _NODES, _NODES_DOUBLE = 4, 6
@@ -74,7 +74,6 @@ _MOST = 1000  # panels; no segment needs as many, but a loop over values that ar
 _TANGENT = 0.45
 _DEPTH, _DEPTH_DOUBLE = 2.2, 1.6
 _NEARER, _FARTHER = 0.5, 0.8
-_REACH, _REACH_DOUBLE = 18.0, 40.0  # optical depths: e^-18 = 1.5e-8 of the light is left, and e^-40 = 4e-18
 
 
 @dataclass(frozen=True)
@@ -204,7 +203,7 @@ def _integral(ray: MediaRay, piece: Piece, x0, x1):
     if ray.polynomial is not None:
         return _published_sum(ray, piece, x0, x1)
     Float = type(x0)
-    x1 = dr.minimum(x1, x0 + (_REACH if is_single(Float) else _REACH_DOUBLE) / least_extinction(piece.medium))
+    x1 = dr.minimum(x1, x0 + optical_reach(Float) / least_extinction(piece.medium))
     if ray.form != "exact":
         return _panels(ray, piece, x0, x1, [])
     paths = paths_from(ray.medium, ray.light, ray.origin, ray.direction, own=piece.number, segment=(x0, x1))

@@ -10,9 +10,7 @@ Read in this order:
 - `exact.py`: the default: as few nodes as a segment needs;
 - `short_segments.py`: its rule for segments that are short compared with their distance from the light;
 - `panels.py`: its rule for all others;
-- `quadrature_theta.py`: nodes in the angle at the light;
-- `marching.py`: the midpoint rule, uniform in the distance or in the angle;
-- `taylor_printed.py`: the coefficients of the annex of Biri 2006 as printed;
+- `stepping.py`: fixed steps along the ray or in the angle at the light, by the midpoint rule or Gauss's;
 - `taylor.py`: the polynomial of Biri 2006 with derived or printed coefficients;
 - `table.py`: tables of the integral;
 - `closed_form.py`: the closed form of Pegoraro and Parker 2009.

@@ -36,6 +36,7 @@ fraction all terms that make Im w agree in sign, so Im S keeps its relative accu
 import drjit as dr
 
 from realtime.errors import InputError
+from realtime.kernels.quadrature import path_over_height
 from realtime.numerics.array_types import is_single, smallest
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
@@ -51,11 +52,6 @@ _REGIONS = {4: (1.0, 12, 42), 8: (2.0, 30, 90)}
 
 def closed_form(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
     """Return the airlight integral J by complex exponential integrals [1/m].
-
-    Parameters
-    ----------
-    geometry, x0, x1, medium, light
-        See `realtime.kernels`.
 
     Raises
     ------
@@ -107,7 +103,7 @@ def _tail(foot, h, x, sigma_t, polynomial):
     """Return exp(-sigma_t foot) int_E^inf exp(-a E') p u dE' for the E of the point at `x`."""
     s = x - foot
     r = dr.sqrt(dr.fma(s, s, h * h))
-    e = dr.select(s >= 0, (s + r) / h, h / (r - s))
+    e = path_over_height(s, r, h)
     tail_u, tail_t = scaled_e1(e, sigma_t * h)
     a = sigma_t * h
     u = dr.rcp(dr.fma(e, e, 1))

@@ -47,11 +47,6 @@ _ISOTROPIC_DOUBLE, _PANEL_NODES = 40, 24
 def exact(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
     """Return the airlight integral J to the accuracy of the arithmetic [1/m].
 
-    Parameters
-    ----------
-    geometry, x0, x1, medium, light
-        See `realtime.kernels`.
-
     Notes
     -----
     Valid for any extinction (vacuum included), any ray, the light beside the segment (height 0) included, any segment,

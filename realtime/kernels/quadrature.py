@@ -35,7 +35,7 @@ from realtime.numerics.array_types import is_single, smallest
 from realtime.numerics.fast_exp import exp_bounded
 from realtime.rays.ray_light import RayGeometry, falloff_beside, smooth_subsegments
 from realtime.scene.lights import Light
-from realtime.scene.medium import Medium, per_extinction
+from realtime.scene.medium import Medium, optical_reach, per_extinction
 
 
 def quadrature(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, nodes: int = 16):
@@ -43,8 +43,6 @@ def quadrature(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, n
 
     Parameters
     ----------
-    geometry, x0, x1, medium, light
-        See `realtime.kernels`.
     nodes
         Nodes of each panel, a positive even number.
 
@@ -116,19 +114,20 @@ def path_interval(geometry: RayGeometry, x0, x1, sigma_t, *, tail=1.0):
     s0, s1 = x0 - foot, x1 - foot
     h = dr.maximum(h, (1e-9 if single else 1e-17) * (dr.abs(s0) + smallest(Float)))
     r0 = dr.sqrt(dr.fma(s0, s0, h * h))
-    e0 = _path_over_height(s0, r0, h)
+    e0 = path_over_height(s0, r0, h)
     # Beyond the first term extinction has left e^-20 (e^-40); beyond the second, p/(1+E^2) has.
     extinction = dr.maximum(sigma_t * h, smallest(Float))
-    reach = dr.minimum((20.0 if single else 40.0) / extinction, (1e7 if single else 1e12) * (tail + e0))
+    reach = dr.minimum(optical_reach(Float) / extinction, (1e7 if single else 1e12) * (tail + e0))
     s1 = dr.select(dr.isfinite(s1), s1, 0)
     r1 = dr.sqrt(dr.fma(s1, s1, h * h))
-    e1 = _path_over_height(s1, r1, h)
+    e1 = path_over_height(s1, r1, h)
     clipped = dr.isinf(x1) | (e1 > e0 + reach)
     e1 = dr.select(clipped, e0 + reach, e1)
     return h, e0, e1, dr.select(clipped, reach, (x1 - x0) * (e0 + e1) / (r0 + r1))
 
 
-def _path_over_height(s, r, h):
+def path_over_height(s, r, h):
+    """Return E = q/h from s = x - foot, r and the height, without cancellation."""
     behind = s >= 0
     return dr.select(behind, s + r, h) / dr.select(behind, h, r - s)
 

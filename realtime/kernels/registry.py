@@ -19,9 +19,8 @@ from typing import Any
 
 from realtime.kernels.closed_form import closed_form
 from realtime.kernels.exact import exact
-from realtime.kernels.marching import equiangular, uniform
 from realtime.kernels.quadrature import quadrature
-from realtime.kernels.quadrature_theta import quadrature_theta
+from realtime.kernels.stepping import equiangular, quadrature_theta, uniform
 from realtime.kernels.table import table
 from realtime.kernels.taylor import taylor
 from realtime.rays.ray_light import RayGeometry

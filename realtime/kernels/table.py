@@ -82,8 +82,6 @@ def table(
 
     Parameters
     ----------
-    geometry, x0, x1, medium, light
-        See `realtime.kernels`.
     form
         'sun', the published table, or 'tail', scaled tails and heads.
     size

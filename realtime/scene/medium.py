@@ -7,8 +7,11 @@ from typing import Any
 
 import drjit as dr
 
+from realtime.numerics.array_types import is_single
 from realtime.scene.density import Density
 from realtime.scene.phase import Phase
+
+OPTICAL_REACH = 20.0  #: optical depths after which float32 has nothing left of light: e^-20 = 2e-9
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,11 @@ def per_extinction(medium: Medium, function: Callable[[Any], Any]):
     """Return `function(sigma_t)` for a grey medium, and its three values as a colour for a coloured one."""
     values = [function(sigma_t) for sigma_t in medium.sigma_t]
     return values[0] if len(values) == 1 else type(medium.albedo)(*values)
+
+
+def optical_reach(Float) -> float:
+    """Return the optical depths after which a number type has nothing left of light; float64 takes twice as many."""
+    return OPTICAL_REACH if is_single(Float) else 2 * OPTICAL_REACH
 
 
 def least_extinction(medium: Medium):

@@ -64,7 +64,7 @@ def _curves(phase: str, a: float, theta: Any) -> dict[str, Any]:
 
     from analytic.phase import PhaseFunction
     from analytic.series import taylor_coefficients
-    from realtime.kernels.taylor_printed import printed_coefficients
+    from realtime.kernels.taylor import printed_coefficients
 
     function = PhaseFunction(phase)
     exact = np.exp(-a * (np.tan(0.5 * theta + 0.25 * np.pi) - 1)) * function(-np.sin(theta))

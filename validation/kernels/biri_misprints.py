@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 
 from analytic.cases import Cases
 from realtime.kernels.exact import exact
-from realtime.kernels.taylor import taylor
-from realtime.kernels.taylor_printed import PRINTED_PHASES
+from realtime.kernels.taylor import PRINTED_PHASES, taylor
 from validation.kernels.rays import wide_rays
 from validation.kernels.values import Kernel, evaluate_cases
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Formulas as they are printed beside what they must be, and the droplets of Bouthors 2008: no image is needed.
 
-`realtime.kernels.taylor_printed` holds the annex of Biri 2006 as transcribed, `analytic.series` derives it, and
+`realtime.kernels.taylor` holds the annex of Biri 2006 as transcribed, `analytic.series` derives it, and
 `analytic.droplets` is Mie's theory. Integrands are written here as the papers print them and integrated by QUADPACK.
 """
 
@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from analytic.droplets import Modified, optics
 from analytic.phase import PhaseFunction
 from analytic.series import taylor_coefficients
-from realtime.kernels.taylor_printed import PRINTED_PHASES, printed_coefficients
+from realtime.kernels.taylor import PRINTED_PHASES, printed_coefficients
 from validation.kernels.biri_misprints import COMPARED, printed_against_derived
 
 Array = NDArray[np.float64]

@@ -25,9 +25,8 @@ from realtime.bounded_media.airlight import MediaRay
 from realtime.methods.interface.view import View
 from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff, ray_geometry
 from realtime.scene.lights import Light
-from realtime.scene.medium import least_extinction, per_extinction
+from realtime.scene.medium import OPTICAL_REACH, least_extinction, per_extinction
 
-OPTICAL_REACH = 20.0  #: where endless uniform steps stop [1]
 _LEAST_HEIGHT = 2.0**-10  # h over g, of the docstring
 
 

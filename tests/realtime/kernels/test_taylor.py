@@ -9,8 +9,7 @@ import pytest
 
 from analytic.phase import PhaseFunction
 from realtime.kernels.exact import exact
-from realtime.kernels.taylor import taylor
-from realtime.kernels.taylor_printed import PRINTED_PHASES
+from realtime.kernels.taylor import PRINTED_PHASES, taylor
 from tests.helpers.kernel_values import kernel_values
 
 pytestmark = pytest.mark.usefixtures("variant")

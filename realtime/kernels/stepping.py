@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What shaders do: fixed steps along the ray or in the angle at the light, by the midpoint rule or Gauss's.
+
+* `uniform`: J ~ sum_k dx exp(-sigma_t (x_k + r_k)) p / r_k^2.
+* `equiangular` and `quadrature_theta`: with x = foot + h tan theta, dx/r^2 = dtheta/h, so J ~ sum_k w_k/h exp(-sigma_t
+  (x_k + r_k)) p, the papers' form. The peak near the light is gone; the end of an unbounded ray is at theta = pi/2.
+
+The midpoint rule is of order 2 in the number of steps once these resolve the integrand. Gauss and Legendre's converges
+like a power of it where the segment ends before theta nears pi/2; there exp(-sigma_t h/cos theta) has an essential
+singularity, which `realtime.kernels.quadrature` avoids.
+"""
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from realtime.errors import InputError
+from realtime.numerics.array_types import smallest
+from realtime.numerics.gauss_legendre import unit_nodes
+from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff
+from realtime.scene.lights import Light
+from realtime.scene.medium import OPTICAL_REACH, Medium, least_extinction, per_extinction
+
+
+def uniform(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, steps: int = 100):
+    """Return the airlight integral J by midpoint steps in the distance [1/m].
+
+    Valid where a step is shorter than the distance to the light, everywhere on the ray. An unbounded ray is cut after
+    20 optical depths; through a vacuum it has no step length, and the result means nothing.
+    """
+    _check("steps", steps)
+    thinnest = dr.maximum(least_extinction(medium), smallest(type(x1)))
+    x1 = dr.select(dr.isinf(x1), x0 + OPTICAL_REACH / thinnest, x1)
+
+    def term(sigma_t, x):
+        r = distance_to_light(geometry, x)
+        return _integrand(geometry, medium, light, sigma_t, x, r) / dr.square(r)
+
+    return per_extinction(medium, lambda sigma_t: _midpoints(lambda x: term(sigma_t, x), x0, x1 - x0, steps))
+
+
+def equiangular(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, steps: int = 16):
+    """Return the airlight integral J by midpoint steps in the angle at the light [1/m].
+
+    Valid for any ray that does not meet the light (height above 0); thick media need many steps, since a few angles
+    hold all the light.
+
+    References
+    ----------
+    Kulla, Fajardo 2012, *Importance sampling techniques for path tracing in participating media*, section 4.
+    """
+    _check("steps", steps)
+    theta0 = dr.atan2(x0 - geometry.foot, geometry.height)
+    theta1 = dr.select(dr.isinf(x1), 0.5 * dr.pi, dr.atan2(x1 - geometry.foot, geometry.height))
+
+    def integral(sigma_t):
+        def term(theta):
+            return _at_angle(geometry, medium, light, sigma_t, theta)
+
+        return _midpoints(term, theta0, theta1 - theta0, steps) / geometry.height
+
+    return per_extinction(medium, integral)
+
+
+def quadrature_theta(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, nodes: int = 16):
+    """Return the airlight integral J by Gauss-Legendre quadrature in theta [1/m].
+
+    The range is split at the foot point unless the phase function is isotropic. Valid for rays that do not meet the
+    light (height above 0). The difference of the angles is one arc tangent, so that short segments do not cancel.
+    """
+    _check("nodes", nodes)
+    split = dr.clip(geometry.foot, x0, x1)
+    whole = medium.phase.constant and not light.varies
+    panels = [(x0, x1)] if whole else [(x0, split), (split, x1)]
+
+    def panel(sigma_t, x0, x1):
+        foot, h = geometry.foot, geometry.height
+        s0, s1 = x0 - foot, dr.select(dr.isinf(x1), 0, x1 - foot)
+        begin = dr.atan2(s0, h)
+        width = dr.select(dr.isinf(x1), 0.5 * dr.pi - begin, dr.atan2(h * (s1 - s0), dr.fma(s0, s1, h * h)))
+        angles = [(dr.fma(width, fraction, begin), weight) for fraction, weight in unit_nodes(nodes)]
+        total: Any = type(h)(0)
+        for theta, weight in angles:
+            total += weight * _at_angle(geometry, medium, light, sigma_t, theta)
+        return total * (width / h)
+
+    return per_extinction(medium, lambda sigma_t: sum(panel(sigma_t, a, b) for a, b in panels))
+
+
+def _check(name: str, count: int) -> None:
+    if not isinstance(count, int) or count < 1:
+        raise InputError(f"{name}: got {count!r}, wanted a whole number of at least 1")
+
+
+def _at_angle(geometry: RayGeometry, medium: Medium, light: Light, sigma_t, theta):
+    x = dr.fma(geometry.height, dr.tan(theta), geometry.foot)
+    return _integrand(geometry, medium, light, sigma_t, x, distance_to_light(geometry, x))
+
+
+def _integrand(geometry: RayGeometry, medium: Medium, light: Light, sigma_t, x, r):
+    """Return exp(-sigma_t (x + r)) p times the falloff of a spot."""
+    value = dr.exp(-sigma_t * (x + r)) * medium.phase.evaluate((geometry.foot - x) / r)
+    return value * falloff(geometry, light, x) if light.varies else value
+
+
+def _midpoints(term, begin, length, steps: int):
+    """Sum the midpoint rule in one loop, so that the kernel does not grow with the number of steps."""
+    Float = type(length)
+    width = length / steps
+    _, total = dr.while_loop(
+        state=(mi.UInt32(0), dr.zeros(Float, dr.width(width))),
+        cond=lambda index, total: index < steps,
+        body=lambda index, total: (index + 1, total + term(dr.fma(Float(index) + 0.5, width, begin))),
+        labels=("index", "total"),
+    )
+    return total * width
