@@ -37,7 +37,7 @@ def checked(data: dict[str, Any]) -> dict[str, Any]:
 
 def timing(median: float) -> dict[str, Any]:
     """Return a timing with its quartiles [ms]."""
-    return {"median_ms": median, "low_ms": 0.9 * median, "high_ms": 1.2 * median, "repetitions": 7}
+    return {"median_ms": median, "low_ms": 0.9 * median, "high_ms": 1.2 * median, "repetitions": 7, "cpu_ms": None}
 
 
 def growth_record(
@@ -235,7 +235,7 @@ def report_of(scenes: list[dict[str, Any]], **changes: Any) -> dict[str, Any]:
 def sampled(samples) -> dict[str, Any]:
     """Return the timing that repetitions give [ms]."""
     low, median, high = np.percentile(samples, [25, 50, 75]).tolist()
-    return {"median_ms": median, "low_ms": low, "high_ms": high, "repetitions": len(samples)}
+    return {"median_ms": median, "low_ms": low, "high_ms": high, "repetitions": len(samples), "cpu_ms": None}
 
 
 def times(frame_ms: float, rng: np.random.Generator | None = None, *, busy: float = 0.0) -> dict[str, Any]:

@@ -76,7 +76,7 @@ _WITNESSES = {
     "objects_moved": (),
 }
 
-Timing = Mapping[str, float]  #: median_ms, low_ms, high_ms, repetitions
+Timing = Mapping[str, Any]  #: median_ms, low_ms, high_ms, repetitions, cpu_ms
 Times = Mapping[str, Timing]  #: by stage
 
 
@@ -184,7 +184,8 @@ def _median(times: Times, stage: str) -> float:
 
 
 def _scaled(timing: Timing, factor: float) -> dict[str, Any]:
-    return {name: value if name == "repetitions" else factor * value for name, value in timing.items()}
+    scaled = ("median_ms", "low_ms", "high_ms")
+    return {name: factor * value if name in scaled else value for name, value in timing.items()}
 
 
 def other_power(old: Mapping[str, Any], new: Mapping[str, Any]) -> float:
