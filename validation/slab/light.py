@@ -23,17 +23,9 @@ def slab_numbers(
 ) -> dict[str, Any]:
     """Return all numbers of a slab.
 
-    Parameters
-    ----------
-    photons
-        How many photons check the numbers; none by default.
-
-    Returns
-    -------
-    dict
-        `tau`, `sun`, `albedo`, `phase`, `orders`, `total`; `error`, with the estimated error of every number of
-        `orders` and `total` in its place; with photons `photons`: their `count` and `seed`, and `orders` and `total` by
-        them, and in `standard_error` the standard error of each.
+    `tau`, `sun`, `albedo`, `phase`, `orders`, `total`; `error`, with the estimated error of every number of `orders`
+    and `total` in its place; with photons that check them `photons`: their `count` and `seed`, `orders` and `total` by
+    them, and in `standard_error` the standard error of each.
     """
     tell = progress or (lambda share, what: None)
     tell(0.0, "orders")
@@ -49,9 +41,7 @@ def slab_numbers(
     )
     numbers, others = _numbers(request, fine), _numbers(request, coarse)
     record: dict[str, Any] = {
-        "tau": request.tau,
-        "sun": request.sun,
-        "albedo": request.albedo,
+        **{name: getattr(request, name) for name in ("tau", "sun", "albedo")},
         "phase": request.phase.name,
         **numbers,
         "error": _differences(numbers, others),

@@ -32,36 +32,18 @@ _TABLE = 20_000  #: rows of the table of droplets
 
 @dataclass(frozen=True)
 class PhasePair:
-    """One phase function on both sides.
+    """One phase function on both sides."""
 
-    Parameters
-    ----------
-    name
-        As it was asked for.
-    deterministic
-        For `realtime.clouds`.
-    sampled
-        Makes it for the photons, when they are asked for.
-    """
-
-    name: str
-    deterministic: SlabPhase
-    sampled: Callable[[], Scattering]
+    name: str  #: as it was asked for
+    deterministic: SlabPhase  #: for `realtime.clouds`
+    sampled: Callable[[], Scattering]  #: makes it for the photons, when they are asked for
 
 
 def phase_pair(name: str) -> PhasePair:
     """Return a phase function by its name.
 
-    Parameters
-    ----------
-    name
-        'isotropic', 'hg:G' with the mean cosine G, 'hg-draine:D' with the diameter of droplets D [um], 'mie' (droplets
-        of r_e = 6 um, green), 'mie-modified' (the same without the peak below 5 degrees), or the path of a CSV file.
-
-    Raises
-    ------
-    InputError
-        For a name that is none, a mean cosine out of range, or a file that cannot be used.
+    'isotropic', 'hg:G' with the mean cosine G, 'hg-draine:D' with the diameter of droplets D [um], 'mie' (droplets of
+    r_e = 6 um, green), 'mie-modified' (the same without the peak below 5 degrees), or the path of a CSV file.
     """
     if name == "isotropic":
         return PhasePair(name, HenyeyGreensteinPhase(0.0), lambda: HenyeyGreenstein(0.0))
@@ -129,13 +111,7 @@ def _mean_cosine(name: str) -> float:
 
 
 def read_phase_file(path: Path) -> tuple[Array, Array]:
-    """Return angles [rad] and values of a CSV file.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or is not a phase function.
-    """
+    """Return angles [rad] and values of a CSV file."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:

@@ -19,29 +19,15 @@ _SMALLEST_TAU = 1e-6
 
 @dataclass(frozen=True)
 class SlabRequest:
-    """A slab, the sun, and what is wanted of it.
+    """A slab, the sun, and what is wanted of it."""
 
-    Parameters
-    ----------
-    tau
-        Thickness [mean free paths].
-    sun
-        Zenith angle of the sun [degrees].
-    orders
-        Names of the sets of orders: '3', '3-4', '31-inf', 'all'.
-    depths
-        Where fluence, flux and radiance are wanted [mean free paths].
-    directions
-        mu, positive upwards, and phi [degrees].
-    """
-
-    tau: float
-    sun: float
+    tau: float  #: thickness [mean free paths]
+    sun: float  #: its zenith angle [degrees]
     phase: PhasePair
     albedo: float
-    orders: tuple[str, ...]
-    depths: tuple[float, ...]
-    directions: tuple[tuple[float, float], ...]
+    orders: tuple[str, ...]  #: names of the sets of orders: '3', '3-4', '31-inf', 'all'
+    depths: tuple[float, ...]  #: where fluence, flux and radiance are wanted [mean free paths]
+    directions: tuple[tuple[float, float], ...]  #: mu, positive upwards, and phi [degrees]
 
     @property
     def mu0(self) -> float:
@@ -64,13 +50,7 @@ def slab_request(
     depths: str | Sequence[float] | None = None,
     directions: str | Sequence[tuple[float, float]] = (),
 ) -> SlabRequest:
-    """Return a request that was checked; words are read as the command takes them.
-
-    Raises
-    ------
-    InputError
-        In one line, for what cannot be computed.
-    """
+    """Return a request that was checked; words are read as the command takes them."""
     tau, sun, albedo = (_number(name, value) for name, value in (("tau", tau), ("sun", sun), ("albedo", albedo)))
     if not _SMALLEST_TAU <= tau <= THICKEST:
         raise InputError(f"tau: got {tau:g}, wanted a thickness of {_SMALLEST_TAU:g} to {THICKEST:g} mean free paths")
@@ -92,13 +72,7 @@ def slab_request(
 
 
 def order_range(name: str) -> tuple[int, float]:
-    """Return first and last order of a set by its name.
-
-    Raises
-    ------
-    InputError
-        For a name that is none, order 0 or orders above `LARGEST_ORDER`.
-    """
+    """Return first and last order of a set by its name."""
     if name == "all":
         return 1, math.inf
     form = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9}|inf))?", name)
@@ -117,13 +91,7 @@ def order_range(name: str) -> tuple[int, float]:
 
 
 def parse_orders(given: str | Sequence[str | int]) -> tuple[str, ...]:
-    """Return the names of sets of orders in the order given, each once; 'sets' stands for `SETS`.
-
-    Raises
-    ------
-    InputError
-        As `order_range`, and for none.
-    """
+    """Return the names of sets of orders in the order given, each once; 'sets' stands for `SETS`."""
     words = given.split(",") if isinstance(given, str) else [str(word) for word in given]
     names = [name for word in words for name in (SETS if word.strip() == "sets" else (word.strip(),))]
     for name in names:

@@ -66,13 +66,7 @@ class Caster:
 def draw_casters(
     draws: Draws, ranges: Ranges, camera: Array, lights: Sequence[Light], *, in_shadow: bool
 ) -> list[Caster]:
-    """Return the casters of a scene.
-
-    Parameters
-    ----------
-    in_shadow
-        Whether a plate keeps the first light from the camera.
-    """
+    """Return the casters of a scene, and perhaps a plate that keeps the first light from the camera."""
     files = _files(ranges["meshes"])
     kinds = {kind: weight for kind, weight in ranges["caster_kinds"].items() if kind != "mesh" or files}
     kinds = kinds if any(kinds.values()) else {"box": 1.0}

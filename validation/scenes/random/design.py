@@ -126,13 +126,7 @@ class Draws:
 
 @lru_cache(maxsize=64)
 def point(seed: int) -> Mapping[str, float]:
-    """Return the coordinates of a seed by name, each within (0, 1).
-
-    Raises
-    ------
-    InputError
-        For a seed that no scene has.
-    """
+    """Return the coordinates of a seed by name, each within (0, 1)."""
     if not 0 <= seed <= LARGEST_SEED:
         raise InputError(f"random scene: got the seed {seed}, wanted a whole number from 0 to {LARGEST_SEED}")
     sequence = qmc.Halton(len(COORDINATES), scramble=True, rng=np.random.default_rng(_SCRAMBLING))

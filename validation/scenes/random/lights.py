@@ -47,13 +47,7 @@ class Light:
 
 
 def draw_lights(draws: Draws, ranges: Ranges, media: list[Medium], camera: Array, seen: Ways) -> list[Light]:
-    """Return the lights of a scene.
-
-    Parameters
-    ----------
-    seen
-        Rays of the camera, for the brightness.
-    """
+    """Return the lights of a scene; their brightness is that on the rays of the camera."""
     endless = any(medium.bounds == "endless" for medium in media)
     kinds = ranges["light_kinds"] | ({"directional": 0.0} if endless else {})
     kinds = kinds if any(kinds.values()) else {"point": 1.0}

@@ -128,20 +128,7 @@ def _bounded(draws: Draws, ranges: Ranges, camera: Array, *, count: int, inside:
 
 
 def optical_depths(media: list[Medium], start: Array, end: Array) -> Array:
-    """Return the optical depths of segments, with balls in place of the bounds.
-
-    Parameters
-    ----------
-    media
-        As `draw_media` returned them.
-    start, end
-        Ends of the segments, (..., 3).
-
-    Returns
-    -------
-    array
-        By channel, (..., 3).
-    """
+    """Return the optical depths of segments, (..., 3), by channel, (..., 3), with balls in place of the bounds."""
     way = end - start
     length = np.linalg.norm(way, axis=-1)
     depth = np.zeros((*length.shape, 3))
@@ -192,14 +179,9 @@ def ways(media: list[Medium], camera: Array, target: Array, reach: float) -> Way
 
 
 def unit_airlight(media: list[Medium], seen: Ways, light: Array, *, directional: bool) -> float:
-    """Return the largest airlight of a light of unit intensity, or of unit irradiance, over rays and channels.
+    """Return the largest airlight of a light of unit intensity over rays and channels.
 
-    Parameters
-    ----------
-    light
-        Where it is, or with `directional` a point very far away from which it comes, (3,).
-    directional
-        Whether its light does not spread.
+    A directional light, of unit irradiance, does not spread; it comes from a point very far away.
     """
     toward = light - seen.points
     distance = np.linalg.norm(toward, axis=-1)

@@ -27,13 +27,7 @@ def _defaults() -> tuple[Ranges, Mapping[str, tuple[float, float]]]:
 
 
 def read_ranges(path: Path) -> Ranges:
-    """Read ranges from a TOML file.
-
-    Raises
-    ------
-    InputError
-        For a missing or malformed file, and as `ranges_from`.
-    """
+    """Read ranges from a TOML file."""
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
@@ -46,10 +40,7 @@ def read_ranges(path: Path) -> Ranges:
 def ranges_from(table: Mapping[str, Any], where: str = "ranges") -> Ranges:
     """Return the usual ranges with what a table says in their place.
 
-    Raises
-    ------
-    InputError
-        For an unknown name, a range that is empty or beyond what can be drawn, and weights of which none is above 0.
+    Unknown names, ranges that are empty or beyond what can be drawn, and weights of which none is above 0 are refused.
     """
     usual, limits = _defaults()
     changed: Ranges = {}

@@ -92,13 +92,7 @@ def is_random(name: str) -> bool:
 
 
 def random_name(name: str, meshes: Path | None = None, ranges: Path | None = None) -> str:
-    """Return the name of a scene with a folder of meshes and a file of ranges, as options give them.
-
-    Raises
-    ------
-    InputError
-        If the scene is no random one and one of them is given.
-    """
+    """Return the name of a scene with a folder of meshes and a file of ranges, which random ones alone can have."""
     given = {"meshes": meshes, "ranges": ranges}
     words = [f"{option}={quote(str(path.resolve()), safe=_SAFE)}" for option, path in given.items() if path is not None]
     if words and not is_random(name):
@@ -109,13 +103,7 @@ def random_name(name: str, meshes: Path | None = None, ranges: Path | None = Non
 
 
 def random_parts(name: str) -> tuple[int, dict[str, Path]]:
-    """Return the seed in a name, and the paths of `meshes` and `ranges` that it goes on with.
-
-    Raises
-    ------
-    InputError
-        For a name of another form.
-    """
+    """Return the seed in a name, and the paths of `meshes` and `ranges` that it goes on with."""
     seed, *options = name.removeprefix(PREFIX).split(",")
     if not (seed.isascii() and seed.isdecimal()):
         raise InputError(f"scene: got {name!r}, wanted {PREFIX}SEED, a whole number, for example {PREFIX}7")
@@ -131,13 +119,7 @@ def random_parts(name: str) -> tuple[int, dict[str, Path]]:
 
 
 def random_record(name: str) -> SceneRecord:
-    """Return the record of a random scene; needs an active Mitsuba variant.
-
-    Raises
-    ------
-    InputError
-        For a name of another form, a seed that no scene has, a folder without meshes and ranges that cannot be drawn.
-    """
+    """Return the record of a random scene; needs an active Mitsuba variant."""
     stage, occluders, _ = _drawn(*_parse(name))
     x, y, z = stage.place(np.zeros(3))
     return SceneRecord(
@@ -189,22 +171,7 @@ def _drawn(seed: int, ranges: Ranges) -> tuple[Stage, dict[str, Any], Reach]:
 
 
 def draw_stage(seed: int, ranges: Ranges, attempt: int = 0) -> Stage:
-    """Return the scene of a seed.
-
-    Parameters
-    ----------
-    seed
-        From 0 to `design.LARGEST_SEED`.
-    ranges
-        What is drawn from where to where.
-    attempt
-        The coordinates of the point are the same for every attempt; places and shapes are others.
-
-    Raises
-    ------
-    InputError
-        For a seed that no scene has.
-    """
+    """Return the scene of a seed; for another attempt its point is the same, and places and shapes are others."""
     draws = Draws(seed, attempt)
     scale = draws.logarithmic(*ranges["scale"], name="scale")
     origin, target, fov = _draw_view(draws, ranges)
@@ -238,15 +205,7 @@ def _draw_view(draws: Draws, ranges: Ranges) -> tuple[Array, Array, float]:
 
 
 def reach(stage: Stage, occluders: Any, aspect: float = 0.75) -> Reach:
-    """Return what light reaches, by rays of Mitsuba.
-
-    Parameters
-    ----------
-    occluders
-        The `mi.Scene` of the casters.
-    aspect
-        Height of the image over its width.
-    """
+    """Return what light reaches past the casters, an `mi.Scene`, in an image of such a height over its width."""
     origin = np.array(stage.place(stage.camera.origin))
     directions = _directions(stage.camera, aspect)
     away = stage.scale * float(np.linalg.norm(stage.camera.origin))
