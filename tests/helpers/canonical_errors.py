@@ -97,16 +97,6 @@ def transport_at(
     return np.stack([T, -x, -y, sigma])
 
 
-def looked_up_points(look_up: LookUp, types: ArrayTypes, count: int, *, seed: int = 0) -> Points:
-    """Return points as above, with what a look-up gives there."""
-    random = np.random.default_rng(seed)
-    t = np.exp(random.uniform(np.log(THINNEST), np.log(THICKEST), count))
-    d, mu = t * random.uniform(0, 1, count), random.uniform(-1, 1, count)
-    phi, mu_l = random.uniform(0, 2 * np.pi, count), random.uniform(LOWEST_SUN, 1, count)
-    values = [_looked_up(look_up, types, number, t, d, mu, phi, mu_l) for number in range(len(SETS))]
-    return Points(t, d, mu, phi, mu_l, *np.stack(values, axis=1))
-
-
 def _looked_up(
     look_up: LookUp, types: ArrayTypes, number: int, t: Array, d: Array, mu: Array, phi: Array, mu_l: Array
 ) -> Array:
