@@ -37,6 +37,7 @@ PARTS = {
     "pictures": shown.pictures,
     "claims": measured.claims,
     "cycles": measured.cycles,
+    "numpy-faults": measured.numpy_faults,
     "tested-claims": tested.claims,
     "last-run": tested.last_run,
     "fastest": measured.fastest,

@@ -156,3 +156,22 @@ def cycles() -> str:
         cells = [row["scene"], row["words"], f"`{row['planted']}`", first, says]
         lines.append(f"| {' | '.join([*cells, *(f'{100 * row[key]:.2g} %' for key in ('residual', 'left'))])} |")
     return "\n".join([*lines, ""])
+
+
+def numpy_faults() -> str:
+    """Return the faults that were set in a renderer in NumPy, and what the diagnosis said of each."""
+    record = json.loads((DATA / "numpy-faults.json").read_text(encoding="utf-8"))
+    rows = record["rows"]
+    lines = [
+        f"{sum(row['right'] for row in rows)} of {len(rows)} images are called what they are ({record['measured']}, "
+        f"64 x 48 pixels, {100 * record['noise']:g} % of noise, the kind of pixel not told).",
+        "",
+        "| injected fault | expected name | named first | words | error | left |",
+        "| --- | --- | --- | --- | ---: | ---: |",
+    ]
+    for row in rows:
+        first = f"`{row['first']}`" if row["right"] else f"**`{row['first']}`**"
+        says = row["says"] + (f" (with {' and '.join(row['together'])})" if row["together"] else "")
+        cells = [row["words"], f"`{row['planted']}`", first, says]
+        lines.append(f"| {' | '.join([*cells, *(f'{100 * row[key]:.2g} %' for key in ('residual', 'left'))])} |")
+    return "\n".join([*lines, ""])

@@ -16,10 +16,13 @@ import math
 import os
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import bpy
 from mathutils import Matrix, Vector
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
 from render_cycles import assign, build, read, render
 
 Properties = dict[str, Any]

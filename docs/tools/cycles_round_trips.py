@@ -41,8 +41,8 @@ def answers(
         The checkout.
     """
     from reference.scene.read import read_truth
-    from validation.diagnosis.diagnose import diagnose_file
-    from validation.diagnosis.prediction import SceneLight
+    from validation.engine.diagnose import diagnose_file
+    from validation.engine.prediction import SceneLight
     from validation.scenes.loading import load_scene
 
     scene = str(root / SCENES[name]) if SCENES[name].endswith(".xml") else SCENES[name]
@@ -56,7 +56,7 @@ def answers(
         path = folder / f"{fault}.exr"
         if not path.exists():
             continue  # a scene that cannot have it
-        diagnosis = diagnose_file(path, scene, pixel="area", light=light)
+        (diagnosis,) = diagnose_file(path, scene, pixel="area", light=light)
         first = diagnosis.ranked[0]
         print(f"{name}, {fault}: {diagnosis.first}, {diagnosis.residual:.2%}, {diagnosis.left:.2%} left", flush=True)
         yield {

@@ -58,7 +58,7 @@ def compare(
     Exit status 1 if the image has values that are negative or not finite, or if the bias is not shown to be within
     the margin.
 
-    `--diagnose` predicts the image that each of some sixty faults would make, of medium, lights, camera and encoding,
+    `--diagnose` predicts the image that each of a hundred faults would make, of medium, lights, camera and encoding,
     and ranks them by evidence. `--fit` finds the parameters of the fog that explain the image, each with its 95 %
     interval. See docs/your-engine.md.
 
@@ -70,7 +70,7 @@ def compare(
     test
         The image to judge, an EXR file; from Python also a result or an array.
     layer
-        Layer to compare, 'airlight' by default; 'total' is R/G/B, the default with a scene where there is no airlight.
+        Layer to compare, 'airlight' by default; 'total' is R/G/B, the default where there is no airlight.
     holds
         With a scene: what the layer holds; what its name says by default.
     pixel
@@ -156,7 +156,7 @@ def compare(
         "exposure": exposure,
     }
     if scene is None:
-        return _two_images(reference, test, layer or "airlight", by_order=by_order, files=files, **options)
+        return _two_images(reference, test, layer, by_order=by_order, files=files, **options)
     how = {"layer": layer, "holds": holds, "pixel": pixel}
     with _as_file(test) as path:
         from reference.storage.exr import read_exr
@@ -201,7 +201,7 @@ def _as_file(image: Any) -> Iterator[Path]:
         yield folder / "image.exr"
 
 
-def as_image(image: Any, layer: str, name: str) -> "tuple[Image, str]":
+def as_image(image: Any, layer: str | None, name: str) -> "tuple[Image, str]":
     """Return layers, among them the one of that name, and what to call the image.
 
     Parameters
@@ -209,7 +209,7 @@ def as_image(image: Any, layer: str, name: str) -> "tuple[Image, str]":
     image
         See `ImageLike`; an array, (height, width[, 3]), becomes the layer.
     layer
-        The layer that will be looked at.
+        The layer that will be looked at; the airlight by default.
     name
         What to call an image that has no name of its own.
 
@@ -228,7 +228,8 @@ def as_image(image: Any, layer: str, name: str) -> "tuple[Image, str]":
         return image.with_total(), image.title
     if isinstance(image, str | os.PathLike):
         read = read_exr(image)
-        image_layer(read, layer, image)  # a message about a missing layer then names the file
+        if layer is not None:
+            image_layer(read, layer, image)  # a message about a missing layer then names the file
         return read, Path(image).name
     if isinstance(image, Image):
         return image, name
@@ -238,7 +239,7 @@ def as_image(image: Any, layer: str, name: str) -> "tuple[Image, str]":
             f"{name}: got {type(image).__name__}, wanted what render or reference return, a path, or numbers (height, "
             "width, 3)"
         )
-    return Image({layer: values}), name
+    return Image({layer or "airlight": values}), name
 
 
 def _mask(mask: Any) -> Any:
@@ -253,11 +254,16 @@ def _mask(mask: Any) -> Any:
 
 
 def _two_images(
-    reference: Any, test: Any, layer: str, *, mask: Any, by_order: bool, files: list[Path], **options: Any
+    reference: Any, test: Any, layer: str | None, *, mask: Any, by_order: bool, files: list[Path], **options: Any
 ) -> "ImageComparison":
     from reference.storage.exr import layer as image_layer
+    from reference.storage.exr import read_exr
     from reports.api.results import ImageComparison, write_difference
-    from validation.comparison.images import compare_files, compare_images
+    from validation.comparison.images import common_layer, compare_files, compare_images
+
+    if layer is None:
+        read = [(str(path), read_exr(path)) for path in (reference, test) if isinstance(path, str | os.PathLike)]
+        layer = common_layer(*read) if len(read) == 2 else "airlight"
 
     exact, exact_name = as_image(reference, layer, "the reference")
     tested, test_name = as_image(test, layer, "the test image")
@@ -282,7 +288,7 @@ def _with_scene(
     scene: str, path: Path, *, mask: Any, files: list[Path], progress: Any, **options: Any
 ) -> "SceneComparison":
     from reports.api.results import SceneComparison, write_difference
-    from validation.comparison.engine_compare import compare_scene
+    from validation.engine.judge import compare_scene
 
     if mask is not None and not isinstance(mask, str | os.PathLike):
         raise InputError("mask: an image is compared with a scene under a mask that is an EXR file; save it first")
@@ -295,7 +301,7 @@ def _with_scene(
 
 def _diagnose(scene: str, path: Path, *, progress: Any, **how: Any) -> "Diagnosed":
     from reports.api.results import Diagnosed
-    from validation.diagnosis.diagnose import diagnose_file
+    from validation.engine.diagnose import diagnose_file
 
     with telling(progress, "diagnosis") as tell:
         return Diagnosed(diagnose_file(path, scene, progress=tell, **how))
@@ -307,13 +313,13 @@ def _fit(
     names = listed("fit", parameters)
     words = [f"{name}={value}" for name, value in start.items()] if isinstance(start, Mapping) else several(start)
     starts = named_values("start", words, float, "NAME=VALUE, such as sigma_t=0.1")
-    layers, name = as_image(image, layer or "airlight", "the image")  # before Mitsuba starts
+    layers, name = as_image(image, layer, "the image")  # before Mitsuba starts
     from reports.machine.environment import activate
 
     activate()
     from reports.api.results import Fitted
-    from validation.comparison.engine_compare import scene_of_size
-    from validation.comparison.engine_layers import judged_layer
+    from validation.engine.judged_layer import judged_layer
+    from validation.engine.seen import scene_of_size
     from validation.fit.fit import fit_image
 
     size = judged_layer(layers, name, name=layer, holds=how["holds"]).size

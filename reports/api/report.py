@@ -249,7 +249,7 @@ def _measured(
     from reports.api.render import asked_configurations
     from reports.report.asked import notes_on, scenes_of_images
     from reports.report.measure import write_report
-    from validation.comparison.engine_images import images_size
+    from validation.engine.images import images_size
     from validation.study.cost import check_work, frame_work, truth_work
     from validation.study.study import RandomScenes, read_study, standard_study
 

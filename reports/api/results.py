@@ -37,12 +37,10 @@ from reports.plotting.pictures import (
 from reports.tables.methods import rate_words
 from reports.tables.record import Result
 from reports.tables.table import Column, Interval, Table, number, table
-from validation.comparison.engine_compare import EngineComparison
 from validation.comparison.images import Comparison
-from validation.diagnosis.diagnose import Diagnosis
-from validation.diagnosis.diagnosis_text import diagnosis_lines
+from validation.engine.diagnose import Diagnosis
+from validation.engine.judge import EngineComparison
 from validation.fit.fit import Fit
-from validation.fit.fit_text import fit_lines
 from validation.metrics.errors import FLOOR, Metrics, colours, plain
 from validation.study.frame_times import FrameTimes
 
@@ -474,18 +472,25 @@ class SceneComparison(Result):
 
 @dataclass(frozen=True, repr=False)
 class Diagnosed(Result):
-    """What is wrong with an image of a scene."""
+    """What is wrong with an image of a scene: with each of airlight and surfaces where it has both as layers."""
 
-    diagnosis: Diagnosis
+    diagnoses: tuple[Diagnosis, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight compare SCENE --diagnose --json` prints."""
-        return self.diagnosis.to_json()
+        """Return what `airlight compare SCENE --diagnose --json` prints: with several layers, a list of all too."""
+        several = [diagnosis.to_json()["diagnosis"] for diagnosis in self.diagnoses]
+        return {"diagnosis": several[0]} | ({"layers": several} if len(several) > 1 else {})
+
+    @property
+    def passed(self) -> bool:
+        """Whether all pixels of the image are finite."""
+        return not any(diagnosis.failures for diagnosis in self.diagnoses)
 
     @property
     def lines(self) -> Sequence[str]:
         """The faults, ranked by evidence."""
-        return diagnosis_lines(self.diagnosis)
+        first, *others = (diagnosis.lines for diagnosis in self.diagnoses)
+        return first + [line for lines in others for line in ("", *lines)]
 
 
 _FITTED = (
@@ -535,7 +540,12 @@ class Fitted(Result):
     @property
     def lines(self) -> Sequence[str]:
         """What the image cannot tell apart, and what is left over."""
-        return fit_lines(self.fit)
+        return self.fit.lines
+
+    @property
+    def passed(self) -> bool:
+        """Whether all pixels of the image are finite."""
+        return not self.fit.failures
 
 
 def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from analytic.errors import InputError
 from realtime.scene.read_scene import read_scene
-from validation.comparison.engine_images import EngineImage, find_images
+from validation.engine.images import EngineImage, find_images
 from validation.scenes.loading import load_scene, scene_stem
 from validation.scenes.registry import SCENES
 

@@ -30,7 +30,7 @@ from reports.page.render import render_page
 from reports.report.others import other_parts, paper_rows, shares
 from reports.report.scene import folder_of, write_scene
 from reports.report.staging import staged
-from validation.comparison.engine_images import EngineImage, images_size
+from validation.engine.images import EngineImage, images_size
 from validation.scenes.loading import scene_stem
 from validation.scenes.random.scene import is_random
 from validation.scenes.registry import FOG_SCENES, SCENES

@@ -208,7 +208,7 @@ def test_an_engine_that_knows_the_description_alone_is_called_right(
 @pytest.mark.claim("diagnosis-cycles")
 def test_what_is_set_wrong_in_cycles_is_named(variant, tmp_path, monkeypatch):
     """A right image, and faults of the medium, the light, the camera and the values."""
-    from validation.diagnosis.diagnose import diagnose_file
+    from validation.engine.diagnose import diagnose_file
 
     planted = {
         "right": "right",
@@ -224,5 +224,5 @@ def test_what_is_set_wrong_in_cycles_is_named(variant, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(DOCS / "tools"))
     render_faults = importlib.import_module("cycles_round_trips").render_faults
     render_faults(python, "sphere-spot", tmp_path, samples=256, size=(80, 60), faults=list(planted))
-    named = {fault: diagnose_file(tmp_path / f"{fault}.exr", "sphere-spot", pixel="area").first for fault in planted}
+    named = {fault: diagnose_file(tmp_path / f"{fault}.exr", "sphere-spot", pixel="area")[0].first for fault in planted}
     assert named == planted

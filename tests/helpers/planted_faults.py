@@ -24,13 +24,11 @@ from reference.scene.area_light import is_area
 from reference.scene.camera import film_directions, pixel_centres
 from reference.scene.directional_light import is_directional
 from reference.scene.read import TruthLight, TruthScene
-from validation.comparison.whole_image import to_srgb
-from validation.diagnosis.encoding import agx, blender_filmic, filmic
-from validation.diagnosis.prediction import Scenery, changed_scene
+from validation.engine.curves import agx, blender_filmic, filmic, to_srgb
+from validation.engine.prediction import Scenery
 from validation.estimates.reference_layers import reference_layer
-from validation.fog_model.build import scattering_paths
-from validation.fog_model.fog import scene_fog
-from validation.fog_model.radiance import as_array, fog_total, on_device
+from validation.fog_model.radiance import FogModel, scene_fog
+from validation.fog_model.view import scattering_paths, view_of
 
 Array = NDArray[np.float64]
 
@@ -148,7 +146,7 @@ def _other_g(truth: TruthScene) -> TruthScene | None:
 
 
 def _scenery(wanted: Callable[[TruthScene], bool], **given: Any) -> Callable[[TruthScene], TruthScene | None]:
-    return lambda truth: changed_scene(truth, Scenery(**given)) if wanted(truth) else None
+    return lambda truth: replace(truth, lights=Scenery(**given).lights(truth)) if wanted(truth) else None
 
 
 def _spots(truth: TruthScene) -> bool:
@@ -198,8 +196,9 @@ def _of_model(wanted: Callable[[TruthScene], bool], laws: Mapping[str, Any], **h
     def image(truth: TruthScene) -> Array | None:
         if not wanted(truth):
             return None
-        paths = on_device(scattering_paths(truth, **({"points": _POINTS} | how)))
-        return as_array(fog_total(paths, replace(scene_fog(truth), **laws))).reshape(truth.height, truth.width, 3)
+        paths = scattering_paths(view_of(truth), **({"samples": _POINTS} | how))
+        layers = FogModel(paths).layers(replace(scene_fog(truth), **laws))
+        return np.asarray(layers.sum(axis=0).reshape(truth.height, truth.width, 3))
 
     return image
 
@@ -240,7 +239,9 @@ PLANTED = (
     Planted("g-sign", "g with the other sign", _of_scene(_phase(_negative_g))),
     Planted("g", "another g", _of_scene(_other_g)),
     Planted("light-leg", "the way from the light not attenuated", _light_leg),
-    Planted("camera-leg", "the way to the camera not attenuated", _of_model(lambda truth: True, {"camera_leg": 0.0})),
+    Planted(
+        "camera-leg", "the way to the camera not attenuated", _of_model(lambda truth: True, {"camera_leg": (0.0, 0.0)})
+    ),
     Planted(
         "distance-law", "one over the distance", _of_model(lambda truth: bool(truth.lights), {"distance_power": 1.0})
     ),

@@ -180,7 +180,7 @@ def compare_files(
     reference_image, test_image = read_exr(reference), read_exr(test)
     chosen = test_image.with_data(reference_image.with_data(None if mask is None else read_mask(mask)))
     names = (str(reference), reference_image), (str(test), test_image)
-    layer = _common_layer(*names) if layer is None else layer
+    layer = common_layer(*names) if layer is None else layer
     whole = _compare(*names, name=layer, mask=chosen, margin=margin, extras=_Extras(all_metrics, flip, exposure))
     whole = replace(
         whole, notes=tuple(f"{path}: {image.attributes[NOTE]}" for path, image in names if NOTE in image.attributes)
@@ -194,7 +194,7 @@ def compare_files(
     return replace(whole, orders=orders)
 
 
-def _common_layer(reference: tuple[str, Image], test: tuple[str, Image]) -> str:
+def common_layer(reference: tuple[str, Image], test: tuple[str, Image]) -> str:
     """Return the layer that both images have: the airlight, the plain channels, or the only one."""
     common = [name for name in reference[1].layers if name in test[1].layers]
     for usual in ("airlight", TOTAL):

@@ -7,11 +7,14 @@ divided by its length, say which: those with a singular value below a millionth 
 them all but as many as can be known are held, the later ones of the list, and the others mean products with them.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from validation.fit.unknowns import Unknown
 
 Array = NDArray[np.float64]
 
@@ -74,3 +77,66 @@ def _group(columns: Array, length: Array, null: Array, members: Sequence[int]) -
         for number, row in zip(kept, powers, strict=True)
     }
     return Group(tuple(members), tuple(held), known)
+
+
+@dataclass(frozen=True)
+class Product:
+    """What an image says of parameters that it does not tell apart: a product of powers of them."""
+
+    name: str  #: such as 'albedo * intensity'
+    value: float
+    low: float
+    high: float | None  #: None where the image sets no end
+
+
+@dataclass(frozen=True)
+class Confounded:
+    """Parameters that the image does not tell apart."""
+
+    parameters: tuple[str, ...]
+    held: tuple[str, ...]  #: which of them were held at the value to begin with
+    products: tuple[Product, ...]  #: what is known of them
+    way_out: str
+
+    @property
+    def lines(self) -> list[str]:
+        """What `airlight compare --fit` prints of them."""
+        names = ", ".join(self.parameters)
+        alone = len(self.parameters) == 1
+        lines = [f"This image says nothing of {names}." if alone else f"This image does not tell apart: {names}."]
+        for each in self.products:
+            ends = f"{each.low:.6g} or more" if each.high is None else f"{each.low:.6g} to {each.high:.6g}"
+            lines.append(f"Known is {each.name} = {each.value:.6g} ({ends}).")
+        return [*lines, f"Way out: {self.way_out}."]
+
+
+def confounded(
+    group: Group, unknowns: Sequence[Unknown], inner: Mapping[int, float], lengths: Mapping[int, Array], holds: str
+) -> Confounded:
+    """Return what an image says of a group, from the numbers on the whole line and the ends of their intervals."""
+    names = {number: unknowns[number].name for number in group.members}
+    products = []
+    for kept, powers in group.powers.items():
+        if all(unknowns[number].scale.relative for number in (kept, *powers)):
+            words = [names[kept], *(_power(names[number], power) for number, power in powers.items())]
+            middle = inner[kept] + sum(power * inner[number] for number, power in powers.items())
+            low, high = (float(np.exp(middle + float(length))) for length in lengths[kept])
+            products.append(Product(" * ".join(words), math.exp(middle), low, high if math.isfinite(high) else None))
+    held = tuple(names[number] for number in group.held)
+    return Confounded(tuple(names.values()), held, tuple(products), _way_out(group, unknowns, holds))
+
+
+def _power(name: str, power: float) -> str:
+    return name if abs(power - 1) < 1e-3 else f"{name}^{power:.3g}"
+
+
+def _way_out(group: Group, unknowns: Sequence[Unknown], holds: str) -> str:
+    kinds = {unknowns[number].kind for number in group.members}
+    if len(group.held) == len(group.members):
+        return "these do nothing in the pixels of this image: fit a layer in which they show"
+    if "albedo" in kinds and holds == "airlight":
+        return (
+            "the airlight holds only their product: leave all but one out of the fit, or fit a layer with lit "
+            "surfaces, which the albedo does not change, such as --layer total"
+        )
+    return "leave all but one out of the fit; what is left out keeps the value of the scene"

@@ -4,41 +4,35 @@
 import math
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.scene.read import read_truth
 from reference.storage.exr import Image, read_exr
-from validation.comparison.engine_compare import scene_of_size
-from validation.comparison.engine_layers import JudgedLayer, judged_layer
-from validation.comparison.engine_pixels import PIXELS
 from validation.comparison.images import read_mask
-from validation.fit.confounding import Group, confounded_groups
-from validation.fit.image_model import (
+from validation.engine.judged_layer import judged_layer
+from validation.engine.seen import Progress, Seen, at_places, pixel_kinds, scene_of_size, seen_image
+from validation.fit.confounding import Confounded, Group, confounded, confounded_groups
+from validation.fit.solve import (
+    SIGMAS,
     ImageModel,
-    Task,
-    at_places,
-    image_model,
-    needed_points,
-    pixels_of_rays,
-    usable_pixels,
-    without_lights,
+    Solution,
+    best_start,
+    interval_ends,
+    no_solution,
+    robust_fit,
+    weighted_fit,
 )
-from validation.fit.intervals import SIGMAS, interval_ends
-from validation.fit.least_squares import Solution, best_start, robust_fit, weighted_derivatives, weighted_fit
 from validation.fit.unknowns import AXES, CHANNELS, Unknown, read_unknowns
-from validation.fog_model.fog import scene_fog
+from validation.fog_model.radiance import scene_fog
 from validation.metrics.errors import plain
 from validation.scenes.loading import LoadedScene
 
 Array = NDArray[np.float64]
-Progress = Callable[[float, str], None]
 
 _MOVES = 12  # rounds in which lit intervals are found anew
 _STILL = 1e-6  # of the distance of a light from the camera: it does not move any more
@@ -48,6 +42,9 @@ _EXACT = 1e-5  # mean relative residual at which pixels are centres beyond doubt
 _FEW_RAYS = 3000  # on which starts are compared
 _FEWER = 4
 _FEWEST = 16  # pixels
+_SATURATED = 8  # values that stop at the largest one
+_MANY = 0.1  # fraction of the pixels: if more are left out, the reader should look why
+_BAD = 0.99  # fraction of the variance: an image that is explained less is not understood
 
 
 @dataclass(frozen=True)
@@ -60,26 +57,6 @@ class Fitted:
     high: float | None
     unit: str
     scene: float  #: what the scene says
-
-
-@dataclass(frozen=True)
-class Product:
-    """What an image says of parameters that it does not tell apart: a product of powers of them."""
-
-    name: str  #: such as 'albedo * intensity'
-    value: float
-    low: float
-    high: float | None  #: None where the image sets no end
-
-
-@dataclass(frozen=True)
-class Confounded:
-    """Parameters that the image does not tell apart."""
-
-    parameters: tuple[str, ...]
-    held: tuple[str, ...]  #: which of them were held at the value to begin with
-    products: tuple[Product, ...]  #: what is known of them
-    way_out: str
 
 
 @dataclass(frozen=True)
@@ -99,6 +76,7 @@ class Fit:
     noise: float  #: median of the relative residual, as a standard deviation
     confounded: tuple[Confounded, ...]
     seconds: float  #: that the fit took, with the paths of light
+    failures: tuple[str, ...] = ()  #: what is wrong with the file, such as pixels that are not finite
 
     def to_json(self) -> dict[str, Any]:
         """Return every number by name. A parameter of three channels has lists of three."""
@@ -120,7 +98,31 @@ class Fit:
             "left_out": self.left_out,
             "confounded": [asdict(each) for each in self.confounded],
             "seconds": plain(self.seconds),
+            "failures": list(self.failures),
         }
+
+    @property
+    def lines(self) -> list[str]:
+        """What `airlight compare --fit` prints beside the table of parameters."""
+        pixel = "at pixel centres" if self.pixel == "centre" else "means over pixels"
+        holds = "airlight + surface" if self.holds == "total" else self.holds
+        left = f"{self.left_out} of {self.pixels} pixels disagree with what explains the others, and are left out"
+        lines = [
+            f"{self.path} as {holds} of {self.scene}, {pixel}: {100 * self.explained:.6g} % of its variance is "
+            f"explained; the relative rmse left is {self.residual:.3g}, the usual error of a value {self.noise:.2g}.",
+            left + (": look where, by airlight compare" if self.left_out > _MANY * self.pixels else "") + ".",
+        ]
+        if self.explained < _BAD:
+            lines.append("That is no explanation: something that was not looked for is different.")
+        held = {name for group in self.confounded for name in group.parameters}
+        lines += [
+            f"{each.name} has no upper end: this image allows any value above {each.low:.6g}."
+            for each in self.parameters
+            if each.high is None and each.low is not None and each.name not in held
+        ]
+        lines += [f"Failed: {reason}." for reason in self.failures]
+        lines.append(f"The fit took {self.seconds:.2g} s.")
+        return lines + [line for group in self.confounded for line in group.lines]
 
 
 def fit_file(
@@ -142,7 +144,7 @@ def fit_file(
     parameters
         What is looked for, see `validation.fit.unknowns`.
     layer
-        Which layer, see `validation.comparison.engine_layers.judged_layer`.
+        Which layer, see `validation.engine.judged_layer.judged_layer`.
     mask
         An EXR file that is 0 in pixels to leave out.
     how
@@ -200,60 +202,38 @@ def fit_image(
     lights with extent are 16 to 128 points here, which leaves some 0.5 % in a pixel. The intervals count pixels as
     independent of one another.
     """
-    if pixel is not None and pixel not in PIXELS:
-        raise InputError(f"--pixel {pixel}; wanted 'centre' or 'area'")
     started = time.perf_counter()
+    kinds = pixel_kinds(image, pixel)
     judged = judged_layer(image, path, name=layer, holds=holds)
-    truth = read_truth(loaded.scene)
-    unknowns = read_unknowns(parameters, truth, scene_fog(truth), starts or {})
-    values = three_channels(judged)
-    used = usable_pixels(values) & without_lights(truth, judged)
-    if mask is not None:
-        used &= _fitting_mask(mask, judged)
+    seen, wrong = seen_image(image, judged, loaded.scene, mask=mask)
+    unknowns = read_unknowns(parameters, seen.truth, scene_fog(seen.truth), starts or {})
+    seen = replace(seen, used=seen.used & ~_cut_off(seen))
     fewest = max(_FEWEST, 4 * len(unknowns))
-    if int(used.sum()) < fewest:
+    if int(seen.used.sum()) < fewest:
         raise InputError(
-            f"{path}: {int(used.sum())} pixels of the layer '{judged.name}' say something; wanted at least {fewest}, "
-            "finite, not cut off at the brightest value, and left by the mask"
+            f"{path}: {int(seen.used.sum())} pixels of the layer '{judged.name}' say something; wanted at least "
+            f"{fewest}, finite, not cut off at the brightest value, and left by the mask"
         )
-    task = Task(truth, values, judged.holds, used, area=False, points=needed_points(truth))
-    said = pixel or said_pixel(image)
-    kinds = [said] if said else list(PIXELS)
     results = []
     for number, kind in enumerate(kinds):
         tell = None if progress is None else _stage(progress, number, len(kinds))
-        results.append((kind, *_solved(replace(task, area=kind == "area"), unknowns, tell)))
+        results.append((kind, *_solved(replace(seen, area=kind == "area"), unknowns, tell)))
         if _wrong(results[-1][3]) < _EXACT:
             break
     kind, model, groups, solution, unknowns = min(results, key=lambda result: _wrong(result[3]))
     fit = _fit((loaded.name, path, judged.holds, kind), model, groups, solution, unknowns)
-    return replace(fit, seconds=time.perf_counter() - started)
+    failures = () if wrong is None else (str(wrong),)
+    return replace(fit, seconds=time.perf_counter() - started, failures=failures)
 
 
-def said_pixel(image: Image) -> str | None:
-    """Return what an image of ours says of its pixels, 'centre' or 'area'; None for others."""
-    said = image.attributes.get("airlight:pixel")
-    if said in PIXELS:
-        return str(said)
-    if "airlight:method" in image.attributes:
-        return "centre"
-    return "area" if "airlight:spp" in image.attributes else None
-
-
-def three_channels(judged: JudgedLayer) -> Array:
-    """Return the values of a layer as rows of pixels, a single channel three times, (pixels, 3)."""
-    values = np.asarray(judged.values, dtype=np.float64)
-    return np.broadcast_to(values.reshape(-1, values.shape[-1]), (judged.size[0] * judged.size[1], 3)).copy()
-
-
-def _fitting_mask(mask: NDArray[np.bool_], judged: JudgedLayer) -> NDArray[np.bool_]:
-    chosen = np.asarray(mask)
-    if chosen.shape != judged.values.shape[:2]:
-        shape = " x ".join(str(side) for side in chosen.shape[::-1])
-        raise InputError(
-            f"the mask is {shape} pixels, the image {judged.size[0]} x {judged.size[1]}; wanted one of the image's size"
-        )
-    return chosen.ravel() != 0
+def _cut_off(seen: Seen) -> NDArray[np.bool_]:
+    """Return which pixels stop, with many others, at the largest value."""
+    if not seen.used.any():
+        return seen.used
+    largest = seen.values[seen.used].max()
+    stopped = seen.used & np.any(seen.values == largest, axis=1)
+    many = largest > 0 and np.count_nonzero(stopped) >= _SATURATED
+    return np.asarray(stopped if many else np.zeros_like(stopped))
 
 
 def _stage(progress: Progress, number: int, count: int) -> Progress:
@@ -261,22 +241,25 @@ def _stage(progress: Progress, number: int, count: int) -> Progress:
 
 
 def _solved(
-    task: Task, unknowns: Sequence[Unknown], progress: Progress | None
+    seen: Seen, unknowns: Sequence[Unknown], progress: Progress | None
 ) -> tuple[ImageModel, tuple[Group, ...], Solution, tuple[Unknown, ...]]:
-    """Solve for parameters; where lights move, with lit intervals found anew in every round."""
+    """Solve for parameters; where lights move, with lit intervals found again in every round."""
     unknowns = tuple(unknowns)
     if any(unknown.moves and unknown.start != unknown.scene for unknown in unknowns):
-        task, unknowns = _moved(task, unknowns, [unknown.start for unknown in unknowns])
-    model = image_model(task, progress=None if progress is None else lambda share, what: progress(0.5 * share, what))
+        seen, unknowns = _moved(seen, unknowns, [unknown.start for unknown in unknowns])
+    model = ImageModel.of(seen)
+    if progress is not None:
+        progress(0.5, "lit intervals")
     # Paths cost more than what is done with them: starts have some of their own where these are far fewer.
-    few = len(model.pixels) > _FEWER * pixels_of_rays(task, _FEW_RAYS)
-    start = best_start(image_model(task, most=_FEW_RAYS) if few else model, unknowns)
-    groups = confounded_groups(weighted_derivatives(model, unknowns, start))
+    few = len(model.image) > _FEWER * seen.pixels_of_rays(_FEW_RAYS)
+    start = best_start(ImageModel.of(seen, most=_FEW_RAYS) if few else model, unknowns)
+    derivatives = model.derivatives(unknowns, start) / model.relative()[:, :, None]
+    groups = confounded_groups(derivatives.reshape(-1, len(unknowns)))
     held = {number for group in groups for number in group.held}
     free = [number for number in range(len(unknowns)) if number not in held]
     given = {number: unknowns[number].scale.inward(unknowns[number].start) for number in held}
     if not free:
-        return model, groups, _nothing(model), unknowns
+        return model, groups, no_solution(model), unknowns
     inner = start[free]
     turns = _MOVES if any(unknowns[number].moves for number in free) else 1
     for turn in range(turns):
@@ -287,46 +270,38 @@ def _solved(
         step, inner = np.abs(solution.inner - inner), solution.inner
         if progress is not None:
             progress(0.5 + 0.5 * (turn + 1) / _MOVES, "fit")
-        still = np.maximum(_STILL * _size(task), _STILL_IN_NOISE * np.sqrt(np.maximum(np.diag(solution.covariance), 0)))
+        still = np.maximum(_STILL * _size(seen), _STILL_IN_NOISE * np.sqrt(np.maximum(np.diag(solution.covariance), 0)))
         if turn + 1 == turns or (turn and np.all(step < still)):
             break
         outward = [unknown.start for unknown in unknowns]
         for number, value in zip(free, inner, strict=True):
-            outward[number] = float(unknowns[number].scale.outward(float(value)))
-        task, unknowns = _moved(task, unknowns, outward)
-        model = image_model(task)
+            outward[number] = unknowns[number].scale.outward(float(value))
+        seen, unknowns = _moved(seen, unknowns, outward)
+        model = ImageModel.of(seen)
     return fixed, groups, solution, unknowns
 
 
-def _size(task: Task) -> float:
-    return max((float(np.linalg.norm(light.position - task.truth.origin)) for light in task.truth.lights), default=1.0)
+def _size(seen: Seen) -> float:
+    return max((float(np.linalg.norm(light.position - seen.truth.origin)) for light in seen.truth.lights), default=1.0)
 
 
-def _moved(task: Task, unknowns: Sequence[Unknown], values: Sequence[float]) -> tuple[Task, tuple[Unknown, ...]]:
-    """Return a task with the lights where parameters put them, and the parameters relative to there."""
-    places = {number: list(light.position) for number, light in enumerate(task.truth.lights)}
+def _moved(seen: Seen, unknowns: Sequence[Unknown], values: Sequence[float]) -> tuple[Seen, tuple[Unknown, ...]]:
+    """Return an image with the lights where parameters put them, and the parameters relative to there."""
+    places = {number: list(light.position) for number, light in enumerate(seen.truth.lights)}
     moved = list(unknowns)
     for row, (unknown, value) in enumerate(zip(unknowns, values, strict=True)):
         if unknown.moves:
             places[unknown.number][AXES.index(unknown.kind[-1])] = value
             moved[row] = replace(unknown, place=value)
-    return at_places(task, {number: (x, y, z) for number, (x, y, z) in places.items()}), tuple(moved)
+    return at_places(seen, {number: (x, y, z) for number, (x, y, z) in places.items()}), tuple(moved)
 
 
 def _holding(model: ImageModel, unknowns: Sequence[Unknown], given: Mapping[int, float]) -> ImageModel:
     """Return the model with parameters held."""
     fog = model.fog
     for number, inner in given.items():
-        fog = unknowns[number].put(fog, float(unknowns[number].scale.outward(inner)))
+        fog = unknowns[number].put(fog, unknowns[number].scale.outward(inner))
     return replace(model, fog=fog)
-
-
-def _nothing(model: ImageModel) -> Solution:
-    radiance = model.radiance(model.fog)
-    kept = np.ones(len(model.pixels), dtype=bool)
-    return Solution(
-        np.empty(0), np.empty((0, 0)), model.image - radiance, radiance, kept, np.ones_like(radiance), np.empty(0)
-    )
 
 
 def _left(solution: Solution) -> Array:
@@ -336,7 +311,7 @@ def _left(solution: Solution) -> Array:
 
 
 def _wrong(solution: Solution) -> float:
-    """Return how far values are off, as `validation.comparison.engine_pixels` does: no single one decides."""
+    """Return how far values are off, as `validation.engine.judge` does: no single one decides."""
     left = _left(solution)
     return float(np.minimum(left, 1.0).mean()) if left.size else math.inf
 
@@ -377,7 +352,7 @@ def _fit(
         len(kept),
         int((~kept).sum()),
         1.4826 * float(np.median(_left(solution))) if _left(solution).size else math.nan,
-        tuple(_confounded(group, unknowns, inner, lengths, what[2]) for group in groups),
+        tuple(confounded(group, unknowns, inner, lengths, what[2]) for group in groups),
         math.nan,
     )
 
@@ -404,34 +379,3 @@ def _whole(unknown: Unknown) -> str:
     if len(unknown.channels) == 1:
         word = word.removesuffix(f".{CHANNELS[unknown.channels[0]]}")
     return word + colon + place
-
-
-def _confounded(
-    group: Group, unknowns: Sequence[Unknown], inner: Mapping[int, float], lengths: Mapping[int, Array], holds: str
-) -> Confounded:
-    names = {number: unknowns[number].name for number in group.members}
-    products = []
-    for kept, powers in group.powers.items():
-        if all(unknowns[number].scale.relative for number in (kept, *powers)):
-            words = [names[kept], *(_power(names[number], power) for number, power in powers.items())]
-            middle = inner[kept] + sum(power * inner[number] for number, power in powers.items())
-            low, high = (float(dr.exp(middle + float(length))) for length in lengths[kept])
-            products.append(Product(" * ".join(words), math.exp(middle), low, _finite(high)))
-    held = tuple(names[number] for number in group.held)
-    return Confounded(tuple(names.values()), held, tuple(products), _way_out(group, unknowns, holds))
-
-
-def _power(name: str, power: float) -> str:
-    return name if abs(power - 1) < 1e-3 else f"{name}^{power:.3g}"
-
-
-def _way_out(group: Group, unknowns: Sequence[Unknown], holds: str) -> str:
-    kinds = {unknowns[number].kind for number in group.members}
-    if len(group.held) == len(group.members):
-        return "these do nothing in the pixels of this image: fit a layer in which they show"
-    if "albedo" in kinds and holds == "airlight":
-        return (
-            "the airlight holds only their product: leave all but one out of --parameters, or fit a layer with lit "
-            "surfaces, which the albedo does not change, such as --layer total"
-        )
-    return "leave all but one out of --parameters; what is left out keeps the value of the scene"

@@ -21,14 +21,14 @@ step is a relative change.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
-import drjit as dr
+import numpy as np
+from numpy.typing import NDArray
 
 from analytic.errors import InputError, nearest
 from reference.scene.read import TruthScene
-from validation.fog_model.build import light_sources
-from validation.fog_model.fog import Fog
+from validation.fog_model.radiance import Fog
+from validation.fog_model.view import light_sources
 
 CHANNELS = ("r", "g", "b")
 AXES = ("x", "y", "z")
@@ -40,13 +40,13 @@ class Scale:
     """How a parameter is looked for: as a number on the whole line."""
 
     inward: Callable[[float], float]
-    outward: Callable[[Any], Any]  #: of numbers and of Dr.Jit arrays
+    outward: Callable[[float], float]
     relative: bool  #: whether a step is a relative change, so that products of such parameters make sense
 
 
-_LOG = Scale(math.log, dr.exp, relative=True)
-_TANH = Scale(math.atanh, dr.tanh, relative=False)
-_PLAIN = Scale(float, lambda value: value, relative=False)
+_LOG = Scale(math.log, lambda value: float(np.exp(value)), relative=True)
+_TANH = Scale(math.atanh, math.tanh, relative=False)
+_PLAIN = Scale(float, float, relative=False)
 
 
 @dataclass(frozen=True)
@@ -63,14 +63,14 @@ class Unknown:
     start: float = math.nan  #: value to begin with
     place: float = math.nan  #: of a position: where the paths begin [m]
 
-    def put(self, fog: Fog, value: Any) -> Fog:
+    def put(self, fog: Fog, value: float) -> Fog:
         """Return the fog with a value of this parameter."""
         if self.kind in ("sigma_t", "albedo"):
             old = getattr(fog, self.kind)[self.number]
             new = tuple(value if channel in self.channels else old[channel] for channel in range(3))
             return fog.with_entry(self.kind, self.number, new)
         if self.kind == "phase.g":
-            return fog.with_entry("g", self.number, value)
+            return fog.with_entry("phase", self.number, value)
         if self.kind == "intensity":
             return fog.with_entry("intensity", self.number, value)
         if self.kind == "exposure":
@@ -106,27 +106,27 @@ def read_unknowns(
         and a start that is out of range.
     """
     if not names:
-        raise InputError(f"--parameters: got none, wanted some of {', '.join(NAMES)}")
+        raise InputError(f"fit: got none, wanted some of {', '.join(NAMES)}")
     unknowns = tuple(unknown for name in names for unknown in _read(name, truth, fog))
     seen: set[tuple[str, int, int]] = set()
     for unknown in unknowns:
         places = {(unknown.kind, unknown.number, channel) for channel in unknown.channels}
         if places & seen:
-            raise InputError(f"--parameters: '{unknown.name}' is there twice; name each parameter once")
+            raise InputError(f"fit: '{unknown.name}' is there twice; name each parameter once")
         seen |= places
     for name in starts:
         if name not in {unknown.name for unknown in unknowns}:
             known = [unknown.name for unknown in unknowns]
             raise InputError(
-                f"--start: '{name}' is not looked for; wanted one of {', '.join(known)}" + nearest(name, known)
+                f"start: '{name}' is not looked for; wanted one of {', '.join(known)}" + nearest(name, known)
             )
     return tuple(_started(unknown, starts) for unknown in unknowns)
 
 
-def with_values(unknowns: Sequence[Unknown], fog: Fog, inner: Sequence[Any]) -> Fog:
+def with_values(unknowns: Sequence[Unknown], fog: Fog, inner: Sequence[float] | NDArray[np.float64]) -> Fog:
     """Return the fog with the values of parameters, given as numbers on the whole line."""
     for unknown, value in zip(unknowns, inner, strict=True):
-        fog = unknown.put(fog, unknown.scale.outward(value))
+        fog = unknown.put(fog, unknown.scale.outward(float(value)))
     return fog
 
 
@@ -138,10 +138,10 @@ def _read(name: str, truth: TruthScene, fog: Fog) -> list[Unknown]:
         if base in ("sigma_t", "albedo", "exposure") and base != word:
             kind, channels = base, (channel,)
     if kind not in NAMES:
-        raise InputError(f"--parameters: got '{name}', wanted some of {', '.join(NAMES)}" + nearest(word, NAMES))
+        raise InputError(f"fit: got '{name}', wanted some of {', '.join(NAMES)}" + nearest(word, NAMES))
     if kind == "exposure":
         if place:
-            raise InputError(f"--parameters: got '{name}'; the exposure is that of the whole image: write '{word}'")
+            raise InputError(f"fit: got '{name}'; the exposure is that of the whole image: write '{word}'")
         return [Unknown(name, kind, 0, channels, 1.0, _LOG, "1")]
     if kind in ("sigma_t", "albedo", "phase.g"):
         return [
@@ -157,10 +157,9 @@ def _of_medium(kind: str, channels: tuple[int, ...], number: int, truth: TruthSc
         phase = (truth.medium, *truth.media)[number].phase
         if not phase.is_constant and phase.name != "hg":
             raise InputError(
-                f"--parameters: 'phase.g' is for the phase functions 'hg' and 'isotropic'; this medium has "
-                f"'{phase.name}'"
+                f"fit: 'phase.g' is for the phase functions 'hg' and 'isotropic'; this medium has '{phase.name}'"
             )
-        return [Unknown(kind + ending, kind, number, (0, 1, 2), fog.g[number] or 0.0, _TANH, "1")]
+        return [Unknown(kind + ending, kind, number, (0, 1, 2), float(fog.phase[number] or 0.0), _TANH, "1")]
     values = getattr(fog, kind)[number]
     unit = "1/m" if kind == "sigma_t" else "1"
     groups = [channels] if len({values[c] for c in channels}) == 1 else [(channel,) for channel in channels]
@@ -184,7 +183,7 @@ def _of_light(kind: str, number: int, truth: TruthScene) -> Unknown:
     if kind == "intensity":
         return Unknown(name, kind, number, (0, 1, 2), 1.0, _LOG, "1")
     if number >= len(truth.lights):
-        raise InputError(f"--parameters: got '{name}', wanted the position of a point or spot light")
+        raise InputError(f"fit: got '{name}', wanted the position of a point or spot light")
     return Unknown(
         name, kind, number, (0, 1, 2), float(truth.lights[number].position[AXES.index(kind[-1])]), _PLAIN, "m"
     )
@@ -220,15 +219,14 @@ def _lights(name: str, place: str, kind: str, truth: TruthScene) -> list[int]:
 def _chosen(name: str, place: str, numbers: list[int], names: list[str], what: str) -> list[int]:
     if not place:
         if not numbers:
-            raise InputError(f"--parameters: got '{name}'; the scene has no {what} of this kind")
+            raise InputError(f"fit: got '{name}'; the scene has no {what} of this kind")
         return numbers
     if place in names:
         return [numbers[names.index(place)]]
     if place.isdigit() and 1 <= int(place) <= len(numbers):
         return [numbers[int(place) - 1]]
     raise InputError(
-        f"--parameters: got '{name}', wanted a {what} of the scene, {', '.join(names)}, or its number"
-        + nearest(place, names)
+        f"fit: got '{name}', wanted a {what} of the scene, {', '.join(names)}, or its number" + nearest(place, names)
     )
 
 
@@ -240,11 +238,11 @@ def _started(unknown: Unknown, starts: Mapping[str, float]) -> Unknown:
         fits, wanted = fits and value > 0, "a number above 0"
         if unknown.name not in starts and value <= 0:
             raise InputError(
-                f"--parameters: '{unknown.name}' is {value:g} in the scene, where nothing can begin; give --start "
+                f"fit: '{unknown.name}' is {value:g} in the scene, where nothing can begin; give start "
                 f"{unknown.name}=VALUE"
             )
     if unknown.scale is _TANH:
         fits, wanted = -1 < value < 1, "a number between -1 and 1"
     if not fits:
-        raise InputError(f"--start: {unknown.name}={value:g}, wanted {wanted}")
+        raise InputError(f"start: {unknown.name}={value:g}, wanted {wanted}")
     return replace(unknown, start=float(value), place=unknown.scene)

@@ -1,239 +1,237 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The radiance of every pixel from its paths, in Dr.Jit: derivatives by all that describes the fog in forward mode.
+"""What describes the fog of a scene and how its laws are read, and the radiance of every pixel.
 
 With the lengths c_k to the camera and l_k to the light in the medium k, a node in the medium m adds
 
     albedo_m sigma_m I p_m(cos) / (4 pi)  weight / r^2  exp(-sum_k sigma_k (a c_k + b l_k)),
 
-a and b the shares of the extinction that dim either leg, 1 by right. A surface point adds its radiance times the same
-exponential. Visibility is held: no derivative moves an edge of a shadow. Where a light is moved by d from where the
-paths begin, a node at r v from it (v of unit length, w along the ray) has
+a and b the fractions of the extinction that attenuate either segment, 1 by right. A surface point adds its radiance
+times the same exponential. Visibility is held. Where a light is moved by d from where the paths begin, a node at r v
+from it (v of unit length, w along the ray) has
 
     r' = |r v - d|,    cos = -(r v - d) . w / r',
 
-and the lengths of its leg change as r'/r, which is right where the medium has no bounds.
+and the lengths of its segment change as r'/r, which is right where the medium has no bounds. In a fog whose density
+falls as exp(-z/H), a path of the length s between the heights u H and v H has the optical depth of the length
+s (e^-u - e^-v)/(v - u).
 """
 
-from dataclasses import dataclass, fields, replace
-from functools import reduce
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-import drjit as dr
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.fog_model.fog import Colour, Fog
-from validation.fog_model.paths import LightPaths, Nodes, ScatteringPaths, SurfacePoints
+from reference.scene.read import TruthScene
+from validation.fog_model.places import AROUND, Places
+from validation.fog_model.view import ScatteringPaths
 
 Array = NDArray[np.float64]
+Colour = tuple[float, float, float]
+PhaseLaw = Callable[[Array], Array]  #: of the cosine of the scattering angle, of mean 1 over the sphere
 
-Columns = tuple[Any, Any, Any]  # red, green, blue of all pixels
-
-
-@dataclass(frozen=True)
-class _Legs:
-    """The legs of nodes or surface points of a light, on the device."""
-
-    pixel: Any
-    r: Any
-    camera: tuple[Any, ...]
-    leg: tuple[Any, ...]
-    towards: Any
-    direction: Any  # of the rays
-    slant: Any  # length of a ray over that along the camera's axis
+_LARGEST = 1e100  # whose square is a number too
 
 
 @dataclass(frozen=True)
-class _DeviceLight:
-    intensity: Colour
-    nodes: _Legs
-    surface: _Legs
-    medium: Any
-    cosine: Any
-    strength: Any  # weight/(4 pi)
-    phases: tuple[Any, ...]  # by medium, the values of the scene's own phase function at all nodes
-    reflected: Columns
+class Fog:
+    """Media, lights and laws. Tuples have an entry for each medium, that without bounds first, or for each light."""
 
+    sigma_t: tuple[Colour, ...]  #: extinction [1/m]
+    albedo: tuple[Colour, ...]  #: single-scattering albedo [1]
+    phase: tuple[float | PhaseLaw | None, ...]  #: g of Henyey and Greenstein's function, or a law; None: the scene's
+    intensity: tuple[float, ...]  #: factors on the lights [1]
+    airlight: tuple[float, ...]  #: factors on what the media scatter of each light [1]
+    surface: tuple[float, ...]  #: factors on what surfaces reflect of each light [1]
+    moved: tuple[Colour, ...]  #: how far the lights are from where the paths begin, x, y, z [m]
+    exposure: Colour = (1.0, 1.0, 1.0)  #: factor on the image [1]
+    #: Fractions of the extinction that attenuate the way to the camera, and the way from the light: of what the medium
+    #: scatters, and of what surfaces reflect [1].
+    camera_leg: tuple[float, float] = (1.0, 1.0)
+    light_leg: tuple[float, float] = (1.0, 1.0)
+    near: float = 0.0  #: the medium without bounds is missing before this plane, along the camera's axis [m]
+    far: float = np.inf  #: it ends at this plane, or at this distance [m]
+    spherical: bool = False  #: whether `near` and `far` are distances from the camera, not planes
+    #: Where depth along the axis is taken for distance along the ray: 'nodes' and 'surfaces' in what attenuates them,
+    #: 'steps' in the length of ray that a node stands for.
+    planar: frozenset[str] = frozenset()
+    distance_power: float = 2.0  #: the irradiance falls as the distance to this power [1]
+    window: Callable[[Array], Array] | None = None  #: factor on the light by the distance from it [m]
+    height: tuple[float, Colour] | None = None  #: H [m] and the unit vector up: density falls from the camera's height
 
-@dataclass(frozen=True)
-class DevicePaths:
-    """The paths of an image on the device."""
-
-    pixels: int
-    share: float  #: of a pixel that a ray stands for
-    lights: tuple[_DeviceLight, ...]
+    def with_entry(self, name: str, number: int, value: Any) -> "Fog":
+        """Return the fog with another entry of one of its tuples, such as the `sigma_t` of a medium."""
+        old = getattr(self, name)
+        entry: dict[str, Any] = {name: (*old[:number], value, *old[number + 1 :])}
+        return replace(self, **entry)
 
     @property
-    def nodes(self) -> int:
-        """How many nodes and surface points there are."""
-        return sum(dr.width(part.pixel) for light in self.lights for part in (light.nodes, light.surface))
+    def without_factors(self) -> "Fog":
+        """The fog without what multiplies the light of each source, see `combined`."""
+        one = (1.0,) * len(self.intensity)
+        return replace(self, intensity=one, airlight=one, surface=one, exposure=(1.0, 1.0, 1.0))
+
+    def combined(self, by_light: Array) -> Array:
+        """Return airlight and surfaces, (2, m, 3), from what `FogModel.by_light` returns."""
+        factors = np.array([self.airlight, self.surface]) * np.array(self.intensity)
+        return np.asarray(np.einsum("kl,klpc->kpc", factors, by_light) * np.array(self.exposure))
 
 
-def on_device(paths: ScatteringPaths) -> DevicePaths:
-    """Return paths as Dr.Jit arrays in float64."""
-    lights = tuple(_device_light(paths, light) for light in paths.lights)
-    return DevicePaths(len(paths.pixels), 1 / paths.rays_per_pixel, lights)
-
-
-def _device_light(paths: ScatteringPaths, light: LightPaths) -> _DeviceLight:
-    nodes, surface = light.nodes, light.surface
-    red, green, blue = (float(value) for value in light.intensity)
-    phases = tuple(
-        mi.Float64(1.0) if medium.phase.is_constant else mi.Float64(medium.phase(np.clip(nodes.cosine, -1, 1)))
-        for medium in paths.media
+def scene_fog(truth: TruthScene) -> Fog:
+    """Return the fog as the scene has it."""
+    media = truth.medium, *truth.media
+    one = (1.0,) * (len(truth.lights) + len(truth.directional) + len(truth.area))
+    return Fog(
+        sigma_t=tuple(colour(medium.sigma_t) for medium in media),
+        albedo=tuple(colour(medium.albedo) for medium in media),
+        phase=tuple(medium.phase.g if medium.phase.name == "hg" else None for medium in media),
+        intensity=one,
+        airlight=one,
+        surface=one,
+        moved=((0.0, 0.0, 0.0),) * len(one),
     )
-    device = _DeviceLight(
-        (red, green, blue),
-        _legs(paths, nodes),
-        _legs(paths, surface),
-        mi.UInt32(nodes.medium.astype(np.uint32)),
-        mi.Float64(nodes.cosine),
-        mi.Float64(nodes.weight / (4 * np.pi)),
-        phases,
-        tuple(mi.Float64(np.ascontiguousarray(column)) for column in surface.radiance.T),
-    )
-    dr.eval(device.medium, device.cosine, device.strength, device.phases, device.reflected)
-    return device
 
 
-def _legs(paths: ScatteringPaths, points: Nodes | SurfacePoints) -> _Legs:
-    camera, leg = (
-        tuple(mi.Float64(np.ascontiguousarray(column)) for column in part.T) for part in (points.camera, points.leg)
-    )
-    legs = _Legs(
-        mi.UInt32(paths.ray_pixel[points.ray].astype(np.uint32)),
-        mi.Float64(points.r),
-        camera,
-        leg,
-        mi.Vector3d(points.towards.T),
-        mi.Vector3d(paths.direction[points.ray].T),
-        mi.Float64(1 / (paths.direction[points.ray] @ paths.axis)),
-    )
-    dr.eval(legs.pixel, legs.r, legs.camera, legs.leg, legs.towards, legs.direction, legs.slant)
-    return legs
-
-
-def fog_airlight(paths: DevicePaths, fog: Fog) -> Columns:
-    """Return the in-scattered radiance of every pixel by channel [W/(m^2 sr)]."""
-    return _sums(paths, fog, lambda light: light.nodes, _airlight)
-
-
-def fog_surface(paths: DevicePaths, fog: Fog) -> Columns:
-    """Return the radiance of the lit surfaces of every pixel by channel [W/(m^2 sr)]."""
-    return _sums(paths, fog, lambda light: light.surface, _surface)
-
-
-def fog_total(paths: DevicePaths, fog: Fog) -> Columns:
-    """Return the sum of both."""
-    airlight, surface = fog_airlight(paths, fog), fog_surface(paths, fog)
-    red, green, blue = (a + s for a, s in zip(airlight, surface, strict=True))
+def colour(values: Any) -> Colour:
+    """Return three numbers as a tuple."""
+    red, green, blue = (float(value) for value in values)
     return red, green, blue
 
 
-def as_array(columns: Columns) -> Array:
-    """Return the channels as an array, (pixels, 3)."""
-    return np.stack([np.array(column, dtype=np.float64) for column in columns], axis=1)
-
-
-def opaque_fog(fog: Fog) -> Fog:
-    """Return a fog whose numbers are no constants of the kernels, which then need not be compiled again for others."""
-
-    def opaque(value: Any) -> Any:
-        if isinstance(value, tuple):
-            return tuple(opaque(each) for each in value)
-        return dr.opaque(mi.Float64, value) if isinstance(value, (int, float)) else value
-
-    kept: dict[str, Any] = {"near": fog.near} if _begins(fog) else {}
-    if _is_right(fog):
-        kept["distance_power"] = fog.distance_power
-    moved = tuple(each if _stands(each) else opaque(each) for each in fog.moved)
-    numbers = {field.name: opaque(getattr(fog, field.name)) for field in fields(fog) if field.name not in kept}
-    return replace(fog, **{**numbers, **kept, "moved": moved})
-
-
-def _sums(paths: DevicePaths, fog: Fog, pick: Any, term: Any) -> Columns:
-    totals = []
-    for channel in range(3):
-        total = dr.zeros(mi.Float64, paths.pixels)
-        for number, light in enumerate(paths.lights):
-            legs = pick(light)
-            if dr.width(legs.pixel):
-                factor = light.intensity[channel] * paths.share * fog.intensity[number] * fog.exposure[channel]
-                dr.scatter_reduce(dr.ReduceOp.Add, total, term(light, fog, number, channel) * factor, legs.pixel)
-        totals.append(total)
-    red, green, blue = totals
-    return red, green, blue
-
-
-def _airlight(light: _DeviceLight, fog: Fog, number: int, channel: int) -> Any:
-    place = _moved(light.nodes, fog.moved[number])
-    cosine = light.cosine if place is None else -dr.dot(place.away, light.nodes.direction) / place.r
-    values = []
-    for sigma_t, albedo, g, own in zip(fog.sigma_t, fog.albedo, fog.g, light.phases, strict=True):
-        phase = own if g is None else _henyey_greenstein(g, cosine)
-        values.append(albedo[channel] * sigma_t[channel] * phase)
-    source = values[0]
-    for medium, value in enumerate(values[1:], start=1):
-        source = dr.select(light.medium == medium, value, source)
-    r = light.nodes.r if place is None else place.r
-    falls = dr.rcp(dr.square(r)) if _is_right(fog) else dr.exp(-fog.distance_power * dr.log(r))
-    strength = light.strength if _begins(fog) else light.strength * _behind_near(light.nodes, fog)
-    return source * strength * falls * _dimmed(light.nodes, fog, channel, place)
-
-
-def _behind_near(nodes: _Legs, fog: Fog) -> Any:
-    return dr.select(nodes.camera[0] >= fog.near * nodes.slant, 1.0, 0.0)
-
-
-def _surface(light: _DeviceLight, fog: Fog, number: int, channel: int) -> Any:
-    place = _moved(light.surface, fog.moved[number])
-    value = light.reflected[channel] * _dimmed(light.surface, fog, channel, place)
-    if place is not None:
-        value = value * dr.square(light.surface.r / place.r)
-    return value if _is_right(fog) else value * dr.exp((2.0 - fog.distance_power) * dr.log(light.surface.r))
+def henyey_greenstein(g: float) -> PhaseLaw:
+    """Return Henyey and Greenstein's phase function, of mean 1."""
+    return lambda cosine: (1 - g * g) / (1 + g * g - 2 * g * cosine) ** 1.5
 
 
 @dataclass(frozen=True)
-class _Place:
-    away: Any  # from the moved light
-    r: Any
+class FogModel:
+    """The paths of some pixels, and the radiance that a fog gives these."""
+
+    paths: ScatteringPaths
+    _phases: dict[tuple[int, int], Array] = field(default_factory=dict, repr=False)
+
+    @property
+    def places(self) -> int:
+        """How many nodes and surface points there are."""
+        return sum(len(light.nodes.r) + len(light.surface.r) for light in self.paths.lights)
+
+    def layers(self, fog: Fog) -> Array:
+        """Return the radiance of airlight and surfaces, (2, m, 3) [W/(m^2 sr)]."""
+        return fog.combined(self.by_light(fog.without_factors))
+
+    def by_light(self, fog: Fog) -> Array:
+        """Return airlight and surfaces from each light, (2, lights, m, 3) [W/(m^2 sr)]; no number is out of range."""
+        view = self.paths.view
+        radiance = np.zeros((2, len(self.paths.lights), len(view.pixels), 3))
+        with np.errstate(over="ignore", invalid="ignore"):
+            for number, light in enumerate(self.paths.lights):
+                for layer, places in enumerate((light.nodes, light.surface)):
+                    if len(places.r):
+                        radiance[layer, number] = self._sums(places, fog, number) * light.intensity
+        radiance *= len(view.pixels) / len(view.ray_pixel)
+        return np.nan_to_num(radiance, nan=_LARGEST, posinf=_LARGEST, neginf=-_LARGEST)
+
+    def transmittance(self, fog: Fog) -> Array:
+        """Return the fraction of light that the rays leave of what is at their ends, (m, 3) [1]."""
+        view = self.paths.view
+        slant = 1.0 if fog.spherical else 1 / (view.truth.direction @ view.axis)
+        length = view.length.copy()
+        length[:, AROUND] = np.maximum(np.minimum(length[:, AROUND], fog.far * slant) - fog.near * slant, 0.0)
+        some = np.any(np.array(fog.sigma_t) > 0, axis=1)
+        depth = length[:, some] @ np.array(fog.sigma_t)[some]
+        count = np.bincount(view.ray_pixel)
+        return np.stack([np.bincount(view.ray_pixel, np.exp(-column)) / count for column in depth.T], axis=1)
+
+    def _sums(self, places: Places, fog: Fog, number: int) -> Array:
+        """Return what the places send to each pixel, of a light of intensity 1, (m, 3)."""
+        view = self.paths.view
+        layer = int(places.is_surface)
+        direction, pixel = view.truth.direction[places.ray], view.ray_pixel[places.ray]
+        slant = 1 / (direction @ view.axis)
+        r, cosine, light = places.r, places.cosine, places.light
+        if any(fog.moved[number]):
+            away = places.towards * r[:, None] - np.array(fog.moved[number])
+            r = np.linalg.norm(away, axis=1)
+            cosine = -np.sum(away * direction, axis=1) / r if len(cosine) else cosine
+            light = light * (r / places.r)[:, None]
+        strength = _falls(r, fog)
+        if places.is_surface:
+            strength = strength * places.r**2
+        else:
+            strength = strength * places.value[:, 0] / (4 * np.pi * (slant if "steps" in fog.planar else 1.0))
+        camera = self._camera_lengths(places, fog, slant)
+        if fog.height is not None:
+            camera, light, density = self._falling(places, fog.height, camera, light, direction)
+            strength = strength * (1.0 if places.is_surface else density)
+        total, sigma_t, count = np.zeros((len(view.pixels), 3)), np.array(fog.sigma_t), len(view.pixels)
+        for channels in _alike(fog):
+            depth = (fog.camera_leg[layer] * camera + fog.light_leg[layer] * light) @ sigma_t[:, channels[0]]
+            left = strength * np.exp(-depth)
+            if places.is_surface:
+                for channel in channels:
+                    total[:, channel] = np.bincount(pixel, left * places.value[:, channel], count)
+                continue
+            for medium in range(len(sigma_t)):
+                here = slice(None) if len(sigma_t) == 1 else places.medium == medium
+                scattered = left[here] * self._phase(places, number, medium, fog, cosine)[here]
+                summed = np.bincount(pixel[here], scattered, count)
+                for channel in channels:
+                    total[:, channel] += fog.albedo[medium][channel] * sigma_t[medium, channel] * summed
+        return total
+
+    def _camera_lengths(self, places: Places, fog: Fog, slant: Array) -> Array:
+        flat = ("surfaces" if places.is_surface else "nodes") in fog.planar
+        camera = places.camera / slant[:, None] if flat else places.camera
+        if fog.near > 0 or np.isfinite(fog.far):
+            plane: Any = 1.0 if fog.spherical else slant
+            camera = camera.copy()
+            around = np.minimum(camera[:, AROUND], fog.far * plane) - fog.near * plane
+            camera[:, AROUND] = np.maximum(around, 0.0)
+        return camera
+
+    def _falling(
+        self, places: Places, height: tuple[float, Colour], camera: Array, light: Array, direction: Array
+    ) -> tuple[Array, Array, Array]:
+        """Return the lengths in a fog whose density falls with height, as lengths of the same optical depth."""
+        scale, up = height[0], np.array(height[1])
+        here = places.x * (direction @ up) / scale
+        there = here - places.r * (places.towards @ up) / scale
+        camera, light = camera.copy(), light.copy()
+        camera[:, AROUND] *= _mean_density(0 * here, here)
+        light[:, AROUND] *= _mean_density(there, here)
+        return camera, light, np.exp(-np.clip(here, -300, 300))
+
+    def _phase(self, places: Places, number: int, medium: int, fog: Fog, cosine: Array) -> Array:
+        law = fog.phase[medium]
+        if isinstance(law, float):
+            return henyey_greenstein(law)(cosine)
+        if law is not None:
+            return law(cosine)
+        key = number, medium  # the scene's own does not change, not even where a light moves a little
+        if key not in self._phases:
+            own = self.paths.media[medium].phase
+            self._phases[key] = np.ones(len(cosine)) if own.is_constant else own(np.clip(places.cosine, -1, 1))
+        return self._phases[key]
 
 
-def _moved(legs: _Legs, moved: Colour) -> _Place | None:
-    if _stands(moved):
-        return None
-    away = legs.towards * legs.r - mi.Vector3d(*moved)
-    return _Place(away, dr.norm(away))
+def _falls(r: Array, fog: Fog) -> Array:
+    """Return how light falls with the distance from its source, (n,)."""
+    falls = r**-2 if fog.distance_power == 2 else r**-fog.distance_power
+    return falls if fog.window is None else falls * fog.window(r)
 
 
-def _stands(moved: Colour) -> bool:
-    """Return whether a light is where its paths begin."""
-    return all(isinstance(each, float) and each == 0 for each in moved)
+def _alike(fog: Fog) -> list[list[int]]:
+    """Return the channels in groups of the same extinction: one exponential is enough for each."""
+    groups: dict[tuple[float, ...], list[int]] = {}
+    for channel in range(3):
+        groups.setdefault(tuple(colours[channel] for colours in fog.sigma_t), []).append(channel)
+    return list(groups.values())
 
 
-def _begins(fog: Fog) -> bool:
-    """Return whether the medium begins at the camera."""
-    return isinstance(fog.near, float) and fog.near == 0
-
-
-def _is_right(fog: Fog) -> bool:
-    return isinstance(fog.distance_power, float) and fog.distance_power == 2.0
-
-
-def _dimmed(legs: _Legs, fog: Fog, channel: int, place: _Place | None) -> Any:
-    """Return the share of the light that both legs leave."""
-    longer = 1.0 if place is None else place.r / legs.r
-    camera_legs = list(legs.camera)
-    if not _begins(fog):
-        camera_legs[0] = dr.maximum(camera_legs[0] - fog.near * legs.slant, 0)
-    parts = [
-        sigma_t[channel] * (fog.camera_leg * camera + fog.light_leg * leg * longer)
-        for sigma_t, camera, leg in zip(fog.sigma_t, camera_legs, legs.leg, strict=True)
-    ]
-    return dr.exp(-reduce(lambda a, b: a + b, parts))
-
-
-def _henyey_greenstein(g: Any, cosine: Any) -> Any:
-    base = 1 + g * g - 2 * g * cosine
-    return (1 - g * g) / (base * dr.sqrt(base))
+def _mean_density(low: Array, high: Array) -> Array:
+    """Return the mean of e^-z between two heights."""
+    low, high = np.clip(low, -300, 300), np.clip(high, -300, 300)
+    apart = high - low
+    safe = np.where(np.abs(apart) < 1e-9, 1.0, apart)
+    return np.exp(-low) * np.where(np.abs(apart) < 1e-9, 1.0, -np.expm1(-safe) / safe)

@@ -23,7 +23,7 @@ from realtime.scene.read_scene import Scene, read_scene
 from reference.quadrature.ray_values import TruthImage
 from reference.storage.exr import TOTAL, Image
 from reference.storage.kept import Kept, is_kept, key_of
-from validation.comparison.engine_images import EngineImage, measure_image
+from validation.engine.images import EngineImage, image_times, measure_image
 from validation.estimates.agreement import agreements
 from validation.estimates.monte_carlo import ElsewhereFor
 from validation.estimates.multiple_scattering import multiple_scattering_share
@@ -306,7 +306,15 @@ def _with_flip(judged: Judged) -> Judged:
 def _image(study: SceneStudy, shown: EngineImage) -> Judged:
     """Return the row of an image from elsewhere."""
     digest = hashlib.sha256(shown.path.read_bytes()).hexdigest()
-    key = key_of("scene-image", _image_measured, scene=study.identity, size=study.size, label=shown.label, file=digest)
+    key = key_of(
+        "scene-image",
+        _image_measured,
+        scene=study.identity,
+        size=study.size,
+        label=shown.label,
+        file=digest,
+        times=image_times(shown.path),
+    )
     result = cached_result(key, partial(_image_measured, study, shown))
     layers = {name.removeprefix(_LAYER): array for name, array in result.arrays.items() if name.startswith(_LAYER)}
     attributes = {"airlight:scene": study.name, "airlight:image": shown.path.name}
@@ -315,7 +323,7 @@ def _image(study: SceneStudy, shown: EngineImage) -> Judged:
 
 
 def _image_measured(study: SceneStudy, shown: EngineImage) -> Computed:
-    measured = measure_image(shown, study.truth_of, surfaces=study.scene.features.surfaces)
+    measured = measure_image(shown, study.loaded, study.truth_of, surfaces=study.scene.features.surfaces)
     row = Row(
         scene=study.path,
         label=shown.label,
@@ -325,20 +333,22 @@ def _image_measured(study: SceneStudy, shown: EngineImage) -> Computed:
         width=study.size[0],
         height=study.size[1],
         status="done",
-        note=measured.note,
+        note=measured.notes,
         kind="image",
-        layer=measured.layer,
-        pixel=measured.pixel,
-        error=measured.error,
+        layer=measured.judged.expected,
+        pixel=measured.judged.pixel,
+        error=measured.judged.comparison.metrics,
         surface_error=measured.surface_error,
     )
     arrays = {f"{_LAYER}{name}": values for name, values in measured.image.layers.items()}
-    arrays["expected"] = measured.expected
-    if measured.layer == TOTAL:
-        arrays["whole"] = measured.expected
-    elif "surface" in measured.image.layers or not np.any(measured.truth.surface > 0):
-        arrays["whole"] = measured.truth.airlight + measured.truth.surface
-    return plain(row), arrays
+    arrays["expected"] = measured.judged.truth
+    truth = measured.judged.fit.truth
+    if measured.judged.expected == TOTAL:
+        arrays["whole"] = measured.judged.truth
+    elif "surface" in measured.image.layers or not np.any(truth.surface > 0):
+        arrays["whole"] = truth.airlight + truth.surface
+    times = {} if measured.times is None else {"times": measured.times.to_json()}
+    return plain(row) | times, arrays
 
 
 def _flip_version() -> str:

@@ -10,15 +10,21 @@ import pytest
 from analytic.errors import InputError
 from reference.scene.read import read_truth
 from reference.storage.exr import Image
+from validation.engine.seen import Seen
 from validation.estimates.quadrature import truth_image
 from validation.fit.confounding import confounded_groups
 from validation.fit.fit import fit_image
-from validation.fit.image_model import Task, image_model
-from validation.fit.intervals import interval_ends
-from validation.fit.least_squares import best_start, robust_fit, weighted_fit
-from validation.fit.noise import noise_of, outliers
+from validation.fit.solve import (
+    ImageModel,
+    best_start,
+    interval_ends,
+    noise_of,
+    outliers,
+    robust_fit,
+    weighted_fit,
+)
 from validation.fit.unknowns import read_unknowns
-from validation.fog_model.fog import scene_fog
+from validation.fog_model.radiance import scene_fog
 from validation.scenes.loading import load_scene
 
 SIZE = (48, 36)
@@ -76,9 +82,8 @@ def test_another_fog_is_found_from_any_start(variant, tmp_path, start):
 def test_each_of_several_lights_has_a_factor(variant, tmp_path):
     scene = scene_file(tmp_path, lights=2)
     truth = read_truth(load_scene(scene).scene)
-    model = image_model(
-        Task(truth, np.ones((SIZE[0] * SIZE[1], 3)), "airlight", np.ones(SIZE[0] * SIZE[1], bool), False)
-    )
+    pixels = SIZE[0] * SIZE[1]
+    model = ImageModel.of(Seen(truth, np.ones((pixels, 3)), "airlight", np.ones(pixels, bool)))
     bright = model.radiance(replace(model.fog, intensity=(1.4, 0.3)))
     image = Image({"airlight": bright.reshape(SIZE[1], SIZE[0], 3)})
     fit = fitted(image, scene, ["intensity", "sigma_t"])
@@ -143,7 +148,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say(variant, tmp_path, noise
     truth = read_truth(load_scene(scene_file(tmp_path), (32, 24)).scene)
     fog, count, trials = scene_fog(truth), 32 * 24, 200
     unknowns = read_unknowns(["sigma_t", "phase.g", "intensity"], truth, fog, {})
-    model = image_model(Task(truth, np.zeros((count, 3)), "airlight", np.ones(count, bool), False))
+    model = ImageModel.of(Seen(truth, np.zeros((count, 3)), "airlight", np.ones(count, bool)))
     clean = model.radiance(fog)
     generator = np.random.default_rng(5)
     wanted = np.array([unknown.scale.inward(unknown.scene) for unknown in unknowns])
@@ -154,7 +159,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say(variant, tmp_path, noise
             "absolute": lambda: clean + 0.01 * clean.mean() * generator.standard_normal(clean.shape),
             "skewed": lambda: clean * generator.gamma(25.0, 0.04, (count, 1)),
         }[noise]()
-        seen = replace(model, task=replace(model.task, values=noisy))
+        seen = replace(model, seen=replace(model.seen, values=noisy))
         solution = weighted_fit(seen, unknowns, robust_fit(seen, unknowns, best_start(seen, unknowns)))
         low, high = interval_ends(seen, unknowns, solution).T
         covered += (low < wanted) & (wanted < high)

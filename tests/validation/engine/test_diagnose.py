@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The diagnosis of images: each hypothesis names the fault that is planted, alone, with another, or none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reference.quadrature.image import quadrature_image
+from reference.scene.read import read_truth
+from reference.storage.exr import Image
+from tests.helpers.planted_faults import PLANTED
+from validation.engine.diagnose import diagnose_image
+from validation.engine.evidence import is_noise
+from validation.engine.prediction import Guess
+from validation.engine.search import Explanation
+from validation.fog_model.radiance import FogModel, scene_fog
+from validation.fog_model.view import scattering_paths, view_of
+from validation.scenes.loading import load_scene
+
+SIZE = (32, 24)
+
+
+def diagnosed(values, scene="sphere-spot", size=SIZE, **how):
+    how = {"pixel": "centre", **how}
+    return diagnose_image(Image({"total": values}), load_scene(scene, size), layer="total", **how)
+
+
+def total(truth, **how):
+    image = quadrature_image(truth, samples=64, **how)
+    return image.airlight + image.surface
+
+
+@pytest.fixture(scope="module")
+def truth(variant):
+    return read_truth(load_scene("sphere-spot", SIZE).scene)
+
+
+# A diagnosis takes some seconds: the fast tests have one fault of each kind.
+FAST = ("extinction", "transfer")
+
+
+def marked(planted):
+    name = f"{planted.name}: {planted.words}"
+    return pytest.param(planted, id=name, marks=() if planted.name in FAST else pytest.mark.slow)
+
+
+#: What this scene cannot have: its fog has no lobe.
+NOT_HERE = ("g-sign",)
+
+
+@pytest.mark.claim("diagnosis-planted")
+@pytest.mark.parametrize("planted", [marked(planted) for planted in PLANTED if planted.name not in NOT_HERE])
+def test_a_planted_fault_comes_first(truth, planted):
+    diagnosis = diagnosed(planted.image(truth))
+    assert diagnosis.first == planted.name, [row.words for row in diagnosis.ranked]
+    assert diagnosis.ranked[0].name == planted.name
+    assert diagnosis.explained
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", ["the extinction 1.4 times", "upside down", "filmic", "half a pixel", "sRGB"])
+def test_a_planted_fault_comes_first_in_noise_and_pixels_of_a_kind_that_nobody_tells(truth, words):
+    """The images of the test above have no noise, and it says that their pixels are centres: an engine says neither."""
+    (planted,) = (each for each in PLANTED if each.words == words)
+    noise = 1 + 0.01 * np.random.default_rng(6).standard_normal((SIZE[1], SIZE[0], 1))
+    assert diagnosed(planted.image(truth) * noise, pixel=None).first == planted.name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["g-sign", "camera-leg", "near-plane", "distance-law", "light-radius"])
+def test_faults_of_fog_with_a_lobe_are_named(variant, tmp_path, name):
+    path = tmp_path / "fog.xml"
+    path.write_text(
+        """<scene version="3.0.0"><medium type="homogeneous" id="fog"><float name="sigma_t" value="0.31"/>
+        <float name="albedo" value="0.83"/><phase type="hg"><float name="g" value="0.47"/></phase></medium>
+        <emitter type="point"><point name="position" value="0.7, 0.3, 1.9"/></emitter>
+        <sensor type="perspective"><transform name="to_world"><lookat origin="0.2, -4.1, 1.3" target="0.1, 0, 0.6"
+        up="0, 0, 1"/></transform><ref name="medium" id="fog"/></sensor>
+        <shape type="sphere" id="ball"><float name="radius" value="0.4"/></shape></scene>"""
+    )
+    own = read_truth(load_scene(str(path), SIZE).scene)
+    (negative,) = (each for each in PLANTED if each.name == "g-sign")
+    # The leg to the camera and the near plane have no route of their own in the truth: the sums over nodes are tested
+    # in tests/validation/fog_model.
+    radius, points = (0.25, 64) if name == "light-radius" else (0.0, 16)
+    view, fog = view_of(own), scene_fog(own)
+    ends = view.ends((0.4, np.inf)) if name == "near-plane" else None
+    model = FogModel(scattering_paths(view, radius=radius, samples=points, ends=ends))
+    laws = {"camera-leg": {"camera_leg": (0.0, 0.0)}, "near-plane": {"near": 0.4}}
+    laws |= {"distance-law": {"distance_power": 1.0}}
+    if name == "g-sign":
+        image = negative.image(own)
+    else:
+        image = model.layers(replace(fog, **laws.get(name, {}))).sum(axis=0).reshape(SIZE[1], SIZE[0], 3)
+    assert diagnosed(image, str(path)).first == name
+
+
+def test_noise_is_of_one_size_all_over_the_image(truth):
+    generator = np.random.default_rng(2)
+    errors, pairs = 0.02 * generator.standard_normal((400, 3)), (np.arange(399), np.arange(1, 400))
+    lit = np.ones(errors.shape, bool)
+    explanation = Explanation((), (), Guess(scene_fog(truth)), errors, lit, float(np.abs(errors).mean()))
+    assert is_noise(explanation, pairs)
+    errors[::7] *= 20  # thin shadows that are off
+    assert not is_noise(explanation, pairs)
+
+
+@pytest.mark.claim("diagnosis-right")
+@pytest.mark.parametrize("noise", [0.01, pytest.param(0.2, marks=pytest.mark.slow)])
+def test_no_fault_is_named_for_a_right_image(truth, noise):
+    generator = np.random.default_rng(3)
+    diagnosis = diagnosed(total(truth) * (1 + noise * generator.standard_normal((SIZE[1], SIZE[0], 1))))
+    assert diagnosis.first == "right"
+    assert diagnosis.explained
+
+
+@pytest.mark.slow
+@pytest.mark.claim("diagnosis-two")
+def test_two_faults_of_different_kinds_are_both_named(truth):
+    denser = replace(truth, medium=replace(truth.medium, sigma_t=1.6 * truth.medium.sigma_t))
+    both = diagnosed(0.7 * total(denser))
+    assert {row.name for row in both.ranked[:2]} == {"extinction", "factor"}
+    assert both.ranked[0].together == ("extinction", "factor")
+    assert [row.parameter for row in both.ranked[:2]] == pytest.approx([1.6, 0.7], rel=1e-2)
+    flipped = diagnosed(total(denser)[::-1])
+    assert {row.name for row in flipped.ranked[:2]} == {"extinction", "flip"}
+    assert "Two faults" in "\n".join(flipped.lines)

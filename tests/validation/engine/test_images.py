@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: BSD-3-Clause
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from reference.storage.exr import Image, write_exr
+from validation.engine.images import TIMES, EngineImage, find_images, image_times, images_size, measure_image
+from validation.scenes.loading import load_scene
+
+SCENES = {"open-fog": "open-fog", "hall": "hall", "hall.small": "hall.small", "mine": "folder/mine.xml"}
+SHAPE = (4, 6, 3)
+RANDOM = np.random.default_rng(5)
+AIRLIGHT, SURFACE = RANDOM.uniform(0.5, 2, SHAPE), RANDOM.uniform(0, 3, SHAPE)
+
+
+def truth_of(pixel):
+    """The means over pixels are a tenth brighter here, where a pixel is bright."""
+    brighter = 1 + 0.1 * (pixel == "area") * (AIRLIGHT > 1)
+    layers = {"airlight": brighter * AIRLIGHT, "surface": brighter * SURFACE, "emitted": None}
+    bounds = {"airlight_bound": 0 * AIRLIGHT, "airlight_se": None, "surface_se": None}
+    return SimpleNamespace(**layers, **bounds, light_angle=np.ones(SHAPE[:2]))
+
+
+def write(folder, name, **layers):
+    path = folder / name
+    write_exr(path, Image(layers or {"total": np.ones(SHAPE, dtype=np.float32)}))
+    return path
+
+
+def test_files_are_found_by_the_name_of_their_scene(tmp_path):
+    for name in ("open-fog.exr", "hall.godot.exr", "hall.unreal 5.4.exr", "hall.small.exr", "mine.EXR"):
+        write(tmp_path, "x.exr").rename(tmp_path / name)
+    (tmp_path / "notes.txt").write_text("not an image")
+    images = find_images(tmp_path, SCENES)
+    labels = {scene: [image.label for image in several] for scene, several in images.items()}
+    assert labels == {
+        "hall": ["godot", "unreal 5.4"],
+        "hall.small": [tmp_path.name],
+        "mine": [tmp_path.name],
+        "open-fog": [tmp_path.name],
+    }
+
+
+def test_images_of_a_scene_have_one_size(tmp_path):
+    first, second = write(tmp_path, "hall.a.exr"), write(tmp_path, "hall.b.exr")
+    images = tuple(find_images(tmp_path, SCENES)["hall"])
+    assert images_size(images) == (6, 4)
+    write_exr(second, Image({"total": np.ones((4, 8, 3), dtype=np.float32)}))
+    with pytest.raises(InputError, match=r"hall\.b\.exr is 8 x 4 pixels and .*hall\.a\.exr 6 x 4"):
+        images_size(images)
+    assert first.is_file()
+
+
+def measured(path, *, surfaces=True):
+    return measure_image(EngineImage("hall", "godot", path), load_scene("hall", (6, 4)), truth_of, surfaces=surfaces)
+
+
+def test_a_layer_of_airlight_is_judged_as_such(variant, tmp_path):
+    path = write(tmp_path, "hall.exr", airlight=1.1 * AIRLIGHT, surface=SURFACE)
+    found = measured(path)
+    assert found.judged.expected == "airlight"
+    # The file holds float32: 6e-8.
+    assert found.judged.comparison.metrics.relative_bias == pytest.approx(0.1, abs=1e-7)
+    assert not found.judged.verdict.right
+    assert found.surface_error.relative_rmse == pytest.approx(0, abs=1e-7)
+    np.testing.assert_allclose(found.light, 1.1 * AIRLIGHT + SURFACE, rtol=1e-6)
+    assert measured(path, surfaces=False).surface_error is None
+
+
+def test_a_file_without_any_light_is_refused(variant, tmp_path):
+    path = write(tmp_path, "hall.exr", beauty=np.ones(SHAPE), matte=np.ones(SHAPE))
+    for refused in (lambda: measured(path), lambda: images_size((EngineImage("hall", "godot", path),))):
+        with pytest.raises(InputError, match="has no channels R, G, B and no layer 'airlight'; it has beauty, matte"):
+            refused()
+
+
+def test_colours_in_integers_are_refused_by_name(tmp_path):
+    """They once ended `report --images` with a StopIteration."""
+    import OpenEXR
+
+    path = tmp_path / "hall.exr"
+    OpenEXR.File({}, {name: np.ones((4, 6), dtype=np.uint32) for name in "RGB"}).write(str(path))
+    with pytest.raises(InputError, match="colours in unsigned integers left out: B, G, R"):
+        images_size((EngineImage("hall", "godot", path),))
+
+
+@pytest.mark.claim("engine-pixels")
+def test_the_truth_that_fits_is_taken(variant, tmp_path):
+    for pixel in ("centre", "area"):
+        truth = truth_of(pixel)
+        path = write(tmp_path, f"{pixel}.exr", total=0.999 * (truth.airlight + truth.surface))
+        found = measured(path)
+        assert (found.judged.pixel, "means over the areas" in found.notes) == (pixel, pixel == "area")
+        assert found.judged.comparison.metrics.relative_bias == pytest.approx(-0.001, abs=1e-6)
+        np.testing.assert_array_equal(found.judged.fit.truth.airlight, truth.airlight)
+
+
+def test_an_engine_says_how_long_its_images_took(variant, tmp_path):
+    path = write(tmp_path, "hall.godot.exr")
+    assert image_times(path) is None
+    (tmp_path / TIMES).write_text('{"hall.godot.exr": {"ms": 3.1, "quartiles": [2.9, 3.4], "device": "a card"}}')
+    found = measured(path)
+    assert found.times.to_json()["frame"] == {"median_ms": 3.1, "low_ms": 2.9, "high_ms": 3.4, "repetitions": 0}
+    assert "timed on a card" in found.notes
+    assert image_times(tmp_path / "hall.other.exr") is None
+    for wrong in ('{"hall.godot": {"ms": -1}}', '{"hall.godot": {"quartiles": [1, 2]}}', "no JSON"):
+        (tmp_path / TIMES).write_text(wrong)
+        with pytest.raises(InputError, match="milliseconds of a frame above 0"):
+            image_times(path)

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import re
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from reference.storage.exr import Image, read_exr, write_exr
+from validation.comparison.images import compare_files
+from validation.engine.images import EngineImage, measure_image
+from validation.engine.judge import compare_scene, truths
+from validation.engine.judged_layer import expected_layer, judged_layer
+from validation.engine.seen import scene_of_size, seen_image
+from validation.estimates.quadrature import truth_image
+from validation.estimates.reference_layers import reference_error, reference_layer
+from validation.scenes.loading import load_scene
+
+SCENE = """<scene version="3.0.0">
+    <medium type="homogeneous" id="fog"><float name="sigma_t" value="0.31"/><float name="albedo" value="0.83"/></medium>
+    <emitter type="point"><point name="position" value="0.7, 0.3, 1.9"/></emitter>
+    <sensor type="perspective">
+        <transform name="to_world"><lookat origin="0.2, -4.1, 1.3" target="0.1, 0, 0.6" up="0, 0, 1"/></transform>
+        <ref name="medium" id="fog"/>
+        <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="24"/></film>
+    </sensor>
+    <shape type="sphere" id="ball"><float name="radius" value="0.4"/></shape>
+</scene>
+"""
+
+
+def refused(text):
+    return pytest.raises(InputError, match=re.escape(text))
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "own.xml"
+    path.write_text(SCENE)
+    return str(path)
+
+
+@pytest.fixture
+def truth(scene, variant):
+    return truth_image(load_scene(scene, (16, 12)).scene)
+
+
+@pytest.fixture
+def write(tmp_path):
+    """Write layers as an EXR file."""
+
+    def written(**layers):
+        path = tmp_path / "engine.exr"
+        write_exr(path, Image({name.replace("__", "."): values for name, values in layers.items()}), finite=False)
+        return path
+
+    return written
+
+
+@pytest.mark.claim("engine-layers")
+def test_airlight_is_compared_where_there_is_one(scene, truth, write):
+    verdict = compare_scene(scene, write(airlight=truth.airlight, surface=2 * truth.surface))
+    assert (verdict.scene, verdict.size, verdict.expected, verdict.comparison.layer) == (
+        "own",
+        (16, 12),
+        *["airlight"] * 2,
+    )
+    assert verdict.comparison.metrics.relative_rmse < 1e-6  # the file is float32
+    assert (verdict.failures, verdict.hints.words) == ((), ())
+    assert 0 <= verdict.truth_error < 1e-6
+    verdict = compare_scene(scene, write(airlight=truth.airlight, surface=2 * truth.surface), layer="surface")
+    np.testing.assert_allclose(verdict.comparison.metrics.relative_bias, 1, rtol=1e-6)
+
+
+@pytest.mark.claim("engine-layers")
+def test_plain_channels_are_compared_with_all_light(scene, truth, write):
+    total = reference_layer(truth, "total")
+    for layers in ({"total": total}, {"Final__Combined": total}):
+        verdict = compare_scene(scene, write(**layers))
+        assert verdict.expected == "total"
+        assert verdict.comparison.metrics.relative_rmse < 1e-6
+    assert "airlight + surface, at pixel centres" in verdict.summary()
+
+
+@pytest.mark.claim("engine-margin")
+def test_margin_decides_without_standard_errors(scene, truth, write):
+    file = write(airlight=1.01 * truth.airlight)
+    assert compare_scene(scene, file, margin=0.011).failures == ()
+    (reason,) = compare_scene(scene, file, margin=0.009).failures
+    assert reason == "the relative bias, +0.01, is not within +-0.009"
+    with refused("margin: got 0, wanted a relative bias above 0"):
+        compare_scene(scene, file, margin=0)
+    nan = truth.airlight.copy()
+    nan[2, 3] = np.nan
+    assert len(compare_scene(scene, write(airlight=nan), margin=0.01).failures) == 1
+
+
+AREA_LIT = SCENE.replace(
+    '<emitter type="point"><point name="position" value="0.7, 0.3, 1.9"/></emitter>',
+    """<shape type="rectangle"><transform name="to_world"><scale value="0.3"/>
+    <lookat origin="0.6, 0.3, 1.2" target="0.2, -4.1, 1.3" up="0, 0, 1"/></transform>
+    <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf><emitter type="area"/></shape>""",
+)
+
+
+@pytest.fixture(scope="module")
+def area_lit(variant, tmp_path_factory):
+    """A scene under an area light that the camera sees: its file, the scene at 16 x 12 pixels and its reference."""
+    path = tmp_path_factory.mktemp("area") / "area.xml"
+    path.write_text(AREA_LIT)
+    loaded = load_scene(str(path), (16, 12))
+    return str(path), loaded, truth_image(loaded.scene)
+
+
+def test_an_area_light_in_view_is_part_of_the_total_of_an_engine_but_not_of_our_files(area_lit, write):
+    """The same engine image was right in the live view and wrong in `compare` and `report --images`, or the reverse."""
+    path, loaded, truth = area_lit
+    assert truth.emitted.max() > 10 * (truth.airlight + truth.surface).max()
+    file = write(total=reference_layer(truth, "total"))
+    assert compare_scene(path, file, pixel="centre").verdict.right
+    assert measure_image(
+        EngineImage("area", "engine", file), loaded, truths(loaded), surfaces=True
+    ).judged.verdict.right
+    dark = compare_scene(path, write(total=truth.airlight + truth.surface), pixel="centre")
+    assert not dark.verdict.right
+    assert dark.hints.words == ("the image does not show the area lights that the camera sees: compare its airlight",)
+    for layers, made in (({"emitted": truth.emitted}, {}), ({}, {"airlight:scene": "area"})):
+        own = judged_layer(
+            Image({"total": truth.airlight + truth.surface, **layers}, attributes=made), "own.exr", name=""
+        )
+        np.testing.assert_array_equal(expected_layer(truth, own), own.values)
+    # Neither a fit nor a diagnosis explains the radiance of the light itself.
+    image = read_exr(file)
+    left = seen_image(image, judged_layer(image, file), loaded.scene)[0].used
+    assert 0.7 < left.mean() < 1
+    assert not left.reshape(12, 16)[truth.emitted.any(axis=2)].any()
+
+
+@pytest.mark.claim("engine-margin", tolerance="1e-5: files are float32")
+@pytest.mark.parametrize("layer", ["airlight", "total"])
+def test_the_references_own_standard_errors_count_as_those_of_its_file(tmp_path, area_lit, write, layer):
+    """Under an area light, `compare SCENE IMAGE` says what `compare REFERENCE.exr IMAGE` says; it left them out."""
+    path, _, truth = area_lit
+    values = reference_layer(truth, layer)
+    errors = reference_error(truth, layer)
+    sure = np.full(values.shape, 1e-5 * values.mean())  # an image that is surer than the reference
+    image = {layer: values + 1e-4 * values.mean(), f"{layer}_se": sure}
+    reference = tmp_path / "reference.exr"
+    write_exr(reference, Image({layer: values, f"{layer}_se": errors}, attributes={"airlight:batches": 8}))
+    by_file = compare_files(reference, write(**image), layer, margin=0.01).statistics
+    compared = compare_scene(path, write(**image), layer=layer, pixel="centre", margin=0.01)
+    by_scene = compared.comparison.statistics
+    assert by_scene.reference_variance_share == pytest.approx(by_file.reference_variance_share, rel=1e-5)
+    assert by_scene.relative_bias_ci == pytest.approx(by_file.relative_bias_ci, rel=1e-5, abs=1e-7)
+    assert by_file.reference_variance_share > 0.9
+    assert compared.truth_error > truth.airlight_se.mean() / truth.airlight.mean()
+
+
+@pytest.mark.parametrize("size", [(32, 24), (64, 48), (31, 23), (1, 1)])
+def test_sizes_of_the_same_aspect_are_taken(scene, variant, size):
+    film = scene_of_size(scene, size, "engine.exr").scene.sensors()[0].film()
+    assert tuple(film.size()) == size
+
+
+@pytest.mark.parametrize("size", [(32, 20), (24, 32), (100, 100)])
+def test_another_aspect_is_refused_with_the_scenes_own(scene, variant, size):
+    with refused("own is 32 x 24, 1.333 to 1"):
+        scene_of_size(scene, size, "engine.exr")
+
+
+def test_layers_that_are_not_there_are_refused(scene, truth, write):
+    total = reference_layer(truth, "total")
+    with refused("has no layer 'airlihgt'"):
+        compare_scene(scene, write(airlight=truth.airlight), layer="airlihgt")
+    file = write(A__Combined=total, B__Combined=total)
+    with refused("it has A.Combined, B.Combined; name one by --layer"):
+        compare_scene(scene, file)
+    assert compare_scene(scene, file, layer="B.Combined").comparison.metrics.relative_rmse < 1e-6
+
+
+@pytest.mark.parametrize("size", [(1, 1), (4, 3)])
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, 3e38])
+def test_odd_images_get_a_verdict_and_no_number_that_is_none(tmp_path, variant, size, value):
+    """All warnings are errors in the tests; the text of an image without failures has no nan and no inf."""
+    path = tmp_path / "own.xml"
+    path.write_text(SCENE.replace('"32"', f'"{size[0]}"').replace('"24"', f'"{size[1]}"'))
+    write_exr(
+        tmp_path / "odd.exr", Image({"total": np.full((size[1], size[0], 3), value, dtype=np.float32)}), finite=False
+    )
+    compared = compare_scene(str(path), tmp_path / "odd.exr", all_metrics=True)
+    assert not compared.verdict.right
+    assert "nan" not in compared.summary()
+    assert not re.search(r"\binf\b", compared.summary())

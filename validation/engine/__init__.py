@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Images of other renderers: whether they are right, and what is wrong with them.
+
+Read in this order:
+
+- `judged_layer.py`: which layer of an image is judged, and what light it holds;
+- `seen.py`: its values, the pixels that take part, and their paths of light;
+- `prediction.py`: what a fog, lights, a camera and an encoding make of a scene;
+- `curves.py`: encodings and tone curves;
+- `fault.py`: what a fault is, and how it changes a guess;
+- `media_faults.py`, `light_faults.py`, `image_faults.py`, `layer_faults.py`: the faults;
+- `faults.py`: the catalogue of all, and those of single lights;
+- `search.py`: the parameters with which faults fit best;
+- `evidence.py`: how much speaks for an explanation, and whether it leaves anything;
+- `error_place.py`: where an error lies;
+- `diagnose.py`: what is wrong with an image;
+- `hints.py`: what may be wrong with an image as a whole, without any path of light;
+- `judge.py`: whether an image is right;
+- `images.py`: a folder of images, found by scene, for the report.
+"""

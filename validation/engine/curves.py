@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What engines do to values before they write them: encodings and tone curves. Values below 0 stay, or become 0."""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+Array = NDArray[np.float64]
+
+
+def to_srgb(linear: Array) -> Array:
+    """Return values encoded by the curve of IEC 61966-2-1; those below 0 become 0."""
+    positive = np.maximum(linear, 0.0)
+    return np.where(positive <= 0.0031308, 12.92 * positive, 1.055 * positive ** (1 / 2.4) - 0.055)
+
+
+def from_srgb(encoded: Array) -> Array:
+    """Return the linear values of those encoded by that curve."""
+    with np.errstate(invalid="ignore"):
+        return np.where(encoded <= 0.04045, encoded / 12.92, ((np.maximum(encoded, 0) + 0.055) / 1.055) ** 2.4)
+
+
+def srgb_in_8_bits(radiance: Array) -> Array:
+    """Return what is left of values that were written in 8 bits by that curve, as numbers from 0 to 1."""
+    return np.round(255 * np.clip(to_srgb(radiance), 0.0, 1.0)) / 255
+
+
+def gamma(radiance: Array, exponent: float) -> Array:
+    """Return values to the power 1/exponent."""
+    return np.asarray(np.maximum(radiance, 0.0) ** (1 / exponent))
+
+
+def reinhard(radiance: Array) -> Array:
+    """Return x/(1 + x) (Reinhard et al. 2002, eq. 3)."""
+    return np.asarray(radiance / (1 + np.maximum(radiance, 0.0)))
+
+
+def exponential(radiance: Array) -> Array:
+    """Return 1 - exp(-x), the response of film."""
+    return np.asarray(-np.expm1(-np.maximum(radiance, 0.0)))
+
+
+def filmic(radiance: Array) -> Array:
+    """Return Narkowicz's fit of the ACES curve (2015)."""
+    x = np.maximum(radiance, 0.0)
+    return np.asarray(np.clip(x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14), 0.0, 1.0))
+
+
+# Blender's view transforms: a curve of log2(x/0.18) at even places, as Blender 5.0.1 wrote greys into a file.
+_STOPS = np.linspace(-10.0, 6.5, 23)
+_FILMIC = (
+    1.5e-5, 0.003, 0.0074, 0.0136, 0.0224, 0.0348, 0.0522, 0.0764, 0.1095, 0.1538, 0.2113, 0.2833,
+    0.3694, 0.4664, 0.5677, 0.6668, 0.7571, 0.8336, 0.8941, 0.9388, 0.9697, 0.9892, 1.0,
+)  # fmt: skip
+_AGX = (
+    0.0, 0.0001, 0.0007, 0.0023, 0.0059, 0.0129, 0.0258, 0.0492, 0.0805, 0.12, 0.171, 0.2369,
+    0.3204, 0.4238, 0.5359, 0.6379, 0.7242, 0.7951, 0.8536, 0.9014, 0.9404, 0.9728, 1.0,
+)  # fmt: skip
+# AgX mixes channels before its curve, and takes that back in linear light after it; fitted to colours, to 2e-3.
+_AGX_BEFORE = np.array([[0.5691, 0.3314, 0.0995], [0.1191, 0.7372, 0.1437], [0.0934, 0.198, 0.7086]])
+_AGX_AFTER = np.array([[1.8311, -0.7004, -0.1307], [-0.2281, 1.3306, -0.1025], [-0.1837, -0.3038, 1.4875]])
+
+
+def _by_stops(curve: tuple[float, ...], radiance: Array) -> Array:
+    stops = np.log2(np.maximum(radiance, 1e-30) / 0.18)
+    return np.asarray(PchipInterpolator(_STOPS, curve)(np.clip(stops, _STOPS[0], _STOPS[-1])))
+
+
+def blender_filmic(radiance: Array) -> Array:
+    """Return Blender's view transform Filmic."""
+    return _by_stops(_FILMIC, radiance)
+
+
+def agx(radiance: Array) -> Array:
+    """Return Blender's view transform AgX, which it begins with."""
+    encoded = _by_stops(_AGX, radiance @ _AGX_BEFORE.T)
+    linear = from_srgb(encoded)
+    return np.clip(to_srgb(linear @ _AGX_AFTER.T), 0.0, 1.0)
+
+
+#: By what is said of an image.
+TONE_CURVES: Mapping[str, Callable[[Array], Array]] = {
+    "the tone curve x/(1 + x)": reinhard,
+    "the tone curve 1 - exp(-x)": exponential,
+    "a filmic (ACES) tone curve": filmic,
+    "the tone curve x/(1 + x), then the sRGB curve": lambda radiance: to_srgb(reinhard(radiance)),
+    "a filmic (ACES) tone curve, then the sRGB curve": lambda radiance: to_srgb(filmic(radiance)),
+    "Blender's view transform Filmic": blender_filmic,
+    "Blender's view transform AgX": agx,
+}

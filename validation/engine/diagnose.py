@@ -1,0 +1,387 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The diagnosis of an image of a scene: every fault predicts the image that it would make, and the data choose.
+
+Faults are tried alone, those that need paths of their own only where no other one explains the image, then pairs of
+different kinds. Whether pixels are centres or means is decided once, by what the faults without paths of their own
+leave of the image.
+"""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from reference.storage.exr import Image, read_exr
+from validation.engine.error_place import place_words
+from validation.engine.evidence import (
+    LEAST_EFFECT,
+    evidence,
+    gains,
+    is_enough,
+    is_explained,
+    is_noise,
+    leaves_nothing,
+    no_fault,
+    scale_of,
+    usual_error,
+)
+from validation.engine.fault import KINDS, Fault
+from validation.engine.faults import faults_of
+from validation.engine.judged_layer import JudgedLayer, judged_layer
+from validation.engine.prediction import Predictor, SceneLight
+from validation.engine.search import Explanation, begin, explain
+from validation.engine.seen import Progress, layers_of, pixel_kinds, scene_of_size, seen_image
+from validation.metrics.errors import plain
+from validation.scenes.loading import LoadedScene
+
+Array = NDArray[np.float64]
+
+RIGHT, UNEXPLAINED = "right", "unexplained"
+
+_REFINED = 5  # faults whose numbers are found to all digits: those that leave least after a coarse search
+_MOVED = 0.02  # fraction by which the error changes where a search left the unchanged scene
+_FAR, _FAR_OF_PATHS = 10.0, 3.0  # errors over the least one that more digits do not bring down to it
+_PARTNERS = 12  # faults, those that leave least, with which all others are tried as pairs
+_PAIRS = 12  # pairs that are followed, those that leave least where they begin
+_BETTER = 0.7  # what a pair must leave of the error of one alone: with more numbers anything fits a little better
+_MUCH = 0.2  # what an explanation must leave of the error to be named although more is wrong
+_ALIKE = 5.0  # evidence by which explanations may differ and still be as good as one another
+_SHOWN, _PRINTED = 8, 5
+_CERTAIN = 1e4  # evidence beyond which the number says no more
+_PARTS = (0.0, 0.3), (0.3, 0.6), (0.8, 1.0), (0.6, 0.8)  # of the time: faults by what they cost, and pairs
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A fault in the order of evidence."""
+
+    name: str
+    parameter: float | None  #: its only number
+    parameters: tuple[float, ...]
+    words: str
+    residual: float  #: mean relative error that it leaves, with what stands beside it
+    evidence: float  #: natural logarithm of the odds against the unchanged scene
+    together: tuple[str, ...]  #: names of all that explain the image together, where it takes more than one
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What is wrong with a layer of an image."""
+
+    scene: str
+    path: str
+    layer: str
+    pixel: str  #: 'centre' or 'area'
+    first: str  #: name of what comes first; 'right' or 'unexplained' where no fault does
+    ranked: tuple[Ranked, ...]
+    residual: float  #: mean relative error of the image as it is
+    left: float  #: what the first explanation leaves of it
+    noise: bool  #: whether that is noise: neighbours do not share it
+    explained: bool  #: whether that is noise, or little
+    place: str  #: where the remaining error lies; empty where it is noise, or little
+    failures: tuple[str, ...] = ()  #: what is wrong with the file, such as pixels that are not finite
+
+    def to_json(self) -> dict[str, Any]:
+        """Return every number by name."""
+        numbers = {name: plain(getattr(self, name)) for name in ("residual", "left")}
+        words = {name: getattr(self, name) for name in ("first", "layer", "pixel", "noise", "explained", "place")}
+        ranked, failures = [plain(row) for row in self.ranked], list(self.failures)
+        return {"diagnosis": {**words, **numbers, "ranked": ranked, "failures": failures}}
+
+    @property
+    def lines(self) -> list[str]:
+        """What comes first, what is left, and what else was thought of."""
+        pixel = "at pixel centres" if self.pixel == "centre" else "means over pixels"
+        off = f"values are {_percent(self.residual)} off in the mean"
+        lines = [f"{self.path}, {self.layer}, against {self.scene}, {pixel}: {off}."]
+        together = [row for row in self.ranked if row.together]
+        rest = "noise: neighbouring pixels do not share it" if self.noise else "little" if self.explained else ""
+        if self.first == RIGHT:
+            lines.append(f"Nothing is wrong with it: the difference is {rest}.")
+        elif self.first == UNEXPLAINED:
+            lines.append(f"Nothing here explains it{': the error lies ' + self.place if self.place else ''}.")
+        else:
+            found = f"Two faults explain it: {'; and '.join(row.words for row in together)}." if together else ""
+            lines.append(found or f"{self.first}: {self.ranked[0].words}.")
+            more = f"no noise: something else is wrong too{', ' + self.place if self.place else ''}"
+            lines.append(f"Without that, values are {_percent(self.left)} off in the mean, which is {rest or more}.")
+        lines += [f"Failed: {reason}." for reason in self.failures]
+        lines += ["", f"{'fault':<16} {'left':>9} {'evidence':>9}  what it says"]
+        for row in self.ranked[:_PRINTED]:
+            weight = f"{row.evidence:.0f}" if abs(row.evidence) < _CERTAIN else f"{row.evidence:.1e}"
+            lines.append(f"{row.name:<16} {_percent(row.residual):>9} {weight:>9}  {row.words}")
+        return [
+            *lines,
+            "",
+            "left: mean relative error without the fault; evidence: natural logarithm of the odds against `right`.",
+        ]
+
+
+def diagnose_file(
+    path: str | os.PathLike[str], scene: str, *, layer: str | None = None, holds: str | None = None, **how: Any
+) -> tuple[Diagnosis, ...]:
+    """Diagnose an EXR file of a scene: each of airlight and surfaces where it has both; see `diagnose_image`.
+
+    Parameters
+    ----------
+    path, scene
+        The EXR file; a built-in scene or a Mitsuba XML file.
+    layer, holds
+        Which layer, see `validation.engine.judged_layer.judged_layer`.
+
+    Raises
+    ------
+    InputError
+        For files and scenes that cannot be read.
+    """
+    image = read_exr(path)
+    several = layers_of(image, str(path), layer, holds)
+    loaded = scene_of_size(scene, several[0].size, path)
+    return tuple(diagnose_image(image, loaded, path=str(path), judged=judged, **how) for judged in several)
+
+
+def diagnose_image(
+    image: Image,
+    loaded: LoadedScene,
+    *,
+    path: str = "the image",
+    layer: str | None = None,
+    holds: str | None = None,
+    judged: JudgedLayer | None = None,
+    pixel: str | None = None,
+    light: SceneLight | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Say what is wrong with an image of a scene.
+
+    Parameters
+    ----------
+    image, loaded
+        The layers, and the scene at their size.
+    layer, holds
+        Which layer, and what it holds: 'airlight', 'surface' or 'total'.
+    judged
+        The layer itself, if it is known.
+    pixel
+        'centre' or 'area'; by default what the image says of itself, or what fits better.
+    light
+        Of this scene, as other images of it have found it.
+
+    Raises
+    ------
+    InputError
+        For a layer that is not there, a scene that has no reference, and an image without finite values.
+    """
+    kinds = pixel_kinds(image, pixel)
+    judged = judged or judged_layer(image, path, name=layer, holds=holds)
+    seen, wrong = seen_image(image, judged, loaded.scene)
+    if not seen.used.any():
+        raise InputError(f"{path}: the layer '{judged.name}' has no finite value; there is nothing to diagnose")
+    light = light or SceneLight(seen.truth)
+    shape = judged.size[1], judged.size[0]
+    begun = []
+    for kind in kinds:
+        attempt = _Attempt(Predictor(replace(seen, area=kind == "area"), shape, light), kind, progress)
+        attempt.try_faults(0)
+        begun.append(attempt)
+    attempt = min(begun, key=lambda each: each.chosen.error)
+    attempt.go_on()
+    chosen, rows = attempt.ranked()
+    explained = attempt.explained(chosen) or gains(chosen, attempt.right)
+    noise = is_explained(chosen, attempt.right, attempt.predictor.pairs, 0.0)
+    return Diagnosis(
+        loaded.name,
+        path,
+        judged.name,
+        attempt.pixel,
+        _first(attempt.right, chosen, explained),
+        tuple(rows[:_SHOWN]),
+        attempt.right.error,
+        chosen.error,
+        noise,
+        explained,
+        "" if explained else place_words(attempt.predictor, chosen),
+        () if wrong is None else (str(wrong),),
+    )
+
+
+def _first(right: Explanation, chosen: Explanation, explained: bool) -> str:
+    if not chosen.faults:
+        return RIGHT if explained else UNEXPLAINED
+    if explained or chosen.error < _MUCH * right.error:
+        return chosen.names[0]
+    return UNEXPLAINED
+
+
+class _Attempt:
+    """The search among all faults, with pixels of one kind."""
+
+    def __init__(self, predictor: Predictor, pixel: str, progress: Progress | None) -> None:
+        self.predictor, self.pixel, self.progress = predictor, pixel, progress
+        self.little = no_fault(predictor.truth)
+        self.right = explain(predictor, ())
+        self.faults = faults_of(predictor)
+        self.singles: list[Explanation] = []
+        self.pairs: list[Explanation] = []
+
+    @property
+    def chosen(self) -> Explanation:
+        """The best explanation by one fault, or the unchanged scene."""
+        return self._best(self.singles)
+
+    def explained(self, explanation: Explanation) -> bool:
+        """Return whether what an explanation leaves is noise, or little."""
+        return is_explained(explanation, self.right, self.predictor.pairs, self.little)
+
+    def go_on(self) -> None:
+        """Try what costs more where it is needed."""
+        if self._settled(self.chosen):
+            return
+        self.try_faults(1)
+        if not self.explained(self.chosen):
+            self.pairs = self._try_pairs(self.chosen)
+        if not self._settled(self._with_pairs()):
+            self.try_faults(2)
+
+    def ranked(self) -> tuple[Explanation, list[Ranked]]:
+        """Return the explanation that is chosen, and all in the order of evidence."""
+        chosen = self._with_pairs()
+        scale = scale_of(chosen, self.pixel)
+        rows: list[Ranked] = []
+        if len(chosen.faults) > 1:
+            rows += _rows(chosen, evidence(chosen, self.right, scale))
+        named = {row.name for row in rows}
+        for each in sorted(self.singles, key=lambda each: -evidence(each, self.right, scale)):
+            if each.names[0] not in named:
+                named.add(each.names[0])
+                # Between explanations that leave the same, the one with fewer numbers comes first.
+                shown = chosen if each.names == chosen.names else each
+                rows += _rows(shown, evidence(shown, self.right, scale))
+        if not chosen.faults:
+            rows.insert(0, Ranked(RIGHT, None, (), "nothing is wrong", self.right.error, 0.0, ()))
+        elif len(chosen.faults) == 1:
+            rows.sort(key=lambda row: row.name != chosen.names[0])
+        return chosen, rows
+
+    def try_faults(self, costly: int) -> None:
+        """Try all faults of a cost, each alone."""
+        own = [fault for fault in self.faults if fault.costly == costly]
+        tried = []
+        for number, fault in enumerate(own):
+            self._tell(_PARTS[costly], number / len(own), fault.name)
+            tried.append(explain(self.predictor, (fault,), fine=False))
+        least = min((each.error for each in self.singles), default=1.0)
+        self.singles += self._refined(tried, least)
+
+    def _settled(self, explanation: Explanation) -> bool:
+        """Return whether nothing is left that another fault could explain."""
+        pairs = self.predictor.pairs
+        if len(explanation.faults) > 1:
+            return leaves_nothing(explanation, self.pixel)
+        if explanation.faults and not self.predictor.truth.area:
+            # What is little for an image may be much beside what the fault itself does, if it is not the right one:
+            # a factor leaves 0.4 % of what a lamp of 0.25 m does, all of it in the shadows, and another g 0.2 % of a
+            # near plane at 0.1 m, most of it in the middle.
+            return leaves_nothing(explanation, "centre") or is_noise(explanation, pairs)
+        return usual_error(explanation) <= self.little or is_noise(explanation, pairs)
+
+    def _with_pairs(self) -> Explanation:
+        """Return the best pair if it leaves far less than the best explanation alone, else that one."""
+        chosen = self.chosen
+        best = self._best([chosen, *self.pairs] if chosen.faults else self.pairs)
+        if best is chosen or not best.faults:
+            return chosen
+        return best if best.error < _BETTER * chosen.error else chosen
+
+    def _refined(self, explanations: list[Explanation], least: float = 1.0) -> list[Explanation]:
+        """Return explanations, those that leave least with all digits; `least` is what others leave.
+
+        Where a search stayed at the unchanged scene, or left far more than another, none are wanted.
+        """
+        least = max(LEAST_EFFECT, min([least, *(each.error for each in explanations)]))
+        moved = [each for each in explanations if abs(each.error - self.right.error) > _MOVED * self.right.error]
+        better = sorted((each for each in moved if each.error < _far(each) * least), key=lambda each: each.error)
+        best = [each for each in better[:_REFINED] if each.parameters]
+        finer = {id(each): explain(self.predictor, each.faults, each.values) for each in best}
+        return [finer.get(id(each), each) for each in explanations]
+
+    def _best(self, explanations: Sequence[Explanation]) -> Explanation:
+        """Return the explanation with the most evidence, or the unchanged scene where none has enough."""
+        if not explanations:
+            return self.right
+        scale = min(scale_of(each, self.pixel) for each in [self.right, *explanations])
+        most = max(evidence(each, self.right, scale) for each in explanations)
+        # Of those that explain it alike, such as a factor and a near plane before dark fog, the simplest and the first.
+        alike = [each for each in explanations if evidence(each, self.right, scale) >= most - _ALIKE]
+        best = min(alike, key=lambda each: each.parameters)
+        return best if is_enough(best, self.right, scale) else self.right
+
+    def _try_pairs(self, chosen: Explanation) -> list[Explanation]:
+        """Return explanations by two faults of different kinds.
+
+        Pairs of any with one of those that leave least begin where their faults do; those that leave least there are
+        followed until one leaves nothing that could be seen.
+        """
+        ordered = sorted(self.singles, key=lambda each: each.error)
+        cheap = [each.faults[0] for each in ordered if not each.faults[0].costly and not each.faults[0].single]
+        both = [_in_order(a, b) for n, a in enumerate(cheap[:_PARTNERS]) for b in cheap[n + 1 :] if _differ(a, b)]
+        begun = []
+        for number, pair in enumerate(both):
+            self._tell(_PARTS[-1], 0.5 * number / len(both), " and ".join(fault.name for fault in pair))
+            begun.append((*begin(self.predictor, pair), pair))
+        begun.sort(key=lambda each: each[0])
+        explanations: list[Explanation] = []
+        for number, (_, near, pair) in enumerate(begun[:_PAIRS]):
+            self._tell(_PARTS[-1], 0.5 + 0.5 * number / _PAIRS, " and ".join(fault.name for fault in pair))
+            explanations.append(explain(self.predictor, pair, near, fine=False))
+            if explanations[-1].error < _MUCH * chosen.error:
+                explanations[-1] = explain(self.predictor, pair, explanations[-1].values)
+                if leaves_nothing(explanations[-1], self.pixel):
+                    break
+        return self._refined(explanations)
+
+    def _tell(self, span: tuple[float, float], part: float, what: str) -> None:
+        if self.progress is not None:
+            self.progress(span[0] + (span[1] - span[0]) * part, what)
+
+
+def _far(explanation: Explanation) -> float:
+    """Return the error over the least one that more digits do not bring down to it: those of other paths are few."""
+    numbers = (parameter for fault in explanation.faults for parameter in fault.parameters)
+    return _FAR_OF_PATHS if any(number.step for number in numbers) else _FAR
+
+
+def _differ(first: Fault, second: Fault) -> bool:
+    """Return whether two faults are of different kinds, and do not both look for paths of their own."""
+    moves = [any(parameter.step for parameter in each.parameters) for each in (first, second)]
+    lights = [each.kind == "light" for each in (first, second)]
+    return first.kind != second.kind and not (any(moves) and any(lights))
+
+
+def _in_order(first: Fault, second: Fault) -> tuple[Fault, Fault]:
+    """Return faults in the order in which they happen: the scene, its image, what is done to values."""
+    return (first, second) if KINDS.index(first.kind) <= KINDS.index(second.kind) else (second, first)
+
+
+def _rows(explanation: Explanation, weight: float) -> list[Ranked]:
+    names = explanation.names if len(explanation.faults) > 1 else ()
+    return [
+        Ranked(
+            fault.name,
+            values[0] if len(values) == 1 else None,
+            values,
+            fault.sentence(values),
+            explanation.error,
+            weight,
+            names,
+        )
+        for fault, values in zip(explanation.faults, explanation.values, strict=True)
+    ]
+
+
+def _percent(part: float) -> str:
+    return f"{100 * part:.3g} %"

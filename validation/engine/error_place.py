@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where the error of an image lies: beside a light, at edges, in rings around a light, or in a part of the frame."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation, maximum_filter, minimum_filter
+
+from reference.quadrature.surface import surface_hits
+from reference.scene.read import TruthScene
+from validation.engine.prediction import Predictor
+from validation.engine.search import Explanation
+from validation.metrics.errors import plain
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+_MOST = 0.9  # fraction of the squared error that is most of it
+_FEW = 0.01  # fraction of the pixels that counts as few
+_BESIDE = 3.0  # pixels from a light
+_STEP = 1.5  # ratio of neighbours across an edge
+_DEEPER = 1.1  # ratio of the distances of neighbours across the outline of a shape
+_WIDE = 4  # pixels from an outline: as far as low resolutions and filters carry an error
+_MORE = 1.7  # how much larger the error is where it lies than all over the image
+_SHARE = 0.5  # of the error, that lies there
+_RINGS = 0.5  # fraction of the squared error that only depends on the angle to a light
+_PLACES = (("upper", "middle", "lower"), ("left", "middle", "right"))
+
+
+@dataclass(frozen=True)
+class ErrorPlace:
+    """Where most of the squared error of an image lies."""
+
+    pixels: int  #: the fewest that have `share` of it
+    share: float
+    worst: tuple[int, int]  #: column and row of the pixel with the largest error, from the upper left
+    kind: str  #: 'lamp', 'edge' or '' for neither
+    relative_rmse_without: float  #: the relative rmse of all other pixels
+    few: bool  #: whether they are less than a hundredth of the image
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the numbers by name."""
+        return plain(self)
+
+    @property
+    def words(self) -> str:
+        """Return a sentence."""
+        kinds = {"lamp": "beside a light", "edge": "at edges of light and shadow"}
+        if not self.few:
+            where = f", most of them {kinds[self.kind]}" if self.kind else ""
+            return f"spread: {100 * self.share:.3g} % of the squared error in {self.pixels} pixels{where}"
+        single = self.pixels == 1
+        place = f"{kinds[self.kind]}, " if self.kind else ""
+        at = "" if single else "the worst "
+        return (
+            f"{100 * self.share:.3g} % of the squared error in {self.pixels} pixel{'s' * (not single)} ({place}{at}in "
+            f"column {self.worst[0]}, row {self.worst[1]}); without {'it' if single else 'them'} the relative rmse is "
+            f"{100 * self.relative_rmse_without:.3g} %"
+        )
+
+
+def error_place(reference: Array, image: Array, light_pixels: Array) -> ErrorPlace | None:
+    """Return where most of the squared error lies; None where there is no error.
+
+    Parameters
+    ----------
+    reference, image
+        Radiance, (height, width, 3) [W/(m^2 sr)].
+    light_pixels
+        How far a light is, (height, width) [pixels].
+    """
+    difference = np.where(np.isfinite(reference) & np.isfinite(image), image - reference, 0.0)
+    squared = (difference**2).sum(axis=2)
+    total = float(squared.sum())
+    if total == 0:
+        return None
+    order = np.argsort(squared, axis=None)[::-1]
+    below = np.cumsum(squared.reshape(-1)[order]) / total
+    count = min(int(np.searchsorted(below, _MOST)) + 1, squared.size)
+    chosen = np.zeros(squared.size, dtype=bool)
+    chosen[order[:count]] = True
+    rest = squared.reshape(-1)[~chosen]
+    mean = float(reference[np.isfinite(reference)].mean())
+    chosen = chosen.reshape(squared.shape)
+    row, column = divmod(int(order[0]), squared.shape[1])
+    light = np.where(np.isfinite(reference), reference, 0.0).sum(axis=2)
+    lamp, edge = (light_pixels[chosen] < _BESIDE).mean() > 0.5, at_edges(light)[chosen].mean() > 0.5
+    kind = "lamp" if lamp else "edge" if edge else ""
+    left = math.sqrt(float(rest.mean()) / reference.shape[2]) / mean if len(rest) and mean > 0 else 0.0
+    return ErrorPlace(count, float(below[count - 1]), (column, row), kind, left, count <= max(1, _FEW * squared.size))
+
+
+def at_edges(values: Array, step: float = _STEP) -> Bools:
+    """Return where a pixel or one beside it is much larger than another of these, (height, width)."""
+    return np.asarray(maximum_filter(values, 3, mode="nearest") > step * minimum_filter(values, 3, mode="nearest"))
+
+
+def place_words(predictor: Predictor, explanation: Explanation) -> str:
+    """Say where the error lies that an explanation leaves, such as 'at the edges of shapes'."""
+    truth, (height, width) = predictor.truth, predictor.shape
+    errors = explanation.errors.mean(axis=1)
+    size = np.abs(explanation.errors).mean(axis=1)
+    row, column = np.divmod(predictor.pixels, width)
+    regions: list[tuple[str, Bools]] = []
+    for words, angle in _angles(truth):
+        pixel = angle.reshape(height, width)
+        step = float(np.median(np.abs(np.diff(pixel, axis=1)))) or math.inf
+        regions.append((f"beside {words}", (angle < 2 * _BESIDE * step)[predictor.pixels]))
+    distance = surface_hits(truth).distance.reshape(height, width)
+    outline = at_edges(np.where(np.isfinite(distance), distance, 1e9), _DEEPER)
+    wide = binary_dilation(outline, iterations=max(1, min(_WIDE, min(height, width) // 12) - 1))
+    regions.append(("at the edges of shapes", wide[row, column]))
+    found = [words for words, here in regions if _lies(size, here)]
+    if found:
+        return " and ".join(found)
+    for words, angle in _angles(truth):
+        if _is_ringed(errors, angle[predictor.pixels]):
+            return f"in rings around {words}"
+    corner = np.hypot(column + 0.5 - 0.5 * width, row + 0.5 - 0.5 * height) > 0.4 * math.hypot(width, height)
+    if _lies(size, corner):
+        return "in the corners"
+    for high, vertical in enumerate(_PLACES[0]):
+        for across, horizontal in enumerate(_PLACES[1]):
+            here = (3 * row // height == high) & (3 * column // width == across)
+            if _lies(size, here):
+                return f"in the {vertical} {horizontal} of the image".replace("middle middle", "middle")
+    return "all over the image"
+
+
+def _lies(size: Array, here: Bools) -> bool:
+    """Return whether the error lies in some pixels: most of it, or far more for a pixel than elsewhere."""
+    if not 0.001 < here.mean() < 0.7 or size.sum() <= 0:
+        return False
+    inside, outside = float(size[here].mean()), float(size[~here].mean())
+    share = float(size[here].sum() / size.sum())
+    return inside > _MORE * outside and (share > _SHARE or (inside > 4 * outside and share > 0.1))
+
+
+def _angles(truth: TruthScene) -> list[tuple[str, Array]]:
+    """Return the angle of every pixel to each light before the camera, (pixels,) [rad], and what it is called."""
+    places = [light.position for light in truth.lights] + [light.centre for light in truth.area]
+    found = []
+    for place in places:
+        way = (place - truth.origin) / max(float(np.linalg.norm(place - truth.origin)), 1e-300)
+        cosine = truth.direction @ way
+        if cosine.max() > 0.9:
+            found.append(("the light" if len(places) == 1 else "a light", np.arccos(np.clip(cosine, -1, 1))))
+    return found
+
+
+def _is_ringed(errors: Array, angle: Array) -> bool:
+    """Return whether errors depend, for the most part, on the angle to a light."""
+    order = np.argsort(angle)
+    parts = np.array_split(errors[order], max(4, len(errors) // 64))
+    smooth = sum(len(part) * float(part.mean()) ** 2 for part in parts)
+    alike = len(errors) * float(errors.mean()) ** 2  # of all rings, which is no ring
+    return smooth - alike > _RINGS * float(np.sum(errors**2))

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a fault of an image is, how faults change what is guessed of it, and what a scene must have for them.
+
+A fault changes a guess, which may be that of another one: two faults of different kinds are one after the other. It has
+no parameter, or some, each with a range and values to begin with.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validation.engine.prediction import Guess, Layers, Predictor
+from validation.fog_model.radiance import Fog
+
+Array = NDArray[np.float64]
+Values = tuple[float, ...]
+Change = Callable[[Predictor, Guess, Values], Guess]
+
+KINDS = ("medium", "light", "layers", "camera", "brightness", "values")  #: in the order in which faults happen
+
+_NAMED = {
+    "pi": math.pi,
+    "2 pi": 2 * math.pi,
+    "4 pi": 4 * math.pi,
+    "pi^2": math.pi**2,
+    "4 pi^2": 4 * math.pi**2,
+    "683, lumens a watt": 683.0,
+}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of a fault."""
+
+    low: float
+    high: float
+    starts: tuple[float, ...] = (1.0,)
+    logarithmic: bool = False  #: whether it is looked for by its logarithm
+    step: float = (
+        0.0  #: of differences, for what moves paths: each guess costs new ones, and few must do; 0: it does not
+    )
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault."""
+
+    name: str
+    kind: str  #: of `KINDS`
+    words: str  #: a sentence with {0}, {1}, .. for the parameters
+    change: Change
+    parameters: tuple[Parameter, ...] = ()
+    begin: Callable[[Predictor, Guess], Sequence[Values]] | None = (
+        None  #: values to begin with, by what the image shows
+    )
+    solved: bool = False  #: whether these are the best already
+    #: The same with the paths held where they are for other values, which slopes can do with.
+    held: Callable[[Predictor, Guess, Values, Values], Guess] | None = None
+    costly: int = 0  #: 1: tried where nothing of 0 explains the image; 2: where no pair does either
+    single: bool = False  #: whether it is not tried together with another one
+    applies: Callable[[Predictor], bool] = lambda predictor: True
+    undo: Callable[[Array], Array] | None = None  #: the image without it, (height, width, 3) -> the same
+    factor: bool = False  #: whether its number is a factor that may have a name
+
+    def sentence(self, values: Values) -> str:
+        """Return what is said of an image with it."""
+        return self.words.format(*values) + (factor_name(values[0]) if self.factor else "")
+
+
+def factor_name(times: float) -> str:
+    """Return the name of a factor in brackets, such as 4 pi, or nothing."""
+    for word, value in _NAMED.items():
+        for name, known in ((word, value), (f"1/({word})", 1 / value)):
+            if abs(times / known - 1) < 0.01:
+                return f" ({name})"
+    return ""
+
+
+def changed_fog(change: Callable[..., Fog]) -> Change:
+    """Return a change of the fog, by a function of it and the values."""
+    return lambda predictor, guess, p: replace(guess, fog=change(guess.fog, *p))
+
+
+def with_law(**given: Any) -> Change:
+    """Return a change of fields of the fog."""
+    return changed_fog(lambda fog: replace(fog, **given))
+
+
+def with_scenery(**given: Any) -> Change:
+    """Return a change of fields of the scenery."""
+    return lambda predictor, guess, p: replace(guess, scenery=replace(guess.scenery, **given))
+
+
+def scenery_number(name: str, digits: int = 4) -> Change:
+    """Return what sets a number of the scenery, with few digits: sceneries that differ by less share their paths."""
+    return lambda predictor, guess, p: with_scenery(**{name: short(p[0], digits)})(predictor, guess, p)
+
+
+def of_fog_alone(change: Change) -> Change:
+    """Return a change of the scenery that surfaces do not see."""
+
+    def changed(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+        return replace(change(predictor, guess, p), surfaces=guess.surfaces or guess.scenery)
+
+    return changed
+
+
+def of_surfaces_alone(change: Change) -> Change:
+    """Return a change of the scenery that the fog does not see."""
+
+    def changed(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+        return replace(guess, surfaces=change(predictor, guess, p).scenery)
+
+    return changed
+
+
+def changed_layers(make: Callable[[Predictor, Guess, Values], Layers]) -> Change:
+    """Return a change of airlight and surfaces before they are added."""
+    return lambda predictor, guess, p: replace(guess, layers=(*guess.layers, make(predictor, guess, p)))
+
+
+def changed_values(change: Callable[..., Array]) -> Change:
+    """Return a change of the values, by a function of them and the numbers of the fault."""
+    return lambda predictor, guess, p: replace(
+        guess, values=(*guess.values, lambda radiance: change(radiance, *p) if p else change(radiance))
+    )
+
+
+def undone(undo: Callable[[Array], Array]) -> Change:
+    """Return what is said of the grid of pixels by what takes it back."""
+    return lambda predictor, guess, p: replace(guess, undo=undo)
+
+
+def short(value: float, digits: int = 4) -> float:
+    """Return a number with few digits."""
+    return float(f"{value:.{digits}g}")
+
+
+# What a scene must have for a fault.
+
+
+def has_shapes(predictor: Predictor) -> bool:
+    """Return whether anything casts shadows."""
+    return bool(predictor.truth.occluders.shapes())
+
+
+def has_near_lights(predictor: Predictor) -> bool:
+    """Return whether there are point or spot lights."""
+    return bool(predictor.truth.lights)
+
+
+def has_spots(predictor: Predictor) -> bool:
+    """Return whether there are spots."""
+    return any(light.axis is not None for light in predictor.truth.lights)
+
+
+def has_soft_spots(predictor: Predictor) -> bool:
+    """Return whether spots fall off between a beam and a cut-off."""
+    return any(light.axis is not None and 0 < light.beam < light.cutoff for light in predictor.truth.lights)
+
+
+def fog_surrounds(predictor: Predictor) -> bool:
+    """Return whether no medium has bounds."""
+    return not predictor.truth.media
+
+
+def shows_fog(predictor: Predictor) -> bool:
+    """Return whether the image shows what media scatter."""
+    return predictor.seen.holds != "surface"
+
+
+def shows_both(predictor: Predictor) -> bool:
+    """Return whether the image shows fog and surfaces in one layer."""
+    return predictor.seen.holds == "total" and has_shapes(predictor)
+
+
+def absorbs(predictor: Predictor) -> bool:
+    """Return whether any medium absorbs."""
+    fog = predictor.fog
+    return any(s > 0 and a < 1 - 1e-6 for ss, aa in zip(fog.sigma_t, fog.albedo) for s, a in zip(ss, aa))
+
+
+def has_lobe(predictor: Predictor) -> bool:
+    """Return whether a phase function is of Henyey and Greenstein."""
+    return any(isinstance(g, float) for g in predictor.fog.phase) and shows_fog(predictor)
+
+
+def has_no_lobe(predictor: Predictor) -> bool:
+    """Return whether all that scatters does so evenly."""
+    media = predictor.truth.medium, *predictor.truth.media
+    return shows_fog(predictor) and not has_lobe(predictor) and any(medium.phase.is_constant for medium in media)
+
+
+def all_of(*wanted: Callable[[Predictor], bool]) -> Callable[[Predictor], bool]:
+    """Return whether all of these hold."""
+    return lambda predictor: all(each(predictor) for each in wanted)

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The catalogue of faults that an engine's image may have: what is said of each, and what it makes of a guess.
+
+`airlight compare --diagnose` tries all of them; the hints of `airlight compare` are those with an `undo`, which takes a
+fault back from a whole image, without any path of light.
+"""
+
+from validation.engine.fault import Fault, shows_both
+from validation.engine.image_faults import BRIGHTNESS, CAMERA, VALUES
+from validation.engine.layer_faults import FOG_AND_SURFACES, factor_fault, scaled
+from validation.engine.light_faults import LIGHTS
+from validation.engine.media_faults import MEDIUM
+from validation.engine.prediction import Predictor
+from validation.fog_model.view import light_sources
+
+_MANY_LIGHTS = 6  # of more, a fault of a single one is not looked for
+
+FAULTS: tuple[Fault, ...] = (BRIGHTNESS, *LIGHTS, *MEDIUM, *FOG_AND_SURFACES, *CAMERA, *VALUES)
+
+
+def faults_of(predictor: Predictor) -> tuple[Fault, ...]:
+    """Return the faults that an image of a scene may have, those of its single lights and classes of lights too."""
+    sources = light_sources(predictor.truth)
+    near, far = len(predictor.truth.lights), len(predictor.truth.lights) + len(predictor.truth.directional)
+    classes = {
+        "point and spot lights": range(near),
+        "directional lights": range(near, far),
+        "area lights": range(far, len(sources)),
+    }
+    groups = {name: tuple(numbers) for name, numbers in classes.items() if 0 < len(numbers) < len(sources)}
+    if 1 < len(sources) <= _MANY_LIGHTS:
+        groups |= {f"the light '{source.name}'": (number,) for number, source in enumerate(sources)}
+    own = []
+    for which, numbers in groups.items():
+        words = f"{which} {'is' if which.startswith('the') else 'are'} {{0:.4g}} times as bright as they should be"
+        own.append(factor_fault("light-factor", words, scaled("intensity", numbers), lambda _: True))
+        words = f"the fog of {which} is {{0:.4g}} times as bright as it should be"
+        own.append(factor_fault("fog-factor", words, scaled("airlight", numbers), shows_both))
+    return tuple(fault for fault in (*FAULTS, *own) if fault.applies(predictor))

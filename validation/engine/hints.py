@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What may be wrong with an image as a whole: a constant factor, another way up, a gamma, values that stop at one.
+
+Such a fault of set-up hides everything else. For each combination of suspects this module takes the faults back,
+computes the root mean square error again, and names those that make it ten times smaller, the fewest first.
+
+The radiance grows without bound towards a lamp, so that one pixel beside it can have most of the error, whatever the
+others are like. Therefore the error that decides leaves out a hundredth of the values that are lit, the worst; and the
+factor that fits best is k = exp(median(log(r/t))) over the values that both images light, with t the test image and r
+the reference.
+"""
+
+import math
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from validation.engine.fault import factor_name
+from validation.engine.faults import FAULTS
+from validation.metrics.errors import FLOOR
+
+Array = NDArray[np.float64]
+
+GAIN = 10.0  #: how many times smaller the error must become for a suspect to be named
+LEAST = 0.01  #: relative error below which nothing is suspected
+OUTLIERS = 0.01  #: share of the lit values that may be as wrong as they like
+
+_LARGEST = 700.0  # the logarithm of a number that a float can hold
+
+#: The faults that are taken back from an image, by name: none, or one of each.
+_UNDONE = [
+    [None, *(fault for fault in FAULTS if fault.name == name and fault.undo is not None)]
+    for name in ("flip", "channels", "transfer")
+]
+
+
+@dataclass(frozen=True)
+class Hints:
+    """What may be wrong with an image as a whole."""
+
+    factor: float  #: times which the image fits the reference best; NaN if there is none
+    factor_rmse: float  #: the relative rmse that is left then
+    words: tuple[str, ...]  #: a sentence for each suspect
+    corrected: Array = field(repr=False, compare=False)  #: the image without what was suspected
+    reason: str = ""  #: why there is no factor
+
+
+def find_hints(reference: ArrayLike, test: ArrayLike) -> Hints:
+    """Look for faults of an image as a whole.
+
+    Parameters
+    ----------
+    reference, test
+        Radiance, (height, width, 3) [W/(m^2 sr)].
+
+    Notes
+    -----
+    Values that are not finite in either are left out.
+    """
+    ref, tst = (np.asarray(values, dtype=np.float64) for values in (reference, test))
+    ref = np.where(np.isfinite(ref), ref, np.nan)
+    tst = np.where(np.isfinite(tst), tst, np.nan)
+    if np.isnan(tst).all():
+        return Hints(math.nan, math.nan, (), tst, "the image has no finite value")
+    mean = float(np.nanmean(ref)) if not np.isnan(ref).all() else 0.0
+    if mean <= 0:
+        return Hints(math.nan, math.nan, (), tst, "the truth is black")
+    factor = _fitted(ref, tst)
+    if math.isnan(factor):
+        dark = "wherever the truth is lit" if np.any(np.nan_to_num(tst)) else "everywhere"
+        return Hints(math.nan, math.nan, (), tst, f"the image is black {dark}")
+    corrected, words = _suspects(ref, tst, mean)
+    return Hints(factor, _rmse(ref, factor * tst) / mean, (*words, *_clipped(ref, tst)), corrected)
+
+
+def _suspects(ref: Array, tst: Array, mean: float) -> tuple[Array, tuple[str, ...]]:
+    """Return the image without the faults that make the error ten times smaller, and their names."""
+    first = smallest = _usual_error(ref, tst)
+    hints: tuple[str, ...] = ()
+    corrected, left = tst, math.nan
+    if first < LEAST * mean:
+        return corrected, ()
+    combinations = sorted(product(*_UNDONE, (False, True)), key=lambda changes: sum(map(bool, changes)))
+    for *faults, scaled in combinations:
+        changed, words = tst, []
+        for fault in faults:
+            if fault is not None and fault.undo is not None:
+                changed, words = fault.undo(changed), [*words, fault.words]
+        factor = _fitted(ref, changed) if scaled else 1.0
+        error = _usual_error(ref, factor * changed)
+        if not error * GAIN < smallest:  # NaN where no factor fits
+            continue
+        smallest, corrected, left = error, factor * changed, _rmse(ref, factor * changed)
+        hints = (*words, f"the image is {_brightness(factor)}") if scaled else tuple(words)
+    if not hints:
+        return corrected, ()
+    fall = f"; without {'it' if len(hints) == 1 else 'all that'} the relative rmse is {left / mean:.3g} instead of "
+    return corrected, (*hints[:-1], hints[-1] + fall + f"{_rmse(ref, tst) / mean:.3g}")
+
+
+def _fitted(ref: Array, tst: Array) -> float:
+    """Return the factor that fits best; NaN if no value is lit in both."""
+    lit = (ref > FLOOR * np.nanmean(ref)) & (np.abs(tst) > 0)
+    if not lit.any():
+        return math.nan
+    sign = float(np.sign(np.median(tst[lit])))
+    # A difference of logarithms: the ratio may be out of range.
+    return sign * _exp(float(np.median(np.log(ref[lit]) - np.log(np.abs(tst[lit])))))
+
+
+def _exp(value: float) -> float:
+    return math.exp(value) if value < _LARGEST else math.nan
+
+
+def _usual_error(ref: Array, tst: Array) -> float:
+    """Return the rmse without the worst hundredth of the values that are lit in either image."""
+    squared = _squared_errors(ref, tst)
+    floor = FLOOR * float(np.nanmean(ref))
+    lit = int(np.count_nonzero((ref > floor) | (tst > floor)))
+    kept = max(len(squared) - int(OUTLIERS * lit), 1)
+    return math.sqrt(float(np.mean(np.partition(squared, kept - 1)[:kept]))) if len(squared) else math.nan
+
+
+def _rmse(ref: Array, tst: Array) -> float:
+    squared = _squared_errors(ref, tst)
+    return math.sqrt(float(np.mean(squared))) if len(squared) else math.nan
+
+
+def _squared_errors(ref: Array, tst: Array) -> Array:
+    """Return the squared errors of the values that are finite in both images, (n,)."""
+    difference = tst - ref
+    with np.errstate(over="ignore"):
+        return difference[np.isfinite(difference)] ** 2
+
+
+def _brightness(factor: float) -> str:
+    """Return how bright an image is that fits when it is multiplied by a factor, with a name for it if it has one."""
+    if factor <= 0:
+        return "negative"
+    times = 1 / factor
+    return f"{times:.4g} times as bright as it should be{factor_name(times)}, {math.log2(times):+.2f} stops"
+
+
+def _clipped(ref: Array, tst: Array) -> tuple[str, ...]:
+    """Say where values stop at their largest while the reference goes on."""
+    finite = tst[np.isfinite(tst)]
+    top = float(finite.max())
+    stopped = tst == top
+    count = int(stopped.sum())
+    if count < 8 or top <= 0 or not (ref[stopped] > 1.02 * top).mean() > 0.5:
+        return ()
+    return (
+        f"{count} values stop at {top:.4g} where the truth goes up to {np.nanmax(ref[stopped]):.4g}: write floats, "
+        "without a tone curve",
+    )

@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Faults of the camera and the grid of pixels, of brightness, and of the values: encodings, curves, channels."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import permutations, product
+
+import numpy as np
+
+from validation.engine.curves import TONE_CURVES, from_srgb, gamma, srgb_in_8_bits, to_srgb
+from validation.engine.fault import (
+    Array,
+    Change,
+    Fault,
+    Parameter,
+    Values,
+    changed_values,
+    scenery_number,
+    undone,
+)
+from validation.engine.prediction import Guess, Predictor
+
+
+def shifted(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+    """Return an image that lies some pixels too far right, and down."""
+    # A pixel that shows what lies to the right of it shows an image that moved to the left.
+    offset = (-round(p[0], 3), -round(p[1], 3))
+    return replace(guess, scenery=replace(guess.scenery, offset=offset))
+
+
+def best_corner(change: Change) -> Callable[[Predictor, Guess], Sequence[Values]]:
+    """Return the best of no shift and half a pixel each way: at sharp edges slopes of one do not lead to others."""
+
+    def begin(predictor: Predictor, guess: Guess) -> Sequence[Values]:
+        def error(shift: Values) -> float:
+            return float(np.abs(predictor.errors(change(predictor, guess, shift))).mean())
+
+        return [min(((0.0, 0.0), *product((-0.5, 0.5), repeat=2)), key=error)]
+
+    return begin
+
+
+SHIFT = tuple(Parameter(-3.0, 3.0, (0.0,), step=0.1) for _ in range(2))
+
+
+def _other_axis(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+    """Return the guess with the angle of view along the other axis: pixels grow with the ratio of the sides."""
+    height, width = predictor.shape
+    return replace(guess, scenery=replace(guess.scenery, zoom=width / height))
+
+
+def _vignette(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+    dimmed = predictor.cosines[:, None] ** p[0]
+    return replace(guess, values=(*guess.values, lambda radiance: radiance * dimmed))
+
+
+#: What is said of an image that is turned, and what undoes it: itself.
+TURNS: tuple[tuple[str, Callable[[Array], Array]], ...] = (
+    ("upside down (flip it vertically)", lambda image: image[::-1]),
+    ("mirrored left to right (a left-handed camera or an axis of the scene)", lambda image: image[:, ::-1]),
+    ("turned by 180 degrees", lambda image: image[::-1, ::-1]),
+)
+
+CAMERA = (
+    *(Fault("flip", "camera", f"the image is {words}", undone(turn), undo=turn) for words, turn in TURNS),
+    Fault(
+        "flip",
+        "camera",
+        "rows and columns are interchanged",
+        undone(lambda image: image.transpose(1, 0, 2)),
+        applies=lambda predictor: predictor.shape[0] == predictor.shape[1],
+    ),
+    Fault(
+        "fov-axis",
+        "camera",
+        "the field of view is that of the other axis",
+        _other_axis,
+        applies=lambda predictor: predictor.shape[0] != predictor.shape[1],
+    ),
+    Fault(
+        "fov",
+        "camera",
+        "the image shows {0:.4g} times the width that it should",
+        scenery_number("zoom", 5),
+        (Parameter(0.2, 5.0, (0.9, 1.1), logarithmic=True, step=0.01),),
+        costly=1,
+    ),
+    Fault(
+        "shift",
+        "camera",
+        "the image is {0:.3g} pixels too far right and {1:.3g} too far down",
+        shifted,
+        SHIFT,
+        begin=best_corner(shifted),
+    ),
+    Fault(
+        "vignette",
+        "camera",
+        "the image falls off to its corners: a vignette, cos^{0:.3g} of the angle from the camera's axis",
+        _vignette,
+        (Parameter(0.0, 100.0, (4.0, 1.0, 12.0)),),
+    ),
+)
+
+
+# Brightness, and the values: encodings, tone curves, limits, channels.
+
+
+def _exposed(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+    red, green, blue = (value * p[0] for value in guess.fog.exposure)
+    return replace(guess, fog=replace(guess.fog, exposure=(red, green, blue)))
+
+
+def _ratio(predictor: Predictor, guess: Guess) -> Sequence[Values]:
+    """Return the usual ratio of image and guess."""
+    predicted, shown = predictor.predicted(guess), predictor.shown(guess)
+    lit = (predicted > 0.01 * predicted.mean()) & (shown > 0)
+    return [(float(np.median(shown[lit] / predicted[lit])) if lit.any() else 1.0,)]
+
+
+def _top(predictor: Predictor) -> float:
+    values = predictor.seen.values
+    return float(values[np.isfinite(values)].max())
+
+
+def _clamp(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+    top = _top(predictor)
+    return replace(guess, values=(*guess.values, lambda radiance: np.minimum(radiance, top)))
+
+
+def _stops(predictor: Predictor) -> bool:
+    """Return whether many values stop at the largest one."""
+    return int(np.count_nonzero(predictor.seen.values == _top(predictor))) >= 8 and _top(predictor) > 0
+
+
+def _darkest(predictor: Predictor, guess: Guess) -> Sequence[Values]:
+    """Return what the darker half of the image has more than the guess."""
+    predicted, shown = predictor.predicted(guess), predictor.shown(guess)
+    more = (shown - predicted)[predicted <= np.median(predicted)]
+    return [(max(float(np.median(more)), 1e-6 * float(np.abs(shown).mean()), 1e-30),)]
+
+
+def _coloured(predictor: Predictor) -> bool:
+    values = predictor.seen.values
+    return bool(np.ptp(np.nan_to_num(values), axis=1).max() > 1e-6 * np.nanmax(np.abs(values)))
+
+
+def _swapped(order: tuple[int, ...]) -> Fault:
+    words = f"the image is in the channel order {', '.join('RGB'[channel] for channel in order)}"
+    undo = (lambda image: image[..., order]) if order == (2, 1, 0) else None  # which undoes itself
+    return Fault(
+        "channels", "values", words, changed_values(lambda radiance: radiance[..., order]), applies=_coloured, undo=undo
+    )
+
+
+BRIGHTNESS = Fault(
+    "factor",
+    "brightness",
+    "the image is {0:.4g} times as bright as it should be",
+    _exposed,
+    (Parameter(1e-9, 1e9, logarithmic=True),),
+    begin=_ratio,
+    factor=True,
+)
+
+VALUES = (
+    Fault(
+        "transfer",
+        "values",
+        "the image is encoded by the sRGB curve (write linear values)",
+        changed_values(to_srgb),
+        undo=from_srgb,
+    ),
+    Fault("transfer", "values", "the values were written in 8 bits by the sRGB curve", changed_values(srgb_in_8_bits)),
+    Fault(
+        "transfer",
+        "values",
+        "the values are encoded by a gamma of {0:.3g}: write linear ones",
+        changed_values(gamma),
+        (Parameter(0.2, 5.0, (0.4545, 1.8, 2.2, 2.4), logarithmic=True),),
+    ),
+    Fault("clamp", "values", "the values are cut off at the largest one: write floats", _clamp, applies=_stops),
+    *(
+        Fault("tone-map", "values", f"the values went through {words}", changed_values(curve))
+        for words, curve in TONE_CURVES.items()
+    ),
+    Fault(
+        "black-level",
+        "values",
+        "every value has {0:.3g} added: a black level, a veil or light from elsewhere",
+        changed_values(lambda radiance, level: radiance + level),
+        (Parameter(1e-30, 1e30, logarithmic=True),),
+        begin=_darkest,
+    ),
+    *(_swapped(order) for order in permutations(range(3)) if order != (0, 1, 2)),
+)

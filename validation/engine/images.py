@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Images that another renderer wrote, a game engine for instance: EXR files named by scene, judged against the truth.
+
+A folder holds SCENE.exr, or SCENE.NAME.exr where several images of a scene are to be told apart. An image with a layer
+`airlight` is judged by that; else its plain channels are judged against airlight plus surface. It is judged at its own
+size, which all images of a scene must share, and by the truth that fits, at pixel centres or over their areas.
+"""
+
+import difflib
+import json
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from reference.storage.exr import Image, read_exr
+from validation.engine.judge import EngineComparison, TruthOf, judge_image
+from validation.engine.judged_layer import AIRLIGHT, SURFACE, judged_layer
+from validation.metrics.errors import Metrics, error_metrics
+from validation.scenes.loading import LoadedScene
+
+TIMES = "times.json"  #: what lies beside images and says how long they took
+
+
+@dataclass(frozen=True)
+class EngineImage:
+    """An image from elsewhere, and the scene that it claims to show."""
+
+    scene: str  #: name of the scene
+    label: str  #: NAME in its file's name, or the name of the folder
+    path: Path
+
+
+@dataclass(frozen=True)
+class ImageTimes:
+    """What an engine says of the time that an image took."""
+
+    median_ms: float  #: of a frame
+    low_ms: float  #: first quartile, or the median where there is none
+    high_ms: float  #: third quartile
+    device: str  #: what it ran on
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the times of a frame, as methods have them."""
+        frame = {"median_ms": self.median_ms, "low_ms": self.low_ms, "high_ms": self.high_ms, "repetitions": 0}
+        return {"frame": frame}
+
+
+@dataclass(frozen=True)
+class ImageMeasurement:
+    """How wrong an image from elsewhere is."""
+
+    shown: EngineImage
+    image: Image  #: only the layers that were judged, named by what they hold
+    judged: EngineComparison
+    surface_error: Metrics | None  #: where the image has both layers
+    times: ImageTimes | None = None  #: that its engine took, as `times.json` says
+
+    @property
+    def light(self) -> NDArray[np.float64]:
+        """All light in the image, to look at (height, width, 3) [W/(m^2 sr)]."""
+        return np.sum([np.asarray(values, dtype=np.float64) for values in self.image.layers.values()], axis=0)
+
+    @property
+    def notes(self) -> str:
+        """What the reader of the file changed or left out, what a pixel is, whether it is right, and the device."""
+        judged = self.judged
+        notes = [judged.note] if judged.note else []
+        notes += ["judged by the means over the areas of pixels, which fit"] if judged.pixel == "area" else []
+        notes += [judged.verdict.words]
+        notes += [f"timed on {self.times.device}"] if self.times is not None and self.times.device else []
+        return "; ".join(notes)
+
+
+def find_images(folder: str | os.PathLike[str], scenes: Mapping[str, str]) -> dict[str, tuple[EngineImage, ...]]:
+    """Return the images in a folder by the name of their scene.
+
+    Parameters
+    ----------
+    folder
+        Holds EXR files; other files are not looked at.
+    scenes
+        The scenes that files may name: a name, and what `validation.scenes.loading.load_scene` takes for it.
+
+    Raises
+    ------
+    InputError
+        If there is no such folder, no EXR file in it, or a file that names no scene.
+    """
+    place = Path(folder)
+    if not place.is_dir():
+        raise InputError(f"--images: got {folder}, wanted a folder with EXR files named by scene, such as open-fog.exr")
+    files = sorted(path for path in place.iterdir() if path.suffix.lower() == ".exr" and not path.name.startswith("."))
+    if not files:
+        raise InputError(f"--images: the folder {folder} has no EXR file; wanted SCENE.exr or SCENE.NAME.exr in it")
+    by_scene: dict[str, tuple[EngineImage, ...]] = {}
+    for path in files:
+        scene = _scene_of(path, scenes)
+        label = path.stem[len(scene) + 1 :] or place.resolve().name or "image"
+        by_scene[scene] = (*by_scene.get(scene, ()), EngineImage(scene, label, path))
+    return by_scene
+
+
+def images_size(images: tuple[EngineImage, ...]) -> tuple[int, int]:
+    """Return the size of the images of one scene, (width, height).
+
+    Raises
+    ------
+    InputError
+        If two sizes differ, or a file cannot be read.
+    """
+    sizes = {image.path: judged_layer(read_exr(image.path), image.path).size for image in images}
+    first = images[0]
+    for path, size in sizes.items():
+        if size != sizes[first.path]:
+            wanted, got = (f"{width} x {height}" for width, height in (sizes[first.path], size))
+            raise InputError(
+                f"--images: {path} is {got} pixels and {first.path} {wanted}; render all images of a scene at one size"
+            )
+    return sizes[first.path]
+
+
+def measure_image(shown: EngineImage, loaded: LoadedScene, truth_of: TruthOf, *, surfaces: bool) -> ImageMeasurement:
+    """Judge an image from elsewhere by the reference of its scene at its size, as `airlight compare SCENE IMAGE` does.
+
+    Parameters
+    ----------
+    loaded, truth_of
+        The scene at that size, and what computes its reference for 'centre' or 'area'.
+    surfaces
+        Whether the scene has surfaces at all.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, has none of the layers, or has another size than the reference.
+    """
+    image = read_exr(shown.path)
+    layer = judged_layer(image, shown.path)
+    layers = {layer.holds: layer.values}
+    if layer.name == AIRLIGHT and SURFACE in image.layers:
+        layers[SURFACE] = image.layers[SURFACE]
+    judged = judge_image(image, layer, loaded, truth_of, path=shown.path, mask=image.with_data())
+    both = surfaces and AIRLIGHT in layers and SURFACE in layers
+    surface = error_metrics(judged.fit.truth.surface, layers[SURFACE]) if both else None
+    return ImageMeasurement(shown, Image(layers), judged, surface, image_times(shown.path))
+
+
+def image_times(path: Path) -> ImageTimes | None:
+    """Return what `times.json` in the folder of an image says of it; None where it says nothing.
+
+    The file holds, by the name of the image, `{"ms": 3.1, "quartiles": [2.9, 3.4], "device": "RTX 4090"}`, of which
+    the last two may be missing.
+
+    Raises
+    ------
+    InputError
+        If the file is no such JSON.
+    """
+    file = path.with_name(TIMES)
+    if not file.is_file():
+        return None
+    try:
+        said = json.loads(file.read_text(encoding="utf-8"))
+        entry = said.get(path.name, said.get(path.stem))
+        if entry is None:
+            return None
+        low, high = entry.get("quartiles", (entry["ms"], entry["ms"]))
+        times = ImageTimes(float(entry["ms"]), float(low), float(high), str(entry.get("device", "")))
+        if not 0 < times.low_ms <= times.median_ms <= times.high_ms < math.inf:
+            raise ValueError("ms")
+    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+        raise InputError(
+            f'{file}: wanted {{"{path.name}": {{"ms": 3.1, "quartiles": [2.9, 3.4], "device": "RTX 4090"}}}}, '
+            "milliseconds of a frame above 0, the median between its quartiles"
+        ) from error
+    return times
+
+
+def _scene_of(path: Path, scenes: Mapping[str, str]) -> str:
+    """Return the scene that a file names: the longest name that its own name begins with."""
+    stem = path.stem
+    names = [name for name in scenes if stem == name or stem.startswith(f"{name}.")]
+    if names:
+        return max(names, key=len)
+    near = difflib.get_close_matches(stem.split(".")[0], scenes, n=1, cutoff=0.0)
+    hint = f"; the nearest is {near[0]}" if near else ""
+    raise InputError(
+        f"--images: {path} names no scene, wanted SCENE.exr or SCENE.NAME.exr with one of {', '.join(scenes)}{hint}"
+    )

@@ -1,0 +1,461 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Whether an image that another renderer made of a scene is right, against the reference of that scene at its size.
+
+**Pixels.** A renderer that filters its samples by a box writes means over the areas of pixels, one that traces a ray
+through each centre does not, and few say which. The two differ where the radiance changes within a pixel: at edges, and
+beside a light, by 10 % and more. Only these values can tell the one from the other, so only they are looked at. With r
+the reference of either kind and t the image, without the faults of the whole that `hints.py` finds, the error is the
+mean of
+
+    min(|t - r| / max(r, 0.001 mean(r)), 1)
+
+which no single value decides, and the kind with the smaller error fits.
+
+**Verdict.** The noise of a path tracer is independent from pixel to pixel, and near a light its variance is infinite:
+no bound on the error of single pixels tells noise from a fault. Means over blocks of pixels do: noise falls as the root
+of their number, an error of light, medium or shadow stays. An image is right if the relative error of the block means,
+
+    |sum(t) - sum(r)| / max(sum(r), 0.05 n mean(r))    over the n pixels of a block, channel by channel,
+
+is at most `RIGHT` in the root mean square, the worst hundredth of the blocks left out (that of the light), if the best
+factor is as close to one, and if nothing is suspected of the image as a whole.
+"""
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from reference.quadrature.light_points import REPLICATES
+from reference.quadrature.ray_values import TruthImage
+from reference.scene.read import read_truth
+from reference.storage.exr import NOTE, TOTAL, Image, read_exr
+from validation.comparison.images import BATCHES, Comparison, compare_images, read_mask
+from validation.engine.error_place import ErrorPlace, error_place
+from validation.engine.hints import GAIN, OUTLIERS, Hints, find_hints
+from validation.engine.judged_layer import KINDS, JudgedLayer, expected_layer, judged_layer
+from validation.engine.seen import PIXELS, Progress, scene_of_size
+from validation.estimates.agreement import pixel_angle
+from validation.estimates.quadrature import truth_image
+from validation.estimates.reference_layers import reference_error, reference_layer
+from validation.metrics.errors import FLOOR, plain
+from validation.scenes.loading import LoadedScene
+
+Array = NDArray[np.float64]
+TruthOf = Callable[[str], TruthImage]  #: returns the reference for 'centre' or 'area'
+
+BLOCK = 8  #: side of a block [pixels], less in images of less than ten blocks
+RIGHT = 0.01  #: largest relative error of an image that is called right
+_DIM = 0.05  # of the mean: a block that is dimmer in both images says nothing
+_APART = 0.01  # by how much the two references must differ, relative to the larger, for a value to say which fits
+_EXACT = 1e-3  # relative error of an image that fits the centres so well that nothing can fit better
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether an image is right."""
+
+    reasons: tuple[str, ...]  #: why it is not; empty if it is
+    block: int  #: side of a block [pixels]
+    block_error: float  #: relative error of block means; NaN where no block is lit
+    block_noise: float  #: what the scatter of the pixels within them explains of it
+
+    @property
+    def right(self) -> bool:
+        """Whether the image is right."""
+        return not self.reasons
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the numbers by name."""
+        return {"right": self.right, **plain(self)}
+
+    @property
+    def words(self) -> str:
+        """Return a sentence."""
+        if self.reasons:
+            return f"not right: {'; '.join(self.reasons)}"
+        size = "single pixels" if self.block == 1 else f"means over {self.block} x {self.block} pixels"
+        return f"right: {size} are within {100 * self.block_error:.2g} % (noise {100 * self.block_noise:.2g} %)"
+
+
+@dataclass(frozen=True)
+class PixelFit:
+    """The truth that an image is judged by."""
+
+    pixel: str  #: 'centre' or 'area'
+    truth: TruthImage
+    hints: Hints
+    centre_error: float | None  #: where the two truths differ; None where they were not compared
+    area_error: float | None
+
+    @property
+    def words(self) -> str:
+        """Which kind fits, and how well, or why that was not asked."""
+        kind = "means over the area" if self.pixel == "area" else "centres"
+        if self.centre_error is None or self.area_error is None:
+            return f"judged by {kind}"
+        ours, other = self.centre_error, self.area_error
+        if self.pixel == "area":
+            ours, other = other, ours
+        another = "centres" if self.pixel == "area" else "means over the area"
+        return f"{kind} fit: {100 * ours:.3g} % off where the two differ; {another}: {100 * other:.3g} %"
+
+
+@dataclass(frozen=True)
+class EngineComparison:
+    """How far an image from elsewhere is from the truth of a scene."""
+
+    scene: str
+    path: str
+    size: tuple[int, int]  #: width and height [pixels]
+    fit: PixelFit  #: what a pixel of the truth is, and what is wrong with the image as a whole
+    expected: str  #: what the layer was compared with: 'airlight', 'surface', or 'total' for both
+    truth_error: float  #: bound of the error of the truth's airlight, with its standard error, relative to its mean
+    comparison: Comparison
+    place: ErrorPlace | None  #: where most of the error lies; None where there is none
+    verdict: Verdict
+    note: str  #: what the reader of the file changed or left out
+    margin: float | None  #: largest relative bias that counts as agreement
+    truth: NDArray[np.floating] = field(repr=False, compare=False)  #: what the image was compared with
+    image: NDArray[np.floating] = field(repr=False, compare=False)  #: the layer that was judged
+
+    @property
+    def layer(self) -> str:
+        """The layer that was judged."""
+        return self.comparison.layer
+
+    @property
+    def pixel(self) -> str:
+        """What a pixel of the truth is: its 'centre' or its 'area'."""
+        return self.fit.pixel
+
+    @property
+    def hints(self) -> Hints:
+        """What may be wrong with the image as a whole."""
+        return self.fit.hints
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """Why the comparison must be called failed; empty if it is not."""
+        bias = self.comparison.metrics.relative_bias
+        reasons = self.comparison.failures
+        if self.margin is not None and self.comparison.statistics is None and not abs(bias) <= self.margin:
+            reasons = (*reasons, f"the relative bias, {bias:+.3g}, is not within +-{self.margin:.3g}")
+        return reasons
+
+    def to_json(self) -> dict[str, Any]:
+        """Return every number by name, those of `Comparison.to_json` among them."""
+        return {
+            "scene": self.scene,
+            "file": self.path,
+            "size": list(self.size),
+            "pixel": self.pixel,
+            "expected": self.expected,
+            "truth_error": plain(self.truth_error),
+            **self.comparison.to_json(),
+            "factor": plain(self.hints.factor),
+            "factor_rmse": plain(self.hints.factor_rmse),
+            "hints": list(self.hints.words),
+            "pixel_errors": {"centre": plain(self.fit.centre_error), "area": plain(self.fit.area_error)},
+            "where": None if self.place is None else self.place.to_json(),
+            "verdict": self.verdict.to_json(),
+            "note": self.note,
+            "failures": list(self.failures),
+        }
+
+    def summary(self) -> str:
+        """Return the numbers as text, a line for each group."""
+        of = "airlight + surface" if self.expected == TOTAL else self.expected
+        pixel = "at pixel centres" if self.pixel == "centre" else "means over pixels"
+        lines = [
+            f"scene            {self.scene}, {self.size[0]} x {self.size[1]}; truth: {of}, {pixel}, airlight known to "
+            f"{self.truth_error:.2g} of its mean",
+            f"pixels           {self.fit.words}",
+            self.comparison.summary(),
+        ]
+        hints = self.hints
+        fitted = f"{hints.factor:.6g} times the image leaves a relative rmse of {100 * hints.factor_rmse:.4g} %"
+        lines.append(f"best factor      {f'none: {hints.reason}' if hints.reason else fitted}")
+        lines += [] if self.place is None else [f"where            {self.place.words}"]
+        lines += [f"suspect          {words}" for words in self.hints.words]
+        lines += [f"file             {self.note}"] if self.note else []
+        own = self.failures[len(self.comparison.failures) :]
+        lines += [f"failed           {reason}" for reason in own]
+        return "\n".join([*lines, f"verdict          {self.verdict.words}"])
+
+
+def compare_scene(
+    scene: str,
+    path: str | os.PathLike[str],
+    *,
+    layer: str | None = None,
+    holds: str | None = None,
+    pixel: str | None = None,
+    mask: str | os.PathLike[str] | None = None,
+    margin: float | None = None,
+    all_metrics: bool = False,
+    flip: bool = False,
+    exposure: float | None = None,
+    progress: Progress | None = None,
+) -> EngineComparison:
+    """Compare an EXR file with the truth of a scene at the file's size.
+
+    Parameters
+    ----------
+    scene
+        A built-in scene or a Mitsuba XML file.
+    layer, holds
+        The layer to judge and what it holds, see `validation.engine.judged_layer.judged_layer`.
+    pixel
+        'centre' or 'area', see `reference.quadrature.image.quadrature_image`; by default what fits.
+    mask, all_metrics, flip, exposure
+        See `validation.comparison.images.compare_files`.
+    margin
+        Largest relative bias [1] that counts as agreement; with standard errors, what they can show counts.
+
+    Raises
+    ------
+    InputError
+        For a scene or a file that cannot be read, a layer that is not there, and a size of another aspect than the
+        scene's.
+    """
+    image = read_exr(path)
+    judged = judged_layer(image, path, name=layer, holds=holds)
+    loaded = scene_of_size(scene, judged.size, path)
+    chosen = image.with_data(None if mask is None else read_mask(mask))
+    return judge_image(
+        image,
+        judged,
+        loaded,
+        truths(loaded, progress),
+        path=path,
+        pixel=pixel,
+        mask=chosen,
+        margin=margin,
+        all_metrics=all_metrics,
+        flip=flip,
+        exposure=exposure,
+    )
+
+
+def judge_image(
+    image: Image,
+    judged: JudgedLayer,
+    loaded: LoadedScene,
+    truth_of: TruthOf,
+    *,
+    path: str | os.PathLike[str] = "the image",
+    pixel: str | None = None,
+    mask: NDArray[np.bool_] | None = None,
+    margin: float | None = None,
+    **metrics: Any,
+) -> EngineComparison:
+    """Judge a layer of an image by the reference of its scene, as `compare_scene` and the report do.
+
+    Parameters
+    ----------
+    image, judged
+        The image, and the layer of it.
+    loaded, truth_of
+        The scene at its size, and what computes its reference for 'centre' or 'area'.
+    mask
+        Which pixels are compared, (height, width); all by default.
+    metrics
+        More for `validation.comparison.images.compare_images`.
+    """
+    if margin is not None and not 0 < margin < math.inf:
+        raise InputError(f"margin: got {margin}, wanted a relative bias above 0, such as 0.005")
+    if pixel is not None and pixel not in PIXELS:
+        raise InputError(f"pixel: got {pixel}, wanted 'centre' or 'area'")
+    if mask is not None and np.shape(mask) == judged.values.shape[:2]:
+        judged = replace(judged, values=np.where(np.asarray(mask)[:, :, None], judged.values, np.nan))
+    fit = fit_pixel(judged, truth_of, pixel)
+    # Light of another kind says nothing of the pixels: either reference may fit it.
+    other = _other_light(judged, [truth_of(each) for each in ((fit.pixel,) if pixel else ("centre", fit.pixel))])
+    fit = replace(fit, hints=replace(fit.hints, words=(*fit.hints.words, *other)))
+    name, with_errors = judged.name, f"{judged.name}_se" in image.layers
+    layers = {name: image.layers[name]} | ({f"{name}_se": image.layers[f"{name}_se"]} if with_errors else {})
+    wanted = expected_layer(fit.truth, judged)
+    expected = {name: wanted}
+    own_error = reference_error(fit.truth, judged.holds)
+    if with_errors and own_error is not None:
+        # Where no path of the image arrived it has no standard error: the reference alone must not judge such a value.
+        expected[f"{name}_se"] = np.where(layers[f"{name}_se"] > 0, own_error, 0.0)
+    comparison = compare_images(
+        Image(expected, attributes={BATCHES: REPLICATES}),
+        Image(layers, attributes=image.attributes),
+        layer=name,
+        mask=mask,
+        margin=margin if with_errors else None,
+        **metrics,
+    )
+    test = judged.values.astype(np.float64)
+    return EngineComparison(
+        scene=loaded.name,
+        path=str(path),
+        size=judged.size,
+        fit=fit,
+        expected=judged.holds,
+        truth_error=relative_bound(fit.truth),
+        comparison=comparison,
+        place=error_place(wanted, test, lamp_distance(loaded, fit.truth)),
+        verdict=judge(wanted, test, fit.hints, comparison.failures),
+        note=str(image.attributes.get(NOTE, "")),
+        margin=margin,
+        truth=wanted,
+        image=image.layers[name],
+    )
+
+
+def truths(loaded: LoadedScene, progress: Progress | None = None) -> Callable[[str], TruthImage]:
+    """Return a function that computes the truth at pixel centres or over their areas, or takes it from the cache."""
+    tell = None if progress is None else lambda done, total, what: progress(done / total, what)
+    return cache(lambda pixel: truth_image(loaded.scene, pixel=pixel, progress=tell))
+
+
+def relative_bound(truth: TruthImage) -> float:
+    """Return how well the airlight is known relative to its mean, where both are finite: its bound + standard error."""
+    error = truth.airlight_bound if truth.airlight_se is None else truth.airlight_bound + truth.airlight_se
+    finite = np.isfinite(truth.airlight) & np.isfinite(error)
+    mean = float(truth.airlight[finite].mean()) if finite.any() else 0.0
+    return float(error[finite].mean()) / mean if mean > 0 else 0.0
+
+
+def lamp_distance(loaded: LoadedScene, truth: TruthImage) -> NDArray[np.float64]:
+    """Return how far the nearest lamp is from each pixel, (height, width) [pixels in the middle of the image]."""
+    angle = pixel_angle(read_truth(loaded.scene))  # zero in an image of one column
+    return truth.light_angle / angle if angle > 0 else np.full(truth.light_angle.shape, math.inf)
+
+
+def _other_light(judged: JudgedLayer, fitting: list[TruthImage]) -> tuple[str, ...]:
+    """Say so where an image is the airlight or the surface alone, or all light, and not what it was taken for."""
+    errors, powers = {}, {}
+    if judged.holds == TOTAL and judged.emitted and fitting[0].emitted is not None:
+        shown, hidden = (
+            min(_mean_square(judged.values - reference_layer(truth, TOTAL, emitted=emitted)) for truth in fitting)
+            for emitted in (True, False)
+        )
+        if GAIN**2 * hidden < shown:
+            return ("the image does not show the area lights that the camera sees: compare its airlight",)
+    for name in KINDS:
+        layers = [reference_layer(truth, name, emitted=judged.emitted) for truth in fitting]
+        errors[name] = min(_mean_square(judged.values - values) for values in layers)
+        powers[name] = _mean_square(layers[0])
+    nearest = min(errors, key=errors.__getitem__)
+    # A dim image is near to a layer without light, but not nearer than a tenth of that layer's own.
+    if nearest == judged.holds or not GAIN**2 * errors[nearest] < min(errors[judged.holds], powers[nearest]):
+        return ()
+    if nearest == TOTAL:
+        return ("the image is all light: say --holds total",)
+    channels = ", ".join(f"{nearest}.{channel}" for channel in "RGB")
+    return (f"the image is the {nearest} alone: name its channels {channels}, or say --holds {nearest}",)
+
+
+def _mean_square(values: NDArray[np.floating]) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.mean(finite**2)) if finite.size else math.inf
+
+
+def fit_pixel(image: JudgedLayer, truth_of: TruthOf, pixel: str | None = None) -> PixelFit:
+    """Return the truth that fits an image.
+
+    Parameters
+    ----------
+    truth_of
+        Computes a truth; asked for the means only if the image does not fit the centres to `_EXACT`.
+    pixel
+        'centre' or 'area' where it is known; by default what fits.
+    """
+    if pixel is not None:
+        truth = truth_of(pixel)
+        return PixelFit(pixel, truth, find_hints(expected_layer(truth, image), image.values), None, None)
+    at_centre = truth_of("centre")
+    centre = expected_layer(at_centre, image)
+    hints = find_hints(centre, image.values)
+    if _fits(centre, hints.corrected):
+        return PixelFit("centre", at_centre, hints, None, None)
+    over_area = truth_of("area")
+    area = expected_layer(over_area, image)
+    apart = np.abs(area - centre) > _APART * np.maximum(area, centre)  # an infinite centre counts
+    area_hints = find_hints(area, image.values)
+    errors = _error(centre, hints.corrected, apart), _error(area, area_hints.corrected, apart)
+    if errors[1] < errors[0]:
+        return PixelFit("area", over_area, area_hints, *errors)
+    return PixelFit("centre", at_centre, hints, *errors)
+
+
+def _fits(truth: Array, image: Array) -> bool:
+    finite = np.isfinite(truth)
+    difference = (image - truth)[finite]
+    power = float(np.mean(truth[finite] ** 2)) if finite.any() else 0.0
+    return bool(np.isfinite(difference).all() and np.mean(difference**2) <= _EXACT**2 * power)
+
+
+def _error(truth: Array, image: Array, where: NDArray[np.bool_]) -> float:
+    """Return the error over some values; an infinite truth is wrong by all of it."""
+    finite = np.isfinite(truth)
+    floor = FLOOR * float(truth[finite].mean()) if finite.any() else 0.0
+    chosen = where & np.isfinite(image)
+    if not chosen.any():
+        return 0.0
+    wanted, got = truth[chosen], image[chosen]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        relative = np.abs(got - wanted) / np.maximum(wanted, floor)
+    return float(np.mean(np.minimum(np.nan_to_num(relative, nan=1.0), 1.0)))
+
+
+def judge(truth: Array, image: Array, hints: Hints, failures: Sequence[str]) -> Verdict:
+    """Decide whether an image is right.
+
+    Parameters
+    ----------
+    truth, image
+        Radiance, (height, width, 3) [W/(m^2 sr)].
+    hints
+        What is suspected of the image as a whole.
+    failures
+        Why it must be called wrong anyway: values that are not finite, or negative.
+    """
+    side = min(BLOCK, max(1, min(truth.shape[:2]) // 10))
+    error, noise = _block_errors(truth, image, side)
+    reasons = [*failures, *hints.words, *([hints.reason] if hints.reason else [])]
+    if not reasons and abs(hints.factor - 1) > RIGHT:
+        reasons.append(f"the best factor is {hints.factor:.4g}")
+    if not reasons and math.isnan(error):
+        reasons.append("nothing is lit in the pixels that are compared")
+    if error > RIGHT:
+        size = "single pixels" if side == 1 else f"means over {side} x {side} pixels"
+        most = ", most of it noise: render more samples" if noise > error / math.sqrt(2) else ""
+        reasons.append(f"{size} are {100 * error:.3g} % off{most}")
+    return Verdict(tuple(reasons), side, error, noise)
+
+
+def _block_errors(truth: Array, image: Array, side: int) -> tuple[float, float]:
+    """Return the relative error of the means of lit blocks, and the share of it that noise explains."""
+    finite = np.isfinite(truth) & np.isfinite(image)
+    wanted, got = np.where(finite, truth, 0.0), np.where(finite, image, 0.0)
+    difference = got - wanted
+    count, light, seen, offset, square = (
+        _block_sums(values, side) for values in (finite.astype(float), wanted, got, difference, difference**2)
+    )
+    floor = _DIM * float(wanted.mean())
+    lit = (count > 0) & (np.maximum(light, seen) > floor * count)
+    if not lit.any():
+        return math.nan, math.nan
+    scale = np.maximum(light, floor * count)[lit]
+    error = np.abs(offset[lit]) / scale
+    scatter = np.maximum(square - offset**2 / np.maximum(count, 1), 0.0)[lit]
+    kept = np.argsort(error)[: len(error) - int(OUTLIERS * len(error))]  # of few blocks none may be wrong
+    return math.sqrt(float(np.mean(error[kept] ** 2))), math.sqrt(float(np.mean((scatter / scale**2)[kept])))
+
+
+def _block_sums(values: Array, side: int) -> Array:
+    """Return the sums over square blocks, those at the ends smaller, channel by channel."""
+    rows, columns = (np.arange(0, length, side) for length in values.shape[:2])
+    return np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1)

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Faults of the fog against the surfaces: factors, opacity, ambient light, a shift, a lag."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from validation.engine.fault import (
+    Array,
+    Change,
+    Fault,
+    Parameter,
+    Values,
+    all_of,
+    changed_layers,
+    has_near_lights,
+    has_shapes,
+    of_fog_alone,
+    of_surfaces_alone,
+    scenery_number,
+    shows_both,
+    shows_fog,
+)
+from validation.engine.image_faults import SHIFT, best_corner, shifted
+from validation.engine.light_faults import PLACE, at_position
+from validation.engine.prediction import Guess, Layers, Predictor
+
+
+def scaled(entry: str, lights: Sequence[int] | None = None) -> Change:
+    """Return what gives some lights, or all, a factor in a tuple of the fog."""
+
+    def changed(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+        old = getattr(guess.fog, entry)
+        new = tuple(value * p[0] if lights is None or n in lights else value for n, value in enumerate(old))
+        return replace(guess, fog=replace(guess.fog, **{entry: new}))
+
+    return changed
+
+
+def _times(change: Change) -> Callable[[Predictor, Guess], Sequence[Values]]:
+    """Return what begins a factor: the one with which its part of the light explains most of what the rest leaves."""
+
+    def begin(predictor: Predictor, guess: Guess) -> Sequence[Values]:
+        once, none = (predictor.predicted(change(predictor, guess, (value,))) for value in (1.0, 0.0))
+        part, left = once - none, predictor.shown(guess) - none
+        lit = part > 0.01 * max(float(part.mean()), 1e-300)
+        if not lit.any():
+            return [(1.0,)]
+        return [(max(_weighted_median(left[lit] / part[lit], part[lit]), 1e-9),)]
+
+    return begin
+
+
+def _weighted_median(values: Array, weights: Array) -> float:
+    order = np.argsort(values)
+    heavier = np.cumsum(weights[order])
+    return float(values[order][min(int(np.searchsorted(heavier, 0.5 * heavier[-1])), len(order) - 1)])
+
+
+def factor_fault(name: str, words: str, change: Change, applies: Callable[[Predictor], bool]) -> Fault:
+    """Return a fault that multiplies a part of the light."""
+    one = (Parameter(1e-9, 1e9, logarithmic=True),)
+    return Fault(name, "layers", words, change, one, begin=_times(change), applies=applies, factor=True)
+
+
+def _opacity(change: Callable[[Array, Array, Array], tuple[Array, Array]]) -> Change:
+    """Return what is done to airlight and surfaces with the transmittance of the fog."""
+
+    def make(predictor: Predictor, guess: Guess, p: Values) -> Layers:
+        left = predictor.transmittance(guess)
+        return lambda airlight, surface: change(airlight, surface, left)
+
+    return changed_layers(make)
+
+
+def _ambient(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+    fog = 1 - predictor.transmittance(guess)
+    return replace(guess, layers=(*guess.layers, lambda airlight, surface: (airlight + np.array(p) * fog, surface)))
+
+
+def _ambient_colour(predictor: Predictor, guess: Guess) -> Sequence[Values]:
+    fog = 1 - predictor.transmittance(guess)
+    more = predictor.shown(guess) - predictor.predicted(guess)
+    safe = np.maximum(fog, 1e-6)
+    return [tuple(max(_weighted_median(m / f, f), 0.0) for m, f in zip(more.T, safe.T, strict=True))]
+
+
+FOG_AND_SURFACES = (
+    factor_fault(
+        "fog-factor",
+        "the fog is {0:.4g} times as bright as it should be, surfaces are right",
+        scaled("airlight"),
+        shows_both,
+    ),
+    factor_fault(
+        "surface-factor",
+        "surfaces are {0:.4g} times as bright as they should be, the fog is right",
+        scaled("surface"),
+        shows_both,
+    ),
+    *(
+        Fault("opacity", "layers", words, _opacity(change), applies=applies)
+        for words, applies, change in (
+            (
+                "the fog is multiplied by its opacity once more: it was blended as a colour, or premultiplied twice",
+                shows_fog,
+                lambda airlight, surface, left: (airlight * (1 - left), surface),
+            ),
+            (
+                "the fog is divided by its opacity: it was not premultiplied, and is taken as if it were",
+                shows_fog,
+                lambda airlight, surface, left: (airlight / np.maximum(1 - left, 1e-6), surface),
+            ),
+            (
+                "the fog is multiplied by the transmittance of the whole ray: it is attenuated once more",
+                shows_both,
+                lambda airlight, surface, left: (airlight * left, surface),
+            ),
+            (
+                "surfaces are attenuated on the way to the camera twice",
+                has_shapes,
+                lambda airlight, surface, left: (airlight, surface * left),
+            ),
+            (
+                "fog and surfaces are mixed by the fog's opacity: both are attenuated once more",
+                shows_both,
+                lambda airlight, surface, left: (airlight * (1 - left), surface * left),
+            ),
+        )
+    ),
+    Fault(
+        "ambient",
+        "layers",
+        "ambient light with the colour ({0:.3g}, {1:.3g}, {2:.3g}) W/(m^2 sr) is in the fog",
+        _ambient,
+        tuple(Parameter(0.0, 1e30) for _ in range(3)),
+        begin=_ambient_colour,
+        solved=True,
+        single=True,
+        applies=shows_fog,
+    ),
+    Fault(
+        "fog-shift",
+        "layers",
+        "the fog lies {0:.3g} pixels too far right and {1:.3g} too far down, against the surfaces",
+        of_fog_alone(shifted),
+        SHIFT,
+        begin=best_corner(of_fog_alone(shifted)),
+        costly=1,
+        single=True,
+        applies=shows_both,
+    ),
+    Fault(
+        "fog-shift",
+        "layers",
+        "the fog shows {0:.4g} times the width that surfaces do",
+        of_fog_alone(scenery_number("zoom", 5)),
+        (Parameter(0.2, 5.0, (0.95, 1.05), logarithmic=True, step=0.01),),
+        costly=1,
+        single=True,
+        applies=shows_both,
+    ),
+    *(
+        Fault(
+            "light-lag",
+            "layers",
+            f"the first light is off by ({{0:.3g}}, {{1:.3g}}, {{2:.3g}}) m for {words}: one of them lags",
+            alone(at_position),
+            PLACE,
+            costly=1,
+            single=True,
+            applies=all_of(shows_both, has_near_lights),
+        )
+        for words, alone in (
+            ("the fog, not for surfaces", of_fog_alone),
+            ("surfaces, not for the fog", of_surfaces_alone),
+        )
+    ),
+)

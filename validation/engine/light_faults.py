@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Faults of lights and shadows."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from validation.engine.fault import (
+    Array,
+    Change,
+    Fault,
+    Parameter,
+    Values,
+    has_near_lights,
+    has_shapes,
+    has_soft_spots,
+    has_spots,
+    of_fog_alone,
+    of_surfaces_alone,
+    scenery_number,
+    short,
+    shows_both,
+    with_law,
+    with_scenery,
+)
+from validation.engine.prediction import Guess, Predictor, Scenery
+
+
+def _window(change: Callable[[Array], Array]) -> Change:
+    return lambda predictor, guess, p: replace(
+        guess, fog=replace(guess.fog, window=lambda r: change(np.minimum(r / p[0], 1.0)))
+    )
+
+
+def _ranges(predictor: Predictor, guess: Guess) -> Sequence[Values]:
+    r = np.concatenate([each.nodes.r for each in predictor.light.model(predictor.seen, Scenery(), 0).paths.lights])
+    if not len(r):
+        r = np.concatenate([e.surface.r for e in predictor.light.model(predictor.seen, Scenery(), 1).paths.lights])
+    far = float(np.median(r)) if len(r) else 1.0
+    return [(far * part,) for part in (0.5, 1.0, 2.0, 4.0)]
+
+
+def at_position(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+    """Return a guess with the first light off by a vector."""
+    x, y, z = (short(value) for value in p)
+    return replace(guess, scenery=replace(guess.scenery, moved=(x, y, z)))
+
+
+def _position_held(predictor: Predictor, guess: Guess, p: Values, at: Values) -> Guess:
+    """Return a guess with the light at p, and shadows as they are where it is at another place."""
+    held = at_position(predictor, guess, at)
+    x, y, z = (value - before for value, before in zip(p, held.scenery.moved, strict=True))
+    return replace(held, fog=held.fog.with_entry("moved", 0, (x, y, z)))
+
+
+PLACE = tuple(Parameter(-1e3, 1e3, (0.0,), step=0.003) for _ in range(3))
+
+LIGHTS = (
+    Fault("no-shadow", "light", "nothing casts a shadow", with_scenery(shadows=False), applies=has_shapes),
+    Fault(
+        "no-shadow",
+        "light",
+        "nothing casts a shadow in the fog, on surfaces it does",
+        of_fog_alone(with_scenery(shadows=False)),
+        applies=shows_both,
+    ),
+    Fault(
+        "no-shadow",
+        "light",
+        "nothing casts a shadow on surfaces, in the fog it does",
+        of_surfaces_alone(with_scenery(shadows=False)),
+        applies=shows_both,
+    ),
+    *(
+        Fault("distance-law", "light", words, with_law(distance_power=power), applies=has_near_lights)
+        for words, power in (
+            ("the light falls as one over the distance, not over its square", 1.0),
+            ("the light does not fall with the distance", 0.0),
+        )
+    ),
+    *(
+        Fault(
+            "light-range",
+            "light",
+            f"lights have a range: {words} {{0:.4g}} m",
+            _window(change),
+            (Parameter(1e-3, 1e6, logarithmic=True),),
+            begin=_ranges,
+            applies=has_near_lights,
+        )
+        for words, change in (
+            ("they fall off by (1 - (r/R)^4)^2 with R =", lambda s: (1 - s**4) ** 2),
+            ("they fall off by 1 - (r/R)^4 with R =", lambda s: 1 - s**4),
+            ("they fall off by (1 - (r/R)^2)^2 with R =", lambda s: (1 - s**2) ** 2),
+            ("they fall off by 1 - r/R with R =", lambda s: 1 - s),
+            ("they end at", lambda s: (s < 1).astype(float)),
+        )
+    ),
+    *(
+        Fault("spot-angle", "light", words, with_scenery(cone=factor), applies=has_spots)
+        for words, factor in (
+            ("the angles of spots are twice what they should be: a half angle was taken for a whole one", 2.0),
+            ("the angles of spots are half of what they should be: a whole angle was taken for a half one", 0.5),
+        )
+    ),
+    Fault(
+        "spot-angle",
+        "light",
+        "the angles of spots are {0:.4g} times what they should be",
+        scenery_number("cone"),
+        (Parameter(0.2, 4.0, (0.8, 1.25), logarithmic=True, step=0.02),),
+        costly=1,
+        applies=has_spots,
+    ),
+    Fault(
+        "spot-falloff",
+        "light",
+        "spots have a hard edge, without falloff",
+        with_scenery(edge="hard"),
+        applies=has_soft_spots,
+    ),
+    Fault(
+        "spot-falloff",
+        "light",
+        "spots fall off from their axis on, not from the beam's edge",
+        with_scenery(edge="smooth"),
+        applies=has_spots,
+    ),
+    Fault(
+        "spot-falloff",
+        "light",
+        "spots fall off as Blender's with a blend of {0:.3g}, which its own is 0.15: smoothly by the cosine",
+        scenery_number("blend"),
+        (Parameter(0.01, 1.0, (0.15, 0.5, 1.0), step=0.01),),
+        costly=1,
+        applies=has_spots,
+    ),
+    Fault(
+        "light-radius",
+        "light",
+        "point lights are spheres of the radius {0:.3g} m",
+        scenery_number("radius"),
+        (Parameter(0.0, 10.0, (0.05, 0.2, 0.5), step=0.01),),
+        costly=2,
+        applies=lambda predictor: any(light.axis is None for light in predictor.truth.lights),
+    ),
+    Fault(
+        "light-position",
+        "light",
+        "the first light is off by ({0:.3g}, {1:.3g}, {2:.3g}) m",
+        at_position,
+        PLACE,
+        held=_position_held,
+        costly=1,
+        applies=has_near_lights,
+    ),
+)

@@ -1,0 +1,345 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Faults of the medium, and of the laws of scattering and attenuation."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from reference.scene.camera import camera_matrix
+from reference.scene.read import TruthScene
+from validation.engine.curves import from_srgb, to_srgb
+from validation.engine.fault import (
+    Array,
+    Change,
+    Fault,
+    Parameter,
+    Values,
+    absorbs,
+    all_of,
+    changed_fog,
+    changed_layers,
+    fog_surrounds,
+    has_lobe,
+    has_near_lights,
+    has_no_lobe,
+    has_shapes,
+    short,
+    shows_both,
+    shows_fog,
+    with_law,
+)
+from validation.engine.prediction import Guess, Layers, Predictor
+from validation.fog_model.radiance import Colour, Fog, PhaseLaw, colour
+
+_FACTOR = (0.5, 0.7, 1.4, 2.0)
+_USUAL_NEAR = (0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0)  # of cameras in engines and modelling programs [m]
+
+
+def _optics(change: Callable[..., tuple[float, float]]) -> Change:
+    """Return what gives extinction and albedo of every channel of every medium."""
+    return changed_fog(lambda fog, *p: changed_optics(fog, lambda s, a: change(s, a, *p)))
+
+
+def changed_optics(fog: Fog, change: Callable[[float, float], tuple[float, float]]) -> Fog:
+    """Return a fog with other extinction and albedo where any medium is."""
+    pairs = [
+        [change(s, a) if s > 0 else (s, a) for s, a in zip(sigma_t, albedo, strict=True)]
+        for sigma_t, albedo in zip(fog.sigma_t, fog.albedo, strict=True)
+    ]
+    sigma_t, albedo = (tuple(colour([pair[which] for pair in medium]) for medium in pairs) for which in (0, 1))
+    return replace(fog, sigma_t=sigma_t, albedo=albedo)
+
+
+def _absorption(sigma_t: float, albedo: float, factor: float = 0.0) -> tuple[float, float]:
+    """Return optics whose absorption has a factor; the scattering stays."""
+    scattering = sigma_t * albedo
+    extinction = scattering + factor * (sigma_t - scattering)
+    return extinction, scattering / extinction if extinction > 0 else albedo
+
+
+def _lobes(choose: Callable[[float], float | PhaseLaw]) -> Change:
+    """Return what changes every phase function of Henyey and Greenstein by its g."""
+    return changed_fog(
+        lambda fog: replace(fog, phase=tuple(choose(g) if isinstance(g, float) else g for g in fog.phase))
+    )
+
+
+def _schlick(k: float) -> PhaseLaw:
+    return lambda cosine: (1 - k * k) / (1 - k * cosine) ** 2
+
+
+def _cornette_shanks(g: float) -> PhaseLaw:
+    return lambda cosine: 1.5 * (1 - g * g) / (2 + g * g) * (1 + cosine**2) / (1 + g * g - 2 * g * cosine) ** 1.5
+
+
+def _rayleigh(cosine: Array) -> Array:
+    return 0.75 * (1 + cosine**2)
+
+
+def _cosine(cosine: Array) -> Array:
+    return 4 * np.maximum(cosine, 0.0)
+
+
+def _every_phase(law: float | PhaseLaw) -> Change:
+    return changed_fog(lambda fog: replace(fog, phase=(law,) * len(fog.phase)))
+
+
+def _unit(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+    """Return what lengths times a factor make of it: paths grow with it, and light from points falls as its square.
+
+    Irradiance and radiance, of lights that are far or have extent, are what they were.
+    """
+    near = len(predictor.truth.lights)
+    intensity = tuple(value / p[0] ** 2 if light < near else value for light, value in enumerate(guess.fog.intensity))
+    fog = changed_optics(guess.fog, lambda sigma_t, albedo: (sigma_t * p[0], albedo))
+    return replace(guess, fog=replace(fog, intensity=intensity))
+
+
+def _between(spherical: bool, end: str) -> Change:
+    """Return what lets the medium begin or end at a distance."""
+
+    def changed(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+        given = {end: short(p[0]), "spherical": spherical}
+        return replace(guess, fog=replace(guess.fog, **given), scenery=replace(guess.scenery, **given))
+
+    return changed
+
+
+def _depths(predictor: Predictor, guess: Guess) -> Sequence[Values]:
+    """Return distances at which a fog may end: parts of those that the image shows."""
+    view = predictor.view
+    seen = view.distance[np.isfinite(view.distance)]
+    lights = [float(np.linalg.norm(light.position - view.truth.origin)) for light in view.truth.lights]
+    far = float(np.quantile(seen, 0.9)) if seen.size else 2 * max(lights, default=5.0)
+    return [(far * part,) for part in (0.9, 0.6, 0.35)]
+
+
+def _height(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+    fog = changed_optics(guess.fog, lambda sigma_t, albedo: (sigma_t * p[1], albedo))
+    return replace(guess, fog=replace(fog, height=(p[0], _up(predictor.truth))))
+
+
+def _up(truth: TruthScene) -> Colour:
+    """Return the axis of the scene that is nearest to the camera's own way up."""
+    up = camera_matrix(truth.scene.sensors()[0])[:3, 1]
+    axis = int(np.argmax(np.abs(up)))
+    return colour(np.sign(up[axis]) * np.eye(3)[axis])
+
+
+def _heights(predictor: Predictor, guess: Guess) -> Sequence[Values]:
+    size = _depths(predictor, guess)[0][0]
+    return [(size * part, factor) for part in (0.1, 0.3, 1.0) for factor in (1.0, 2.0)]
+
+
+def _depth_for_distance(*what: str, march: bool = False) -> Change:
+    def changed(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+        fog = replace(guess.fog, planar=guess.fog.planar | set(what))
+        surfaces = guess.surfaces or guess.scenery
+        return replace(guess, fog=fog, scenery=replace(guess.scenery, planar=march), surfaces=surfaces)
+
+    return changed
+
+
+def _multiple(of_surfaces: bool) -> Change:
+    def make(predictor: Predictor, guess: Guess, p: Values) -> Layers:
+        more = predictor.light.higher_orders
+        if more is None:
+            return lambda airlight, surface: (airlight, surface)
+        orders = more[:, predictor.pixels]
+        return lambda airlight, surface: (airlight + p[0] * orders[0], surface + p[0] * of_surfaces * orders[1])
+
+    return changed_layers(make)
+
+
+def _brighter(predictor: Predictor) -> bool:
+    """Return whether an image has more light than it should: higher orders take none away."""
+    guess = Guess(predictor.fog)
+    return float(np.median(predictor.shown(guess) - predictor.predicted(guess))) > 0
+
+
+MEDIUM = (
+    Fault(
+        "extinction",
+        "medium",
+        "the extinction is one over what it should be: a mean free path was asked for",
+        _optics(lambda sigma_t, albedo: (1 / sigma_t, albedo)),
+    ),
+    Fault(
+        "extinction",
+        "medium",
+        "the extinction is {0:.4g} times what it should be",
+        _optics(lambda sigma_t, albedo, factor: (sigma_t * factor, albedo)),
+        (Parameter(1e-3, 1e3, (*_FACTOR, 0.1, 10.0), logarithmic=True),),
+    ),
+    Fault(
+        "absorption",
+        "medium",
+        "the absorption is {0:.4g} times what it should be, at the same scattering",
+        _optics(_absorption),
+        (Parameter(0.0, 50.0, (0.0, 0.5, 2.0, 5.0)),),
+        applies=absorbs,
+    ),
+    Fault(
+        "absorption",
+        "medium",
+        "the medium does not absorb: extinction is only what is scattered",
+        _optics(_absorption),
+        applies=absorbs,
+    ),
+    Fault(
+        "sigma-s",
+        "medium",
+        "the extinction was taken for the scattering coefficient, and absorption came on top",
+        _optics(lambda sigma_t, albedo: (sigma_t / albedo if albedo > 0 else sigma_t, albedo)),
+        applies=absorbs,
+    ),
+    *(
+        Fault("albedo", "medium", f"the albedo was {words}", _optics(change), applies=absorbs)
+        for words, change in (
+            ("applied twice", lambda sigma_t, albedo: (sigma_t, albedo**2)),
+            ("left out", lambda sigma_t, albedo: (sigma_t, 1.0)),
+            (
+                "decoded by the sRGB curve, as the value of a colour picker",
+                lambda sigma_t, albedo: (sigma_t, float(from_srgb(np.array(albedo)))),
+            ),
+            ("encoded by the sRGB curve", lambda sigma_t, albedo: (sigma_t, float(to_srgb(np.array(albedo))))),
+        )
+    ),
+    Fault(
+        "g-sign",
+        "medium",
+        "g of the phase function has the other sign: light that should go on comes back",
+        _lobes(lambda g: -g),
+        applies=lambda predictor: has_lobe(predictor) and any(predictor.fog.phase),
+    ),
+    Fault(
+        "g",
+        "medium",
+        "g of the phase function is {0:.4g}",
+        lambda predictor, guess, p: _lobes(lambda g: float(p[0]))(predictor, guess, ()),
+        (Parameter(-0.99, 0.99, (-0.5, 0.0, 0.4, 0.8)),),
+        applies=has_lobe,
+    ),
+    Fault(
+        "g",
+        "medium",
+        "the phase function is Henyey and Greenstein's with g {0:.4g}, not isotropic",
+        lambda predictor, guess, p: _every_phase(float(p[0]))(predictor, guess, ()),
+        (Parameter(-0.99, 0.99, (-0.5, 0.4, 0.8)),),
+        applies=has_no_lobe,
+    ),
+    *(
+        Fault("phase", "medium", f"the phase function is {words}", change, applies=has_lobe)
+        for words, change in (
+            ("isotropic", _lobes(lambda g: 0.0)),
+            ("Schlick's, with k = 1.55 g - 0.55 g^3", _lobes(lambda g: _schlick(1.55 * g - 0.55 * g**3))),
+            ("Schlick's, with k = g", _lobes(_schlick)),
+            ("Cornette and Shanks's, with the same g", _lobes(_cornette_shanks)),
+        )
+    ),
+    Fault("phase", "medium", "the phase function is Rayleigh's", _every_phase(_rayleigh), applies=shows_fog),
+    Fault("phase", "medium", "a cosine was taken for the phase function", _every_phase(_cosine), applies=shows_fog),
+    *(
+        Fault(name, "medium", f"the way {words} is not attenuated", with_law(**{name.replace("-", "_"): (0.0, 0.0)}))
+        for name, words in (("light-leg", "from the light"), ("camera-leg", "to the camera"))
+    ),
+    *(
+        Fault(
+            name,
+            "medium",
+            f"the way {words} is not attenuated for {which}",
+            with_law(**{name.replace("-", "_"): legs}),
+            applies=shows_both,
+        )
+        for name, words in (("light-leg", "from the light"), ("camera-leg", "to the camera"))
+        for which, legs in (("the fog, for surfaces it is", (0.0, 1.0)), ("surfaces, for the fog it is", (1.0, 0.0)))
+    ),
+    Fault(
+        "unit-length",
+        "medium",
+        "lengths are {0:.4g} times what they should be: another unit of length",
+        _unit,
+        (Parameter(1e-4, 1e4, (0.01, 100.0, 0.1, 10.0, 0.3048, 3.2808, 0.001, 1000.0), logarithmic=True),),
+        applies=has_near_lights,
+    ),
+    # Where the fog before it is dark, a near plane is a factor with all digits of one that engines have.
+    *(
+        Fault(
+            "near-plane",
+            "medium",
+            f"the medium is missing up to {distance:g} m before the camera: a usual near plane",
+            lambda predictor, guess, p, distance=distance: _between(False, "near")(predictor, guess, (distance,)),
+            applies=fog_surrounds,
+        )
+        for distance in _USUAL_NEAR
+    ),
+    Fault(
+        "near-plane",
+        "medium",
+        "the medium is missing up to {0:.4g} m before the camera: its near plane",
+        _between(False, "near"),
+        (Parameter(0.0, np.inf, (0.05, 0.2, 0.5, 1.0)),),
+        applies=fog_surrounds,
+    ),
+    *(
+        Fault(
+            "fog-end",
+            "medium",
+            f"the fog ends {{0:.3g}} m {words}: beyond, nothing is scattered or attenuated",
+            _between(spherical, "far"),
+            (Parameter(1e-3, np.inf, logarithmic=True),),
+            begin=_depths,
+            costly=1,
+            applies=all_of(fog_surrounds, shows_fog),
+        )
+        for words, spherical in (("before the camera, at a plane", False), ("away from the camera", True))
+    ),
+    *(
+        Fault(
+            "depth-axis",
+            "medium",
+            f"distances along the axis of the camera were taken for distances along the ray {where}",
+            change,
+            applies=applies,
+        )
+        for where, change, applies in (
+            ("in the attenuation and where rays end", _depth_for_distance("surfaces", march=True), shows_fog),
+            ("in the attenuation", _depth_for_distance("nodes", "surfaces"), has_shapes),
+            (
+                "in the attenuation and the steps of the march",
+                _depth_for_distance("nodes", "surfaces", "steps"),
+                shows_fog,
+            ),
+            ("in the attenuation of surfaces", _depth_for_distance("surfaces"), shows_both),
+        )
+    ),
+    Fault(
+        "height-fog",
+        "medium",
+        "the density falls with height, to 1/e in {0:.3g} m, and is {1:.3g} times what it should be at the camera",
+        _height,
+        (Parameter(1e-2, 1e4, logarithmic=True), Parameter(1e-2, 1e2, logarithmic=True)),
+        begin=_heights,
+        single=True,
+        applies=fog_surrounds,
+    ),
+    Fault(
+        "multiple",
+        "medium",
+        "{0:.3g} times the light of multiple scattering is included",
+        _multiple(of_surfaces=False),
+        (Parameter(0.0, 3.0),),
+        costly=1,
+        applies=all_of(shows_fog, _brighter),
+    ),
+    Fault(
+        "multiple",
+        "medium",
+        "{0:.3g} times the light of higher orders is included, between surfaces and of the medium",
+        _multiple(of_surfaces=True),
+        (Parameter(0.0, 3.0),),
+        costly=1,
+        applies=all_of(lambda predictor: predictor.seen.holds == "total", _brighter),
+    ),
+)

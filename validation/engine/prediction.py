@@ -1,0 +1,261 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What an engine with a fault would show, pixel by pixel: the fog model of a changed scene, then changed values."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from reference.monte_carlo.batches import LAYERS
+from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.scene.read import TruthLight, TruthScene
+from validation.engine.seen import Seen
+from validation.fog_model.radiance import Fog, FogModel, scene_fog
+from validation.fog_model.view import View
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+Layers = Callable[[Array, Array], tuple[Array, Array]]  #: of airlight and surfaces, (m, 3) each
+
+APART = 2  #: pixels between those whose errors are compared: a filter that is wider than a pixel joins neighbours
+_MOST_RAYS = 3200  # every pixel of an image of 64 x 48
+_SPHERE_SAMPLES = 32  # of a sphere in the place of a point light: its rays pass by close
+_BATCHES, _PATHS = 4, 16  # batches of paths a pixel for the light of multiple scattering
+_SMOOTH = 40  # of the width of an image: the width of the filter for that light
+_FLOOR = 0.01  # of the mean of an image: below it values count relative to this
+_BLACK = 1e-7  # of the mean that the scene itself would have: below it an image is black
+
+
+@dataclass(frozen=True)
+class Scenery:
+    """What of a scene decides the paths of light; each combination has paths of its own."""
+
+    shadows: bool = True
+    offset: tuple[float, float] = (0.0, 0.0)  #: of all rays, to the right and down [pixels]
+    zoom: float = 1.0  #: factor on the distance of pixels from the middle of the image
+    moved: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: of the first point or spot light [m]
+    cone: float = 1.0  #: factor on the angles of spots
+    edge: str = ""  #: of spots: 'hard', or 'smooth' from the axis on; the scene's own
+    radius: float = 0.0  #: of spheres in the place of point lights [m]
+    blend: float = 0.0  #: fraction of 1 - cos(cut-off) in which spots fall off smoothly, as Blender's do
+    near: float = 0.0  #: nodes begin at this plane before the camera [m]
+    far: float = np.inf  #: and end at this one [m]
+    spherical: bool = False  #: whether both are distances from the camera
+    planar: bool = False  #: whether nodes end at the distance along the ray that is the depth of the surface
+
+    @property
+    def where(self) -> dict[str, Any]:
+        """What decides the rays."""
+        return {"offset": self.offset, "zoom": self.zoom}
+
+    def lights(self, truth: TruthScene) -> tuple[TruthLight, ...]:
+        """Return the point and spot lights of a scene as this scenery has them."""
+        lights = []
+        for number, light in enumerate(truth.lights):
+            if number == 0 and any(self.moved):
+                light = replace(light, position=light.position + np.array(self.moved))
+            if light.axis is not None and self.cone != 1:
+                cutoff, beam = (min(angle * self.cone, 0.499 * np.pi) for angle in (light.cutoff, light.beam))
+                light = replace(light, cutoff=cutoff, beam=beam)
+            if light.axis is not None and self.edge:
+                light = replace(light, beam=light.cutoff if self.edge == "hard" else 0.0)
+            lights.append(light)
+        return tuple(lights)
+
+    def model(self, seen: Seen, view: View, layer: int) -> FogModel:
+        """Return the paths of a layer of an image, 0: airlight, 1: surfaces."""
+        ends = None
+        if self.near > 0 or np.isfinite(self.far):
+            ends = view.ends((self.near, self.far), self.spherical)
+        if self.planar:
+            ends = np.zeros_like(view.distance), view.distance * (view.truth.direction @ view.axis)
+        return seen.model(
+            view,
+            self.lights(seen.truth),
+            ends=ends,
+            shadows=self.shadows,
+            radius=self.radius,
+            blend=self.blend,
+            airlight=layer == 0,
+            surface=layer == 1,
+            samples=max(_SPHERE_SAMPLES if self.radius else 0, seen.samples),
+        )
+
+
+@dataclass(frozen=True)
+class Guess:
+    """What an image could be: a scene, what fills it, and what was done to the values."""
+
+    fog: Fog
+    scenery: Scenery = field(default_factory=Scenery)
+    surfaces: Scenery | None = None  #: of what surfaces reflect, where that is another one
+    layers: tuple[Layers, ...] = ()  #: what was done to airlight and surfaces before they were added
+    values: tuple[Callable[[Array], Array], ...] = ()  #: what was done to the values, in this order
+    #: Takes back what was done to the grid, (height, width, 3) -> the same.
+    undo: Callable[[Array], Array] | None = None
+
+
+@dataclass
+class SceneLight:
+    """The light of a scene, which all images of it share: paths by scenery, radiance by fog."""
+
+    truth: TruthScene
+    most: int = 12_000_000  #: numbers that are kept, those used last: some eight bytes each
+    _kept: dict[Any, tuple[Any, int]] = field(default_factory=dict)  # with their sizes; the one used last comes last
+
+    @cached_property
+    def higher_orders(self) -> Array | None:
+        """Light of higher orders in airlight and surfaces, (2, pixels, 3), by Mitsuba's path tracer.
+
+        None where an image is so large that this would take minutes.
+        """
+        truth = self.truth
+        if truth.width * truth.height > 1 << 17:
+            return None
+        parts = []
+        for seed in range(_BATCHES):
+            whole, single = (volpath_batch(truth, seed, _PATHS, max_depth=depth).mean for depth in (64, 2))
+            parts.append((whole - single)[[LAYERS.index(layer) for layer in ("airlight", "surface")]])
+        image = np.mean(parts, axis=0).reshape(2, truth.height, truth.width, 3)
+        # It is smooth but for edges, and noisy.
+        width = truth.width / _SMOOTH
+        return np.asarray(gaussian_filter(image, (0, width, width, 0)).reshape(2, -1, 3))
+
+    def view(self, seen: Seen, scenery: Scenery) -> View:
+        """Return the rays of an image in a scenery, and what is known of them."""
+        key = "view", scenery.offset, scenery.zoom, _sight(seen)
+        return self._once(
+            key, lambda: seen.view(most=_MOST_RAYS, apart=APART, **scenery.where), lambda v: 40 * v.distance.size
+        )
+
+    def model(self, seen: Seen, scenery: Scenery, layer: int) -> FogModel:
+        """Return the paths of a layer of an image in a scenery, 0: airlight, 1: surfaces."""
+        key = "model", scenery, layer, _sight(seen)
+        view = self.view(seen, scenery)
+        return self._once(key, lambda: scenery.model(seen, view, layer), lambda model: 20 * model.places)
+
+    def radiance(self, seen: Seen, scenery: Scenery, fog: Fog, layer: int) -> Array:
+        """Return what a fog makes of a layer of the pixels, (m, 3) [W/(m^2 sr)]."""
+        plain = fog.without_factors
+        if layer == 1:  # of which the ends of nodes change nothing
+            scenery = replace(scenery, near=0.0, far=np.inf, spherical=False, planar=False)
+        key = "radiance", scenery, plain, layer, _sight(seen)
+        by_light = self._once(key, lambda: self.model(seen, scenery, layer).by_light(plain), lambda each: each.size)
+        return fog.combined(by_light)[layer]
+
+    def _once(self, key: Any, made: Callable[[], Any], size: Callable[[Any], int]) -> Any:
+        known = self._kept.pop(key, None)
+        if known is None:
+            value = made()
+            known = value, size(value)
+            while self._kept and sum(each for _, each in self._kept.values()) > self.most - known[1]:
+                del self._kept[next(iter(self._kept))]
+        self._kept[key] = known
+        return known[0]
+
+
+def _sight(seen: Seen) -> tuple[Any, ...]:
+    """Return what of an image its pixels depend on, and their paths."""
+    return seen.area, seen.holds, seen.samples, seen.used.tobytes()
+
+
+@dataclass
+class Predictor:
+    """Predicts images."""
+
+    seen: Seen
+    shape: tuple[int, int]
+    light: SceneLight
+
+    @property
+    def truth(self) -> TruthScene:
+        """The scene."""
+        return self.seen.truth
+
+    @property
+    def fog(self) -> Fog:
+        """The fog as the scene has it."""
+        return scene_fog(self.seen.truth)
+
+    @cached_property
+    def view(self) -> View:
+        """The rays of the scene."""
+        return self.light.view(self.seen, Scenery())
+
+    @cached_property
+    def pixels(self) -> Index:
+        """Which pixels take part, in any scenery, (m,)."""
+        return self.view.pixels
+
+    @cached_property
+    def pairs(self) -> tuple[Index, Index]:
+        """Which rows of `errors` are pixels, and which their neighbours, those of the next columns if it can be."""
+        pixels, width = self.pixels, self.shape[1]
+        for apart in (1, APART) if len(pixels) == self.seen.used.sum() else (APART,):
+            partner = np.searchsorted(pixels, pixels + apart)
+            row = np.flatnonzero(partner < len(pixels))
+            partner = partner[row]
+            there = (pixels[partner] == pixels[row] + apart) & (pixels[row] % width + apart < width)
+            if there.any():
+                return row[there], partner[there]
+        return np.empty(0, np.int64), np.empty(0, np.int64)
+
+    def layers(self, guess: Guess) -> tuple[Array, Array]:
+        """Return airlight and surfaces of the pixels, (m, 3) each; 0 where the image does not hold one."""
+        parts = []
+        for layer, scenery in enumerate((guess.scenery, guess.surfaces or guess.scenery)):
+            held = self.seen.holds != ("surface", "airlight")[layer]
+            parts.append(self.light.radiance(self.seen, scenery, guess.fog, layer) if held else None)
+        airlight, surface = (np.zeros((len(self.pixels), 3)) if part is None else part for part in parts)
+        for change in guess.layers:
+            airlight, surface = change(airlight, surface)
+        return airlight, surface
+
+    def predicted(self, guess: Guess) -> Array:
+        """Return the values of the pixels, (m, 3)."""
+        radiance = self.seen.held(np.stack(self.layers(guess)))
+        for change in guess.values:
+            radiance = change(radiance)
+        return radiance
+
+    def transmittance(self, guess: Guess) -> Array:
+        """Return the fraction of light that a guess leaves of what surfaces send, (m, 3)."""
+        return self.light.model(self.seen, guess.scenery, 0).transmittance(guess.fog)
+
+    @cached_property
+    def cosines(self) -> Array:
+        """The cosines of the pixels to the axis of the camera, (m,)."""
+        return np.asarray(self.truth.direction[self.pixels] @ self.view.axis)
+
+    def shown(self, guess: Guess) -> Array:
+        """Return the values of the image in these pixels, (m, 3), with the fault of the grid taken back."""
+        values = self.seen.values
+        if guess.undo is not None:
+            values = np.ascontiguousarray(guess.undo(values.reshape(*self.shape, 3))).reshape(-1, 3)
+        return values[self.pixels]
+
+    @cached_property
+    def _least(self) -> float:
+        return _BLACK * float(np.mean(np.abs(self.predicted(Guess(self.fog))))) + 1e-300
+
+    def _floor(self, shown: Array) -> float:
+        finite = shown[np.isfinite(shown)]
+        return max(_FLOOR * float(np.mean(np.abs(finite))) if finite.size else 0.0, self._least)
+
+    def errors(self, guess: Guess) -> Array:
+        """Return the errors of a guess, relative to the larger of both values, (m, 3), from -1 to 1."""
+        predicted, shown = self.predicted(guess), self.shown(guess)
+        scale = np.maximum(np.maximum(np.abs(shown), np.abs(predicted)), self._floor(shown))
+        with np.errstate(invalid="ignore"):
+            errors = (shown - predicted) / scale
+        return np.where(np.isfinite(errors), errors, 1.0)
+
+    def lit(self, guess: Guess) -> Bools:
+        """Return which values of the image are not dark, (m, 3): the others have no noise that could be seen."""
+        shown = self.shown(guess)
+        return np.asarray(np.abs(shown) > self._floor(shown))

@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The parameters with which faults fit an image best, one alone or two together.
+
+The measure is the mean of log(1 + (e/s)^2) over all values, e the relative errors and s a scale: pixels that disagree
+cannot decide (Cauchy's loss). One parameter is looked for on the line, since there may be several minima; several by
+steps of Gauss and Newton with Cauchy's weights. The scale begins at what the unchanged scene leaves and ends at what
+the search leaves.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from validation.engine.fault import Fault, Parameter, Values
+from validation.engine.prediction import Guess, Predictor
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+_LEAST_SCALE, _LEAST_COARSE = 1e-4, 1e-2  # where most pixels do not know a parameter, those that do are no outliers
+_COARSE = 0.02  # on a line, of a logarithm or in units of the parameter: enough to tell faults apart
+_BEGUN = 2  # of the best starts: the best one may lead to a lesser minimum
+_TURNS, _TURNS_COARSE = 8, 4  # steps of Gauss and Newton at most
+_LITTLE = 0.9  # fraction of the loss that a step leaves which gains little
+_STEP = 1e-4  # of differences, of a logarithm or in units of the parameter, where no paths move
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Faults with their best parameters, and what they leave."""
+
+    faults: tuple[Fault, ...]
+    values: tuple[Values, ...]
+    guess: Guess
+    errors: Array  #: relative, (pixels, 3)
+    lit: Bools  #: which values of the image are not dark, (pixels, 3): their errors say what the noise is
+    error: float  #: mean of their sizes
+
+    @property
+    def parameters(self) -> int:
+        """How many numbers were looked for."""
+        return sum(len(fault.parameters) for fault in self.faults)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the faults."""
+        return tuple(fault.name for fault in self.faults)
+
+
+def explain(
+    predictor: Predictor, faults: Sequence[Fault], near: Sequence[Values] = (), *, fine: bool = True
+) -> Explanation:
+    """Return the best explanation by some faults together.
+
+    Parameters
+    ----------
+    faults
+        In the order in which they change the guess.
+    near
+        Values to begin with; by default all starts of the faults are tried.
+    fine
+        Whether the values are looked for to all digits, or to some per cent, which a fault that is wrong needs.
+    """
+    search = _Search(predictor, tuple(faults))
+    parameters = search.parameters
+    starts = [tuple(value for part in near for value in part)] if near else _starts(predictor, faults)
+    best = starts[0]
+    if all(fault.solved or not fault.parameters for fault in faults):
+        parameters = ()
+    if parameters:
+        scale = min(search.scale(start, fine) for start in starts)
+        starts = sorted(starts, key=lambda start: search.loss(start, scale))
+        on_a_line = len(parameters) == 1 and not parameters[0].step
+        places = [search.inward(start) for start in starts[: _BEGUN if on_a_line else 1]]
+        for turn in range(2 if fine else 1):
+            scale = scale if turn == 0 else search.scale(search.outward(places[0]), fine)
+            improve = search.on_line if on_a_line else search.by_steps
+            places = [improve(place, scale, fine) for place in places]
+        best = min((search.outward(place) for place in places), key=lambda values: search.loss(values, scale))
+    errors, guess = search.errors(best), search.guess(best)
+    error = float(np.abs(errors).mean())
+    return Explanation(tuple(faults), _parted(faults, best), guess, errors, predictor.lit(guess), error)
+
+
+def begin(predictor: Predictor, faults: Sequence[Fault]) -> tuple[float, tuple[Values, ...]]:
+    """Return the least mean error at the starts of some faults together, and the values there."""
+    starts = _starts(predictor, faults)
+    left = [float(np.abs(predictor.errors(guess_of(predictor, faults, start))).mean()) for start in starts]
+    return min(left), _parted(faults, starts[int(np.argmin(left))])
+
+
+def guess_of(predictor: Predictor, faults: Sequence[Fault], values: Values) -> Guess:
+    """Return what some faults with these values make of the scene."""
+    guess = Guess(predictor.fog)
+    for fault, part in zip(faults, _parted(faults, values), strict=True):
+        guess = fault.change(predictor, guess, part)
+    return guess
+
+
+def usual_size(errors: Array) -> float:
+    """Return the standard deviation of normal errors with this median size."""
+    return 1.4826 * float(np.median(np.abs(errors))) if errors.size else 0.0
+
+
+class _Search:
+    """The errors of guesses, by the values of all parameters."""
+
+    def __init__(self, predictor: Predictor, faults: tuple[Fault, ...]) -> None:
+        self.predictor, self.faults = predictor, faults
+        self.parameters = tuple(parameter for fault in faults for parameter in fault.parameters)
+        self.known: dict[Values, Array] = {}
+
+    def guess(self, values: Values) -> Guess:
+        return guess_of(self.predictor, self.faults, values)
+
+    def errors(self, values: Values) -> Array:
+        if values not in self.known:
+            self.known[values] = self.predictor.errors(self.guess(values))
+        return self.known[values]
+
+    def loss(self, values: Values, scale: float) -> float:
+        return float(np.mean(np.log1p((self.errors(values) / scale) ** 2)))
+
+    def scale(self, values: Values, fine: bool) -> float:
+        left = self.errors(values)[self.predictor.lit(self.guess(values))]
+        return max(usual_size(left), _LEAST_SCALE if fine else _LEAST_COARSE)
+
+    def inward(self, values: Values) -> Array:
+        pairs = zip(self.parameters, values, strict=True)
+        return np.array([math.log(value) if parameter.logarithmic else value for parameter, value in pairs])
+
+    def outward(self, place: Array) -> Values:
+        pairs = zip(self.parameters, place, strict=True)
+        return tuple(math.exp(value) if parameter.logarithmic else float(value) for parameter, value in pairs)
+
+    def on_line(self, place: Array, scale: float, fine: bool) -> Array:
+        """Return the best value of one parameter."""
+        (parameter,) = self.parameters
+        low, high = (float(self.inward((end,))[0]) for end in (parameter.low, parameter.high))
+
+        def loss(value: float) -> float:
+            return self.loss(self.outward(np.array([value])), scale)
+
+        ends = _between(parameter, float(place[0]), low, high)
+        solved = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": 1e-7 if fine else _COARSE})
+        return np.array([solved.x]) if solved.fun <= loss(float(place[0])) else place
+
+    def by_steps(self, place: Array, scale: float, fine: bool) -> Array:
+        """Return the end of a few steps of Gauss and Newton with Cauchy's weights, halved while they make it worse."""
+        low, high = (self.inward(tuple(getattr(p, end) for p in self.parameters)) for end in ("low", "high"))
+        steps = np.array([parameter.step or _STEP for parameter in self.parameters])
+        least = self.loss(self.outward(place), scale)
+        for _ in range(_TURNS if fine else _TURNS_COARSE):
+            left = self.errors(self.outward(place)).ravel()
+            slopes = self._slopes(place, left, steps)
+            weights = 1 / (1 + (left / scale) ** 2)
+            move = -np.linalg.lstsq(slopes * np.sqrt(weights)[:, None], left * np.sqrt(weights), rcond=1e-10)[0]
+            for _ in range(4 if fine else 2):
+                trial = np.clip(place + move, low, high)
+                reached = self.loss(self.outward(trial), scale)
+                if reached < least:
+                    break
+                move = 0.5 * move
+            else:
+                return place
+            small = np.all(np.abs(trial - place) < 0.02 * steps) or (not fine and reached > _LITTLE * least)
+            place, least = trial, reached
+            if small:
+                break
+            steps = np.where([p.step > 0 for p in self.parameters], 0.6 * steps, steps)
+        return place
+
+    def _slopes(self, place: Array, left: Array, steps: Array) -> Array:
+        at = self.outward(place)
+        columns = []
+        for step, axis in zip(steps, np.eye(len(place)), strict=True):
+            values = self.outward(place + step * axis)
+            columns.append((self._held_errors(values, at).ravel() - left) / step)
+        return np.stack(columns, axis=1)
+
+    def _held_errors(self, values: Values, at: Values) -> Array:
+        """Return the errors with paths held where they are, for faults that can do with that."""
+        if not any(fault.held for fault in self.faults):
+            return self.errors(values)
+        guess = Guess(self.predictor.fog)
+        for fault, part, old in zip(self.faults, _parted(self.faults, values), _parted(self.faults, at), strict=True):
+            held = fault.held
+            guess = (
+                fault.change(self.predictor, guess, part) if held is None else held(self.predictor, guess, part, old)
+            )
+        return self.predictor.errors(guess)
+
+
+def _between(parameter: Parameter, inner: float, low: float, high: float) -> tuple[float, float]:
+    """Return the ends of a search on the line: a start's are the starts beside it, others have some room."""
+    step = 0.7 if parameter.logarithmic else max(0.3 * abs(inner), 0.1)
+    ends = inner - step, inner + step
+    if not parameter.logarithmic and inner in parameter.starts:
+        below, above = ([start for start in parameter.starts if sign * (start - inner) > 0] for sign in (-1, 1))
+        ends = max(below, default=low), min(above, default=high if math.isfinite(high) else ends[1])
+    return max(low, ends[0]), min(high, ends[1])
+
+
+def _parted(faults: Sequence[Fault], values: Values) -> tuple[Values, ...]:
+    parts, start = [], 0
+    for fault in faults:
+        end = start + len(fault.parameters)
+        parts.append(tuple(float(value) for value in values[start:end]))
+        start = end
+    return tuple(parts)
+
+
+def _starts(predictor: Predictor, faults: Sequence[Fault]) -> list[Values]:
+    """Return values to begin with, those of each fault chosen after what those before it change."""
+    starts: list[Values] = [()]
+    for number, fault in enumerate(faults):
+        before = faults[:number]
+        starts = [(*start, *more) for start in starts for more in _own_starts(predictor, fault, before, start)]
+    return starts
+
+
+def _own_starts(predictor: Predictor, fault: Fault, before: Sequence[Fault], values: Values) -> Sequence[Values]:
+    if fault.begin is not None:
+        return fault.begin(predictor, guess_of(predictor, before, values))
+    if len(fault.parameters) == 1:
+        return [(start,) for start in fault.parameters[0].starts]
+    return [tuple(parameter.starts[0] for parameter in fault.parameters)]

@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An image that is to be explained: its values, which pixels take part, and what a fog makes of these."""
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
+
+from analytic.errors import InputError
+from reference.quadrature.emission import emitted_light
+from reference.quadrature.surface import surface_hits
+from reference.scene.read import TruthLight, TruthScene, read_truth
+from reference.storage.exr import TOTAL, Image
+from validation.engine.judged_layer import AIRLIGHT, SURFACE, JudgedLayer, judged_layer
+from validation.fog_model.radiance import FogModel, scene_fog
+from validation.fog_model.view import SAMPLES, View, scattering_paths, view_of
+from validation.scenes.loading import LoadedScene, load_scene
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+Progress = Callable[[float, str], None]
+
+PIXELS = ("centre", "area")  #: what a pixel may be: the radiance at its centre, or the mean over its area
+
+_FEWEST = 64  # pixels, whatever rays they need
+_SIDE = 3  # rays along a side of a pixel, for means over its area
+_MOST_SAMPLES = 128  # of an area light
+_SETTLED = 0.005  # mean relative change of an image with twice the samples, below which there are enough
+_TRIED = 48  # pixels that say how many samples a light needs
+
+
+@dataclass(frozen=True)
+class Seen:
+    """An image and what is known of it."""
+
+    truth: TruthScene
+    values: Array  #: (pixels, 3), all pixels of the image, row by row [W/(m^2 sr)]
+    holds: str  #: 'airlight', 'surface' or 'total'
+    used: Bools  #: which pixels may take part, (pixels,)
+    area: bool = False  #: whether a pixel is a mean over its area, or the value at its centre
+    samples: int = SAMPLES  #: that stand for an area light, see `needed_samples`
+
+    def view(
+        self, *, most: int, apart: int = 0, offset: tuple[float, float] = (0.0, 0.0), zoom: float = 1.0, seed: int = 0
+    ) -> View:
+        """Return the rays of the pixels that take part: one at random of each of as many equal parts of the image.
+
+        Parameters
+        ----------
+        most
+            How many rays are enough.
+        apart
+            Where not all pixels take part, they are chosen as pairs so far apart in a row; 0: each by itself [pixels].
+        offset, zoom
+            See `validation.fog_model.view.view_of`.
+        """
+        pixels, count = np.flatnonzero(self.used), self.pixels_of_rays(most)
+        if len(pixels) > count:
+            places = (np.arange(count) + np.random.default_rng(seed).random(count)) * (len(pixels) / count)
+            pixels = np.unique(pixels[np.minimum(places.astype(np.int64), len(pixels) - 1)])
+            if apart:
+                pixels = self._with_partners(pixels[::2], apart)
+        return view_of(self.truth, pixels, rays_per_side=_SIDE if self.area else 0, offset=offset, zoom=zoom)
+
+    def model(self, view: View, lights: tuple[TruthLight, ...] | None = None, **how: Any) -> FogModel:
+        """Return the paths of the light that the image holds; `how`: see `scattering_paths`."""
+        parts = {"airlight": self.holds != SURFACE, "surface": self.holds != AIRLIGHT, "samples": self.samples}
+        return FogModel(scattering_paths(view, lights, **(parts | how)))
+
+    def pixels_of_rays(self, most: int) -> int:
+        """Return how many pixels so many rays allow, or the fewest that are looked at."""
+        return max(_FEWEST, most // ((_SIDE**2 if self.area else 1) * (self.samples if self.truth.area else 1)))
+
+    def held(self, layers: Array) -> Array:
+        """Return the light that the image holds of airlight and surfaces, (2, m, 3)."""
+        return np.asarray(layers[0] if self.holds == AIRLIGHT else layers[1] if self.holds == SURFACE else sum(layers))
+
+    def _with_partners(self, pixels: Index, apart: int) -> Index:
+        """Return pixels, and those to the right of them that can take part too."""
+        partners = pixels + apart
+        partners = partners[(pixels % self.truth.width + apart < self.truth.width) & (partners < len(self.used))]
+        return np.asarray(np.union1d(pixels, partners[self.used[partners]]), dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class NotFinite:
+    """Pixels of an image that are NaN or infinite."""
+
+    count: int
+    column: int  #: of the first
+    row: int
+
+    def __str__(self) -> str:
+        many = f"{self.count} pixels are" if self.count > 1 else "1 pixel is"
+        return f"{many} NaN or infinite, the first in column {self.column}, row {self.row}, and left out"
+
+
+def seen_image(
+    image: Image, judged: JudgedLayer, scene: Any, *, mask: Bools | None = None
+) -> tuple[Seen, NotFinite | None]:
+    """Return a layer of an image as what is to be explained, and which of its pixels are not finite.
+
+    Neither a fit nor a diagnosis explains an area light itself, whose radiance no fog makes: pixels that show one take
+    no part, nor do those beside it, nor those that a file does not hold or a mask leaves out.
+
+    Raises
+    ------
+    InputError
+        For a scene that has no reference, and a mask of another size.
+    """
+    if mask is not None and np.shape(mask) != judged.values.shape[:2]:
+        shape = " x ".join(str(side) for side in np.shape(mask)[::-1])
+        raise InputError(
+            f"the mask is {shape} pixels, the image {judged.size[0]} x {judged.size[1]}; wanted one of the image's size"
+        )
+    truth = read_truth(scene)
+    values = np.asarray(judged.values, dtype=np.float64)
+    values = np.broadcast_to(values.reshape(-1, values.shape[-1]), (judged.size[0] * judged.size[1], 3)).copy()
+    finite = np.isfinite(values).all(axis=1)
+    used = finite.copy()
+    chosen = image.with_data(None if mask is None else np.asarray(mask) != 0)
+    if chosen is not None:
+        used &= np.asarray(chosen).ravel()
+        finite |= ~np.asarray(chosen).ravel()
+    if (truth.area or truth.background is not None) and judged.holds == TOTAL and judged.emitted:
+        lit = emitted_light(truth, surface_hits(truth).distance).any(axis=1).reshape(truth.height, truth.width)
+        used &= ~binary_dilation(lit, np.ones((3, 3), dtype=bool)).ravel()
+    wrong = np.flatnonzero(~finite)
+    row, column = divmod(int(wrong[0]), truth.width) if len(wrong) else (0, 0)
+    seen = Seen(truth, values, judged.holds, used, samples=needed_samples(truth))
+    return seen, NotFinite(len(wrong), column, row) if len(wrong) else None
+
+
+def layers_of(image: Image, path: str, name: str | None, holds: str | None) -> tuple[JudgedLayer, ...]:
+    """Return the layers to explain: the one that is named, or airlight and surface where an image has both."""
+    if name is None and holds is None and {AIRLIGHT, SURFACE} <= image.layers.keys():
+        return tuple(judged_layer(image, path, name=each) for each in (AIRLIGHT, SURFACE))
+    return (judged_layer(image, path, name=name, holds=holds),)
+
+
+def pixel_kinds(image: Image, pixel: str | None) -> tuple[str, ...]:
+    """Return what the pixels of an image may be: what was said, what an image of ours says, or both.
+
+    Raises
+    ------
+    InputError
+        For a word that is none of `PIXELS`.
+    """
+    if pixel is not None and pixel not in PIXELS:
+        raise InputError(f"pixel: got {pixel}, wanted 'centre' or 'area'")
+    said = pixel or image.attributes.get("airlight:pixel")
+    if said in PIXELS:
+        return (str(said),)
+    if "airlight:method" in image.attributes:
+        return ("centre",)
+    return ("area",) if "airlight:spp" in image.attributes else PIXELS
+
+
+def needed_samples(truth: TruthScene) -> int:
+    """Return how many samples stand for an area light: twice as many until the image hardly changes.
+
+    A window before pillars needs 128 where a lamp above an edge needs 16: each sample has shadows of its own.
+    """
+    samples, fog = SAMPLES, scene_fog(truth)
+    if not truth.area:
+        return samples
+    count = truth.width * truth.height
+    view = view_of(truth, np.unique(np.linspace(0, count - 1, min(count, _TRIED)).astype(np.int64)))
+
+    def image(samples: int) -> Array:
+        return FogModel(scattering_paths(view, samples=samples)).layers(fog).sum(axis=0)
+
+    values = image(samples)
+    while samples < _MOST_SAMPLES:
+        finer = image(2 * samples)
+        change = np.abs(finer - values) / np.maximum(finer, 0.01 * finer.mean())
+        if float(change.mean()) < _SETTLED:
+            break
+        samples, values = 2 * samples, finer
+    return samples
+
+
+def at_places(seen: Seen, places: dict[int, tuple[float, float, float]]) -> Seen:
+    """Return an image of a scene with point or spot lights, by number, at other places [m]."""
+    lights = tuple(
+        replace(light, position=np.array(places[number])) if number in places else light
+        for number, light in enumerate(seen.truth.lights)
+    )
+    return replace(seen, truth=replace(seen.truth, lights=lights))
+
+
+def scene_of_size(scene: str, size: tuple[int, int], path: str | os.PathLike[str]) -> LoadedScene:
+    """Return a scene at the size of an image of it.
+
+    Raises
+    ------
+    InputError
+        If the image has another aspect ratio than the scene by more than a pixel: it shows more or less of it.
+    """
+    loaded = load_scene(scene)
+    width, height = (int(n) for n in loaded.scene.sensors()[0].film().size()) if loaded.scene.sensors() else size
+    if abs(size[0] * height / width - size[1]) >= 1 and abs(size[1] * width / height - size[0]) >= 1:
+        raise InputError(
+            f"{path} is {size[0]} x {size[1]} pixels, {size[0] / size[1]:.4g} to 1; {loaded.name} is {width} x "
+            f"{height}, {width / height:.4g} to 1: render it at that size or a multiple or share of it"
+        )
+    return load_scene(scene, size)

@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Places that a light reaches: nodes on lit parts of camera rays, and visible surface points.
+
+On a piece of a ray in one medium, with w = asinh((x - foot)/height),
+
+    dx / r^2 = dw / (height cosh w),      r = height cosh w,
+
+and everything in the integrand of the airlight has its singularities at |Im w| >= pi/2, whatever the phase function
+(`reference.quadrature.bounded` says why). With half a panel of the width 1.2 the ellipse of regularity has
+rho = 1.31 + sqrt(1 + 1.31^2) = 2.96, so eight Gauss-Legendre nodes err by about rho^-16 = 3e-8, and four nodes on a
+panel of the width 0.6 (rho = 10.6) by 6e-9. The extinction adds exp(-sigma_t height e^w), entire in w; a panel over
+which it falls by many orders is the only hard one, and what is left beyond it is small.
+
+The path from a directional light is unbounded, so that only media with bounds attenuate it; between the kinks of its
+lengths (`reference.quadrature.directional_sums`) the integrand is an exponential of a linear function, and eight nodes
+are exact to rounding over up to four optical depths.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.quadrature.bounded import smooth_pieces
+from reference.quadrature.directional_sums import kinks
+from reference.quadrature.light_airlight import LitRays
+from reference.quadrature.pieces import Crossed, Setup, cut_pieces
+from reference.quadrature.unbounded import lit_stretches
+from reference.scene.directional_light import DirectionalLight
+from reference.scene.read import TruthLight, TruthScene
+from reference.visibility.line_crossings import crossings
+from reference.visibility.spot_cone import falloff
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+AROUND = 0  #: number of the medium without bounds; the media with bounds count on from there
+
+_NOTHING_LEFT = 40.0  # optical depth after which e^-40 = 4e-18 of the light is left
+_THINNEST = 1 / 30  # fraction of the scene's extinction down to which unbounded rays are long enough
+_AT_LIGHT = 1e-290  # height [m] below which a ray meets the light
+_NEAR_ZERO = 1e-15  # height over distance below which a light beside a piece may as well be at this height
+_PANEL, _SHORT = 2.4, 0.6
+_DEEP, _SHALLOW = 4.0, 0.5  # the same in optical depths, at the scene's own extinction
+_OF_ONE, _OF_MANY = (8, 4), (4, 2)  # nodes on a panel and on a short one: of a light, of a sample of an area light
+
+
+@dataclass(frozen=True)
+class Places:
+    """Places that a light reaches, of intensity 1; (n,) unless it says otherwise."""
+
+    ray: Index  #: number of the ray
+    x: Array  #: distance from the camera [m]
+    r: Array  #: distance from the light [m]; 1 for a directional light
+    towards: Array  #: unit vector from the light to the place, (n, 3); 0 for a directional light
+    camera: Array  #: length in each medium between camera and place, (n, media) [m]
+    light: Array  #: length in each medium between light and place, (n, media) [m]
+    medium: Index  #: number of the medium that scatters there; of surfaces nothing, (0,)
+    cosine: Array  #: of the scattering angle; of surfaces nothing, (0,)
+    #: Of a node the length of ray that it stands for times the profile of the light, (n, 1) [m]; of a surface what it
+    #: sends to the camera where nothing attenuates it, (n, 3) [W/(m^2 sr)].
+    value: Array
+
+    @staticmethod
+    def joined(parts: "Sequence[Places]") -> "Places":
+        """Join places of several lights, or of several samples of one."""
+        return Places(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Places)))
+
+    @property
+    def is_surface(self) -> bool:
+        """Whether these are surface points."""
+        return self.value.shape[1] == 3
+
+
+def no_places(media: int, *, surface: bool) -> Places:
+    """Return an empty record, for lights that reach nothing."""
+    none, empty, vectors, lengths = np.empty(0, np.int64), np.empty(0), np.empty((0, 3)), np.empty((0, media))
+    return Places(none, empty, empty, vectors, lengths, lengths, none, empty, np.empty((0, 3 if surface else 1)))
+
+
+def point_nodes(
+    truth: TruthScene, light: TruthLight, reach: LitRays, ends: tuple[Array, Array] | None = None
+) -> Places:
+    """Return the nodes of a point or spot light, or of a sample of an area light.
+
+    Parameters
+    ----------
+    reach
+        Which parts of the rays it reaches.
+    ends
+        Distances between which rays have nodes, (rays,) each [m]; all by default.
+    """
+    rays = reach.rays
+    ray, x0, x1 = lit_stretches(light, rays, reach.lit)
+    if ends is not None:
+        x0, x1 = np.maximum(x0, ends[0][ray]), np.minimum(x1, ends[1][ray])
+    used = x1 > x0
+    ray, x0, x1 = ray[used], x0[used], x1[used]
+    if reach.segments is None:
+        medium = np.full(len(ray), AROUND)
+        x1 = np.where(np.isinf(x1), np.maximum(x0, rays.foot[ray]) + _long_enough(truth), x1)
+    else:
+        setup = Setup(truth, rays.direction, reach.segments, light, rays, 1.0, reach.lit.edge)
+        pieces, _ = smooth_pieces(setup, (ray, x0, x1))
+        # The reference counts media with bounds from 0 and calls what surrounds them -1.
+        ray, x0, x1, medium = pieces.ray, pieces.x0, pieces.x1, pieces.medium + 1
+    foot, s0, s1 = rays.foot[ray], x0 - rays.foot[ray], x1 - rays.foot[ray]
+    beside = np.where(s0 > 0, s0, np.where(s1 < 0, -s1, 0.0))
+    height = np.maximum(rays.height[ray], np.maximum(_NEAR_ZERO * beside, _AT_LIGHT))
+    start = np.arcsinh(s0 / height)
+    orders = _OF_MANY if light.cosine else _OF_ONE
+    owner, w, weight = panel_nodes(start, np.arcsinh(s1 / height) - start, orders=orders)
+    ray, foot, height = ray[owner], foot[owner], height[owner]
+    sine, r = np.tanh(w), height * np.cosh(w)
+    x = foot + height * np.sinh(w)
+    direction, normal = rays.direction[ray], rays.normal[ray]
+    profile = falloff(np.arcsin(sine)[:, None], direction, normal, light)[:, 0] if light.is_soft else 1.0
+    towards = sine[:, None] * direction + (1 / np.cosh(w))[:, None] * normal
+    camera, leg = lengths(truth, truth.origin, direction, x), lengths(truth, light.position, towards, r)
+    return Places(ray, x, r, towards, camera, leg, medium[owner], -sine, (weight * r * profile)[:, None])
+
+
+def parallel_nodes(
+    truth: TruthScene, light: DirectionalLight, reach: tuple, ends: tuple[Array, Array] | None = None
+) -> Places:
+    """Return the nodes of a directional light on the lit parts of all rays, see `point_nodes`."""
+    rays, lit, segments = reach
+    x0, x1 = rays.distance(lit.ray, lit.low), rays.distance(lit.ray, lit.high)
+    if ends is not None:
+        x0, x1 = np.maximum(x0, ends[0][lit.ray]), np.minimum(x1, ends[1][lit.ray])
+    used = x1 > x0
+    stretches = lit.ray[used], x0[used], x1[used]
+    setup = Crossed(truth, rays.direction, segments)
+    pieces = cut_pieces(setup, stretches, kinks(truth, rays, np.unique(stretches[0])))
+    width = pieces.x1 - pieces.x0
+    depth = np.maximum(width * setup.by_medium("sigma_t", pieces.medium).max(axis=1), 1e-300)
+    owner, place, weight = panel_nodes(np.zeros(len(width)), depth, most=_DEEP, short=_SHALLOW)
+    place, weight, ray = place / depth[owner], weight / depth[owner], pieces.ray[owner]
+    x, direction = pieces.x0[owner] + width[owner] * place, truth.direction[ray]
+    point, endless = truth.origin + x[:, None] * direction, np.full(len(x), np.inf)
+    leg = lengths(truth, point, np.broadcast_to(-light.direction, point.shape), endless)
+    camera, medium = lengths(truth, truth.origin, direction, x), pieces.medium[owner] + 1
+    value = (weight * width[owner])[:, None]
+    return Places(ray, x, np.ones_like(x), 0 * direction, camera, leg, medium, rays.cosine[ray], value)
+
+
+def surface_points(
+    truth: TruthScene, light: TruthLight | DirectionalLight, distance: Array, reflected: Array, lit: Bools
+) -> Places:
+    """Return the visible surface points that a light reaches: L = f(w_i, w_o) cos I profile / r^2.
+
+    Parameters
+    ----------
+    distance
+        Of the surfaces along the rays, (rays,) [m].
+    reflected
+        f cos, (rays, 3) [1/sr].
+    lit
+        Which of them the light reaches, (rays,).
+    """
+    ray = np.flatnonzero(lit & np.any(reflected > 0, axis=1))
+    direction, x = truth.direction[ray], distance[ray]
+    point = truth.origin + x[:, None] * direction
+    if isinstance(light, DirectionalLight):
+        r, towards, value = np.ones(len(ray)), np.zeros_like(point), reflected[ray]
+        way = np.broadcast_to(-light.direction, point.shape)
+        leg = lengths(truth, point, way, np.full(len(ray), np.inf))
+    else:
+        way = point - light.position
+        r = np.maximum(np.linalg.norm(way, axis=1), np.finfo(float).tiny)
+        towards = way / r[:, None]
+        leg = lengths(truth, light.position, towards, r)
+        value = reflected[ray] * (_profile(light, towards) / r**2)[:, None]
+    camera, none = lengths(truth, truth.origin, direction, x), np.empty(0)
+    return Places(ray, x, r, towards, camera, leg, none.astype(np.int64), none, value)
+
+
+def panel_nodes(
+    start: Array, width: Array, *, most: float = _PANEL, short: float = _SHORT, orders: tuple[int, int] = _OF_ONE
+) -> tuple[Index, Array, Array]:
+    """Return Gauss-Legendre nodes on intervals.
+
+    Parameters
+    ----------
+    start, width
+        Of the intervals, (n,), in any variable.
+    most, short
+        Widest panel, and the widest interval that few nodes serve.
+    orders
+        How many nodes a panel has, and how many are few.
+
+    Returns
+    -------
+    owner, place, weight
+        Number of the interval, variable and weight of each node, (nodes,) each; sorted by interval.
+    """
+    few = width <= short
+    owners, places, weights = [], [], []
+    for chosen, order in ((np.flatnonzero(few), orders[1]), (np.flatnonzero(~few), orders[0])):
+        panels = np.maximum(np.ceil(width[chosen] / most).astype(np.int64), 1)
+        owner = np.repeat(chosen, panels)
+        number = np.arange(len(owner)) - np.repeat(np.cumsum(panels) - panels, panels)
+        size = width[owner] / np.repeat(panels, panels)
+        node, weight = np.polynomial.legendre.leggauss(order)
+        owners.append(np.repeat(owner, order))
+        places.append(((start[owner] + size * number)[:, None] + 0.5 * size[:, None] * (1 + node)).ravel())
+        weights.append((0.5 * size[:, None] * weight).ravel())
+    owner = np.concatenate(owners)
+    by_owner = np.argsort(owner, kind="stable")
+    return owner[by_owner], np.concatenate(places)[by_owner], np.concatenate(weights)[by_owner]
+
+
+def lengths(truth: TruthScene, origin: Array, direction: Array, reach: Array) -> Array:
+    """Return how much of straight lines lies in each medium, that without bounds first, (n, media) [m].
+
+    Parameters
+    ----------
+    origin, direction
+        Of the lines, (3,) or (n, 3) [m], and (n, 3).
+    reach
+        How long they are, (n,) [m]; infinite where nothing surrounds the media, whose length is then given as 0.
+    """
+    inside = []
+    for medium in truth.media:
+        enter, leave = crossings(medium.bounds, origin, direction)
+        inside.append(np.maximum(np.minimum(leave, reach) - np.maximum(enter, 0.0), 0.0))
+    around = np.where(np.isfinite(reach), reach, 0.0) - sum(inside)
+    return np.stack([np.maximum(around, 0.0), *inside], axis=1)
+
+
+def _long_enough(truth: TruthScene) -> float:
+    """Return how far behind its foot point an unbounded ray is followed [m]."""
+    sigma_t = truth.medium.sigma_t
+    return float(_NOTHING_LEFT / (_THINNEST * sigma_t[sigma_t > 0].min())) if np.any(sigma_t > 0) else 0.0
+
+
+def _profile(light: TruthLight, direction: Array) -> Array:
+    """Return the profile of a light in directions away from it, (n,): on a ray along each, straight ahead."""
+    if light.axis is None:
+        return np.ones(len(direction))
+    inside = np.arccos(np.clip(direction @ light.axis, -1.0, 1.0)) <= light.cutoff
+    straight = np.full((len(direction), 1), 0.5 * np.pi)
+    return inside * falloff(straight, direction, np.zeros_like(direction), light)[:, 0]

@@ -1,0 +1,328 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The rays of some pixels, what lights reach on them, and from both all single-scattering paths of a scene.
+
+What a light reaches depends on where it is and how wide its cone is, not on its fall-off, on the fog or on the values:
+a view finds it once.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.quadrature.directional_airlight import lit_parallel_rays
+from reference.quadrature.light_airlight import lit_rays
+from reference.quadrature.light_points import PointPlan, light_points, square_points
+from reference.quadrature.surface import surface_hits
+from reference.scene.area_light import TruthAreaLight, is_area
+from reference.scene.camera import camera_matrix, film_directions, pixel_centres
+from reference.scene.directional_light import DirectionalLight, is_directional
+from reference.scene.read import TruthLight, TruthMedium, TruthScene
+from reference.scene.shapes import read_shapes
+from reference.visibility.before_light import before_light
+from reference.visibility.exact_distance import exact_distance
+from validation.fog_model.places import Places, lengths, no_places, parallel_nodes, point_nodes, surface_points
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+Light = TruthLight | DirectionalLight
+Progress = Callable[[float, str], None]
+
+SAMPLES = 16  #: of an area light
+
+
+@dataclass(frozen=True)
+class View:
+    """The rays of some pixels."""
+
+    truth: TruthScene  #: the scene, with these rays in the place of its own
+    pixels: Index  #: numbers of the pixels, row by row, ascending, (m,)
+    ray_pixel: Index  #: by ray, which of these it belongs to, (rays,)
+    axis: Array  #: of the camera, unit, (3,)
+    distance: Array  #: along the rays to the surfaces, (rays,) [m]
+    interaction: Any  #: Mitsuba's, at the surfaces
+    shapes: Any  #: the shapes that shadow
+    length: Array  #: of the rays up to the surfaces in each medium, (rays, media) [m]
+    _found: dict[Any, Any] = field(default_factory=dict, repr=False)
+
+    def ends(self, planes: tuple[float, float], spherical: bool = False) -> tuple[Array, Array]:
+        """Return the distances of two planes before the camera, or of two spheres around it, along the rays [m]."""
+        slant = 1.0 if spherical else 1 / (self.truth.direction @ self.axis)
+        near, far = (np.broadcast_to(plane * slant, self.distance.shape) for plane in planes)
+        return near, far
+
+    def reach(self, light: Light, *, shadows: bool, area: TruthAreaLight | None) -> Any:
+        """Return which parts of the rays a light reaches; the shape of an area light does not shadow its samples."""
+
+        def found() -> Any:
+            truth, shapes = self.truth, self.shapes
+            if not shadows:
+                truth, shapes = replace(truth, occluders=mi.load_dict({"type": "scene"})), None
+            elif area is not None:
+                truth, shapes = self._once(("before", area.name), lambda: before_light(truth, area))
+            # Intervals by geometry are what they are: random checks only say how far to trust them.
+            how = {"shapes": shapes} | ({} if self.shapes.others is not None else {"checks": 0})
+            reached = lit_parallel_rays if isinstance(light, DirectionalLight) else lit_rays
+            return reached(truth, light, self.distance, how)
+
+        return self._once(("reach", _place_of(light), shadows, None if area is None else area.name), found)
+
+    def reflected(self, light: Light, *, shadows: bool) -> tuple[Array, Bools]:
+        """Return f cos at the surfaces towards a light, (rays, 3), and which of them it reaches, (rays,)."""
+
+        def found() -> tuple[Array, Bools]:
+            visible = np.isfinite(self.distance)
+            point = self.truth.origin + np.where(visible, self.distance, 0.0)[:, None] * self.truth.direction
+            facing = self.interaction.is_valid()
+            if isinstance(light, DirectionalLight):
+                towards = np.broadcast_to(-light.direction, point.shape)
+                shadow_ray = self.interaction.spawn_ray(mi.Vector3f(towards.T))
+            else:
+                way = light.position - point
+                towards = way / np.maximum(np.linalg.norm(way, axis=1), np.finfo(float).tiny)[:, None]
+                # An array, since a number would be a constant of a kernel, which each light would compile again.
+                place = np.broadcast_to(light.position, point.shape)
+                shadow_ray = self.interaction.spawn_ray_to(mi.Point3f(np.ascontiguousarray(place.T)))
+            local = self.interaction.to_local(mi.Vector3f(np.ascontiguousarray(towards.T)))
+            value = self.interaction.bsdf().eval(mi.BSDFContext(), self.interaction, local, facing)
+            reflected = np.array(value, dtype=np.float64).reshape(3, -1).T
+            lit = visible & np.any(reflected > 0, axis=1)
+            if shadows:
+                lit &= ~np.array(self.truth.occluders.ray_test(shadow_ray, facing), dtype=bool)
+            return reflected, lit
+
+        return self._once(("surface", _place_of(light)[:2], shadows), found)
+
+    def _once(self, key: Any, found: Callable[[], Any]) -> Any:
+        if key not in self._found:
+            self._found[key] = found()
+        return self._found[key]
+
+
+def _place_of(light: Light) -> tuple[Any, ...]:
+    """Return what decides which parts of rays a light reaches."""
+    if isinstance(light, DirectionalLight):
+        return light.direction.tobytes(), None
+    return light.position.tobytes(), "near", None if light.axis is None else light.axis.tobytes(), light.cutoff
+
+
+def view_of(
+    truth: TruthScene,
+    pixels: Index | None = None,
+    *,
+    rays_per_side: int = 0,
+    offset: tuple[float, float] = (0.0, 0.0),
+    zoom: float = 1.0,
+) -> View:
+    """Return the rays of some pixels.
+
+    Parameters
+    ----------
+    pixels
+        Numbers of the pixels, row by row; all by default.
+    rays_per_side
+        0: one ray through the centre of each pixel. n: n x n rays, one through the middle of each cell of a grid,
+        whose mean is that over the pixel.
+    offset
+        Moves all rays on the film, to the right and down [pixels].
+    zoom
+        Factor on the distance of all rays from the middle of the film, before they are moved.
+    """
+    size = truth.width, truth.height
+    pixels = np.arange(size[0] * size[1]) if pixels is None else np.unique(pixels)
+    positions, middle = _positions(pixel_centres(size)[pixels], rays_per_side), 0.5 * np.array(size)
+    positions = middle + zoom * (positions - middle) + np.asarray(offset)
+    rays = replace(truth, direction=film_directions(truth.scene.sensors()[0], positions, size))
+    shapes, hits = read_shapes(truth.occluders), surface_hits(rays)
+    distance = exact_distance(rays, hits.interaction, hits.distance, shapes)
+    length = lengths(rays, truth.origin, rays.direction, distance)
+    length[~np.isfinite(distance), 0] = np.inf
+    owner = np.repeat(np.arange(len(pixels)), max(1, rays_per_side) ** 2)
+    axis = camera_matrix(truth.scene.sensors()[0])[:3, 2]
+    return View(rays, pixels, owner, axis, distance, hits.interaction, shapes, length)
+
+
+def _positions(centres: Array, rays_per_side: int) -> Array:
+    """Return places on the film, those of a pixel one after another."""
+    if not rays_per_side:
+        return centres
+    row, column = np.divmod(np.arange(rays_per_side**2), rays_per_side)
+    cells = np.stack([column, row], axis=1)
+    # The middles: where the image is smooth, random places would err by its slope, these by its curvature.
+    return (centres[:, None, :] - 0.5 + (cells + 0.5) / rays_per_side).reshape(-1, 2)
+
+
+@dataclass(frozen=True)
+class LightPaths:
+    """All paths from one light of the scene."""
+
+    name: str  #: the light's id
+    intensity: Array  #: radiant intensity, irradiance or radiance times area, (3,): what multiplies the nodes
+    nodes: Places
+    surface: Places
+
+
+@dataclass(frozen=True)
+class ScatteringPaths:
+    """All paths of some pixels of an image."""
+
+    view: View
+    media: tuple[TruthMedium, ...]  #: that without bounds first
+    lights: tuple[LightPaths, ...]
+
+
+def scattering_paths(
+    view: View,
+    lights: Sequence[TruthLight] | None = None,
+    *,
+    radius: float = 0.0,
+    blend: float = 0.0,
+    ends: tuple[Array, Array] | None = None,
+    shadows: bool = True,
+    airlight: bool = True,
+    surface: bool = True,
+    samples: int = SAMPLES,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> ScatteringPaths:
+    """Return all paths of a view.
+
+    Parameters
+    ----------
+    lights
+        Point and spot lights in the place of those of the scene.
+    radius
+        Of spheres that take the place of point lights, of the same intensity [m].
+    blend
+        Fraction of 1 - cos(cut-off), from the cut-off inwards, in which spots fall off smoothly, besides their own
+        edge.
+    ends
+        Distances between which rays have nodes, (rays,) each [m].
+    shadows
+        False where surfaces hide nothing from the lights.
+    samples, seed
+        How many samples stand for an area light, and their seed.
+    """
+    truth = view.truth if lights is None else replace(view.truth, lights=tuple(lights))
+    sources = light_sources(truth, samples, seed, radius)
+    paths = []
+    for number, source in enumerate(sources):
+        nodes, lit = [no_places(len(truth.media) + 1, surface=False)], [no_places(len(truth.media) + 1, surface=True)]
+        for given in source.lights:
+            light = _whole_within(given, blend) if blend else given
+            if airlight and not (isinstance(light, DirectionalLight) and not truth.media):  # which scatters nowhere
+                reach = view.reach(light, shadows=shadows, area=source.area)
+                make: Any = parallel_nodes if isinstance(light, DirectionalLight) else point_nodes
+                nodes.append(_edged(make(truth, light, reach, ends), light, source, blend))
+            if surface and truth.occluders.shapes():
+                reflected, visible = view.reflected(light, shadows=shadows)
+                points = surface_points(truth, light, view.distance, reflected, visible)
+                lit.append(_edged(points, light, source, blend))
+        paths.append(LightPaths(source.name, np.asarray(source.intensity), Places.joined(nodes), Places.joined(lit)))
+        if progress is not None:
+            progress((number + 1) / len(sources), "lit intervals")
+    return ScatteringPaths(view, (truth.medium, *truth.media), tuple(paths))
+
+
+@dataclass(frozen=True)
+class Source:
+    """A light of the scene."""
+
+    name: str  #: its id
+    intensity: Array  #: what multiplies the paths from it, (3,)
+    lights: Sequence[Light]  #: that stand for it
+    centre: Array | None = None  #: of a sphere, (3,) [m]
+    area: TruthAreaLight | None = None  #: that has this extent in the scene
+
+
+def light_sources(truth: TruthScene, samples: int = SAMPLES, seed: int = 0, radius: float = 0.0) -> list[Source]:
+    """Return the lights of a scene: point and spot lights, directional ones, then area lights.
+
+    The parameters are those of `scattering_paths`.
+    """
+    emitters = truth.scene.emitters()
+    far_names = [emitter.id() for emitter in emitters if is_directional(emitter)]
+    near_names = [emitter.id() for emitter in emitters if not is_directional(emitter) and not is_area(emitter)]
+    plan = PointPlan(most=samples, seed=seed)
+    near = [
+        _as_sphere(name, light, plan, radius)
+        if radius > 0 and light.axis is None
+        else Source(name, light.intensity, (light,))
+        for name, light in zip(near_names, truth.lights, strict=True)
+    ]
+    far = [Source(name, light.irradiance, (light,)) for name, light in zip(far_names, truth.directional, strict=True)]
+    wide = [
+        Source(
+            light.name,
+            light.radiance * light.area / samples,
+            light_points(light, square_points(plan, number, 0, light.kind)),
+            light.centre if light.kind == "sphere" else None,
+            light,
+        )
+        for number, light in enumerate(truth.area)
+    ]
+    return [*near, *far, *wide]
+
+
+def _as_sphere(name: str, light: TruthLight, plan: PointPlan, radius: float) -> Source:
+    """Return a sphere of a point light's intensity.
+
+    Seen from anywhere, a sphere of the radiance L has the intensity L pi R^2; one of N points on it stands for the area
+    4 pi R^2/N, of the intensity L 4 pi R^2/N along its normal: four times that of the light over N.
+    """
+    wide = TruthAreaLight("sphere", light.position, np.eye(3), np.full(2, radius), np.zeros(3), False, None)
+    samples = light_points(wide, square_points(plan, 0, 0, "sphere"))
+    return Source(name, 4 * light.intensity / plan.most, samples, light.position)
+
+
+def _edged(places: Places, light: Light, source: Source, blend: float) -> Places:
+    """Return places with the edge of a spot as Blender has it, and as a sphere lights them that samples stand for."""
+    factor = _blended(places.towards, light) if blend else 1.0
+    if source.centre is not None and isinstance(light, TruthLight):
+        factor = factor / _level(places, light, source, source.centre)
+    return places if np.ndim(factor) == 0 else replace(places, value=places.value * np.asarray(factor)[:, None])
+
+
+def _level(places: Places, light: TruthLight, sphere: Source, centre: Array) -> Array:
+    """Return what the samples of a sphere together send to places, as a multiple of what the sphere sends there, (n,).
+
+    At the distance r from its centre a sphere of the radius R and the radiance L has the solid angle
+    2 pi (1 - sqrt(1 - (R/r)^2)), and an area that faces it the irradiance pi L (R/r)^2. N samples with the normals n_i
+    at the distances d_i along v_i stand for the area 4 pi R^2/N each, and give 4 pi R^2 L/N sum max(n_i.v_i, 0)/d_i^2,
+    each times the cosine to the way from the centre on such an area. Sixteen samples are 10 % off.
+    """
+    own = [each for each in sphere.lights if isinstance(each, TruthLight)]
+    place = light.position - centre + places.r[:, None] * places.towards
+    radius, r = float(np.linalg.norm(light.position - centre)), np.linalg.norm(place, axis=1)
+    starts, normals = (
+        np.stack(rows) for rows in ([e.position - centre for e in own], [np.asarray(e.axis) for e in own])
+    )
+    d = np.sqrt(np.maximum(r[:, None] ** 2 - 2 * place @ starts.T + radius**2, np.finfo(float).tiny))
+    sent = np.maximum(place @ normals.T - (starts * normals).sum(axis=1), 0) / d**3
+    if places.is_surface:
+        whole = 1 / r**2
+        sent *= (r[:, None] - (place / r[:, None]) @ starts.T) / d
+    else:
+        whole = 2 * (1 - np.sqrt(1 - np.minimum(radius / r, 1.0) ** 2)) / radius**2
+    return np.asarray(4 * sent.mean(axis=1) / whole)
+
+
+def _whole_within(light: Light, blend: float) -> Light:
+    """Return a spot that ends its full intensity where that of Blender's `spot_blend` ends, a kink."""
+    if isinstance(light, DirectionalLight) or light.axis is None or light.cosine:
+        return light
+    return replace(light, beam=float(np.arccos(min(blend + (1 - blend) * np.cos(light.cutoff), 1.0))))
+
+
+def _blended(towards: Array, light: Light) -> Array:
+    """Return Blender's edge over that of a spot with the same ends, (n,): smoothstep of the cosine, linear in angle."""
+    if isinstance(light, DirectionalLight) or light.axis is None or light.cosine:
+        return np.ones(len(towards))
+    cosine = np.clip(towards @ light.axis, -1.0, 1.0)
+    part = np.clip((cosine - np.cos(light.cutoff)) / (np.cos(light.beam) - np.cos(light.cutoff)), 0.0, 1.0)
+    linear = np.clip((light.cutoff - np.arccos(cosine)) / (light.cutoff - light.beam), 0.0, 1.0)
+    return np.divide(part * part * (3 - 2 * part), linear, out=np.zeros(len(cosine)), where=linear > 0)
