@@ -135,7 +135,6 @@ def test_the_worked_method_is_measured_like_a_built_in_one(fog, variant):
 
 @pytest.mark.claim("own-method")
 def test_the_plain_method_returns_what_the_page_says(fog, variant):
-
     from realtime.frame.renderer import render_frame
     from realtime.scene.read_scene import read_scene
     from validation.study.configuration import prepared

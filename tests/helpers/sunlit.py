@@ -65,7 +65,6 @@ def shaded(*, size=(16, 12), **changes: Any) -> dict[str, Any]:
 
 def rays(scene) -> tuple[Array, Array]:
     """Return the camera's place and the directions of all pixels in the order of the image."""
-
     camera = scene.camera
     direction, _ = ray_directions(camera, dr.arange(mi.UInt32, camera.width * camera.height))
     return np.array(camera.origin, dtype=float).ravel(), np.array(direction, dtype=float).T

@@ -30,7 +30,6 @@ def simple_camera():
 
 def opaque_camera(size, vectors):
     """Return a camera of these vectors, in float64; all such cameras share their kernels, as the product's do."""
-
     arrays = [mi.Vector3d(*map(float, vector)) for vector in vectors]
     dr.make_opaque(arrays)
     return Camera(*size, *arrays, grid=pixel_grid(*size, mi.Float64))

@@ -22,7 +22,6 @@ HG = {"phase": {"type": "hg", "g": 0.6}}
 
 def traced(scene, batches, samples=64):
     """Return quadrature image and batches of single-scatter."""
-
     truth = read_truth(mi.load_dict(scene))
     done = single_scatter_batch(truth, 0, samples)
     for seed in range(1, batches):
@@ -82,7 +81,6 @@ def test_single_scatter_agrees_with_the_quadrature(variant, name):
 @pytest.mark.claim("sampled-distances")
 def test_sampled_distances_have_their_density(variant):
     """The mean of 1/density over the samples is the length; the density is below 1/(2 length) nowhere."""
-
     count = 4096
     u = mi.Float((np.arange(count) + 0.5) / count)
     for sigma_t in ([0.0], [1.3], [0.2, 3.0, 40.0]):
@@ -110,7 +108,6 @@ def test_volpath_agrees(variant, name):
 @pytest.mark.parametrize("estimator", ["quadrature", "single-scatter"])
 @pytest.mark.parametrize("bounded", [False, True], ids=["fog alone", "a body in fog"])
 def test_medium_without_bounds_is_refused(variant, estimator, bounded):
-
     body = {"brick": brick() | {"exterior": {"type": "ref", "id": "fog"}}} if bounded else {}
     scene = mi.load_dict(tiny_scene(lamp=None, sun=sun(), **body))
     medium = scene.sensors()[0].get_medium()

@@ -12,7 +12,6 @@ from tests.helpers.scenes import tiny_scene
 
 
 def read(**changes):
-
     return read_scene(mi.load_dict(tiny_scene(**changes)))
 
 

@@ -27,7 +27,6 @@ render = partial(frames.render, precision="double")
 
 
 def truth_of(scene):
-
     return read_truth(mi.load_dict(scene))
 
 

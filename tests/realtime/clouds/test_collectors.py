@@ -22,7 +22,6 @@ EXTINCTION = 2.3
 
 
 def _map(direction, *, sides=SLAB, turn=SLAB_TURN, size=256):
-
     entry = cube(centre=tuple(MIDDLE), sides=sides, turn=turn)
     scene = read(clear_scene(lamp=sun(direction), cube=entry))
     return light_map([mi.load_dict({"type": "scene", "cloud": entry})], scene.lights[0], size)
@@ -34,7 +33,6 @@ def _vectors(points):
 
 
 def _search(light_map, transport, points, towards, *, behind=100.0, **options):
-
     point, toward = _vectors(points), _vectors(towards)
     light = collector_light(
         light_map,
@@ -111,7 +109,6 @@ WEDGE_HEIGHT, WEDGE_SLOPE = 0.7, 0.05
 
 def _wedge(axis):
     """Return the map of a cloud with a level face at z = 0 and a floor at -0.7 - 0.05 x: its thickness tells x."""
-
     vertices, faces = box((12.0, 9.0, 1.0))
     vertices = np.array(vertices, dtype=float)
     below = vertices[:, 2] < 0

@@ -19,7 +19,6 @@ SIZE = 64
 
 
 def _cube_map(precision="single", *, size=SIZE, direction=ALONG, slopes=True):
-
     scene = read(clear_scene(lamp=sun(direction), cube=cube()), precision)
     cloud = mi.load_dict({"type": "scene", "cloud": cube()})
     surfaces = cast_surfaces(cloud, scene.lights[0], size)
@@ -34,7 +33,6 @@ def _vectors(points):
 @pytest.mark.claim("collector-slopes", tolerance="1e-4 of the cosine, against 0.05 by unit normals")
 def test_normals_of_levels_are_those_of_mean_slopes(variant):
     """Through a saw tooth whose steep sides hide, the mean plane is level: its unit normals lean towards the light."""
-
     scene = read(clear_scene(lamp=sun((0.0, 0.0, -1.0)), cube=cube()), "single")
     basis = filtered_map([_saw()], scene.lights[0], slopes=False).projection.basis
     width = 2 * float(np.linalg.norm(np.array(basis[0]))) / SIZE
@@ -52,7 +50,6 @@ def test_normals_of_levels_are_those_of_mean_slopes(variant):
 
 def _saw(width=1.0):
     """Return a surface that rises by a texel's width a texel, eight texels long, and falls back in a step."""
-
     count = SIZE * SIZE
     column = np.arange(count) % SIZE
     tilted = np.tile([[-(0.5**0.5)], [0.0], [0.5**0.5]], count)
@@ -69,7 +66,6 @@ def _saw(width=1.0):
 @pytest.mark.parametrize("slopes", [True, False])
 def test_levels_are_means_over_the_cloud_alone(variant, slopes):
     """A premultiplied mean leaves out what lies beside the cloud, and knows where the rest is."""
-
     surfaces, light_map = _cube_map(slopes=slopes)
     in_rows = np.argsort(np.array(surfaces.place))
     parts = (np.array(value)[in_rows] for value in (surfaces.there, surfaces.front, surfaces.back))
@@ -106,7 +102,6 @@ def test_levels_are_means_over_the_cloud_alone(variant, slopes):
 @pytest.mark.parametrize("width", [0.0, 0.03, 0.4, 50.0])
 def test_beside_the_cloud_is_what_is_nearest_of_it(variant, width):
     """Past the silhouette A = 0: there is no mean, and yet a surface."""
-
     _, light_map = _cube_map()
     rng = np.random.default_rng(7)
     points = np.asarray(MIDDLE) + rng.uniform(-3, 3, (500, 3))

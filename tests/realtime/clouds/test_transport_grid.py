@@ -32,7 +32,6 @@ def _formula(types):
 
 
 def _both(points):
-
     look_up = _formula(SimpleNamespace(scalar=mi.Float))
     grid = transport_grid(look_up, np.ones((SETS, ENTRIES)), SETS)
     arguments = [aligned_array(mi.Float, np.asarray(column)) for column in points]

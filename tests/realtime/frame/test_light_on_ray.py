@@ -62,7 +62,6 @@ def test_a_ray_straight_away_from_a_light_has_its_airlight(variant, method, para
 
 
 def test_what_is_not_finite_is_refused_whatever_the_reason():
-
     values = np.ones((2, 3, 3))
     values[1, 2, 0] = np.nan
     scene = SimpleNamespace(lights=(), medium=SimpleNamespace(clear=False))

@@ -28,7 +28,6 @@ METHODS = {
 
 
 def scene(*, lamp=False):
-
     disk = area_lamp("disk", (0.31, -0.57, 1.93), (0.13, 0.29, -1.0), 0.17, (5.3, 4.9, 4.1))
     lamps = {"lamp": disk} if lamp else {}
     box = mi.ScalarTransform4f().translate([0.13, 0.17, 0.71]).rotate([0.3, 1, 0.2], 29.0).scale(0.37)

@@ -87,7 +87,6 @@ def waits_in_clouds(method: str) -> dict[str, Counter[str]]:
 
 def waits_of_frames(scene: dict[str, Any], method: str) -> dict[str, Counter[str]]:
     """By what moved, the waits of a frame that has been rendered before."""
-
     read = read_scene(mi.load_dict(scene))
     points = {"points": POINTS} if read.area_lights else {}
     renderer = frame_renderer(read, METHODS[method], kernel=KERNELS["exact"].function, **points)

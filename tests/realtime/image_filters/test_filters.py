@@ -66,7 +66,6 @@ def as_image(lanes):
 
 def filtered(name, image, *, hd=1.7, hr=0.5, depth=None, support=3.0):
     """Run a filter by its name on an image (height, width)."""
-
     raster, lanes = Raster(WIDTH, HEIGHT), as_lanes(image)
     own = () if np.isinf(hr) else (Guide(lanes, hr),)
     guides = own if depth is None else (depth_guide(as_lanes(depth), 0.1),)
@@ -118,7 +117,6 @@ def test_sky_and_zero_depth_give_numbers(variant, name):
 
 
 def test_levels_leave_out_what_is_not_there(variant):
-
     image, there = noise(), np.random.default_rng(9).uniform(size=(HEIGHT, WIDTH)) < 0.7
     lanes = bilateral_of_levels(
         as_lanes(image), Raster(WIDTH, HEIGHT), levels=LEVELS, hd=1.7, hr=0.5, there=mi.Bool(there.ravel())
@@ -131,7 +129,6 @@ def test_levels_leave_out_what_is_not_there(variant):
 
 def test_a_width_by_pixel_counts_the_taps_of_each_pixel(variant):
     """Where the width is that of one pixel, so is the result of the Gaussian of this width along one row."""
-
     row = np.random.default_rng(8).uniform(size=40)
     widths = np.where(np.arange(40) < 20, 0.8, 2.5)
     raster = Raster(40, 1)

@@ -14,7 +14,6 @@ WIDTH, HEIGHT = 24, 16
 
 def upsampled(image, depth, scale):
     """Take every `scale`-th pixel of an image and interpolate them again."""
-
     large, small = Raster(WIDTH, HEIGHT), Raster(WIDTH // scale, HEIGHT // scale)
     pixel = np.array(small_pixels(small, scale, WIDTH))
     guide = depth_guide(mi.Float(depth.ravel()), 0.1)

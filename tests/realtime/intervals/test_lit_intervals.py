@@ -39,7 +39,6 @@ def integral(a, b):
 
 
 def start(layers, places):
-
     columns = [aligned_array(mi.Float, column) for column in places.T]
     return aligned_array(mi.Float, layers), columns, no_intervals(dr.zeros(mi.Vector3f, RAYS), columns[0])
 
@@ -55,7 +54,6 @@ def check(total, layers, places, gains):
 @given(layers=arrays(np.int64, RAYS, elements=st.integers(-1, 2)), places=PLACES, gains=GAINS, due=WAITS)
 def test_intervals_that_wait_as_long_as_they_may(variant, layers, places, gains, due):
     """As shadow planes use it: until another one closes, or until it is due; the rest at the end of the ray."""
-
     over, columns, intervals = start(layers, places)
     opened = columns[0]
     for step in range(STEPS):
@@ -73,7 +71,6 @@ def test_intervals_that_wait_as_long_as_they_may(variant, layers, places, gains,
 @given(layers=arrays(np.int64, RAYS, elements=st.integers(-1, 2)), places=PLACES, gains=GAINS)
 def test_intervals_that_are_added_at_once(variant, layers, places, gains):
     """As min-max uses it: what is lit to the end closes there."""
-
     over, columns, intervals = start(layers, places)
     for step in range(STEPS):
         behind = over + aligned_array(mi.Float, gains[:, step])

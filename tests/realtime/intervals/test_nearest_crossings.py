@@ -37,7 +37,6 @@ def rows(values):
 @settings(deadline=None, max_examples=50)
 @given(keys=KEYS)
 def test_the_nearest_are_kept_in_order_and_the_others_come_out(variant, larger, keys):
-
     none = 0.0 if larger else np.inf
     queue, out = filled(none, PLACES, mi.Float, RAYS), []
     for number, key in enumerate(columns(keys)):
@@ -61,7 +60,6 @@ def test_the_nearest_are_kept_in_order_and_the_others_come_out(variant, larger, 
 @settings(deadline=None, max_examples=50)
 @given(keys=KEYS, shift=arrays(np.int64, (RAYS, COUNT), elements=st.integers(0, PLACES)))
 def test_exchange_mends_an_order_that_is_wrong_by_no_more_than_its_places(variant, larger, keys, shift):
-
     keys = np.take_along_axis(keys, in_order(keys, larger=larger), axis=1)
     # Each comes at most PLACES later than in order, so none waits for more than these.
     late = np.argsort(np.arange(COUNT) + shift, axis=1, kind="stable")

@@ -28,7 +28,6 @@ def ball(**phase):
 
 def by_hand(scene, exponent, p):
     """Integrate exp(-exponent(x, r, foot, height, enter)) p/r^2 over every chord by adaptive quadrature."""
-
     truth = read_truth(mi.load_dict(scene))
     light = truth.lights[0]
     image = np.zeros(len(truth.direction))

@@ -86,7 +86,6 @@ def test_a_light_beside_the_segment_on_the_ray(variant, name):
 @pytest.mark.parametrize("method", ["unshadowed", "light-volumes"])
 def test_a_refusal_from_the_body_of_a_loop_stays_one(variant, method):
     """Dr.Jit wraps what is raised there: `random:13` ended `airlight render` with a traceback."""
-
     entries = tiny_scene()
     fog = entries["fog"] | {"phase": {"type": "tabphase", "values": "1.1, 0.4, 1.7"}}
     block = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).scale(0.31)}

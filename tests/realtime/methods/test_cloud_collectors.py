@@ -59,7 +59,6 @@ def _scene(scale=1.0, *, size=(16, 12), **parts):
 
 
 def _renderer(scene, precision="single", **parameters):
-
     return frame_renderer(read_scene(mi.load_dict(scene), precision), METHODS["cloud-collectors"], **parameters)
 
 
@@ -74,7 +73,6 @@ def _airlight(scene, precision="single", **parameters):
 
 
 def _rays(scene, precision="single"):
-
     camera = read_scene(mi.load_dict(scene), precision).camera
     pixels = mi.UInt32(np.arange(camera.width * camera.height))
     directions = np.array(ray_directions(camera, pixels)[0]).T
@@ -128,7 +126,6 @@ def test_coloured_clouds_are_three_grey_ones(variant):
 
 def test_the_peak_lowers_the_density(variant):
     """The share of the peak is what the slab loses in thickness; the printed half is more."""
-
     share = share_of_peak(HenyeyGreenstein(mi.Float(0.85)), array_types("single"))
     thin = _slab(medium=DROPLETS | {"sigma_t": (1 - share) * EXTINCTION})
     matched = _airlight(_scene(), peak="matched")

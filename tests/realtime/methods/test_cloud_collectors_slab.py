@@ -30,7 +30,6 @@ AXIS = np.array([0.517, 0.211, -0.829]) / np.linalg.norm([0.517, 0.211, -0.829])
 @pytest.mark.claim("collector-slab", tolerance="2 % RMSE of the mean: linear entries of the grid")
 @pytest.mark.parametrize("peak", ["matched", "full"])
 def test_a_slab_is_exact_to_two_percent(variant, monkeypatch, peak):
-
     from realtime.clouds.canonical.tables import Grid, canonical_tables
 
     for name, value in (("THINNEST", 3.0), ("THICKEST", 4.8), ("LOWEST_SUN", 0.7)):

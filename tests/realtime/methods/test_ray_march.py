@@ -26,7 +26,6 @@ def lit_by_hand(points, light, centre, radius):
 
 def runs_by_hand(scene, distance, steps, spacing):
     """Add up, cell by cell, twelve Gauss nodes of the integrand where the middle of the cell is lit."""
-
     truth = read_truth(mi.load_dict(scene))
     light, centre, radius = truth.lights[0], np.array(scene["ball"]["center"]), scene["ball"]["radius"]
     sigma, albedo = truth.medium.sigma_t, truth.medium.albedo

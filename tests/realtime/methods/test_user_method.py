@@ -189,7 +189,6 @@ def test_faults_in_the_file_are_told_with_their_line(tmp_path, monkeypatch):
 
 @pytest.mark.claim("own-method-frozen")
 def test_only_a_method_that_says_so_is_frozen(own, variant):
-
     scene = read_scene(mi.load_dict(tiny_scene()))
     assert not isinstance(frame_renderer(scene, find_method(f"{own}:constant")).render, Frozen)
     assert isinstance(frame_renderer(scene, find_method(f"{own}:calls"), kernel=print).render, Frozen)

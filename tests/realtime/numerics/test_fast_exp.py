@@ -6,21 +6,18 @@ from realtime.numerics.fast_exp import WIDEST, exp2_bounded, exp_bounded, sinh_b
 
 
 def test_relative_error_over_the_stated_range(variant):
-
     x = np.linspace(-87, 88, 2_000_001).astype(np.float32)
     value = np.array(exp_bounded(mi.Float(x)), dtype=np.float64)
     assert np.max(np.abs(value / np.exp(x.astype(np.float64)) - 1)) < 2e-7  # stated in the docstring
 
 
 def test_power_of_two_over_the_stated_range(variant):
-
     x = np.linspace(-125, 125, 1_000_001).astype(np.float32)
     value = np.array(exp2_bounded(mi.Float(x)), dtype=np.float64)
     assert np.max(np.abs(value / np.exp2(x.astype(np.float64)) - 1)) < 2e-7  # stated in the docstring
 
 
 def test_hyperbolic_sine_over_the_stated_range(variant):
-
     y = np.append(np.linspace(-WIDEST, WIDEST, 100_000), np.geomspace(1e-30, 1, 1000)).astype(np.float32)
     value = np.array(sinh_bounded(mi.Float(y)), dtype=np.float64)
     assert np.max(np.abs(value / np.sinh(y.astype(np.float64)) - 1)) < 2e-7  # stated in the docstring

@@ -25,7 +25,6 @@ def collecting():
 
 def test_nothing_is_collected_during_a_call(variant, collecting):
     """A scene that is freed while a frame is recorded ends the process."""
-
     seen = []
 
     def doubled(x):

@@ -20,7 +20,6 @@ from validation.study.configuration import configuration, prepared
     [((64, 48), "x", None), ((37, 53), "y", None), ((37, 53), "smaller", (10, 31)), ((64, 48), "smaller", (10, 31))],
 )
 def test_rays_are_those_of_mitsuba(variant, size, axis, pixels):
-
     sensor = {
         "type": "perspective",
         "fov": 47.0,
@@ -42,7 +41,6 @@ def test_rays_are_those_of_mitsuba(variant, size, axis, pixels):
 
 def test_aim_is_kept_to_twice_the_digits(variant):
     """Single precision with its low part against double precision: the angle between the two."""
-
     matrix = mi.ScalarTransform4f().look_at([1.3, -2.1, 0.7], [0.2, 0.4, 0.9], [0.1, 0.2, 1.0])
     film = {"type": "hdrfilm", "width": 801, "height": 601}
     scene = mi.load_dict({"type": "scene", "s": {"type": "perspective", "fov": 63.7, "to_world": matrix, "film": film}})
@@ -77,7 +75,6 @@ def test_rows_and_columns_are_those_of_a_division(variant, width):
 
 def test_one_kernel_serves_images_of_all_sizes(variant):
     """Rationale: a kernel that holds the size of an image is compiled anew for each, for half a second and more."""
-
     launched = []
     for size in ((64, 48), (96, 80)):
         scene = read_scene(load_scene("sphere-spot", size).scene)

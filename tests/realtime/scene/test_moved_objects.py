@@ -43,7 +43,6 @@ def floor():
 
 
 def read(turn=None, *, normals: bool = False):
-
     parts = {"ball": bumpy_ball(turn, normals=normals), "floor": floor()}
     return read_scene(mi.load_dict(tiny_scene(size=(48, 36), **parts)))
 

@@ -19,7 +19,6 @@ def phases():
 @pytest.mark.claim("phase-two-sides", tolerance="1e-5 relative: float32")
 def test_against_the_analytic_side(variant):
     """The same functions written twice, in float32 here and in float64 there."""
-
     cosine = np.linspace(-1, 1, 2001).astype(np.float32)
     for name, g, phase in phases():
         value = np.broadcast_to(np.array(evaluate(phase, mi.Float(cosine)), dtype=np.float64), cosine.shape)
@@ -39,7 +38,6 @@ def test_against_the_analytic_side(variant):
     ],
 )
 def test_droplets_are_those_of_the_analytic_side(variant, words):
-
     angle = np.concatenate([np.linspace(0.1, np.pi, 700), np.geomspace(1e-4, 0.08, 80)])
     down = np.sin(0.5 * angle) ** 2
     for Float, tolerance in ((mi.Float32, 2e-5), (mi.Float64, 1e-6)):

@@ -9,7 +9,6 @@ from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 
 
 def read(**changes):
-
     return read_scene(mi.load_dict(tiny_scene(**changes)))
 
 
@@ -30,7 +29,6 @@ def test_reads_what_the_scene_holds(variant):
 @pytest.mark.parametrize("names", [("a.b", "a-b"), ("Sphere-2", ""), ("", "Sphere-1"), ("", ""), ("a.b.c", "a-b.c")])
 def test_every_opaque_shape_stays_whatever_its_name(variant, names):
     """Mitsuba's dictionaries have keys without dots, each once; beside a boundary the opaque shapes are a new scene."""
-
     bounded = bounded_medium({"type": "cube"}, 0.3, (0.9, 0.9, 0.9))
     scene = clear_scene(first={"type": "sphere"}, second={"type": "sphere", "center": [5.0, 0.0, 0.0]}, box=bounded)
     loaded = mi.load_dict(scene)

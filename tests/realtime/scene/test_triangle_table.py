@@ -13,7 +13,6 @@ from tests.helpers.scenes import tiny_scene
 
 def shaded(scene, *, table: bool):
     """Render the surfaces of a scene with its table of triangles, or with Mitsuba's interactions."""
-
     read = read_scene(mi.load_dict(scene))
     return read, render_frame(
         frame_renderer(read if table else replace(read, facets=None), METHODS["ray-march"], steps=1)

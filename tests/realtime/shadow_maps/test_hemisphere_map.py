@@ -12,7 +12,6 @@ from tests.helpers.lamps import lamp_scene
 
 
 def test_a_plane_never_shadows_itself(variant):
-
     scene = with_light_points(read_scene(mi.load_dict(lamp_scene(ball=None))), 3, "ring")
     state = source_state(scene.geometry, list(scene.lights), 64, with_maps=True)
     points = np.random.default_rng(4).uniform([-5, -5, 0], [5, 5, 0], (50000, 3))

@@ -13,7 +13,6 @@ from tests.helpers.scenes import spot, tiny_scene
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_a_look_up_stays_in_the_map_whatever_the_point(variant, kind):
     """At the light itself a place on a face is no number: a load from there ended the process."""
-
     scene = read_scene(mi.load_dict(tiny_scene(**({"lamp": spot()} if kind == "spot" else {}))))
     light = scene.lights[0]
     shadow_map = cast_shadow_map(scene.geometry, light, 8)

@@ -28,7 +28,6 @@ SIZE = 48, 32
 
 def image_of(function, tolerance, *, depth=None, lit=None):
     """Return the image of a function of column and row between corners, and how many pixels were computed."""
-
     width, height = SIZE
     pixel = mi.UInt32(tiled_pixels(width, height))
     corners = tile_corners(pixel, SimpleNamespace(width=width, height=height), tolerance, by_rays=True, lights=1)
@@ -131,7 +130,6 @@ def test_frames_err_by_about_the_tolerance(variant, method, parameters):
 
 
 def frame(method, parameters, size=(96, 72)):
-
     chosen = METHODS[method]
     turned = mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).rotate([1, 2, 3], 40).scale(0.33)
     scene = read_scene(mi.load_dict(tiny_scene(size=size, ball={"type": "cube", "to_world": turned})))

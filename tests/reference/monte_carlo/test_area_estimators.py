@@ -41,7 +41,6 @@ def _lamp(kind, bsdf, *, in_view=False):
 
 
 def _truth(**changes):
-
     scene = tiny_scene(**changes)
     if changes.get("fog", scene) is None:
         scene["sensor"] = {key: entry for key, entry in scene["sensor"].items() if key != "medium"}
@@ -128,7 +127,6 @@ def test_both_estimators_agree(variant, name):
 )
 def test_surfaces_are_those_of_mitsubas_direct_integrator(variant, kind):
     """Rationale: without fog, Mitsuba's `direct` is a third way to the light on surfaces."""
-
     fog = tiny_scene()["fog"] | {"sigma_t": 0.0}
     truth = _truth(lamp=_lamp(kind, BLACK), fog=fog)
     ours = _run(single_scatter_batch, truth, 256)

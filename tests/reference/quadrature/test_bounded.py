@@ -19,7 +19,6 @@ FINE_TABLE = {
 
 
 def truth_and_image(scene, **settings):
-
     truth = read_truth(mi.load_dict(scene))
     return truth, quadrature_image(truth, **settings)
 

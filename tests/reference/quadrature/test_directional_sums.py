@@ -21,7 +21,6 @@ TABLE = {"phase": {"type": "tabphase", "values": "0.5, 0.2, 0.4, 1.7"}}
 
 
 def truth_and_image(scene, **settings):
-
     truth = read_truth(mi.load_dict(scene))
     return truth, quadrature_image(truth, **settings)
 
@@ -92,7 +91,6 @@ def test_ray_through_a_box_in_closed_form(variant, way):
 @pytest.mark.claim("directional-truth", tolerance="2e-9 relative")
 def test_panels_give_the_closed_form(variant):
     """Two ways to integrate the same pieces, of a polyhedron: Kronrod's rule and the exponential."""
-
     caster = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([-0.6, 0.1, 1.4]).scale([0.1, 0.3, 0.05])}
     truth = read_truth(mi.load_dict(sunny(brick=brick((0.71, 0.3, 0.02), scale=9.7), caster=caster, size=(32, 24))))
     light = truth.directional[0]

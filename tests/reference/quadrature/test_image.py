@@ -11,7 +11,6 @@ from tests.helpers.scenes import spot, tiny_scene
 
 
 def truth_of(samples=256, **changes):
-
     truth = read_truth(mi.load_dict(tiny_scene(**changes)))
     return truth, quadrature_image(truth, samples=samples)
 
@@ -72,7 +71,6 @@ def test_shadow_of_a_sphere_against_its_closed_form(variant):
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_surface_is_mitsubas_direct_integrator(variant, kind):
     """In a vacuum the lit surface is what Mitsuba's `direct` integrator renders at the pixel centres."""
-
     changes = {} if kind == "point" else {"lamp": spot(beam=20.0)}
     scene = mi.load_dict(tiny_scene(fog=tiny_scene()["fog"] | {"sigma_t": 0.0}, **changes))
     truth = read_truth(scene)

@@ -15,7 +15,6 @@ from tests.helpers.scenes import tiny_scene
 
 
 def truth_of(scene):
-
     return read_truth(mi.load_dict(scene))
 
 

@@ -21,7 +21,6 @@ def shapes(**extra):
 
 
 def truth_of(*, ambient=False, **changes):
-
     if not ambient:
         return read_truth(mi.load_dict(clear_scene(size=(9, 7), **shapes(), **changes)))
     scene = tiny_scene(size=(9, 7), fog=FOG, ball=None, floor=None)

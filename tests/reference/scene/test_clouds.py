@@ -16,7 +16,6 @@ def cloud(mesh, name="puff"):
 
 
 def read(**parts):
-
     usual = {
         "sensor": camera((0.3, -7.1, 0.7), (0, 0, 0), fov=41.0, size=(4, 3), in_fog=False),
         "sun": sun((0.1, 0.2, -0.9), (1.3, 1.1, 0.9)),

@@ -108,6 +108,5 @@ AMBIENT = {"type": "homogeneous", "sigma_t": 0.2, "albedo": 0.5}
     ],
 )
 def test_refused_scenes(variant, changes, message):
-
     with pytest.raises(InputError, match=message):
         read_truth(mi.load_dict(clear_scene(size=(4, 3), **changes())))

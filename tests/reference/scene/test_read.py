@@ -12,7 +12,6 @@ from tests.helpers.scenes import spot, tiny_scene
 
 def test_both_sides_read_the_same_scene(variant):
     """The truth and the methods under test read a scene by routes of their own; the numbers must be the same."""
-
     fog = tiny_scene()["fog"] | {"scale": 1.7, "phase": {"type": "hg", "g": -0.31}}
     scene = mi.load_dict(tiny_scene(fog=fog, spot=spot(cutoff=31.0, beam=17.0)))
     truth, other = read_truth(scene), read_scene(scene, "double")
@@ -32,7 +31,6 @@ def test_both_sides_read_the_same_scene(variant):
 
 @pytest.mark.claim("pixel-centre", tolerance="5e-7: Mitsuba's float32 matrices")
 def test_rays_are_those_of_mitsuba(variant):
-
     scene = mi.load_dict(tiny_scene(size=(33, 21)))
     truth = read_truth(scene)
     number = np.arange(33 * 21)
@@ -47,6 +45,5 @@ def test_rays_are_those_of_mitsuba(variant):
     [({"lamp": None}, "no light"), ({"lamp": None, "sky": {"type": "constant"}}, "light 'sky' of type 'constant'")],
 )
 def test_refusals(variant, changes, message):
-
     with pytest.raises(InputError, match=message):
         read_truth(mi.load_dict(tiny_scene(**changes)))

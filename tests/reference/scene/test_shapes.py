@@ -11,7 +11,6 @@ from tests.helpers.scenes import spot, tiny_scene
 @pytest.mark.parametrize("scale", [[2.0, 1.0, 1.0], [1.0, 2.0, 0.5], [-1.5, 1.5, 1.5]])
 def test_a_stretched_sphere_is_the_sphere_that_mitsuba_makes_of_it(variant, scale):
     """Mitsuba warns of it, and intersects a sphere whose radius is the first of the scales."""
-
     turned = mi.ScalarTransform4f().translate([0.3, 0.2, 0.1]).rotate([0.0, 0.6, 0.8], 40.0).scale(scale)
     scene = mi.load_dict({"type": "scene", "ball": {"type": "sphere", "to_world": turned, "flip_normals": True}})
     shapes = read_shapes(scene)
@@ -24,7 +23,6 @@ def test_a_stretched_sphere_is_the_sphere_that_mitsuba_makes_of_it(variant, scal
 
 
 def test_shapes_are_sorted_and_others_refused_by_name(variant):
-
     disk = {"type": "disk", "to_world": mi.ScalarTransform4f().translate([0, 0, 3])}
     shapes = read_shapes(mi.load_dict(tiny_scene(lid=disk)))
     assert shapes.triangles.shape == (2, 3, 3)

@@ -119,7 +119,6 @@ def scene_of_many(**changes):
 
 
 def rays_and_truth(scene):
-
     truth = read_truth(mi.load_dict(scene))
     span = scattering_range(camera_segments(truth, surface_hits(truth).distance))
     return truth, parallel_rays(truth.origin, truth.direction, truth.directional[0], span)

@@ -13,7 +13,6 @@ from tests.helpers.scenes import tiny_scene
 
 
 def test_distance_to_a_plane_is_exact(variant):
-
     truth = read_truth(mi.load_dict(tiny_scene(ball=None)))
     hits = surface_hits(truth)
     distance = exact_distance(truth, hits.interaction, hits.distance)
@@ -26,7 +25,6 @@ def test_distance_to_a_plane_is_exact(variant):
 @pytest.mark.parametrize("inside", [False, True], ids=["outside", "inside"])
 def test_distance_to_a_sphere_is_exact(variant, inside):
     """The points lie on the sphere in float64, and they are those that were cast."""
-
     sphere = {"type": "sphere", "center": [0.1, -3.9, 1.2], "radius": 1.9} if inside else tiny_scene()["ball"]
     truth = read_truth(mi.load_dict(tiny_scene(ball=sphere, floor=None)))
     hits = surface_hits(truth)

@@ -20,7 +20,6 @@ from validation.scenes.loading import load_scene
 
 
 def setup(scene):
-
     truth = read_truth(mi.load_dict(scene))
     return truth, *rays_of(truth)
 

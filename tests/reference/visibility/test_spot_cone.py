@@ -32,7 +32,6 @@ def test_interval_against_sampling(degrees):
 
 @pytest.mark.claim("spot-falloff", tolerance="2e-5: acos of a float32 cosine")
 def test_profile_is_that_of_mitsuba(variant):
-
     scene = mi.load_dict(tiny_scene(lamp=spot(cutoff=37.0, beam=14.0)))
     truth = read_truth(scene)
     light = truth.lights[0]

@@ -62,7 +62,6 @@ def test_segments_are_blocked_as_rays_are(variant):
 @pytest.mark.claim("shadow-rays-start-off-the-surface")
 def test_the_truth_of_a_renderer_with_an_epsilon_has_its_edges(variant):
     """A camera that sees nothing but the band between the two edges: lit in the truth, dark for such a renderer."""
-
     to_roof = mi.ScalarTransform4f().translate([-2, 0, 1]).scale([2, 3, 1])
     camera = mi.ScalarTransform4f().look_at(
         origin=[-0.5 + NEAR, 0.1, 0.4], target=[-0.5 + NEAR, 0.1, 0.0], up=[0, 1, 0]

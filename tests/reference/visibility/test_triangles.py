@@ -39,7 +39,6 @@ def test_shadow_rays_agree_with_the_geometry_of_built_in_scenes(variant, name):
 @pytest.mark.claim("cast-shadows", tolerance="2e-5, median 1e-6: where shadow rays stop")
 def test_edges_by_geometry_are_those_by_bisection(variant):
     """Two routes that share no code: edge by edge within the rounding of a float32 shadow ray."""
-
     truth = read_truth(mi.load_dict(box_scene()))
     light, rays, ends = rays_of(truth)
     exact = geometric_intervals(truth, light, rays, ends=ends)
@@ -53,7 +52,6 @@ def test_edges_by_geometry_are_those_by_bisection(variant):
 @pytest.mark.claim("exact-shadows")
 def test_a_needle_is_found_where_regular_samples_step_over_it(variant):
     """Its shadow in closed form: the two sides of a box that is seen from the light, in one plane."""
-
     width = 2e-4
     scene = tiny_scene(ball=None, floor=None, needle=box((0.3, -0.1, 0.9), (width, width, 8.0)))
     truth = read_truth(mi.load_dict(scene))
@@ -85,7 +83,6 @@ def test_a_needle_is_found_where_regular_samples_step_over_it(variant):
 @pytest.mark.claim("exact-shadows", tolerance="1e-12")
 def test_one_triangle_against_its_closed_form(variant):
     """Light, triangle and ray in one plane: the angles of the two corners as seen from the light."""
-
     truth = read_truth(mi.load_dict(tiny_scene(ball=None, floor=None, size=(1, 1))))
     light, (direction, normal, height), ends = rays_of(truth)
     a = light.position + 0.3 * height[0] * (np.cos(0.2) * normal[0] + np.sin(0.2) * direction[0])

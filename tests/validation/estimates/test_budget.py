@@ -63,7 +63,6 @@ def test_errors_by_hand():
 @pytest.mark.claim("pixels-beside-a-light")
 def test_pixels_beside_a_light_are_those_that_the_truth_names(variant):
     """The same pixels as from the quadrature's own angles; a light in view, one behind us, one in the sphere."""
-
     behind = {"type": "point", "position": [0.3, -6.0, 1.1]}
     hidden = {"type": "point", "position": [0.1, 0.3, 0.65]}
     scene = mi.load_dict(tiny_scene(size=(40, 30), behind=behind, hidden=hidden))

@@ -41,7 +41,6 @@ def test_every_estimator_refuses_a_light_at_the_camera_or_on_a_ray(variant, posi
 
 
 def test_a_spot_on_a_ray_is_refused_where_the_ray_is_in_its_cone(variant):
-
     def lamp(target):
         place = mi.ScalarTransform4f().look_at([0, 0, 1], target, [0, 0, 1])
         return spot() | {"to_world": place}

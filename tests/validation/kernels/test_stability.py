@@ -67,7 +67,6 @@ def test_small_relative_mistake_is_found_where_it_is(variant):
     """One part in a thousand, only for rays whose light is behind the camera."""
 
     def wrong_behind(geometry, x0, x1, medium, light):
-
         J = quadrature(geometry, x0, x1, medium, light, nodes=16)
         return dr.select(geometry.foot < 0, 1.001 * J, J)
 

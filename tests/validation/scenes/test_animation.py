@@ -55,7 +55,6 @@ def test_lights_circle_at_one_height_and_come_back(variant, name):
 )
 def test_frames_record_nothing_and_compile_nothing(variant, name, moves, method):
     """From the second frame on every kernel is replayed; what moves is data."""
-
     scene, animation = read(name)
     parameters = {"points": 4} if scene.area_lights else {}
     renderer = prepared(scene, configuration(method, None, parameters))

@@ -224,7 +224,6 @@ def test_what_no_command_takes_is_refused_by_its_name(load, words):
 @pytest.mark.parametrize("coefficient", ["albedo", "sigma_t"])
 def test_a_coefficient_on_a_grid_is_refused_by_both_readers(load, tmp_path, coefficient):
     """Mitsuba calls a medium homogeneous whose albedo differs from place to place."""
-
     mi.VolumeGrid(np.linspace(0.1, 0.9, 8, dtype=np.float32).reshape(2, 2, 2, 1)).write(str(tmp_path / "grid.vol"))
     other = {"albedo": "sigma_t", "sigma_t": "albedo"}[coefficient]
     scene = load(LAMP, media=medium(GRID.format(coefficient, "grid.vol") + f'<float name="{other}" value="0.4"/>'))

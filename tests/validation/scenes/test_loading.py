@@ -86,7 +86,6 @@ def test_size_is_read():
 @pytest.mark.parametrize("size", [(16, 12), (31, 12), (9, 40), (1, 1)])
 def test_resized_scene_has_the_rays_of_one_built_at_that_size(variant, small_file, size):
     """For Mitsuba's own rays and for both readers."""
-
     text = SMALL.replace('value="16"', f'value="{size[0]}"').replace('value="12"', f'value="{size[1]}"')
     expected = mi.load_string(text)
     resized = load_scene(str(small_file), size).scene

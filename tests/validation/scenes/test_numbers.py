@@ -36,7 +36,6 @@ def test_an_odd_number_is_refused_by_its_name(variant, tmp_path, place):
 
 
 def test_the_python_interface_checks_scenes_that_are_built(variant):
-
     import airlight
 
     built = mi.load_string(scene(position="0, nan, 0"))
@@ -61,7 +60,6 @@ def test_deep_elements_are_refused(variant, tmp_path):
 
 def test_no_opaque_shape_without_a_name_is_lost_beside_bounded_media(variant):
     """A dictionary with one key for all of them kept the last alone."""
-
     text = scene(extra='<shape type="rectangle"/><shape type="cube"/>' + cloud())
     read = read_scene(mi.load_string(text))
     assert len(read.geometry.shapes()) == 3

@@ -36,7 +36,6 @@ def test_a_table_keeps_the_light_of_the_peak(variant):
 
 
 def fog_of(phase, size=(8, 6)):
-
     return mi.load_dict(
         {
             "type": "scene",

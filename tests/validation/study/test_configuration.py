@@ -76,7 +76,6 @@ def test_a_setting_given_twice_is_refused_unless_both_say_the_same():
 
 
 def test_kernels_of_ones_own_come_through_the_same_door(variant):
-
     scene = read_scene(mi.load_dict(tiny_scene(ball=None)))
     own, built_in = (
         render_frame(prepared(scene, configuration("unshadowed", kernel)))

@@ -16,7 +16,6 @@ from validation.study.decompose import decompose
 
 
 def split(method, kernel=None, *, size=(24, 20), render=None, **parameters):
-
     cube = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).scale(0.3)}
     lamp = {"type": "point", "position": [0.3, 0.4, 3.1], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
     scene = mi.load_dict(tiny_scene(size=size, ball=cube, lamp=lamp))

@@ -61,7 +61,6 @@ def test_works_are_timed_in_turns(clock):
 
 @pytest.fixture(scope="module")
 def renderer(variant):
-
     scene = read_scene(mi.load_dict(tiny_scene(size=(16, 12))))
     return frame_renderer(scene, METHODS["ray-march"], steps=8, shadow="map", map=16)
 
@@ -85,7 +84,6 @@ def test_every_stage_of_a_frame_is_timed(renderer):
 @pytest.mark.parametrize(("spent", "turns"), [(0.0, 1), (1e6, 5)])
 def test_a_slow_frame_is_timed_a_few_times(variant, monkeypatch, spent, turns):
     """A frame that takes minutes must not be rendered thirty times."""
-
     monkeypatch.setattr(timing, "_TURNS", spent)
     scene = read_scene(mi.load_dict(tiny_scene(size=(16, 12))))
     renderer = frame_renderer(scene, METHODS["ray-march"], steps=3)

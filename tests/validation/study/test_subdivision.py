@@ -11,7 +11,6 @@ from validation.study.subdivision import subdivided, triangles_of
 
 
 def test_a_scene_keeps_what_has_no_triangles_to_cut(variant):
-
     box = mi.ScalarTransform4f().translate([0.13, 0.17, 0.71]).scale(0.37)
     scene = mi.load_dict(tiny_scene(block={"type": "cube", "to_world": box}))
     count = triangles_of(scene)

@@ -16,7 +16,6 @@ FINE = {"sampling": "pixels", "slices": 6000}
 
 @pytest.mark.parametrize("name", ["aslant", "along the view"])
 def test_against_the_truth(variant, name):
-
     scene = scenes()[name]
     truth = truth_image(mi.load_dict(scene)).airlight
     loaded = read(scene)

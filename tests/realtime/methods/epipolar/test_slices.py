@@ -28,7 +28,6 @@ PLACES = {
 
 
 def read(position, *, kind="point", **changes):
-
     look = mi.ScalarTransform4f().look_at([0, 0, 0], [0, 1, 0], [0, 0, 1])
     lamp = {"type": "point", "position": list(position), "intensity": 1.0}
     if kind == "spot":
@@ -52,7 +51,6 @@ def slices_of(scene, count=24):
 @pytest.mark.claim("slices-by-the-border", tolerance="1e-4 relative")
 @pytest.mark.parametrize("place", PLACES)
 def test_slices_leave_at_equal_steps_and_reach_every_pixel(variant, place):
-
     scene = read(PLACES[place])
     slices, camera = slices_of(scene, 200), scene.camera
     ends = np.array(slices.ends, dtype=float).reshape(-1, 4)
@@ -114,7 +112,6 @@ def test_the_tree_holds_the_bounds(variant, kind):
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_lit_pieces_are_those_of_many_points(variant, kind):
     """A ray of the slice looked at point by point in float64: where is it, and what does the map hold there?"""
-
     scene = read((0.4, 1.9, 1.9), kind=kind)
     heights = height_maps(scene, size=32)
     values, slices = samples_of(heights), heights.slices

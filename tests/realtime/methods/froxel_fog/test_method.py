@@ -49,7 +49,6 @@ def hazy(sigma_t=(0.11, 0.37, 0.93)):
 
 def by_hand(scene, *, width, height, slices, near, far):
     """Do what the method does in NumPy, from the formulas of its documentation; no shadows, no bounds."""
-
     truth = read_truth(mi.load_dict(scene))
     matrix = np.array(mi.load_dict(scene).sensors()[0].world_transform().matrix, dtype=float).reshape(4, 4)
     origin, forward = matrix[:3, 3], matrix[:3, 2]
@@ -111,7 +110,6 @@ def test_the_sums_are_those_of_plain_numpy(variant):
 @pytest.mark.parametrize("sigma_t", [1e-9, 0.003, 0.9, 37.0])
 @pytest.mark.parametrize("slices", [1, 5])
 def test_slices_of_constant_light_add_up_to_the_closed_form(variant, sigma_t, slices):
-
     scene = read(tiny_scene(size=(2, 2)), "double")
     grid = Grid(2, 1, slices, scene.camera, mi.Float64(3.1), mi.Float64(0.7))
     medium = SimpleNamespace(sigma_t=(mi.Float64(sigma_t),))

@@ -61,7 +61,6 @@ def test_walls_stand_where_the_edges_of_a_plate_are(variant, size, precision):
 @pytest.mark.claim("upright-walls")
 def test_slopes_are_no_walls(variant):
     """A floor that rays meet at a grazing angle is as steep as a jump between two samples, and bends nowhere."""
-
     ground = {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale([400, 400, 1])}
     heights, places = walled(loaded_scene(ball=None, floor=ground, lamp=lamp(*LAMP)), 32)
     s00, s10, s01, s11 = np.array(heights.texels).reshape(-1, 4).T
@@ -74,7 +73,6 @@ def test_slopes_are_no_walls(variant):
 @pytest.mark.claim("upright-walls")
 def test_a_shadow_of_straight_edges_is_known_to_a_fraction_of_a_texel(variant):
     """The frame against the truth: what is left are the corners, and a 64th of a texel."""
-
     description = tiny_scene(size=(40, 30), **FLAT, plate=plate(-0.31, -0.47))
     truth = truth_image(mi.load_dict(description)).airlight
     loaded = mi.load_dict(description)

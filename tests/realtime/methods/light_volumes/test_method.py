@@ -127,7 +127,6 @@ def vertices_of(shadow_map):
 
 def with_heights(shadow_map, heights):
     """Return a map that has these inverse depths at its corners."""
-
     length = np.array(inverse_depth(replace(shadow_map, distance=mi.Float64(np.ones(len(heights))))))
     with np.errstate(divide="ignore"):
         return replace(shadow_map, distance=mi.Float64(length / heights))
@@ -168,7 +167,6 @@ def any_walls(rng, faces, share):
 @given(data=st.data())
 def test_any_walls_in_any_map(variant, kind, data):
     """Wherever walls stand, on any number of a texel's sides, between heights that jump or do not."""
-
     loaded, (walk, _), shadow_map = renderers(kind, data.draw(st.integers(0, len(VIEWS) - 1)))
     vertex = vertices_of(shadow_map)
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32)))

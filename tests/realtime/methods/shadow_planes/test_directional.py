@@ -41,7 +41,6 @@ def scenes() -> dict[str, dict[str, Any]]:
 
 @pytest.mark.parametrize("name", ["two media", "parallel to edges"])
 def test_against_the_truth(variant, name):
-
     scene = scenes()[name]
     truth = truth_image(mi.load_dict(scene)).airlight
     loaded = read(scene, "double")

@@ -18,7 +18,6 @@ NAMES = ["torus", "open cylinder", "Moebius strip"]
 
 def walked(index, ways, end, *, begin=0.0):
     """The sum over lit segments of 1 - exp(-x), and whether the light reaches the end."""
-
     Float = type(index.distance)
     rays = rays_of(index, ways, end)
     segment = Float(np.full(len(ways), begin)), Float(np.asarray(end, dtype=np.float64))

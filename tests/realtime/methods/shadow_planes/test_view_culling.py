@@ -13,7 +13,6 @@ from tests.helpers.scenes import tiny_scene
 
 
 def camera_at(origin, target, size=(40, 30)):
-
     scene = tiny_scene(size=size, ball=None, floor=None)
     look = mi.ScalarTransform4f().look_at(list(origin), list(target), [0.1, 0.3, 1])
     scene["sensor"] = scene["sensor"] | {"to_world": look}

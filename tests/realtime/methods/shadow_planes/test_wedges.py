@@ -34,7 +34,6 @@ def test_wedges_hold_every_plane_that_a_ray_crosses(variant, name, camera):
 
 def test_wedges_stay_in_the_index_whatever_the_azimuth(variant):
     """The azimuth about a light that is at the camera is no number: a load from wedge 2^32 - 1 ended the process."""
-
     index = index_of(casters_of("torus"))
     azimuths = mi.Float([np.nan, np.inf, -np.inf, 1e30, -1e30, 0.5])
     way = (mi.Float([0.6] * 6), mi.Float([0.0] * 6), mi.Float([0.8] * 6))

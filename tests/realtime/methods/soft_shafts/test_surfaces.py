@@ -40,7 +40,6 @@ def test_the_automatic_width_is_nearly_the_best(variant, levels, width):
 @pytest.mark.parametrize("ratios", [(0.7,), (0.2, 0.8)])
 def test_the_width_of_a_penumbra_follows_from_similar_triangles(variant, ratios):
     """Bars over a floor: w = L (d_r - d_b) / d_b, over the size of a pixel there; of two the geometric mean."""
-
     camera = read_scene(mi.load_dict(tiny_scene(size=(160, 120)))).camera
     raster, distance = Raster(160, 120), dr.full(mi.Float, 3.0, 160 * 120)
     few, step = few_pixels(raster)

@@ -23,7 +23,6 @@ SETS = [("1", (1, 1)), ("2", (2, 2)), ("3-4", (3, 4)), ("5-inf", (5, math.inf))]
 
 
 def clouds_of(medium=None, **parts):
-
     mesh = placed(box(tuple(HIGH - LOW - 2.6)), tuple(0.5 * (LOW + HIGH)))
     scene = cloud_scene(sun=SUN, sky=sky((0.06, 0.11, 0.2)), box=cloud("box", mesh, medium), **parts)
     return read_clouds(mi.load_dict(scene))
@@ -83,7 +82,6 @@ def test_opacity_is_the_sum_over_the_grid(variant):
 
 @pytest.mark.claim("hypertexture-refused", tolerance="none: an error and its words")
 def test_what_is_no_density_is_refused_by_name(variant):
-
     wrong = ROUGH.copy()
     wrong[3, 2, 1] = -1e-3
     coloured = {"type": "gridvolume", "grid": mi.VolumeGrid(np.full((2, 2, 2, 3), 0.5, dtype=np.float32))}

@@ -49,7 +49,6 @@ def ball(sigma_t, albedo, phase, centre=(0.0, 0.0, 0.0), radius=1.3):
 
 
 def scene(**parts):
-
     usual = {
         "type": "scene",
         "sensor": camera((0.3, -6.1, 0.7), (0.1, 0.0, 0.1), fov=43.0, size=(8, 6), in_fog=False),

@@ -26,7 +26,6 @@ CONSENSUS = {
 
 def lit_from(sun):
     """Return the scene with the sun at a zenith angle [degrees]."""
-
     angle = math.radians(sun)
     own = {"sun": light((math.sin(angle), 0.0, -math.cos(angle)), (math.pi,) * 3)}
     return mi.load_dict(SCENES["step-cloud"].build() | own)
@@ -49,7 +48,6 @@ def reflectance(radiance, sun):
 
 
 def by_walk(scene, paths, seed):
-
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, paths)
     targets = Targets(mi.UInt32([0, 0]), 1)

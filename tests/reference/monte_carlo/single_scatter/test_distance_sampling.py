@@ -43,13 +43,11 @@ CELLS = 101
 
 
 def _span(case):
-
     height, start, length, _ = SPANS[case]
     return Span(*(dr.opaque(mi.Float64, value) for value in (height, start, length)))
 
 
 def _mixture(case):
-
     return mixture_of(_span(case), [dr.opaque(mi.Float64, rate) for rate in SPANS[case][3]])
 
 
@@ -66,7 +64,6 @@ def mixture_cdf(y, mixture):
 
 def _technique(case, name):
     """Return a sampler of u and a density of y of one technique."""
-
     if name == "equi-angular":
         return lambda u: ds.equi_angular(u, _span(case)), lambda y: equi_angular_pdf(y, _span(case))
     if name == "free-flight":

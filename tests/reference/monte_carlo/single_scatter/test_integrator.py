@@ -35,7 +35,6 @@ def _run(scene, *, samples=64, first_seed=0, batches=_BATCHES):
 
 def _along(scene, origin, direction, *, samples, seed, medium=None):
     """Return airlight and surface along rays, (rays, 3) each."""
-
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, len(direction))
     ray = double_ray(mi.Point3d(np.broadcast_to(origin, direction.shape).T), mi.Vector3d(direction.T))

@@ -11,7 +11,6 @@ from tests.helpers.volpath import assert_volpath_agrees
 
 @pytest.fixture(scope="module")
 def truth(variant):
-
     return read_truth(mi.load_dict(tiny_scene()))
 
 
@@ -23,7 +22,6 @@ def test_one_kernel_serves_any_number_of_samples(truth):
 
 def _large_kernels(truth, *, samples, seed=0):
     """Return the hashes of the kernels of a batch that trace paths, in the order of their launches."""
-
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
         dr.kernel_history_clear()
         volpath_batch(truth, seed, samples)

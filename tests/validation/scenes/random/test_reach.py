@@ -15,7 +15,6 @@ from validation.scenes.random.scene import Camera, draw_stage, reach
 
 def found(*meshes):
     """What light reaches of a stage about the origin of radius 1 under a lamp, with casters."""
-
     camera = Camera(np.array([0.0, -4.0, 0.1]), np.zeros(3), 47.0, "endless", False)
     lamp = Light("light-1", "point", np.array([0.0, 0.3, 5.0]), np.zeros(3), np.ones(3), 1.0)
     drawn = draw_stage(0, ranges_from({}))

@@ -12,7 +12,6 @@ from tests.helpers.scenes import spot, tiny_scene
 
 
 def map_of(kind: str, size: int):
-
     scene = read_scene(mi.load_dict(tiny_scene(**({"lamp": spot()} if kind == "spot" else {}))))
     return cast_shadow_map(scene.geometry, scene.lights[0], size), scene.lights[0]
 
