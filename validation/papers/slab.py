@@ -21,9 +21,8 @@ from realtime.clouds.canonical.fit import fit_on_device, fitted_functions
 from realtime.clouds.canonical.look_up import LookUp, on_device
 from realtime.clouds.canonical.sets import SETS, set_name
 from realtime.clouds.canonical.tables import canonical_tables
-from realtime.clouds.slab_orders.droplets import droplet_phase
 from realtime.clouds.slab_orders.moments import SlabOrders, order_sets
-from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SlabPhase
+from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SlabPhase, droplet_phase
 from realtime.numerics.array_types import ArrayTypes, array_types
 from validation.slab.phases import phase_pair
 

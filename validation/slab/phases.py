@@ -16,8 +16,13 @@ from numpy.typing import NDArray
 from analytic.droplets import Droplets, Modified, optics
 from analytic.errors import InputError, nearest
 from analytic.phase import PhaseFunction
-from realtime.clouds.slab_orders.droplets import HgDrainePhase, droplet_phase
-from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SlabPhase, tabulated_phase
+from realtime.clouds.slab_orders.phases import (
+    HenyeyGreensteinPhase,
+    SlabPhase,
+    droplet_phase,
+    hg_draine_phase,
+    tabulated_phase,
+)
 from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein, Tabulated
 from reference.monte_carlo.slab_walk.walk import Scattering
 
@@ -75,7 +80,7 @@ def _hg_draine(name: str, words: list[str]) -> PhasePair:
         function = PhaseFunction("hg-draine", diameter=diameter)
         return Tabulated(angles, function.from_half(np.sin(angles / 2) ** 2, np.cos(angles / 2) ** 2))
 
-    return PhasePair(name, HgDrainePhase(diameter), sampled)
+    return PhasePair(name, hg_draine_phase(diameter), sampled)
 
 
 def _droplets(name: str, words: list[str], *, modified: bool) -> PhasePair:

@@ -7,8 +7,7 @@ and runs nowhere in a frame. The truth that checks it is a walk of photons, on t
 
 Read in this order:
 
-- `phases.py`: phase functions by values and Legendre moments;
-- `droplets.py`: water droplets among them;
+- `phases.py`: phase functions by values and Legendre moments, water droplets among them;
 - `streams.py`: directions, and scattering between them by mode of the azimuth;
 - `depth_panels.py`: light along straight lines through the slab;
 - `discrete_ordinates.py`: all orders of one mode at once;

@@ -12,8 +12,12 @@ from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
-from numpy.polynomial.legendre import leggauss, legval
+from numpy.polynomial.legendre import leggauss
 from numpy.typing import ArrayLike, NDArray
+
+from realtime.droplets.series import droplet_series
+from realtime.droplets.table import CUT
+from realtime.scene.phase import HgDraine
 
 Array = NDArray[np.float64]
 
@@ -32,15 +36,9 @@ class SlabPhase(Protocol):
 
 @dataclass(frozen=True)
 class HenyeyGreensteinPhase:
-    """The phase function of Henyey and Greenstein 1941; isotropic for g = 0.
+    """The phase function of Henyey and Greenstein 1941; isotropic for g = 0."""
 
-    Parameters
-    ----------
-    g
-        Mean cosine, in (-1, 1).
-    """
-
-    g: float
+    g: float  #: mean cosine, in (-1, 1)
 
     def moments(self, count: int) -> Array:
         """Return g^l."""
@@ -51,30 +49,6 @@ class HenyeyGreensteinPhase:
         g = self.g
         down = (1 - np.asarray(cosines, dtype=np.float64)) / 2
         return (1 - g * g) / ((1 - g) ** 2 + 4 * g * down) ** 1.5
-
-
-@dataclass(frozen=True, eq=False)
-class SeriesPhase:
-    """A phase function by its moments, all others being zero.
-
-    Parameters
-    ----------
-    chi
-        (L,), chi_0 = 1.
-    """
-
-    chi: Array
-
-    def moments(self, count: int) -> Array:
-        """Return the moments, zero after the last."""
-        moments = np.zeros(count)
-        kept = min(count, self.chi.size)
-        moments[:kept] = self.chi[:kept]
-        return moments
-
-    def values(self, cosines: ArrayLike) -> Array:
-        """Return the series."""
-        return np.asarray(legval(np.asarray(cosines, dtype=np.float64), (2 * np.arange(self.chi.size) + 1) * self.chi))
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,11 +103,37 @@ class AnglePhase:
 def tabulated_phase(angles: Array, heights: Array) -> AnglePhase:
     """Return the phase function that is linear in the angle between values.
 
-    Parameters
-    ----------
-    angles
-        (A,), increasing from 0 to pi [rad].
-    heights
-        (A,), not negative, in any unit.
+    `angles` increase from 0 to pi [rad], (A,); `heights`, (A,), are not negative, in any unit.
     """
     return AnglePhase(lambda angle: np.interp(angle, angles, heights), angles)
+
+
+def droplet_phase(radius: float, gamma: float, wavelength: float, *, modified: bool) -> AnglePhase:
+    """Return the phase function of droplets; the numbers are those of `realtime.droplets.series.droplet_series`.
+
+    If it is `modified`, the peak below `CUT` is cut to zero: lengths are then those of the medium whose density is
+    lowered by the share of the peak.
+    """
+    series, edge = droplet_series(radius, gamma, wavelength), np.deg2rad(CUT)
+    if not modified:
+        return AnglePhase(series.values, np.array([0.0, np.pi]))
+    return AnglePhase(lambda angles: np.where(angles < edge, 0.0, series.values(angles)), np.array([0.0, edge, np.pi]))
+
+
+def hg_draine_phase(diameter: float) -> AnglePhase:
+    """Return `realtime.scene.phase.HgDraine` of droplets of a diameter of 5 to 50 um.
+
+    Its narrow lobe is a few thousandths wide: panels near the peak are as short as their distance from it.
+    """
+    fit = HgDraine(diameter)
+    (share, narrow), (_, wide) = fit.lobes
+    constant, square = fit.rise
+    breaks = np.append(0.0, np.geomspace(1e-4, np.pi, 16))
+    breaks[-1] = np.pi
+
+    def heights(angles: Array) -> Array:
+        down, cosines = np.sin(angles / 2) ** 2, np.cos(angles)
+        lobes = [(1 - g * g) / ((1 - g) ** 2 + 4 * g * down) ** 1.5 for g in (narrow, wide)]
+        return share * lobes[0] + (constant + square * cosines**2) * lobes[1]
+
+    return AnglePhase(heights, breaks)

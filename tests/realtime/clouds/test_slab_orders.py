@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.polynomial.legendre import legval
 from PythonicDISORT.pydisort import pydisort
 
 from realtime.clouds.slab_orders.moments import SlabOrders, order_sets
-from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SeriesPhase
+from realtime.clouds.slab_orders.phases import AnglePhase, HenyeyGreensteinPhase
 from realtime.clouds.slab_orders.radiance import slab_radiance
 from realtime.clouds.slab_orders.slab import slab_light
 
@@ -22,7 +23,7 @@ ISOTROPIC, HG = HenyeyGreensteinPhase(0.0), HenyeyGreensteinPhase(0.75)
 @pytest.fixture(scope="module")
 def cloud_c1():
     table = np.loadtxt(DATA / "cloud_c1_moments.csv", delimiter=",", skiprows=3)
-    return SeriesPhase(table[:, 1] / (2 * table[:, 0] + 1))
+    return AnglePhase(lambda angles: legval(np.cos(angles), table[:, 1]), np.array([0.0, np.pi]))
 
 
 def summed(tau, mu0, phase, albedo, depths, streams=32):
