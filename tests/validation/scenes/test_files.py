@@ -16,7 +16,7 @@ from validation.scenes.loading import LoadedScene, load_scene
 
 COEFFICIENTS = '<float name="sigma_t" value="0.23"/><float name="albedo" value="0.83"/>'
 FOG = f'<medium type="homogeneous" id="fog">{COEFFICIENTS}</medium>'
-INSIDE = '<ref name="medium" id="fog"/>'
+INSIDE, OUTSIDE = '<ref name="medium" id="fog"/>', '<ref name="exterior" id="fog"/>'
 LOOK = '<transform name="to_world"><lookat origin="0.2, -4.1, 1.3" target="0.1, 0, 0.6" up="0, 0, 1"/></transform>'
 CAMERA = f"""<sensor type="perspective" id="eye"><float name="fov" value="41.7"/>{LOOK}{{}}
 <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="6"/></film></sensor>"""
@@ -273,3 +273,44 @@ def test_every_plugin_of_mitsuba_is_taken_or_refused_in_one_line(load):
         plugin for plugin, words in said.items() if words == "own"
     }
     assert "'projector'" in said["projector"]
+
+
+def room(*, without=""):
+    """A window of a room of fog and its five walls, which reference the fog too; a lamp and a ball are inside."""
+    turns = {
+        "window": '<rotate x="1" angle="90"/><translate y="-1.3"/>',
+        "back": '<rotate x="1" angle="90"/><translate y="1.3"/>',
+        "left": '<rotate y="1" angle="90"/><translate x="-1.3"/>',
+        "right": '<rotate y="1" angle="-90"/><translate x="1.3"/>',
+        "floor": '<translate z="-1.3"/>',
+        "ceiling": '<rotate x="1" angle="180"/><translate z="1.3"/>',
+    }
+    wall, parts = GREY + OUTSIDE, [LAMP.replace("0.7, 0.3, 1.9", "0.4, 0.3, 0.9")]
+    for name, turn in turns.items():
+        if name != without:
+            place = f'<transform name="to_world"><scale value="1.3"/>{turn}</transform>'
+            sides = NULL + '<ref name="interior" id="fog"/>' if name == "window" else wall
+            parts.append(f'<shape type="rectangle" id="{name}">{place}{sides}</shape>')
+    return [*parts, shape("sphere", wall, at=(0.1, 0.2, -0.3))]
+
+
+def test_a_room_of_fog_behind_a_window_is_a_box(load):
+    """The image is that of a box of fog within the same walls."""
+    rooms = load(*room(), camera=CAMERA.format(""))
+    assert next(each for each in rooms.shapes() if each.id() == "window").is_mesh()
+    box = '<shape type="cube" id="window"><transform name="to_world"><scale value="1.3"/></transform>'
+    walls = [part.replace(OUTSIDE, "") for part in room(without="window")]
+    plain = load(*walls, f'{box}{NULL}<ref name="interior" id="fog"/></shape>', camera=CAMERA.format(""))
+    expected = image(plain)
+    assert expected[0].max() > 0
+    # The box reaches 1e-4 of its size beyond the walls.
+    np.testing.assert_allclose(image(rooms), expected, rtol=2e-3, atol=1e-3 * expected.max())
+
+
+def test_a_window_without_a_whole_room_is_refused(load):
+    from realtime.errors import InputError as RefusedByMethods
+    from realtime.scene.read_scene import read_scene
+
+    open_room = load(*room(without="left"), camera=CAMERA.format(""))
+    with pytest.raises(RefusedByMethods, match="'window' bounds a medium and is a Rectangle"):
+        read_scene(open_room)

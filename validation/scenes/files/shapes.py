@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shapes of files made into shapes that both readers know: instances written out, lamps on boxes as rectangles."""
+"""Shapes of files made into shapes that both readers know.
+
+Instances are written out, lamps on boxes become rectangles, and windows of rooms full of fog the boxes of that fog.
+"""
 
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -15,6 +18,7 @@ Array = NDArray[np.float64]
 
 _FLAT = 1e-5  # of a quad's size: corners beyond a plane, sides that are no parallelogram, sides off a right angle
 _MOST = 64  # rectangles of a lamp
+_BEYOND = 1e-4  # of a room's size: how far its box of fog reaches beyond the walls
 _POINTS = 16  # on a lamp, at which its normals are looked at
 
 
@@ -146,3 +150,68 @@ def _write_rectangles(state: Any, index: int, matrices: list[Array]) -> None:
             state.nodes.append(mi.parser.SceneNode(state.nodes[index]))
             properties(state, 0)[f"{name}_{number}"] = mi.Properties.ResolvedReference(len(state.nodes) - 1)
         state.nodes[len(state.nodes) - 1 if number else index].props = rectangle
+
+
+def rooms_as_boxes(state: Any, shapes: Iterable[Any]) -> list[str]:
+    """Make windows of rooms full of fog the boxes of that fog, and return notes on them.
+
+    A window is a rectangle without a material that bounds a medium on one side, where opaque rectangles are the other
+    five faces of a box. The box reaches a little beyond these: a surface in a bound is lost to rays in part.
+    """
+    nodes = {properties(state, index).id(): index for index in of_kind(state, "Shape")}
+    known = [shape for shape in shapes if shape.id() in nodes and shape.class_name() == "Rectangle"]
+    walls = [_corners(_matrix(shape)) for shape in known if not _is_null(shape)]
+    notes = []
+    for shape in known:
+        inside = [medium for medium in (shape.interior_medium(), shape.exterior_medium()) if medium is not None]
+        room = _room(_matrix(shape), -1.0 if shape.interior_medium() else 1.0, walls)
+        if not _is_null(shape) or len(inside) != 1 or room is None:
+            continue
+        box = mi.Properties("cube")
+        box.set_id(shape.id())
+        box["to_world"] = mi.ScalarAffineTransform4d(room)
+        for key, at in references(properties(state, nodes[shape.id()])):
+            box["interior" if kind(state, at) == "Medium" else key] = mi.Properties.ResolvedReference(at)
+        state.nodes[nodes[shape.id()]].props = box
+        notes.append(f"shape '{shape.id()}' and the walls about its medium are read as a box of that medium")
+    return notes
+
+
+def _is_null(shape: Any) -> bool:
+    return bool(int(shape.bsdf().flags()) & int(mi.BSDFFlags.Null))
+
+
+def _matrix(shape: Any) -> Array:
+    return np.array(mi.traverse(shape)["to_world"].matrix, dtype=np.float64).reshape(4, 4)
+
+
+def _corners(matrix: Array) -> Array:
+    """Return the corners of a rectangle, (4, 3), one after the other."""
+    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    return np.asarray(matrix[:3, 3] + signs @ matrix[:3, :2].T)
+
+
+def _room(window: Array, side: float, walls: list[Array]) -> Array | None:
+    """Return the transform that makes Mitsuba's cube the room behind a window, None where walls are missing."""
+    front = _corners(window)
+    normal = np.cross(window[:3, 0], window[:3, 1])
+    inward = side * normal / np.linalg.norm(normal)
+    size = float(np.linalg.norm(front[0] - front[2]))
+
+    def stands(face: Array) -> bool:
+        gaps = (np.linalg.norm(face[:, None] - wall, axis=2).min(axis=1).max() for wall in walls)
+        return any(gap <= _FLAT * size for gap in gaps)
+
+    depths = {float((wall.mean(axis=0) - window[:3, 3]) @ inward) for wall in walls}
+    depth = next((each for each in depths if each > _FLAT * size and stands(front + each * inward)), None)
+    if depth is None:
+        return None
+    back = front + depth * inward
+    ends = [[number, (number + 1) % 4] for number in range(4)]
+    if not all(stands(np.concatenate([front[pair], back[pair]])) for pair in ends):
+        return None
+    across, up = ((1 + _BEYOND) * window[:3, axis] for axis in ((0, 1) if side > 0 else (1, 0)))
+    half = 0.5 * (depth + _BEYOND * size) * inward
+    matrix = np.eye(4)
+    matrix[:3] = np.column_stack([across, up, half, window[:3, 3] + half])
+    return matrix
