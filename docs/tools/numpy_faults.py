@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).resolve().parents[2]
 RECORD = ROOT / "docs/data/numpy-faults.json"
 _SIZE = (64, 48)
-_STEPS = 160
+_STEPS = 96
 _SIDE = 3  # rays along a side of a pixel
 
 Array = NDArray[np.float64]
@@ -185,7 +185,7 @@ def _layers(engine: Engine, positions: Array) -> tuple[Array, Array, Array]:
             density = 1.0 if engine.density is None else engine.density(here[:, 2])
             depth = engine.legs[0] * _depth(engine, ORIGIN[2] + 0 * x, here[:, 2], np.maximum(x - engine.start, 0))
             depth = depth + engine.legs[1] * _depth(engine, here[:, 2], lamp.place[2] + 0 * r, r)
-            value = sent * engine.phase(-np.sum(to * way, axis=1)) * density * np.exp(-depth) * np.maximum(size, 0)
+            value = sent * engine.phase(np.sum(to * way, axis=1)) * density * np.exp(-depth) * np.maximum(size, 0)
             scale = engine.fog[number] * engine.sigma_t / (4 * math.pi)
             fog += scale * value[:, None] * np.multiply(engine.albedo, lamp.intensity)
     return fog, engine.surface * surface, left[:, None]

@@ -80,17 +80,22 @@ class Diagnosis:
     ranked: tuple[Ranked, ...]
     residual: float  #: mean relative error of the image as it is
     left: float  #: what the first explanation leaves of it
-    noise: bool  #: whether that is noise: neighbours do not share it
-    explained: bool  #: whether that is noise, or little
+    rest: str  #: what that is: noise, little, or less than a tenth of what it was; empty where it is none of these
     place: str  #: where the remaining error lies; empty where it is noise, or little
     failures: tuple[str, ...] = ()  #: what is wrong with the file, such as pixels that are not finite
 
     def to_json(self) -> dict[str, Any]:
         """Return every number by name."""
         numbers = {name: plain(getattr(self, name)) for name in ("residual", "left")}
-        words = {name: getattr(self, name) for name in ("first", "layer", "pixel", "noise", "explained", "place")}
+        words = {name: getattr(self, name) for name in ("first", "layer", "pixel", "rest", "place")}
+        words["explained"] = self.explained
         ranked, failures = [plain(row) for row in self.ranked], list(self.failures)
         return {"diagnosis": {**words, **numbers, "ranked": ranked, "failures": failures}}
+
+    @property
+    def explained(self) -> bool:
+        """Whether what is left is nothing to explain."""
+        return bool(self.rest)
 
     @property
     def lines(self) -> list[str]:
@@ -99,16 +104,17 @@ class Diagnosis:
         off = f"values are {_percent(self.residual)} off in the mean"
         lines = [f"{self.path}, {self.layer}, against {self.scene}, {pixel}: {off}."]
         together = [row for row in self.ranked if row.together]
-        rest = "noise: neighbouring pixels do not share it" if self.noise else "little" if self.explained else ""
         if self.first == RIGHT:
-            lines.append(f"Nothing is wrong with it: the difference is {rest}.")
+            lines.append(f"Nothing is wrong with it: the difference is {self.rest}.")
         elif self.first == UNEXPLAINED:
             lines.append(f"Nothing here explains it{': the error lies ' + self.place if self.place else ''}.")
         else:
             found = f"Two faults explain it: {'; and '.join(row.words for row in together)}." if together else ""
             lines.append(found or f"{self.first}: {self.ranked[0].words}.")
             more = f"no noise: something else is wrong too{', ' + self.place if self.place else ''}"
-            lines.append(f"Without that, values are {_percent(self.left)} off in the mean, which is {rest or more}.")
+            lines.append(
+                f"Without that, values are {_percent(self.left)} off in the mean, which is {self.rest or more}."
+            )
         lines += [f"Failed: {reason}." for reason in self.failures]
         lines += ["", f"{'fault':<16} {'left':>9} {'evidence':>9}  what it says"]
         for row in self.ranked[:_PRINTED]:
@@ -191,20 +197,18 @@ def diagnose_image(
     attempt = min(begun, key=lambda each: each.chosen.error)
     attempt.go_on()
     chosen, rows = attempt.ranked()
-    explained = attempt.explained(chosen) or gains(chosen, attempt.right)
-    noise = is_explained(chosen, attempt.right, attempt.predictor.pairs, 0.0)
+    rest = attempt.rest(chosen)
     return Diagnosis(
         loaded.name,
         path,
         judged.name,
         attempt.pixel,
-        _first(attempt.right, chosen, explained),
+        _first(attempt.right, chosen, bool(rest)),
         tuple(rows[:_SHOWN]),
         attempt.right.error,
         chosen.error,
-        noise,
-        explained,
-        "" if explained else place_words(attempt.predictor, chosen),
+        rest,
+        "" if rest else place_words(attempt.predictor, chosen),
         () if wrong is None else (str(wrong),),
     )
 
@@ -236,6 +240,14 @@ class _Attempt:
     def explained(self, explanation: Explanation) -> bool:
         """Return whether what an explanation leaves is noise, or little."""
         return is_explained(explanation, self.right, self.predictor.pairs, self.little)
+
+    def rest(self, explanation: Explanation) -> str:
+        """Return what an explanation leaves, in words; nothing where something else is wrong too."""
+        if is_explained(explanation, self.right, self.predictor.pairs, 0.0):
+            return "noise: neighbouring pixels do not share it"
+        if self.explained(explanation):
+            return "little"
+        return "less than a tenth of what it was" if gains(explanation, self.right) else ""
 
     def go_on(self) -> None:
         """Try what costs more where it is needed."""

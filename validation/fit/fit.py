@@ -2,7 +2,6 @@
 """The parameters of the fog that explain an image file of a scene, with their intervals."""
 
 import math
-import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -12,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.storage.exr import Image, read_exr
-from validation.comparison.images import read_mask
+from reference.storage.exr import Image
 from validation.engine.judged_layer import judged_layer
-from validation.engine.seen import Progress, Seen, at_places, pixel_kinds, scene_of_size, seen_image
+from validation.engine.seen import Progress, Seen, at_places, pixel_kinds, seen_image
 from validation.fit.confounding import Confounded, Group, confounded, confounded_groups
 from validation.fit.solve import (
     SIGMAS,
@@ -125,43 +123,6 @@ class Fit:
         return lines + [line for group in self.confounded for line in group.lines]
 
 
-def fit_file(
-    path: str | os.PathLike[str],
-    scene: str,
-    parameters: Sequence[str],
-    *,
-    layer: str | None = None,
-    mask: str | os.PathLike[str] | None = None,
-    **how: Any,
-) -> Fit:
-    """Find the parameters that explain an EXR file.
-
-    Parameters
-    ----------
-    scene
-        A built-in scene or a Mitsuba XML file: geometry, camera and lights are taken from it, and so is what is not
-        looked for.
-    parameters
-        What is looked for, see `validation.fit.unknowns`.
-    layer
-        Which layer, see `validation.engine.judged_layer.judged_layer`.
-    mask
-        An EXR file that is 0 in pixels to leave out.
-    how
-        More for `fit_image`.
-
-    Raises
-    ------
-    InputError
-        For files, scenes and names that cannot be used, and what `fit_image` refuses.
-    """
-    image = read_exr(path)
-    judged = judged_layer(image, path, name=layer, holds=how.get("holds"))
-    loaded = scene_of_size(scene, judged.size, path)
-    chosen = None if mask is None else read_mask(mask)
-    return fit_image(image, loaded, parameters, path=str(path), layer=layer, mask=chosen, **how)
-
-
 def fit_image(
     image: Image,
     loaded: LoadedScene,
@@ -180,26 +141,26 @@ def fit_image(
     Parameters
     ----------
     loaded
-        The scene, at the size of the image.
-    parameters, layer, holds
-        See `fit_file`; what the layer holds is 'airlight', 'surface' or 'total'.
+        The scene, at the size of the image: geometry, camera and lights are taken from it, and what is not looked for.
+    parameters, starts
+        What is looked for, see `validation.fit.unknowns`, and values to begin with; the scene's own by default.
+    layer, holds
+        Which layer, and what it holds, see `validation.engine.judged_layer.judged_layer`.
     pixel
         'centre' or 'area'; by default what the image says of itself, or what fits better.
     mask
         Which pixels may take part, (height, width); all by default.
-    starts
-        Values to begin with, by name; the scene's own by default.
 
     Raises
     ------
     InputError
-        For layers and names that are not known, a scene that has no truth, a mask of another size, and an image with
-        too few pixels that say something.
+        For layers and names that are not known, a scene that has no reference, a mask of another size, and an image
+        with too few pixels that say something.
 
     Notes
     -----
     Valid for single scattering: homogeneous media, point and spot lights, directional ones where media have bounds;
-    lights with extent are 16 to 128 points here, which leaves some 0.5 % in a pixel. The intervals count pixels as
+    area lights are 16 to 128 samples here, which leaves some 0.5 % in a pixel. The intervals count pixels as
     independent of one another.
     """
     started = time.perf_counter()
