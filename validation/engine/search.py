@@ -145,6 +145,7 @@ class _Search:
         def loss(value: float) -> float:
             return self.loss(self.outward(np.array([value])), scale)
 
+        place = np.clip(place, low, high)  # an image that is nearly black may begin beyond an end
         ends = _between(parameter, float(place[0]), low, high)
         solved = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": 1e-7 if fine else _COARSE})
         return np.array([solved.x]) if solved.fun <= loss(float(place[0])) else place

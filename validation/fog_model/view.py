@@ -66,8 +66,9 @@ class View:
                 truth, shapes = self._once(("before", area.name), lambda: before_light(truth, area))
             # Intervals by geometry are what they are: random checks only say how far to trust them.
             how = {"shapes": shapes} | ({} if self.shapes.others is not None else {"checks": 0})
-            reached = lit_parallel_rays if isinstance(light, DirectionalLight) else lit_rays
-            return reached(truth, light, self.distance, how)
+            if isinstance(light, DirectionalLight):
+                return lit_parallel_rays(truth, light, self.distance, how)
+            return lit_rays(truth, light, self.distance, how)
 
         return self._once(("reach", _place_of(light), shadows, None if area is None else area.name), found)
 
