@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analytic.columns import column
 from reports.sweep.read import Sweep
 from reports.sweep.samples import FAULTS, Sample
 from validation.study.row import PROPERTY
@@ -44,24 +45,24 @@ class Reason:
 class Fault:
     """An image that is wrong whatever its error."""
 
-    check: str  #: of `CHECKS`
-    label: str
-    scene: str
-    pixels: int
-    of: int  #: pixels compared
-    command: str
+    check: str = column("what", meaning="of `CHECKS`")
+    scene: str = column()
+    label: str = column("method")
+    pixels: int = column()
+    of: int = column(meaning="pixels compared")
+    command: str = column("shown by")
 
 
 @dataclass(frozen=True)
 class Check:
     """How many rows were checked for a fault, and how many have it."""
 
-    check: str
-    meaning: str
-    rows: int  #: that say
-    scenes: int  #: of these rows
-    faulty_rows: int
-    faulty_scenes: int
+    check: str = column("what would be wrong")
+    rows: int = column("images checked")
+    scenes: int = column()
+    faulty_rows: int = column("images at fault")
+    faulty_scenes: int = column("scenes at fault")
+    meaning: str = column("which means")
 
 
 def reasons(sweep: Sweep, statuses: Sequence[str] = ("refused", *FAULTS)) -> list[Reason]:
@@ -95,11 +96,11 @@ def without_numbers(reason: str, scene: str) -> str:
 def checks(sweep: Sweep) -> list[Check]:
     """Return how many images were checked for each fault, and how many have it."""
     made = []
-    for name, column, meaning in CHECKS:
-        pixels, scenes = sweep.numbers(column), sweep.texts("scene")
+    for name, counted, meaning in CHECKS:
+        pixels, scenes = sweep.numbers(counted), sweep.texts("scene")
         says, bad = np.isfinite(pixels), np.nan_to_num(pixels) > 0
         made.append(
-            Check(name, meaning, int(says.sum()), len(set(scenes[says])), int(bad.sum()), len(set(scenes[bad])))
+            Check(name, int(says.sum()), len(set(scenes[says])), int(bad.sum()), len(set(scenes[bad])), meaning)
         )
     return made
 
@@ -108,11 +109,11 @@ def faults(sweep: Sweep) -> list[Fault]:
     """Return every image that is wrong, those with the most pixels first within a check."""
     labels, scenes, commands, of = (*map(sweep.texts, ("label", "scene", "command")), sweep.numbers("error.pixels"))
     made = []
-    for name, column, _ in CHECKS:
-        pixels = np.nan_to_num(sweep.numbers(column))
+    for name, counted, _ in CHECKS:
+        pixels = np.nan_to_num(sweep.numbers(counted))
         for row in sorted(np.flatnonzero(pixels > 0), key=lambda row: (-pixels[row], row)):
             whole = 0 if np.isnan(of[row]) else int(of[row])
-            made.append(Fault(name, labels[row], scenes[row], int(pixels[row]), whole, commands[row] or ""))
+            made.append(Fault(name, scenes[row], labels[row], int(pixels[row]), whole, commands[row] or ""))
     return made
 
 

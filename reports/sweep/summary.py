@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""All that a sweep says, worked out once: for the page, the digest and `--json`."""
+"""All that a sweep says, worked out once: for the page, the tables and `--json`."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from analytic.columns import column
 from reports.sweep.claims import TARGETS, Claim, best_claims, claims, percent, written
 from reports.sweep.correlations import Correlation, correlations, property_words, sentences, strongest
 from reports.sweep.faults import Check, Fault, Reason, Worst, checks, faults, reasons, worst
@@ -36,21 +37,21 @@ class Fastest:
 class Truth:
     """What one estimator says of its own error."""
 
-    estimator: str
-    scenes: int
-    median: float  #: over its scenes, relative to the mean of the truth
-    largest: float
+    estimator: str = column("reference")
+    scenes: int = column()
+    median: float = column("own error, median", meaning="over its scenes, relative to the mean of the reference")
+    largest: float = column("own error, largest")
 
 
 @dataclass(frozen=True)
 class Host:
     """Where rows were computed."""
 
-    host: str
-    device: str
-    threads: int | None
-    rows: int
-    timed_alone: int
+    host: str = column()
+    device: str = column()
+    threads: int | None = column()
+    rows: int = column("cells")
+    timed_alone: int = column()
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The tables of a sweep, for its page, its digest and the terminal."""
 
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
+
 import numpy as np
 
+from analytic.columns import columns_of
 from reports.sweep.claims import TARGETS, written
 from reports.sweep.correlations import property_words
+from reports.sweep.faults import Check, Fault
 from reports.sweep.samples import FAULTS, UNTOLD
-from reports.sweep.summary import Summary, quantiles
+from reports.sweep.summary import Host, Property, Summary, Truth, quantiles
 from reports.tables.table import Column, Measured, Name, Table, numbers, table, words
 
 _SHARE = {"digits": 2, "share": True}
@@ -111,51 +117,50 @@ def refusals_table(said: Summary) -> Table:
 
 def checks_table(said: Summary) -> Table:
     """Return how many images were checked for each fault and how many have it."""
-    columns = (
-        *words(check="what would be wrong"),
-        *numbers(rows="images checked", scenes="scenes"),
-        *numbers(faulty_rows="images at fault", faulty_scenes="scenes at fault", how={"alarm": True}),
-        *words(meaning="which means", how={"long": True, "minor": True}),
-    )
+    how = {"faulty_rows": {"alarm": True}, "faulty_scenes": {"alarm": True}, "meaning": {"long": True, "minor": True}}
     shown = [each for each in said.checks if each.rows]
-    return table("Images that were checked", columns, [vars(each) for each in shown])
+    return _table_of("Images that were checked", Check, shown, how=how)
 
 
 def faults_table(said: Summary, most: int = 30) -> Table:
     """Return the images that are wrong, the worst of each kind first."""
-    columns = (
-        *words(check="what", scene="scene", label="method"),
-        *numbers(pixels="pixels", of="of"),
-        *words(command="shown by", how={"long": True, "minor": True}),
-    )
     rows = [vars(each) | {"command": Name(each.command)} for each in said.faults[:most]]
     left = len(said.faults) - most
     explanation = f"{left} more are in --json." if left > 0 else ""
-    return table("Images at fault", columns, rows, explanation=explanation)
+    how = {"command": {"long": True, "minor": True}}
+    return _table_of("Images at fault", Fault, rows, explanation=explanation, how=how)
 
 
 def truths_table(said: Summary) -> Table:
-    """Return what the truths say of their own errors."""
-    columns = (
-        *words(estimator="truth"),
-        *numbers(scenes="scenes"),
-        *numbers(median="own error, median", largest="own error, largest", how=_SHARE),
-    )
-    explanation = "Relative to the mean of the true airlight: the quadrature's bound, or Monte Carlo's standard error."
-    return table("Errors of the truth itself", columns, [vars(each) for each in said.truths], explanation=explanation)
+    """Return what the references say of their own errors."""
+    explanation = "Relative to the mean of the airlight: the quadrature's bound, or Monte Carlo's standard error."
+    how = {"median": _SHARE, "largest": _SHARE}
+    return _table_of("Errors of the reference itself", Truth, said.truths, explanation=explanation, how=how)
 
 
 def properties_table(said: Summary) -> Table:
     """Return what the scenes hold."""
-    columns = (*words(property="property"), *numbers("least", "median", "largest"), *numbers(scenes="scenes"))
     rows = [vars(each) | {"property": property_words(each.property)} for each in said.properties]
-    return table("What the scenes hold", columns, rows)
+    return _table_of("What the scenes hold", Property, rows)
 
 
 def hosts_table(said: Summary) -> Table:
     """Return where rows were computed."""
-    columns = (
-        *words(host="host", device="device"),
-        *numbers(threads="threads", rows="cells", timed_alone="timed alone"),
-    )
-    return table("Where it ran", columns, [vars(each) for each in said.hosts])
+    return _table_of("Where it ran", Host, said.hosts)
+
+
+def _table_of(
+    title: str,
+    record: type,
+    rows: Sequence[Any],
+    *,
+    explanation: str = "",
+    how: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
+) -> Table:
+    """Return the table of some records; `how` are other fields of a column by its key."""
+    columns = [
+        Column(each.key, each.heading, words=each.kind == "string", **how.get(each.key, {}))
+        for each in columns_of(record)
+    ]
+    values = [row if isinstance(row, Mapping) else vars(row) for row in rows]
+    return table(title, columns, values, explanation=explanation)
