@@ -7,8 +7,9 @@ nothing changed computes nothing.
 
 import hashlib
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, partial
 from importlib.metadata import PackageNotFoundError, version
@@ -30,7 +31,7 @@ from validation.estimates.multiple_scattering import multiple_scattering_share
 from validation.estimates.quadrature import has_truth, kept_truth, truth_image
 from validation.metrics.errors import plain
 from validation.metrics.flip import flip_hdr
-from validation.scenes.loading import LoadedScene, load_scene, scene_identity
+from validation.scenes.loading import LoadedScene, load_scene, resize, scene_identity
 from validation.study.configuration import Configuration, rendered_lights, user_code
 from validation.study.cost import frame_work, sampled_work, steps_of, truth_work
 from validation.study.reference import of_image
@@ -64,7 +65,10 @@ class SceneStudy:
     def timed(self) -> Scene | None:
         """The scene at the size of the timed frames; None if that is the size of the images."""
         size = self.study.measure.timed_size
-        return None if size is None or size == self.size else read_scene(self.at(size))
+        if size is None or size == self.size:
+            return None
+        with self.at(size) as scene:
+            return read_scene(scene)
 
     @cached_property
     def kept_truth(self) -> tuple[TruthImage, Kept]:
@@ -101,9 +105,14 @@ class SceneStudy:
         """Of the images [pixels]."""
         return self.study.sizes[0]
 
-    def at(self, size: tuple[int, int]) -> Any:
-        """Return the `mi.Scene` at another size [pixels]."""
-        return load_scene(self.path, size).scene
+    @contextmanager
+    def at(self, size: tuple[int, int]) -> Iterator[Any]:
+        """Give the `mi.Scene` another size [pixels] for a while: it is loaded once."""
+        resize(self.loaded.scene, size)
+        try:
+            yield self.loaded.scene
+        finally:
+            resize(self.loaded.scene, self.size)
 
     def truth_of(self, pixel: str) -> TruthImage:
         """Return the quadrature reference at pixel centres, or its means over their areas: 'centre' or 'area'."""
@@ -230,14 +239,15 @@ def configurations_for(features: SceneFeatures, configurations: Sequence[Configu
 def check_reference(study: SceneStudy, *, spread: ElsewhereFor | None = None) -> dict[str, Any]:
     """Compare the reference with the Monte Carlo estimators; see `validation.estimates.agreement.agreements`."""
     checks = study.study.checks
-    return agreements(
-        study.at(checks.size),
-        checks.margins,
-        batches=checks.batches,
-        samples=checks.samples,
-        seconds=checks.patience,
-        spread=spread,
-    )
+    with study.at(checks.size) as scene:
+        return agreements(
+            scene,
+            checks.margins,
+            batches=checks.batches,
+            samples=checks.samples,
+            seconds=checks.patience,
+            spread=spread,
+        )
 
 
 def _checks_key(study: SceneStudy) -> str:
@@ -252,7 +262,8 @@ def _multiple_key(study: SceneStudy) -> str:
 
 def _multiple(study: SceneStudy) -> Computed:
     batches, samples = study.study.checks.multiple
-    return plain(multiple_scattering_share(study.at(_MULTIPLE), batches=batches, samples=samples)), {}
+    with study.at(_MULTIPLE) as scene:
+        return plain(multiple_scattering_share(scene, batches=batches, samples=samples)), {}
 
 
 def _cell_key(study: SceneStudy, chosen: Configuration) -> str:

@@ -148,16 +148,17 @@ def _parts(counts: Counts) -> list[slice]:
 
 
 def _trace_pixels(truth: TruthScene, integrator, medium, pixels: slice, seed: int, counts: Counts) -> Array:
-    direction = mi.Vector3f(truth.direction[pixels].T)
-    numbers = mi.UInt32(np.repeat(np.arange(len(counts), dtype=np.uint32), counts))
     # A kernel is compiled for how the memory lies that it reads, and NumPy's lies anywhere.
+    direction = dr.normalize(mi.Vector3f(truth.direction[pixels].T))
+    dr.eval(direction)
+    numbers = mi.UInt32(np.repeat(np.arange(len(counts), dtype=np.uint32), counts))
     pixel = dr.empty(mi.UInt32, dr.width(numbers))
     dr.scatter(pixel, numbers, dr.arange(mi.UInt32, dr.width(numbers)))
     dr.eval(pixel)
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, dr.width(pixel))
     start = mi.Point3f(*(float(c) for c in truth.origin))
-    ray = mi.Ray3f(start, dr.normalize(dr.gather(mi.Vector3f, direction, pixel)))
+    ray = mi.Ray3f(start, dr.gather(mi.Vector3f, direction, pixel))
     radiance, _, _ = integrator.sample(truth.scene, sampler, mi.RayDifferential3f(ray), medium)
     dr.eval(radiance)  # all channels at once: one after the other, each would trace the paths again
     first = np.cumsum(counts, dtype=np.int64) - counts
