@@ -334,13 +334,7 @@ class _Run:
         """Return X = T (S (last + X) + gain) of one mode, (F, Z, 2 N), with T the way of light through the slab."""
         modes = self.slab._modes(m)
         kernel = self.slab._between[m].astype(np.float64)
-        along, edges = Transport(self.panels, modes.cosines)(modes.decoupled(last @ kernel.T + gain))
-        half = modes.rates.size
-        bottom, top = modes.entering(self.tau, top=edges[:, 0, :half].T, bottom=edges[:, -1, half:].T)
-        depths = self.panels.depths[:, None]
-        along[..., :half] += bottom.T[:, None] * np.exp(-modes.rates * (self.tau - depths))
-        along[..., half:] += top.T[:, None] * np.exp(-modes.rates * depths)
-        return modes.radiance(along)
+        return modes.all_orders(Transport(self.panels, modes.cosines), last @ kernel.T + gain)
 
 
 def _neighbours(a: Sequence[Array], m: int, suns: int) -> Array:

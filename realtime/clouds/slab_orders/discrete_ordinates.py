@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
+from realtime.clouds.slab_orders.depth_panels import Transport
 from realtime.clouds.slab_orders.streams import Streams, mode_kernel
 
 Array = NDArray[np.float64]
@@ -92,16 +93,28 @@ class Eigenmodes:
         r = ((plus + minus) / 2) @ self._differences.T * self._out
         return np.concatenate([(p + r) / 2, (p - r) / 2], axis=-1)
 
-    def entering(self, tau: float, top: Array, bottom: Array) -> tuple[Array, Array]:
-        """Return e+ at the bottom and e- at the top for which no light enters from outside.
+    def all_orders(self, transport: Transport, source: Array) -> Array:
+        """Return the radiance at the nodes that a source makes with all that is scattered again, (F, Z, 2 N) both.
 
-        Parameters
-        ----------
-        tau
-            Thickness [mean free paths].
-        top, bottom
-            (N,), e+ at the top and e- at the bottom that the sources alone make.
+        `transport` is that of the panels along the lines of `cosines`.
         """
+        along, edges = transport(self.decoupled(source))
+        half, panels = self.rates.size, transport.panels
+        ends = edges[:, 0, :half], edges[:, -1, half:]
+        return self.radiance(self.closed(along, panels.depths, float(panels.edges[-1]), *ends))
+
+    def closed(self, along: Array, depths: Array, tau: float, top: Array, bottom: Array) -> Array:
+        """Return e+ and e- at depths (Z,) with what their sources send into them through the faces, (.., Z, 2 N).
+
+        `top` and `bottom`, (.., N), are e+ at the top and e- at the bottom that the sources alone make.
+        """
+        from_bottom, from_top = (ends.T[..., None, :] for ends in self._entering(tau, top.T, bottom.T))
+        plus, minus = np.split(along, 2, axis=-1)
+        plus = plus + from_bottom * np.exp(-self.rates * (tau - depths[:, None]))
+        return np.concatenate([plus, minus + from_top * np.exp(-self.rates * depths[:, None])], axis=-1)
+
+    def _entering(self, tau: float, top: Array, bottom: Array) -> tuple[Array, Array]:
+        """Return e+ at the bottom and e- at the top, (N, ..), for which no light enters from outside."""
         fade, lost = np.exp(-self.rates * tau), -np.expm1(-self.rates * tau)
         x, y = self._sums / (2 * self.rates), self._differences / 2
         difference = np.linalg.solve(x * (1 + fade) + y * lost, (x - y) @ (bottom - top))

@@ -181,7 +181,6 @@ class _AllOrders:
     """One mode of a slab under a beam, for all orders at once."""
 
     def __init__(self, slab: SlabOrders, m: int):
-        self._panels = slab.panels
         self._scatter = slab.scatter[m]
         self._modes = Eigenmodes(slab.streams, m, albedo=slab.albedo, moments=slab.kept, peak=slab.peak)
         self._transport = Transport(slab.panels, self._modes.cosines)
@@ -194,13 +193,7 @@ class _AllOrders:
         source = last @ self._scatter + gained
         beam = self._beam(source[None, :, -1:] / self._passing)[0][0]
         diffuse = source[:, :-1] + beam * self._scatter[-1, :-1]
-        (along,), (edges,) = self._transport(self._modes.decoupled(diffuse)[None])
-        half, tau = edges.shape[-1] // 2, float(self._panels.edges[-1])
-        bottom, top = self._modes.entering(tau, top=edges[0, :half], bottom=edges[-1, half:])
-        depths = self._panels.depths[:, None]
-        along[:, :half] += bottom * np.exp(-self._modes.rates * (tau - depths))
-        along[:, half:] += top * np.exp(-self._modes.rates * depths)
-        return np.concatenate([self._modes.radiance(along), beam], axis=-1)
+        return np.concatenate([self._modes.all_orders(self._transport, diffuse[None])[0], beam], axis=-1)
 
 
 def order_sets(slab: SlabOrders, sets: Sequence[tuple[int, float]]) -> tuple[list[Edges], Edges]:

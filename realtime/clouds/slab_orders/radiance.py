@@ -84,14 +84,14 @@ def _diffuse_source(
     panels: DepthPanels, rule: Streams, mu0: float, *, kept: Array, albedo: float, mu: Array, phi: Array
 ) -> Array:
     """Return what light of order 1 and above scatters into the directions, (Z, directions)."""
-    depths, tau = panels.depths[:, None], float(panels.edges[-1])
+    tau = float(panels.edges[-1])
     total = np.zeros((panels.depths.size, mu.size))
     quiet = 0
     for m in range(kept.size):
         to_user = albedo / 2 * mode_kernel(m, kept, mu, rule.mu) * rule.weights
         from_beam = albedo / (4 * np.pi) * mode_kernel(m, kept, rule.mu, np.array([-mu0]))[:, 0]
         modes = Eigenmodes(rule, m, albedo=albedo, moments=kept, peak=0.0)
-        field = modes.radiance(_beam_lines(modes, modes.decoupled(from_beam), mu0, depths, tau))
+        field = modes.radiance(_beam_lines(modes, modes.decoupled(from_beam), mu0, panels.depths, tau))
         part = (2 if m else 1) * field @ to_user.T
         total += part * np.cos(m * phi)
         quiet = quiet + 1 if np.max(np.abs(part)) <= _NEGLIGIBLE * np.max(np.abs(total)) else 0
@@ -114,7 +114,5 @@ def _beam_lines(modes: Eigenmodes, source: Array, mu0: float, depths: Array, tau
         lag = np.where(gap * z > 1e-9, -np.expm1(-gap * z) / np.maximum(gap, 1e-300), z)
         return minus * k * np.exp(-slow * z) * lag
 
-    bottom, top = modes.entering(tau, top=upward(0.0), bottom=downward(tau))
-    return np.concatenate(
-        [upward(depths) + bottom * np.exp(-k * (tau - depths)), downward(depths) + top * np.exp(-k * depths)], axis=-1
-    )
+    along = np.concatenate([upward(depths[:, None]), downward(depths[:, None])], axis=-1)
+    return modes.closed(along, depths, tau, upward(0.0), downward(tau))

@@ -79,12 +79,8 @@ def slab_escapes(tau: float, phase: SlabPhase, albedo: float, *, streams: int = 
         (field,), (edges,) = transport((field @ scatter.T)[None])
         leaving.append(edges[0, upward])
     modes = Eigenmodes(rule, 0, albedo=albedo, moments=kept, peak=peak)
-    (along,), (ends,) = Transport(panels, modes.cosines)(modes.decoupled(field @ scatter.T)[None])
-    half = modes.rates.size
-    bottom, top = modes.entering(tau, top=ends[0, :half], bottom=ends[-1, half:])
-    along[:, :half] += bottom * np.exp(-modes.rates * (tau - depths))
-    along[:, half:] += top * np.exp(-modes.rates * depths)
-    _, (edges,) = transport(((field + modes.radiance(along)) @ scatter.T)[None])
+    (rest,) = modes.all_orders(Transport(panels, modes.cosines), (field @ scatter.T)[None])
+    _, (edges,) = transport(((field + rest) @ scatter.T)[None])
     bounds = [first - 1 for first in FIRST_ORDERS]
     sets = [sum(leaving[first:end]) for first, end in pairwise(bounds)] + [edges[0, upward]]
     cosines = rule.mu[upward]
