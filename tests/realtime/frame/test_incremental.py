@@ -149,4 +149,4 @@ def test_frames_replay_whatever_moves(variant):
     for now, moved in frames(renderer.scene, STEPS):
         _, kept = next_frame(renderer, now, kept, **moved)
     assert renderer.surface.n_recordings <= 2
-    assert [stage.n_recordings for stage in (renderer.shade, renderer.cull, renderer.render)] == [1, 1, 1]
+    assert [stage.n_recordings for stage in (renderer.shade, renderer.render)] == [1, 1]

@@ -88,7 +88,7 @@ def test_many_lights_one_by_one_are_all_at_once(variant):
 def test_a_black_lamp_shadows_others_and_not_itself(variant):
     """A disk before the point light of the scene: what is behind it gets its own light alone."""
 
-    def frames(material):
+    def drawn(material):
         screen = area_lamp("disk", size=0.3, material=material) | {
             "to_world": mi.ScalarTransform4f().look_at([0.75, 0.6, 1.5], [0.1, 0.1, -3.0], [0, 1, 0]).scale(0.3)
         }
@@ -98,9 +98,9 @@ def test_a_black_lamp_shadows_others_and_not_itself(variant):
             for name, parameters in (("shadow-planes", {}), ("ray-march", {"steps": 1000}))
         ]
 
-    planes, marched = frames(None)
+    planes, marched = drawn(None)
     assert relative_rmse(planes.airlight, marched.airlight) < 4e-3  # a polygon stands for the disk
-    clear, _ = frames({"type": "null"})
+    clear, _ = drawn({"type": "null"})
     assert planes.airlight.mean() < 0.97 * clear.airlight.mean()
 
 
