@@ -136,23 +136,19 @@ def test_a_worker_of_another_version_that_joins_a_run_is_sent_away_and_its_work_
     address = f"tcp://127.0.0.1:{port}"
     other = other_version(tmp_path)
     made = made_here(__version__, variant)
-    groups = [
-        Group(tuple(Task(f"{g}-{n}", tasks.add, (n,)) for n in range(4)), Task(f"t{g}", tasks.square, (g, 0.3)))
-        for g in range(400)
-    ]
     refused, ended = [], {}
     with _ended(_scheduler(port), _worker(address)) as running, connected(Place(address=address)) as cluster:
         running.append(_worker(address, other))
-        # Enough groups for the other worker to come, and a few more.
-        left = 10
 
         def until_it_came():
-            nonlocal left
-            for group in groups:
+            """Groups until the other worker has come, however busy the machine is, and a few more."""
+            left = 10
+            for g in range(10_000):
                 left -= bool(refused)
                 if not left:
                     break
-                yield group
+                several = tuple(Task(f"{g}-{n}", tasks.add, (n,)) for n in range(4))
+                yield Group(several, Task(f"t{g}", tasks.square, (g, 0.3)))
 
         for outcome in run_groups(cluster, until_it_came(), made=made, refused=refused.append):
             assert outcome.task.name not in ended
