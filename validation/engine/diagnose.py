@@ -138,11 +138,6 @@ def diagnose_file(
         The EXR file; a built-in scene or a Mitsuba XML file.
     layer, holds
         Which layer, see `validation.engine.judged_layer.judged_layer`.
-
-    Raises
-    ------
-    InputError
-        For files and scenes that cannot be read.
     """
     image = read_exr(path)
     several = layers_of(image, str(path), layer, holds)
@@ -176,11 +171,6 @@ def diagnose_image(
         'centre' or 'area'; by default what the image says of itself, or what fits better.
     light
         Of this scene, as other images of it have found it.
-
-    Raises
-    ------
-    InputError
-        For a layer that is not there, a scene that has no reference, and an image without finite values.
     """
     kinds = pixel_kinds(image, pixel)
     judged = judged or judged_layer(image, path, name=layer, holds=holds)

@@ -87,11 +87,6 @@ def find_images(folder: str | os.PathLike[str], scenes: Mapping[str, str]) -> di
         Holds EXR files; other files are not looked at.
     scenes
         The scenes that files may name: a name, and what `validation.scenes.loading.load_scene` takes for it.
-
-    Raises
-    ------
-    InputError
-        If there is no such folder, no EXR file in it, or a file that names no scene.
     """
     place = Path(folder)
     if not place.is_dir():
@@ -108,13 +103,7 @@ def find_images(folder: str | os.PathLike[str], scenes: Mapping[str, str]) -> di
 
 
 def images_size(images: tuple[EngineImage, ...]) -> tuple[int, int]:
-    """Return the size of the images of one scene, (width, height).
-
-    Raises
-    ------
-    InputError
-        If two sizes differ, or a file cannot be read.
-    """
+    """Return the size of the images of one scene, (width, height)."""
     sizes = {image.path: judged_layer(read_exr(image.path), image.path).size for image in images}
     first = images[0]
     for path, size in sizes.items():
@@ -135,11 +124,6 @@ def measure_image(shown: EngineImage, loaded: LoadedScene, truth_of: TruthOf, *,
         The scene at that size, and what computes its reference for 'centre' or 'area'.
     surfaces
         Whether the scene has surfaces at all.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, has none of the layers, or has another size than the reference.
     """
     image = read_exr(shown.path)
     layer = judged_layer(image, shown.path)
@@ -157,11 +141,6 @@ def image_times(path: Path) -> ImageTimes | None:
 
     The file holds, by the name of the image, `{"ms": 3.1, "quartiles": [2.9, 3.4], "device": "RTX 4090"}`, of which
     the last two may be missing.
-
-    Raises
-    ------
-    InputError
-        If the file is no such JSON.
     """
     file = path.with_name(TIMES)
     if not file.is_file():

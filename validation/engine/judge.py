@@ -218,12 +218,6 @@ def compare_scene(
         See `validation.comparison.images.compare_files`.
     margin
         Largest relative bias [1] that counts as agreement; with standard errors, what they can show counts.
-
-    Raises
-    ------
-    InputError
-        For a scene or a file that cannot be read, a layer that is not there, and a size of another aspect than the
-        scene's.
     """
     image = read_exr(path)
     judged = judged_layer(image, path, name=layer, holds=holds)

@@ -47,11 +47,6 @@ def judged_layer(
         one that Blender calls Combined.
     holds
         What it holds, one of `KINDS`: by default what its name says, else all light.
-
-    Raises
-    ------
-    InputError
-        If it is not there, or not clear which one is meant.
     """
     if holds is not None and holds not in KINDS:
         raise InputError(f"holds {holds}; wanted one of {', '.join(KINDS)}")

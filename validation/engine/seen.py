@@ -107,11 +107,6 @@ def seen_image(
 
     Neither a fit nor a diagnosis explains an area light itself, whose radiance no fog makes: pixels that show one take
     no part, nor do those beside it, nor those that a file does not hold or a mask leaves out.
-
-    Raises
-    ------
-    InputError
-        For a scene that has no reference, and a mask of another size.
     """
     if mask is not None and np.shape(mask) != judged.values.shape[:2]:
         shape = " x ".join(str(side) for side in np.shape(mask)[::-1])
@@ -122,7 +117,7 @@ def seen_image(
     values = np.asarray(judged.values, dtype=np.float64)
     values = np.broadcast_to(values.reshape(-1, values.shape[-1]), (judged.size[0] * judged.size[1], 3)).copy()
     finite = np.isfinite(values).all(axis=1)
-    used = finite.copy()
+    used: Bools = finite.copy()
     chosen = image.with_data(None if mask is None else np.asarray(mask) != 0)
     if chosen is not None:
         used &= np.asarray(chosen).ravel()
@@ -132,7 +127,7 @@ def seen_image(
         used &= ~binary_dilation(lit, np.ones((3, 3), dtype=bool)).ravel()
     wrong = np.flatnonzero(~finite)
     row, column = divmod(int(wrong[0]), truth.width) if len(wrong) else (0, 0)
-    seen = Seen(truth, values, judged.holds, used, samples=needed_samples(truth))
+    seen = Seen(truth, values, judged.holds, np.asarray(used), samples=needed_samples(truth))
     return seen, NotFinite(len(wrong), column, row) if len(wrong) else None
 
 
@@ -144,13 +139,7 @@ def layers_of(image: Image, path: str, name: str | None, holds: str | None) -> t
 
 
 def pixel_kinds(image: Image, pixel: str | None) -> tuple[str, ...]:
-    """Return what the pixels of an image may be: what was said, what an image of ours says, or both.
-
-    Raises
-    ------
-    InputError
-        For a word that is none of `PIXELS`.
-    """
+    """Return what the pixels of an image may be: what was said, what an image of ours says, or both."""
     if pixel is not None and pixel not in PIXELS:
         raise InputError(f"pixel: got {pixel}, wanted 'centre' or 'area'")
     said = pixel or image.attributes.get("airlight:pixel")
@@ -195,13 +184,7 @@ def at_places(seen: Seen, places: dict[int, tuple[float, float, float]]) -> Seen
 
 
 def scene_of_size(scene: str, size: tuple[int, int], path: str | os.PathLike[str]) -> LoadedScene:
-    """Return a scene at the size of an image of it.
-
-    Raises
-    ------
-    InputError
-        If the image has another aspect ratio than the scene by more than a pixel: it shows more or less of it.
-    """
+    """Return a scene at the size of an image of it."""
     loaded = load_scene(scene)
     width, height = (int(n) for n in loaded.scene.sensors()[0].film().size()) if loaded.scene.sensors() else size
     if abs(size[0] * height / width - size[1]) >= 1 and abs(size[1] * width / height - size[0]) >= 1:

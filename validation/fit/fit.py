@@ -151,12 +151,6 @@ def fit_image(
     mask
         Which pixels may take part, (height, width); all by default.
 
-    Raises
-    ------
-    InputError
-        For layers and names that are not known, a scene that has no reference, a mask of another size, and an image
-        with too few pixels that say something.
-
     Notes
     -----
     Valid for single scattering: homogeneous media, point and spot lights, directional ones where media have bounds;

@@ -98,12 +98,6 @@ def read_unknowns(
         The scene, and what it says of the fog.
     starts
         Values to begin with, by name; the scene's own by default.
-
-    Raises
-    ------
-    InputError
-        For a name that is not known or given twice, a medium, light or phase function that the scene does not have,
-        and a start that is out of range.
     """
     if not names:
         raise InputError(f"fit: got none, wanted some of {', '.join(NAMES)}")
@@ -159,7 +153,9 @@ def _of_medium(kind: str, channels: tuple[int, ...], number: int, truth: TruthSc
             raise InputError(
                 f"fit: 'phase.g' is for the phase functions 'hg' and 'isotropic'; this medium has '{phase.name}'"
             )
-        return [Unknown(kind + ending, kind, number, (0, 1, 2), float(fog.phase[number] or 0.0), _TANH, "1")]
+        own = fog.phase[number]
+        g = own if isinstance(own, float) else 0.0
+        return [Unknown(kind + ending, kind, number, (0, 1, 2), g, _TANH, "1")]
     values = getattr(fog, kind)[number]
     unit = "1/m" if kind == "sigma_t" else "1"
     groups = [channels] if len({values[c] for c in channels}) == 1 else [(channel,) for channel in channels]
