@@ -106,7 +106,7 @@ def leaves_nothing(explanation: Explanation, pixel: str) -> bool:
 
 def gains(explanation: Explanation, right: Explanation) -> bool:
     """Return whether an explanation leaves a tenth of the errors of the unchanged scene, or less."""
-    return bool(explanation.hypotheses) and explanation.error <= right.error / _GAIN
+    return bool(explanation.faults) and explanation.error <= right.error / _GAIN
 
 
 def correlation(errors: Array, pairs: tuple[Index, Index]) -> float:

@@ -82,9 +82,9 @@ def _suspects(ref: Array, tst: Array, mean: float) -> tuple[Array, tuple[str, ..
     corrected, left = tst, math.nan
     if first < LEAST * mean:
         return corrected, ()
-    combinations = sorted(product(*_UNDONE, (False, True)), key=lambda changes: sum(map(bool, changes)))
-    for *faults, scaled in combinations:
-        changed, words = tst, []
+    combinations = product(product(*_UNDONE), (False, True))
+    for faults, scaled in sorted(combinations, key=lambda each: sum(map(bool, each[0])) + each[1]):
+        changed, words = tst, list[str]()
         for fault in faults:
             if fault is not None and fault.undo is not None:
                 changed, words = fault.undo(changed), [*words, fault.words]

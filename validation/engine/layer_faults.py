@@ -3,6 +3,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,8 @@ def scaled(entry: str, lights: Sequence[int] | None = None) -> Change:
     def changed(predictor: Predictor, guess: Guess, p: Values) -> Guess:
         old = getattr(guess.fog, entry)
         new = tuple(value * p[0] if lights is None or n in lights else value for n, value in enumerate(old))
-        return replace(guess, fog=replace(guess.fog, **{entry: new}))
+        given: dict[str, Any] = {entry: new}
+        return replace(guess, fog=replace(guess.fog, **given))
 
     return changed
 

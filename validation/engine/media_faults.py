@@ -3,6 +3,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -96,11 +97,11 @@ def _unit(predictor: Predictor, guess: Guess, p: Values) -> Guess:
     return replace(guess, fog=replace(fog, intensity=intensity))
 
 
-def _between(spherical: bool, end: str) -> Change:
-    """Return what lets the medium begin or end at a distance."""
+def _between(spherical: bool, end: str, at: float | None = None) -> Change:
+    """Return what lets the medium begin or end at a distance, one that is given or a number of the fault."""
 
     def changed(predictor: Predictor, guess: Guess, p: Values) -> Guess:
-        given = {end: short(p[0]), "spherical": spherical}
+        given: dict[str, Any] = {end: short(p[0]) if at is None else at, "spherical": spherical}
         return replace(guess, fog=replace(guess.fog, **given), scenery=replace(guess.scenery, **given))
 
     return changed
@@ -269,7 +270,7 @@ MEDIUM = (
             "near-plane",
             "medium",
             f"the medium is missing up to {distance:g} m before the camera: a usual near plane",
-            lambda predictor, guess, p, distance=distance: _between(False, "near")(predictor, guess, (distance,)),
+            _between(False, "near", at=distance),
             applies=fog_surrounds,
         )
         for distance in _USUAL_NEAR
