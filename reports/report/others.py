@@ -152,17 +152,7 @@ def decided(chosen: Sequence[Claim], figures: Mapping[str, Mapping[str, Any]]) -
 def measure_claims(
     chosen: Sequence[Claim], *, quick: bool = False, progress: Progress | None = None
 ) -> list[dict[str, Any]]:
-    """Measure what claims need and is not cached, and return those that are decided.
-
-    Parameters
-    ----------
-    chosen
-        Of `validation.papers.claims.claims`.
-    quick
-        Leave out what needs images.
-    progress
-        Called with (share done, what) now and then.
-    """
+    """Measure what claims need and is not cached, and return those that are decided; `quick` leaves out images."""
     parts = {name: _paper(name) for name in experiments_of(chosen, "quick" if quick else EFFORTS[-1])}
     steps = shares({name: part.seconds for name, part in parts.items()})
     figures = {

@@ -59,17 +59,7 @@ class Claim:
 
 
 def claim(sample: Sample, target: float, level: float = LEVEL) -> Claim:
-    """Return in what share of the scenes a configuration keeps an error.
-
-    Parameters
-    ----------
-    sample
-        Of the configuration.
-    target
-        Relative RMSE [1].
-    level
-        Of confidence [1]; of this claim alone, not of several together.
-    """
+    """Return in what share of the scenes a configuration keeps a relative RMSE; `level` is of this claim alone [1]."""
     measured = sample.measured
     finite = measured & (sample.nonfinite == 0)
     surely = finite & (sample.errors + sample.truth_errors <= target)

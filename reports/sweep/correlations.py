@@ -40,14 +40,7 @@ class Correlation:
 def correlations(sweep: Sweep, made: Sequence[Sample], level: float = LEVEL) -> list[Correlation]:
     """Return the correlation of every property that varies with the error of every configuration.
 
-    Parameters
-    ----------
-    sweep
-        Has the properties.
-    made
-        Samples of the configurations.
-    level
-        Of confidence that all intervals hold what they estimate [1].
+    All intervals hold what they estimate with the probability `level` [1].
     """
     pairs = []
     for sample in made:
@@ -73,16 +66,7 @@ def sure(found: Correlation) -> bool:
 def strongest(found: Sequence[Correlation], sweep: Sweep, sample: Sample, count: int = NAMED) -> list[Correlation]:
     """Return the properties that go with the error of a configuration most, without any that say nearly the same.
 
-    Parameters
-    ----------
-    found
-        From `correlations`.
-    sweep
-        Has the properties.
-    sample
-        Of the configuration.
-    count
-        How many at most.
+    `found` comes from `correlations`; there are `count` at most.
     """
     own = [each for each in found if each.label == sample.label and sure(each)]
     chosen: list[Correlation] = []
@@ -105,10 +89,7 @@ def _of(sweep: Sweep, sample: Sample, name: str) -> Numbers:
 def sentences(strongest_of: Mapping[str, Sequence[Correlation]]) -> list[str]:
     """Return in plain words what goes with the error of each configuration, and last of which nothing does.
 
-    Parameters
-    ----------
-    strongest_of
-        From `strongest`, by the short name of the configuration.
+    `strongest_of` has what `strongest` returns by the short names of configurations.
     """
     made = [sentence(name, chosen) for name, chosen in strongest_of.items() if chosen]
     without = [name for name, chosen in strongest_of.items() if not chosen]

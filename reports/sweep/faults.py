@@ -134,19 +134,7 @@ class Worst:
 
 
 def worst(sweep: Sweep, sample: Sample, properties: Sequence[str], count: int = COUNT) -> list[Worst]:
-    """Return the worst scenes of a configuration, the worst first; of equals the first of the sweep.
-
-    Parameters
-    ----------
-    sweep
-        Has the rows.
-    sample
-        Of the configuration.
-    properties
-        Which ones are told of each scene.
-    count
-        How many scenes.
-    """
+    """Return the worst scenes of a configuration, the worst first, with some of their properties."""
     errors = np.where(np.isnan(sample.errors), -np.inf, sample.errors)
     order = np.lexsort((-errors, -sample.nonfinite.astype(bool).astype(float)))
     places = [place for place in order if sample.measured[place]][:count]

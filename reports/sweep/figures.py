@@ -137,15 +137,7 @@ FIGURES: Mapping[str, Callable[[Summary], "Figure | None"]] = {
 
 
 def drawn(said: Summary, names: Sequence[str] = tuple(FIGURES)) -> Iterator[tuple[str, "Figure"]]:
-    """Yield the figures that the sweep has data for, by name.
-
-    Parameters
-    ----------
-    said
-        What the sweep says.
-    names
-        Of `FIGURES`.
-    """
+    """Yield the figures of these names, of `FIGURES`, that the sweep has data for."""
     for name in names:
         figure = FIGURES[name](said)
         if figure is not None:

@@ -34,24 +34,10 @@ _TABLES = ("errors", "speed", "refusals", "checks", "faults", "truths", "propert
 
 
 def write_sweep(source: Path, target: Path | None = None) -> tuple[Summary, Path]:
-    """Write what a sweep says, from its Parquet alone.
+    """Write what a sweep says, from its Parquet alone; return that and the path of its page.
 
-    Parameters
-    ----------
-    source
-        The folder of a sweep, or its Parquet.
-    target
-        Folder of the files; the one with the Parquet by default.
-
-    Returns
-    -------
-    tuple
-        What the sweep says, and the path of its page.
-
-    Raises
-    ------
-    InputError
-        If there is no such Parquet, it cannot be used, or the folder cannot be written.
+    `source` is the folder of a sweep or its Parquet, `target` the folder of the files, the one with the Parquet by
+    default.
     """
     said = summary_of(read_sweep(source))
     folder = ensure_folder(said.sweep.path.parent if target is None else target)
@@ -66,21 +52,10 @@ def write_sweep(source: Path, target: Path | None = None) -> tuple[Summary, Path
 
 
 def render_sweep(said: Summary, charts: Mapping[str, str], *, limit: int = PAGE_LIMIT) -> str:
-    """Return the HTML page of a sweep.
+    """Return the HTML page of a sweep, with its figures as SVG by name.
 
-    Parameters
-    ----------
-    said
-        What the sweep says.
-    charts
-        Its figures as SVG, by name; see `reports.sweep.figures`.
-    limit
-        Of the page [bytes]; pictures are left out to keep it, those of the least bad scenes first.
-
-    Raises
-    ------
-    InputError
-        If the page without any picture is larger.
+    Pictures are left out to keep the `limit` [bytes], those of the least bad scenes first. A page that is larger
+    without any of them is refused.
     """
     from markupsafe import Markup
 

@@ -70,17 +70,9 @@ class Sweep:
 
 
 def read_sweep(path: Path | str) -> Sweep:
-    """Read the rows of a sweep.
+    """Read the rows of a sweep, from its Parquet or the folder that holds it.
 
-    Parameters
-    ----------
-    path
-        Of the Parquet, or of the folder that holds it.
-
-    Raises
-    ------
-    InputError
-        If there is none, it cannot be read, has no rows, or is not what this version of airlight writes.
+    A file that is missing, cannot be read, has no rows or is not of this version is refused.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq

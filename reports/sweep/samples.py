@@ -119,16 +119,7 @@ def short_names(methods: Sequence[str], labels: Sequence[str], most: int = 34) -
     """Return short names for labels such as 'ray-march (steps=16, map=512)', all different.
 
     A name holds the words in parentheses in which the configurations of one method differ, as many as there is room
-    for; the method alone where it has one configuration.
-
-    Parameters
-    ----------
-    methods
-        Of each configuration.
-    labels
-        In full, all different.
-    most
-        Letters of a name.
+    for in `most` letters; the method alone where it has one configuration.
     """
     inside = [_words(label) for label in labels]
     names = []
@@ -185,20 +176,9 @@ def _badness(status: str, error: float) -> tuple[int, float]:
 
 
 def fastest_counts(made: Sequence[Sample], target: float) -> tuple[list[int], int, int]:
-    """Return in how many scenes each configuration is the fastest within an error.
+    """Return in how many scenes each configuration is the fastest within an error, and in how many none is within it.
 
-    Parameters
-    ----------
-    made
-        Samples of all configurations.
-    target
-        Largest relative RMSE [1].
-
-    Returns
-    -------
-    tuple
-        A count for each configuration, in how many scenes none is within the error, and how many scenes were counted:
-        those in which whatever was measured was also timed alone.
+    The last number is how many scenes were counted: those in which whatever was measured was also timed alone.
     """
     best: dict[str, tuple[float, int]] = {}
     timed: dict[str, bool] = {}

@@ -106,17 +106,7 @@ def efficiency(
 
 
 def scene_efficiency(scene, *, samples: int = 64, batches: int = 8) -> Efficiency:
-    """Measure single-scatter against volpath on the airlight of a Mitsuba scene at its own size.
-
-    Parameters
-    ----------
-    scene
-        The `mi.Scene`.
-    samples
-        A pixel in each batch, of both.
-    batches
-        Of each.
-    """
+    """Measure single-scatter against volpath on the airlight of a Mitsuba scene at its own size."""
     truth, image = read_truth(scene), truth_image(scene)
     estimators = {"single-scatter": (single_scatter_batch, samples), "volpath": (volpath_batch, samples)}
     mask = layer_masks(truth, image)["airlight"]

@@ -15,20 +15,10 @@ from validation.estimates.quadrature import truth_image
 
 
 def estimator_truth(scene, estimator: str) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return what an estimator should find in the pixels of a scene that can be compared, and which these are.
+    """Return the airlight that an estimator of a Mitsuba scene converges to, and the pixels that can be compared.
 
-    Parameters
-    ----------
-    scene
-        The `mi.Scene`.
-    estimator
-        'single-scatter' or 'volpath'.
-
-    Returns
-    -------
-    tuple
-        The airlight [W/(m^2 sr)], (pixels, 3), and the mask of the image, (height, width): see
-        `validation.estimates.agreement.layer_masks`.
+    The airlight is that of these pixels, (pixels, 3) [W/(m^2 sr)]; their mask, (height, width), is that of
+    `validation.estimates.agreement.layer_masks`.
     """
     epsilon = measure_shadow_epsilon() if estimator == "volpath" else 0.0
     truth = truth_image(scene, shadow_scale=1 - epsilon)

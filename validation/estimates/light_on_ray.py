@@ -38,13 +38,7 @@ _ROUNDING = 2.0**-24
 
 
 def check_camera(truth: TruthScene) -> None:
-    """Refuse a scene whose camera is at a light, whose every pixel is infinite.
-
-    Raises
-    ------
-    InputError
-        With the light and its distance.
-    """
+    """Refuse a scene whose camera is at a light, whose every pixel is infinite."""
     for number, light in enumerate(truth.lights, 1):
         distance = float(np.linalg.norm(light.position - truth.origin))
         if distance <= _uncertainty(truth, light) and _scatters(truth, light):
@@ -55,20 +49,7 @@ def check_camera(truth: TruthScene) -> None:
 
 
 def check_rays(truth: TruthScene, distance: Array) -> None:
-    """Refuse rays through pixel centres that meet a light before the visible surface.
-
-    Parameters
-    ----------
-    truth
-        The scene.
-    distance
-        To the visible surface, of as many entries as there are pixels [m].
-
-    Raises
-    ------
-    InputError
-        With the light, its distance from the ray, and the pixel.
-    """
+    """Refuse rays through pixel centres that meet a light before the visible surface, so far away, (rays,) [m]."""
     ends = np.ravel(distance)
     for number, light in enumerate(truth.lights, 1):
         origin = np.broadcast_to(truth.origin, truth.direction.shape)
@@ -86,13 +67,7 @@ def check_rays(truth: TruthScene, distance: Array) -> None:
 
 
 def check_values(truth: TruthScene, image: TruthImage) -> None:
-    """Refuse a truth that is not finite.
-
-    Raises
-    ------
-    InputError
-        With the first pixel.
-    """
+    """Refuse a truth that is not finite, by its first pixel."""
     for what in ("airlight", "airlight_bound", "surface"):
         values: Any = getattr(image, what)
         wrong = ~np.isfinite(values).all(axis=2)

@@ -103,13 +103,7 @@ def multiple_scattering_share(
 
 
 def left_out(part: Array, whole: Array) -> Share:
-    """Return 1 - part/whole with its 95 % interval, from paired batch means; 0 of a whole without light.
-
-    Parameters
-    ----------
-    part, whole
-        Means of the image in each batch, (batches,) [W/(m^2 sr)], of the same batches.
-    """
+    """Return 1 - part/whole with its 95 % interval, from image means of paired batches, (batches,); 0 without light."""
     count = len(whole)
     if not whole.mean() > 0:
         return Share(0.0, (0.0, 0.0))

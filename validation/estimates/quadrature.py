@@ -70,25 +70,7 @@ def kept_truth(
 
 
 def truth_of_pixels(scene, pixels: NDArray[np.integer]) -> TruthImage:
-    """Return the quadrature truth of some pixels of a Mitsuba scene's image; it is not kept.
-
-    Parameters
-    ----------
-    scene
-        The `mi.Scene`.
-    pixels
-        Their numbers, row by row, (count,).
-
-    Returns
-    -------
-    TruthImage
-        An image of one row, (1, count, 3) [W/(m^2 sr)].
-
-    Raises
-    ------
-    InputError
-        As `truth_image`; a pixel that it names is counted among these.
-    """
+    """Return the quadrature truth of pixels of a Mitsuba scene by number, row by row, (1, count, 3); it is not kept."""
     whole = read_truth(scene)
     return _checked_image(replace(whole, width=len(pixels), height=1, direction=whole.direction[pixels]), _USUAL)
 

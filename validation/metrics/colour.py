@@ -118,13 +118,7 @@ def colour_difference(
 
 
 def auto_exposure(reference: ArrayLike) -> float:
-    """Return the exposure [stops] that brings the 99th percentile of the finite values to 0.9; 0 for black.
-
-    Parameters
-    ----------
-    reference
-        Linear radiance [W/(m^2 sr)] of any shape.
-    """
+    """Return the exposure [stops] that brings the 99th percentile of the finite radiance to 0.9; 0 for black."""
     values = np.asarray(reference, dtype=np.float64)
     values = values[np.isfinite(values)]
     bright = float(np.percentile(values, 99)) if values.size else 0.0

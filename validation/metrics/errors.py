@@ -106,17 +106,7 @@ def compared(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
     """Return two images as float64, (height, width, channels), and the pixels to compare, (height, width).
 
-    Parameters
-    ----------
-    reference, test
-        Two images of one unit, such as [W/(m^2 sr)], (height, width) or (height, width, channels).
-    mask
-        Pixels to compare, (height, width) of truth values; None for all.
-
-    Raises
-    ------
-    InputError
-        If the sizes differ, an image is empty, or the mask does not fit or leaves nothing.
+    Images of different sizes, empty ones, and a mask that does not fit or leaves nothing are refused.
     """
     ref, tst = np.asarray(reference, dtype=np.float64), np.asarray(test, dtype=np.float64)
     if ref.shape != tst.shape:
@@ -134,13 +124,7 @@ def compared(
 
 
 def colours(image: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return an `image`, (height, width, channels) [any unit], with three channels; one channel becomes grey.
-
-    Raises
-    ------
-    InputError
-        If it has neither one nor three channels: only these have a colour.
-    """
+    """Return an image, (height, width, channels), with three channels; one becomes grey, other numbers are refused."""
     if image.shape[2] not in (1, 3):
         raise InputError(
             f"an image of {image.shape[2]} channels has no colour; wanted one (grey) or three (linear RGB)"

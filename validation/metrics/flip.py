@@ -145,13 +145,7 @@ def flip_hdr(
 
 
 def exposure_range(reference: ArrayLike) -> tuple[float, float]:
-    """Return the first and the last exposure [stops] of HDR-FLIP for a reference (..., 3) (see the module).
-
-    Raises
-    ------
-    InputError
-        If it has no positive luminance.
-    """
+    """Return the first and the last exposure [stops] of HDR-FLIP for a reference (..., 3) that is not black."""
     luminance = np.asarray(reference, dtype=np.float64) @ _LUMINANCE
     luminance = luminance[luminance > 0]
     if not luminance.size:

@@ -140,13 +140,7 @@ def configuration(
 
 
 def chosen_configurations(methods: Sequence[str]) -> tuple[Configuration, ...]:
-    """Return the standard configurations of some methods; one without any for every scene has its defaults too.
-
-    Raises
-    ------
-    InputError
-        As `configuration`.
-    """
+    """Return the standard configurations of some methods; one without any for every scene has its defaults too."""
     chosen: list[Configuration] = []
     for method in methods:
         default = configuration(method)
@@ -157,23 +151,14 @@ def chosen_configurations(methods: Sequence[str]) -> tuple[Configuration, ...]:
 
 
 def parse_settings(settings: Sequence[str]) -> dict[str, str]:
-    """Return values by name from words of the form 'NAME=VALUE'.
-
-    Raises
-    ------
-    InputError
-        As of `analytic.errors.named_values`.
-    """
+    """Return values by name from words of the form 'NAME=VALUE'."""
     return named_values("--set", settings, str, "NAME=VALUE, for example steps=100")
 
 
 def prepared(scene: Scene, chosen: Configuration, *, extra_layers: bool = False) -> FrameRenderer:
     """Return the frame renderer of a configuration for a scene; `extra_layers` as of `frame_renderer`.
 
-    Raises
-    ------
-    realtime.errors.InputError
-        If the method refuses the scene or a parameter.
+    What the method refuses raises `realtime.errors.InputError`.
     """
     kernel = find_kernel(chosen.kernel) if chosen.kernel else None
     parameters: dict[str, Any] = dict(chosen.parameters)
@@ -202,18 +187,9 @@ def _function_name(function: Callable[..., Any]) -> str:
 def find_kernel(name: str) -> Callable[..., Any]:
     """Return the kernel function of a name.
 
-    Parameters
-    ----------
-    name
-        A name of `realtime.kernels.registry.KERNELS`, 'name-N' for the same kernel with its first parameter set to the
-        whole number N, or a user's own: 'module:function', 'path/to/file.py:function'
-        (`realtime.methods.user_method`).
-
-    Raises
-    ------
-    InputError
-        For an unknown name (the message suggests the nearest), a number for a kernel without parameters, and what
-        cannot be imported or called.
+    The name is one of `realtime.kernels.registry.KERNELS`, 'name-N' for the same kernel with its first parameter
+    set to the whole number N, or a user's own, 'module:function' or 'path/to/file.py:function'. An unknown one is
+    refused with the nearest.
     """
     if ":" in name:
         return _imported(name)
@@ -224,13 +200,7 @@ def find_kernel(name: str) -> Callable[..., Any]:
 
 
 def split_name(name: str) -> tuple[Kernel, int | None]:
-    """Return the record of a kernel, and the N of 'name-N' or None for a plain name.
-
-    Raises
-    ------
-    InputError
-        As `find_kernel`.
-    """
+    """Return the record of a kernel, and the N of 'name-N' or None for a plain name."""
     if name in KERNELS:
         return KERNELS[name], None
     base, separator, digits = name.rpartition("-")

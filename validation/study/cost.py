@@ -59,17 +59,9 @@ def steps_of(parameters: Iterable[tuple[str, Any]]) -> float:
 
 
 def check_work(what: str, works: Iterable[Work], *, force: bool) -> None:
-    """Ask before a command takes more than an hour, or more memory than the machine has.
+    """Refuse what would take more than an hour, or more memory than the machine has, unless it is forced.
 
-    Parameters
-    ----------
-    what
-        What is asked for, as the message begins.
-
-    Raises
-    ------
-    InputError
-        With the time, the memory and what to do.
+    `what` is asked for, as the message begins, which gives the time, the memory and what to do.
     """
     works = list(works)
     if force or not works:

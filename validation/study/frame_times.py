@@ -42,12 +42,8 @@ _TURNS = 1.5  # approximate time for the one to five frames that are timed stage
 def timed_image(renderer: FrameRenderer, scene: Scene, caches: tuple[FrameCache, ...] | None, **moved: bool):
     """Render the next frame by `realtime.frame.incremental.next_parts`.
 
-    Returns
-    -------
-    frame, caches
-        The image on the host, and what its parts leave to the next frame.
-    milliseconds
-        What it took without bringing it to the host [ms].
+    Return the image on the host, what its parts leave to the next frame, and what it took without bringing it to
+    the host [ms].
     """
     in_turn, frame, kept, took = next_parts(renderer, scene, caches, **moved), None, [], 0.0
     while True:

@@ -94,15 +94,7 @@ def study_scaling(
     seconds: float = 0.3,
     progress: Progress | None = None,
 ) -> list[Scaling]:
-    """Measure how methods grow with a kind of work.
-
-    Parameters
-    ----------
-    kind
-        Of `validation.study.ladders.KINDS`.
-    steps
-        Of `validation.study.ladders.ladder`.
-    """
+    """Measure how methods grow with a kind of work, in steps of `validation.study.ladders.ladder`."""
     costs: dict[Configuration, list[Cost]] = {chosen: [] for chosen in configurations}
     refused: dict[Configuration, str] = {}
     total = len(steps) * len(configurations)
@@ -142,15 +134,7 @@ def _cost(scene: Scene, step: Step, chosen: Configuration, seconds: float) -> Co
 
 
 def growth(kind: str, name: str, costs: Sequence[Cost]) -> Growth:
-    """Return how one of `TIMES` grows with the work.
-
-    Parameters
-    ----------
-    name
-        Of `TIMES`.
-    costs
-        Of the steps, the least work first.
-    """
+    """Return how one of `TIMES` grows with the work, from the costs of steps, the least work first."""
     times = [getattr(cost, name).median_ms for cost in costs]
     fit: Slope = fitted_slope([cost.work for cost in costs], times)
     local = [

@@ -47,21 +47,9 @@ class Step:
 
 
 def ladder(kind: str, name_or_path: str, size: tuple[int, int]) -> list[Step]:
-    """Return the steps of a kind of work for a scene, the least work first.
+    """Return the steps of a kind of work, of `KINDS`, for a scene at a size [pixels], the least work first.
 
-    Parameters
-    ----------
-    kind
-        Of `KINDS`.
-    name_or_path
-        See `validation.scenes.loading.load_scene`.
-    size
-        Of the image [pixels].
-
-    Raises
-    ------
-    InputError
-        For another kind, and where the scene has nothing of the kind of which there could be less or more.
+    A scene that has nothing of the kind of which there could be less or more is refused.
     """
     makers = {"size": _sizes, "triangles": _triangles, "lights": _lights, "media": _media, "map": _maps}
     if kind not in makers:

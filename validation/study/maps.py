@@ -95,13 +95,9 @@ class MapFlicker:
 
 
 def fitted_slope(sizes: ArrayLike, errors: ArrayLike) -> Slope:
-    """Return the order at which errors fall with the size, by least squares of the logarithms.
+    """Return the order at which relative errors fall with the texels along an edge of the map, both (n,).
 
-    Parameters
-    ----------
-    sizes, errors
-        Texels along an edge of the map and relative errors, (n,) each [1]. Errors that are not positive and finite
-        are left out.
+    It is that of least squares of the logarithms; errors that are not positive and finite are left out.
     """
     n, e = np.asarray(sizes, dtype=np.float64), np.asarray(errors, dtype=np.float64)
     counts = (e > 0) & np.isfinite(e)
@@ -120,22 +116,10 @@ def map_errors(
     sizes: Sequence[int] = SIZES,
     progress: Progress | None = None,
 ) -> MapErrors:
-    """Measure the error of a method against the size of its shadow map.
+    """Measure the error of a method in an `mi.Scene`, at its own size, against the size of its shadow map [texels].
 
-    Parameters
-    ----------
-    scene
-        The `mi.Scene`, rendered at its own size.
-    method, kernel, parameters
-        See `validation.study.configuration.configuration`. This function sets the method's parameter `map`. Its
-        other errors, such as that of the steps of a marcher, must be well below the error of the largest map.
-    sizes
-        Of the shadow map [texels].
-
-    Raises
-    ------
-    InputError
-        For a method without shadow maps, a size that is not valid, or no sizes at all.
+    Other errors of the method, such as that of the steps of a marcher, must be well below the error of the largest
+    map. A method without shadow maps is refused.
     """
     shared, by_size = _configurations(method, kernel, parameters, sizes)
     read, truth = read_scene(scene), truth_image(scene).airlight

@@ -81,24 +81,12 @@ def of_image(image: TruthImage, spent: Spent = _UNKNOWN) -> Reference:
 
 
 def load_cell(cell: Cell) -> LoadedScene:
-    """Load the scene of a cell at its size, with its medium.
-
-    Raises
-    ------
-    InputError
-        As of `validation.scenes.loading.load_scene`.
-    """
+    """Load the scene of a cell at its size, with its medium."""
     return load_scene(cell.scene, cell.size, parse_changes(cell.medium))
 
 
 def cell_reference(loaded: LoadedScene) -> Reference:
-    """Return the reference of a loaded scene, from the cache where it was computed before.
-
-    Raises
-    ------
-    InputError
-        As of `validation.estimates.quadrature.truth_image`.
-    """
+    """Return the reference of a loaded scene, from the cache where it was computed before."""
     if not any(emitter.get_shape() is not None for emitter in loaded.scene.emitters()):
         spent = stopwatch()
         return of_image(truth_image(loaded.scene), spent())
@@ -109,13 +97,7 @@ def cell_reference(loaded: LoadedScene) -> Reference:
 
 
 def sampled_reference(scene) -> dict[str, Array]:
-    """Return airlight, its bound and the mask of the pixels that have one, of an `mi.Scene`.
-
-    Raises
-    ------
-    InputError
-        As of `validation.estimates.quadrature.truth_image`.
-    """
+    """Return airlight, its bound and the mask of the pixels that have one, of an `mi.Scene`."""
     truth = read_truth(scene)
     check_camera(truth)
     count = truth.height * truth.width

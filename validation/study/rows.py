@@ -87,10 +87,7 @@ class RowStore:
     def add(self, row: Mapping[str, Any]) -> None:
         """Add a row, or replace the one of the same key.
 
-        Raises
-        ------
-        OSError
-            If the disk is full: the rows are as they were, and the message names the file.
+        If the disk is full an OSError names the file; the rows are as they were.
         """
         data = {name: value for name, value in row.items() if value is not None and name != "picture"}
         text = json.dumps(data, allow_nan=False)

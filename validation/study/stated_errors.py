@@ -78,15 +78,8 @@ def _kinks(phase: Any) -> float:
 
 
 def worth_of_ends(scene: Any, pixels: NDArray[np.int64]) -> Array:
-    """Return what the uncertain ends of lit intervals are worth, (pixels, 3) [W/(m^2 sr)].
+    """Return what the uncertain ends of lit intervals are worth in an `mi.Scene`, (pixels, 3) [W/(m^2 sr)].
 
-    Parameters
-    ----------
-    scene
-        The `mi.Scene`.
-
-    Notes
-    -----
     Valid for lights without extent. Wherever a ray may end: the largest x s(x) along it, whether it is lit there or
     not.
     """

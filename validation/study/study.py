@@ -243,10 +243,7 @@ def default_study(count: int, first: int = 0) -> Study:
 def read_study(path: Path, *, count: int | None = None) -> Study:
     """Return the study of a TOML file; `count` random scenes in place of those that it names, if given.
 
-    Raises
-    ------
-    InputError
-        For a file that cannot be read, and for every name, type or value that a study cannot have.
+    Every name, type or value that a study cannot have is refused.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -267,22 +264,7 @@ def read_study(path: Path, *, count: int | None = None) -> Study:
 
 
 def parse_study(data: Mapping[str, Any], *, folder: Path = Path(), name: str = "sweep") -> Study:
-    """Return the study that a table describes.
-
-    Parameters
-    ----------
-    data
-        What `tomllib` reads.
-    folder
-        Where relative paths of scenes begin.
-    name
-        Of the study, where it gives none.
-
-    Raises
-    ------
-    InputError
-        As `read_study`.
-    """
+    """Return the study that a table describes, as `tomllib` reads it; paths of scenes begin at `folder`."""
     others = ("scenes", "random", "methods", "kernels", "maps", "parameters")
     _known("", data, (*_STUDY, *_MEASURE, *others))
     given, measure = _read("", data, _STUDY), _read("", data, _MEASURE)

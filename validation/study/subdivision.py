@@ -36,18 +36,7 @@ def triangles_of(scene) -> int:
 
 
 def subdivided(scene, levels: int) -> Any:
-    """Return a Mitsuba scene whose opaque meshes have 4^levels times the triangles, and bumps.
-
-    Parameters
-    ----------
-    levels
-        How often each triangle is cut into four.
-
-    Raises
-    ------
-    InputError
-        If nothing in it is an opaque mesh.
-    """
+    """Return a Mitsuba scene whose opaque meshes, if any, have 4^levels times the triangles, and bumps."""
     if not triangles_of(scene):
         raise InputError("triangles: the scene has no opaque meshes, which alone can have more triangles; use another")
     box = scene.bbox()
