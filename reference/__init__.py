@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The ground truth: images of single scattering, each with its own error.
 
-Three estimators lead to it. `quadrature` finds the lit intervals of every camera ray by exact geometry or by ray
-casting and sums airlight integrals over them in float64. `monte_carlo.single_scatter` samples the same integral as an
+Three estimators lead to it. `quadrature` finds the lit intervals of every camera ray by exact geometry
+and sums airlight integrals over them in float64. `monte_carlo.single_scatter` samples the same integral as an
 integrator of Mitsuba. `monte_carlo.volpath` runs Mitsuba's volumetric path tracer, which nobody here wrote.
 
 None of the three imports another. What two of them share is the reading of the scene (`scene`: coefficients, lights,

@@ -3,22 +3,19 @@
 
 Read in this order:
 
-- `unbounded.py`: sums over lit intervals in one medium without bounds;
-- `segments.py`: media in convex bounds along rays;
-- `pieces.py`: smooth pieces of lit intervals in bounded media;
+- `unbounded.py`: sums over lit stretches in one medium without bounds;
+- `segments.py`: media in convex bounds along rays and shadow segments;
+- `pieces.py`: smooth pieces of lit stretches in bounded media;
 - `adaptive_panels.py`: panels that are halved until a sum meets its tolerance;
-- `bounded.py`: sums over lit intervals in bounded media;
-- `light_airlight.py`: the airlight of one point or spot light;
-- `directional_sums.py`: the same for directional lights;
-- `directional_airlight.py`: the airlight of one directional light;
+- `bounded.py`: sums over lit stretches in bounded media, for all lights;
+- `light_airlight.py`: the airlight of one point, spot or directional light;
 - `surface.py`: the lit surface behind the medium;
 - `ahead.py`: work that threads do ahead of what needs it;
-- `light_points.py`: points on lights with extent;
-- `replicates.py`: how many of them a ray needs, and means whose intervals hold;
-- `area_airlight.py`: the airlight of lights with extent;
-- `area_surface.py`: the surface that they light;
+- `replicates.py`: how many samples a ray needs, and means whose intervals hold;
+- `light_samples.py`: samples of area lights for a ray or a surface point;
+- `light_points.py`: even points on them, for sums that all rays share;
+- `area_lights.py`: the airlight of area lights, and the surfaces that they light;
 - `emission.py`: these lights seen directly;
 - `ray_values.py`: all of this along every ray;
-- `pixel_area.py`: means over the areas of pixels;
-- `image.py`: the image.
+- `image.py`: the image, by pixel centres or by means over pixels.
 """

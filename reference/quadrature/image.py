@@ -1,21 +1,51 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The truth of an image: the values of the rays through pixel centres, or means over the areas of pixels."""
+"""The truth of an image: the values of the rays through pixel centres, or means over the areas of pixels.
+
+A mean over a pixel is a sum over positions in it: eight replicates of a scrambled net, whose spread is the standard
+error, and a pilot that says how many positions a pixel needs (`reference.quadrature.replicates`). All pixels share the
+positions, so that the spread of the mean of an image is known, too. Near a light the radiance grows as one over the
+distance to it on the film: the mean over an area is finite. Under area lights each replicate has samples of its own of
+them, and its spread is that of both.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.quadrature.area_airlight import Keep
-from reference.quadrature.light_points import PointPlan
-from reference.quadrature.pixel_area import area_image
-from reference.quadrature.ray_values import Progress, TruthImage, image_of, ray_values
+from reference.quadrature.ray_values import Progress, RayValues, TruthImage, ray_values
+from reference.quadrature.replicates import (
+    PILOT,
+    REPLICATES,
+    Keep,
+    PointPlan,
+    replicate_means,
+    square_points,
+    standard_error,
+)
+from reference.quadrature.unbounded import sums_of
+from reference.scene.camera import film_directions, pixel_centres
 from reference.scene.read import TruthScene
+from reference.scene.shapes import read_shapes
+from reference.visibility.certificate import RandomChecks
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_POSITIONS = PointPlan(first=4, most=128)  # of each replicate in a pixel
+_OF_LIGHTS = 4  # samples of area lights for each position, eight times
+_CHUNK = 1 << 17  # rays at once
 
 
 def quadrature_image(
     truth: TruthScene,
     *,
-    samples: int = 256,
+    checks: int = 32,
     shadow_scale: float = 1.0,
     pixel: str = "centre",
-    edges: str = "auto",
+    tolerance: float = 1e-3,
     progress: Progress | None = None,
     plan: PointPlan | None = None,
     keep: Keep | None = None,
@@ -26,21 +56,21 @@ def quadrature_image(
     ----------
     truth
         The scene.
-    samples
-        Visibility samples of each ray and light; an eighth as many random ones check the lit intervals.
+    checks
+        Random shadow rays to each ray and light, which check the lit intervals.
     shadow_scale
-        Attenuate the leg from the light over this share [1] of its length: 1 is the truth, 1 - epsilon what a renderer
-        with a shadow-ray epsilon converges to (DESIGN section 6.1). Such a renderer also starts its shadow rays off the
-        surface, and so do those for `surface` then (`reference.visibility.surface_shadows`).
+        Attenuate over this share [1] of each shadow segment: 1 is the truth, 1 - epsilon what a renderer with a
+        shadow-ray epsilon converges to (DESIGN section 6.1). Such a renderer also starts its shadow rays off the
+        surface, and so do those for `surface` then (`reference.visibility.certificate.reached_by_shadow_rays`).
     pixel
         "centre": the radiance along the ray through the centre. "area": the mean over the pixel.
-    edges
-        How lit intervals are found: "geometry", "rays" or "auto", see
-        `reference.visibility.lit_intervals.lit_intervals`.
+    tolerance
+        Of a mean over a pixel: the standard error over value [1] for which positions are chosen, up to 128 in each
+        replicate. `airlight_se` and `surface_se` say what was reached.
     progress
         Called with (done, total, what) as the work goes on.
     plan
-        How many points and scan lines stand for lights with extent.
+        How many samples stand for area lights, along rays through pixel centres.
     keep
         Called with the name of each part of that work and a function that does it: it may keep what it returns, and
         give it back when the same image is computed again. Not for means over pixels.
@@ -53,20 +83,91 @@ def quadrature_image(
     Raises
     ------
     InputError
-        For another word in `pixel` or `edges`.
+        For another word in `pixel`.
 
     Notes
     -----
-    Valid for homogeneous media, point and spot lights, lights with extent, opaque surfaces; for directional lights
-    where all media have bounds. Their legs have no end, so `shadow_scale` leaves them as they are. A pixel whose centre
-    ray meets a point light has an infinite airlight; the mean over its area is finite.
+    Valid for homogeneous media, point and spot lights, area lights, opaque surfaces; for directional lights where all
+    media have bounds. Their shadow segments have no end, so `shadow_scale` leaves them as they are. A pixel whose
+    centre ray meets a point light has an infinite airlight; the mean over its area is finite.
     """
+    how: dict[str, Any] = {"checks": checks, "shadow_scale": shadow_scale}
     if pixel == "area":
-        return area_image(truth, samples=samples, shadow_scale=shadow_scale, edges=edges, progress=progress, plan=plan)
+        return _means(truth, tolerance, plan, progress, how)
     if pixel != "centre":
         raise InputError(f"pixel is '{pixel}'; wanted 'centre' or 'area'")
-    values = ray_values(
-        truth, samples=samples, shadow_scale=shadow_scale, edges=edges, progress=progress, plan=plan, keep=keep
+    values = ray_values(truth, progress=progress, plan=plan, keep=keep, **how)
+    layers = np.concatenate([values.airlight, values.surface, values.emitted.reshape(len(values.airlight), -1)], axis=1)
+    return _image(truth, values, layers, values.bound, values.replicates if truth.area else None)
+
+
+def _image(truth: TruthScene, centre: RayValues, layers: Array, bound: Array, replicates: Array | None) -> TruthImage:
+    """Return the image of layers, (pixels, 6 or 9); distances, angles and checks are those of the centres."""
+    shape, checked = (truth.height, truth.width), centre.random_checks
+    extra: dict[str, Any] = {"emitted": layers[:, 6:].reshape(*shape, 3)} if layers.shape[1] > 6 else {}
+    if replicates is not None:
+        errors = standard_error(replicates[:, :6]).reshape(*shape, 6)
+        extra |= {"airlight_se": errors[..., :3], "surface_se": errors[..., 3:]}
+        extra["replicate_means"] = replicates[:, :6].mean(axis=0).reshape(2, 3, -1).swapaxes(1, 2)
+    return TruthImage(
+        layers[:, :3].reshape(*shape, 3),
+        bound.reshape(*shape, 3),
+        layers[:, 3:6].reshape(*shape, 3),
+        centre.distance.reshape(shape),
+        centre.light_angle.reshape(shape),
+        centre.transitions,
+        checked.missed,
+        checked.checked,
+        checked.disagreements,
+        checked.refined,
+        checked.left,
+        **extra,
     )
-    layers = values.airlight, values.bound, values.surface
-    return image_of(truth, values, layers, (values.emitted, values.replicates))
+
+
+def _means(
+    truth: TruthScene, tolerance: float, plan: PointPlan | None, progress: Progress | None, how: dict[str, Any]
+) -> TruthImage:
+    """Return the means over the areas of all pixels."""
+    size, shapes = (truth.width, truth.height), read_shapes(truth.occluders)
+    corner = pixel_centres(size) - 0.5
+    sensor = truth.scene.sensors()[0]
+    seed = plan.seed if plan is not None else 0
+    lights = PointPlan(error=0.0, first=_OF_LIGHTS, most=_OF_LIGHTS)
+    bounds, checks = np.zeros((len(corner), 3)), list[RandomChecks]()
+    # Replicates are looked at together, but under area lights each has samples of them of its own.
+    groups = [[replicate] for replicate in range(REPLICATES)] if truth.area else [list(range(REPLICATES))]
+    rounds, done = 2 * _POSITIONS.rounds * len(groups), 0
+
+    def sums(part: str, chosen: PointPlan, active: Index, numbers: tuple[int, int]) -> Array:
+        nonlocal done
+        total = []
+        for group in groups:
+            square = np.stack([square_points(chosen, 0, replicate, "pixel")[slice(*numbers)] for replicate in group])
+            positions = (corner[active, None] + square[:, None]).reshape(-1, 2)
+            owner = np.repeat(np.arange(len(group) * len(active)), square.shape[1])
+            of_lights = replace(lights, seed=chosen.seed * REPLICATES + group[0] + (numbers[0] << 16))
+            parts = []
+            for first in range(0, len(positions), _CHUNK):
+                direction = film_directions(sensor, positions[first : first + _CHUNK], size)
+                ray = ray_values(replace(truth, direction=direction), plan=of_lights, shapes=shapes, **how)
+                emitted = ray.emitted.reshape(len(direction), -1)
+                parts.append(np.concatenate([ray.airlight, ray.surface, emitted], axis=1))
+                if part != PILOT:
+                    np.add.at(bounds, active[owner[first : first + _CHUNK] % len(active)], ray.bound)
+                    checks.append(ray.random_checks)
+            found = sums_of(owner, np.concatenate(parts), len(group) * len(active))
+            total.append(found.reshape(len(group), len(active), -1))
+            done += 1
+            if progress is not None:
+                progress(done, rounds, "positions in pixels")
+        return np.moveaxis(np.concatenate(total), 0, -1)
+
+    centre = ray_values(truth, plan=lights, shapes=shapes, **how)
+    chosen = replace(_POSITIONS, error=tolerance, seed=seed)
+    known = np.zeros((len(corner), 6 + 3 * bool(centre.emitted.size)))
+    means, counts = replicate_means(len(corner), known, chosen, sums)
+    if progress is not None:
+        progress(rounds, rounds, "positions in pixels")
+    checked = replace(centre, random_checks=RandomChecks.of_all([centre.random_checks, *checks]))
+    return _image(truth, checked, means.mean(axis=2), bounds / (REPLICATES * counts[:, None]), means)

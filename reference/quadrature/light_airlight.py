@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The airlight of one point or spot light along every ray, by the steps of `reference.quadrature.ray_values`."""
+"""The airlight of one light along every ray, by the steps of `reference.quadrature.ray_values`."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.geometry import foot_and_height
 from reference.quadrature.bounded import sum_media
 from reference.quadrature.segments import Segments, camera_segments, scattering_range
-from reference.quadrature.unbounded import Rays, sum_intervals
+from reference.quadrature.unbounded import lit_stretches, profile_of, sum_intervals
+from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import TruthLight, TruthScene
-from reference.visibility.intervals import LitIntervals
-from reference.visibility.lit_intervals import lit_intervals
-from reference.visibility.spot_cone import cone_interval, perpendicular
+from reference.scene.shapes import Shapes
+from reference.visibility.candidates import Ball
+from reference.visibility.certificate import LitIntervals, coordinates
+from reference.visibility.lit_intervals import lit_intervals, obstacles, reaches
+from reference.visibility.planes import Rays, cone_interval, rays_at
 
 Array = NDArray[np.float64]
 
@@ -27,7 +29,7 @@ class LightAirlight:
     bound: Array  #: of its error, (rays, 3) [W/(m^2 sr)]
     angle: Array  #: between the ray and the direction to the light, pi where that is not before the surface [rad]
     lit: LitIntervals  #: the intervals that were integrated
-    reached: NDArray[np.bool_] | None  #: whether the light reaches the end of the ray; None if that was not looked at
+    reached: NDArray[np.bool_]  #: whether the light reaches the end of the ray
 
 
 @dataclass(frozen=True)
@@ -35,92 +37,109 @@ class LitRays:
     """The rays in their planes with one light, and which parts of them it reaches."""
 
     rays: Rays
-    lit: LitIntervals  #: up to the surface, in the cone of a spot, and where a medium scatters
+    lit: LitIntervals  #: up to the surface, in the cone of a spot
     segments: Segments | None  #: the media along the rays, where these have bounds
-    end: Array  #: angle at the light of the visible surface, (rays,) [rad]
+    shapes: Shapes  #: what can stand in the light
 
 
 def light_airlight(
-    truth: TruthScene,
-    light: TruthLight,
-    distance: Array,
-    *,
-    shadow_scale: float,
-    how: dict[str, Any],
-    **tolerance: float,
+    truth: TruthScene, light: TruthLight, distance: Array, *, shadow_scale: float = 1.0, **how: Any
 ) -> LightAirlight:
     """Compute the airlight of one point or spot light along every ray.
 
     Parameters
     ----------
     truth, light
-        The scene and one of its lights, or a point of a light with extent.
+        The scene and one of its lights.
     distance
         To the visible surface, (rays,), infinite where there is none [m].
     shadow_scale
         See `reference.quadrature.image.quadrature_image`.
     how
-        What `reference.visibility.lit_intervals.lit_intervals` takes to find the lit intervals.
-    tolerance
-        `rtol` of the integrals; by default, what `sum_intervals` and `sum_media` take.
+        See `lit_rays`.
     """
-    reaches = lit_rays(truth, light, distance, how)
-    rays, lit, segments = reaches.rays, reaches.lit, reaches.segments
+    found = lit_rays(truth, light, distance, **how)
+    rays, lit, segments = found.rays, found.lit, found.segments
     if segments is None:
-        radiance, bound = sum_intervals(truth.medium, light, rays, lit, shadow_scale, **tolerance)
+        radiance, bound = sum_intervals(truth.medium, light, rays, lit, shadow_scale)
     else:
-        radiance, bound = sum_media(truth, light, rays, lit, segments, shadow_scale=shadow_scale, **tolerance)
+        stretches = lit_stretches(light, rays, lit)
+        named = {"profile": profile_of(light, rays), "shadow_scale": shadow_scale, "edge": lit.edge}
+        radiance, bound = (part * light.intensity for part in sum_media(truth, rays, stretches, segments, **named))
     in_front = (rays.foot > 0) & (rays.foot < distance)
     angle = np.where(in_front, np.arctan2(rays.height, rays.foot), np.pi)
-    bound += _worth_of_doubt(light, rays, lit, truth)
-    # Intervals end at a bound of the media, not at the surface, where there are any.
-    reached = None if segments is not None else _reach(lit, reaches.end)
-    return LightAirlight(radiance, bound, angle, lit, reached)
+    bound = bound + worth_of_doubt(truth, rays, lit) * light.intensity
+    return LightAirlight(radiance, bound, angle, lit, reaches(lit, distance))
 
 
-def lit_rays(truth: TruthScene, light: TruthLight, distance: Array, how: dict[str, Any]) -> LitRays:
+def lit_rays(
+    truth: TruthScene, light: TruthLight, distance: Array, *, shapes: Shapes | None = None, checks: int = 32
+) -> LitRays:
     """Return which parts of the rays a point or spot light reaches.
 
     Parameters
     ----------
-    truth, light, distance, how
+    truth, light, distance
         See `light_airlight`.
+    shapes
+        What `reference.scene.shapes.read_shapes` returned, if known.
+    checks
+        Random shadow rays to each ray.
     """
-    direction = truth.direction
-    foot, height = foot_and_height(np.broadcast_to(truth.origin, direction.shape), direction, light.position)
-    normal = perpendicular(truth.origin, direction, light)
-    theta0 = np.arctan2(-foot, height)
-    ended = np.isfinite(distance)
-    theta1 = np.where(ended, np.arctan2(np.where(ended, distance, 0) - foot, height), np.pi / 2)
-    cone = cone_interval(direction, normal, light, light.cutoff)
-    ends = np.maximum(theta0, cone[0]), np.minimum(theta1, cone[1])
+    rays = rays_at(truth.origin, truth.direction, light.position)
+    cone = cone_interval(rays, light, light.cutoff)
+    none = cone[0] > cone[1]
+    ends = np.maximum(rays.distance(cone[0]), 0.0), np.minimum(rays.distance(cone[1]), distance)
+    ends = np.where(none, 0.0, ends[0]), np.where(none, 0.0, ends[1])
+    normal = None
+    if light.cosine and light.axis is not None:
+        normal = np.broadcast_to(light.axis, truth.direction.shape)
+    known = obstacles(truth, Ball(light.position), distance, shapes)
+    lit = lit_intervals(rays, ends, known, checks=checks, normal=normal)
+    return LitRays(rays, lit, camera_segments(truth, distance) if truth.media else None, known.shapes)
+
+
+def directional_airlight(truth: TruthScene, light: DirectionalLight, distance: Array, **how: Any) -> LightAirlight:
+    """Compute the airlight of one directional light along every ray; see `light_airlight`."""
+    found = lit_parallel_rays(truth, light, distance, **how)
+    rays, lit = found.rays, found.lit
+    none = np.zeros((len(distance), 3))
+    angle = np.full(len(distance), np.pi)
+    if found.segments is None:
+        return LightAirlight(none, none, angle, lit, reaches(lit, distance))
+    # What the uncertainty of coordinates is worth on a ray, through an edge or a kink; at most all of the ray.
+    scale = np.maximum(coordinates(rays, found.shapes), lit.high.max(initial=0.0) / rays.height)
+    edge = np.minimum(lit.edge * scale, np.bincount(lit.ray, lit.high - lit.low, len(distance)))
+    stretches = lit.ray, lit.low, lit.high
+    sums = sum_media(truth, rays, stretches, found.segments, edge=edge, rounding=np.finfo(float).eps * scale)
+    radiance, bound = (part * light.irradiance for part in sums)
+    bound = bound + worth_of_doubt(truth, rays, lit) * light.irradiance
+    return LightAirlight(radiance, bound, angle, lit, reaches(lit, distance))
+
+
+def lit_parallel_rays(
+    truth: TruthScene, light: DirectionalLight, distance: Array, *, shapes: Shapes | None = None, checks: int = 32
+) -> LitRays:
+    """Return which parts of the rays a directional light reaches; see `lit_rays`."""
     segments = camera_segments(truth, distance) if truth.media else None
-    if segments is not None:
-        first, last = (np.arctan2(x - foot, height) for x in scattering_range(segments))
-        ends = np.maximum(ends[0], first), np.minimum(ends[1], last)
-    lit = lit_intervals(truth, light, (direction, normal, height), ends=ends, **how)
-    return LitRays(Rays(direction, normal, foot, height), lit, segments, theta1)
+    last = scattering_range(segments)[1] if segments is not None else np.full(len(distance), -np.inf)
+    end = np.where(np.isfinite(distance), distance, np.maximum(last, 0.0))
+    rays = rays_at(truth.origin, truth.direction, -light.direction, w=0)
+    known = obstacles(truth, Ball(-light.direction, w=0), end, shapes)
+    lit = lit_intervals(rays, (np.zeros_like(end), end), known, checks=checks)
+    return LitRays(rays, lit, segments, known.shapes)
 
 
-def _reach(lit: LitIntervals, end: Array) -> NDArray[np.bool_]:
-    """Return by ray whether its last lit interval goes on to an angle."""
-    last = np.full(len(end), -np.inf)
-    np.maximum.at(last, lit.ray, lit.high)
-    return last >= end - 1e-12
-
-
-def _worth_of_doubt(light: TruthLight, rays: Rays, lit: LitIntervals, truth: TruthScene) -> Array:
-    """Return the most that the angles which the shadow rays left in doubt can be worth, (rays, 3).
+def worth_of_doubt(truth: TruthScene, rays: Rays, lit: LitIntervals) -> Array:
+    """Return the most that what shadow rays left in doubt can be worth for a light of strength 1, (rays, 3).
 
     In theta the integrand of J is exp(-sigma_t (x + r)) p / height; the exponential is at most one, and the phase
-    function at most its largest value.
+    function at most its largest value. Of a directional light it is exp(-tau) p, in the distance.
     """
     worth = np.zeros((len(rays.foot), 3))
-    if lit.doubt is None:
-        return worth
-    ray, _, width = lit.doubt
+    ray, part = lit.doubt
+    part = part / rays.height[ray] if rays.w else part
     for medium in (truth.medium, *truth.media):
         strongest = medium.phase(np.linspace(-1, 1, 1001)).max()
-        factor = medium.albedo * medium.sigma_t * light.intensity / (4 * np.pi) * strongest
-        np.add.at(worth, ray, (width / rays.height[ray])[:, None] * factor)
+        np.add.at(worth, ray, part[:, None] * medium.albedo * medium.sigma_t * strongest / (4 * np.pi))
     return worth

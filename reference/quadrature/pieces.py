@@ -11,41 +11,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.quadrature.segments import AMBIENT, Segments, optical_depth
-from reference.quadrature.unbounded import Rays
-from reference.scene.read import TruthLight, TruthMedium, TruthScene
+from reference.quadrature.unbounded import Stretches
+from reference.scene.read import TruthMedium, TruthScene
+from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Kinks = tuple[Index, Array]  # rays, and distances along them [m]
 
 _UNDERFLOW = 745.0  # optical depth after which nothing is left
 
 
-@dataclass(frozen=True)
-class Crossed:
-    """Rays of a scene and the media that they cross."""
-
-    truth: TruthScene  #: the scene
-    direction: Array  #: of the rays, unit, (rays, 3)
-    segments: Segments  #: the media along them
-
-    def medium(self, number: int) -> TruthMedium:
-        """Return the medium of this number."""
-        return self.truth.medium if number == AMBIENT else self.truth.media[number]
-
-    def by_medium(self, name: str, numbers: Index) -> Array:
-        """Return a property of the media of these numbers, (n, 3)."""
-        media = (*self.truth.media, self.truth.medium)  # AMBIENT is the last
-        return np.stack([getattr(medium, name) for medium in media])[numbers]
+def medium_of(truth: TruthScene, number: int) -> TruthMedium:
+    """Return the medium of this number."""
+    return truth.medium if number == AMBIENT else truth.media[number]
 
 
-@dataclass(frozen=True)
-class Setup(Crossed):
-    """What all pieces of rays share that a point light shines on."""
-
-    light: TruthLight  #: the point or spot light
-    rays: Rays  #: in the planes with the light
-    shadow_scale: float  #: share of the leg from the light that is attenuated [1]
-    edge: float  #: relative uncertainty of the distance of an edge between light and shadow [1]
+def by_medium(truth: TruthScene, name: str, numbers: Index) -> Array:
+    """Return a property of the media of these numbers, (n, 3)."""
+    media = (*truth.media, truth.medium)  # AMBIENT is the last
+    return np.stack([getattr(medium, name) for medium in media])[numbers]
 
 
 @dataclass(frozen=True)
@@ -65,44 +50,40 @@ class Pieces:
         return Pieces(*(getattr(self, f.name)[rows] for f in fields(self)))
 
 
-def cut_pieces(
-    setup: Crossed, lit: tuple[Index, Array, Array], kinks: tuple[Index, Array], foot: Array | None = None
-) -> Pieces:
-    """Cut lit intervals at the bounds of media and at every kink of the integrand.
+def cut_pieces(truth: TruthScene, rays: Rays, segments: Segments, lit: Stretches, kinks: Kinks) -> Pieces:
+    """Cut lit stretches at the bounds of media and at every kink of the integrand.
 
     Parameters
     ----------
-    setup
-        The rays.
+    truth, rays, segments
+        The scene, the rays, and the media along them.
     lit
-        Rays, (intervals,), and distances of both ends of the lit intervals, (intervals,) each [m].
+        Rays, (stretches,), and distances of both ends, (stretches,) each [m].
     kinks
         Rays and distances of the kinks, (kinks,) each [m], in any order.
-    foot
-        Distance at which each ray is closest to the light, (rays,) [m], where rays may be endless.
     """
-    return _cut(setup, _parts(setup, *lit, foot), *kinks)
+    return _cut(truth, rays, _parts(truth, rays, segments, *lit), *kinks)
 
 
-def _parts(setup: Crossed, ray: Index, x0: Array, x1: Array, foot: Array | None) -> Pieces:
+def _parts(truth: TruthScene, rays: Rays, segments: Segments, ray: Index, x0: Array, x1: Array) -> Pieces:
     """Return what parts of lit intervals lie in each medium, by ray and distance."""
     parts = []
-    for start, end, medium in zip(setup.segments.start, setup.segments.end, setup.segments.medium):
+    for start, end, medium in zip(segments.start, segments.end, segments.medium):
         low, high = np.maximum(x0, start[ray]), np.minimum(x1, end[ray])
         keep = high > low
         rows, low, high = ray[keep], low[keep], high[keep]
         parts.append((rows, medium[rows], low, high, low == x0[keep], (high == x1[keep]) & np.isfinite(high)))
     ray, number, low, high, first, last = (np.concatenate(column) for column in zip(*parts))
-    if foot is not None and np.any(np.isinf(high)):
+    if np.any(np.isinf(high)):
         # Only what surrounds the bodies is endless, and only if its extinction is not zero does it scatter.
-        sigma_t = setup.truth.medium.sigma_t
-        reach = np.maximum(low, foot[ray]) + _UNDERFLOW / sigma_t[sigma_t > 0].min()
+        sigma_t = truth.medium.sigma_t
+        reach = np.maximum(low, rays.foot[ray]) + _UNDERFLOW / sigma_t[sigma_t > 0].min()
         high = np.where(np.isinf(high), reach, high)
     order = np.lexsort((low, ray))
     return Pieces(ray, number, low, high, first, last, np.zeros((len(ray), 3)), np.arange(len(ray)))[order]
 
 
-def _cut(setup: Crossed, parts: Pieces, ray: Index, x: Array) -> Pieces:
+def _cut(truth: TruthScene, rays: Rays, parts: Pieces, ray: Index, x: Array) -> Pieces:
     """Cut parts of rays, given by ray and distance, at kinks."""
     # The part in which each kink lies is the last one that begins before it.
     everything = np.lexsort((np.concatenate([parts.x0, x]), np.concatenate([parts.ray, ray])))
@@ -118,10 +99,8 @@ def _cut(setup: Crossed, parts: Pieces, ray: Index, x: Array) -> Pieces:
     ends = np.append(owner[1:] != owner[:-1], True)[: len(owner)]
     end = np.where(ends, parts.x1[owner], np.append(start[1:], 0.0)[: len(owner)])
     begin = np.append(True, ends[:-1])[: len(owner)]
-    before = optical_depth(
-        setup.truth, setup.truth.origin, setup.direction[parts.ray], np.zeros(len(parts.ray)), parts.x0
-    )
-    sigma_t = setup.by_medium("sigma_t", parts.medium[owner])
+    before = optical_depth(truth, rays.origin, rays.direction[parts.ray], np.zeros(len(parts.ray)), parts.x0)
+    sigma_t = by_medium(truth, "sigma_t", parts.medium[owner])
     depth = before[owner] + (start - parts.x0[owner])[:, None] * sigma_t
     pieces = Pieces(
         parts.ray[owner],

@@ -5,15 +5,15 @@ For each light and each ray, in float64:
 
 1. the visible surface ends the ray (cast in float32, as by every method, so that all share the same surface; where that
    is a polygon or a sphere its distance is computed again in float64);
-2. the cone of a spot and the visible surface bound the angle theta at the light (`reference.visibility.spot_cone`);
-3. that range is cut into lit intervals, by exact geometry or by ray casting, which random shadow rays then check
-   (`reference.visibility.lit_intervals`);
-4. the intervals are integrated and added up, with an error estimate (`reference.quadrature.unbounded`).
+2. the ray up to there, or what is in the cone of a spot, is cut into lit intervals by exact geometry
+   (`reference.visibility.shadows`), which random shadow rays then check (`reference.visibility.certificate`);
+3. the intervals are integrated and added up, with an error estimate (`reference.quadrature.unbounded`,
+   `reference.quadrature.bounded`);
+4. a light reaches the surface where its last interval does (`reference.quadrature.surface`).
 
 The bound of a ray adds the estimates, what the rounding of each edge between light and shadow is worth, and what the
-shadow rays left in doubt. Lights with extent come last (`reference.quadrature.area_airlight`,
-`reference.quadrature.area_surface`), with standard errors of their own. For directional lights the share of a ray takes
-the place of the angle (`reference.visibility.parallel_rays`).
+shadow rays left in doubt. Area lights come last (`reference.quadrature.area_lights`), with standard errors of their
+own.
 """
 
 from collections.abc import Callable
@@ -24,19 +24,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.area_airlight import Keep, area_airlight
-from reference.quadrature.area_surface import area_surface
-from reference.quadrature.directional_airlight import directional_airlight
+from reference.quadrature.area_lights import area_airlight, area_surface, beams_of
 from reference.quadrature.emission import emitted_light
-from reference.quadrature.light_airlight import light_airlight
-from reference.quadrature.light_points import PointPlan
-from reference.quadrature.replicates import standard_error
+from reference.quadrature.light_airlight import directional_airlight, light_airlight
+from reference.quadrature.replicates import Keep, PointPlan
 from reference.quadrature.surface import lit_surface, surface_hits
+from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import TruthScene
 from reference.scene.shapes import Shapes, read_shapes
+from reference.visibility.certificate import RandomChecks, reached_by_shadow_rays
 from reference.visibility.exact_distance import exact_distance
-from reference.visibility.intervals import RandomChecks
-from reference.visibility.surface_shadows import reached_by_shadow_rays
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
@@ -85,57 +82,11 @@ class RayValues:
     replicates: Array = field(default_factory=lambda: np.empty((0, 0, 0)))
 
 
-def image_of(
-    truth: TruthScene,
-    centre: RayValues,
-    layers: tuple[Array, Array, Array],
-    wide: tuple[Array, Array],
-) -> TruthImage:
-    """Return the image with these layers; its distances, angles and checks are those of the rays through the centres.
-
-    Parameters
-    ----------
-    truth
-        The scene.
-    centre
-        The values of the rays through the centres of the pixels.
-    layers
-        Airlight, the bound of its error, and surface, (pixels, 3) each [W/(m^2 sr)].
-    wide
-        Lights with extent seen directly, (pixels, 3), and the replicates, (pixels, 6, replicates), of a scene that has
-        such lights.
-    """
-    shape, known = (truth.height, truth.width), centre.random_checks
-    airlight, bound, surface = (layer.reshape(*shape, 3) for layer in layers)
-    extra: dict[str, Array] = {}
-    if wide[0].size:
-        extra = {"emitted": wide[0].reshape(*shape, 3)}
-    if truth.area:
-        errors = standard_error(wide[1]).reshape(*shape, 6)
-        extra |= {"airlight_se": errors[..., :3], "surface_se": errors[..., 3:]}
-        extra["replicate_means"] = wide[1].mean(axis=0).reshape(2, 3, -1).swapaxes(1, 2)
-    return TruthImage(
-        airlight,
-        bound,
-        surface,
-        centre.distance.reshape(shape),
-        centre.light_angle.reshape(shape),
-        centre.transitions,
-        known.missed,
-        known.checked,
-        known.disagreements,
-        known.refined,
-        known.left,
-        **extra,
-    )
-
-
 def ray_values(
     truth: TruthScene,
     *,
-    samples: int = 256,
+    checks: int = 32,
     shadow_scale: float = 1.0,
-    edges: str = "auto",
     progress: Progress | None = None,
     shapes: Shapes | None = None,
     plan: PointPlan | None = None,
@@ -147,7 +98,7 @@ def ray_values(
     ----------
     truth
         The scene, with any rays.
-    samples, shadow_scale, edges, progress, plan, keep
+    checks, shadow_scale, progress, plan, keep
         See `reference.quadrature.image.quadrature_image`.
     shapes
         What `reference.scene.shapes.read_shapes` returned for the occluders, if that is known.
@@ -163,33 +114,26 @@ def ray_values(
     hits = replace(hits, distance=exact_distance(truth, hits.interaction, cast, shapes))
     count = len(truth.direction)
     airlight, bound, light_angle = np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, np.pi)
-    intervals, transitions, checks = np.zeros(count, np.int64), 0, []
-    reached: list[NDArray[np.bool_] | None] = []
-    how = {"samples": samples, "edges": edges, "shapes": shapes}
+    intervals, transitions, found = np.zeros(count, np.int64), 0, list[RandomChecks]()
+    reached: list[NDArray[np.bool_]] = []
+    how = {"checks": checks, "shapes": shapes}
     total = len(truth.lights) + len(truth.directional) + 2 * _STEPS * bool(truth.area)
-    for number, light in enumerate(truth.lights):
-        received = light_airlight(truth, light, hits.distance, shadow_scale=shadow_scale, how=how)
+    for number, light in enumerate((*truth.lights, *truth.directional)):
+        if isinstance(light, DirectionalLight):
+            received = directional_airlight(truth, light, hits.distance, **how)
+        else:
+            received = light_airlight(truth, light, hits.distance, shadow_scale=shadow_scale, **how)
         airlight += received.radiance
         bound += received.bound
         light_angle = np.minimum(light_angle, received.angle)
         intervals += np.bincount(received.lit.ray, minlength=count)
         transitions += received.lit.transitions
-        checks.append(received.lit.random_checks)
+        found.append(received.lit.random_checks)
         seen = received.reached
-        if seen is not None and shadow_scale != 1:
+        if shadow_scale != 1 and not isinstance(light, DirectionalLight):
             what = {"scene": truth.occluders, "shapes": shapes}
             seen = reached_by_shadow_rays(hits.interaction, light.position, seen, **what)
         reached.append(seen)
-        if progress is not None:
-            progress(number + 1, total, "quadrature")
-    for number, far in enumerate(truth.directional, start=len(truth.lights)):
-        sent = directional_airlight(truth, far, hits.distance, how)
-        if sent is not None:
-            airlight += sent.radiance
-            bound += sent.bound
-            intervals += np.bincount(sent.lit.ray, minlength=count)
-            transitions += sent.lit.transitions
-            checks.append(sent.lit.random_checks)
         if progress is not None:
             progress(number + 1, total, "quadrature")
     surface = lit_surface(truth, hits, reached=reached, shadow_scale=shadow_scale)
@@ -200,17 +144,18 @@ def ray_values(
         plan, done = plan or PointPlan(), total - 2 * _STEPS
         tell = partial(_tell, progress, total)
         how_kept: dict[str, Any] = {"plan": plan, "shadow_scale": shadow_scale} | ({"keep": keep} if keep else {})
-        scattered = area_airlight(truth, hits.distance, airlight, how=how, tell=partial(tell, done), **how_kept)
+        beams = beams_of(truth, hits.distance)
+        scattered = area_airlight(truth, beams, airlight, tell=partial(tell, done), **how_kept)
         lit = np.zeros_like(scattered.replicates)
         if plan.surfaces:
-            lit = area_surface(truth, hits, surface, tell=partial(tell, done + _STEPS), **how_kept)
+            lit = area_surface(truth, hits, beams, surface, tell=partial(tell, done + _STEPS), **how_kept)
         tell(total, 0.0)
         replicates = np.concatenate([scattered.replicates, lit], axis=1)
         mean = replicates.mean(axis=2)
         airlight, surface, bound = airlight + mean[:, :3], surface + mean[:, 3:], bound + scattered.bound
-        checks.append(scattered.random_checks)
+        found.append(scattered.random_checks)
         wide["replicates"] = replicates
-    checked = RandomChecks.of_all(checks)
+    checked = RandomChecks.of_all(found)
     return RayValues(airlight, bound, surface, cast, light_angle, intervals, transitions, checked, **wide)
 
 

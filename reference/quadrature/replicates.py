@@ -19,46 +19,118 @@ as much as the points that count. It foresees S ~ N^-3/2, the rate of scrambled 
 Scrambled net variance for integrals of smooth functions); measured in fog 1.5, on surfaces in penumbrae 1.0 to 1.2.
 Where that is too hopeful, the error that is stated is up to 1.4 times the one that was asked for, and right. A ray that
 could not reach the error with all its points at that rate gets them all at once.
+
+**Points of the unit square.** They are Sobol's in base 2, scrambled at random: in each coordinate a digit is flipped or
+not by a coin of its own for each value of the digits before it (Owen 1995, Randomly permuted (t,m,s)-nets and
+(t,s)-sequences). Each point is then uniform on its own, so every sum over N of them has the right mean, and independent
+scramblings show its spread. Sums over nets of that scrambling become normal (Loh 2003, On the asymptotic distribution
+of scrambled net quadrature), as Student's intervals of a few replicates take for granted. A random matrix with a
+digital shift has the same variance but rarely a large error, often next to none: kurtosis 50 at 128 points of a light
+in a penumbra, where nested scrambling has -0.2, and intervals that hold in 99 % of all runs.
+
+What a sphere sends is smooth, and periodic in an angle. There a lattice does better, (i, 1555 i)/N modulo 1, with a
+random shift, folded in the first coordinate by a tent, u = 1 - |2 t - 1|, and in the order of the mirrored digits of i,
+so that every power of two of them is a lattice. For every N from 16 to 16384 the shortest frequency that all N points
+see alike is at least 0.76 sqrt(N).
 """
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-
-from reference.quadrature.light_points import REPLICATES, PointPlan
+from scipy.stats import qmc
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Range = tuple[int, int]
-Sums = Callable[[str, PointPlan, Index, Range], Array]
+Kept = Mapping[str, Array]
+Keep = Callable[[str, Callable[[], Kept]], Kept]
 
 FLOOR = 0.05  #: of the mean over rays: below this a ray's error need not be small relative to its value
 PILOT = "pilot-"  #: the name of the part of the work that decides
 _PILOT_SEED = 1 << 30  # apart from the seeds of points that count
+REPLICATES = 8  #: independent scramblings
+_LATTICE = np.array([1.0, 1555.0])
 _RATE = 1.5  # the power of 1/N by which a standard error is foreseen to fall
 
 
+@dataclass(frozen=True)
+class PointPlan:
+    """How many points stand for a light."""
+
+    error: float = 1e-3  #: standard error over value for which a pilot chooses the points of a ray; 0: all points
+    first: int = 16  #: points of each replicate that every ray gets, a power of two
+    most: int = 1024  #: points that no ray or surface point exceeds, a power of two
+    seed: int = 0  #: of the scramblings
+    surfaces: bool = True  #: whether surfaces get the light; if not, theirs is that of other lights alone
+
+    @property
+    def rounds(self) -> int:
+        """How often the first points can be doubled, and once more."""
+        return 1 + int(np.log2(max(1, self.most // max(1, self.first))))
+
+
+def square_points(plan: PointPlan, number: int, replicate: int, kind: str) -> Array:
+    """Return the points of the unit square of a replicate of a light, (plan.most, 2) [1].
+
+    Parameters
+    ----------
+    plan
+        How many, and the seed.
+    number, kind
+        Of the light.
+    replicate
+        Number of the replicate.
+    """
+    generator = np.random.default_rng((plan.seed, number, replicate))
+    if kind == "sphere":
+        place = np.array([mirrored_digits(i) for i in range(plan.most)])
+        place = np.mod(place[:, None] * _LATTICE + generator.random(2), 1.0)
+        place[:, 0] = 1 - np.abs(2 * place[:, 0] - 1)
+        return place
+    digits = max(1, plan.most - 1).bit_length()
+    sobol = (qmc.Sobol(2, scramble=False).random(plan.most) * (1 << digits)).astype(np.int64)
+    return np.stack([_scrambled(column, digits, generator) for column in sobol.T], axis=1)
+
+
+def _scrambled(numbers: NDArray[np.int64], digits: int, generator: np.random.Generator) -> Array:
+    """Scramble the first binary digits of numbers, (n,), all different: what follows them is random."""
+    flips = np.zeros_like(numbers)
+    for digit in range(digits):
+        before, place = numbers >> (digits - digit), digits - digit - 1
+        flips |= generator.integers(0, 2, 1 << digit)[before] << place
+    return ((numbers ^ flips) + generator.random(len(numbers))) / (1 << digits)
+
+
+def mirrored_digits(number: int) -> float:
+    """Return a number with its binary digits mirrored at the point: the first 2^k of them are a lattice."""
+    return float(int(f"{number:032b}"[::-1], 2)) / 2.0**32
+
+
+Sums = Callable[[str, PointPlan, Index, Range], Array]
+
+
 def replicate_means(rays: int, known: Array, plan: PointPlan, sums: Sums) -> tuple[Array, Index]:
-    """Return the means of every ray and replicate, (rays, 3, replicates) [W/(m^2 sr)], and of how many points, (rays,).
+    """Return the means of every ray and replicate, (rays, columns, replicates), and of how many points, (rays,).
 
     Parameters
     ----------
     rays
         How many.
     known
-        What else they receive, to which errors are relative too, (rays, 3) [W/(m^2 sr)].
+        What else they receive, to which errors are relative too, (rays, columns).
     plan
         The error to reach, and how many points a ray has.
     sums
         Called with `PILOT`, or an empty name for what counts, the plan with its seed, the numbers of some rays, and the
-        range of the numbers of points; returns what these give in each replicate, added up, (rays, 3, replicates).
+        range of the numbers of points; returns what these give in each replicate, added up, (rays, columns,
+        replicates).
     """
     counts = np.full(rays, plan.most)
     if plan.error > 0 and plan.first < plan.most:
         counts = _planned(rays, known, plan, sums)
-    total = np.zeros((rays, 3, REPLICATES))
+    total = np.zeros((*known.shape, REPLICATES))
     low = 0
     for high in sorted(set(counts.tolist())):
         active = np.flatnonzero(counts >= high)
@@ -72,7 +144,7 @@ def _planned(rays: int, known: Array, plan: PointPlan, sums: Sums) -> Index:
     """Return how many points each ray needs."""
     pilot = replace(plan, seed=plan.seed + _PILOT_SEED)
     counts = np.full(rays, plan.most)
-    total = np.zeros((rays, 3, REPLICATES))
+    total = np.zeros((*known.shape, REPLICATES))
     active, low, high = np.arange(rays), 0, max(1, plan.first // 2)
     floor: Array | None = None
     while len(active) and 2 * high < plan.most:

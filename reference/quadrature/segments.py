@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Media in convex bounds along rays, in float64: segments, optical depths, and where the leg from the light has kinks.
+"""Media in convex bounds along rays, in float64: segments, optical depths, and where shadow segments have kinks.
 
 The bodies are disjoint, so the optical depth between two points of a ray is
 
@@ -8,13 +8,10 @@ The bodies are disjoint, so the optical depth between two points of a ray is
 l the distance, l_j what lies in body j, sigma_0 the extinction of what surrounds the bodies. A body holds one interval
 [enter, leave] of a straight line; l_j is the part of it between the points.
 
-Seen from a light, the point x on a camera ray lies at the angle theta in the plane of ray and light (see
-`analytic.geometry`). In that plane a body is a convex polygon or a disc, and as x moves, the part of the leg in it is
-an analytic function of theta until the leg passes a corner of the polygon, or becomes a tangent of the disc. Such a
-corner at p = (along the ray, away from the light), measured from the light, matters only between light and ray, that is
-for 0 < p_2 < height, and the leg passes it on its way to
-
-    x = foot + height p_1/p_2.
+In the plane of a ray and a light (`reference.visibility.planes`) a body is a convex polygon or a disk, and as x moves
+along the ray, the part of the shadow segment in it is an analytic function of x until the segment passes a corner of
+the polygon, or becomes a tangent of the disk. Such a point (z, y) matters only between ray and light, and the segment
+passes it at the x to which the map of the plane takes it.
 """
 
 from dataclasses import dataclass
@@ -25,7 +22,8 @@ from numpy.typing import NDArray
 
 from reference.scene.convex_bounds import Bounds, Polyhedron, Sphere
 from reference.scene.read import TruthScene
-from reference.visibility.line_crossings import crossings
+from reference.visibility.line_crossings import crossings, half_chord
+from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -102,78 +100,62 @@ def scattering_range(segments: Segments) -> tuple[Array, Array]:
     return low, high
 
 
-def leg_kinks(bounds: Bounds, light: Array, axes: tuple[Array, Array], height: Array) -> tuple[Index, Array]:
-    """Return where on rays the leg from the light has kinks by passing the corners of a body.
+def shadow_kinks(bounds: Bounds, rays: Rays) -> tuple[Index, Array]:
+    """Return where on rays the shadow segment has kinks: where it passes a corner of a body or touches it.
 
     Parameters
     ----------
     bounds
         The body.
-    light
-        Position [m], (3,).
-    axes
-        Unit vectors along the rays and from the light to the foot points, (n, 3) each.
-    height
-        Distance between light and ray, (n,) [m].
+    rays
+        The rays in their planes with lights.
 
     Returns
     -------
-    ray, offset
-        Number of the ray and x - foot of each kink [m], in no particular order.
+    ray, x
+        Number of the ray and distance of each kink [m], in no particular order.
     """
     if isinstance(bounds, Sphere):
-        find, step = partial(_sphere_corners, bounds), _BLOCK
+        find, step = partial(_tangents, bounds), _BLOCK
     else:
-        find, step = partial(polygon_corners, bounds), max(1, _BLOCK // max(1, len(bounds.edge)))
-    rays, offsets = [np.empty(0, np.int64)], [np.empty(0)]
-    for first in range(0, len(height), step):
-        block = slice(first, first + step)
-        ray, along, away = find(light, axes[0][block], axes[1][block])
+        find, step = partial(_corners, bounds), max(1, _BLOCK // max(1, len(bounds.edge)))
+    numbers, distances = [np.empty(0, np.int64)], [np.empty(0)]
+    for first in range(0, len(rays.foot), step):
+        part = rays[first : first + step]
+        ray, z, y = find(part)
+        foot, height = part.foot[ray], part.height[ray]
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            offset = height[block][ray] * (along / away)
-        before = (away > 0) & (away < height[block][ray]) & np.isfinite(offset)
-        rays.append(ray[before] + first)
-        offsets.append(offset[before])
-    return np.concatenate(rays), np.concatenate(offsets)
+            x = (z * height - y * foot) / (height - part.w * y)
+        between = (y > 0) & (part.w * y < height) & np.isfinite(x)
+        numbers.append(ray[between] + first)
+        distances.append(x[between])
+    return np.concatenate(numbers), np.concatenate(distances)
 
 
-def polygon_corners(body: Polyhedron, light: Array, along: Array, away: Array) -> tuple[Index, Array, Array]:
-    """Return where the edges of a polyhedron meet the planes of rays and light.
-
-    Parameters
-    ----------
-    body
-        The polyhedron.
-    light
-        Position [m], (3,).
-    along, away
-        Unit vectors along the rays and from the light to the foot points, (rays, 3) each.
-
-    Returns
-    -------
-    ray, p_1, p_2
-        Number of the ray and components along both vectors, from the light [m], (corners,) each.
-    """
-    ends = body.edge - light
-    normal = np.cross(along, away)
+def _corners(body: Polyhedron, rays: Rays) -> tuple[Index, Array, Array]:
+    """Return where the edges of a polyhedron meet the planes of rays and lights: numbers of the rays, z and y."""
+    ends = body.edge - rays.origin
+    across = -rays.normal
+    normal = np.cross(rays.direction, across)
     at_start, at_end = normal @ ends[:, 0].T, normal @ ends[:, 1].T
     ray, edge = np.nonzero((at_start * at_end <= 0) & (at_start != at_end))
     share = (at_start[ray, edge] / (at_start[ray, edge] - at_end[ray, edge]))[:, None]
     point = ends[edge, 0] + share * (ends[edge, 1] - ends[edge, 0])
-    return ray, np.sum(point * along[ray], axis=1), np.sum(point * away[ray], axis=1)
+    return ray, np.sum(point * rays.direction[ray], axis=1), np.sum(point * across[ray], axis=1)
 
 
-def _sphere_corners(sphere: Sphere, light: Array, along: Array, away: Array) -> tuple[Index, Array, Array]:
-    """Return the points at which tangents from the light touch the discs in the planes of rays and light."""
-    centre = sphere.centre - light
-    beside = np.cross(along, away) @ centre
-    c1, c2 = along @ centre, away @ centre
-    square, power = sphere.radius**2 - beside**2, c1**2 + c2**2 - (sphere.radius**2 - beside**2)
-    ray = np.flatnonzero((square > 0) & (power > 0))
-    c1, c2, radius, reach = c1[ray], c2[ray], np.sqrt(square[ray]), np.sqrt(power[ray])
-    distance = np.hypot(c1, c2)
-    # The tangent leaves the direction to the centre by the angle whose cosine is reach/distance.
-    cosine, sine = reach / distance, radius / distance
-    turned = [(cosine * c1 - s * sine * c2, cosine * c2 + s * sine * c1) for s in (1, -1)]
-    p1, p2 = (np.concatenate([turned[0][i], turned[1][i]]) * np.tile(cosine, 2) for i in (0, 1))
-    return np.tile(ray, 2), p1, p2
+def _tangents(sphere: Sphere, rays: Rays) -> tuple[Index, Array, Array]:
+    """Return where tangents from the lights touch the disks of a sphere (`reference.visibility.shadows`)."""
+    centre, across = sphere.centre - rays.origin, -rays.normal
+    beside = np.cross(rays.direction, across) @ centre
+    c_z, c_y = rays.direction @ centre, across @ centre
+    disk = half_chord(sphere.radius, np.abs(beside))
+    e_z, e_y = rays.w * c_z - rays.foot, rays.w * c_y - rays.height
+    far = np.maximum(np.hypot(e_z, e_y), 1e-290)
+    ray = np.flatnonzero((np.abs(beside) < sphere.radius) & ((disk < far) | (rays.w == 0)))
+    e_z, e_y, c_z, c_y, disk = (e_z / far)[ray], (e_y / far)[ray], c_z[ray], c_y[ray], disk[ray]
+    sine = rays.w * disk / far[ray]
+    level = np.sqrt((1 - sine) * (1 + sine))
+    z = [c_z + disk * (-sine * e_z - sign * level * e_y) for sign in (-1, 1)]
+    y = [c_y + disk * (-sine * e_y + sign * level * e_z) for sign in (-1, 1)]
+    return np.tile(ray, 2), np.concatenate(z), np.concatenate(y)

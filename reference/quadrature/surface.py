@@ -3,9 +3,9 @@
 
     L = f(w_i, w_o) cos I / r^2 exp(-sigma_t (distance + s r)),
 
-with f cos by `BSDF.eval` and I / r^2 by `Emitter.sample_direction`; s scales the shadow leg (see
-`reference.quadrature.ray_values`). Through bounded media the optical depth is that of both legs piece by piece. A
-directional light has its irradiance in the place of I / r^2. Its leg is endless, and only bodies dim it.
+with f cos by `BSDF.eval` and I / r^2 by `Emitter.sample_direction`; s scales the shadow segment (see
+`reference.quadrature.ray_values`). Through bounded media the optical depth is that of both ways piece by piece. A
+directional light has its irradiance in the place of I / r^2, and an endless shadow segment: only bodies dim it.
 """
 
 from collections.abc import Sequence
@@ -23,6 +23,9 @@ from reference.scene.directional_light import DirectionalLight, is_directional
 from reference.scene.read import TruthScene
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_ENDLESS = float(np.finfo(float).max)  # how far the shadow segment of a directional light goes [m]
 
 
 @dataclass(frozen=True)
@@ -43,24 +46,33 @@ def surface_hits(truth: TruthScene) -> SurfaceHits:
     return SurfaceHits(np.where(valid, np.array(interaction.t, dtype=np.float64), np.inf), interaction)
 
 
+@dataclass(frozen=True)
+class Reflection:
+    """Mitsuba's materials where rays hit surfaces."""
+
+    interaction: Any  #: Mitsuba's surface interactions
+
+    def __call__(self, ray: Index, towards: Array) -> Array:
+        """Return f cos_s, (n, 3) [1/sr], where rays of these numbers hit, for light from unit directions, (n, 3)."""
+        at = dr.gather(mi.SurfaceInteraction3f, self.interaction, mi.UInt32(ray.astype(np.uint32)))
+        local = at.to_local(dr.normalize(mi.Vector3f(towards.T)))
+        return np.array(at.bsdf().eval(mi.BSDFContext(), at, local), dtype=np.float64).reshape(3, -1).T
+
+
 def lit_surface(
-    truth: TruthScene,
-    hits: SurfaceHits,
-    *,
-    reached: Sequence[NDArray[np.bool_] | None],
-    shadow_scale: float,
+    truth: TruthScene, hits: SurfaceHits, *, reached: Sequence[NDArray[np.bool_]], shadow_scale: float = 1.0
 ) -> Array:
-    """Return the radiance of the lit surface at each pixel centre, (pixels, 3) [W/(m^2 sr)].
+    """Return the radiance of the surface at each pixel centre that point, spot and directional lights give it.
+
+    In W/(m^2 sr), (pixels, 3).
 
     Parameters
     ----------
     truth, hits
         The scene and what its rays hit.
     reached
-        By light whether it reaches the surface at the end of each ray, as its lit intervals say. Where that is not
-        known, None, in bounded media and under directional lights, a shadow ray is cast in single precision. Mitsuba
-        starts it d = 1e-4 (1 + the largest coordinate) off the surface, so that the edges of shadows are off by at most
-        d tan(angle between normal and light) there: a point that is nearer to an edge may be lit or dark wrongly.
+        By light, the directional ones last, whether it reaches the surface at the end of each ray, as its lit intervals
+        say.
     shadow_scale
         See `reference.quadrature.ray_values`.
     """
@@ -68,49 +80,23 @@ def lit_surface(
     total = np.zeros((len(hits.distance), 3))
     if not truth.occluders.shapes():
         return total
-    if truth.media:
-        seen = np.where(np.isfinite(hits.distance), hits.distance, 0.0)
-        point = truth.origin + seen[:, None] * truth.direction
-        to_camera = optical_depth(truth, truth.origin, truth.direction, np.zeros(len(seen)), seen)
-    emitters = truth.scene.emitters()
-    near = [emitter for emitter in emitters if not is_directional(emitter) and not is_area(emitter)]
-    for emitter, light, reaches in zip(near, truth.lights, reached, strict=True):
-        towards, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
-        facing = interaction.is_valid()
-        if reaches is None:
-            reaches = ~np.array(truth.occluders.ray_test(interaction.spawn_ray_to(towards.p), facing), dtype=bool)
-        reflected = interaction.bsdf().eval(mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing)
-        radiance = np.array(reflected * arriving, dtype=np.float64).T
-        lit = np.array(facing, dtype=bool) & reaches
-        if truth.media:
-            depth = to_camera + _leg_depth(truth, point, light.position, shadow_scale)
-        else:
-            path = np.where(lit, hits.distance, 0) + shadow_scale * np.array(towards.dist, dtype=np.float64)
-            depth = np.where(lit, path, 0)[:, None] * truth.medium.sigma_t
-        total += np.where(lit[:, None], radiance * np.exp(-depth), 0.0)
-    for far in truth.directional:
-        lit, radiance = _lit_from_infinity(truth, interaction, far)
-        if truth.media:
-            towards = np.broadcast_to(-far.direction, point.shape)
-            endless = np.full(len(point), np.finfo(float).max)
-            radiance = radiance * np.exp(-to_camera - optical_depth(truth, point, towards, 0 * endless, endless))
-        total += np.where(lit[:, None], radiance, 0.0)
-    return total
-
-
-def _lit_from_infinity(truth: TruthScene, interaction: Any, light: DirectionalLight) -> tuple[NDArray[np.bool_], Array]:
-    """Return which surfaces a directional light reaches, by shadow rays, and what they reflect in clear air."""
-    towards, arriving = light.emitter.sample_direction(interaction, mi.Point2f(0.5))
+    far = np.where(np.isfinite(hits.distance), hits.distance, 0.0)
+    point = truth.origin + far[:, None] * truth.direction
+    to_camera = optical_depth(truth, truth.origin, truth.direction, np.zeros(len(far)), far)
+    emitters = [emitter for emitter in truth.scene.emitters() if not is_area(emitter)]
+    emitters = sorted(emitters, key=is_directional)
     facing = interaction.is_valid()
-    hidden = truth.occluders.ray_test(interaction.spawn_ray(towards.d), facing)
-    reflected = interaction.bsdf().eval(mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing)
-    lit = np.array(facing, dtype=bool) & ~np.array(hidden, dtype=bool)
-    return lit, np.array(arriving * reflected, dtype=np.float64).T
-
-
-def _leg_depth(truth: TruthScene, point: Array, light: Array, shadow_scale: float) -> Array:
-    """Return the optical depth between points and a light through bounded media, (pixels, 3)."""
-    leg = point - light
-    length = np.linalg.norm(leg, axis=1)
-    leg /= np.maximum(length, np.finfo(float).tiny)[:, None]
-    return optical_depth(truth, light, leg, (1 - shadow_scale) * length, length)
+    for emitter, light, reaches in zip(emitters, (*truth.lights, *truth.directional), reached, strict=True):
+        towards, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
+        reflected = interaction.bsdf().eval(mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing)
+        radiance = np.array(reflected * arriving, dtype=np.float64).reshape(3, -1).T
+        if isinstance(light, DirectionalLight):
+            way, r = np.broadcast_to(-light.direction, point.shape), np.full(len(point), _ENDLESS)
+        else:
+            way = light.position - point
+            r = np.linalg.norm(way, axis=1)
+            way, r = way / np.maximum(r, np.finfo(float).tiny)[:, None], shadow_scale * r
+        depth = to_camera + optical_depth(truth, point, way, np.zeros(len(point)), r)
+        lit = np.array(facing, dtype=bool) & reaches
+        total += np.where(lit[:, None], radiance * np.exp(-depth), 0.0)
+    return total

@@ -55,6 +55,12 @@ class TruthAreaLight:
         return float((np.pi if self.kind == "disk" else 4 * np.pi) * self.radius**2)
 
     @property
+    def corners(self) -> Array:
+        """Of a rectangle, in order, (4, 3) [m]."""
+        signs = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+        return self.centre + (signs * self.half) @ self.frame[:2]
+
+    @property
     def power(self) -> Array:
         """Radiant flux [W], RGB: pi times radiance times area."""
         return np.pi * self.area * self.radiance

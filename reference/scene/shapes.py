@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What hides lights, as numbers: triangles of polygons, spheres, and the shapes that only cast rays can find.
+"""What hides lights, as numbers: triangles of meshes and rectangles, spheres, and disks.
 
 Mitsuba takes a `sphere` for the sphere around the image of its centre whose radius is the length of the image of its
 first axis, whatever else the transform does to it, and so does this module. Shadows do not depend on the side to which
@@ -15,9 +15,19 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.scene.convex_bounds import Sphere
-from reference.scene.read import scene_of
 
 Array = NDArray[np.float64]
+
+_ROUND = 1e-5  # scales of a disk that differ by less are meant to be equal
+
+
+@dataclass(frozen=True)
+class Disks:
+    """Flat round shapes."""
+
+    centre: Array = field(default_factory=lambda: np.empty((0, 3)))  #: (disks, 3) [m]
+    normal: Array = field(default_factory=lambda: np.empty((0, 3)))  #: unit, of either side, (disks, 3)
+    radius: Array = field(default_factory=lambda: np.empty(0))  #: (disks,) [m]
 
 
 @dataclass(frozen=True)
@@ -27,48 +37,54 @@ class Shapes:
     triangles: Array  #: those of meshes and rectangles, (triangles, 3, 3) [m]
     centre: Array = field(default_factory=lambda: np.empty((0, 3)))  #: of the spheres, (spheres, 3) [m]
     radius: Array = field(default_factory=lambda: np.empty(0))  #: of the spheres, (spheres,) [m]
-    others: Any = None  #: an `mi.Scene` of all other shapes, None where there are none
-    single: tuple[tuple[Any, Array | Sphere], ...] = ()  #: meshes, rectangles and spheres one by one, each as numbers
+    disks: Disks = field(default_factory=Disks)
+    single: tuple[tuple[Any, Array | Sphere | Disks], ...] = ()  #: all shapes one by one, each as numbers
+
+    @property
+    def count(self) -> int:
+        """How many triangles, spheres and disks there are."""
+        return len(self.triangles) + len(self.radius) + len(self.disks.radius)
 
 
 def read_shapes(scene) -> Shapes:
-    """Read the shapes of a Mitsuba scene, all of them opaque."""
-    single: list[tuple[Any, Array | Sphere]] = []
-    others = []
-    for shape in scene.shapes():
-        if is_polygonal(shape):
-            single.append((shape, _shape_triangles(shape)))
-        elif shape.class_name() == "Sphere":
-            single.append((shape, _sphere(shape)))
-        else:
-            others.append(shape)
-    triangles = [part for _, part in single if not isinstance(part, Sphere)]
-    spheres = [part for _, part in single if isinstance(part, Sphere)]
-    return Shapes(
-        np.concatenate([np.empty((0, 3, 3)), *triangles]),
-        np.array([sphere.centre for sphere in spheres]).reshape(-1, 3),
-        np.array([sphere.radius for sphere in spheres]),
-        scene_of(others, scene) if others else None,
-        tuple(single),
-    )
-
-
-def refuse_others(shapes: Shapes) -> None:
-    """Refuse shapes whose shadows are not exact.
+    """Read the shapes of a Mitsuba scene, all of them opaque.
 
     Raises
     ------
     InputError
-        For a shape that is neither a mesh nor a rectangle nor a sphere, with its name.
+        For a shape that is neither a mesh nor a rectangle, a sphere or a disk, with its name.
     """
-    if shapes.others is not None:
-        shape = next(
-            each for each in shapes.others.shapes() if not is_polygonal(each) and each.class_name() != "Sphere"
-        )
+    single = tuple((shape, _read(shape)) for shape in scene.shapes())
+    triangles = [part for _, part in single if isinstance(part, np.ndarray)]
+    spheres = [part for _, part in single if isinstance(part, Sphere)]
+    disks = [part for _, part in single if isinstance(part, Disks)]
+    return Shapes(
+        np.concatenate([np.empty((0, 3, 3)), *triangles]),
+        np.array([sphere.centre for sphere in spheres]).reshape(-1, 3),
+        np.array([sphere.radius for sphere in spheres]),
+        Disks(
+            *(np.concatenate(column) for column in zip(*((d.centre, d.normal, d.radius) for d in (Disks(), *disks))))
+        ),
+        single,
+    )
+
+
+def _read(shape) -> Array | Sphere | Disks:
+    if is_polygonal(shape):
+        return _shape_triangles(shape)
+    matrix = _matrix(shape)
+    length = np.linalg.norm(matrix[:3, :3], axis=0)
+    if shape.class_name() == "Sphere":
+        return Sphere(matrix[:3, 3], float(length[0]))
+    if shape.class_name() != "Disk":
         raise InputError(
-            f"shape '{shape.id()}' is a {shape.class_name()}; wanted meshes, rectangles and spheres, whose lit "
-            "intervals are exact: replace it by a mesh, or take edges='auto'"
+            f"shape '{shape.id()}' is a {shape.class_name()}; wanted meshes, rectangles, spheres and disks, whose "
+            "shadows are exact: replace it by a mesh, as fine as you need"
         )
+    if abs(length[0] - length[1]) > _ROUND * length[0] or abs(matrix[:3, 0] @ matrix[:3, 1]) > _ROUND * length[0] ** 2:
+        raise InputError(f"shape '{shape.id()}' is an oval disk; wanted a round one, or a mesh")
+    normal = np.cross(matrix[:3, 0], matrix[:3, 1])
+    return Disks(matrix[None, :3, 3], normal[None] / np.linalg.norm(normal), length[:1])
 
 
 def is_polygonal(shape) -> bool:
@@ -88,11 +104,6 @@ def _shape_triangles(shape) -> Array:
     parameters = mi.traverse(shape)
     vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
     return vertices[np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)]
-
-
-def _sphere(shape) -> Sphere:
-    matrix = _matrix(shape)
-    return Sphere(matrix[:3, 3], float(np.linalg.norm(matrix[:3, 0])))
 
 
 def _matrix(shape) -> Array:

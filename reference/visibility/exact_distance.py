@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from reference.scene.convex_bounds import Sphere
 from reference.scene.read import TruthScene
-from reference.scene.shapes import Shapes, is_rectangle, read_shapes
+from reference.scene.shapes import Disks, Shapes, is_rectangle, read_shapes
 from reference.visibility.line_crossings import half_chord
 
 Array = NDArray[np.float64]
 
 
 def exact_distance(truth: TruthScene, interaction: Any, distance: Array, shapes: Shapes | None = None) -> Array:
-    """Return the distances to the visible surface again in float64, where that is a polygon or a sphere.
+    """Return the distances to the visible surface again in float64, where that is flat or a sphere.
 
     Parameters
     ----------
@@ -33,8 +33,7 @@ def exact_distance(truth: TruthScene, interaction: Any, distance: Array, shapes:
     Notes
     -----
     Valid where the plane of the triangle is met within 1e-4 of the distance; elsewhere, on triangles seen edge-on, the
-    distance stays what it was. So it does on spheres that a ray misses in float64, which happens where it touches them,
-    and on other shapes.
+    distance stays what it was. So it does on spheres that a ray misses in float64, which happens where it touches them.
     """
     hit = np.isfinite(distance)
     shape_of_hit = np.array(dr.reinterpret_array(mi.UInt32, interaction.shape))
@@ -48,6 +47,9 @@ def exact_distance(truth: TruthScene, interaction: Any, distance: Array, shapes:
         if isinstance(part, Sphere):
             refined[mine] = _to_sphere(part, truth.origin, truth.direction[mine], distance[mine])
             continue
+        if isinstance(part, Disks):
+            refined[mine] = _along(part.centre - truth.origin, part.normal, truth.direction[mine], distance[mine])
+            continue
         # A rectangle counts as one primitive; both its triangles lie in one plane.
         number_in_shape = 0 * mine if is_rectangle(shape) else primitive[mine]
         refined[mine] = _to_plane(part[number_in_shape] - truth.origin, truth.direction[mine], distance[mine])
@@ -56,9 +58,13 @@ def exact_distance(truth: TruthScene, interaction: Any, distance: Array, shapes:
 
 def _to_plane(corner: Array, direction: Array, distance: Array) -> Array:
     """Return how far rays from the origin go to the planes of triangles."""
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    return _along(corner[:, 0], np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), direction, distance)
+
+
+def _along(place: Array, normal: Array, direction: Array, distance: Array) -> Array:
+    """Return how far rays go to planes through places."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        exact = np.sum(normal * corner[:, 0], axis=1) / np.sum(normal * direction, axis=1)
+        exact = np.sum(normal * place, axis=1) / np.sum(normal * direction, axis=1)
     return np.where(np.abs(exact - distance) < 1e-4 * distance, exact, distance)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 from reference.monte_carlo.volpath.integrator import volpath_batch
 from reference.quadrature.image import quadrature_image
-from reference.quadrature.light_points import PointPlan
+from reference.quadrature.replicates import PointPlan
 from reference.scene.read import TruthScene, read_truth
 from tests.evidence.certified.model import FogBox, FogScene, FogScreen, load_fog, mitsuba_dict
 from tests.evidence.certified.scenes import fog_scenes

@@ -18,8 +18,10 @@ from reference.monte_carlo.single_scatter.distance_sampling import mixture_pdfs
 from reference.scene.read import TruthScene
 from tests.evidence.injected import Change, Put, Rewrite, Wrap
 
-_DIRECTIONAL = "reference.quadrature.directional_sums"
-_AREA = "reference.scene.area_light:TruthAreaLight.area"
+_BOUNDED = "reference.quadrature.bounded"
+_SAMPLES = "reference.quadrature.light_samples"
+_WEIGHTED = "reference.quadrature.area_lights"
+_SHADOWS = "reference.visibility.shadows"
 _TRACED = "reference.monte_carlo.single_scatter"
 _ESTIMATOR, _EXTENDED = f"{_TRACED}.estimator", f"{_TRACED}.area_estimate"
 _FOUR_PI = 4 * np.pi
@@ -106,8 +108,8 @@ def _wide(light, cutoff: float):
     return replace(light, cutoff=cutoff, beam=min(light.beam, cutoff))
 
 
-def _linear_in_cosine(function, theta, direction, normal, light):
-    value = function(theta, direction, normal, light)
+def _linear_in_cosine(function, theta, rays, light):
+    value = function(theta, rays, light)
     if not light.is_soft or light.cosine:
         return value
     cosine = np.cos(light.cutoff - value * (light.cutoff - light.beam))
@@ -120,16 +122,19 @@ def _one_light(function, truth, light, *others, **named):
 
 
 def _lit(change: Callable[..., Any]) -> Wrap:
-    """Change the lit intervals: change(intervals of a ray, ends of the ray) -> intervals of that ray."""
+    """Change the lit intervals: change(intervals of a ray, ends of the ray) -> its intervals, angles at the light."""
 
-    def around(function, truth, light, rays, *, ends, **how):
-        found = function(truth, light, rays, ends=ends, **how)
+    def around(function, rays, ends, known, **how):
+        found = function(rays, ends, known, **how)
+        first, last = (rays.theta(end) for end in ends)
+        begin, end = (rays.theta(x, found.ray) for x in (found.low, found.high))
         parts = []
         for ray in np.flatnonzero(ends[1] > ends[0]):
-            of_ray = [(low, high) for low, high in zip(found.low[found.ray == ray], found.high[found.ray == ray])]
-            parts += [(ray, low, high) for low, high in change(of_ray, ends[0][ray], ends[1][ray]) if high > low]
+            of_ray = list(zip(begin[found.ray == ray], end[found.ray == ray]))
+            parts += [(ray, low, high) for low, high in change(of_ray, first[ray], last[ray]) if high > low]
         ray, low, high = np.array(parts, dtype=float).reshape(-1, 3).T
-        return replace(found, ray=ray.astype(np.int64), low=low, high=high, doubt=None)
+        ray = ray.astype(np.int64)
+        return replace(found, ray=ray, low=rays.distance(low, ray), high=rays.distance(high, ray))
 
     return Wrap("reference.visibility.lit_intervals:lit_intervals", around)
 
@@ -188,35 +193,31 @@ def _all_reached(function, truth, hits, named):
 
 
 def _sun(change: Callable[..., Any]) -> Wrap:
-    """Change what hides a directional light: change(shapes)."""
+    """Change what hides a directional light: change(lists of shapes near rays)."""
     return Wrap(
-        "reference.visibility.directional_geometry:parallel_intervals",
-        lambda function, rays, shapes: function(rays, change(shapes)),
+        f"{_SHADOWS}:lit_parts",
+        lambda function, rays, ends, near, shapes, of: function(rays, ends, change(near), shapes, of),
     )
 
 
-def _points(change: Callable[..., Any]) -> Wrap:
-    """Change the points of area lights: change(function, light, square)."""
-    return Wrap("reference.quadrature.light_points:light_points", change)
+def _none(lists):
+    return lists[0], lists[0], lists[2]
 
 
-def _square_for_disk(function, light, square):
-    if light.kind != "disk":
-        return function(light, square)
-    intensity = light.radiance * light.area
-    return [replace(point, intensity=intensity) for point in function(replace(light, kind="rectangle"), square)]
+def _samples(change: Callable[..., Any]) -> Wrap:
+    """Change the samples of area lights along rays: change(samples, light)."""
+    return Wrap(
+        f"{_SAMPLES}:samples_for_rays", lambda function, light, *arguments: change(function(light, *arguments), light)
+    )
 
 
-def _even_angles(function, light, square):
-    even = np.stack([0.5 * (1 - np.cos(np.pi * square[:, 0])), square[:, 1]], axis=1)
-    return function(light, even if light.kind == "sphere" else square)
+def _weighted(factor: Callable[..., float]) -> Wrap:
+    return _samples(lambda samples, light: replace(samples, weight=samples.weight * factor(light)))
 
 
-def _stronger(factor: Callable[..., float]) -> Wrap:
-    def change(function, light, square):
-        return [replace(point, intensity=point.intensity * factor(light)) for point in function(light, square)]
-
-    return _points(change)
+def _for_points(function, *arguments):
+    samples = function(*arguments)
+    return replace(samples, weight=2 * samples.weight)
 
 
 def _one_too_few(function, *arguments, plan, **named):
@@ -318,17 +319,14 @@ _FOG = _all(
         "henyey-greenstein-squared": _phase("hg", lambda value, g: (1 - g * g) * (value / (1 - g * g)) ** (2 / 3)),
         "radians-for-degrees": _spots(lambda light: _wide(light, np.rad2deg(light.cutoff) % np.pi)),
         "wide-spot": _spots(lambda light: _wide(light, 2 * light.cutoff)),
-        "falloff-in-the-cosine": Wrap("reference.visibility.spot_cone:falloff", _linear_in_cosine),
-        "hard-spot": Wrap(
-            "reference.visibility.spot_cone:falloff", lambda function, theta, *others: np.ones_like(theta)
-        ),
+        "falloff-in-the-cosine": Wrap("reference.visibility.planes:falloff", _linear_in_cosine),
+        "hard-spot": Wrap("reference.visibility.planes:falloff", lambda function, theta, *others: np.ones_like(theta)),
         "first-light-only": Wrap("reference.quadrature.light_airlight:light_airlight", _one_light),
         "no-light-behind": Wrap("reference.quadrature.unbounded:sum_intervals", _behind),
         "shadow-for-light": _lit(_complement),
         "no-shadows": _lit(lambda lit, low, high: [(low, high)]),
         "no-sphere-shadows": Wrap(
-            "reference.visibility.spheres:hidden_behind",
-            lambda function, *arguments: tuple(part[:0] for part in function(*arguments)),
+            f"{_SHADOWS}:_sphere", lambda function, *arguments: (mi.Float64(dr.inf), mi.Float64(-dr.inf))
         ),
         "through-surfaces": Wrap(
             "reference.quadrature.light_airlight:light_airlight",
@@ -353,9 +351,7 @@ _MESHES = _all(
     {
         "edges-shifted": _lit(_shifted),
         "thin-shadows-missed": _lit(_coarse),
-        "last-tenth-missed": Rewrite(
-            "reference.visibility.triangles", "(low_ <= height) & (high_ > 0)", "(low_ <= 0.9 * height) & (high_ > 0)"
-        ),
+        "last-tenth-missed": Rewrite(_SHADOWS, "y1 >= 0", "y1 >= 0.1 * top"),
         "surface-without-cosine": _surface(_without_cosine),
     },
 )
@@ -374,33 +370,24 @@ _SUN = _all(
     "sun",
     {
         "directional-without-four-pi": Wrap(
-            f"{_DIRECTIONAL}:sum_directional",
+            f"{_BOUNDED}:sum_media",
             lambda function, *arguments, **named: tuple(_FOUR_PI * part for part in function(*arguments, **named)),
         ),
         "directional-bright-leg": Rewrite(
-            _DIRECTIONAL,
-            "np.maximum(length_(rows_, x_), 0.0)[:, :, None] * sigma_",
-            "np.maximum(length_(rows_, x_), 0.0)[:, :, None] * 0 * sigma_",
+            _BOUNDED, "body_.length(rows_, x_, r_, limit_)", "0 * body_.length(rows_, x_, r_, limit_)"
         ),
-        "directional-leg-both-ways": Rewrite(_DIRECTIONAL, "(enter_, low_ <= 0)", "(enter_, low_ < -np.inf)"),
-        "directional-chord-both-ways": Rewrite(
-            _DIRECTIONAL,
-            "closest_ + half_ - np.maximum(closest_ - half_, 0.0)",
-            "closest_ + half_ - (closest_ - half_)",
-        ),
+        "directional-chord-both-ways": Rewrite(_BOUNDED, "np.maximum(enter, 0.0)", "enter"),
         "directional-forward-is-backward": _BACKWARD,
-        "directional-corners-behind": Rewrite(_DIRECTIONAL, "(y_ > 0) & np.isfinite(x_)", "(y_ < 0) & np.isfinite(x_)"),
+        "directional-corners-behind": Rewrite(
+            "reference.quadrature.segments", "(y_ > 0) & (w_ * y_ < height_)", "(y_ < 0) & (w_ * y_ < height_)"
+        ),
         "directional-shadows-leaning-back": Rewrite(
-            "reference.visibility",
-            "(rays_.cosine / rays_.sine)[mine_][row_]",
-            "-(rays_.cosine / rays_.sine)[mine_][row_]",
+            _SHADOWS, "z * self.height - y * self.foot", "z * self.height + y * self.foot"
         ),
-        "directional-no-shadows": _sun(lambda shapes: replace(shapes, triangles=shapes.triangles[:0])),
-        "directional-no-sphere-shadows": _sun(
-            lambda shapes: replace(shapes, centre=shapes.centre[:0], radius=shapes.radius[:0])
-        ),
+        "directional-no-shadows": _sun(lambda near: replace(near, triangles=_none(near.triangles))),
+        "directional-no-sphere-shadows": _sun(lambda near: replace(near, spheres=_none(near.spheres))),
         "directional-surface-bright-leg": Rewrite(
-            "reference.quadrature.surface", "-to_camera_ - optical_depth(a_, b_, c_, d_, e_)", "-to_camera_"
+            "reference.quadrature.surface", "to_camera_ + optical_depth(a_, b_, c_, d_, e_)", "to_camera_"
         ),
     },
 )
@@ -410,42 +397,27 @@ _WIDE = _all(
     "wide-lights",
     {
         "area-without-cosine": _integrals(lambda *_: {"weight": None}),
-        "area-both-sides": _points(
-            lambda function, light, square: [
-                turned
-                for point in function(light, square)
-                for turned in (point, replace(point, axis=-np.asarray(point.axis)))
-            ]
+        "area-other-side": _samples(lambda samples, light: replace(samples, normal=-samples.normal)),
+        "area-wrong-count": Wrap(f"{_WEIGHTED}:area_airlight", _one_too_few),
+        "area-projected-sphere": _weighted(lambda light: 0.25 if light.kind == "sphere" else 1.0),
+        "area-half-sides": _weighted(lambda light: 0.25 if light.kind == "rectangle" else 1.0),
+        "area-power-for-intensity": _weighted(lambda light: np.pi),
+        "area-radiance-for-intensity": _weighted(lambda light: 1 / light.area),
+        "area-sphere-evenly": Rewrite(
+            _SAMPLES, "radius_ * h_ * (high_ - low_) * rate_", "radius_ * radius_ * (high_ - low_) * rate_"
         ),
-        "area-other-side": _points(
-            lambda function, light, square: [
-                replace(point, axis=-np.asarray(point.axis)) for point in function(light, square)
-            ]
+        "area-sections-of-one-length": Rewrite(
+            _SAMPLES, "h_ * np.hypot(a_, b_) * per_density_", "h_ * np.hypot(a_, b_).mean() * per_density_"
         ),
-        "area-wrong-count": Wrap("reference.quadrature.area_airlight:area_airlight", _one_too_few),
-        "area-projected-sphere": Wrap(
-            _AREA, lambda function, light: function(light) / (4 if light.kind == "sphere" else 1)
-        ),
-        "area-half-sides": Wrap(
-            _AREA, lambda function, light: function(light) / (4 if light.kind == "rectangle" else 1)
-        ),
-        "area-power-for-intensity": _stronger(lambda light: np.pi),
-        "area-radiance-for-intensity": _stronger(lambda light: 1 / light.area),
-        "area-polar-angles-evenly": _points(_even_angles),
-        "area-square-for-disk": _points(_square_for_disk),
         "area-shadows-itself": Wrap("reference.visibility.before_light:before_light", _own_shape),
         "area-null-is-opaque": _sorted(True),
         "area-black-is-clear": _sorted(False),
-        "area-surface-without-cosine": Rewrite(
-            "reference.quadrature",
-            "(factor_ * seen_.depth[row_] / lines_.height[of_] ** 2)[:, None] * cosine_",
-            "(factor_ / lines_.height[of_])[:, None] * np.ones_like(cosine_)",
-        ),
+        "area-surface-both-sides": Wrap(f"{_SAMPLES}:samples_for_points", _for_points),
         "area-surface-bright-leg": Rewrite(
-            "reference.quadrature", "bsdf_(point_, towards_) * np.exp(-depth_)", "bsdf_(point_, towards_)"
+            _WEIGHTED, "value_ * np.exp(-shadow_) * weight_[:, None]", "value_ * weight_[:, None]"
         ),
-        "area-surface-half-horizon": Rewrite(
-            "reference.visibility", "np.maximum(low_, middle_ - 0.5 * np.pi)", "np.maximum(low_, middle_)"
+        "area-surface-without-shadows": Wrap(
+            "reference.visibility.lit_intervals:reaches", lambda function, lit, end: np.ones(len(end), bool)
         ),
     },
 )

@@ -21,8 +21,8 @@ from reference.monte_carlo.batches import LAYERS, Batches, merged
 from reference.monte_carlo.single_scatter import integrator as single_scatter
 from reference.monte_carlo.volpath import integrator as volpath
 from reference.quadrature import image as quadrature
-from reference.quadrature.light_points import PointPlan
 from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.replicates import PointPlan
 from reference.scene import read
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
 from tests.evidence.injected import injected

@@ -8,10 +8,10 @@ import pytest
 
 from analytic.area_light import sphere_airlight
 from analytic.phase import PhaseFunction
-from reference.quadrature.unbounded import Rays, sum_intervals
+from reference.quadrature.unbounded import sum_intervals
 from reference.scene.read import TruthLight, TruthMedium
-from reference.visibility.intervals import LitIntervals
-from reference.visibility.spot_cone import cone_interval
+from reference.visibility.certificate import LitIntervals
+from reference.visibility.planes import Rays, cone_interval
 from tests.evidence.certified import area_lights
 
 
@@ -43,10 +43,11 @@ def test_the_truth_of_one_point(certified, number):
     quarter = 0.5 * np.pi
     normal = np.array([beside, row["across"], row["axial"]])
     light = TruthLight(np.zeros(3), np.ones(3), normal, cutoff=quarter, beam=quarter, cosine=True)
-    rays = Rays(np.array([[0.0, 0, 1]]), np.array([[0.0, 1, 0]]), np.array([row["foot"]]), np.array([row["height"]]))
-    cone = cone_interval(rays.direction, rays.normal, light, light.cutoff)
-    low, high = (np.arctan2(row[x] - row["foot"], row["height"]) for x in ("x0", "x1"))
-    lit = LitIntervals(np.array([0]), np.maximum(low, cone[0]), np.minimum(high, cone[1]), 0, edge=0.0)
+    place, along, across = np.zeros((1, 3)), np.array([[0.0, 0, 1]]), np.array([[0.0, 1, 0]])
+    origin = row["height"] * across[0] - row["foot"] * along[0]
+    rays = Rays(origin, along, place, across, np.array([row["foot"]]), np.array([row["height"]]))
+    low, high = (rays.distance(end) for end in cone_interval(rays, light, light.cutoff))
+    lit = LitIntervals(np.array([0]), np.maximum(row["x0"], low), np.minimum(row["x1"], high), edge=0.0)
     value, bound = sum_intervals(medium, light, rays, lit, 1.0)
     expected = float(row["J"]) * row["sigma_t"] / (4 * np.pi)
     assert value[0] == pytest.approx(expected, rel=1e-10)

@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scenes with area lights, and their airlight."""
 
+from dataclasses import replace
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
-from reference.quadrature.area_airlight import AreaAirlight, area_airlight
-from reference.quadrature.light_points import PointPlan
+from reference.quadrature.area_lights import AreaAirlight, area_airlight, beams_of
+from reference.quadrature.light_samples import samples_for_points
+from reference.quadrature.replicates import REPLICATES, PointPlan, square_points
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import TruthScene, read_truth
+from reference.visibility.before_light import before_light
+from reference.visibility.candidates import Ball
+from reference.visibility.lit_intervals import lit_intervals, obstacles, reaches
+from reference.visibility.planes import rays_at
 
 BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0, 0.0, 0.0]}}
 NULL = {"type": "null"}
@@ -72,6 +78,30 @@ def lit_room(light, *, size=(5, 4), medium=None, empty=False, **shapes: Any) -> 
     return read_truth(lit_scene(size=size, to_world=camera, medium=medium, lamp=light, **chosen))
 
 
+def visible_share(truth: TruthScene, place, normal, samples: int):
+    """Return the share of the area of the first light that surface points see, (points, replicates) [1].
+
+    A camera looks down on each point along its normal.
+    """
+    light, result = truth.area[0], np.zeros((len(place), REPLICATES))
+    _, shapes = before_light(truth, light)
+    normal = np.asarray(normal, dtype=float)
+    for number, point in enumerate(np.asarray(place, dtype=float)):
+        down = replace(truth, origin=point + normal, direction=-normal[None])
+        known = obstacles(down, Ball(light.centre, light.radius), np.ones(1), shapes)
+        for replicate in range(REPLICATES):
+            square = square_points(PointPlan(most=samples), 0, replicate, light.kind)
+            seen_at, of_light, angle = samples_for_points(light, point[None], square).flat()
+            way = point - seen_at
+            r = np.linalg.norm(way, axis=1)
+            area = angle * r**3 / np.sum(way * of_light, axis=1)
+            rays = rays_at(down.origin, np.repeat(down.direction, samples, axis=0), seen_at)
+            end = np.ones(samples)
+            lit = lit_intervals(rays, (0.999 * end, end), known, of=np.zeros(samples, np.int64), checks=0)
+            result[number, replicate] = area[reaches(lit, end)].sum() / area.sum()
+    return result
+
+
 def fixed(points: int, seed: int = 0) -> PointPlan:
     """Return the plan of so many points for every ray."""
     return PointPlan(error=0.0, first=points, most=points, seed=seed)
@@ -80,8 +110,7 @@ def fixed(points: int, seed: int = 0) -> PointPlan:
 def area_airlight_of(truth: TruthScene, plan: PointPlan, distance=None) -> AreaAirlight:
     """Return the airlight of the area lights of a scene along its rays up to their surfaces, or to a distance [m]."""
     distance = surface_hits(truth).distance if distance is None else distance
-    known, how = np.zeros((len(distance), 3)), {"samples": 64, "edges": "auto"}
-    return area_airlight(truth, distance, known, plan=plan, shadow_scale=1.0, how=how, tell=lambda share: None)
+    return area_airlight(truth, beams_of(truth, distance), np.zeros((len(distance), 3)), plan=plan)
 
 
 def airlight_replicates(truth: TruthScene, plan: PointPlan, distance=None):

@@ -45,7 +45,7 @@ def frame(scene: dict[str, Any], method: str = "unshadowed", **options: Any):
 
 def truth(scene: dict[str, Any]):
     """Return the image of the quadrature reference, which shares no code with the methods."""
-    return _once(("truth", scene), lambda: quadrature_image(read_truth(mi.load_dict(scene)), edges="geometry"))
+    return _once(("truth", scene), lambda: quadrature_image(read_truth(mi.load_dict(scene))))
 
 
 def relative_rmse(values: Any, expected: Any) -> float:

@@ -32,8 +32,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.quadrature.light_points import REPLICATES
 from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.replicates import REPLICATES
 from reference.scene.read import read_truth
 from reference.storage.exr import NOTE, TOTAL, Image, read_exr
 from validation.comparison.images import BATCHES, Comparison, compare_images, read_mask

@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 
 from reference.monte_carlo.allocation import allocated
 from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches
-from reference.quadrature.light_points import REPLICATES
 from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.replicates import REPLICATES
 from reference.scene.read import TruthScene, read_truth
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
 from validation.estimates.monte_carlo import ElsewhereFor, monte_carlo_batches

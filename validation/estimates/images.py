@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from reference.monte_carlo.batches import LARGEST_SEED, Batches, seed_ranges
 from reference.monte_carlo.cloud_paths.opacity import seen_clouds
-from reference.quadrature.light_points import REPLICATES
 from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.replicates import REPLICATES
 from reference.quadrature.surface import surface_hits
 from reference.scene.clouds import read_clouds
 from reference.scene.read import read_truth

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.area_airlight import Keep
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.replicates import Keep
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import TruthScene, read_truth
 from reference.storage.cache import drop_arrays
@@ -21,13 +21,13 @@ from validation.estimates.light_on_ray import check_camera, check_rays, check_va
 
 Progress = Callable[[int, int, str], None]
 
-_USUAL: dict[str, Any] = {"samples": 256, "shadow_scale": 1.0, "pixel": "centre"}
+_USUAL: dict[str, Any] = {"checks": 32, "shadow_scale": 1.0, "pixel": "centre"}
 
 
 def truth_image(
     scene,
     *,
-    samples: int = 256,
+    checks: int = 32,
     shadow_scale: float = 1.0,
     pixel: str = "centre",
     progress: Progress | None = None,
@@ -38,7 +38,7 @@ def truth_image(
     ----------
     scene
         The `mi.Scene`.
-    samples, shadow_scale, pixel, progress
+    checks, shadow_scale, pixel, progress
         See `reference.quadrature.image.quadrature_image`.
 
     Raises
@@ -46,7 +46,7 @@ def truth_image(
     InputError
         For a scene that cannot be read, and for radiance that is not finite, see `validation.estimates.light_on_ray`.
     """
-    settings: dict[str, Any] = {"samples": samples, "shadow_scale": shadow_scale, "pixel": pixel}
+    settings: dict[str, Any] = {"checks": checks, "shadow_scale": shadow_scale, "pixel": pixel}
     return kept_truth(scene, settings, progress=progress)[0]
 
 

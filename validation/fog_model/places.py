@@ -12,7 +12,7 @@ panel of the width 0.6 (rho = 10.6) by 6e-9. The extinction adds exp(-sigma_t he
 which it falls by many orders is the only hard one, and what is left beyond it is small.
 
 The path from a directional light is unbounded, so that only media with bounds attenuate it; between the kinks of its
-lengths (`reference.quadrature.directional_sums`) the integrand is an exponential of a linear function, and eight nodes
+lengths (`reference.quadrature.segments`) the integrand is an exponential of a linear function, and eight nodes
 are exact to rounding over up to four optical depths.
 """
 
@@ -23,14 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.quadrature.bounded import smooth_pieces
-from reference.quadrature.directional_sums import kinks
 from reference.quadrature.light_airlight import LitRays
-from reference.quadrature.pieces import Crossed, Setup, cut_pieces
-from reference.quadrature.unbounded import lit_stretches
+from reference.quadrature.pieces import by_medium
+from reference.quadrature.unbounded import lit_stretches, profile_of
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import TruthLight, TruthScene
 from reference.visibility.line_crossings import crossings
-from reference.visibility.spot_cone import falloff
+from reference.visibility.planes import falloff, rays_at
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -102,8 +101,7 @@ def point_nodes(
         medium = np.full(len(ray), AROUND)
         x1 = np.where(np.isinf(x1), np.maximum(x0, rays.foot[ray]) + _long_enough(truth), x1)
     else:
-        setup = Setup(truth, rays.direction, reach.segments, light, rays, 1.0, reach.lit.edge)
-        pieces, _ = smooth_pieces(setup, (ray, x0, x1))
+        pieces, _ = smooth_pieces(truth, rays, reach.segments, (ray, x0, x1))
         # The reference counts media with bounds from 0 and calls what surrounds them -1.
         ray, x0, x1, medium = pieces.ray, pieces.x0, pieces.x1, pieces.medium + 1
     foot, s0, s1 = rays.foot[ray], x0 - rays.foot[ray], x1 - rays.foot[ray]
@@ -116,26 +114,27 @@ def point_nodes(
     sine, r = np.tanh(w), height * np.cosh(w)
     x = foot + height * np.sinh(w)
     direction, normal = rays.direction[ray], rays.normal[ray]
-    profile = falloff(np.arcsin(sine)[:, None], direction, normal, light)[:, 0] if light.is_soft else 1.0
+    along = profile_of(light, rays)
+    profile = 1.0 if along is None else along(x[:, None], ray)[:, 0]
     towards = sine[:, None] * direction + (1 / np.cosh(w))[:, None] * normal
     camera, leg = lengths(truth, truth.origin, direction, x), lengths(truth, light.position, towards, r)
     return Places(ray, x, r, towards, camera, leg, medium[owner], -sine, (weight * r * profile)[:, None])
 
 
 def parallel_nodes(
-    truth: TruthScene, light: DirectionalLight, reach: tuple, ends: tuple[Array, Array] | None = None
+    truth: TruthScene, light: DirectionalLight, reach: LitRays, ends: tuple[Array, Array] | None = None
 ) -> Places:
     """Return the nodes of a directional light on the lit parts of all rays, see `point_nodes`."""
-    rays, lit, segments = reach
-    x0, x1 = rays.distance(lit.ray, lit.low), rays.distance(lit.ray, lit.high)
+    rays, lit = reach.rays, reach.lit
+    assert reach.segments is not None
+    x0, x1 = lit.low, lit.high
     if ends is not None:
         x0, x1 = np.maximum(x0, ends[0][lit.ray]), np.minimum(x1, ends[1][lit.ray])
     used = x1 > x0
     stretches = lit.ray[used], x0[used], x1[used]
-    setup = Crossed(truth, rays.direction, segments)
-    pieces = cut_pieces(setup, stretches, kinks(truth, rays, np.unique(stretches[0])))
+    pieces, _ = smooth_pieces(truth, rays, reach.segments, stretches)
     width = pieces.x1 - pieces.x0
-    depth = np.maximum(width * setup.by_medium("sigma_t", pieces.medium).max(axis=1), 1e-300)
+    depth = np.maximum(width * by_medium(truth, "sigma_t", pieces.medium).max(axis=1), 1e-300)
     owner, place, weight = panel_nodes(np.zeros(len(width)), depth, most=_DEEP, short=_SHALLOW)
     place, weight, ray = place / depth[owner], weight / depth[owner], pieces.ray[owner]
     x, direction = pieces.x0[owner] + width[owner] * place, truth.direction[ray]
@@ -143,7 +142,7 @@ def parallel_nodes(
     leg = lengths(truth, point, np.broadcast_to(-light.direction, point.shape), endless)
     camera, medium = lengths(truth, truth.origin, direction, x), pieces.medium[owner] + 1
     value = (weight * width[owner])[:, None]
-    return Places(ray, x, np.ones_like(x), 0 * direction, camera, leg, medium, rays.cosine[ray], value)
+    return Places(ray, x, np.ones_like(x), 0 * direction, camera, leg, medium, rays.foot[ray], value)
 
 
 def surface_points(
@@ -242,4 +241,4 @@ def _profile(light: TruthLight, direction: Array) -> Array:
         return np.ones(len(direction))
     inside = np.arccos(np.clip(direction @ light.axis, -1.0, 1.0)) <= light.cutoff
     straight = np.full((len(direction), 1), 0.5 * np.pi)
-    return inside * falloff(straight, direction, np.zeros_like(direction), light)[:, 0]
+    return inside * falloff(straight, rays_at(light.position, direction, light.position), light)[:, 0]

@@ -13,9 +13,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.directional_airlight import lit_parallel_rays
-from reference.quadrature.light_airlight import lit_rays
-from reference.quadrature.light_points import PointPlan, light_points, square_points
+from reference.quadrature.light_airlight import lit_parallel_rays, lit_rays
+from reference.quadrature.light_points import light_points
+from reference.quadrature.replicates import PointPlan, square_points
 from reference.quadrature.surface import surface_hits
 from reference.scene.area_light import TruthAreaLight, is_area
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
@@ -65,10 +65,10 @@ class View:
             elif area is not None:
                 truth, shapes = self._once(("before", area.name), lambda: before_light(truth, area))
             # Intervals by geometry are what they are: random checks only say how far to trust them.
-            how = {"shapes": shapes} | ({} if self.shapes.others is not None else {"checks": 0})
+            how: dict[str, Any] = {"shapes": shapes, "checks": 0}
             if isinstance(light, DirectionalLight):
-                return lit_parallel_rays(truth, light, self.distance, how)
-            return lit_rays(truth, light, self.distance, how)
+                return lit_parallel_rays(truth, light, self.distance, **how)
+            return lit_rays(truth, light, self.distance, **how)
 
         return self._once(("reach", _place_of(light), shadows, None if area is None else area.name), found)
 

@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.quadrature.light_points import PointPlan
 from reference.quadrature.ray_values import TruthImage, ray_values
-from reference.quadrature.replicates import standard_error
+from reference.quadrature.replicates import PointPlan, standard_error
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_truth
 from reference.storage.kept import Spent, kept, key_of, stopwatch

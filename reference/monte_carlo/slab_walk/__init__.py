@@ -6,5 +6,4 @@ Read in this order:
 - `scattering.py`: scattering angles at random;
 - `walk.py`: photons through a slab, counted by order with their distance from the point of entry;
 - `estimates.py`: sets of orders with standard errors;
-- `directions.py`: radiance in bins of directions, with where its light entered.
 """

@@ -14,7 +14,7 @@ same mean as to count those that do, and less noise. The fluence's variance dive
 The walk shares nothing with the deterministic computation that it checks (`realtime/clouds/slab_orders/`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -93,12 +93,8 @@ def walk(slab: Slab, photons: int, random: np.random.Generator) -> Counts:
     random
         Where numbers come from.
     """
-    x, y, z = np.zeros(photons), np.zeros(photons), np.zeros(photons)  # z is the depth
-    sine = np.sqrt((1 - slab.mu0) * (1 + slab.mu0))
-    direction = np.full(photons, sine), np.zeros(photons), np.full(photons, slab.mu0)  # downwards is positive here
     rows: list[Array] = []
-    weight = 1.0
-    while x.size and weight > _LEAST_WEIGHT:
+    for weight, (x, y, z), direction in flights(slab, photons, random):
         rising = direction[2] < 0
         row = np.zeros((2 + 3 * len(slab.depths), 3))
         row[0], _ = _passages(x, y, z, direction, rising, 0.0)
@@ -109,27 +105,34 @@ def walk(slab: Slab, photons: int, random: np.random.Generator) -> Counts:
             down, down_fluence = _passages(x, y, z, direction, ~rising & (z < depth), depth)
             row[first : first + 3] = up, down, up_fluence + down_fluence
         rows.append(row * weight)
-        (x, y, z), direction = next_scattering(slab, (x, y, z), direction, random)
-        weight *= slab.albedo
     counts = np.moveaxis(np.array(rows), 0, -1) / photons
     depths = counts[2:].reshape(len(slab.depths), 3, 3, counts.shape[-1])
     return Counts(counts[0], counts[1], depths[:, 0], depths[:, 1], depths[:, 2])
 
 
-def next_scattering(
+def flights(slab: Slab, photons: int, random: np.random.Generator) -> Iterator[tuple[float, Vectors, Vectors]]:
+    """Yield the flights of a batch of photons, order by order, until all have left, for tallies to count.
+
+    Yields
+    ------
+    weight, place, direction
+        What absorption has left; x, y and the depth z of the photons, and the components of their directions, the third
+        downwards, (photons,) each.
+    """
+    place = np.zeros(photons), np.zeros(photons), np.zeros(photons)
+    sine = np.sqrt((1 - slab.mu0) * (1 + slab.mu0))
+    direction = np.full(photons, sine), np.zeros(photons), np.full(photons, slab.mu0)
+    weight = 1.0
+    while place[0].size and weight > _LEAST_WEIGHT:
+        yield weight, place, direction
+        place, direction = _next_scattering(slab, place, direction, random)
+        weight *= slab.albedo
+
+
+def _next_scattering(
     slab: Slab, place: Vectors, direction: Vectors, random: np.random.Generator
 ) -> tuple[Vectors, Vectors]:
-    """Return the photons that scatter in the slab once more: where they do, and where they go from there.
-
-    Parameters
-    ----------
-    slab
-        The slab.
-    place, direction
-        x, y and the depth z, and the components along them, (photons,) each.
-    random
-        Where numbers come from.
-    """
+    """Return the photons that scatter in the slab once more: where they do, and where they go from there."""
     (x, y, z), (u, v, w) = place, direction
     flight = random.standard_exponential(x.size)
     end = z + w * flight

@@ -25,7 +25,7 @@ other half of a cone and for the other side of a plane.
 
 Between two neighbours of all these distances a ray is lit or dark as a whole. The definition itself, evaluated in the
 middle for the segment against every occluder, tells which. Nothing here is shared with
-`reference.visibility.triangles`, which projects triangles on the plane of ray and light, nor with the casting of rays.
+`reference.visibility.shadows`, which projects triangles on the plane of ray and light, nor with the casting of rays.
 """
 
 from collections.abc import Sequence

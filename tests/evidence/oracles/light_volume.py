@@ -42,17 +42,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from analytic.geometry import foot_and_height
 from realtime.methods.light_volumes.jump_search import with_walls
 from realtime.scene.read_scene import Scene
 from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
 from realtime.shadow_maps.shadow_map import ShadowMap
 from reference.quadrature.surface import surface_hits
-from reference.quadrature.unbounded import Rays, sum_intervals
+from reference.quadrature.unbounded import sum_intervals
 from reference.scene.read import TruthLight, TruthScene
+from reference.visibility.certificate import LitIntervals
 from reference.visibility.exact_distance import exact_distance
-from reference.visibility.intervals import LitIntervals
-from reference.visibility.spot_cone import cone_interval, perpendicular
+from reference.visibility.planes import Rays, cone_interval, rays_at
 from tests.evidence.oracles.height_field import Array, HeightField, Index, Path, by_ray, height_field, zero_angle
 from tests.evidence.oracles.upright_walls import walled_parts
 
@@ -96,14 +95,9 @@ def oracle_airlight(
 
 def _rays_of(truth: TruthScene, light: TruthLight, distance: Array) -> tuple[Rays, tuple[Array, Array]]:
     """Return the rays and the angles between which they can be lit: up to the surface, in the cone."""
-    direction = truth.direction
-    foot, height = foot_and_height(np.broadcast_to(truth.origin, direction.shape), direction, light.position)
-    normal = perpendicular(truth.origin, direction, light)
-    ended = np.isfinite(distance)
-    end = np.where(ended, np.arctan2(np.where(ended, distance, 0) - foot, height), 0.5 * np.pi)
-    cone = cone_interval(direction, normal, light, light.cutoff)
-    ends = np.maximum(np.arctan2(-foot, height), cone[0]), np.minimum(end, cone[1])
-    return Rays(direction, normal, foot, height), ends
+    rays = rays_at(truth.origin, truth.direction, light.position)
+    cone = cone_interval(rays, light, light.cutoff)
+    return rays, (np.maximum(rays.theta(0.0), cone[0]), np.minimum(rays.theta(distance), cone[1]))
 
 
 def volume_intervals(field: HeightField, rays: Rays, ends: tuple[Array, Array]) -> LitIntervals:
@@ -125,7 +119,8 @@ def volume_intervals(field: HeightField, rays: Rays, ends: tuple[Array, Array]) 
             parts.append((some[row], begin, end))
     ray, low, high = (np.concatenate(column) for column in zip(*parts, strict=True))
     order = np.lexsort((low, ray))
-    return LitIntervals(ray[order], low[order], high[order], len(ray), 0.0)
+    ray, ends = ray[order], (low[order], high[order])
+    return LitIntervals(ray, *(rays.distance(end, ray) for end in ends), len(ray), 0.0)
 
 
 def _within_face(face: int, normal: Array, direction: Array, ends: tuple[Array, Array]) -> tuple[Array, Array]:

@@ -40,7 +40,7 @@ def exact_interval(direction, angle):
     """Return where a ray is in the cone, and its foot and height, by the angle at the light in 40 digits.
 
     The cosine between axis and direction from the light is m cos(theta - theta_m): see
-    `reference.visibility.spot_cone`.
+    `reference.visibility.planes`.
     """
     with mp.workdps(40):
         d, away, axis = (mpmath.matrix([mp.mpf(float(x)) for x in v]) for v in (direction, LIGHT - CAMERA, AXIS))

@@ -7,13 +7,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.quadrature.directional_sums import sum_directional
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.ray_values import ray_values
-from reference.quadrature.segments import camera_segments, scattering_range
 from reference.scene.read import read_truth
-from reference.visibility.directional_casting import directional_intervals, edge_scale
-from reference.visibility.parallel_rays import parallel_rays
 from tests.helpers.suns import BRICK, CHORDS, brick, pearl, plain_airlight, sun, sunny
 
 HG = {"phase": {"type": "hg", "g": 0.6}}
@@ -86,24 +82,6 @@ def test_ray_through_a_box_in_closed_form(variant, way):
     expected = truth.directional[0].irradiance / (4 * np.pi) * medium.albedo * sigma_t * p * integral
     assert values.airlight[0] == pytest.approx(expected, rel=1e-12)  # the closed form, but for rounding
     assert np.all(values.bound < 1e-6 * values.airlight)
-
-
-@pytest.mark.claim("directional-truth", tolerance="2e-9 relative")
-def test_panels_give_the_closed_form(variant):
-    """Two ways to integrate the same pieces, of a polyhedron: Kronrod's rule and the exponential."""
-    caster = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([-0.6, 0.1, 1.4]).scale([0.1, 0.3, 0.05])}
-    truth = read_truth(mi.load_dict(sunny(brick=brick((0.71, 0.3, 0.02), scale=9.7), caster=caster, size=(32, 24))))
-    light = truth.directional[0]
-    segments = camera_segments(truth, np.full(len(truth.direction), np.inf))
-    rays = parallel_rays(truth.origin, truth.direction, light, scattering_range(segments))
-    lit = directional_intervals(truth, rays)
-    scale = edge_scale(truth, rays)
-    by_exponential, by_panels = (
-        sum_directional(truth, light, rays, lit, segments, scale=scale, closed=closed)[0] for closed in (True, False)
-    )
-    assert lit.transitions > 10
-    assert by_exponential.max() > 0
-    assert by_panels == pytest.approx(by_exponential, rel=2e-9)  # 1e-9 is asked of the panels
 
 
 def test_shadow_of_a_sphere_in_fog(variant):

@@ -10,9 +10,9 @@ from reference.scene.read import read_truth
 from tests.helpers.scenes import spot, tiny_scene
 
 
-def truth_of(samples=256, **changes):
+def truth_of(**changes):
     truth = read_truth(mi.load_dict(tiny_scene(**changes)))
-    return truth, quadrature_image(truth, samples=samples)
+    return truth, quadrature_image(truth)
 
 
 @pytest.mark.claim("radiance", "attenuation-and-falloff", tolerance="1e-9 relative")

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from analytic.area_light import sphere_airlight
-from reference.quadrature.area_surface import area_surface
-from reference.quadrature.light_points import REPLICATES, PointPlan
-from reference.quadrature.replicates import PILOT, replicate_means, standard_error
+from reference.quadrature.area_lights import area_surface, beams_of
+from reference.quadrature.replicates import PILOT, REPLICATES, PointPlan, replicate_means, standard_error
 from reference.quadrature.surface import surface_hits
+from reference.visibility.exact_distance import exact_distance
 from tests.helpers.area_lights import airlight_replicates, fixed, fog, lamp, lit_room, turned
 
 STUDENT = 2.3646  #: standard errors to either side that hold 95 % with seven degrees of freedom
@@ -110,12 +110,13 @@ def test_intervals_beside_a_lamp_hold(variant):
 def test_intervals_in_a_penumbra_hold(variant, layer):
     truth = lit_room(lamp(to_world=turned((0.3, 0.4, 2.9), 163, (0.5, 0.3, 1.0))), size=(4, 3))
     hits = surface_hits(truth)
+    hits = replace(hits, distance=exact_distance(truth, hits.interaction, hits.distance))
     known = np.zeros((len(hits.distance), 3))
 
     def replicates(plan):
         if layer == "airlight":
             return airlight_replicates(truth, plan)[:, 0]
-        return area_surface(truth, hits, known, plan=plan, shadow_scale=1.0, tell=lambda share: None)[:, 0]
+        return area_surface(truth, hits, beams_of(truth, hits.distance), known, plan=plan)[:, 0]
 
     fine = replicates(fixed(8192, seed=RUNS))
     lit = fine.mean(axis=1) > 0

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from reference.scene.shapes import read_shapes, refuse_others
-from tests.helpers.scenes import spot, tiny_scene
+from reference.scene.shapes import read_shapes
+from tests.helpers.scenes import tiny_scene
 
 
 @pytest.mark.parametrize("scale", [[2.0, 1.0, 1.0], [1.0, 2.0, 0.5], [-1.5, 1.5, 1.5]])
@@ -27,9 +27,9 @@ def test_shapes_are_sorted_and_others_refused_by_name(variant):
     shapes = read_shapes(mi.load_dict(tiny_scene(lid=disk)))
     assert shapes.triangles.shape == (2, 3, 3)
     assert shapes.centre == pytest.approx(np.array([[0.1, 0.1, 0.7]]), rel=1e-6)
-    assert [shape.id() for shape in shapes.others.shapes()] == ["lid"]
-    with pytest.raises(InputError, match="'lid' is a Disk; wanted meshes, rectangles and spheres"):
-        refuse_others(shapes)
-    plain = read_shapes(mi.load_dict(tiny_scene(ball=None, lamp=spot())))
-    assert (plain.triangles.shape, len(plain.radius), plain.others) == ((2, 3, 3), 0, None)
-    refuse_others(plain)
+    assert shapes.disks.centre == pytest.approx(np.array([[0.0, 0.0, 3.0]]))
+    with pytest.raises(InputError, match="'lid' is a Cylinder; wanted meshes, rectangles, spheres and disks"):
+        read_shapes(mi.load_dict(tiny_scene(lid=disk | {"type": "cylinder"})))
+    oval = disk | {"to_world": mi.ScalarTransform4f().scale([1.0, 2.0, 1.0])}
+    with pytest.raises(InputError, match="'lid' is an oval disk"):
+        read_shapes(mi.load_dict(tiny_scene(lid=oval)))

@@ -1,22 +1,148 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""Lit intervals of point lights, samples of lights and suns: against the definition, closed forms, and cast rays."""
+
 from dataclasses import replace
 
 import mitsuba as mi
 import numpy as np
 import pytest
 
-import reference.quadrature.light_airlight as light_airlight
-import reference.quadrature.ray_values as quadrature
 from analytic.errors import InputError
-from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_truth
-from reference.scene.shapes import Shapes, read_shapes
-from reference.visibility.lit_intervals import point_leg
-from reference.visibility.random_checks import checked_geometry
-from reference.visibility.triangles import EXACT_EDGE, geometric_intervals
-from tests.helpers.polygons import box_scene, rays_of, visibility_test
+from reference.scene.shapes import Disks, Shapes
+from reference.visibility.candidates import Ball, near_shapes
+from reference.visibility.certificate import EXACT_EDGE, certified, segments_blocked
+from reference.visibility.lit_intervals import Obstacles, lit_intervals, reaches
+from reference.visibility.planes import rays_at
+from tests.helpers.polygons import box_scene, rays_of
 from tests.helpers.scenes import tiny_scene
-from validation.scenes.loading import load_scene
+
+
+def unit(vector):
+    return np.asarray(vector) / np.linalg.norm(vector)
+
+
+def random_shapes(seed=4):
+    """Return triangles, spheres and disks all around the origin."""
+    draw = np.random.default_rng(seed)
+    normal = draw.normal(size=(5, 3))
+    disks = Disks(
+        draw.uniform(-4, 4, (5, 3)), normal / np.linalg.norm(normal, axis=1)[:, None], draw.uniform(0.2, 1, 5)
+    )
+    triangles = draw.uniform(-4, 4, (60, 1, 3)) + draw.normal(size=(60, 3, 3)) * 0.6
+    return Shapes(triangles, draw.uniform(-4, 4, (9, 3)), draw.uniform(0.1, 0.9, 9), disks)
+
+
+def random_directions(count, seed=7):
+    direction = np.random.default_rng(seed).normal(size=(count, 3))
+    return direction / np.linalg.norm(direction, axis=1, keepdims=True)
+
+
+def obstacles_of(shapes, ball, origin, direction, distance):
+    return Obstacles(None, shapes, near_shapes(ball, origin, direction, distance, shapes), ball)
+
+
+PLACES = {
+    "beside": (np.array([0.9, -1.4, 2.1]), 1),
+    "far": (np.array([30.0, 5.0, -7.0]), 1),
+    "at the camera": (np.zeros(3), 1),
+    "in a sphere": (None, 1),
+    "sun": (unit([0.3, -0.5, 0.7]), 0),
+    "sun overhead": (np.array([0.0, 0.0, 1.0]), 0),
+    "low sun": (unit([-0.9, 0.02, 0.0]), 0),
+}
+
+
+@pytest.mark.claim("directional-truth", "exact-shadows")
+@pytest.mark.parametrize("place", PLACES)
+def test_random_points_by_the_definition(variant, place):
+    """Triangles, spheres and disks all around: points far from an edge are lit or not, by a test of each shape."""
+    shapes, (light, w) = random_shapes(), PLACES[place]
+    light = shapes.centre[2] + 0.03 if light is None else light
+    direction = random_directions(300)
+    rays = rays_at(np.zeros(3), direction, light, w)
+    ends = np.full(300, 0.1), np.full(300, 5.0)
+    known = obstacles_of(shapes, Ball(light, w=w), np.zeros(3), direction, ends[1])
+    lit = lit_intervals(rays, ends, known, checks=0)
+    ray = np.repeat(np.arange(300), 20)
+    x = np.random.default_rng(3).uniform(0.1, 5.0, len(ray))
+    inside, gap = np.zeros(len(ray), bool), np.full(len(ray), np.inf)
+    for number, low, high in zip(lit.ray, lit.low, lit.high, strict=True):
+        mine = ray == number
+        inside[mine] |= (x[mine] > low) & (x[mine] < high)
+        gap[mine] = np.minimum(gap[mine], np.minimum(np.abs(x[mine] - low), np.abs(x[mine] - high)))
+    target = rays.point(ray, x)
+    start = np.broadcast_to(light, target.shape) if w else target + 30 * light
+    hidden = segments_blocked(start, target, shapes)
+    assert 0.05 < hidden.mean() < 1 if place == "in a sphere" else 0.05 < hidden.mean() < 0.95
+    # Where a plane all but touches a sphere, or a ray is all but along the light, rounding is worth more.
+    assert not np.any((inside == hidden)[gap > 1e-8])
+
+
+@pytest.mark.claim("exact-shadows")
+@pytest.mark.parametrize("radius", [0.0, 0.4])
+@pytest.mark.parametrize("w", [1, 0])
+def test_no_shape_in_the_light_is_left_out(variant, radius, w):
+    """With every shape for every ray the intervals are the same; the lists are much shorter."""
+    shapes = random_shapes()
+    centre = np.array([0.9, -1.4, 3.1]) if w else unit([0.3, -0.5, 0.7])
+    direction = random_directions(400)
+    distance = np.where(np.arange(400) % 3 > 0, 4.0, np.inf if w else 9.0)
+    draw = np.random.default_rng(2).normal(size=(400, 3))
+    position = centre + radius * draw / np.linalg.norm(draw, axis=1)[:, None] if w else centre
+    rays = rays_at(np.zeros(3), direction, position, w)
+    ball = Ball(centre, radius * w, w)
+    known = obstacles_of(shapes, ball, np.zeros(3), direction, distance)
+    ends = np.zeros(400), distance
+    some = lit_intervals(rays, ends, known, checks=0)
+    counts = len(shapes.triangles), len(shapes.radius), len(shapes.disks.radius)
+    every = [(np.zeros(400, np.int64), np.full(400, count), np.arange(count)) for count in counts]
+    near = replace(known.near, triangles=every[0], spheres=every[1], disks=every[2])
+    full = lit_intervals(rays, ends, replace(known, near=near), checks=0)
+    listed = np.mean(known.near.triangles[1] - known.near.triangles[0])
+    assert listed < (0.6 if w else 0.8) * counts[0]
+    assert np.array_equal(some.ray, full.ray)
+    assert some.low == pytest.approx(full.low, abs=1e-12)
+    assert some.high == pytest.approx(full.high, abs=1e-12)
+
+
+@pytest.mark.claim("directional-truth", tolerance="1e-13")
+def test_one_triangle_in_closed_form(variant):
+    """Light, triangle and ray in one plane: z - y cot for the corners, the crossing where it goes through the ray."""
+    direction = np.array([[1.0, 0, 0]])
+    light = unit([3.0, 0.0, 4.0])  # cot = 3/4 for a ray along x
+    rays, ends = rays_at(np.zeros(3), direction, light, w=0), (np.zeros(1), np.array([10.0]))
+    out = np.array([0.0, 0.3, 0.0])
+    for corners, expected in (
+        (((4.0, 0.0, 2.0), (6.0, 0.0, 1.0)), (2.5, 5.25)),
+        (((4.0, 0.0, -2.0), (6.0, 0.0, 2.0)), (4.5, 5.0)),  # half of it lies on the dark side
+    ):
+        a, b = (np.array(end) for end in corners)
+        shapes = Shapes(np.array([[a + out, a - out, b]]))
+        known = obstacles_of(shapes, Ball(light, w=0), np.zeros(3), direction, ends[1])
+        found = lit_intervals(rays, ends, known, checks=0)
+        low, high = expected
+        assert found.low == pytest.approx([0, high], abs=1e-13)
+        assert found.high == pytest.approx([low, 10], abs=1e-13)
+        assert found.transitions == 2
+
+
+@pytest.mark.claim("exact-shadows", tolerance="1e-12")
+def test_a_slit_of_a_billionth_is_found(variant):
+    """A light at the height 2 over a ray, two sheets at the height 1 with a slit: its image is twice as wide."""
+    slit, direction = 1e-9, np.array([[1.0, 0, 0]])
+    sheets = [
+        [[-9.0, -1, 1], [-9.0, 1, 1], [0.5, 1, 1]],
+        [[-9.0, -1, 1], [0.5, 1, 1], [0.5, -1, 1]],
+        [[0.5 + slit, -1, 1], [0.5 + slit, 1, 1], [9.0, 1, 1]],
+        [[0.5 + slit, -1, 1], [9.0, 1, 1], [9.0, -1, 1]],
+    ]
+    shapes, light = Shapes(np.array(sheets)), np.array([0.25, 0.0, 2.0])
+    rays, ends = rays_at(np.zeros(3), direction, light), (np.zeros(1), np.array([5.0]))
+    known = obstacles_of(shapes, Ball(light), np.zeros(3), direction, ends[1])
+    found = lit_intervals(rays, ends, known, checks=0)
+    assert found.low == pytest.approx([0.75], abs=1e-12)
+    assert found.high - found.low == pytest.approx([2 * slit], rel=1e-5)  # 1e-14 of rounding over 2e-9
 
 
 def setup(scene):
@@ -24,91 +150,70 @@ def setup(scene):
     return truth, *rays_of(truth)
 
 
-def cylinder(**changes):
-    """Return a pipe beside the sphere."""
-    return {"type": "cylinder", "p0": [0.7, -0.2, 0.1], "p1": [0.8, 0.1, 1.3], "radius": 0.1} | changes
-
-
 @pytest.mark.claim("exact-shadows")
-def test_polygons_and_balls_are_exact_and_other_shapes_are_cast(variant):
-    from reference.visibility.lit_intervals import lit_intervals
-
-    for scene in (tiny_scene(), box_scene()):
-        truth, light, rays, ends = setup(scene)
-        assert lit_intervals(truth, light, rays, ends=ends).edge == EXACT_EDGE
-    with pytest.raises(InputError, match="edges is 'both'; wanted 'geometry', 'rays' or 'auto'"):
-        lit_intervals(truth, light, rays, ends=ends, edges="both")
-    truth, light, rays, ends = setup(tiny_scene(pipe=cylinder()))
-    assert lit_intervals(truth, light, rays, ends=ends).edge > EXACT_EDGE
-    with pytest.raises(InputError, match="'pipe' is a Cylinder; wanted meshes, rectangles and spheres"):
-        lit_intervals(truth, light, rays, ends=ends, edges="geometry")
+def test_other_shapes_are_refused(variant):
+    pipe = {"type": "cylinder", "p0": [0.7, -0.2, 0.1], "p1": [0.8, 0.1, 1.3], "radius": 0.1}
+    with pytest.raises(InputError, match="'pipe' is a Cylinder; wanted meshes, rectangles, spheres and disks"):
+        setup(tiny_scene(pipe=pipe))
 
 
 @pytest.mark.claim("shadow-ray-certificate")
-def test_certificate_of_both_routes_is_clean(variant):
-    from reference.visibility.lit_intervals import lit_intervals
-
-    truth, light, rays, ends = setup(box_scene())
-    rays_used = int(np.sum(ends[1] > ends[0]))
-    for edges in ("geometry", "rays"):
-        known = lit_intervals(truth, light, rays, ends=ends, samples=256, edges=edges).random_checks
-        assert known.checked >= 32 * rays_used
-        assert known.left == 0
-        assert known.missed < 1e-3
-
-
-@pytest.mark.claim("shadow-ray-certificate")
-def test_wrong_geometry_is_found_and_left_in_doubt(variant):
+def test_the_certificate_is_clean_and_notices_a_fault(variant):
     """Intervals from which one box is missing contradict the shadow rays, and the test of all triangles."""
-    truth, light, rays, ends = setup(box_scene())
-    shapes = read_shapes(truth.occluders)
-    wrong = geometric_intervals(truth, light, rays, ends=ends, shapes=Shapes(shapes.triangles[12:]))
-    visible = visibility_test(truth.occluders, light.position, rays)
-    checked = checked_geometry(wrong, visible, (point_leg(light.position, rays), shapes), ends=ends, checks=16)
+    truth, rays, ends, known = setup(box_scene())
+    right = lit_intervals(rays, ends, known)
+    assert right.random_checks.checked == 32 * np.sum(ends[1] > ends[0])
+    assert right.random_checks.left == 0
+    assert right.random_checks.missed < 1e-3
+    assert right.edge == EXACT_EDGE
+    fewer = replace(known.shapes, triangles=known.shapes.triangles[12:])
+    near = near_shapes(known.light, truth.origin, truth.direction, ends[1], fewer)
+    wrong = lit_intervals(rays, ends, replace(known, shapes=fewer, near=near), checks=0)
+    checked = certified(wrong, rays, ends, occluders=truth.occluders, shapes=known.shapes, checks=16)
     assert checked.random_checks.left > 20
-    assert checked.doubt is not None
     assert len(checked.doubt[0]) == checked.random_checks.left
-    # Shadow rays that are wrong themselves are overruled by the float64 test.
-    right = geometric_intervals(truth, light, rays, ends=ends, shapes=shapes)
-
-    def unreliable(ray, theta):
-        lit = visible(ray, theta)
-        lit[::701] ^= True
-        return lit
-
-    checked = checked_geometry(right, unreliable, (point_leg(light.position, rays), shapes), ends=ends, checks=4)
-    assert checked.random_checks.disagreements > 0
-    assert checked.random_checks.left == 0
-    assert checked.doubt is None
 
 
 @pytest.mark.claim("shadow-ray-certificate")
 def test_doubt_widens_the_bound(variant, monkeypatch):
-    truth, light, rays, _ = setup(box_scene())
+    import reference.quadrature.light_airlight as light_airlight
+    import reference.quadrature.ray_values as quadrature
+
+    truth, rays, _, _ = setup(box_scene())
+    light = truth.lights[0]
     plain = quadrature.ray_values(truth)
     compute = light_airlight.lit_intervals
 
     def doubtful(*arguments, **settings):
-        intervals = compute(*arguments, **settings)
-        return replace(intervals, doubt=(np.array([5]), np.array([0.1]), np.array([1e-3])))
+        return replace(compute(*arguments, **settings), doubt=(np.array([5]), np.array([1e-3])))
 
     monkeypatch.setattr(light_airlight, "lit_intervals", doubtful)
     doubted = quadrature.ray_values(truth)
     assert np.array_equal(doubted.airlight, plain.airlight)
     assert np.flatnonzero((doubted.bound > plain.bound).any(axis=1)).tolist() == [5]
-    # In theta the integrand is exp(-sigma_t (x + r)) p/h: a milliradian about 0.1, if it were lit, is worth less than
-    # what the bound grew by, and that is no more than its worth in a vacuum.
-    height, foot = rays[2][5], (light.position - truth.origin) @ truth.direction[5]
-    way = foot + height * np.tan(0.1) + height / np.cos(0.1)
-    most = truth.medium.albedo * truth.medium.sigma_t * light.intensity / (4 * np.pi) * 1e-3 / height
-    grown = doubted.bound[5] - plain.bound[5]
-    assert np.all(grown >= most * np.exp(-truth.medium.sigma_t * way))
-    assert np.all(grown <= most * (1 + 1e-9))
+    # In theta the integrand is exp(-sigma_t (x + r)) p/h: a milliradian, if it were lit, is worth no more than this.
+    most = truth.medium.albedo * truth.medium.sigma_t * light.intensity / (4 * np.pi) * 1e-3 / rays.height[5]
+    assert doubted.bound[5] - plain.bound[5] == pytest.approx(most, rel=1e-9)
+
+
+def test_surfaces_are_reached_as_rays_are(variant):
+    """The last interval reaches the surface where a float64 segment from just above it meets nothing."""
+    _, rays, ends, known = setup(box_scene())
+    lit = lit_intervals(rays, ends, known, checks=0)
+    seen = np.flatnonzero(np.isfinite(ends[1]))
+    point = rays.point(seen, ends[1][seen] * (1 - 1e-7))
+    blocked = segments_blocked(rays.position[seen], point, known.shapes)
+    assert np.mean(reaches(lit, ends[1])[seen] == ~blocked) > 0.999
+    assert 0.05 < blocked.mean() < 0.95
 
 
 @pytest.mark.claim("bound-in-every-pixel", tolerance="1e-5 relative")
 def test_a_built_in_scene_is_certain_to_1e_minus_5(variant):
     """The figure to reach, at a size for tests: every bound below 1e-5 of its pixel, and nothing contradicted."""
+    from reference.quadrature.image import quadrature_image
+    from reference.scene.read import read_truth
+    from validation.scenes.loading import load_scene
+
     image = quadrature_image(read_truth(load_scene("colonnade", size=(32, 24)).scene))
     reached = image.airlight_bound < 1e-5 * image.airlight
     assert np.mean(reached[image.airlight > 0]) > 0.999

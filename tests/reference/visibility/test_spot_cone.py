@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from reference.scene.read import TruthLight, read_truth
-from reference.visibility.spot_cone import cone_interval, falloff, perpendicular
+from reference.visibility.planes import cone_interval, falloff, rays_at
 from tests.helpers.scenes import spot, tiny_scene
 
 
@@ -19,10 +19,10 @@ def test_interval_against_sampling(degrees):
     origin = np.array([1.1, -0.7, 0.9])
     direction = rng.normal(size=(500, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    normal = perpendicular(origin, direction, light)
-    low, high = cone_interval(direction, normal, light, angle)
+    rays = rays_at(origin, direction, light.position)
+    low, high = cone_interval(rays, light, angle)
     theta = np.linspace(-0.499 * np.pi, 0.499 * np.pi, 401)
-    away = direction[:, None] * np.sin(theta)[:, None] + normal[:, None] * np.cos(theta)[:, None]
+    away = direction[:, None] * np.sin(theta)[:, None] + rays.normal[:, None] * np.cos(theta)[:, None]
     cosine = away @ axis
     clear = np.abs(cosine - np.cos(angle)) > 1e-9
     inside = (theta >= low[:, None]) & (theta <= high[:, None])
@@ -35,9 +35,10 @@ def test_profile_is_that_of_mitsuba(variant):
     scene = mi.load_dict(tiny_scene(lamp=spot(cutoff=37.0, beam=14.0)))
     truth = read_truth(scene)
     light = truth.lights[0]
-    normal = perpendicular(truth.origin, truth.direction, light)
+    rays = rays_at(truth.origin, truth.direction, light.position)
+    normal = rays.normal
     theta = np.linspace(-1.3, 1.3, 57)
-    value = falloff(np.broadcast_to(theta, (len(normal), 57)), truth.direction, normal, light)
+    value = falloff(np.broadcast_to(theta, (len(normal), 57)), rays, light)
     away = truth.direction[:, None] * np.sin(theta)[:, None] + normal[:, None] * np.cos(theta)[:, None]
     interaction = dr.zeros(mi.Interaction3f, away[..., 0].size)
     interaction.p = mi.Point3f((light.position + away).reshape(-1, 3).T)

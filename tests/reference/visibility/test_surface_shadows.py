@@ -8,7 +8,7 @@ import pytest
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_truth
 from reference.scene.shapes import read_shapes
-from reference.visibility.surface_shadows import reached_by_shadow_rays, segments_blocked
+from reference.visibility.certificate import reached_by_shadow_rays, segments_blocked
 from tests.helpers.scenes import tiny_scene
 
 LIGHT = np.array([1.0, 0.0, 3.0])

@@ -5,7 +5,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.quadrature import area_airlight
+from reference.quadrature import area_lights
 from tests.helpers.area_lights import lamp, lit_scene
 from tests.helpers.scenes import tiny_scene
 from validation.estimates.images import layered_truth
@@ -41,7 +41,7 @@ def assert_same(actual, expected):
 
 
 def test_second_call_reads_the_same_numbers(scene, own_cache, computed):
-    first, second = truth_image(scene, samples=32), truth_image(scene, samples=32)
+    first, second = truth_image(scene, checks=4), truth_image(scene, checks=4)
     assert len(computed) == 1
     assert_same(first, second)
     assert first.airlight.shape == (6, 8, 3)
@@ -51,8 +51,8 @@ def test_second_call_reads_the_same_numbers(scene, own_cache, computed):
 def test_other_phase_function_has_another_truth(scene, own_cache, computed):
     """The phase function has no parameters that a key could see; an isotropic truth would pass for it."""
     fog = tiny_scene()["fog"] | {"phase": {"type": "rayleigh"}}
-    plain = truth_image(scene, samples=32)
-    rayleigh = truth_image(mi.load_dict(tiny_scene(size=(8, 6), fog=fog)), samples=32)
+    plain = truth_image(scene, checks=4)
+    rayleigh = truth_image(mi.load_dict(tiny_scene(size=(8, 6), fog=fog)), checks=4)
     assert len(computed) == 2
     assert np.abs(rayleigh.airlight / plain.airlight - 1).max() > 0.05
 
@@ -73,7 +73,7 @@ def loaded(scene):
 @pytest.mark.claim("area-light-goes-on")
 def test_truth_of_an_area_light_goes_on_where_it_was_interrupted(own_cache, monkeypatch):
     scene = lit_scene(size=(2, 2), lamp=lamp("sphere", center=[0.3, 0.2, 3.0], radius=0.4))
-    done, compute = [], area_airlight._sums_over
+    done, compute = [], area_lights._scattered
 
     def some(*arguments):
         if len(done) == 5:
@@ -81,11 +81,11 @@ def test_truth_of_an_area_light_goes_on_where_it_was_interrupted(own_cache, monk
         done.append(arguments)
         return compute(*arguments)
 
-    monkeypatch.setattr(area_airlight, "_sums_over", some)
+    monkeypatch.setattr(area_lights, "_scattered", some)
     with pytest.raises(KeyboardInterrupt):
         truth_image(scene)
     counted = []
-    monkeypatch.setattr(area_airlight, "_sums_over", lambda *arguments: (counted.append(1), compute(*arguments))[1])
+    monkeypatch.setattr(area_lights, "_scattered", lambda *arguments: (counted.append(1), compute(*arguments))[1])
     again = truth_image(scene)
     went_on = len(counted)
     assert not list(own_cache.glob("**/airlight-*"))

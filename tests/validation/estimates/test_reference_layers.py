@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from reference.quadrature.image import quadrature_image
-from reference.quadrature.light_points import PointPlan
 from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.replicates import PointPlan
 from reference.scene.read import read_truth
 from tests.helpers.area_lights import NULL, fog, lamp, lit_scene
 from validation.estimates.agreement import truth_estimate

@@ -50,6 +50,23 @@ def image(scene):
     return np.stack([truth.airlight, truth.surface])
 
 
+def test_a_cylinder_is_one_mesh_for_all(load):
+    """Its name, place and material stay, and its shadow is that of the round one but for the sides."""
+    scene = load(LAMP, shape("cylinder", GREY, name="pipe", size=0.3))
+    (pipe,) = scene.shapes()
+    assert (pipe.id(), pipe.is_mesh(), pipe.face_count()) == ("pipe", True, 512)
+    corners = np.array(mi_traverse(pipe)["vertex_positions"]).reshape(-1, 3) - [0.1, 0.1, 0.7]
+    np.testing.assert_allclose(np.hypot(corners[:, 0], corners[:, 1]), 0.3, atol=1e-6)
+    assert np.ptp(corners[:, 2]) == pytest.approx(0.3, abs=1e-6)
+    assert np.isfinite(image(scene)).all()
+
+
+def mi_traverse(shape):
+    import mitsuba as mi
+
+    return mi.traverse(shape)
+
+
 def test_references_to_the_medium_that_is_there_change_nothing(load):
     """Walls and lamps of Mitsuba 0.6 say in which medium they stand; volpath and both readers see the plain scene."""
     fog = '<ref name="exterior" id="fog"/>'

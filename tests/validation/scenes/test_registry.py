@@ -12,12 +12,10 @@ from realtime.frame.renderer import frame_renderer, render_frame
 from realtime.kernels.registry import KERNELS
 from realtime.methods.registry import METHODS
 from realtime.scene.read_scene import read_scene
-from reference.quadrature.segments import camera_segments, scattering_range
+from reference.quadrature.light_airlight import lit_parallel_rays
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_truth
 from reference.storage.scene_digest import scene_digest
-from reference.visibility.directional_casting import directional_intervals
-from reference.visibility.parallel_rays import parallel_rays
 from validation.estimates.quadrature import truth_image
 from validation.scenes.loading import load_scene
 from validation.scenes.registry import FILES, FOG_SCENES, SCENES
@@ -109,12 +107,10 @@ def test_sun_comes_in_by_the_windows_alone(variant):
     truth = read_truth(load_scene("windows", (40, 30)).scene)
     wall = tomllib.loads(FILES[0].read_text())["windows"]["shapes"][1]
     left, front = wall["corner"][:2]
-    span = scattering_range(camera_segments(truth, surface_hits(truth).distance))
-    rays = parallel_rays(truth.origin, truth.direction, truth.directional[0], span)
-    intervals = directional_intervals(truth, rays)
+    intervals = lit_parallel_rays(truth, truth.directional[0], surface_hits(truth).distance).lit
     assert intervals.transitions > 500
     assert intervals.random_checks.left == 0
-    x = rays.distance(intervals.ray, 0.5 * (intervals.low + intervals.high))
+    x = 0.5 * (intervals.low + intervals.high)
     point = truth.origin + x[:, None] * truth.direction[intervals.ray]
     towards = -truth.directional[0].direction
     at_wall = point + ((left - point[:, 0]) / towards[0])[:, None] * towards

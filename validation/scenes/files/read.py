@@ -10,11 +10,17 @@ from typing import Any
 import mitsuba as mi
 
 from analytic.errors import InputError
+from reference.storage.files import temporary_folder
 from validation.scenes.files.kinds import check_kinds
 from validation.scenes.files.media import give_extinction, pass_where_no_material
 from validation.scenes.files.nodes import kind, name_nodes, properties, references
 from validation.scenes.files.references import leave_out_media, touching
-from validation.scenes.files.shapes import lamps_as_rectangles, rooms_as_boxes, write_out_instances
+from validation.scenes.files.shapes import (
+    cylinders_as_meshes,
+    lamps_as_rectangles,
+    rooms_as_boxes,
+    write_out_instances,
+)
 from validation.scenes.lobes import give_lobes
 
 _FILM = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y")
@@ -75,11 +81,13 @@ def _built(config: Any, state: Any, lobes: Mapping[str, float]) -> Any:
         return mi.parser.instantiate(config, state)
     _mend(state)
     give_lobes(state, lobes)
-    scene = mi.parser.instantiate(config, mi.parser.ParserState(state))  # which takes the nodes apart
-    rooms = rooms_as_boxes(state, scene.shapes())
-    changed = [bool(rooms), lamps_as_rectangles(state, scene.shapes()), leave_out_media(state, scene)]
-    scene = mi.parser.instantiate(config, state) if any(changed) else scene
-    for note in rooms + touching(scene):
+    with temporary_folder() as folder:
+        notes = cylinders_as_meshes(state, folder)
+        scene = mi.parser.instantiate(config, mi.parser.ParserState(state))  # which takes the nodes apart
+        rooms = rooms_as_boxes(state, scene.shapes())
+        changed = [bool(rooms), lamps_as_rectangles(state, scene.shapes()), leave_out_media(state, scene)]
+        scene = mi.parser.instantiate(config, state) if any(changed) else scene
+    for note in [*notes, *rooms, *touching(scene)]:
         mi.Log(mi.LogLevel.Warn, note)
     return scene
 

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shapes of files made into shapes that both readers know.
+"""Shapes of files made into shapes that all readers know.
 
 Instances are written out, lamps on boxes become rectangles, and windows of rooms full of fog the boxes of that fog.
+Cylinders become meshes: every method and estimator then has the same triangles, whose shadows are exact.
 """
 
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
@@ -16,9 +18,12 @@ from validation.scenes.files.nodes import kind, of_kind, properties, references
 
 Array = NDArray[np.float64]
 
+_FOOT, _HEAD = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)  # of Mitsuba's cylinder
+
 _FLAT = 1e-5  # of a quad's size: corners beyond a plane, sides that are no parallelogram, sides off a right angle
 _MOST = 64  # rectangles of a lamp
 _BEYOND = 1e-4  # of a room's size: how far its box of fog reaches beyond the walls
+_SIDES = 256  # of the mesh of a cylinder: it differs from it by 8e-5 of the radius
 _POINTS = 16  # on a lamp, at which its normals are looked at
 
 
@@ -57,6 +62,50 @@ def _copies(state: Any, index: int) -> Iterator[Any]:
         node.props["to_world"] = place @ node.props.get("to_world", mi.ScalarAffineTransform4d())
         node.props.set_id(f"{instance.id()}-{node.props.id()}" if len(parts) > 1 else instance.id())
         yield node
+
+
+def cylinders_as_meshes(state: Any, folder: Path) -> list[str]:
+    """Put meshes in the place of cylinders, written into a folder for Mitsuba to read; return notes that say so."""
+    notes = []
+    for index in list(of_kind(state, "Shape")):
+        old = properties(state, index)
+        if old.plugin_name() != "cylinder":
+            continue
+        first, last = (np.array(old.get(name, end), dtype=np.float64) for name, end in (("p0", _FOOT), ("p1", _HEAD)))
+        path = folder / f"cylinder-{index}.ply"
+        _write_cylinder(path, first, last, float(old.get("radius", 1.0)))
+        new = mi.Properties("ply")
+        new.set_id(old.id())
+        new["filename"] = str(path)
+        for name in ("to_world", "flip_normals"):
+            if name in old:
+                new[name] = old[name]
+        for key, at in list(references(old)):
+            new[key] = mi.Properties.ResolvedReference(at)
+        state.nodes[index].props = new
+        notes.append(f"shape '{old.id()}' is a cylinder: it is a mesh of {_SIDES} sides for all that follows")
+    return notes
+
+
+def _write_cylinder(path: Path, first: Array, last: Array, radius: float) -> None:
+    """Write the side of a cylinder with the normals of a round one, as a PLY file."""
+    axis = last - first
+    across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    across /= np.linalg.norm(across)
+    turn = 2 * np.pi * np.arange(_SIDES)[:, None] / _SIDES
+    normal = np.cos(turn) * across + np.sin(turn) * np.cross(axis / np.linalg.norm(axis), across)
+    corners = np.concatenate([np.concatenate([end + radius * normal, normal], axis=1) for end in (first, last)])
+    side = np.arange(_SIDES)
+    after = (side + 1) % _SIDES
+    faces = np.concatenate(
+        [np.stack([side, after, side + _SIDES], axis=1), np.stack([after, after + _SIDES, side + _SIDES], axis=1)]
+    )
+    names = "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz"))
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(corners)}\n{names}"
+    header += f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    rows = np.zeros(len(faces), dtype=[("count", "u1"), ("corners", "<i4", 3)])
+    rows["count"], rows["corners"] = 3, faces
+    path.write_bytes(header.encode() + corners.astype("<f4").tobytes() + rows.tobytes())
 
 
 def lamps_as_rectangles(state: Any, shapes: Iterable[Any]) -> bool:

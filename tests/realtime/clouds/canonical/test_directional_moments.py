@@ -14,9 +14,9 @@ from realtime.clouds.canonical.sets import SETS
 from realtime.clouds.slab_orders.moments import SlabOrders, order_sets
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
 from realtime.clouds.slab_orders.streams import double_gauss
-from reference.monte_carlo.slab_walk.directions import direction_estimate
 from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein
 from reference.monte_carlo.slab_walk.walk import Slab
+from tests.helpers.slab_directions import direction_estimate
 
 HG = HenyeyGreensteinPhase(0.75)
 

@@ -55,7 +55,7 @@ def airlight(scene, precision, **parameters):
 )
 def test_the_default_keeps_the_digits_that_gamma_loses(variant):
     built = slats()
-    truth = quadrature_image(read_truth(built), edges="geometry").airlight
+    truth = quadrature_image(read_truth(built)).airlight
 
     def errors(image, expected=truth):
         return np.abs(image - expected) / np.maximum(truth, FLOOR * truth.mean())

@@ -42,7 +42,7 @@ def scene_with(mesh, *, size=(24, 18), **changes):
 
 
 def truth(scene):
-    return quadrature_image(read_truth(scene), edges="geometry")
+    return quadrature_image(read_truth(scene))
 
 
 def assert_is_truth(frame, image, *, rmse=1e-5):

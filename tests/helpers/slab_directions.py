@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Radiance of a slab in bins of directions by sets of orders, with where its light entered, by photons.
 
-The walk is that of `walk.py`. Every flight counts at every plane before it with its probability to reach it, over |mu|,
-in the bin of its direction: the mean radiance of the bin follows with its solid angle. Nothing changes under y -> -y,
-so that bins hold both signs of the azimuth, and the displacement along y counts with the sign of the direction's.
+The walk is that of `reference.monte_carlo.slab_walk.walk`. Every flight counts at every plane before it with its
+probability to reach it, over |mu|, in the bin of its direction: the mean radiance of the bin follows with its solid
+angle. Nothing changes under y -> -y, so that bins hold both signs of the azimuth, and the displacement along y counts
+with the sign of the direction's.
 """
 
 import math
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.monte_carlo.slab_walk.walk import Slab, next_scattering
+from reference.monte_carlo.slab_walk.walk import Slab, flights
 
 Array = NDArray[np.float64]
 
@@ -103,14 +104,9 @@ def _walk(
     random: np.random.Generator,
 ) -> Array:
     """Return sums over a batch over its number of photons, (4, sets, depths, mu bins, phi bins)."""
-    x, y, z = np.zeros(photons), np.zeros(photons), np.zeros(photons)
-    sine = math.sqrt((1 - slab.mu0) * (1 + slab.mu0))
-    direction = np.full(photons, sine), np.zeros(photons), np.full(photons, slab.mu0)  # downwards is positive here
     shape = (mu_edges.size - 1, phi_edges.size - 1)
     sums = np.zeros((4, len(sets), len(slab.depths), *shape))
-    order, weight = 0, 1.0
-    while x.size and weight > 1e-14:
-        u, v, w = direction
+    for order, (weight, (x, y, z), (u, v, w)) in enumerate(flights(slab, photons, random)):
         rows = [number for number, (first, last) in enumerate(sets) if first <= order <= last]
         if rows:
             places = _bins(-w, mu_edges) * shape[1] + _bins(np.arctan2(np.abs(v), u), phi_edges)
@@ -124,9 +120,6 @@ def _walk(
                     counts = np.bincount(places[before], weights * moment, shape[0] * shape[1]).reshape(shape)
                     for row in rows:
                         sums[field, row, plane] += counts
-        (x, y, z), direction = next_scattering(slab, (x, y, z), direction, random)
-        weight *= slab.albedo
-        order += 1
     return sums / photons
 
 

@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""The airlight of area lights and the surfaces that they light: sums over samples, each with exact lit intervals.
+
+With the points y on the surface of a light of radiance Le the radiance along a camera ray is
+
+    L = albedo sigma_t Le / (4 pi)  int_A int  V p exp(-sigma_t (x + r)) cos_l / r^2  dx dA,
+    cos_l = n . (o + x w - y) / r.
+
+The inner integral is that of a point light with a cosine for its profile, cut where the ray passes the plane of y and
+n. It is continuous in y where the visibility from a surface is not, so that few samples do. Surfaces at the end of a
+ray receive, from samples of their own,
+
+    L = exp(-tau_camera)  int Le V f cos_s exp(-s tau_shadow) domega,
+
+f cos_s by Mitsuba's `BSDF.eval`; V is whether the last lit interval of the ray reaches its end.
+`reference.quadrature.light_samples` draws both kinds of samples, `reference.quadrature.replicates` says how many a ray
+gets: eight independent scramblings each give a mean, and their spread the standard error.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from typing import Any
+
+import drjit as dr
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.quadrature.ahead import done_ahead
+from reference.quadrature.bounded import sum_media
+from reference.quadrature.light_airlight import worth_of_doubt
+from reference.quadrature.light_samples import samples_for_points, samples_for_rays
+from reference.quadrature.replicates import PILOT, REPLICATES, Keep, Kept, PointPlan, replicate_means, square_points
+from reference.quadrature.segments import camera_segments, optical_depth
+from reference.quadrature.surface import Reflection, SurfaceHits
+from reference.quadrature.unbounded import cosine_profile, stretch_sums, sums_of
+from reference.scene.area_light import TruthAreaLight
+from reference.scene.read import TruthScene
+from reference.visibility.before_light import IN_PLANE, before_light
+from reference.visibility.candidates import Ball
+from reference.visibility.certificate import LitIntervals, RandomChecks
+from reference.visibility.lit_intervals import Obstacles, lit_intervals, obstacles, reaches
+from reference.visibility.planes import Rays, before, rays_at
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Share = Callable[[float], None]
+
+_RTOL = 1e-6  # of the integral of one sample, whose estimate is many digits too large: far below the error of a mean
+_PAIRS = 1 << 16  # rays and samples at once
+_EVERY = 7  # of the pairs is checked by a shadow ray: odd, so that it steps through all samples
+_LAST = 1e-5  # of the way to a surface: the part of a ray whose end is asked for
+
+
+@dataclass(frozen=True)
+class AreaAirlight:
+    """The airlight of all area lights, by replicate."""
+
+    replicates: Array  #: (rays, 3, replicates) [W/(m^2 sr)]
+    bound: Array  #: of the error of the lit intervals and their integrals, not of the samples, (rays, 3) [W/(m^2 sr)]
+    random_checks: RandomChecks
+
+
+@dataclass(frozen=True)
+class Beam:
+    """An area light and what can stand in it."""
+
+    light: TruthAreaLight
+    scene: TruthScene  #: without the light's own shape
+    distance: Array  #: of its rays to the visible surface, (rays,) [m]
+    known: Callable[[], Obstacles]  #: looked for once, where somebody asks
+
+
+def beams_of(truth: TruthScene, distance: Array) -> list[Beam]:
+    """Return the area lights of a scene, and what can stand between them and its rays up to distances [m]."""
+    beams = []
+    for light in truth.area:
+        scene, shapes = before_light(truth, light)
+        known = cache(partial(obstacles, scene, Ball(light.centre, light.radius), distance, shapes))
+        beams.append(Beam(light, scene, distance, known))
+    return beams
+
+
+def area_airlight(
+    truth: TruthScene,
+    beams: list[Beam],
+    known: Array,
+    *,
+    plan: PointPlan,
+    shadow_scale: float = 1.0,
+    tell: Share = lambda share: None,
+    keep: Keep = lambda name, work: work(),
+) -> AreaAirlight:
+    """Compute the airlight of all area lights along every ray.
+
+    Parameters
+    ----------
+    truth, beams
+        The scene, and its lights from `beams_of`.
+    known
+        The airlight of all other lights, to which errors are relative too, (rays, 3) [W/(m^2 sr)].
+    plan
+        How many samples.
+    shadow_scale
+        See `reference.quadrature.image.quadrature_image`.
+    tell
+        Called with the share of the work that is done.
+    keep
+        Called with the name of each part of the work and a function that does it; may return what it did before.
+    """
+    count = len(truth.direction)
+    bound, checks = np.zeros((count, 3)), list[RandomChecks]()
+    rounds, done = 2 * plan.rounds * len(truth.area) * REPLICATES, 0
+
+    def sums(part: str, chosen: PointPlan, active: Index, numbers: tuple[int, int]) -> Array:
+        nonlocal done
+        total = np.zeros((len(active), 3, REPLICATES))
+        for number, beam in enumerate(beams):
+            for replicate in range(REPLICATES):
+                square = square_points(chosen, number, replicate, beam.light.kind)[slice(*numbers)]
+                work = partial(_scattered, beam, active, square, shadow_scale)
+                got = keep(f"airlight-{part}{number}-{numbers[1]}-{replicate}", work)
+                total[..., replicate] += got["radiance"]
+                if part != PILOT:
+                    bound[active] += got["bound"]
+                    checks.append(RandomChecks(*(int(value) for value in got["checks"][:4]), float(got["checks"][4])))
+                done += 1
+                tell(done / rounds)
+        return total
+
+    means, used = replicate_means(count, known, plan, sums)
+    return AreaAirlight(means, bound / (REPLICATES * used[:, None]), RandomChecks.of_all(checks))
+
+
+def _scattered(beam: Beam, active: Index, square: Array, shadow_scale: float) -> Kept:
+    """Return sums over samples: radiances and bounds of their errors, (rays, 3) each, and counts of the checks."""
+    truth, light, count, each = beam.scene, beam.light, len(active), len(square)
+    radiance, bound, checks = np.zeros((count, 3)), np.zeros((count, 3)), [RandomChecks()]
+    step = max(1, _PAIRS // each)
+
+    def lit_pairs() -> Iterator[tuple[slice, Rays, Array, Array, LitIntervals]]:
+        for first in range(0, count, step):
+            rows = slice(first, first + step)
+            direction, distance = truth.direction[active[rows]], beam.distance[active[rows]]
+            samples = samples_for_rays(light, truth.origin, direction, distance, square)
+            place, normal, weight = samples.flat()
+            rays = rays_at(truth.origin, np.repeat(direction, each, axis=0), place)
+            low, high = before(rays, normal)
+            ends = np.maximum(low, 0.0), np.minimum(high, np.repeat(distance, each))
+            ends = ends[0], np.maximum(*ends)
+            of = np.repeat(active[rows], each)
+            lit = lit_intervals(rays, ends, beam.known(), of=of, checks=1, every=_EVERY, normal=normal)
+            yield rows, rays, normal, weight, lit
+
+    def summed(work: tuple[slice, Rays, Array, Array, LitIntervals]) -> tuple[slice, RandomChecks, Array, Array]:
+        rows, rays, normal, weight, lit = work
+        how: Any = {
+            "profile": cosine_profile(rays, normal),
+            "shadow_scale": shadow_scale,
+            "rtol": _RTOL,
+            "edge": lit.edge,
+        }
+        stretches = lit.ray, lit.low, lit.high
+        if truth.media:
+            along = replace(truth, direction=rays.direction)
+            segments = camera_segments(along, np.repeat(beam.distance[active[rows]], each))
+            parts = sum_media(truth, rays, stretches, segments, **how)
+        else:
+            sums = stretch_sums(truth.medium, rays, stretches, **how)
+            parts = tuple(sums_of(lit.ray, values, len(weight)) for values in sums)
+        parts = parts[0], parts[1] + worth_of_doubt(truth, rays, lit)
+        value, error = ((part * weight[:, None]).reshape(-1, each, 3).sum(axis=1) * light.radiance for part in parts)
+        return rows, lit.random_checks, value, error
+
+    for rows, found, value, error in done_ahead(summed, lit_pairs(), workers=dr.thread_count()):
+        radiance[rows], bound[rows] = value, error
+        checks.append(found)
+    known = RandomChecks.of_all(checks)
+    counts = known.checked, known.disagreements, known.refined, known.left, known.missed
+    return {"radiance": radiance, "bound": bound, "checks": np.array(counts)}
+
+
+def area_surface(
+    truth: TruthScene,
+    hits: SurfaceHits,
+    beams: list[Beam],
+    known: Array,
+    *,
+    plan: PointPlan,
+    shadow_scale: float = 1.0,
+    tell: Share = lambda share: None,
+    keep: Keep = lambda name, work: work(),
+) -> Array:
+    """Return the radiance of surfaces lit by area lights, by replicate, (rays, 3, replicates) [W/(m^2 sr)].
+
+    Parameters
+    ----------
+    truth, hits, beams
+        The scene, what its rays hit, and its lights from `beams_of`.
+    known
+        The radiance that all other lights give, to which errors are relative too, (rays, 3) [W/(m^2 sr)].
+    plan, shadow_scale, tell, keep
+        As in `area_airlight`.
+    """
+    result = np.zeros((len(hits.distance), 3, REPLICATES))
+    rows = np.flatnonzero(np.isfinite(hits.distance))
+    if not len(rows):
+        return result
+    reflection = Reflection(hits.interaction)
+    depth = optical_depth(truth, truth.origin, truth.direction[rows], np.zeros(len(rows)), hits.distance[rows])
+    rounds, done = 2 * plan.rounds * len(truth.area) * REPLICATES, 0
+
+    def sums(part: str, chosen: PointPlan, active: Index, numbers: tuple[int, int]) -> Array:
+        nonlocal done
+        total = np.zeros((len(active), 3, REPLICATES))
+        for number, beam in enumerate(beams):
+            for replicate in range(REPLICATES):
+                square = square_points(chosen, number, replicate, beam.light.kind)[slice(*numbers)]
+                work = partial(_reflected, beam, rows[active], square, shadow_scale, reflection)
+                total[..., replicate] += keep(f"surface-{part}{number}-{numbers[1]}-{replicate}", work)["radiance"]
+                done += 1
+                tell(done / rounds)
+        return total * np.exp(-depth[active, :, None])
+
+    result[rows], _ = replicate_means(len(rows), known[rows], plan, sums)
+    return result
+
+
+def _reflected(beam: Beam, active: Index, square: Array, shadow_scale: float, reflection: Reflection) -> Kept:
+    """Return sums over samples of what surface points reflect, before what is between them and the camera."""
+    truth, light, each = beam.scene, beam.light, len(square)
+    total = np.zeros((len(active), 3))
+    point = truth.origin + beam.distance[active, None] * truth.direction[active]
+    away = point - light.centre
+    if light.kind == "sphere":
+        sees = np.linalg.norm(away, axis=1) > light.radius * (1 + _LAST)
+    else:
+        sees = away @ light.normal > IN_PLANE * max(1.0, float(np.abs(light.centre).max()))
+    seeing = np.flatnonzero(sees)
+    step = max(1, _PAIRS // each)
+    for first in range(0, len(seeing), step):
+        rows = seeing[first : first + step]
+        samples = samples_for_points(light, point[rows], square)
+        place, _, weight = samples.flat()
+        of = np.repeat(rows, each)
+        way = place - point[of]
+        r = np.linalg.norm(way, axis=1)
+        towards = way / np.maximum(r, np.finfo(float).tiny)[:, None]
+        value = reflection(active[of], towards)
+        used = np.flatnonzero(value.max(axis=1) > 0)
+        of, towards, r, value, weight = of[used], towards[used], r[used], value[used], weight[used]
+        rays = rays_at(truth.origin, truth.direction[active[of]], place[used])
+        end = beam.distance[active[of]]
+        lit = lit_intervals(rays, (end * (1 - _LAST), end), beam.known(), of=active[of], checks=0)
+        seen = reaches(lit, end)
+        of, value, weight = of[seen], value[seen], weight[seen]
+        shadow = optical_depth(truth, point[of], towards[seen], np.zeros(len(of)), shadow_scale * r[seen])
+        total += sums_of(of, value * np.exp(-shadow) * weight[:, None] * light.radiance, len(total))
+    return {"radiance": total}

@@ -1,0 +1,372 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Samples of area lights: points of the light that suit one ray, or one surface point, and the area each stands for.
+
+**Along a ray.** A point y of the light at the height h over the ray sends into it J(y), which grows like 1/h: points
+drawn evenly on the light leave a peak beside the light that no number of them resolves. In half planes about the ray,
+with phi the azimuth of such a half plane and l the arc length along the curve in which it cuts the light,
+
+    dA = h dphi dl / n_in,        n_in the length of the part of the normal within the half plane,
+
+and h J(y) is bounded however close the ray passes: an endless ray in a clear medium receives (1 + cos) n_in from y, cos
+that of the angle in the half plane between normal and ray. So samples are drawn by phi and l. These are polar
+coordinates about the ray, the same for all of its points, and lit intervals stay those of one point of the light.
+
+A half plane cuts a rectangle, a triangle and a disk in a segment, a sphere of radius R in a circle of radius rho. There
+dA = R h dphi db with the angle b on the circle. The azimuths of a disk or sphere that the line of the ray misses are
+those of the quadratic form
+
+    e^T M e <= 0,     M = c c^T - R^2 (1 - n n^T)     (a sphere: n = 0),
+
+e the unit normal of the half plane, c the way from the ray to the centre. With its eigenvalues -a <= 0 < b and the
+angle delta from the middle, half the chord is proportional to sqrt(S^2 - sin^2(delta)), S^2 = a/(a + b); with
+sin(delta) = S sin(g) that is a smooth function of g and periodic, as what follows from it, and samples are even in g. A
+line that meets the light has all azimuths, and samples that are even in phi. Of a polygon phi follows the length of the
+section, which is tabulated: the density is linear between the nodes, at corners of the light and between them, and the
+weight of a sample is by the density itself, so that the table costs no accuracy.
+
+**From a surface point.** The solid angle about any axis through the point is dphi dcos(psi). In the same half planes,
+about an axis across the way to the light, samples are drawn evenly in the cosine between both ends of the section, and
+phi by the length of that range: evenly in the solid angle (for rectangles Urena, Fajardo, King 2013, An area-preserving
+parametrization for spherical rectangles, has this in closed form). A sphere fills a cone of directions.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.scene.area_light import TruthAreaLight
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_CELLS = 8  # of the table between two corners of a light
+_LEAST = 0.25  # of the density in the middles beside it: below this no node of the table lies
+_TINY = 1e-300
+
+
+@dataclass(frozen=True)
+class LightSamples:
+    """Samples of a light for each of some rays or surface points; the mean over them of weight times f is int f."""
+
+    place: Array  #: (rays, samples, 3) [m]
+    normal: Array  #: unit, of the side that emits, (rays, samples, 3)
+    weight: Array  #: dA [m^2] for rays, the solid angle [sr] for surface points, (rays, samples)
+
+    def flat(self) -> tuple[Array, Array, Array]:
+        """Return place, normal and weight of all pairs of ray and sample, ray by ray."""
+        return self.place.reshape(-1, 3), self.normal.reshape(-1, 3), self.weight.ravel()
+
+
+@dataclass(frozen=True)
+class _Axes:
+    """An axis for each row, and the light's centre seen along it: the centre has the azimuth 0."""
+
+    origin: Array  # (rows, 3)
+    axis: Array  # unit, (rows, 3)
+    up: Array  # unit, across the axis towards the centre
+    side: Array  # unit, across both
+    along: Array  # of the centre, (rows,)
+    height: Array  # of the centre over the axis, (rows,)
+
+    def components(self, vector: Array) -> Array:
+        """Return the components of vectors, (rows, k, 3), along axis, up and side."""
+        return np.stack([np.einsum("rki,ri->rk", vector, part) for part in (self.axis, self.up, self.side)], axis=-1)
+
+    def point(self, z: Array, h: Array, phi: Array) -> Array:
+        """Return the points at z along the axis, h over it, and the azimuth phi, (rows, k, 3) [m]."""
+        across = np.cos(phi)[..., None] * self.up[:, None] + np.sin(phi)[..., None] * self.side[:, None]
+        return self.origin[:, None] + z[..., None] * self.axis[:, None] + h[..., None] * across
+
+
+def _axes(origin: Array, axis: Array, centre: Array) -> _Axes:
+    origin = np.broadcast_to(origin, axis.shape)
+    way = centre - origin
+    along = np.sum(way * axis, axis=1)
+    away = way - along[:, None] * axis
+    height = np.linalg.norm(away, axis=1)
+    helper = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis), axis=1)])
+    far = height > 1e-12 * np.linalg.norm(way, axis=1)
+    up = np.where(far[:, None], away, helper)
+    up -= np.sum(up * axis, axis=1)[:, None] * axis
+    up /= np.linalg.norm(up, axis=1)[:, None]
+    return _Axes(origin, axis, up, np.cross(axis, up), along, np.where(far, height, 0.0))
+
+
+def samples_for_rays(
+    light: TruthAreaLight, origin: Array, direction: Array, distance: Array, square: Array
+) -> LightSamples:
+    """Return samples of a light for the airlight of rays.
+
+    Parameters
+    ----------
+    light
+        The light.
+    origin, direction, distance
+        Of the rays: where they start, (3,) [m], unit vectors, (rays, 3), and how far they go, (rays,) [m].
+    square
+        Points of the unit square, (samples, 2) [1], the same for all rays.
+    """
+    axes = _axes(origin, direction, light.centre)
+    if light.kind == "sphere":
+        return _on_sphere(light, axes, distance, square)
+    fan = _fan(light, axes)
+    phi, per_density = fan.drawn(square[:, 0], lambda z0, h0, z1, h1: np.hypot(z1 - z0, h1 - h0))
+    z0, h0, z1, h1 = fan.section(phi)
+    part = square[:, 1]
+    z, h = z0 + part * (z1 - z0), h0 + part * (h1 - h0)
+    n = axes.components(np.broadcast_to(light.normal, (len(direction), 1, 3)))[:, 0]
+    across = -n[:, 1:2] * np.sin(phi) + n[:, 2:] * np.cos(phi)
+    within = np.sqrt(np.maximum((1 - across) * (1 + across), 0.0))
+    weight = h * np.hypot(z1 - z0, h1 - h0) * per_density / np.maximum(within, _TINY)
+    place = axes.point(z, h, phi)
+    return LightSamples(place, np.broadcast_to(light.normal, place.shape), weight)
+
+
+def samples_for_points(light: TruthAreaLight, place: Array, square: Array) -> LightSamples:
+    """Return samples of a light for surface points that lie before it, even in the solid angle.
+
+    Parameters
+    ----------
+    light
+        The light.
+    place
+        The points, (points, 3) [m].
+    square
+        Points of the unit square, (samples, 2) [1], the same for all surface points.
+    """
+    way = light.centre - place
+    if light.kind == "sphere":
+        return _in_cone(light, place, square)
+    # Of both sides of the light that which lies more across the way to it.
+    sides = light.frame[:2]
+    side = sides[np.argmin(np.abs(way @ sides.T), axis=1)]
+    axis = side - (np.sum(side * way, axis=1) / np.sum(way * way, axis=1))[:, None] * way
+    axis /= np.linalg.norm(axis, axis=1)[:, None]
+    axes = _axes(place, axis, light.centre)
+    fan = _fan(light, axes)
+
+    def span(z0: Array, h0: Array, z1: Array, h1: Array) -> Array:
+        return np.abs(_cosine(z1, h1) - _cosine(z0, h0))
+
+    phi, per_density = fan.drawn(square[..., 0], span)
+    ends = fan.section(phi)
+    z0, h0, z1, h1 = ends
+    first, last = _cosine(z0, h0), _cosine(z1, h1)
+    cosine = first + square[..., 1] * (last - first)
+    sine = np.sqrt(np.maximum((1 - cosine) * (1 + cosine), 0.0))
+    below = (z0 - z1) * sine - (h0 - h1) * cosine
+    part = np.clip((z0 * sine - h0 * cosine) / np.where(below == 0, 1.0, below), 0.0, 1.0)
+    found = axes.point(z0 + part * (z1 - z0), h0 + part * (h1 - h0), phi)
+    return LightSamples(found, np.broadcast_to(light.normal, found.shape), span(*ends) * per_density)
+
+
+def _cosine(z: Array, h: Array) -> Array:
+    return z / np.maximum(np.hypot(z, h), _TINY)
+
+
+# --- Flat lights: a half plane cuts them in a segment ---
+
+
+@dataclass(frozen=True)
+class _Fan:
+    """The sections of a flat light by half planes about axes."""
+
+    axes: _Axes
+    corners: Array | None  # of a polygon, along axis, up and side, (rows, k, 3); None for a disk
+    normal: Array  # of the light, along the same, (rows, 3)
+    radius: float  # of a disk
+
+    def section(self, phi: Array) -> tuple[Array, Array, Array, Array]:
+        """Return z and h of both ends of the sections at azimuths, (rows, k) each; without length where there is none.
+
+        The end that is closer to the axis comes first.
+        """
+        z0, h0, z1, h1 = self._polygon(phi) if self.corners is not None else self._disk(phi)
+        swap = h0 > h1
+        z0, z1, h0, h1 = np.where(swap, z1, z0), np.where(swap, z0, z1), np.where(swap, h1, h0), np.where(swap, h0, h1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            on_axis = z0 - h0 * (z1 - z0) / (h1 - h0)
+        behind = (h0 < 0) & (h1 > 0)
+        z0, h0 = np.where(behind, on_axis, z0), np.where(behind, 0.0, h0)
+        none = h1 <= 0
+        return np.where(none, z1, z0), np.maximum(h0, 0.0), z1, np.maximum(h1, 0.0)
+
+    def _polygon(self, phi: Array) -> tuple[Array, Array, Array, Array]:
+        assert self.corners is not None
+        sine, cosine = np.sin(phi)[..., None], np.cos(phi)[..., None]
+        z = np.broadcast_to(self.corners[:, None, :, 0], (*phi.shape, self.corners.shape[1]))
+        a, b = self.corners[:, None, :, 1], self.corners[:, None, :, 2]
+        beside, h = b * cosine - a * sine, a * cosine + b * sine
+        after = [np.roll(part, -1, axis=-1) for part in (beside, h, z)]
+        cut = (beside >= 0) != (after[0] >= 0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.where(cut, beside / (beside - after[0]), 0.0)
+        h, z = h + share * (after[1] - h), z + share * (after[2] - z)
+        first = np.argmax(cut, axis=-1)[..., None]
+        last = cut.shape[-1] - 1 - np.argmax(cut[..., ::-1], axis=-1)[..., None]
+        last = np.where(cut.any(axis=-1, keepdims=True), last, first)
+        z0, h0, z1, h1 = (np.take_along_axis(part, end, axis=-1)[..., 0] for end in (first, last) for part in (z, h))
+        return z0, h0, z1, h1
+
+    def _disk(self, phi: Array) -> tuple[Array, Array, Array, Array]:
+        n_w, n_u, n_v = (self.normal[:, k, None] for k in range(3))
+        sine, cosine = np.sin(phi), np.cos(phi)
+        n_d, n_e = n_u * cosine + n_v * sine, n_v * cosine - n_u * sine
+        within = np.maximum(1 - n_e**2, _TINY)
+        height = self.axes.height[:, None]
+        beside = -height * sine  # of the centre from the half plane
+        half = np.sqrt(np.maximum(self.radius**2 - beside**2 / within, 0.0) / within)
+        z = self.axes.along[:, None] + beside * n_e * n_w / within
+        h = height * cosine + beside * n_e * n_d / within
+        return z - half * n_d, h + half * n_w, z + half * n_d, h - half * n_w
+
+    def drawn(self, uniform: Array, length) -> tuple[Array, Array]:
+        """Return azimuths, of a polygon by the length of the sections, (rows, k), and one over their density.
+
+        Parameters
+        ----------
+        uniform
+            Numbers from 0 to 1, (k,), or (rows, k).
+        length
+            (z0, h0, z1, h1) -> what the density is to follow.
+        """
+        if self.corners is None:
+            spread = _spread(self.axes.height, self.radius, self.normal[:, 1:])
+            return spread.azimuth(np.broadcast_to(uniform, (len(self.axes.along), uniform.shape[-1])))
+        phi, density = _by_table(self._breaks(), lambda phi: length(*self.section(phi)), uniform)
+        return phi, 1 / density
+
+    def _breaks(self) -> Array:
+        """Return the azimuths of the corners of a polygon, and of nodes between them, (rows, nodes)."""
+        assert self.corners is not None
+        a, b = self.corners[..., 1], self.corners[..., 2]
+        turn = a * np.roll(b, -1, axis=1) - b * np.roll(a, -1, axis=1)
+        around = (turn > 0).all(axis=1) | (turn < 0).all(axis=1)
+        azimuth = np.sort(np.arctan2(b, a), axis=1)
+        last = np.where(around, azimuth[:, 0] + 2 * np.pi, azimuth[:, -1])
+        breaks = np.concatenate([azimuth, last[:, None]], axis=1)
+        part = np.arange(_CELLS) / _CELLS
+        nodes = breaks[:, :-1, None] + np.diff(breaks, axis=1)[..., None] * part
+        return np.concatenate([nodes.reshape(len(a), -1), last[:, None]], axis=1)
+
+
+def _fan(light: TruthAreaLight, axes: _Axes) -> _Fan:
+    rows = len(axes.along)
+    normal = axes.components(np.broadcast_to(light.normal, (rows, 1, 3)))[:, 0]
+    if light.kind == "disk":
+        return _Fan(axes, None, normal, light.radius)
+    corners = light.corners - axes.origin[:, None]
+    return _Fan(axes, axes.components(corners), normal, 0.0)
+
+
+@dataclass(frozen=True)
+class _Spread:
+    """The azimuths of disks or spheres about axes, by a number t from 0 to 1."""
+
+    middle: Array  # (rows,) [rad]
+    sine: Array  # of half of the range, (rows,); above 1: all azimuths
+
+    def azimuth(self, t: Array) -> tuple[Array, Array]:
+        """Return azimuths, (rows, k), and dphi/dt."""
+        sine, middle = self.sine[:, None], self.middle[:, None]
+        angle = np.pi * (t - 0.5)
+        s = np.minimum(sine, 1.0) * np.sin(angle)
+        phi = np.where(sine > 1, 2 * np.pi * t, np.arcsin(s))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            rate = np.pi * sine * np.cos(angle) / np.sqrt((1 - s) * (1 + s))
+        return middle + phi, np.where(sine > 1, 2 * np.pi, rate)
+
+
+def _spread(height: Array, radius: float, normal: Array) -> _Spread:
+    """Return the azimuths of a disk with normals (rows, 2) across the axes, or of a sphere, whose normals are zero."""
+    n_u, n_v = normal.T
+    first = height**2 - radius**2 * (1 - n_u**2)
+    second, mixed = -(radius**2) * (1 - n_v**2), radius**2 * n_u * n_v
+    middle = 0.5 * np.arctan2(2 * mixed, first - second)
+    root = np.hypot(0.5 * (first - second), mixed)
+    above, below = 0.5 * (first + second) + root, root - 0.5 * (first + second)
+    sine = np.sqrt(np.maximum(below, 0.0) / np.maximum(above + below, _TINY))
+    return _Spread(middle, np.where(above > 0, np.minimum(sine, 1.0), 2.0))
+
+
+def _by_table(nodes: Array, density, uniform: Array) -> tuple[Array, Array]:
+    """Return numbers, (rows, k), whose density is linear between nodes, (rows, nodes), and that density."""
+    width = np.diff(nodes, axis=1)
+    inside = density(0.5 * (nodes[:, 1:] + nodes[:, :-1])) * (width > 0)
+    beside = np.concatenate([inside[:, :1], np.maximum(inside[:, 1:], inside[:, :-1]), inside[:, -1:]], axis=1)
+    value = np.maximum(density(nodes), _LEAST * beside)
+    mass = 0.5 * width * (value[:, 1:] + value[:, :-1])
+    total = mass.sum(axis=1, keepdims=True)
+    none = total <= 0
+    mass, total, value = np.where(none, width, mass), np.where(none, width.sum(axis=1)[:, None], total), value + none
+    below = np.cumsum(mass, axis=1)
+    wanted = np.broadcast_to(uniform, (len(nodes), uniform.shape[-1])) * total
+    cell = np.minimum((below[:, None, :-1] <= wanted[..., None]).sum(axis=2), mass.shape[1] - 1)
+    first, left, right, wide = (
+        np.take_along_axis(part, cell, axis=1) for part in (nodes[:, :-1], value[:, :-1], value[:, 1:], width)
+    )
+    rest = wanted - np.take_along_axis(below - mass, cell, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rest = np.where(wide > 0, np.maximum(rest, 0.0) / wide, 0.0)
+    root = np.sqrt(np.maximum(left * left + 2 * (right - left) * rest, 0.0))
+    part = np.clip(2 * rest / np.maximum(left + root, _TINY), 0.0, 1.0)
+    return first + part * wide, np.maximum(left + part * (right - left), _TINY) / total
+
+
+# --- Spheres ---
+
+
+def _on_sphere(light: TruthAreaLight, axes: _Axes, distance: Array, square: Array) -> LightSamples:
+    """Return samples of a sphere by azimuth and by the angle on the circle in which a half plane cuts it.
+
+    Both are periodic where the line misses the sphere. Where it does not, the circle ends at the line, and where the
+    ray ends at the sphere, at what its beginning sees: the ray sees no other point of the sphere.
+    """
+    radius, rows = light.radius, len(axes.along)
+    spread = _spread(axes.height, radius, np.zeros((rows, 2)))
+    meets = axes.height < radius
+    front = axes.along - np.sqrt(np.maximum(radius**2 - axes.height**2, 0.0))
+    ends = (meets & (front > 0) & (distance <= 0.5 * (front + axes.along)))[:, None]
+    meets = meets[:, None]
+
+    def circle(phi: Array) -> tuple[Array, Array, Array, Array]:
+        """Return height and radius of the circles, and both ends of the angles on them."""
+        beside = axes.height[:, None] * np.sin(phi)
+        rho = np.sqrt(np.maximum((radius - beside) * (radius + beside), 0.0))
+        middle = axes.height[:, None] * np.cos(phi)
+        reach = np.where(meets, np.arccos(np.clip(-middle / np.maximum(rho, _TINY), -1.0, 1.0)), np.pi)
+        seen = np.hypot(middle, axes.along[:, None])
+        back = np.arctan2(-axes.along[:, None], -middle) + np.arccos(np.clip(rho / np.maximum(seen, rho), 0.0, 1.0))
+        return middle, rho, -reach, np.where(ends, np.clip(back, -reach, reach), reach)
+
+    # The lattice of `reference.quadrature.replicates` is folded in its first coordinate and periodic in the other.
+    folded, periodic = square[:, 0], square[:, 1]
+    phi, rate = spread.azimuth(np.where(meets, periodic, folded))
+    middle, rho, low, high = circle(phi)
+    angle = low + np.where(meets, folded, periodic) * (high - low)
+    h = np.maximum(middle + rho * np.cos(angle), 0.0)
+    place = axes.point(axes.along[:, None] + rho * np.sin(angle), h, phi)
+    return LightSamples(place, (place - light.centre) / radius, radius * h * (high - low) * rate)
+
+
+def _in_cone(light: TruthAreaLight, place: Array, square: Array) -> LightSamples:
+    """Return samples of a sphere for points outside of it, even in the cone of directions that meet it."""
+    way = light.centre - place
+    d = np.linalg.norm(way, axis=1)[:, None]
+    axis = way / d
+    helper = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis), axis=1)])
+    helper /= np.linalg.norm(helper, axis=1)[:, None]
+    ratio = np.minimum(light.radius / d, 1.0)
+    span = ratio**2 / (1 + np.sqrt((1 - ratio) * (1 + ratio)))  # 1 - cos of the cone
+    down = square[..., 0] * span
+    cosine, sine = 1 - down, np.sqrt(down * (2 - down))
+    turn = 2 * np.pi * square[..., 1]
+    direction = cosine[..., None] * axis[:, None] + sine[..., None] * (
+        np.cos(turn)[..., None] * helper[:, None] + np.sin(turn)[..., None] * np.cross(axis, helper)[:, None]
+    )
+    half = np.sqrt(np.maximum((light.radius - d * sine) * (light.radius + d * sine), 0.0))
+    found = place[:, None] + (d * cosine - half)[..., None] * direction
+    normal = found - light.centre
+    normal /= np.linalg.norm(normal, axis=-1)[..., None]
+    return LightSamples(found, normal, np.broadcast_to(2 * np.pi * span, down.shape))

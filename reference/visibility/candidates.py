@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Which shapes can stand in the light of which rays: one search for all lights.
+
+Shadow segments lead from a ball about the light, or from far away in its direction, to points of the rays, all of which
+begin at the camera: they lie in the convex hull of both. A shape beyond a plane that has the hull on one side is left
+out. For a unit vector m the hull reaches up to
+
+    h(m) = max(0, m . (C - o) + R, max_i l_i m . d_i),
+
+o the camera, C and R the ball (a direction C towards the light: endless if m . C > 0), d_i and l_i the rays and their
+lengths; a shape is out if the ball around it is above h(m) along m. That holds whatever m is, so no case needs care.
+
+Rays are taken in tiles: sorted by their azimuth about the axis from the camera to the light, cut in strips, and these
+by the angle from the axis. All planes of rays and a point light hold this axis, so the planes on both sides of a strip
+leave out all but the shapes that the planes of its rays meet. Other m lie in the plane of the tile's mean ray and the
+axis, and touch the ball beside it. Where rays are endless, m is leaned back until none of them rises along it. Rays
+are parted again and again, and each part looks through what the one that it is of has left; for a light with extent,
+whose samples are many, down to single rays.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.scene.shapes import Shapes
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_TILE = 32  # rays
+_STRIP = 128  # rays of a strip of a point light: thin in azimuth
+_PARTS = 4  # in which rays are parted, again and again
+_FAN = np.arange(12) * np.pi / 6  # directions in the plane of a ray and the axis [rad]
+_LEVEL = 1e-12  # a rise of a vector along a ray below this is rounding
+_SLACK = 1e-9  # of the size of the scene: rounding
+_NUMBERS = 1 << 21  # looked at at once
+
+
+@dataclass(frozen=True)
+class Ball:
+    """What holds a light: a ball about a place, or the direction towards it, with w as in `planes`."""
+
+    centre: Array  #: (3,) [m], or a unit vector
+    radius: float = 0.0  #: [m]
+    w: int = 1
+
+
+@dataclass(frozen=True)
+class Near:
+    """The shapes near each ray: lists of numbers, and where that of a ray begins and ends."""
+
+    triangles: tuple[Index, Index, Index]  #: begin, end, (rays,) each, and numbers
+    spheres: tuple[Index, Index, Index]
+    disks: tuple[Index, Index, Index]
+
+
+def near_shapes(light: Ball, origin: Array, direction: Array, length: Array, shapes: Shapes) -> Near:
+    """Return the shapes that can stand between a light and rays.
+
+    Parameters
+    ----------
+    light
+        What holds it.
+    origin, direction, length
+        Of the rays: where all begin, (3,) [m], unit vectors, (rays, 3), and how far they go, (rays,) [m].
+    shapes
+        The shapes.
+    """
+    none = np.zeros(len(direction), np.int64), np.zeros(len(direction), np.int64), np.empty(0, np.int64)
+    if not shapes.count or not len(direction):
+        return Near(none, none, none)
+    middle = shapes.triangles.mean(axis=1)
+    around = np.linalg.norm(shapes.triangles - middle[:, None], axis=2).max(axis=1)
+    centres = np.concatenate([middle, shapes.centre, shapes.disks.centre]) - origin
+    solids = centres, np.concatenate([around, shapes.radius, shapes.disks.radius])
+    lists: list[tuple[Index, Index]] = []  # of rays, and of solids, of which each tile has all pairs
+    for rays, numbers in _tiles(light, origin, direction, length, solids):
+        lists.append((rays, numbers))
+    ends = np.cumsum([0, len(shapes.triangles), len(shapes.radius), len(shapes.disks.radius)])
+    return Near(*(_of_kind(lists, len(direction), ends[k], ends[k + 1]) for k in range(3)))
+
+
+def _of_kind(lists: list[tuple[Index, Index]], count: int, first: int, last: int) -> tuple[Index, Index, Index]:
+    """Return the lists of the solids from `first` up to `last`, which are ascending, by ray."""
+    begin, end = np.zeros(count, np.int64), np.zeros(count, np.int64)
+    parts, at = [np.empty(0, np.int64)], 0
+    for rays, numbers in lists:
+        low, high = np.searchsorted(numbers, (first, last))
+        begin[rays], end[rays] = at, at + high - low
+        parts.append(numbers[low:high] - first)
+        at += high - low
+    return begin, end, np.concatenate(parts)
+
+
+def _tiles(
+    light: Ball, origin: Array, direction: Array, length: Array, solids: tuple[Array, Array]
+) -> Iterator[tuple[Index, Index]]:
+    """Yield rays, and the solids near all of them."""
+    to_light = light.centre - light.w * origin
+    far = np.linalg.norm(to_light)
+    axis = to_light / far if far > 0 else np.array([0.0, 0.0, 1.0])
+    across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    across /= np.linalg.norm(across)
+    turned = np.cross(axis, across)
+    azimuth = np.argsort(np.arctan2(direction @ turned, direction @ across), kind="stable")
+    leaning = direction @ axis
+    wide = light.radius > 0 and light.w == 1
+    width = max(_TILE, int(np.sqrt(_TILE * len(azimuth)))) if wide else _STRIP
+    size = _SLACK * (1 + (far if light.w else 0) + light.radius + np.abs(solids[0]).max(initial=0))
+    waiting = [(azimuth, np.arange(len(solids[0])))]
+    while waiting:
+        rays, numbers = waiting.pop()
+        fan = _FAN if len(rays) <= width else _FAN[:0]
+        hull = _Hull(light, axis, to_light, direction[rays], length[rays], fan, size)
+        numbers = numbers[hull.near(solids, numbers)]
+        if not len(numbers):
+            continue
+        if len(rays) <= (1 if wide else _TILE):
+            yield rays, numbers
+            continue
+        if len(rays) <= width and len(rays) > width // _PARTS:
+            rays = rays[np.argsort(leaning[rays], kind="stable")]
+        step = -(-len(rays) // _PARTS)
+        waiting += [(rays[first : first + step], numbers) for first in range(0, len(rays), step)]
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Return the cross product of two vectors: NumPy's, for many of them, takes fifty times as long for two."""
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+
+
+class _Hull:
+    """Half spaces that hold a light and some rays."""
+
+    def __init__(
+        self, light: Ball, axis: Array, to_light: Array, direction: Array, length: Array, fan: Array, slack: float
+    ):
+        mean = direction.mean(axis=0)
+        size = np.linalg.norm(mean)
+        mean = mean / size if size > 1e-6 else direction[0]
+        up = axis - (axis @ mean) * mean
+        helper = _cross(mean, np.eye(3)[np.argmin(np.abs(mean))])
+        up = up if np.linalg.norm(up) > 1e-9 else helper
+        up /= np.linalg.norm(up)
+        side = _cross(mean, up)
+        vectors = [np.cos(turn) * mean + np.sin(turn) * up for turn in fan]
+        # Both planes through the axis that hold the rays between them, and those that touch the ball as well.
+        out = up - (up @ axis) * axis
+        if np.linalg.norm(out) < 1e-9:
+            out = mean - (mean @ axis) * axis
+        out = out if np.linalg.norm(out) > 1e-9 else helper - (helper @ axis) * axis
+        out /= -np.linalg.norm(out) if out @ mean < 0 else np.linalg.norm(out)
+        turned = _cross(axis, out)
+        azimuth = np.arctan2(direction @ turned, direction @ out)
+        for sign, turn in ((-1.0, azimuth.min()), (1.0, azimuth.max())):
+            edge = sign * (np.cos(turn) * turned - np.sin(turn) * out)
+            vectors.append(edge)
+            if light.radius > 0:
+                beside = abs(to_light @ up)
+                lean = min(light.radius / beside, 1.0) if beside > 0 else 1.0
+                vectors.append(sign * np.sqrt(1 - lean**2) * side - lean * up)
+        m = np.stack(vectors)
+        if np.isinf(length).any():
+            forward = direction @ mean
+            rise = (m @ direction.T) / np.maximum(forward, 1e-3)
+            m = m - np.where(forward.min() > 1e-3, np.maximum(rise.max(axis=1), 0.0), 0.0)[:, None] * mean
+        rise = m @ direction.T
+        with np.errstate(invalid="ignore"):
+            reach = np.where(rise > _LEVEL, rise * length, 0.0).max(axis=1)
+        norm = np.linalg.norm(m, axis=1)
+        ball = m @ to_light
+        ball = ball + light.radius * norm if light.w else np.where(ball > _LEVEL, np.inf, 0.0)
+        self.support = np.maximum(np.maximum(reach, ball), 0.0) + slack
+        useful = np.isfinite(self.support) & (norm > 1e-6)
+        self.m, self.support, self.norm = m[useful], self.support[useful], norm[useful]
+
+    def near(self, solids: tuple[Array, Array], numbers: Index) -> NDArray[np.bool_]:
+        """Return which balls of these numbers no half space leaves out."""
+        centre, radius = solids
+        result = np.ones(len(numbers), bool)
+        step = max(1, _NUMBERS // max(1, len(self.m)))
+        for first in range(0, len(numbers), step):
+            some = numbers[first : first + step]
+            beyond = centre[some] @ self.m.T - radius[some, None] * self.norm > self.support
+            result[first : first + step] = ~beyond.any(axis=1)
+        return result

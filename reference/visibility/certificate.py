@@ -1,0 +1,286 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Evidence that lit intervals are right: fresh random shadow rays, which share no code with them, and one judge.
+
+Mitsuba casts the shadow rays in single precision. Within the rounding of an edge they decide nothing. Elsewhere a
+third route judges a contradiction: a float64 test of that one shadow segment against every triangle (Moeller and
+Trumbore 1997, Fast, minimum storage ray-triangle intersection, J. Graphics Tools 2(1)), sphere and disk. What is left
+then is doubt, and its worth goes into the bound of the image.
+"""
+
+import hashlib
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.scene.shapes import Shapes
+from reference.visibility.planes import Rays
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Index = NDArray[np.int64]
+
+ROUNDING = 1e-5  #: of the angle at a light, or of coordinates: shadow rays end 2e-6 early, and are rounded to 1e-7
+EXACT_EDGE = 1e-11  #: relative uncertainty of the distance of an edge from its light: rounding, a lost digit, merging
+JUDGED = 256  #: contradictions that are tested against every shape; more than a few mean that something is wrong
+_SHORT = 2e-6  # relative: how far before its point a shadow ray ends
+_CLEAR = 1e-5  # of the largest coordinate: off the surface of a light, clear of float32 shapes in its plane
+_CHUNK = 1 << 22  # rays cast at once
+_SLACK = 1e-9  # of how far away a triangle is: float64 rounding is 1e-15
+
+
+@dataclass(frozen=True)
+class RandomChecks:
+    """How often fresh random shadow rays contradicted lit intervals."""
+
+    checked: int = 0  #: shadow rays cast
+    disagreements: int = 0  #: of these, how many contradicted the intervals further from an edge than rounding
+    refined: int = 0  #: disagreements that were settled by testing every shape in float64
+    left: int = 0  #: disagreements that were not
+    missed: float = 0.0  #: share of the shadow rays that contradicted the intervals
+
+    @staticmethod
+    def of_all(parts: "list[RandomChecks]") -> "RandomChecks":
+        """Add up the checks of several lights or chunks of rays; of the shares the worst counts."""
+        return RandomChecks(
+            sum(part.checked for part in parts),
+            sum(part.disagreements for part in parts),
+            sum(part.refined for part in parts),
+            sum(part.left for part in parts),
+            max((part.missed for part in parts), default=0.0),
+        )
+
+
+@dataclass(frozen=True)
+class LitIntervals:
+    """The lit parts of rays: one entry per interval, sorted by ray and distance."""
+
+    ray: Index  #: number of the ray
+    low: Array  #: distance at which the interval begins [m]
+    high: Array  #: where it ends, may be infinite [m]
+    transitions: int = 0  #: edges between light and shadow
+    edge: float = EXACT_EDGE  #: relative uncertainty of the distance of an edge from its light, or of coordinates
+    random_checks: RandomChecks = field(default_factory=RandomChecks)
+    #: what was left in doubt: rays, and what part of each, an angle at the light [rad] or a length [m]
+    doubt: tuple[Index, Array] = field(default_factory=lambda: (np.empty(0, np.int64), np.empty(0)))
+
+
+def certified(
+    lit: LitIntervals,
+    rays: Rays,
+    ends: tuple[Array, Array],
+    *,
+    occluders: Any,
+    shapes: Shapes,
+    checks: int,
+    every: int = 1,
+    normal: Array | None = None,
+) -> LitIntervals:
+    """Check lit intervals at random places.
+
+    Parameters
+    ----------
+    lit, rays
+        The intervals, and the rays in their planes with the light.
+    ends
+        Between which distances the rays were looked at, (rays,) each [m].
+    occluders, shapes
+        What stands in the light: as an `mi.Scene`, and as numbers.
+    checks, every
+        Shadow rays to each of every so many rays: an odd number steps through all samples of a light.
+    normal
+        Of the surface of the light at each position, unit, (rays, 3); None for lights that are points.
+    """
+    ray = np.arange(0, len(rays.foot), every)
+    ray = ray[ends[1][ray] > ends[0][ray]]
+    if not len(ray) or not shapes.count:
+        return lit
+    low, high = (_measure(rays, end, slice(None)) for end in ends)
+    share = (np.arange(checks) + _generator(rays.foot, rays.height).random((len(ray), checks))) / checks
+    ray, share = np.repeat(ray, checks), share.ravel()
+    at = low[ray] + share * (high - low)[ray]
+    x = at if rays.w == 0 else rays.distance(at, ray)
+    # Two a ray, and the share of it that comes before: one number orders all.
+    width = np.where(high > low, high - low, 1.0)
+    begin, end = (
+        np.clip((_measure(rays, part, lit.ray) - low[lit.ray]) / width[lit.ray], 0, 1) for part in (lit.low, lit.high)
+    )
+    number = np.searchsorted(2.0 * lit.ray + begin, 2.0 * ray + share, side="right")
+    count = len(lit.ray)
+    expected, gap = np.zeros(len(ray), bool), np.minimum(share, 1 - share)
+    for offset in (-1, 0):
+        k = np.clip(number + offset, 0, max(count - 1, 0))
+        if not count:
+            break
+        same = (number + offset >= 0) & (number + offset < count) & (lit.ray[k] == ray)
+        expected |= same & (begin[k] <= share) & (share <= end[k])
+        near = np.minimum(np.abs(share - begin[k]), np.abs(share - end[k]))
+        gap = np.where(same, np.minimum(gap, near), gap)
+    rounding = ROUNDING * (1.0 if rays.w else coordinates(rays, shapes))
+    start, target = _segments(rays, ray, x, shapes)
+    clear = start if normal is None else start + _CLEAR * (1 + np.abs(start).max(axis=1))[:, None] * normal[ray]
+    seen = _cast(occluders, clear, target)
+    wrong = np.flatnonzero((seen != expected) & (gap * width[ray] > np.broadcast_to(rounding, len(low))[ray]))
+    judged = wrong[:JUDGED]
+    lit_there = ~segments_blocked(start[judged], target[judged], shapes)
+    left = np.append(judged[lit_there != expected[judged]], wrong[JUDGED:])
+    found = RandomChecks(len(ray), len(wrong), len(wrong) - len(left), len(left), len(wrong) / len(ray))
+    return replace(lit, random_checks=found, doubt=(ray[left], width[ray[left]] / checks))
+
+
+def _measure(rays: Rays, x: Array, ray: Index | slice) -> Array:
+    """Return in what random places are even: angles at a light at a place, or distances."""
+    return rays.theta(x, ray) if rays.w else x
+
+
+def coordinates(rays: Rays, shapes: Shapes) -> Array:
+    """Return what the relative uncertainty of coordinates is worth on each ray, by edges of shadows, (rays,) [m].
+
+    That is, under a directional light: the largest distance between the camera and what is on shadow segments, over the
+    sine.
+    """
+    return _reach(rays, shapes) / rays.height
+
+
+def _reach(rays: Rays, shapes: Shapes) -> float:
+    points = np.concatenate(
+        [
+            shapes.triangles.reshape(-1, 3),
+            _box(shapes.centre, shapes.radius),
+            _box(shapes.disks.centre, shapes.disks.radius),
+        ]
+    )
+    return 1.0 + float(np.linalg.norm(np.abs(points - rays.origin).max(axis=0, initial=0.0)))
+
+
+def _box(centre: Array, radius: Array) -> Array:
+    return np.concatenate([centre - radius[:, None], centre + radius[:, None]])
+
+
+def _segments(rays: Rays, ray: Index, x: Array, shapes: Shapes) -> tuple[Array, Array]:
+    """Return both ends of shadow segments: at the light, or beyond all shapes, and at points of rays."""
+    target = rays.point(ray, x)
+    if rays.w:
+        return rays.position[ray], target
+    reach = 2 * _reach(rays, shapes) + x
+    return target + reach[:, None] * rays.position[ray], target
+
+
+def _cast(occluders: Any, start: Array, target: Array) -> Bools:
+    """Return which segments nothing blocks, by Mitsuba."""
+    parts = [np.empty(0, bool)]
+    for first in range(0, len(start), _CHUNK):
+        block = slice(first, first + _CHUNK)
+        way = target[block] - start[block]
+        length = np.maximum(np.linalg.norm(way, axis=1), np.finfo(float).tiny)
+        direction = mi.Vector3f((way / length[:, None]).T)
+        ray = mi.Ray3f(mi.Point3f(start[block].T), direction, mi.Float(length * (1 - _SHORT)), 0.0, [])
+        parts.append(~np.array(occluders.ray_test(ray), dtype=bool))
+    return np.concatenate(parts)
+
+
+def _generator(*drawn_for: Array) -> np.random.Generator:
+    """Return a generator whose seed is the digest of what numbers are drawn for.
+
+    Rays, lights and scenes are then checked at places of their own, and at the same ones in every run.
+    """
+    digest = hashlib.blake2b(digest_size=16)
+    for array in drawn_for:
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return np.random.default_rng(int.from_bytes(digest.digest()))
+
+
+def segments_blocked(start: Array, end: Array, shapes: Shapes) -> Bools:
+    """Return which segments meet a triangle, the surface of a sphere, or a disk, in float64.
+
+    Parameters
+    ----------
+    start, end
+        The ends of the segments, (segments, 3) [m].
+    shapes
+        The shapes.
+    """
+    way = end - start
+    blocked = np.zeros(len(start), dtype=bool)
+    corner = shapes.triangles[:, 0]
+    edges = shapes.triangles[:, 1] - corner, shapes.triangles[:, 2] - corner
+    # Spheres about the first corners: a triangle whose sphere the line misses cannot be met.
+    longest = np.sqrt(np.maximum(*(np.sum(edge * edge, axis=1) for edge in edges)))
+    for number, (point, towards) in enumerate(zip(start, way, strict=True)):
+        away = corner - point
+        length = np.linalg.norm(towards)
+        off = np.linalg.norm(np.cross(away, towards / length), axis=1) if length > 0 else np.zeros(len(away))
+        near = np.flatnonzero(off <= longest + _SLACK * (1 + np.abs(away).max(axis=1, initial=0)))
+        blocked[number] = _meets_triangle(point, towards, corner[near], (edges[0][near], edges[1][near])).any()
+    for centre, radius in zip(shapes.centre, shapes.radius, strict=True):
+        blocked |= _meets_sphere(start - centre, way, radius)
+    disks = shapes.disks
+    for centre, normal, radius in zip(disks.centre, disks.normal, disks.radius, strict=True):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            s = ((centre - start) @ normal) / (way @ normal)
+            beside = np.linalg.norm(start + s[:, None] * way - centre, axis=1)
+        blocked |= (s > 0) & (s < 1) & (beside < radius)
+    return blocked
+
+
+def _meets_triangle(start: Array, way: Array, corner: Array, edges: tuple[Array, Array]) -> Bools:
+    """Solve start + s way = corner + u e1 + v e2 for every triangle; the scalar products share the determinant."""
+    first_edge, second_edge = edges
+    across = np.cross(way, second_edge)
+    determinant = np.sum(first_edge * across, axis=-1)
+    from_corner = start - corner
+    beside = np.cross(from_corner, first_edge)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        u = np.sum(from_corner * across, axis=-1) / determinant
+        v = np.sum(way * beside, axis=-1) / determinant
+        s = np.sum(second_edge * beside, axis=-1) / determinant
+        return (u >= 0) & (v >= 0) & (u + v <= 1) & (s > 0) & (s < 1)
+
+
+def _meets_sphere(from_centre: Array, way: Array, radius: float) -> Bools:
+    """Return which segments cross the surface of a sphere, from outside or from within."""
+    square = np.sum(way * way, axis=1)
+    half = np.sum(from_centre * way, axis=1)
+    outside = np.sum(from_centre * from_centre, axis=1) - radius**2
+    discriminant = half**2 - square * outside
+    root = np.sqrt(np.maximum(discriminant, 0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        near, far = (-half - root) / square, (-half + root) / square
+        return (discriminant > 0) & (((near > 0) & (near < 1)) | ((far > 0) & (far < 1)))
+
+
+def reached_by_shadow_rays(interaction: Any, light: Array, reached: Bools, *, scene: Any, shapes: Shapes) -> Bools:
+    """Return which surfaces a light reaches from where Mitsuba starts its shadow rays.
+
+    A shadow ray must not hit the surface that it leaves, so `SurfaceInteraction.spawn_ray_to` starts it some way off
+    the surface, along its normal: in single precision 1e-4 (1 + the largest coordinate) (Mitsuba 3.9, `offset_p` in
+    `include/mitsuba/render/interaction.h`). A point whose own shadow ray just clears an edge may then lie in the
+    shadow, and the other way round: shadow edges move by about that length, and a renderer that starts its rays so
+    converges to the moved edges, as it does to the shortened segment of `reference.scene.shadow_epsilon`. Where
+    Mitsuba's ray and the exact lit intervals differ, what the judge says of the ray from Mitsuba's start holds: so a
+    fault of the lit intervals is still found by the comparison.
+
+    Parameters
+    ----------
+    interaction
+        Mitsuba's surface interactions, one for each ray.
+    light
+        Position of the light (3,) [m].
+    reached
+        Whether it reaches the surface points themselves, by exact geometry, (rays,).
+    scene, shapes
+        The `mi.Scene` of the occluders, and the same as numbers.
+    """
+    ray = interaction.spawn_ray_to(mi.Point3f(*(float(c) for c in light)))
+    valid = np.array(interaction.is_valid(), dtype=bool)
+    cast = ~np.array(scene.ray_test(ray, interaction.is_valid()), dtype=bool)
+    differs = np.flatnonzero(valid & (cast != reached))
+    start = np.array(ray.o, dtype=np.float64).T[differs]
+    way = light - start
+    length = np.linalg.norm(way, axis=1)
+    share = np.minimum(np.array(ray.maxt, dtype=np.float64)[differs] / np.maximum(length, np.finfo(float).tiny), 1.0)
+    confirmed = reached.copy()
+    confirmed[differs] = ~segments_blocked(start, start + way * share[:, None], shapes)
+    return confirmed

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""The plane of a ray and a light, and the one map that brings all that stands in the light down to the ray.
+
+A light is a homogeneous position: a place p with w = 1, or the unit direction p towards it with w = 0. In the plane of
+a ray o + x d and the light let z be the component along d, and y that across it on the light's side; the ray is y = 0.
+The light is at
+
+    (z_P, y_P) = (foot, height) of a place,      (cos, sin) of the angle between ray and light of a direction.
+
+What stands at (z, y) is on the shadow segment of one point of the ray,
+
+    x = (z y_P - y z_P) / (y_P - w y),      where 0 <= y and w y < y_P,
+
+for a place the point on the ray that it hides, for a direction z - y cos/sin. At y = y_P a place sends light along the
+ray: x goes to infinity, on the side on which it stands. For a direction -cos is the cosine of the angle between the
+light's way and the ray; the scattering angle has the cosine cos.
+
+With theta, the angle at a light at a place from the foot point, x = z_P + y_P tan(theta). The cosine between an axis of
+the light and the way to the point at theta is
+
+    c(theta) = axial sin(theta) + across cos(theta) = m cos(theta - theta_m),
+    m = sqrt(axial^2 + across^2),   theta_m = atan2(axial, across),
+
+`axial` and `across` the components of the axis along d and along n, the unit vector from the light to the foot point.
+So a cone of half angle b is one interval, |theta - theta_m| <= acos(cos b / m), nothing if m < cos b: no nappes, no
+cases. (`realtime.rays.ray_light` solves a quadratic equation in the distance instead.)
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.scene.read import TruthLight
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_SMALLEST_SINE = 1e-12  # a ray this close to the direction of a light [rad] is as good as one beside it
+
+
+@dataclass(frozen=True)
+class Rays:
+    """Camera rays, each in its plane with a light: arrays of shape (n, ...)."""
+
+    origin: Array  #: where all begin [m], (3,)
+    direction: Array  #: unit, (n, 3)
+    position: Array  #: p: where the light of each ray is [m], or the unit direction towards it, (n, 3)
+    normal: Array  #: unit vector across the ray, from the light to the foot point or along the light, (n, 3)
+    foot: Array  #: z_P: distance along the ray [m], or the cosine, (n,)
+    height: Array  #: y_P: distance from the ray [m], or the sine, (n,)
+    w: int = 1  #: 1: p is a place, 0: a direction
+
+    def __getitem__(self, rows) -> "Rays":
+        changed = {f.name: getattr(self, f.name) for f in fields(self)}
+        return Rays(**{name: part if name in ("origin", "w") else part[rows] for name, part in changed.items()})
+
+    def point(self, ray: Index, x: Array) -> Array:
+        """Return the points at distances along rays of these numbers, (k, 3) [m]."""
+        return self.origin + x[:, None] * self.direction[ray]
+
+    def theta(self, x: Array, ray: Index | slice = slice(None)) -> Array:
+        """Return the angle at the light of points at distances x of rays of these numbers [rad]."""
+        return np.arctan2(x - self.foot[ray], self.height[ray])
+
+    def distance(self, theta: Array, ray: Index | slice = slice(None)) -> Array:
+        """Return distances, infinite from a right angle on [m]."""
+        with np.errstate(over="ignore"):
+            x = self.foot[ray] + self.height[ray] * np.tan(theta)
+        return np.where(np.abs(theta) >= 0.5 * np.pi, np.copysign(np.inf, theta), x)
+
+
+def rays_at(origin: Array, direction: Array, position: Array, w: int = 1) -> Rays:
+    """Return rays in their planes with a light.
+
+    Parameters
+    ----------
+    origin
+        Where all rays begin [m], (3,).
+    direction
+        Unit vectors, (n, 3).
+    position
+        Of the light, (3,), or of the light of each ray, (n, 3): places [m] or unit directions.
+    w
+        1 for places, 0 for directions.
+
+    Notes
+    -----
+    Valid for all rays. One that meets the light lies in many planes: any is as good.
+    """
+    position = np.broadcast_to(position, direction.shape)
+    way = w * origin - position  # from a place to the camera, or along the light
+    foot = -np.sum(way * direction, axis=1)
+    away = way + foot[:, None] * direction
+    away -= np.sum(away * direction, axis=1)[:, None] * direction
+    height = np.linalg.norm(away, axis=1)
+    least = np.finfo(float).tiny if w else _SMALLEST_SINE
+    helper = np.cross(direction, np.where(np.abs(direction[:, :1]) < 0.5, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
+    helper /= np.linalg.norm(helper, axis=1)[:, None]
+    beside = height > least
+    normal = np.where(beside[:, None], away / np.maximum(height, least)[:, None], helper)
+    return Rays(origin, direction, position, normal, foot, height if w else np.maximum(height, least), w)
+
+
+def cone_interval(rays: Rays, light: TruthLight, angle: float) -> tuple[Array, Array]:
+    """Return the interval of theta inside a cone about the light's axis.
+
+    Parameters
+    ----------
+    rays, light
+        The rays in their planes with the light; for a point light the interval is that of the whole line.
+    angle
+        Half angle of the cone [rad].
+
+    Returns
+    -------
+    low, high
+        (rays,) each [rad]; low > high where the ray misses the cone.
+    """
+    if light.axis is None:
+        half_pi = np.full(len(rays.foot), 0.5 * np.pi)
+        return -half_pi, half_pi
+    axial, across = rays.direction @ light.axis, rays.normal @ light.axis
+    magnitude = np.hypot(axial, across)
+    middle = np.arctan2(axial, across)
+    ratio = np.cos(angle) / np.maximum(magnitude, np.finfo(float).tiny)
+    half = np.where(ratio < 1, np.arccos(np.minimum(ratio, 1.0)), -1.0)
+    return middle - half, middle + half
+
+
+def falloff(theta: Array, rays: Rays, light: TruthLight) -> Array:
+    """Return intensity over that on the axis [1]: Mitsuba's spot profile, linear behind the beam, or a cosine.
+
+    Parameters
+    ----------
+    theta
+        Angles at the light, (rays, angles) [rad].
+    rays, light
+        The rays in their planes with the light.
+    """
+    if not light.is_soft or light.axis is None:
+        return np.ones_like(theta)
+    axial, across = (rays.direction @ light.axis)[:, None], (rays.normal @ light.axis)[:, None]
+    if light.cosine:
+        return np.maximum(axial * np.sin(theta) + across * np.cos(theta), 0.0)
+    angle = np.arccos(np.clip(axial * np.sin(theta) + across * np.cos(theta), -1.0, 1.0))
+    return np.clip((light.cutoff - angle) / (light.cutoff - light.beam), 0.0, 1.0)
+
+
+def before(rays: Rays, normal: Array) -> tuple[Array, Array]:
+    """Return between which distances rays are before the planes through their lights with unit normals, (n, 3).
+
+    low >= high where they are not.
+    """
+    rise = np.sum(normal * rays.direction, axis=1)
+    start = np.sum(normal * (rays.origin - rays.position), axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        zero = np.where(rise != 0, -start / rise, np.where(start > 0, -np.inf, np.inf))
+    return np.where(rise >= 0, zero, -np.inf), np.where(rise < 0, zero, np.inf)

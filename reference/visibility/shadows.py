@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""What triangles, disks and spheres take from the light of rays, and what is left: compiled loops, a ray in each lane.
+
+In the plane of a ray and its light (`reference.visibility.planes`) a triangle and a disk are segments, a sphere is a
+disk of centre (c_z, c_y) and radius rho. What casts a shadow lies in the strip 0 <= y, w y < y_P, and each part of it
+that is convex hides one interval of the ray, since the map
+
+    x = (z y_P - y z_P) / (y_P - w y)
+
+takes lines to lines and keeps what is between. No sampling, no rays cast, everything in float64: however thin a shadow,
+it is found.
+
+**Segments** are clipped to the strip and hide what lies between the images of both ends.
+
+**Spheres.** The tangents from the light touch the disk at C + rho n. With e the unit vector along w C - P, from the
+light to the centre, or along the light,
+
+    n = -s e +- sqrt(1 - s^2) e',      s = w rho / |w C - P|,      e' across e,
+
+and the shadow ends at the images of both, unless one is touched at w y >= y_P: the disk then reaches beyond the line
+through the light along the ray, and the shadow is endless on that side; or at y < 0: then it ends where the ray itself
+meets the disk, at c_z +- sqrt(rho^2 - c_y^2). A light inside of a sphere sees what is inside and nothing else, and the
+range in which a ray is looked at is cut to that before (`reference.visibility.lit_intervals`).
+
+**What is left.** Neighbours in a mesh mostly follow one another in its list: a shadow that touches the one before it
+becomes part of it as it is found. Then t begins at the beginning of a ray: shadows that begin before t and end after it
+move t to their end, until none does; the ray is lit from t to where the next shadow begins, and t moves there. Nothing
+is sorted. Gaps below 1e-12 of a distance are rounding: touching triangles share the coordinates of their vertices.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.scene.shapes import Shapes
+from reference.visibility.candidates import Near
+from reference.visibility.planes import Rays
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+MERGE = 1e-12  #: gaps between shadows below this share of 1 + |x| are rounding
+_SLOTS = 8  # lit intervals of a ray; more where they do not suffice
+_SHADOWS = 64  # shadows of a ray; more where they do not suffice
+_STORED = 1 << 23  # shadows of all lanes at once
+
+
+@dataclass(frozen=True)
+class _Lanes:
+    """A ray in each lane, in the frame of its plane with the light."""
+
+    origin: Any
+    direction: Any
+    across: Any
+    normal: Any
+    foot: Any
+    height: Any
+    w: Any
+
+    def project(self, z: Any, y: Any) -> Any:
+        return (z * self.height - y * self.foot) / (self.height - self.w * y)
+
+
+def lit_parts(
+    rays: Rays, ends: tuple[Array, Array], near: Near, shapes: Shapes, of: Index
+) -> tuple[Index, Array, Array]:
+    """Return the lit parts of rays between two distances.
+
+    Parameters
+    ----------
+    rays
+        The rays.
+    ends
+        Between which distances they are looked at, (rays,) each [m]; nowhere if the first is not below the second.
+    near
+        Lists of the shapes that can stand in the light.
+    shapes
+        All shapes.
+    of
+        By ray, the number of its lists in `near`, (rays,).
+
+    Returns
+    -------
+    ray, low, high
+        Of every lit part, ascending, (parts,) each; distances [m].
+    """
+    if not shapes.count:
+        ray = np.flatnonzero(ends[1] > ends[0])
+        return ray, ends[0][ray], ends[1][ray]
+    data = [
+        mi.Float64(np.ascontiguousarray(part).ravel())
+        for part in (
+            shapes.triangles,
+            np.column_stack([shapes.centre, shapes.radius]),
+            np.column_stack([shapes.disks.centre, shapes.disks.normal, shapes.disks.radius]),
+        )
+    ]
+    lists = [mi.UInt32(each[2].astype(np.uint32)) for each in (near.triangles, near.spheres, near.disks)]
+    parts = []
+    shadows, slots = _SHADOWS, _SLOTS
+    first = 0
+    while first < len(of):
+        block = slice(first, min(len(of), first + max(1, _STORED // shadows)))
+        spans = [(begin[of[block]], end[of[block]]) for begin, end, _ in (near.triangles, near.spheres, near.disks)]
+        found = _compiled(rays[block], (ends[0][block], ends[1][block]), (data, lists, spans), (shadows, slots))
+        most, used = found[:2]
+        if most > shadows:
+            shadows = 1 << (most - 1).bit_length()
+            continue
+        if used.max(initial=0) > slots:
+            slots = 1 << (int(used.max()) - 1).bit_length()
+            continue
+        filled = np.flatnonzero(np.arange(slots) < used[:, None])
+        parts.append((first + filled // slots, found[2][filled], found[3][filled]))
+        first = block.stop
+    if not parts:
+        return np.empty(0, np.int64), np.empty(0), np.empty(0)
+    ray, low, high = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return ray, low, high
+
+
+def _compiled(rays: Rays, ends: tuple, lists: tuple, sizes: tuple[int, int]) -> tuple[int, Index, Array, Array]:
+    """Return the most shadows of a lane, how many lit parts each has, and where they begin and end."""
+    shadows, slots = sizes
+    count = len(rays.foot)
+    low, high = mi.Float64(ends[0]), mi.Float64(np.maximum(*ends))
+    origin = mi.Vector3d(*(float(c) for c in rays.origin))
+    w, room, most = mi.Float64(float(rays.w)), mi.UInt32(shadows), mi.UInt32(slots)
+    stride = mi.UInt32(count)
+    dr.make_opaque(origin, w, room, most, stride)
+    direction, across = mi.Vector3d(rays.direction.T), mi.Vector3d(-rays.normal.T)
+    lanes = _Lanes(
+        origin, direction, across, dr.cross(direction, across), mi.Float64(rays.foot), mi.Float64(rays.height), w
+    )
+    lane = dr.arange(mi.UInt32, count)
+    lows, highs = dr.empty(mi.Float64, count * shadows), dr.empty(mi.Float64, count * shadows)
+
+    def store(number: Any, start: Any, finish: Any, active: Any) -> None:
+        dr.scatter(lows, start, number * stride + lane, active & (number < room))
+        dr.scatter(highs, finish, number * stride + lane, active & (number < room))
+
+    # The shadow that was found last is held back: the next one may go on from it.
+    state = (dr.zeros(mi.UInt32, count), dr.full(mi.Float64, dr.inf, count), dr.full(mi.Float64, -dr.inf, count))
+    data, numbers, spans = lists
+    for shadow, values, number, (begin, end) in zip((_triangle, _sphere, _disk), data, numbers, spans, strict=True):
+        if not len(number):
+            continue
+        last = mi.UInt32(end.astype(np.uint32))
+
+        def look(j, known, held0, held1, shadow=shadow, values=values, number=number):
+            start, finish = shadow(lanes, values, dr.gather(mi.UInt32, number, j))
+            casts = (start < finish) & (start < high) & (finish > low)
+            touches = (start <= held1 + MERGE * (1 + dr.abs(held1))) & (held0 <= finish + MERGE * (1 + dr.abs(finish)))
+            new = casts & ~touches & (held0 < held1)
+            store(known, held0, held1, new)
+            known += dr.select(new, mi.UInt32(1), mi.UInt32(0))
+            held0 = dr.select(casts, dr.select(touches, dr.minimum(held0, start), start), held0)
+            held1 = dr.select(casts, dr.select(touches, dr.maximum(held1, finish), finish), held1)
+            return j + 1, known, held0, held1
+
+        _, *state = dr.while_loop(
+            (mi.UInt32(begin.astype(np.uint32)), *state), lambda j, *others, last=last: j < last, look
+        )
+    known, held0, held1 = state
+    casts = held0 < held1
+    store(known, held0, held1, casts)
+    known += dr.select(casts, mi.UInt32(1), mi.UInt32(0))
+    dr.eval(known, lows, highs)
+    found = int(np.array(dr.max(known))[0])
+    if found > shadows:
+        return found, np.empty(0, np.int64), np.empty(0), np.empty(0)
+    begins, finishes = dr.zeros(mi.Float64, count * slots), dr.zeros(mi.Float64, count * slots)
+    at = lane * most
+
+    def body(t, used):
+        def turn(j, t, after, moved):
+            start, finish = (dr.gather(mi.Float64, column, j * stride + lane) for column in (lows, highs))
+            limit = t + MERGE * (1 + dr.abs(t))
+            covers = (start <= limit) & (finish > t)
+            after = dr.select(start > limit, dr.minimum(after, start), after)
+            return j + 1, dr.select(covers, finish, t), after, moved | covers
+
+        _, t, after, moved = dr.while_loop(
+            (mi.UInt32(0), t, mi.Float64(high), mi.Bool(False)),
+            lambda j, t, after, moved: (j < known) & (t < high),
+            turn,
+        )
+        lit = ~moved & (t < high)
+        wide = lit & (after - t > MERGE * (1 + dr.abs(t)))
+        here = wide & (used < most)
+        dr.scatter(begins, t, at + used, here)
+        dr.scatter(finishes, after, at + used, here)
+        return dr.select(lit, after, t), used + dr.select(wide, mi.UInt32(1), mi.UInt32(0))
+
+    _, used = dr.while_loop((mi.Float64(low), dr.zeros(mi.UInt32, count)), lambda t, used: t < high, body)
+    dr.eval(used, begins, finishes)
+    return found, np.array(used, dtype=np.int64), np.array(begins), np.array(finishes)
+
+
+def _triangle(lanes: _Lanes, corners: Any, number: Any) -> tuple[Any, Any]:
+    """Return where the shadow of a triangle on the ray begins and ends; the first above the second if there is none."""
+    side, y, z = [], [], []
+    for k in range(3):
+        base = number * 9 + 3 * k
+        corner = mi.Vector3d(*(dr.gather(mi.Float64, corners, base + c) for c in range(3))) - lanes.origin
+        side.append(dr.dot(corner, lanes.normal))
+        y.append(dr.dot(corner, lanes.across))
+        z.append(dr.dot(corner, lanes.direction))
+    above = [s >= 0 for s in side]
+    cut = (above[0] != above[1]) | (above[1] != above[2])
+    # The corner that is alone on its side of the plane comes first.
+    last, middle = above[0] == above[1], above[0] == above[2]
+
+    def ordered(values: list) -> tuple:
+        a = dr.select(last, values[2], dr.select(middle, values[1], values[0]))
+        b = dr.select(last, values[0], dr.select(middle, values[2], values[1]))
+        c = dr.select(last, values[1], dr.select(middle, values[0], values[2]))
+        return a, b, c
+
+    s = ordered(side)
+    shares = [s[0] / (s[0] - s[k]) for k in (1, 2)]
+    (y0, y1), (z0, z1) = (
+        [(1 - share) * v[0] + share * v[k] for k, share in enumerate(shares, 1)] for v in (ordered(y), ordered(z))
+    )
+    return _segment(lanes, (z0, y0), (z1, y1), cut)
+
+
+def _segment(lanes: _Lanes, first: tuple, second: tuple, cut: Any) -> tuple[Any, Any]:
+    """Return what a segment of the plane hides of the ray."""
+    (z0, y0), (z1, y1) = first, second
+    swap = y0 > y1
+    y0, y1, z0, z1 = (dr.select(swap, a, b) for a, b in ((y1, y0), (y0, y1), (z1, z0), (z0, z1)))
+    w, top = lanes.w, lanes.height
+    keep = cut & (y1 >= 0) & (w * y0 < top)
+    slope = dr.select(y1 > y0, (z1 - z0) / (y1 - y0), 0.0)
+    begin = dr.select(y0 < 0, z0 - y0 * slope, lanes.project(z0, y0))
+    beyond = dr.select(z0 + (top - y0) * slope > lanes.foot, mi.Float64(dr.inf), mi.Float64(-dr.inf))
+    end = dr.select(w * y1 >= top, beyond, lanes.project(z1, y1))
+    return dr.select(keep, dr.minimum(begin, end), dr.inf), dr.select(keep, dr.maximum(begin, end), -dr.inf)
+
+
+def _sphere(lanes: _Lanes, spheres: Any, number: Any) -> tuple[Any, Any]:
+    """Return what a sphere hides of the ray."""
+    parts = [dr.gather(mi.Float64, spheres, number * 4 + k) for k in range(4)]
+    centre, radius = mi.Vector3d(*parts[:3]) - lanes.origin, parts[3]
+    beside, c_y, c_z = dr.dot(centre, lanes.normal), dr.dot(centre, lanes.across), dr.dot(centre, lanes.direction)
+    disk = _half_chord(radius, dr.abs(beside))
+    e_z, e_y = lanes.w * c_z - lanes.foot, lanes.w * c_y - lanes.height
+    far = dr.maximum(dr.norm(mi.Vector2d(e_z, e_y)), 1e-290)
+    outside = ~((lanes.w > 0) & (dr.square(far) + dr.square(beside) <= dr.square(radius)))
+    e_z, e_y = e_z / far, e_y / far
+    sine = dr.minimum(lanes.w * disk / far, 1.0)
+    level = dr.sqrt((1 - sine) * (1 + sine))
+    chord = _half_chord(disk, dr.abs(c_y))
+    ends = []
+    for sign in (-1.0, 1.0):
+        # e' = (-e_y, e_z) has a positive z where the light is over the ray: the sign is that of the end.
+        z = c_z + disk * (-sine * e_z - sign * level * e_y)
+        y = c_y + disk * (-sine * e_y + sign * level * e_z)
+        end = dr.select(y < 0, c_z + sign * chord, lanes.project(z, y))
+        ends.append(dr.select(lanes.w * y >= lanes.height, sign * dr.inf, end))
+    dark = outside & (dr.abs(beside) < radius) & (c_y + disk > 0) & (lanes.w * (c_y - disk) < lanes.height)
+    return dr.select(dark, ends[0], dr.inf), dr.select(dark, ends[1], -dr.inf)
+
+
+def _disk(lanes: _Lanes, disks: Any, number: Any) -> tuple[Any, Any]:
+    """Return what a flat disk hides of the ray: the segment in which the plane cuts it."""
+    parts = [dr.gather(mi.Float64, disks, number * 7 + k) for k in range(7)]
+    centre, n, radius = mi.Vector3d(*parts[:3]) - lanes.origin, mi.Vector3d(*parts[3:6]), parts[6]
+    along = dr.cross(n, lanes.normal)
+    within = dr.maximum(dr.norm(along), 1e-290)
+    away = dr.cross(along, n) / within  # in the disk, across the section, towards the plane's normal
+    beside = dr.dot(centre, lanes.normal) / within
+    middle = centre - beside * away
+    half = _half_chord(radius, dr.abs(beside)) / within * along
+    ends = [(dr.dot(point, lanes.direction), dr.dot(point, lanes.across)) for point in (middle - half, middle + half)]
+    return _segment(lanes, *ends, dr.abs(beside) < radius)
+
+
+def _half_chord(radius: Any, distance: Any) -> Any:
+    return dr.sqrt(dr.maximum(radius - distance, 0) * (radius + distance))
