@@ -96,7 +96,7 @@ def test_enclosed_light_is_black(variant):
 
 def test_ambient_light_is_added_by_its_formula(variant):
     scene = scene_with(SOUND["sphere"]())
-    without, with_it = render(scene, "shadow-planes", "double"), render(scene, "shadow-planes", "double", ambient=0.23)
+    without, with_it = (render(scene, "shadow-planes", precision="double", ambient=each) for each in (0.0, 0.23))
     depth = 0.31 * np.minimum(without.distance, 1e30)
     expected = 0.23 * np.array([0.9, 0.8, 0.7]) * (1 - np.exp(-depth))[..., None]
     assert with_it.airlight - without.airlight == pytest.approx(expected, rel=1e-5)
