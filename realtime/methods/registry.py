@@ -27,7 +27,6 @@ from realtime.methods.froxel_fog.method import (
 from realtime.methods.interface.method import Method, always, never
 from realtime.methods.light_volumes.method import (
     LightVolumeParameters,
-    cull_light_volumes,
     finds_lit_surfaces,
     light_volumes,
     prepare_light_volumes,
@@ -92,7 +91,6 @@ METHODS: dict[str, Method] = {
         "Billeter, Sintorn, Assarsson 2010",
         prepare=prepare_light_volumes,
         prepared_from=frozenset({"geometry", "light"}),
-        cull=cull_light_volumes,
         provides_visibility=finds_lit_surfaces,
         by_rays=lambda parameters: parameters.evaluation == "walk",
         frozen=lambda parameters: parameters.evaluation == "walk",  # the crossings of a mesh are counted on the way

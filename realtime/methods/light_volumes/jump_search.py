@@ -21,12 +21,13 @@ import mitsuba as mi
 
 from realtime.methods.light_volumes.texel_walls import BOTTOM, LEFT, PLACES, RIGHT, TOP, walled_heights
 from realtime.scene.lights import Light
-from realtime.shadow_maps.inverse_depth_field import LEAF, InverseDepthField
+from realtime.shadow_maps.inverse_depth_field import InverseDepthField, level_start
 from realtime.shadow_maps.shadow_map import cast_map_rays
 
 _HALVINGS = PLACES.bit_length() - 1
 _JUMP = 0.05  # of the larger height: walls lower than that are left slanted
 _KEPT = 0.5  # of the change between the samples that a jump keeps in the last interval
+LEAF = 4  #: texels on a side of the nodes in which sides are looked for, those two levels above the texels
 _SIDES = 2 * LEAF * (LEAF + 1)  # of the texels of a leaf
 
 
@@ -60,7 +61,7 @@ class _Edge:
 
 def _edge_of(heights: InverseDepthField, leaf, side) -> _Edge:
     """Return a side by the number of its leaf and its own in there."""
-    nodes = 1 << heights.finest
+    nodes = heights.size // LEAF
     row = leaf // nodes
     face = row // nodes
     upright = side >= _SIDES // 2
@@ -72,9 +73,10 @@ def _edge_of(heights: InverseDepthField, leaf, side) -> _Edge:
 
 def _jumping_sides(heights: InverseDepthField):
     """Return the sides over which heights differ enough, by their leaves' numbers and their own."""
-    per_face = 4**heights.finest
+    per_face = (heights.size // LEAF) ** 2
     leaf = dr.arange(mi.UInt32, heights.faces * per_face)
-    node = leaf + (leaf // per_face + 1) * (heights.nodes - per_face)
+    face = leaf // per_face
+    node = face * heights.nodes + level_start(heights.finest - 2) + (leaf - face * per_face)
     low, high = (dr.gather(type(heights.bounds), heights.bounds, 2 * node + which) for which in (0, 1))
     leaf = dr.compress(high - low > _JUMP * high)
     if not dr.width(leaf):

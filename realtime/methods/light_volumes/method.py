@@ -10,16 +10,14 @@ and leaves that volume at crossings with its boundary; with Gamma(x) the airligh
 in any order. The boundary is the height field of `realtime.shadow_maps.inverse_depth_field`, and `evaluation` says
 how it is crossed:
 
-* `walk`: each ray looks at the texels on its line (`realtime.methods.light_volumes.walk`) that a beam of rays about it
-may meet
-  (`realtime.methods.light_volumes.tile_lists`); terms are put in order and integrated pair by pair, which keeps the
+* `walk`: each ray descends into a pyramid of heights to the texels that it may cross
+  (`realtime.methods.light_volumes.walk`); the intervals between crossings are integrated one by one, which keeps the
   digits that a difference of two Gammas loses. Where the map jumps the boundary stands upright, at a place that rays
   from the light find (`realtime.methods.light_volumes.jump_search`).
 * `mesh`, as published: the boundary becomes triangles (`realtime.methods.light_volumes.published.mesh`), each is drawn
-over the pixels that it
-  covers (`realtime.methods.light_volumes.published.raster`), and terms are added up as they come
-  (`realtime.methods.light_volumes.published.signed_sum`). The `static` mesh is the height field itself, an `adaptive`
-  one has fewer triangles where the map is flat (`realtime.methods.light_volumes.published.tessellation`).
+  over the pixels that it covers (`realtime.methods.light_volumes.published.raster`), and terms are added up as they
+  come (`realtime.methods.light_volumes.published.signed_sum`). The `static` mesh is the height field itself, an
+  `adaptive` one has fewer triangles where the map is flat (`realtime.methods.light_volumes.published.tessellation`).
 """
 
 from collections.abc import Callable
@@ -36,17 +34,15 @@ from realtime.methods.interface.view import View, rays_in_media
 from realtime.methods.light_volumes.jump_search import with_walls
 from realtime.methods.light_volumes.published.mesh import THRESHOLD, memory_needed, volume_mesh
 from realtime.methods.light_volumes.published.signed_sum import mesh_airlight
-from realtime.methods.light_volumes.tile_lists import Leaves, tile_leaves
 from realtime.methods.light_volumes.walk import sum_lit_intervals
 from realtime.numerics.array_types import bytes_of
 from realtime.parameters import Parameters, parameter
 from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene
 from realtime.shadow_maps.inverse_depth_field import InverseDepthField, inverse_depth_field, level_start
-from realtime.shadow_maps.projection import light_faces, light_projection
+from realtime.shadow_maps.projection import light_faces
 from realtime.shadow_maps.shadow_map import cast_shadow_map, map_memory, map_size
 from realtime.tiles.adaptive_sampling import tolerance
-from realtime.tiles.layout import Layout
 
 
 @dataclass(frozen=True)
@@ -88,9 +84,7 @@ class LightVolumeParameters(Parameters):
             )
 
 
-def light_volumes(
-    view: View, state: tuple[Any, ...], lists: tuple[Leaves, ...], *, kernel, parameters: LightVolumeParameters
-) -> Layers:
+def light_volumes(view: View, state: tuple[Any, ...], lists, *, kernel, parameters: LightVolumeParameters) -> Layers:
     """Return the airlight of every ray in the light volumes, and by light whether it reaches the visible surface.
 
     Parameters
@@ -100,7 +94,7 @@ def light_volumes(
     state
         By light its height field, or its mesh, from `prepare_light_volumes`.
     lists
-        By light the leaves of the height field that concern each tile, from `cull_light_volumes`.
+        Not used.
     kernel
         An airlight kernel, see `realtime.kernels`.
     parameters
@@ -128,7 +122,7 @@ def light_volumes(
             continue
         airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None)
         if view.features.shadows:
-            value, reached = _walk(state[number], lists[number], airlight)
+            value, reached = _walk(state[number], airlight)
         else:
             value, reached = airlight.radiance(airlight.integral(*airlight.segment)), True
         total += value
@@ -142,26 +136,13 @@ def finds_lit_surfaces(parameters: LightVolumeParameters) -> bool:
     return parameters.evaluation == "walk" and parameters.surface == "map"
 
 
-def cull_light_volumes(view: View, state: tuple[Any, ...], parameters: LightVolumeParameters) -> tuple[Leaves, ...]:
-    """Return by light the leaves of its height field that concern each tile; a mesh has none."""
-    if parameters.evaluation == "mesh":
-        return ()
-    return tuple(_leaves(view, light, heights) for light, heights in zip(view.lights, state))
-
-
-def _leaves(view: View, light: Light, heights: InverseDepthField) -> Leaves:
-    toward = light.position - view.origin
-    place = {"light": toward, "square": view.layout is Layout.SQUARES}
-    return tile_leaves(heights, lambda lane: view.rays(lane)[0], view.distance, **place)
-
-
-def _walk(heights: InverseDepthField, leaves: Leaves, airlight: RayAirlight):
+def _walk(heights: InverseDepthField, airlight: RayAirlight):
     """Return the airlight of one light along the rays [W/(m^2 sr)], and whether it reaches their ends."""
     view = airlight.view
     zero = dr.zeros(integral_type(view), dr.width(view.distance))
     away = view.origin - airlight.light.position
-    place = {"away": away, "direction": view.direction, "segment": airlight.segment, "tile": view.tile}
-    value, reached = sum_lit_intervals(heights, leaves, **place, integral=airlight.integral, zero=zero)
+    place = {"away": away, "direction": view.direction, "segment": airlight.segment}
+    value, reached = sum_lit_intervals(heights, **place, integral=airlight.integral, zero=zero)
     return airlight.radiance(value), reached
 
 
@@ -203,8 +184,6 @@ def _memory_of(light: Light, size: int, evaluation: str) -> int:
     if evaluation == "mesh":
         # Drawing it takes four doubles for each vertex as it is, and four for it in the image.
         return corners + memory_needed(faces, size) + faces * (size + 1) ** 2 * 8 * 8
-    # Distances and heights at the corners, four heights and walls a texel, two bounds a node, a gap and sides a leaf.
-    heights = InverseDepthField(size, light_projection(light), None, None)
-    leaves = 4**heights.finest
-    numbers = 4 * size**2 + 2 * level_start(heights.finest + 1) + 2 * leaves
-    return 2 * corners + faces * (number * numbers + 4 * leaves + 4 * size**2)
+    # Distances and heights at the corners, four heights and walls a texel, two bounds a node.
+    numbers = 4 * size**2 + 2 * level_start(size.bit_length())
+    return 2 * corners + faces * (number * numbers + 4 * size**2)

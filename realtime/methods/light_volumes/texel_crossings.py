@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The passage of a camera ray over one texel, and where it crosses the height field there.
 
-This is one step of `realtime.methods.light_volumes.crossings`.
+This is one step of `realtime.methods.light_volumes.walk`.
 
 With D = s of the ray - height, a ray is lit where D > 0. On the borders of texels, D is the same number for both.
 """
@@ -13,8 +13,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.light_volumes.ray_lines import at_line
-from realtime.methods.light_volumes.texel_lines import Line, borders
+from realtime.methods.light_volumes.face_lines import Line, at_line, borders
 from realtime.methods.light_volumes.texel_walls import (
     BOTTOM,
     LEFT,

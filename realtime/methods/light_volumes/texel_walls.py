@@ -4,7 +4,7 @@
 A texel's walls are one whole number: a byte for each side, 0 or 1 + the number of the place where the wall stands. Both
 texels of a side hold the same byte. On a side with a wall the height is that of the one corner up to the wall and that
 of the other beyond it; on a side without, it is linear. A side looks the same from both of its texels, so all that
-holds of crossings in `realtime.methods.light_volumes.crossings` holds still: between two ends of a ray the number of
+holds of crossings in `realtime.methods.light_volumes.walk` holds still: between two ends of a ray the number of
 changes of sign says whether both are lit.
 
 One straight line divides the texel into two parts, each under a plane; where these differ a wall stands on the line:
@@ -15,7 +15,7 @@ One straight line divides the texel into two parts, each under a plane; where th
   lies in it;
 * else the line is the diagonal from (0, 0) to (1, 1), between two triangles, as without walls.
 
-A plane through three corners may leave their range towards the fourth: `walled_heights` widens the bounds that tiles go
+A plane through three corners may leave their range towards the fourth: `walled_heights` widens the bounds that rays go
 by. Beside a corner that is cut off the border and the plane differ by the slope over a part of a texel, and of walls on
 three or four sides one or two end at the border: there a step stands on the border itself, and which side of it is lit
 says the border.
@@ -141,19 +141,19 @@ def walled_heights(heights: InverseDepthField, walls, texels) -> InverseDepthFie
     texels
         Those that may have walls; some may be there more than once.
     """
-    bounds, gaps = heights.bounds + 0, heights.gaps + 0
+    bounds = heights.bounds + 0
     if dr.width(texels):
         size = heights.size
         row = texels // size
         face, i = row // size, texels - row * size
-        _widen(heights, (bounds, gaps), (face, i, row - face * size), dr.gather(mi.UInt32, walls, texels))
-    dr.eval(bounds, gaps)
-    return replace(heights, bounds=bounds, gaps=gaps, walls=walls)
+        _widen(heights, bounds, (face, i, row - face * size), dr.gather(mi.UInt32, walls, texels))
+    dr.eval(bounds)
+    return replace(heights, bounds=bounds, walls=walls)
 
 
-def _widen(heights: InverseDepthField, arrays, texel, walls) -> None:
-    """Widen bounds and gaps to hold the planes over texels with a corner cut off."""
-    (bounds, gaps), mode = arrays, dr.ReduceMode.Direct  # few: no copies of the arrays for each thread
+def _widen(heights: InverseDepthField, bounds, texel, walls) -> None:
+    """Widen the bounds to hold the planes over texels with a corner cut off."""
+    mode = dr.ReduceMode.Direct  # few: no copies of the arrays for each thread
     face, i, j = texel
     four = texel_heights(heights, face, i, j)
     sides = _sides_of(walls, type(bounds))
@@ -164,13 +164,7 @@ def _widen(heights: InverseDepthField, arrays, texel, walls) -> None:
     value = dr.maximum(value, 0)  # no ray comes below
     low, high = cut & (value < dr.min(four)), cut & (value > dr.max(four))
     for level in range(heights.finest + 1):
-        shift = heights.finest + 2 - level
+        shift = heights.finest - level
         node = face * heights.nodes + level_start(level) + ((j >> shift) << level) + (i >> shift)
         dr.scatter_reduce(dr.ReduceOp.Min, bounds, value, 2 * node, low, mode)
         dr.scatter_reduce(dr.ReduceOp.Max, bounds, value, 2 * node + 1, high, mode)
-    leaf = (((face << heights.finest) + (j >> 2)) << heights.finest) + (i >> 2)
-    bit = mi.UInt32(1) << ((i & 3) + 4 * (j & 3))
-    sorted_as = dr.gather(mi.UInt32, heights.sides, leaf)
-    below, both = (sorted_as & bit) != 0, (sorted_as & (bit << 16)) != 0
-    dr.scatter_reduce(dr.ReduceOp.Max, gaps, value, 2 * leaf, high & below, mode)
-    dr.scatter_reduce(dr.ReduceOp.Min, gaps, value, 2 * leaf + 1, low & ~below & ~both, mode)

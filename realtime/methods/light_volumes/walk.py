@@ -1,48 +1,62 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The lit intervals of camera rays in a light volume.
+"""The lit intervals of camera rays in a light volume, by a descent into the pyramid of its heights.
 
-A ray goes over the faces of the map that its tile may pass, in the order of the tile's middle ray. In each it finds
-where it crosses the volume's boundary (`realtime.methods.light_volumes.crossings`); between crossings it is lit or dark
-as a whole, and the kernel integrates each lit interval (`realtime.intervals.lit_intervals`).
+A ray goes over the faces of the map in the order in which it passes them. Over a face its line in (u, v) goes from node
+to node of the pyramid of bounds (`realtime.shadow_maps.inverse_depth_field`). With D(t) = s of the ray - height, a node
+over which the ray is above the largest height is lit as a whole, one over which it is below the least is dark; the ray
+steps to its neighbour, one level up where the border is that of the parent too. Into any other node it descends, down
+to the texels. In a texel it crosses the height field not at all, once, or twice
+(`realtime.methods.light_volumes.texel_crossings`), and between crossings it is lit or dark as a whole
+(`realtime.intervals.lit_intervals`). So crossings come in the order of the ray.
 
-What is lit up to the border of a face, and on from there in the next one, is one interval: it waits until it ends. At a
-face where all is lit that the tile passes no ray looks.
+The borders of a node are crossed at t = (column - u0) dt/du and t = (row - v0) dt/dv, computed from its own four
+borders alone. So two neighbours see the same number t between them and, if they are texels, the same two heights: D,
+lit or not, is the same for both. A whole node says by itself whether it is lit; where that is not what the ray was
+before it, by rounding, the change is at its beginning.
+
+What is lit up to the border of a face, and on from there in the next one, is one interval.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
-from itertools import pairwise
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
-from realtime.intervals.lit_intervals import LitIntervals, add_waiting, close_interval, no_intervals
-from realtime.methods.light_volumes.crossings import NearestCrossings, nearest_crossings
-from realtime.methods.light_volumes.cube_faces import FACE_BITS, NO_FACE
-from realtime.methods.light_volumes.ray_lines import FaceRay, face_ray, in_face
-from realtime.methods.light_volumes.texel_lines import line_of
-from realtime.methods.light_volumes.tile_lists import LARGER, LIT, Leaves
-from realtime.shadow_maps.inverse_depth_field import InverseDepthField
+from realtime.intervals.lit_intervals import LitIntervals, add_waiting, close_interval, no_intervals, sum_at_end
+from realtime.methods.light_volumes.face_lines import Line, at_line, distance_at, face_ray, in_face, line_of
+from realtime.methods.light_volumes.texel_crossings import passage, texel_crossings
+from realtime.shadow_maps.inverse_depth_field import InverseDepthField, node_bounds
+
+_FIRST = 3  # levels below that of the whole face, at which a ray begins
+_FACE_BITS = 3  # of the number of a face in an order of faces
+_NO_FACE = (1 << _FACE_BITS) - 1  # stands behind the last
+
+
+@dataclass
+class _Walk:
+    """Where a ray is on its way over a face; columns and rows are counted along its line."""
+
+    i: Any  #: column of the texel at which it comes into the node
+    j: Any  #: row
+    t: Any  #: where it does so
+    shift: Any  #: the node has 2^shift texels on a side
+    lit: Any  #: whether the light reaches the ray there
+    opened: Any  #: where the light came back last [m]
+    intervals: LitIntervals  #: in distances [m]
+    done: Any
 
 
 def sum_lit_intervals(
-    heights: InverseDepthField,
-    leaves: Leaves,
-    *,
-    away,
-    direction,
-    segment,
-    integral: Callable[[Any, Any], Any],
-    zero,
-    tile,
+    heights: InverseDepthField, *, away, direction, segment, integral: Callable[[Any, Any], Any], zero
 ):
     """Add up an integral over the lit intervals of every ray.
 
     Parameters
     ----------
-    heights, leaves
-        The height field and which of its leaves concern each tile.
+    heights
+        The height field.
     away
         The camera less the light [m].
     direction
@@ -53,8 +67,6 @@ def sum_lit_intervals(
         Function (x0, x1) -> value of one interval.
     zero
         The value of no interval, one for each ray.
-    tile
-        The tile of every ray, see `realtime.methods.interface.view.View`.
 
     Returns
     -------
@@ -64,107 +76,179 @@ def sum_lit_intervals(
         Whether the light reaches what is at the end of the segment: a hard shadow by the shadow map, with the range of
         the heights over a texel as its bias.
     """
+    x0, x1 = segment
     width = dr.width(direction, zero)
+    start = x0 + dr.zeros(type(x1), width)
 
-    def of_face(to_come, intervals, reached):
-        face = to_come & NO_FACE
+    def between(begin, end):
+        return integral(begin, dr.maximum(begin, end))
+
+    def of_face(to_come, lit, opened, intervals, reached):
+        face = to_come & _NO_FACE
         begin, end = in_face(heights, face, away, direction, segment)
+        ray = replace(face_ray(heights, face, away, direction, (begin, end)), stops=end >= x1)
+        line = line_of(heights, face, ray)
+        # All is lit before the line begins, and after it ends early.
+        lit_here = ~ray.walks | (line.excess[0] > 0)
         passes = begin < end
-        place = tile * heights.faces + face
-        first, last = (dr.gather(mi.UInt32, ends, place, passes) for ends in (leaves.first, leaves.last))
-        # The whole part is lit. It joins the interval before it, unless that lies elsewhere.
-        lit = passes & ((first & LIT) != 0) & (~intervals.waits | (intervals.end == begin))
-        intervals = close_interval(intervals, end, lit, begin=dr.select(intervals.waits, intervals.begin, begin))
-
-        def walk(intervals, reached):
-            ray = replace(face_ray(heights, face, away, direction, (begin, end)), stops=end >= segment[1])
-            source = leaves, first & (LIT - 1), last, (first & LARGER) != 0
-            intervals, lit = _over_face(heights, face, ray, source, intervals, integral)
-            return intervals, dr.select(end >= segment[1], lit, reached)
-
-        intervals, reached = dr.if_stmt(
-            args=(intervals, reached | (lit & (end >= segment[1]))),
-            cond=passes & ~lit,
-            true_fn=walk,
-            false_fn=lambda *unchanged: unchanged,
+        changes = passes & (lit != lit_here)
+        intervals, opened = _changed(intervals, (begin, begin), opened, lit, (changes, none))
+        way = _way(heights, face, line)
+        walk = _Walk(
+            i=line.cells[0][0] ^ way.mirror[0],
+            j=line.cells[0][1] ^ way.mirror[1],
+            t=dr.zeros(type(x1), width),
+            shift=dr.full(mi.UInt32, max(heights.finest - _FIRST, 0), width),
+            lit=dr.select(passes, lit_here, lit),
+            opened=opened,
+            intervals=intervals,
+            done=~(passes & ray.walks),
         )
-        return to_come >> FACE_BITS, intervals, reached
+        (walk,) = dr.while_loop(
+            state=(walk,),
+            cond=lambda walk: ~walk.done,
+            body=lambda walk: (_next_interval(way, walk, between),),
+            labels=("walk",),
+        )
+        seen = ~ray.walks | (line.excess[1] > -line.slack)
+        reached = dr.select(passes & (end >= x1), seen, reached)
+        return to_come >> _FACE_BITS, walk.lit, walk.opened, walk.intervals, reached
 
-    intervals = no_intervals(zero, dr.zeros(type(segment[1]), width))
-    no = dr.full(mi.Bool, False, width)
+    none = dr.full(mi.Bool, False, width)
+    state = none, start, no_intervals(zero, +start), none & True
     if heights.faces == 1:
-        _, intervals, reached = of_face(mi.UInt32(0), intervals, no)
+        _, *state = of_face(mi.UInt32(0), *state)
     else:
-        _, intervals, reached = dr.while_loop(
-            state=(dr.gather(mi.UInt32, leaves.faces, tile), intervals, no),
-            cond=lambda to_come, intervals, reached: to_come != NO_FACE,
+        _, *state = dr.while_loop(
+            state=(_faces_in_order(heights, away, direction, segment), *state),
+            cond=lambda to_come, *_: to_come != _NO_FACE,
             body=of_face,
-            labels=("to_come", "intervals", "reached"),
+            labels=("to_come", "lit", "opened", "intervals", "reached"),
         )
-    return add_waiting(intervals, integral).total, reached
+    lit, opened, intervals, reached = state
+    wanted = mi.Bool(x1 > x0)
+    return sum_at_end(intervals, between, x1, opened=opened, lit=lit, active=wanted), reached
 
 
-def _over_face(heights, face, ray: FaceRay, source, intervals: LitIntervals, integral):
-    """Go over one face.
+def _faces_in_order(heights: InverseDepthField, away, direction, segment):
+    """Return the faces that rays pass in the order of their beginnings, three bits each, the first in the lowest."""
+    begins = []
+    for face in range(heights.faces):
+        begin, end = in_face(heights, mi.UInt32(face), away, direction, segment)
+        begins.append(dr.select(begin < end, begin, dr.inf))
+    count, order = mi.UInt32(0), mi.UInt32(0)
+    for face, begin in enumerate(begins):
+        rank = mi.UInt32(0)
+        for other, its_begin in enumerate(begins):
+            before = its_begin <= begin if other < face else its_begin < begin
+            rank += dr.select(before, mi.UInt32(1), 0)
+        there = begin < dr.inf
+        order |= dr.select(there, mi.UInt32(face) << (_FACE_BITS * rank), 0)
+        count += dr.select(there, mi.UInt32(1), 0)
+    return order | (mi.UInt32(_NO_FACE) << (_FACE_BITS * count))
 
-    Returns
-    -------
-    intervals
-        With those of the face; what may go on in the next one waits.
-    reached
-        Whether the ray is lit where it leaves the face.
-    """
-    line = line_of(heights, face, ray)
-    # All is lit before the line begins, and after it ends early.
-    lit = ~ray.walks | (line.excess[0] > 0)
-    reached = ~ray.walks | (line.excess[1] > -line.slack)
 
-    def one_pass(after, intervals, more):
-        nearest = nearest_crossings(heights, face, line, source, after, more & ray.walks)
-        intervals = _add_between(nearest, ray, after, lit ^ nearest.odd, more, integral, intervals)
-        return dr.select(nearest.lost, nearest.queue.key[-1], after), intervals, more & nearest.lost
+@dataclass
+class _Way:
+    """The line of a ray over a face, counted from where it comes from: columns and rows rise along it."""
 
-    after = ray.begin + dr.zeros(type(ray.begin), dr.width(intervals))
-    _, intervals, _ = dr.while_loop(
-        state=(after, intervals, ray.begin < ray.end),
-        cond=lambda after, intervals, more: more,
-        body=one_pass,
-        labels=("after", "intervals", "more"),
+    heights: InverseDepthField
+    face: Any
+    line: Line
+    mirror: tuple[Any, Any]  #: columns and rows of the face are these numbers with those bits the other way round
+    start: tuple[Any, Any]  #: columns and rows of the line at t = 0 [texels]
+    per: tuple[Any, Any]  #: dt a column and a row
+
+
+def _way(heights: InverseDepthField, face, line: Line) -> _Way:
+    ray, last = line.ray, heights.size - 1
+    mirror = tuple(dr.select(rises, mi.UInt32(0), mi.UInt32(last)) for rises in (line.right, line.up))
+    start = tuple(
+        dr.select(rises, pair[0], heights.size - pair[0]) for rises, pair in ((line.right, ray.u), (line.up, ray.v))
     )
-    return intervals, reached
+    return _Way(heights, face, line, mirror, start, (dr.abs(ray.per_u), dr.abs(ray.per_v)))
 
 
-def _add_between(nearest: NearestCrossings, ray: FaceRay, after, lit, active, integral, intervals: LitIntervals):
-    """Add the lit intervals between the crossings of a queue; the last one is left if there are more crossings.
+def _next_interval(way: _Way, walk: _Walk, integral) -> _Walk:
+    """Go on to the end of a lit interval, or of the line, and integrate.
 
-    The first goes on from one that waits and ends where it begins. One that reaches the end of the face waits, unless
-    another one does: of a ray that passes the faces in another order than its tile, or where two faces are at odds
-    about a point on their border, by rounding.
+    Rays whose intervals end at different places wait for one another here: an integral costs as much as many steps.
     """
-    queue, more = nearest.queue.key, nearest.lost
-    goes_on = active & intervals.waits & lit & (intervals.end == after)
-    waits = intervals.waits & ~goes_on
-    # Lit intervals lie between the first and second entry, the third and fourth, and so on.
-    bounds = [dr.select(lit, dr.select(goes_on, intervals.begin, after), queue[0])]
-    bounds += [dr.select(lit, before, behind) for before, behind in pairwise(queue)]
-    bounds.append(dr.select(lit & ~more, queue[-1], dr.inf))
-    bounds = [dr.minimum(bound, ray.end) for bound in bounds]
-
-    def body(k, bounds, total):
-        value = dr.select(bounds[0] < bounds[1], integral(bounds[0], bounds[1]), 0)
-        return k + 1, [*bounds[2:], ray.end, ray.end], total + value
-
-    def is_whole(k, bounds, total):
-        return active & (bounds[0] < ray.end) & (k < len(queue)) & (waits | (bounds[1] < ray.end))
-
-    Float = type(ray.end)
-    width = dr.width(intervals)
-    padded = [*bounds, ray.end]
-    _, bounds, total = dr.while_loop(
-        state=(dr.zeros(mi.UInt32, width), [bound + dr.zeros(Float, width) for bound in padded], intervals.total),
-        cond=is_whole,
-        body=body,
-        labels=("k", "bounds", "total"),
+    (walk,) = dr.while_loop(
+        state=(walk,),
+        cond=lambda walk: ~(walk.intervals.waits | walk.done),
+        body=lambda walk: (_next_texel(way, walk),),
+        labels=("walk",),
     )
-    left = active & (bounds[0] < ray.end) & ~waits
-    return close_interval(replace(intervals, total=total, waits=waits), ray.end, left, begin=bounds[0])
+    walk.intervals = add_waiting(walk.intervals, integral)
+    return walk
+
+
+def _next_texel(way: _Way, walk: _Walk) -> _Walk:
+    """Go over nodes up to one that has to be looked at, and look at it: a texel, or one that is not as before it."""
+    none = walk.done & False
+
+    def step(i, j, t, shift, done, found, whole):
+        return _step(way, (i, j, t, shift), walk.lit, found, whole)
+
+    i, j, t, shift, done, found, whole = dr.while_loop(
+        state=(walk.i, walk.j, walk.t, walk.shift, walk.done, none, none & True),
+        cond=lambda i, j, t, shift, done, found, whole: ~(found | done),
+        body=step,
+        labels=("i", "j", "t", "shift", "done", "found", "whole"),
+    )
+    line = way.line
+    over = passage(way.heights, way.face, line, (i ^ way.mirror[0], j ^ way.mirror[1]))
+    here = texel_crossings(line, over)
+    crosses = found & (whole | here.crosses)
+    twice = found & ~whole & here.crosses & here.twice
+    x, second = distance_at(line.ray, dr.select(whole, t, here.t)), distance_at(line.ray, here.second)
+    intervals, opened = _changed(walk.intervals, (x, second), walk.opened, walk.lit, (crosses, twice))
+    ahead, end, there = _neighbour(way, i, j, shift)
+    i, j, t = (dr.select(found, new, old) for new, old in zip((*ahead, end), (i, j, t)))
+    return _Walk(i, j, t, shift, walk.lit ^ crosses ^ twice, opened, intervals, done | (found & ~there))
+
+
+def _changed(intervals: LitIntervals, x, opened, lit, changes):
+    """Return the intervals, and where the last one opened, behind a place `x` [m] where the light comes or ends.
+
+    Of two places one closes an interval and the other opens one; nothing may wait.
+    """
+    (first, second), (changes, twice) = x, changes
+    closes = (changes & lit) | twice
+    end, begin = dr.select(lit, first, second), dr.select(lit, opened, first)
+    intervals = close_interval(intervals, end, closes, begin=begin)
+    return intervals, dr.select(changes & ~lit, first, dr.select(twice, second, opened))
+
+
+def _step(way: _Way, node, was_lit, found, whole):
+    """Look at the bounds of one node: go over it, or down into it, or stay."""
+    i, j, t, shift = node
+    heights, ray = way.heights, way.line.ray
+    ahead, end, there = _neighbour(way, i, j, shift)
+    column, row = (i ^ way.mirror[0]) >> shift, (j ^ way.mirror[1]) >> shift
+    low, high = node_bounds(heights, way.face, heights.finest - shift, column, row)
+    s0, s1 = at_line(ray.s, t), at_line(ray.s, end)
+    lit, dark = dr.minimum(s0, s1) > high, dr.maximum(s0, s1) <= low
+    whole, empty = lit | dark, t >= end
+    over = (whole & (lit == was_lit)) | empty
+    down = ~over & ~whole & (shift > 0)
+    # One level up where the neighbour is beyond the parent too.
+    up = over & (shift < heights.finest) & ((((i ^ ahead[0]) | (j ^ ahead[1])) >> shift) > 1)
+    shift = dr.select(down, shift - 1, dr.select(up, shift + 1, shift))
+    i, j, t = (dr.select(over, new, old) for new, old in zip((*ahead, end), (i, j, t)))
+    return i, j, t, shift, over & ~there, ~over & ~down, whole
+
+
+def _neighbour(way: _Way, i, j, shift):
+    """Return the texel at which a line comes into the neighbour of a node, where, and whether there is one."""
+    ray, size = way.line.ray, way.heights.size
+    Float = type(ray.begin)
+    rest = (mi.UInt32(1) << shift) - 1
+    next_i, next_j = (i | rest) + 1, (j | rest) + 1
+    out_u, out_v = ((Float(n) - start) * per for n, start, per in zip((next_i, next_j), way.start, way.per))
+    by_u, end = out_u <= out_v, dr.minimum(dr.minimum(out_u, out_v), 1)
+    along_u, along_v = (dr.abs(pair[1] - pair[0]) * end + start for pair, start in zip((ray.u, ray.v), way.start))
+    ahead_i = dr.select(by_u, next_i, dr.clip(mi.UInt32(along_u), i, next_i - 1))
+    ahead_j = dr.select(by_u, dr.clip(mi.UInt32(along_v), j, next_j - 1), next_j)
+    return (ahead_i, ahead_j), end, (end < 1) & (ahead_i < size) & (ahead_j < size)

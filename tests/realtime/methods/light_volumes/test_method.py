@@ -68,19 +68,6 @@ def test_any_size_of_image(variant, size):
         assert differ(frame.airlight, wanted) < 1e-5
 
 
-@pytest.mark.claim("lists-in-any-room", tolerance="2e-6 of the largest")
-@pytest.mark.parametrize("rooms", [(6, 1), (24, 9)])
-def test_lists_that_overflow_change_nothing(variant, monkeypatch, rooms):
-    import realtime.methods.light_volumes.tile_lists
-
-    loaded = loaded_scene("fence")
-    wanted = render(loaded, "light-volumes", map=64).airlight
-    monkeypatch.setattr(realtime.methods.light_volumes.tile_lists, "_TILE_ROOM", rooms[0])
-    monkeypatch.setattr(realtime.methods.light_volumes.tile_lists, "_BLOCK_ROOM", rooms[1])
-    # Larger squares begin elsewhere on the line: rounding.
-    assert differ(render(loaded, "light-volumes", map=64).airlight, wanted) < 2e-6
-
-
 @pytest.mark.parametrize("axis", [0, 2])
 @pytest.mark.parametrize("evaluation", EVALUATIONS)
 def test_rays_on_the_border_of_two_faces_are_lit_once(variant, axis, evaluation):

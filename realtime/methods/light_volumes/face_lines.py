@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Camera rays in the projective coordinates of a face of a shadow map.
+"""Camera rays over a face of a shadow map: in its projective coordinates, and their lines over its texels.
 
 With the camera at a0 across + b0 up + c0 axis from the light and the direction (da, db, dc) likewise, the point at x
 has
@@ -23,10 +23,12 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.shadow_maps.inverse_depth_field import InverseDepthField, node_bounds
+from realtime.methods.light_volumes.texel_walls import height_in, parts_of
+from realtime.shadow_maps.inverse_depth_field import InverseDepthField, node_bounds, texel_heights, texel_walls
 
 _NEARER = 1 - 1e-4  # of the nearest height, with room for rounding
 _STEEP = 1e30  # stands for 1/0: lines that are never crossed lie far beyond [0, 1]
+_ROUNDING = 1e-5  # of a height of the map, with room
 
 
 @dataclass
@@ -153,3 +155,74 @@ def at_line(pair, t):
 def distance_at(ray: FaceRay, t):
     """Return the distance x along the ray at t [m]."""
     return at_line(ray.y, t) if ray.parallel else at_line(ray.y, t) / at_line(ray.s, t)
+
+
+@dataclass
+class Line:
+    """A ray's line over a face, with D at its ends."""
+
+    ray: FaceRay
+    right: Any  #: whether columns rise along it
+    up: Any  #: whether rows do
+    excess: tuple[Any, Any]  #: D at t = 0 and t = 1
+    cells: tuple[tuple[Any, Any], tuple[Any, Any]]  #: column and row of the texels that they lie in
+    slack: Any  #: how far below the height field a point at t = 1 may seem that lies on what it samples
+
+
+def line_of(heights: InverseDepthField, face, ray: FaceRay) -> Line:
+    """Return the line of a ray in a face; D at its ends is that of the texel whose borders lie about them."""
+    right, up = ray.per_u > 0, ray.per_v > 0
+    excess, cells, slack = [], [], type(ray.begin)(0)
+    for t in (0, 1):
+        at = type(ray.begin)(t)
+        i, j = (
+            cell_at(pair, per, at, mi.UInt32(0), mi.UInt32(heights.size))
+            for pair, per in ((ray.u, ray.per_u), (ray.v, ray.per_v))
+        )
+        four = texel_heights(heights, face, i, j, ray.walks)
+        x, y = ray.u[t] - type(at)(i), ray.v[t] - type(at)(j)
+        height, doubt = _height_in(heights, (face, i, j, ray.walks), four, x, y)
+        excess.append(ray.s[t] - height)
+        cells.append((i, j))
+        slack = dr.fma(ray.s[t], _ROUNDING, doubt)
+    return Line(ray, right, up, (excess[0], excess[1]), (cells[0], cells[1]), slack)
+
+
+def _height_in(heights, texel, four, x, y):
+    """Return the height at a point of a texel with four heights, and how far below it a lit surface may seem to be.
+
+    That is the range of the heights, as the surface may do anything between the samples. Beside a wall it is half of
+    it: then it is a question of which of two surfaces the point lies on.
+    """
+    s00, s10, s01, s11 = four
+    below = x >= y
+    along, upward = dr.select(below, s10 - s00, s11 - s01), dr.select(below, s11 - s10, s01 - s00)
+    height, range_ = dr.fma(x, along, dr.fma(y, upward, s00)), dr.max(four) - dr.min(four)
+    if heights.walls is None:
+        return height, range_
+    walls = texel_walls(heights, *texel)
+    beside = walls != 0
+    walled = height_in(parts_of(four, walls, type(x)), x, y)
+    return dr.select(beside, walled, height), dr.select(beside, 0.5 * range_, range_)
+
+
+def cell_at(pair, per, t, low, side):
+    """Return the column (or row) of a strip of texels whose own borders are on either side of t.
+
+    The strip begins at texel `low`; `pair` is the coordinate at the ends of the line and `per` its inverse change.
+    """
+    first, last = mi.Int32(low), mi.Int32(low + side) - 1
+    cell = dr.clip(mi.Int32(dr.floor(at_line(pair, t))), first, last)
+    # Rounding may have put it one too far, or not far enough.
+    begin, end = borders(type(t)(cell), pair[0], per)
+    step = dr.select(per > 0, mi.Int32(1), mi.Int32(-1))
+    return mi.UInt32(dr.clip(dr.select(t >= end, cell + step, dr.select(t < begin, cell - step, cell)), first, last))
+
+
+def borders(low, start, per, across=1.0):
+    """Return the t at which a line enters and leaves the strip from `low` to `low + across` [texels].
+
+    The line is at `start` [texels] for t = 0 and needs `per` for a texel.
+    """
+    at_low, at_high = (low - start) * per, (low + across - start) * per
+    return dr.minimum(at_low, at_high), dr.maximum(at_low, at_high)
