@@ -1,28 +1,45 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The side under test: real-time single scattering in Dr.Jit, float32 and float64 from one source.
 
-A scene is read once, a method turns the view of a frame into the layers of every pixel, and a frame is composed of the
-layers. Mitsuba only reads the scene and casts rays. Nothing here imports the truth (`analytic`, `reference`) or what
-compares both sides.
+A scene is read once, a method says of each light which radiance the lit media scatter into the camera rays, and a frame
+adds that to the surfaces. Mitsuba only reads the scene and casts rays. Nothing here imports the reference side
+(`analytic`, `reference`) or what compares both sides.
 
-Read in this order:
+Rooms:
 
 - `errors.py`: the exception for mistakes of the user;
 - `memory.py`: refuses work that needs more memory than the machine, its container or the GPU has;
 - `parameters.py`: typed parameters of methods, with defaults, ranges and help;
 - `numerics/`: array types, error-free arithmetic, fast functions, Gauss-Legendre nodes;
 - `droplets/`: phase functions of the droplets of fog and clouds;
-- `area_lights/`: lights with extent, and the points that stand for them;
+- `area_lights/`: area lights, and the samples that stand for them;
 - `scene/`: camera, lights, media, phase functions and meshes, read from Mitsuba; the features of a scene; what moves;
 - `rays/`: the geometry of rays and lights, and the cone of a spot;
 - `shadow_maps/`: shadow maps and the field of inverse depth over them;
 - `image_filters/`: Gaussian, bilateral and joint bilateral filters of whole images, and up-sampling;
-- `tiles/`: pixels in tiles of 4 x 4, lists of candidates, and adaptive sampling between the corners of tiles;
 - `kernels/`: the airlight integral between two distances along a ray;
-- `bounded_media/`: rays, legs and airlight in bounded media;
-- `intervals/`: the lit intervals of rays, their sum, and the nearest crossings;
-- `clouds/`: light scattered more than once: a slab by orders;
-- `methods/`: the methods: `interface/`, `unshadowed`, `ray_march`, `shadow_planes/`, `light_volumes/`, `epipolar/`,
-  `froxel_fog/`, `soft_shafts/`;
+- `bounded_media/`: rays, light paths and airlight in bounded media;
+- `intervals/`: the lit intervals of rays and their sum;
+- `clouds/`: light scattered more than once;
+- `methods/`: the methods, and in `methods/interface/` what all of them share with frames;
 - `frame/`: camera rays, the lit surface, and whole frames, one or the next.
+
+**One frame, from XML to pixel**: the files that `airlight render hall --method shadow-planes` passes, in this order.
+
+1. `scene/read_scene.py` reads what Mitsuba loaded: `scene/camera.py`, `scene/read_media.py` and `scene/lights.py` the
+   parts, `scene/features.py` what of them asks for code, `scene/triangle_table.py` what shading needs of triangles.
+2. `methods/registry.py` finds the class of a name, and `methods/interface/method.py` gives it its parameters.
+3. `frame/renderer.py` groups the lights, and records the stages below once for each structure of lights.
+4. `methods/shadow_planes/method.py` prepares: `scene/mesh_adjacency.py` reads how triangles hang together,
+   `methods/shadow_planes/silhouettes.py` finds the edges that bound shadows, and
+   `methods/shadow_planes/plane_table.py` makes planes of them, in wedges of azimuth about the light.
+5. `frame/surface.py` casts the camera rays and shades what they meet, without shadows.
+6. `methods/interface/view.py` makes the view of these rays, and `methods/shadow_planes/pixel_rays.py` says where each
+   passes the light, in terms of `rays/ray_light.py` and, for a spot, `rays/spot_cone.py`.
+7. `methods/shadow_planes/sweep.py` walks along the planes of each ray and finds its lit intervals
+   (`intervals/lit_intervals.py`).
+8. `methods/interface/light_airlight.py` asks `kernels/registry.py` for the integral over each interval:
+   `kernels/exact.py`, for which `kernels/preparation.py` made tables ready if it has any.
+9. Behind the stages the renderer adds up what is lit of the surfaces and the airlight and brings both to the host;
+   `frame/light_on_ray.py` checks that all of it is finite.
 """

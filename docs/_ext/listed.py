@@ -103,7 +103,7 @@ def parameters(method: str) -> str:
 
     from realtime.methods.registry import METHODS
 
-    rows = [(f"`{item.name}`", *_parameter(item)) for item in fields(METHODS[method].parameters)]
+    rows = [(f"`{item.name}`", *_parameter(item)) for item in fields(METHODS[method])]
     return table(("`--set`", "values", "what it does"), rows, 3) if rows else "The method has no parameters."
 
 

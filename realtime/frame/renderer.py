@@ -1,26 +1,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A frame: camera rays, the lit surface, what the method sorts by tiles, its layers, and passes over the whole image.
+"""A frame: camera rays, the lit surface, and what a method adds, by groups of lights and parts of the image.
 
-Each stage is one frozen function. Frozen functions (`drjit.freeze`) record their kernels on the first call and replay
-them afterwards, so a frame costs its kernels and little else. A method whose arrays change their sizes from frame to
-frame cannot be frozen. All that moves (camera, lights, medium, shadow maps) is passed in as opaque arrays. What of a
-frame serves the next one too: `realtime.frame.incremental`.
+A frame is a list of groups of lights times a list of parts of the image. Each group is run by recorded functions
+(`drjit.freeze`), which record their kernels on the first call and replay them afterwards, so that a frame costs its
+kernels and little else; what groups and parts render is added up and put together. Most frames have one group and one
+part. A method whose arrays change their sizes from frame to frame is not frozen. All that moves (camera, lights,
+medium, shadow maps) is passed in as opaque arrays. What serves the next frame too: `realtime.frame.incremental`.
 
-Where there are lights with extent, or many, a renderer has groups of lights (`LightGroups`): those without extent
-together where they are few, or each by itself, then each light point by itself. Stages for one light are recorded once
-and replayed for all of its structure; their radiance is added up. So the code of a kernel, and the time to compile it,
-do not grow with the lights: with five lights and two media in one kernel it had half a million operations, and took a
-minute. What the stages of a single group take and return is a tuple by group then: states, surfaces and lists.
+Groups: lights without extent are one where they are few, else each is one; each sample of an area light is one. Lights
+of one structure share their recorded functions. So the code of a kernel, and the time to compile it, do not grow with
+the lights: with five lights and two media in one kernel it had half a million operations, and took a minute. A method
+that looks at all lights together has one group.
 
-A large image of a method that computes each ray by itself is rendered in parts, one after the other (`parts`): what a
+Parts: a large image of a method that computes each ray by itself is rendered in parts, one after the other: what a
 frame needs beside the image that it shows is then that of a part. Where the method needs the whole image, its stage is
 not frozen if that is large: a replay of Dr.Jit 1.5 frees what it made on its way only at its end, and filters make some
 twenty images on theirs.
 """
 
 import gc
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, is_dataclass, replace
+from functools import reduce
+from operator import add
 from typing import Any
 
 import drjit as dr
@@ -29,81 +31,82 @@ import numpy as np
 
 from realtime.area_lights.points import LightPoints
 from realtime.errors import InputError, refusals
-from realtime.frame.frame_view import frame_view
-from realtime.frame.layers import adaptive_layers, added, composed, image_passes
+from realtime.frame.adaptive_sampling import Corners, adaptive_layers, tile_corners
 from realtime.frame.light_on_ray import check_radiance
-from realtime.frame.surface import Cast
-from realtime.frame.surface_stages import no_surface, surface_stages
+from realtime.frame.surface import Cast, surface_stages
 from realtime.kernels.preparation import prepare_kernel, with_tables
-from realtime.methods.interface.layers import History
-from realtime.methods.interface.method import Method, Preparation, method_parameters
+from realtime.methods.interface.method import Layers, Method, Preparation, method_parameters
+from realtime.methods.interface.view import camera_view
 from realtime.numerics.aligned import aligned_array
-from realtime.numerics.array_types import Metres, PerRay
+from realtime.numerics.array_types import PerRay
 from realtime.numerics.recorded import Frozen
-from realtime.scene.camera import tiled_pixels
+from realtime.scene.camera import TILE, tiled_pixels
 from realtime.scene.light_points import with_light_points
 from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene
-from realtime.tiles.adaptive_sampling import Corners, tile_corners
-from realtime.tiles.layout import TILE
 
 _ROOM = 2**30  # of states of groups of lights, such as shadow maps [bytes]
 _LARGE = 2**21  # pixels; a larger image is rendered in parts where it can be
 _PART = 2**20  # pixels of a part at most
 _FEW = 4  # lights without extent whose code one kernel may hold; in bounded media it is long, and only one may
-_MOST_KEPT = 32  # groups of lights of which states, surfaces and lists are kept; those of others are made when needed
+_MOST_KEPT = 32  # groups of lights of which states and surfaces are kept; those of others are made when needed
 
 
 @dataclass(frozen=True)
-class LightGroups:
-    """The stages of a frame by groups of lights, for a scene with lights with extent, or with many."""
+class Stages:
+    """The recorded functions of a frame for lights of one structure."""
 
-    light_points: LightPoints
-    ordinary: tuple["FrameRenderer", ...]  #: of the lights without extent: one of all of them, or one of each
-    of_point: "FrameRenderer | None"  #: of one light point; None where there is none by itself
-    at_once: bool = False  #: whether there is one group, of all lights and light points
+    prepare: Preparation  #: scene -> the state of the method: shadow maps, shadow planes
+    surface: Callable[..., Any]  #: -> what camera rays meet, and what `shade` returns for it
+    shade: Callable[..., Any]  #: -> surface radiance: by light where the method knows their visibility, or a sum
+    render: Callable[..., Any]  #: -> what `_rendered` returns
+    shade_casts_rays: bool  #: whether shading asks Mitsuba for shapes or shadows
+
+
+@dataclass(frozen=True)
+class LightGroup:
+    """Some lights of a scene, and the functions that render them."""
+
+    scene: Scene  #: with these lights alone
+    stages: Stages
+
+    @property
+    def lights(self) -> tuple[Light, ...]:
+        """The lights for recorded functions: a sample by itself is of no area light, as one recording serves all."""
+        lights = self.scene.lights
+        return (replace(lights[0], source=0),) if len(lights) == 1 and lights[0].source else lights
 
 
 @dataclass(frozen=True)
 class FrameRenderer:
-    """The stages of a frame of one scene with one method, ready to be run any number of times."""
+    """The frames of one scene with one method, ready to be rendered any number of times."""
 
     scene: Scene
     method: Method
+    light_points: LightPoints
     pixel: PerRay  #: pixel numbers in the order of the lanes
-    prepare: Preparation  #: scene -> the state of the method: shadow maps, shadow planes
-    surface: Callable[..., Any]  #: -> what camera rays meet, and what `shade` returns for it
-    shade: Callable[..., Any]  #: -> surface radiance: by light where the method knows their visibility, or a sum
-    cull: Callable[..., Any]  #: -> what concerns each tile; () where the method sorts nothing
-    render: Callable[..., Any]  #: -> airlight, and the surface where layers change it; layers where there are passes
-    passes: Callable[..., Any] | None  #: -> airlight, surface and what they leave; None where the method has none
+    structures: Mapping[Any, Stages]  #: by what lights have
     tables: Any  #: what the kernel reads; None for most
     corners: Corners | None  #: how the tiles of the image lie; None where every pixel is computed
-    lane: PerRay | None  #: the entry of every pixel row by row, for passes
-    shade_casts_rays: bool  #: whether shading asks Mitsuba for shapes or shadows
-    casts_rays: bool  #: whether the method casts rays of its own
-    carries: bool  #: whether the method hands arrays on to the next frame
-    by_rays: bool  #: whether each ray is computed by itself, so that any part of the image can be rendered alone
-    extra_layers: bool  #: whether `render` returns `Layers.extra` too
-    groups: LightGroups | None = None  #: where the scene has lights with extent, or many
-
-    # A frozen function reads all shapes of a scene that it is given anew at every call.
+    extra_layers: bool  #: whether frames have the further layers that the method names
 
     @property
-    def shade_geometry(self) -> Any:
-        """The Mitsuba scene if shading needs it."""
-        return self.scene.geometry if self.shade_casts_rays else None
+    def by_rays(self) -> bool:
+        """Whether any part of the image can be rendered alone."""
+        return self.method.by_rays and not self.method.carries and self.corners is None
 
     @property
-    def geometry(self) -> Any:
-        """The Mitsuba scene if the method needs it."""
-        return self.scene.geometry if self.casts_rays else None
+    def stages(self) -> Stages:
+        """The functions of the first group of lights."""
+        return next(iter(self.structures.values()))
 
-    @property
-    def lights(self) -> tuple[Light, ...]:
-        """The lights for recorded functions: a light point by itself is of no light, as one recording serves all."""
-        lights = self.scene.lights
-        return (replace(lights[0], source=0),) if len(lights) == 1 and lights[0].source else lights
+    def prepare(self, scene: Scene) -> tuple[Any, ...]:
+        """Return the state of the method by groups of lights, None for those that are not kept."""
+        states: list[Any] = []
+        for group in light_groups(replace(self, scene=scene)):
+            kept = not states or len(states) < kept_groups(states[0])
+            states.append(group.stages.prepare(group.scene) if kept else None)
+        return tuple(states)
 
 
 @dataclass(frozen=True)
@@ -116,8 +119,18 @@ class Frame:
     extra: Mapping[str, Any] = field(default_factory=dict)  #: further layers by their names, colours
 
 
+@dataclass(frozen=True)
+class Rendered:
+    """What a method has rendered, in the order of the lanes, not evaluated."""
+
+    airlight: PerRay  #: in-scattered radiance [W/(m^2 sr)]
+    surface: PerRay  #: what is seen through it [W/(m^2 sr)]
+    extra: Mapping[str, PerRay] | None = None  #: further layers by their names
+    carried: Any = None  #: for the next frame
+
+
 def frame_renderer(
-    scene: Scene, method: Method, *, kernel=None, extra_layers: bool = False, **parameters
+    scene: Scene, method: type[Method], *, kernel=None, extra_layers: bool = False, **parameters
 ) -> FrameRenderer:
     """Prepare the stages of a frame.
 
@@ -130,8 +143,8 @@ def frame_renderer(
     kernel
         An airlight kernel function; needed where `method.uses_kernel` says so.
     extra_layers
-        Whether frames have the further layers that the method names; in a scene with lights with extent they have not.
-        In others all lights are in one group then.
+        Whether frames have the further layers that the method names; in a scene with area lights they have not. In
+        others all lights are in one group then.
     parameters
         Values of the method's parameters, and of `realtime.area_lights.points.LightPoints`; the others have their
         defaults.
@@ -139,39 +152,35 @@ def frame_renderer(
     Raises
     ------
     InputError
-        For a parameter that the method does not have, where a kernel is missing, and for what method or kernel refuse;
-        what the kernel of a method that is not frozen refuses comes with the first frame.
+        For a parameter that the method does not have, where a kernel is missing, and for what the method refuses of the
+        scene; what it or the kernel refuses of the rays comes with the first frame.
     """
     chosen, light_points = method_parameters(method, parameters)
-    if method.uses_kernel(chosen) and kernel is None:
+    if chosen.uses_kernel and kernel is None:
         raise InputError(f"method {method.name}: got no kernel, wanted one of realtime.kernels.registry.KERNELS")
-    _check_clouds(scene, method)
-    at_once = _has_passes(method, chosen) or method.lights_at_once(chosen) or method.carries(chosen)
-    by_light = len(scene.lights) > (1 if scene.features.bounded else _FEW) and not (at_once or extra_layers)
-    if not (scene.area_lights or by_light):
-        return _stages(scene, method, kernel, chosen, extra_layers=extra_layers)
-    lit = with_light_points(scene, light_points.points, light_points.pattern)
-    if at_once:
-        groups = LightGroups(light_points, (_stages(lit, method, kernel, chosen),), None, at_once=True)
-    else:
-        of_one: dict[Any, FrameRenderer] = {}
-
-        def stages_of(light: Light) -> FrameRenderer:
-            """Return the stages for one light: lights of one structure share them."""
-            structure = tuple(value is None for value in vars(light).values())
-            if structure not in of_one:
-                alone = replace(lit, lights=(light,))
-                of_one[structure] = _stages(alone, method, kernel, chosen, adds_up=True)
-            return of_one[structure]
-
-        if by_light:
-            ordinary = tuple(stages_of(light) for light in scene.lights)
-        else:
-            ordinary = (_stages(scene, method, kernel, chosen),) if scene.lights else ()
-        groups = LightGroups(light_points, ordinary, stages_of(lit.lights[-1]) if scene.area_lights else None)
-    known = groups.ordinary[0] if groups.ordinary else groups.of_point
-    assert known is not None
-    return replace(known, scene=scene, prepare=GroupPreparation(groups), groups=groups)
+    _check_clouds(scene, chosen)
+    pixel = aligned_array(mi.UInt32, tiled_pixels(scene.camera.width, scene.camera.height))
+    dr.eval(pixel)
+    made = FrameRenderer(
+        scene,
+        chosen,
+        light_points,
+        pixel,
+        structures={},
+        tables=prepare_kernel(kernel, type(scene.camera.origin.x)) if chosen.uses_kernel else None,
+        corners=None,
+        extra_layers=extra_layers and not scene.area_lights,
+    )
+    groups = _lights_by_group(made)
+    if chosen.interpolated:
+        most = max(map(len, groups))
+        made = replace(made, corners=tile_corners(pixel, scene.camera, by_rays=chosen.by_rays, lights=most))
+    structures: dict[Any, Stages] = {}
+    for lights in groups:
+        key = _structure(lights)
+        if key not in structures:
+            structures[key] = _stages(made, replace(scene, lights=lights), kernel, alone=len(groups) == 1)
+    return replace(made, structures=structures)
 
 
 def _check_clouds(scene: Scene, method: Method) -> None:
@@ -208,123 +217,98 @@ def _check_clouds(scene: Scene, method: Method) -> None:
         )
 
 
-def _stages(
-    scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: bool = False, extra_layers: bool = False
-) -> FrameRenderer:
-    """Return the stages for the lights of a scene; with `adds_up`, what they render is added to what was before."""
-    by_rays = method.by_rays is not None and method.by_rays(chosen)
-    tolerance = chosen.tolerance if method.by_rays else 0.0
-    features, camera = scene.features, scene.camera
-    provides_visibility = method.provides_visibility(chosen)
-    pixel = aligned_array(mi.UInt32, tiled_pixels(camera.width, camera.height))
-    corners = tile_corners(pixel, camera, tolerance, by_rays=by_rays, lights=len(scene.lights))
-    stages = surface_stages(
+def _structure(lights: tuple[Light, ...]) -> tuple[tuple[bool, ...], ...]:
+    """Return what lights have: those that have the same share recorded functions."""
+    return tuple(tuple(value is None for value in vars(light).values()) for light in lights)
+
+
+def _lights_by_group(renderer: FrameRenderer) -> list[tuple[Light, ...]]:
+    """Return the lights of a scene by groups."""
+    scene, points = renderer.scene, renderer.light_points
+    lit = with_light_points(scene, points.points, points.pattern) if scene.area_lights else scene
+    if renderer.method.at_once or renderer.extra_layers:
+        return [lit.lights]
+    groups = [scene.lights] if scene.lights else []
+    if len(scene.lights) > (1 if scene.features.bounded else _FEW):
+        groups = [(light,) for light in scene.lights]
+    return groups + [(sample,) for sample in lit.lights[len(scene.lights) :]]
+
+
+def light_groups(renderer: FrameRenderer) -> tuple[LightGroup, ...]:
+    """Return the groups of lights of the scene as it is now, each with its functions."""
+    return tuple(
+        LightGroup(replace(renderer.scene, lights=lights), renderer.structures[_structure(lights)])
+        for lights in _lights_by_group(renderer)
+    )
+
+
+def _stages(renderer: FrameRenderer, scene: Scene, kernel: Any, *, alone: bool) -> Stages:
+    """Return the functions for the lights of a scene; `alone` if these are all lights of the frame."""
+    method, features = renderer.method, scene.features
+    method.check(scene)
+    interpolates, extra_layers = renderer.corners is not None, renderer.extra_layers
+    surface, shade, shade_casts_rays = surface_stages(
         scene,
-        provides_visibility=provides_visibility,
-        by_source=method.by_source(chosen),
+        provides_visibility=method.provides_visibility,
+        by_source=method.by_source,
         through_media=not method.renders_clouds,
     )
-    surface, shade, shade_casts_rays = stages
-    has_passes = _has_passes(method, chosen)
-    tables = prepare_kernel(kernel, type(camera.origin.x)) if method.uses_kernel(chosen) else None
 
-    def sort(pixel, camera, medium, lights, state, distance):
-        assert method.cull is not None
-        shown = {"features": features, "geometry": None, "medium": medium, "lights": lights}
-        return method.cull(frame_view(camera, pixel, distance, **shown), state, chosen)
-
-    carries = method.carries(chosen)
-
-    def run(
-        geometry,
-        pixel,
-        camera,
-        medium,
-        lights,
-        state,
-        lists,
-        distance,
-        by_light,
-        tables,
-        corners=None,
-        sums=None,
-        last=None,
-    ):
-        shown = {"features": features, "geometry": geometry, "medium": medium, "lights": lights}
-        view = frame_view(camera, pixel, distance, **shown)
-        if carries:
-            view = replace(view, carried=last)
-        if provides_visibility:
+    def run(geometry, pixel, camera, medium, lights, state, distance, by_light, tables, last=None):
+        shown = {"features": features, "scene": geometry, "medium": medium, "lights": lights}
+        view = camera_view(camera, pixel, distance, **shown)
+        view = replace(view, carried=last, extra_layers=extra_layers)
+        if method.provides_visibility and not interpolates:
             view = replace(view, surfaces=by_light)
+        with refusals():
+            layers = method.render(view, state, with_tables(kernel, tables))
+        layers = layers if extra_layers else replace(layers, extra=None)
+        return layers if interpolates else _composed(layers, by_light, alone=alone)
 
-        if extra_layers:
-            view = replace(view, extra_layers=True)
-
-        def layers_of(view):
-            with refusals():
-                layers = method.render(view, state, lists, kernel=with_tables(kernel, tables), parameters=chosen)
-            return layers if extra_layers else replace(layers, extra=None)
-
-        layers = layers_of(view) if corners is None else adaptive_layers(layers_of, view, corners, tolerance)
-        extra, layers = layers.extra, replace(layers, extra=None)
-        if carries:
-            carried, layers = layers.carried, replace(layers, carried=None)
-            returned: Any = ((layers if has_passes else composed(layers, by_light)), carried)
-        elif has_passes:
-            returned = layers
-        else:
-            returned = composed(layers, by_light) if sums is None else added(sums, layers, by_light)
-        return (returned, extra) if extra_layers else returned
-
-    prepare = method.prepare(scene, chosen) if method.prepare else _no_state
-    cull = sort if method.cull and features.shadows else _no_lists
-    casts_rays = method.casts_rays(chosen)
-    render: Callable[..., Any] = run
-    passes: Callable[..., Any] | None = None
-    if has_passes:
-        passes = image_passes(method, chosen, surfaces=features.surfaces)
-    in_parts = by_rays and not has_passes and not carries and corners is None
-    if method.frozen(chosen) and (in_parts or camera.width * camera.height <= _LARGE):
-        # Trace one tile without launching anything: what the method refuses must not be raised while a frozen function
-        # is being recorded, which Dr.Jit 1.5 answers by aborting a later recording.
-        few = mi.UInt32(np.array(pixel)[:TILE])
-        shown = few, camera, scene.medium, scene.lights
-        near = dr.full(type(camera.origin.x), 1, dr.width(few))
-        state = prepare(scene)
-        lists = cull(*shown, state, near)
-        dark = no_surface(None, None, *shown, None)
-        sums = no_light(scene, dr.width(few)) if adds_up else None
-        run(scene.geometry if casts_rays else None, *shown, state, lists, near, dark, tables, sums=sums)
-        render = Frozen(run)
-        cull = Frozen(sort) if cull is sort else cull
-        passes = passes and Frozen(passes)
-    lane = None
-    if passes is not None:
-        lane = aligned_array(mi.UInt32, np.argsort(np.array(pixel)).astype(np.uint32))
-    dr.eval(pixel, lane)
-    return FrameRenderer(
-        scene,
-        method,
-        pixel,
-        prepare,
-        surface=surface,
-        shade=shade,
-        cull=cull,
-        render=render,
-        passes=passes,
-        tables=tables,
-        corners=corners,
-        lane=lane,
-        shade_casts_rays=shade_casts_rays,
-        casts_rays=casts_rays,
-        carries=carries,
-        by_rays=in_parts,
-        extra_layers=extra_layers,
-    )
+    frozen = method.frozen and (renderer.by_rays or scene.camera.width * scene.camera.height <= _LARGE)
+    render = Frozen(run) if frozen else run
+    return Stages(method.preparation(scene), surface, shade, render, shade_casts_rays)
 
 
-def _has_passes(method: Method, parameters: Any) -> bool:
-    return bool(method.passes) and method.runs_passes(parameters)
+def _composed(layers: Layers, by_light: tuple[PerRay, ...], *, alone: bool):
+    """Return what a frame makes of layers, by the formula of `realtime.methods.interface.method`.
+
+    Parameters
+    ----------
+    layers
+        Of a method.
+    by_light
+        The radiance of the surfaces by light where the layers have a visibility, otherwise their sum alone.
+    alone
+        Whether there is no other group of lights.
+
+    Returns
+    -------
+    airlight, surface
+        In-scattered radiance, and that from behind it [W/(m^2 sr)]; None where that is the shaded surface as it is.
+    beyond
+        The background through the layers, which is no light's own; None where there is none, or it is in `surface`.
+    extra, carried
+        As the layers have them.
+    """
+    surface, beyond = None, layers.background
+    if layers.visibility is not None:
+        surface = _sum(tuple(_lit(share, color) for share, color in zip(layers.visibility, by_light)))
+    if layers.transmittance is not None:
+        surface = layers.transmittance * (_sum(by_light) if surface is None else surface)
+        beyond = None if beyond is None else layers.transmittance * beyond
+    if alone and beyond is not None:
+        surface, beyond = (_sum(by_light) if surface is None else surface) + beyond, None
+    return layers.in_scattered, surface, beyond, layers.extra, layers.carried
+
+
+def _sum(colors: tuple[PerRay, ...]) -> PerRay:
+    """Return the sum of some colours, a single one as it is."""
+    return reduce(add, colors)
+
+
+def _lit(share: PerRay, color: PerRay) -> PerRay:
+    return dr.select(share, color, 0) if isinstance(share, bool) or dr.is_mask_v(share) else share * color
 
 
 def render_frame(renderer: FrameRenderer) -> Frame:
@@ -332,11 +316,11 @@ def render_frame(renderer: FrameRenderer) -> Frame:
     state, frame = renderer.prepare(renderer.scene), None
     for part in parts(renderer):
         cast, by_light = run_cast_and_shade(part)
-        if is_large(renderer):
-            cast = read_by_method(part, cast)
-        layers = run_method(part, state, cast, by_light)
-        stages, extra = evaluated(cast, by_light, layers), layers[2]
-        del cast, by_light, layers
+        if is_large(renderer) and len(renderer.structures) == 1:
+            cast = Cast(cast.distance)  # the method reads no more
+        rendered = run_method(part, state, cast, by_light)
+        stages, extra = evaluated(cast, rendered), rendered.extra
+        del cast, by_light, rendered
         give_memory_back(renderer)  # the host's images need room now
         frame = frame_with_part(frame, part, stages, extra)
     assert frame is not None
@@ -350,7 +334,7 @@ def is_large(renderer: FrameRenderer) -> bool:
 
 
 def give_memory_back(renderer: FrameRenderer) -> None:
-    """Free what a large frame left and nobody reads: a view and its functions hold one another."""
+    """Free what a large frame left and nobody reads."""
     if is_large(renderer):
         gc.collect()
         dr.flush_malloc_cache()
@@ -366,17 +350,119 @@ def parts(renderer: FrameRenderer) -> tuple[FrameRenderer, ...]:
     lanes = [dr.arange(mi.UInt32, begin, min(begin + length, count)) for begin in range(0, count, length)]
     pixels = [dr.gather(mi.UInt32, renderer.pixel, lane) for lane in lanes]
     dr.eval(pixels)
-    return tuple(_of_pixels(renderer, pixel) for pixel in pixels)
+    return tuple(replace(renderer, pixel=pixel) for pixel in pixels)
 
 
-def _of_pixels(renderer: FrameRenderer, pixel: PerRay) -> FrameRenderer:
-    """Return a renderer of some pixels."""
-    groups = renderer.groups
-    if groups is not None:
-        ordinary = tuple(replace(each, pixel=pixel) for each in groups.ordinary)
-        of_point = groups.of_point and replace(groups.of_point, pixel=pixel)
-        groups = replace(groups, ordinary=ordinary, of_point=of_point)
-    return replace(renderer, pixel=pixel, groups=groups)
+def run_stages(renderer: FrameRenderer, state):
+    """Run the stages on the device and return distance, surface and airlight, evaluated, in the order of the lanes."""
+    cast, by_light = run_cast_and_shade(renderer)
+    return evaluated(cast, run_method(renderer, state, cast, by_light))
+
+
+def evaluated(cast: Cast, rendered: Rendered):
+    """Return distance [m], surface and airlight [W/(m^2 sr)], evaluated, of what camera rays met and a method did."""
+    dr.eval(cast.distance, rendered.surface, rendered.airlight, rendered.extra, rendered.carried)
+    return cast.distance, rendered.surface, rendered.airlight
+
+
+def run_cast_and_shade(renderer: FrameRenderer) -> tuple[Cast, tuple[Any, ...]]:
+    """Run the stage of camera rays and lit surface; return what the rays meet, and what `run_shade` returns for it."""
+    first, *others = light_groups(renderer)
+    scene = renderer.scene
+    shown = scene.geometry, scene.facets, renderer.pixel, scene.camera, scene.medium, first.lights
+    cast, by_light = first.stages.surface(*shown)
+    kept = others[: _MOST_KEPT - 1]
+    shaded = [_shaded(renderer, group, cast) for group in kept] + [None] * (len(others) - len(kept))
+    return cast, (by_light, *shaded)
+
+
+def run_shade(renderer: FrameRenderer, cast: Cast) -> tuple[Any, ...]:
+    """Run the stage of the lit surface on what was cast for an earlier frame, by groups of lights.
+
+    It is None for those that are not kept.
+    """
+    groups = light_groups(renderer)
+    return tuple(_shaded(renderer, group, cast) if k < _MOST_KEPT else None for k, group in enumerate(groups))
+
+
+def _shaded(renderer: FrameRenderer, group: LightGroup, cast: Cast):
+    """Return what camera rays met in the light of a group."""
+    scene, stages = renderer.scene, group.stages
+    geometry = scene.geometry if stages.shade_casts_rays else None
+    return stages.shade(geometry, scene.facets, renderer.pixel, scene.camera, scene.medium, group.lights, cast)
+
+
+def run_method(renderer: FrameRenderer, state, cast: Cast, by_light, carried: Any = None) -> Rendered:
+    """Run the method for all groups of lights.
+
+    Parameters
+    ----------
+    renderer, state
+        The frame, and what its `prepare` returned.
+    cast, by_light
+        From `run_cast_and_shade`.
+    carried
+        What the method handed on from the last frame; None for the first.
+    """
+    groups, sums = light_groups(renderer), None
+    for number, group in enumerate(groups):
+        shaded = by_light[number] if by_light[number] is not None else _shaded(renderer, group, cast)
+        own = state[number] if state[number] is not None else group.stages.prepare(group.scene)
+        rendered, beyond = _run_group(renderer, group, own, cast, shaded, carried)
+        if sums is None:
+            surface = rendered.surface if beyond is None else rendered.surface + beyond
+            sums = replace(rendered, surface=surface)
+        else:
+            airlight, surface = sums.airlight + rendered.airlight, sums.surface + rendered.surface
+            sums = replace(sums, airlight=airlight, surface=surface)
+        if len(groups) > 1:
+            dr.eval(sums.airlight, sums.surface)
+    assert sums is not None
+    return sums
+
+
+def _run_group(
+    renderer: FrameRenderer, group: LightGroup, state, cast: Cast, by_light, last
+) -> tuple[Rendered, PerRay | None]:
+    """Run the method for one group of lights; return what is seen behind all media, of no light, too."""
+    scene, method = renderer.scene, renderer.method
+    geometry = scene.geometry if method.casts_rays else None
+
+    def render(pixel, distance, last):
+        shown = geometry, pixel, scene.camera, scene.medium, group.lights, state, distance, by_light, renderer.tables
+        return group.stages.render(*shown, last) if method.carries else group.stages.render(*shown)
+
+    if renderer.corners is None:
+        found = render(renderer.pixel, cast.distance, last)
+    else:
+        layers = adaptive_layers(
+            render,
+            renderer.corners,
+            renderer.pixel,
+            cast.distance,
+            width=scene.camera.width,
+            tolerance=method.interpolated,
+            last=last,
+        )
+        found = _composed(layers, by_light, alone=False)
+    airlight, surface, beyond, extra, carried = found
+    return Rendered(airlight, _sum(by_light) if surface is None else surface, extra, carried), beyond
+
+
+def kept_groups(state: Any) -> int:
+    """Return of how many groups of lights states like this are kept: not more than fill the room for them."""
+    return min(_MOST_KEPT, max(1, _ROOM // max(_bytes_in(state), 1)))
+
+
+def _bytes_in(value: Any) -> int:
+    """Return the size of the Dr.Jit arrays in a state [bytes]."""
+    if isinstance(value, tuple | list):
+        return sum(_bytes_in(item) for item in value)
+    if is_dataclass(value):
+        return sum(_bytes_in(item) for item in vars(value).values())
+    if not dr.is_array_v(value):
+        return 0
+    return sum(map(_bytes_in, value)) if dr.depth_v(value) > 1 else dr.width(value) * dr.itemsize_v(value)
 
 
 def image_frame(renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None = None) -> Frame:
@@ -387,7 +473,7 @@ def image_frame(renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | N
 
 
 def unchecked_frame(renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None = None) -> Frame:
-    """Do what `image_frame` does, and return radiance that is not finite too, for whoever counts it."""
+    """Do what `image_frame` does, and return radiance that is not finite too, for anyone who counts it."""
     return frame_with_part(None, renderer, stages, extra)
 
 
@@ -401,242 +487,6 @@ def frame_with_part(frame: Frame | None, renderer: FrameRenderer, stages, extra:
         _image(renderer, distance, frame and frame.distance),
         {name: _image(renderer, values, frame and frame.extra[name]) for name, values in shown.items()},
     )
-
-
-def run_stages(renderer: FrameRenderer, state):
-    """Run the stages on the device and return distance, surface and airlight, evaluated, in the order of the lanes."""
-    cast, by_light = run_cast_and_shade(renderer)
-    return evaluated(cast, by_light, run_method(renderer, state, cast, by_light))
-
-
-def evaluated(cast: Cast, by_light, layers):
-    """Return distance [m], surface and airlight [W/(m^2 sr)], evaluated, from `cast`, `by_light` and `layers`.
-
-    These are what the stages returned; a colour by light is the surface where the layers have none of their own.
-    """
-    airlight, behind, *more = layers[:3]
-    surface = by_light[0] if behind is None else behind
-    dr.eval(cast.distance, surface, airlight, more)
-    return cast.distance, surface, airlight
-
-
-@dataclass(frozen=True)
-class GroupPreparation:
-    """What makes the states of groups of lights; called with the scene as it is now, returns them in a tuple."""
-
-    groups: LightGroups
-
-    def __call__(self, scene: Scene) -> tuple[Any, ...]:
-        """Return the state of each group, None for those that are not kept."""
-        states: list[Any] = []
-        for group in _groups_in(self.groups, scene):
-            kept = not states or len(states) < kept_groups(states[0])
-            states.append(group.prepare(group.scene) if kept else None)
-        return tuple(states)
-
-
-def kept_groups(state: Any) -> int:
-    """Return of how many groups of lights states like this are kept: not more than fill the room for them."""
-    return min(_MOST_KEPT, max(1, _ROOM // max(bytes_in(state), 1)))
-
-
-def bytes_in(value: Any) -> int:
-    """Return the size of the Dr.Jit arrays in a state [bytes]."""
-    if isinstance(value, tuple | list):
-        return sum(bytes_in(item) for item in value)
-    if is_dataclass(value):
-        return sum(bytes_in(item) for item in vars(value).values())
-    if not dr.is_array_v(value):
-        return 0
-    return sum(map(bytes_in, value)) if dr.depth_v(value) > 1 else dr.width(value) * dr.itemsize_v(value)
-
-
-def light_groups(renderer: FrameRenderer) -> tuple[FrameRenderer, ...]:
-    """Return a renderer for each group of lights; a renderer without lights with extent itself."""
-    return (renderer,) if renderer.groups is None else _groups_in(renderer.groups, renderer.scene)
-
-
-def _groups_in(groups: LightGroups, scene: Scene) -> tuple[FrameRenderer, ...]:
-    lit = with_light_points(scene, groups.light_points.points, groups.light_points.pattern)
-    if groups.at_once:
-        return (replace(groups.ordinary[0], scene=lit),)
-    shown = [scene]  # lights without extent, by group
-    if len(groups.ordinary) > 1:
-        shown = [replace(scene, lights=(light,)) for light in scene.lights]
-    ordinary = tuple(replace(each, scene=part) for each, part in zip(groups.ordinary, shown))
-    if groups.of_point is None:
-        return ordinary
-    of_point = groups.of_point
-    points = (replace(lit, lights=(point,)) for point in lit.lights[len(scene.lights) :])
-    return ordinary + tuple(replace(of_point, scene=point) for point in points)
-
-
-def run_cast_and_shade(renderer: FrameRenderer) -> tuple[Cast, Any]:
-    """Run the stage of camera rays and lit surface; return what the rays meet, and what `run_shade` returns for it."""
-    if renderer.groups is not None:
-        first, *others = light_groups(renderer)
-        cast, by_light = run_cast_and_shade(first)
-        return cast, (by_light, *_shaded(others, cast, 1))
-    scene = renderer.scene
-    return renderer.surface(scene.geometry, scene.facets, renderer.pixel, scene.camera, scene.medium, renderer.lights)
-
-
-def read_by_method(renderer: FrameRenderer, cast: Cast) -> Cast:
-    """Return of what camera rays meet what the method reads; a frame that shades it again needs all."""
-    one_by_one = renderer.groups is not None and not renderer.groups.at_once
-    reads_surfaces = renderer.passes is not None and not renderer.method.passes_read_depth_alone
-    return cast if one_by_one or reads_surfaces else Cast(cast.distance)
-
-
-def run_shade(renderer: FrameRenderer, cast: Cast):
-    """Run the stage of the lit surface on what was cast for an earlier frame."""
-    if renderer.groups is not None:
-        return _shaded(light_groups(renderer), cast, 0)
-    scene = renderer.scene
-    arguments = (scene.facets, renderer.pixel, scene.camera, scene.medium, renderer.lights, cast)
-    return renderer.shade(renderer.shade_geometry, *arguments)
-
-
-def _shaded(groups: Sequence[FrameRenderer], cast: Cast, before: int) -> tuple[Any, ...]:
-    """Return the surfaces of groups of lights, of which some came `before`; None for those that are not kept."""
-    kept = max(_MOST_KEPT - before, 0)
-    return tuple(run_shade(group, cast) if number < kept else None for number, group in enumerate(groups))
-
-
-def run_cull(renderer: FrameRenderer, state, distance: Metres):
-    """Run the stage that sorts by tiles, for rays up to a `distance` [m], and return its lists."""
-    if renderer.groups is not None:
-        groups = light_groups(renderer)
-        states = state or renderer.prepare(renderer.scene)
-        return tuple(
-            None if own is None else run_cull(group, own, distance) for group, own in zip(groups, states, strict=True)
-        )
-    scene = renderer.scene
-    return renderer.cull(renderer.pixel, scene.camera, scene.medium, renderer.lights, state, distance)
-
-
-def run_method(
-    renderer: FrameRenderer,
-    state,
-    cast: Cast,
-    by_light,
-    lists=None,
-    history: History | None = None,
-    carried: Any = None,
-) -> tuple[PerRay, PerRay | None, Mapping[str, PerRay] | None, History | None, Any]:
-    """Run the stages of the method, and return what they do, not evaluated.
-
-    Parameters
-    ----------
-    renderer, state
-        The stages, and what their `prepare` returned.
-    cast, by_light
-        From `run_cast_and_shade`.
-    lists
-        From `run_cull`; None to run that too.
-    history
-        What the last frame returned, for passes; None for the first.
-    carried
-        What the method handed on from the last frame; None for the first.
-
-    Returns
-    -------
-    airlight
-        In-scattered radiance [W/(m^2 sr)].
-    surface
-        What is seen through it [W/(m^2 sr)]; None where that is the shaded surface as it is.
-    extra
-        Further layers by their names; None where nobody asks for them.
-    history
-        For the next frame; None where the method has no passes.
-    carried
-        For the next frame; None where the method hands nothing on.
-    """
-    if renderer.groups is not None:
-        groups = light_groups(renderer)
-        if renderer.groups.at_once:
-            only = None if lists is None else lists[0]
-            own = state[0] if state else groups[0].prepare(groups[0].scene)
-            airlight, surface, *left = run_method(groups[0], own, cast, by_light[0], only, history, carried)
-            return airlight, by_light[0][0] if surface is None else surface, *left
-        return *_summed(groups, state, cast, by_light, lists), None, None, None
-    scene, pixel = renderer.scene, renderer.pixel
-    if lists is None:
-        lists = run_cull(renderer, state, cast.distance)
-    shown = pixel, scene.camera, scene.medium, renderer.lights
-    inputs = state, lists, cast.distance, by_light, renderer.tables, renderer.corners
-    last = (None, carried) if renderer.carries else ()
-    layers, extra = renderer.render(renderer.geometry, *shown, *inputs, *last), None
-    if renderer.extra_layers:
-        layers, extra = layers
-    if renderer.carries:
-        layers, carried = layers
-    if renderer.passes is None:
-        return *layers, extra, None, carried
-    geometry = scene.geometry if scene.facets is None else None
-    place = geometry, scene.facets, pixel, renderer.lane, scene.camera, scene.medium
-    airlight, surface, layers, g_buffer = renderer.passes(*place, cast, by_light, layers, history)
-    return airlight, surface, extra, History(layers, g_buffer, scene.camera), carried
-
-
-def _summed(groups: Sequence[FrameRenderer], states, cast: Cast, by_light, lists) -> tuple[PerRay, PerRay]:
-    """Return airlight and surface of all groups of lights."""
-    sums, beyond = no_light(groups[0].scene, dr.width(cast.distance)), None
-    for number, group in enumerate(groups):
-        shaded = by_light[number] if by_light[number] is not None else run_shade(group, cast)
-        state = states[number] if states and states[number] is not None else group.prepare(group.scene)
-        own = lists[number] if lists is not None and lists[number] is not None else None
-        if own is None:
-            own = run_cull(group, state, cast.distance)
-        sums, more = run_group(group, sums, state, own, cast, shaded)
-        if number == 0:
-            beyond = more
-    airlight, surface = sums
-    return airlight, surface if beyond is None else surface + beyond
-
-
-def run_group(
-    renderer: FrameRenderer, sums: tuple[PerRay, PerRay], state, lists, cast: Cast, by_light
-) -> tuple[tuple[PerRay, PerRay], PerRay | None]:
-    """Run the method for one group of lights.
-
-    Parameters
-    ----------
-    renderer
-        Of `light_groups`.
-    sums
-        Airlight and surface of the groups before it [W/(m^2 sr)].
-    state, lists, cast, by_light
-        See `run_method`.
-
-    Returns
-    -------
-    sums
-        With this group's, evaluated.
-    beyond
-        What is seen behind all media, of no light; None where there is nothing.
-    """
-    scene = renderer.scene
-    shown = renderer.pixel, scene.camera, scene.medium, renderer.lights
-    inputs = state, lists, cast.distance, by_light, renderer.tables, renderer.corners
-    airlight, surface, beyond = renderer.render(renderer.geometry, *shown, *inputs, sums)
-    dr.eval(airlight, surface, beyond)
-    return (airlight, surface), beyond
-
-
-def no_light(scene: Scene, width: int) -> tuple[PerRay, PerRay]:
-    """Return airlight and surface without any light, for `width` rays."""
-    airlight, surface = (dr.zeros(type(scene.medium.albedo), width) for _ in range(2))
-    dr.make_opaque(airlight, surface)
-    return airlight, surface
-
-
-def _no_state(scene: Scene) -> tuple[()]:
-    return ()
-
-
-def _no_lists(*place) -> tuple[()]:
-    return ()
 
 
 def _colour(renderer: FrameRenderer, values):

@@ -7,6 +7,5 @@ closed where it ends, and closed intervals are integrated and added up.
 
 Read in this order:
 
-- `lit_intervals.py`: the state of a ray between boundaries, what a boundary does to it, the sum, the end of the ray.
-- `nearest_crossings.py`: a queue of the nearest crossings in registers.
+- `lit_intervals.py`: the state of a ray between boundaries, the sum, and a queue that puts boundaries in order.
 """

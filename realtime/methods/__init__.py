@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The methods under test, each a record of its stages, and a user's own.
+"""The methods under test, each a class with its parameters, and a user's own.
 
 A method answers one question: which radiance do the lit media scatter into each camera ray? `unshadowed` and
 `ray_march` are one file each; what needs more has a folder, and none of these imports another.
@@ -10,7 +10,7 @@ Read in this order:
 - `ray_march.py`: the baseline, steps with a visibility test each.
 - `cloud_octaves.py`: clouds as engines render them.
 - `cloud_collectors.py`: light of many orders in clouds, from where it enters them.
-- `registry.py`: the records by name, and how a name becomes a record.
-- `user_method.py`: a user's plain function or record, made a method with its errors named.
+- `registry.py`: the methods by name, and how a name becomes a method.
+- `user_method.py`: a user's plain function or class, made a method with its errors named.
 - `user_result.py`: what that returned, checked.
 """

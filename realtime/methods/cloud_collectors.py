@@ -60,24 +60,21 @@ from realtime.clouds.light_maps.pyramid import (
     maps_memory,
     shade,
 )
-from realtime.clouds.order_layers import OPACITY, order_layer
+from realtime.clouds.order_layers import OPACITY, ORDER_LAYERS, order_layer
 from realtime.clouds.single_scattering.behind import light_on_surfaces, sky_behind
 from realtime.clouds.single_scattering.march import Beam, CloudRays, cloud_rays
 from realtime.clouds.single_scattering.opacity import opacity_of
 from realtime.clouds.uniform_sky.light import SkyEscapes, beams_of, sky_escapes, sky_light
 from realtime.memory import check_memory
-from realtime.methods.interface.layers import Layers
-from realtime.methods.interface.method import ErrorCause
+from realtime.methods.interface.method import Layers, Method, tolerance
 from realtime.methods.interface.view import View
 from realtime.numerics.array_types import types_of
 from realtime.numerics.recorded import Frozen
-from realtime.parameters import Parameters, parameter
+from realtime.parameters import parameter
 from realtime.scene.medium import Clouds
 from realtime.scene.named_shapes import scene_of
 from realtime.scene.read_scene import Scene
 from realtime.shadow_maps.shadow_map import map_size
-from realtime.tiles.adaptive_sampling import tolerance
-from realtime.tiles.layout import Layout
 
 _HALF = 0.5  #: of the density, as printed
 #: N0 pi r_e^2 over the extinction by Mie's theory, for the droplets of the paper.
@@ -85,8 +82,19 @@ _PRINTED_EXTINCTION = 0.0452 / 0.0363
 
 
 @dataclass(frozen=True)
-class CollectorParameters(Parameters):
-    """The parameters of the collector method."""
+class CloudCollectors(Method):
+    """The light of clouds along every ray, by order of scattering."""
+
+    name = "cloud-collectors"
+    summary = "clouds: light of all orders from where it enters them, found by light maps and the transport of a slab"
+    source = "Bouthors, Neyret, Max, Bruneton, Crassin 2008"
+    renders_clouds = True
+    layers = (*ORDER_LAYERS, OPACITY)
+    prepared_from = frozenset({"geometry", "light"})
+    uses_kernel = False
+    casts_rays = True
+    provides_visibility = True
+    by_rays = True
 
     iterations: int = parameter(10, "steps of a search at most", least=1, most=1000)
     start: str = parameter(
@@ -157,6 +165,39 @@ class CollectorParameters(Parameters):
     map: int = map_size(256, "texels on a side of the maps of a sun")
     tolerance: float = tolerance()
 
+    @property
+    def carries(self):
+        """Frames hand their collectors on."""
+        return self.start == "previous"
+
+    @property
+    def at_once(self):
+        """Collectors are handed on for all suns together."""
+        return self.carries
+
+    def preparation(self, scene):
+        """Return what makes the light maps of a frame; tables and boundaries are made here, once.
+
+        Raises
+        ------
+        InputError
+            If the maps need more memory than the machine has.
+        """
+        return _preparation(scene, self)
+
+    def render(self, view, state, kernel):
+        """Return the layers of every ray."""
+        return _collected(view, state, self)
+
+    def error_causes(self, size):
+        """Return the causes of its errors, see `Method.error_causes`."""
+        return (
+            ("resolution", {"tolerance": 0.0}),
+            ("map", {"map": 2048}),
+            ("search", {"iterations": 40}),
+            ("slab", None),
+        )
+
 
 @dataclass(frozen=True)
 class Filling:
@@ -190,19 +231,7 @@ class _Entry:
     there: Any  #: whether there is one before the visible surface
 
 
-def carries(parameters: CollectorParameters) -> bool:
-    """Return whether frames hand their collectors on."""
-    return parameters.start == "previous"
-
-
-def prepare_collectors(scene: Scene, parameters: CollectorParameters) -> Callable[[Scene], CloudState]:
-    """Return the function that makes the light maps of a frame; tables and boundaries are made here, once.
-
-    Raises
-    ------
-    InputError
-        If the maps need more memory than the machine has.
-    """
+def _preparation(scene: Scene, parameters: CloudCollectors) -> Callable[[Scene], CloudState]:
     filled, clouds = scene.medium.clouds, len(scene.boundaries)
     assert filled is not None
     suns = beams_of(scene.lights, parameters.sky, filled)
@@ -252,7 +281,7 @@ def prepare_collectors(scene: Scene, parameters: CollectorParameters) -> Callabl
     return state
 
 
-def _fillings(scene: Scene, parameters: CollectorParameters) -> tuple[tuple[Filling, ...], tuple[Any, ...]]:
+def _fillings(scene: Scene, parameters: CloudCollectors) -> tuple[tuple[Filling, ...], tuple[Any, ...]]:
     """Return what clouds are filled with, each phase function and albedo once, and `CloudState.left`."""
     clouds = scene.medium.clouds
     assert clouds is not None
@@ -284,25 +313,8 @@ def _fillings(scene: Scene, parameters: CollectorParameters) -> tuple[tuple[Fill
     return tuple(fillings), lefts
 
 
-def collector_errors(parameters: CollectorParameters, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
-    """Return the causes of its errors, as `realtime.methods.interface.method.Method.error_causes` has them."""
-    return ("resolution", {"tolerance": 0.0}), ("map", {"map": 2048}), ("search", {"iterations": 40}), ("slab", None)
-
-
-def cloud_collectors(view: View, state: CloudState, lists, *, kernel, parameters: CollectorParameters) -> Layers:
-    """Return the light of clouds along every ray [W/(m^2 sr)].
-
-    Parameters
-    ----------
-    view
-        The frame.
-    state
-        From `prepare_collectors`.
-    lists, kernel
-        Not used.
-    parameters
-        Values of the parameters.
-    """
+def _collected(view: View, state: CloudState, parameters: CloudCollectors) -> Layers:
+    """Return the light of clouds along every ray [W/(m^2 sr)]."""
     Color = type(view.medium.albedo)
     rays, thin_rays = _rays(view, state, parameters)
     by_set, kept = [_scattered_once(view, state, thin_rays, parameters), *(Color(0) for _ in SETS)], []
@@ -321,16 +333,16 @@ def cloud_collectors(view: View, state: CloudState, lists, *, kernel, parameters
     layers = _with_opacity(view, state, rays, sum(by_set), opacity)
     names = (order_layer(first) for first in (1, *(int(first) for first, _ in SETS)))
     extra = dict(zip(names, by_set)) | {OPACITY: opacity} if view.extra_layers else None
-    return replace(layers, extra=extra, carried=tuple(kept) if carries(parameters) else None)
+    return replace(layers, extra=extra, carried=tuple(kept) if parameters.carries else None)
 
 
-def _suns(view: View, parameters: CollectorParameters) -> list[int]:
+def _suns(view: View, parameters: CloudCollectors) -> list[int]:
     """Return the numbers of the lights that shine from one direction."""
     assert view.medium.clouds is not None
     return beams_of(view.lights, parameters.sky, view.medium.clouds)
 
 
-def _rays(view: View, state: CloudState, parameters: CollectorParameters) -> tuple[CloudRays, CloudRays]:
+def _rays(view: View, state: CloudState, parameters: CloudCollectors) -> tuple[CloudRays, CloudRays]:
     """Return camera rays through clouds as dense as they are, and through those without the peak."""
     assert view.medium.clouds is not None
     clouds = _as_dense(view.medium.clouds, parameters)
@@ -365,7 +377,7 @@ def _entry(view: View, state: CloudState, rays: CloudRays) -> _Entry:
     return _Entry(view.origin + view.direction * dr.select(there, begin, 0), first.cloud, there)
 
 
-def _scattered_once(view: View, state: CloudState, thin_rays: CloudRays, parameters: CollectorParameters) -> Any:
+def _scattered_once(view: View, state: CloudState, thin_rays: CloudRays, parameters: CloudCollectors) -> Any:
     """Return order 1, a colour [W/(m^2 sr)]."""
     beams = [_beam(view, state, thin_rays.clouds, number, parameters) for number in _suns(view, parameters)]
     once = light_once(
@@ -374,7 +386,7 @@ def _scattered_once(view: View, state: CloudState, thin_rays: CloudRays, paramet
     return sum((radiance for (radiance,) in once), type(view.medium.albedo)(0))
 
 
-def _opacity(view: View, state: CloudState, rays: CloudRays, parameters: CollectorParameters) -> Any:
+def _opacity(view: View, state: CloudState, rays: CloudRays, parameters: CloudCollectors) -> Any:
     """Return the opacity, a colour."""
     if parameters.opacity == "printed":
         return opacity_as_printed(
@@ -396,7 +408,7 @@ def _with_opacity(view: View, state: CloudState, rays: CloudRays, in_scattered: 
     )
 
 
-def _as_dense(clouds: Clouds, parameters: CollectorParameters) -> Clouds:
+def _as_dense(clouds: Clouds, parameters: CloudCollectors) -> Clouds:
     """Return clouds as dense as they are, or as eq. 4 makes them."""
     if parameters.kappa == "mie":
         return clouds
@@ -411,7 +423,7 @@ def _without_peak(clouds: Clouds, state: CloudState) -> Clouds:
     return replace(clouds, sigma_t=sigma_t, albedo=type(clouds.albedo)(*albedo))
 
 
-def _beam(view: View, state: CloudState, clouds: Clouds, number: int, parameters: CollectorParameters) -> Beam:
+def _beam(view: View, state: CloudState, clouds: Clouds, number: int, parameters: CloudCollectors) -> Beam:
     """Return a sun as points in clouds see it that scatter once."""
     light, sun = view.lights[number], state.maps[number]
     Float = type(view.distance)
@@ -439,8 +451,7 @@ def _many_times(
 ) -> OrdersLight:
     """Return the light of the sun of a number that was scattered twice and more, for unit irradiance [1/sr].
 
-    Its sets are colours; `collectors` are by channel and filling what the next frame takes as `last`. In an
-    interpolated frame, those of the corners of tiles go on for all their pixels.
+    Its sets are colours; `collectors` are by channel and filling what the next frame takes as `last`.
     """
     Float, Color = type(view.distance), type(view.medium.albedo)
     search = Search(
@@ -476,7 +487,6 @@ def _many_times(
                 behind=rays.depths[channel],
                 search=search,
                 last=None if last is None else last[channel][len(of_channel)],
-                place=view.tile if view.layout is Layout.SOME else None,
                 active=filled,
             )
             lit = [_reaching(view, of_sun, own, entry, sun, collector) for collector in light.collectors]

@@ -31,9 +31,9 @@ from realtime.clouds.single_scattering.march import Beam, cloud_rays, exact_leg
 from realtime.clouds.single_scattering.opacity import opacity_of
 from realtime.clouds.uniform_sky.light import SkyEscapes, beams_of, sky_escapes, sky_light
 from realtime.errors import InputError
-from realtime.methods.interface.layers import Layers
+from realtime.methods.interface.method import Layers, Method
 from realtime.methods.interface.view import View
-from realtime.parameters import Parameters, parameter
+from realtime.parameters import parameter
 from realtime.scene.density import Density
 from realtime.scene.lights import Light
 from realtime.scene.medium import Clouds
@@ -57,8 +57,24 @@ def _check_phase(words: Any) -> None:
 
 
 @dataclass(frozen=True)
-class CloudOctavesParameters(Parameters):
-    """The parameters of octaves."""
+class CloudOctaves(Method):
+    """The light of clouds by octaves, their opacity, and how much they attenuate the light on surfaces.
+
+    References
+    ----------
+    Wrenninge, Kulla, Lundqvist 2013, *Oz: the great and volumetric*, SIGGRAPH talks. Hillaire 2016, *Physically based
+    sky, atmosphere and cloud rendering in Frostbite*, SIGGRAPH course, section 5.6.
+    """
+
+    name = "cloud-octaves"
+    summary = "clouds: single scattering that is extinguished less with every octave, what engines do"
+    source = "Wrenninge 2013; Hillaire 2016"
+    renders_clouds = True
+    layers = (*ORDER_LAYERS, OPACITY)
+    prepared_from = frozenset({"geometry", "light"})
+    uses_kernel = False
+    casts_rays = True
+    provides_visibility = True
 
     octaves: int = parameter(8, "how many", least=1, most=31)
     extinction: float = parameter(0.5, "a: times the depth of the leg, with every octave", above=0, most=1)
@@ -84,6 +100,14 @@ class CloudOctavesParameters(Parameters):
     single: str = parameter("corrected", "equation 1 of Bouthors 2008", choices=("corrected", "printed"))
     opacity: str = parameter("corrected", "equation 2 of Bouthors 2008", choices=("corrected", "printed"))
 
+    def preparation(self, scene):
+        """Return what makes the state of a frame."""
+        return _preparation(scene, self)
+
+    def render(self, view, state, kernel):
+        """Return the layers of every ray."""
+        return _octaves(view, state, self)
+
 
 @dataclass(frozen=True)
 class OctaveState:
@@ -100,7 +124,7 @@ class OctaveState:
     escapes: SkyEscapes | None = None  #: where there is a sky that is no beam
 
 
-def prepare_cloud_octaves(scene: Scene, parameters: CloudOctavesParameters) -> Callable[[Scene], OctaveState]:
+def _preparation(scene: Scene, parameters: CloudOctaves) -> Callable[[Scene], OctaveState]:
     """Return the function that makes the state of a frame."""
     clouds = scene.medium.clouds
     assert clouds is not None  # `realtime.frame.renderer` refuses the others
@@ -131,25 +155,8 @@ def prepare_cloud_octaves(scene: Scene, parameters: CloudOctavesParameters) -> C
     return with_depths
 
 
-def cloud_octaves(view: View, state: OctaveState, lists, *, kernel, parameters: CloudOctavesParameters) -> Layers:
-    """Return the light of clouds by octaves, their opacity, and how much they dim the light on surfaces.
-
-    Parameters
-    ----------
-    view
-        The frame.
-    state
-        From `prepare_cloud_octaves`.
-    lists, kernel
-        Not used.
-    parameters
-        Values of the parameters.
-
-    References
-    ----------
-    Wrenninge, Kulla, Lundqvist 2013, *Oz: the great and volumetric*, SIGGRAPH talks. Hillaire 2016, *Physically based
-    sky, atmosphere and cloud rendering in Frostbite*, SIGGRAPH course, section 5.6.
-    """
+def _octaves(view: View, state: OctaveState, parameters: CloudOctaves) -> Layers:
+    """Return the layers of every ray."""
     clouds, surfaces = view.medium.clouds, state.surfaces
     assert clouds is not None
     Color = type(clouds.albedo)
@@ -197,14 +204,14 @@ def mean_cosine(phase: Phase, Float: Any) -> float:
     return float(share @ np.cos(angle) / share.sum())
 
 
-def _phases(clouds: Clouds, parameters: CloudOctavesParameters, Float: Any) -> tuple[Phase, ...]:
+def _phases(clouds: Clouds, parameters: CloudOctaves, Float: Any) -> tuple[Phase, ...]:
     """Return the phase functions of octave 0."""
     if parameters.phase == "scene":
         return clouds.phases
     return (named_phase(parameters.phase, Float=Float),) * len(clouds.phases)
 
 
-def _beam(view: View, state: OctaveState, number: int, parameters: CloudOctavesParameters) -> Beam:
+def _beam(view: View, state: OctaveState, number: int, parameters: CloudOctaves) -> Beam:
     """Return a light with the depths of its legs and its phase functions by octave."""
     clouds, surfaces, light = view.medium.clouds, state.surfaces, view.lights[number]
     assert clouds is not None

@@ -24,32 +24,38 @@ integrand, so on a ray without shadows the sum is that of the kernel with any N.
 at most: the order is 1. The paper starts at the farthest sample; the sum is the same from either end.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
 from realtime.errors import InputError
 from realtime.intervals.lit_intervals import add_waiting, close_interval, no_intervals, sum_at_end
-from realtime.memory import check_memory
-from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
-from realtime.methods.interface.marching import OPTICAL_REACH, equal_angles, marched_integral, within
-from realtime.methods.interface.method import ErrorCause
-from realtime.methods.interface.view import View, bounded_radiance, radiance, rays_in_media
-from realtime.parameters import Parameters, parameter
-from realtime.scene.medium import least_extinction
-from realtime.scene.read_scene import Scene
-from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, lit_in_map, map_memory, map_size
-from realtime.tiles.adaptive_sampling import tolerance
+from realtime.methods.interface.marching import marched_integral, marched_steps
+from realtime.methods.interface.method import Method, tolerance
+from realtime.parameters import parameter
+from realtime.shadow_maps.shadow_map import cast_shadow_map, check_maps, lit_in_map, map_size
 
 _DUE = 3  # in the last bits of a step's number: there an interval that has ended is integrated
 
 
 @dataclass(frozen=True)
-class RayMarchParameters(Parameters):
-    """The parameters of ray marching."""
+class RayMarch(Method):
+    """Airlight by steps along each ray.
+
+    References
+    ----------
+    Billeter, Sintorn, Assarsson 2010, section 6 (the marcher that they compare with). Kulla, Fajardo 2012, *Importance
+    sampling techniques for path tracing in participating media*, section 4 (the equi-angular variable).
+    """
+
+    name = "ray-march"
+    summary = "midpoint steps with one visibility test each: the baseline to beat"
+    source = "Billeter, Sintorn, Assarsson 2010, section 2; Kulla and Fajardo 2012 (equi-angular steps)"
+    prepared_from = frozenset({"geometry", "light"})
+    by_rays = True
 
     steps: int = parameter(100, "steps of every ray and light", least=1)
     spacing: str = parameter(
@@ -66,104 +72,59 @@ class RayMarchParameters(Parameters):
     map: int = map_size(512, "texels on a side of a face of the map, with `shadow=map`")
     tolerance: float = tolerance()
 
+    @property
+    def uses_kernel(self):
+        """Runs of lit steps are integrated by a kernel."""
+        return self.sum == "transitions"
 
-def ray_march(view: View, state, lists, *, kernel, parameters: RayMarchParameters) -> Layers:
-    """Return the airlight of every ray by marching [W/(m^2 sr)].
+    @property
+    def casts_rays(self):
+        """Shadow rays are cast from the steps."""
+        return self.shadow == "ray"
 
-    Parameters
-    ----------
-    view
-        The frame.
-    state
-        From `prepare_maps`.
-    lists
-        Not used.
-    kernel
-        An airlight kernel for `sum=transitions`, see `realtime.kernels`; otherwise each step evaluates the integrand.
-    parameters
-        Values of the parameters.
+    def check(self, scene):
+        """Refuse maps that have no room, and uniform steps on an endless ray through a vacuum."""
+        if self.spacing == "uniform" and scene.features.vacuum and not scene.medium.clear:
+            raise InputError(
+                "spacing=uniform: an endless ray through a vacuum has no step length; use spacing=equiangular"
+            )
+        if self.shadow == "map" and scene.features.shadows:
+            check_maps(scene.lights, self.map)
 
-    Raises
-    ------
-    InputError
-        For uniform steps on an endless ray through a vacuum.
+    def prepare(self, scene, light):
+        """Return the shadow map of a light, if it is asked for."""
+        return cast_shadow_map(scene.geometry, light, self.map) if self.shadow == "map" else ()
 
-    References
-    ----------
-    Billeter, Sintorn, Assarsson 2010, section 6 (the marcher that they compare with). Kulla, Fajardo 2012, *Importance
-    sampling techniques for path tracing in participating media*, section 4 (the equi-angular variable).
-    """
-    steps, spacing = parameters.steps, parameters.spacing
-    if spacing == "uniform" and view.features.vacuum and not view.medium.clear:
-        raise InputError("spacing=uniform: an endless ray through a vacuum has no step length; use spacing=equiangular")
-    total = type(view.medium.albedo)(0)
-    asked = kernel if parameters.sum == "transitions" else None
-    in_media = rays_in_media(view, kernel=asked) if view.features.bounded else ()
-    for number, light in enumerate(view.lights):
-        media = in_media[number] if in_media else None
-        lit = _visibility(view, state, number, parameters.shadow)
-        if parameters.sum == "transitions":
-            airlight = ray_airlight(view, light, kernel, media)
-            total += airlight.radiance(_lit_runs(airlight, steps=steps, spacing=spacing, lit=lit))
-            continue
-        integral = marched_integral(view, light, media, steps=steps, spacing=spacing, lit=lit)
-        total += bounded_radiance(light, integral) if media else radiance(view.medium, light, integral)
-    return Layers(total)
+    def airlight(self, view, light, state, kernel):
+        """Return the airlight of every ray by marching [W/(m^2 sr)]."""
+        airlight = ray_airlight(view, light, kernel if self.uses_kernel else None)
+
+        def lit(point):
+            if self.shadow == "none" or not view.features.shadows:
+                return True
+            return lit_in_map(state, light, point) if self.shadow == "map" else view.visible(point, light)
+
+        if self.sum == "transitions":
+            return airlight.radiance(_lit_runs(airlight, steps=self.steps, spacing=self.spacing, lit=lit))
+        return airlight.radiance(marched_integral(airlight, steps=self.steps, spacing=self.spacing, lit=lit))
+
+    def error_causes(self, size):
+        """Return the causes of its errors, see `Method.error_causes`."""
+        without = "shadows" if self.shadow == "none" else "map"
+        return ("resolution", {"tolerance": 0.0}), (without, {"shadow": "ray"}), ("steps", None)
 
 
-def prepare_maps(scene: Scene, parameters: RayMarchParameters) -> Callable[[Scene], tuple[ShadowMap, ...]]:
-    """Return the function that casts a shadow map for every light of a frame, if they are asked for.
-
-    Raises
-    ------
-    InputError
-        If the maps need more memory than the machine has.
-    """
-    map = parameters.map
-    if parameters.shadow != "map" or not scene.features.shadows:
-        return lambda scene: ()
-    needed = sum(map_memory(light, map) for light in scene.lights)
-    check_memory(f"map: {map} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
-    return lambda scene: tuple(cast_shadow_map(scene.geometry, light, map) for light in scene.lights)
-
-
-def marching_errors(parameters: RayMarchParameters, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
-    """Return the causes of its errors, as `realtime.methods.interface.method.Method.error_causes` has them."""
-    without = "shadows" if parameters.shadow == "none" else "map"
-    return ("resolution", {"tolerance": 0.0}), (without, {"shadow": "ray"}), ("steps", None)
-
-
-def _visibility(view: View, maps, number: int, shadow: str):
-    """Return the function that says whether the light of a number reaches a point."""
-    light = view.lights[number]
-    if shadow == "none" or not view.features.shadows:
-        return lambda point: True
-    if shadow == "map":
-        return lambda point: lit_in_map(maps[number], light, point)
-    return lambda point: view.visible(point, light)
-
-
-def _lit_runs(airlight: RayAirlight, *, steps: int, spacing: str, lit):
+def _lit_runs(airlight: RayAirlight, *, steps: int, spacing: str, lit) -> Any:
     """Integrate the runs of cells whose middles are lit."""
-    view, light, geometry, media = airlight.view, airlight.light, airlight.geometry, airlight.media
+    view = airlight.view
     Float, lanes = type(view.distance), dr.width(view.distance)
-    x0, x1 = airlight.segment
-    if media and view.medium.clear:
-        x0, x1 = within(media, x0, x1)
-    elif spacing == "uniform":
-        x1 = dr.minimum(x1, x0 + OPTICAL_REACH / least_extinction(view.medium))
-    uniform = spacing == "uniform" or not light.w
-    angles = None if uniform else equal_angles(geometry.foot, geometry.height, x0, x1)
-    meets = x1 > x0  # rays that miss all bodies march on the spot, where a map can be asked
-    begin = dr.select(meets, angles.begin if angles else x0, 0)
-    width = dr.select(meets, ((angles.end if angles else x1) - begin) / steps, 0)
-
-    def place(u):
-        return angles.place(u) if angles else u
+    cells = marched_steps(airlight, steps, spacing)
+    meets = cells.width > 0  # rays that miss all bodies march on the spot, where a map can be asked
+    x0, x1 = cells.x0, cells.x1
 
     def step(index, was_lit, opened, intervals):
-        border = dr.select(index == 0, x0, dr.maximum(place(dr.fma(Float(index), width, begin)), x0))
-        x = place(dr.fma(Float(index) + 0.5, width, begin))
+        border = dr.select(index == 0, x0, dr.maximum(cells.place(dr.fma(Float(index), cells.width, cells.begin)), x0))
+        x = cells.place(dr.fma(Float(index) + 0.5, cells.width, cells.begin))
         now = meets & lit(view.origin + view.direction * x)
         closes = was_lit & ~now
         intervals = add_waiting(intervals, airlight.integral, closes | ((index & _DUE) == _DUE))

@@ -1,25 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Airlight without volumetric shadows: one integral from the camera to the visible surface, for each light."""
 
-from realtime.kernels.registry import airlight_integral
-from realtime.methods.interface.layers import Layers
-from realtime.methods.interface.view import View, bounded_radiance, radiance, rays_in_media
-from realtime.parameters import Parameters
-from realtime.rays.ray_light import ray_geometry
+from dataclasses import dataclass
+
+from realtime.methods.interface.light_airlight import ray_airlight
+from realtime.methods.interface.method import Method
 
 
-def unshadowed(view: View, *, kernel):
-    """Return the airlight of every ray as if nothing cast a shadow [W/(m^2 sr)].
+@dataclass(frozen=True)
+class Unshadowed(Method):
+    """Airlight as if nothing cast a shadow.
 
-    Parameters
-    ----------
-    view
-        The frame.
-    kernel
-        An airlight kernel, see `realtime.kernels`.
-
-    Notes
-    -----
     Valid for any scene without occluders between a light and a visible part of the medium; elsewhere it shows how much
     light the volumetric shadows take away. Bounded media have nodes of their own, but for a polynomial kernel.
 
@@ -27,18 +18,22 @@ def unshadowed(view: View, *, kernel):
     ----------
     Biri, Arques, Michelin 2006, eq. 2. Sun, Ramamoorthi, Narasimhan, Nayar 2005.
     """
-    total = type(view.medium.albedo)(0)
-    start = type(view.distance)(0)
-    if view.features.bounded:
-        rays = rays_in_media(view, kernel=kernel)
-        return sum(bounded_radiance(ray.light, ray.airlight(start, view.distance)) for ray in rays)
-    for light in view.lights:
-        geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
-        integral = airlight_integral(kernel, geometry, start, view.distance, medium=view.medium, light=light)
-        total += radiance(view.medium, light, integral)
-    return total
+
+    name = "unshadowed"
+    summary = "one airlight integral a ray and light, no volumetric shadows"
+    source = "Biri, Arques, Michelin 2006, section 4.1; Sun et al. 2005"
+    shadows = False
+
+    def airlight(self, view, light, state, kernel):
+        """Return the airlight of every ray as if nothing cast a shadow [W/(m^2 sr)]."""
+        airlight = ray_airlight(view, light, kernel)
+        return airlight.radiance(airlight.integral(type(view.distance)(0), view.distance))
+
+    def error_causes(self, size):
+        """Return shadows, which nothing takes away."""
+        return (("shadows", None),)
 
 
-def render_unshadowed(view: View, state, lists, *, kernel, parameters: Parameters) -> Layers:
-    """Return `unshadowed` as the layers of a method."""
-    return Layers(unshadowed(view, kernel=kernel))
+def unshadowed(view, *, kernel):
+    """Return the airlight of all lights of a view as if nothing cast a shadow, for a user's function [W/(m^2 sr)]."""
+    return Unshadowed().render(view, (), kernel).in_scattered

@@ -15,66 +15,108 @@ import inspect
 import os
 import sys
 import traceback
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import field, make_dataclass, replace
+from dataclasses import dataclass, field, make_dataclass, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from realtime.errors import InputError, root_of
-from realtime.methods.interface.layers import Layers
-from realtime.methods.interface.method import Method, always, never
+from realtime.methods.interface.method import Layers, Method, no_state, tolerance
 from realtime.methods.user_result import checked_layers, checked_radiance
-from realtime.parameters import Parameters, values
-from realtime.tiles.adaptive_sampling import tolerance
+from realtime.parameters import values
 
 _WANTED = "wanted 'module:function' or 'path/to/file.py:function'"
 _TYPES = (bool, int, float, str)
 
 
-def own_method(name: str) -> Method:
-    """Return the record of a user's own method.
+def user_method(name: str) -> type[Method]:
+    """Return a user's own method.
 
     Parameters
     ----------
     name
         'module:function', the current folder first on the path, or 'path/to/file.py:function'. The object may also be a
-        `Method`, for all that an attribute cannot say; it is taken as it is, and what it returns is checked.
+        class derived from `Method`; what it returns is checked.
 
     Raises
     ------
     InputError
         For what cannot be imported, is not there or is no function, and a function that no frame can call.
     """
-    named_object = user_object(name, "method")
-    if isinstance(named_object, Method):
-        return replace(
-            named_object,
-            render=_guarded_render(named_object.render, name, provides_visibility=named_object.provides_visibility),
-            name=name,
+    found = user_object(name, "method")
+    if isinstance(found, type) and issubclass(found, Method):
+        return _guarded(found, name)
+    if isinstance(found, type) or not callable(found):
+        kind = "class" if isinstance(found, type) else type(found).__name__
+        raise InputError(
+            f"method {name}: this is a {kind}; wanted a function of the view, or a class of airlight.Method"
         )
-    if isinstance(named_object, type) or not callable(named_object):
-        kind = "class" if isinstance(named_object, type) else type(named_object).__name__
-        raise InputError(f"method {name}: this is a {kind}; wanted a function of the view")
-    takes_kernel, parameters = _signature(named_object, name)
+    return _of_function(found, name)
+
+
+def _of_function(function: Any, name: str) -> type[Method]:
+    """Return a plain function of the view as a method."""
+    takes_kernel, parameters = _signature(function, name)
     fields = [(key, type(default), field(default=default)) for key, default in parameters.items()]
-    by_rays = bool(getattr(named_object, "by_rays", False))
+    by_rays = bool(getattr(function, "by_rays", False))
     if by_rays:
         fields = [*(entry for entry in fields if entry[0] != "tolerance"), ("tolerance", float, tolerance())]
-    return Method(
-        name,
-        _guarded(named_object, name, takes_kernel=takes_kernel, takes=parameters),
-        _summary(named_object),
-        _file(named_object) or "one's own",
-        uses_kernel=always if takes_kernel else never,
-        prepare=_guarded_prepare(getattr(named_object, "prepare", None), name),
-        casts_rays=always,
-        frozen=always if getattr(named_object, "frozen", False) else never,
-        by_rays=always if by_rays else None,
-        shadows=bool(getattr(named_object, "shadows", True)),
-        parameters=make_dataclass("OwnParameters", fields, bases=(Parameters,), frozen=True),
-    )
+    prepare = getattr(function, "prepare", None)
+    if prepare is not None and not callable(prepare):
+        raise InputError(f"method {name}: its `prepare` is a {type(prepare).__name__}; wanted a function of the scene")
+
+    def preparation(self, scene):
+        if prepare is None:
+            return no_state
+        with user_errors(f"method {name}", _file(prepare)):
+            made = prepare(scene, **values(self))
+        if not callable(made):
+            raise InputError(
+                f"method {name}: `prepare` returned a {type(made).__name__}; wanted a function of the scene"
+            )
+
+        def run(now):
+            with user_errors(f"method {name}", _file(prepare)):
+                return made(now)
+
+        return run
+
+    def render(self, view, state, kernel):
+        given = {key: value for key, value in values(self).items() if key in parameters}
+        given |= {"kernel": kernel} if takes_kernel else {}
+        with user_errors(f"method {name}", _file(function)):
+            returned = function(replace(view, prepared=state), **given)
+        return Layers(checked_radiance(returned, view, name))
+
+    what = {
+        "name": name,
+        "summary": _summary(function),
+        "source": _file(function) or "one's own",
+        "uses_kernel": takes_kernel,
+        "casts_rays": True,
+        "frozen": bool(getattr(function, "frozen", False)),
+        "by_rays": by_rays,
+        "shadows": bool(getattr(function, "shadows", True)),
+        "preparation": preparation,
+        "render": render,
+    }
+    if not by_rays:
+        what["interpolated"] = 0.0  # a parameter of that name is the user's
+    return make_dataclass("UserMethod", fields, bases=(Method,), frozen=True, namespace=what)
+
+
+def _guarded(method: type[Method], name: str) -> type[Method]:
+    """Return a user's class with its errors named and its results checked."""
+    file = _file(method.render)
+
+    def render(self, view, state, kernel):
+        with user_errors(f"method {name}", file):
+            returned = method.render(self, view, state, kernel)
+        return checked_layers(returned, view, name, visibility=self.provides_visibility)
+
+    return dataclass(frozen=True)(type(method.__name__, (method,), {"name": name, "render": render}))
 
 
 def method_file(name: str) -> Path | None:
@@ -110,7 +152,7 @@ def user_object(name: str, kind: str) -> Any:
     if not module_name or not all(part.isidentifier() for part in path.split(".")):
         raise InputError(f"{kind}: got {name!r}, {_WANTED}")
     what = f"{kind} {name}"
-    with own_errors(what):
+    with user_errors(what):
         module = _from_file(Path(module_name), what) if _is_file(module_name) else _from_path(module_name, what)
     named_object: Any = module
     for part in path.split("."):
@@ -123,8 +165,8 @@ def user_object(name: str, kind: str) -> Any:
 
 
 def _is_candidate(value: Any, module: ModuleType) -> bool:
-    if isinstance(value, Method):
-        return True
+    if isinstance(value, type) and issubclass(value, Method):
+        return value.__module__ == module.__name__
     return inspect.isfunction(value) and value.__module__ == module.__name__ and not value.__name__.startswith("_")
 
 
@@ -199,60 +241,8 @@ def _signature(function: Callable[..., Any], name: str) -> tuple[bool, dict[str,
     return takes_kernel, parameters
 
 
-def _guarded(
-    function: Callable[..., Any], name: str, *, takes_kernel: bool, takes: Collection[str]
-) -> Callable[..., Layers]:
-    """Return a plain function as what renders a method, with its errors named and its result checked."""
-
-    def render(view, state, lists, *, kernel, parameters):
-        given = {key: value for key, value in values(parameters).items() if key in takes}
-        given |= {"kernel": kernel} if takes_kernel else {}
-        with own_errors(f"method {name}", _file(function)):
-            returned = function(replace(view, prepared=state), **given)
-        return Layers(checked_radiance(returned, view, name))
-
-    return render
-
-
-def _guarded_render(
-    function: Callable[..., Layers], name: str, *, provides_visibility: Callable[[Any], bool]
-) -> Callable[..., Layers]:
-    """Return what renders a record of the user's own, with its errors named and its result checked."""
-
-    def render(view, state, lists, *, kernel, parameters):
-        with own_errors(f"method {name}", _file(function)):
-            returned = function(view, state, lists, kernel=kernel, parameters=parameters)
-        return checked_layers(returned, view, name, visibility=provides_visibility(parameters))
-
-    return render
-
-
-def _guarded_prepare(prepare: Any, name: str) -> Callable[..., Any] | None:
-    """Return the preparation with its errors named."""
-    if prepare is None:
-        return None
-    if not callable(prepare):
-        raise InputError(f"method {name}: its `prepare` is a {type(prepare).__name__}; wanted a function of the scene")
-
-    def ready(scene, parameters):
-        with own_errors(f"method {name}", _file(prepare)):
-            made = prepare(scene, **values(parameters))
-        if not callable(made):
-            raise InputError(
-                f"method {name}: `prepare` returned a {type(made).__name__}; wanted a function of the scene"
-            )
-
-        def run(moved):
-            with own_errors(f"method {name}", _file(prepare)):
-                return made(moved)
-
-        return run
-
-    return ready
-
-
 @contextmanager
-def own_errors(what: str, file: str | None = None) -> Iterator[None]:
+def user_errors(what: str, file: str | None = None) -> Iterator[None]:
     """Turn any exception of the user's code into an `InputError` that says where it came from."""
     try:
         yield

@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.errors import InputError
-from realtime.methods.interface.layers import Layers
+from realtime.methods.interface.method import Layers
 from realtime.methods.interface.view import View
 
 _WANTED = "wanted the radiance of every pixel, an RGB colour or one number: a Dr.Jit array, or NumPy's (pixels, 3)"
@@ -64,7 +64,7 @@ def checked_layers(returned: Any, view: View, name: str, *, visibility: bool) ->
     """
     if not isinstance(returned, Layers):
         raise InputError(
-            f"method {name}: returned a {type(returned).__name__}; wanted realtime.methods.interface.layers.Layers"
+            f"method {name}: returned a {type(returned).__name__}; wanted realtime.methods.interface.method.Layers"
         )
     shares = 0 if returned.visibility is None else len(returned.visibility)
     wanted = len(view.lights) if visibility else 0

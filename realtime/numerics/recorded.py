@@ -4,6 +4,9 @@
 While Dr.Jit records a function, nothing may be freed that the device must be told of, and no object may vanish that
 virtual calls go over: a Mitsuba scene that is collected in the middle ends the process, or the recording fails. What is
 garbage then is collected after the call.
+
+What the function raises while it is recorded ends the recording as if it had returned nothing, and is raised behind it:
+Dr.Jit 1.5 answers an exception in a recording by aborting a later one.
 """
 
 import gc
@@ -17,17 +20,31 @@ class Frozen:
     """A function frozen by `drjit.freeze`, during whose calls nothing is collected."""
 
     def __init__(self, function: Callable[..., Any], **options):
-        self._recorded = dr.freeze(function, **options)
+        self._raised: Exception | None = None
+
+        def recorded(*args):
+            try:
+                return function(*args)
+            except Exception as error:
+                self._raised = error
+                return None
+
+        self._recorded = dr.freeze(recorded, **options)
 
     def __call__(self, *args):
         """Call the function: the first time it is recorded, then replayed."""
         enabled = gc.isenabled()
         gc.disable()
         try:
-            return self._recorded(*args)
+            result = self._recorded(*args)
         finally:
             if enabled:
                 gc.enable()
+        raised, self._raised = self._raised, None
+        if raised is not None:
+            self._recorded.clear()
+            raise raised
+        return result
 
     @property
     def n_recordings(self) -> int:

@@ -173,3 +173,16 @@ def falloff(geometry: RayGeometry, light: Light, x):
     cos, sin = light.cone.cos, dr.sqrt(light.cone.square_sin)
     within = dr.atan2(sin * along - cos * away, dr.fma(cos, along, sin * away))
     return dr.clip(within * light.inverse_transition, 0, 1)
+
+
+def profile(light: Light, point, away):
+    """Return the relative intensity of a light in unit directions `away` from it, to points [m]."""
+    if light.facing is not None:
+        return dr.maximum(dr.dot(light.normal, away), 0)
+    if light.cone is None:
+        return type(away.x)(1)
+    inside = dr.dot(light.axis, away) > light.cos_cutoff
+    if light.beam is None:
+        return dr.select(inside, type(away.x)(1), 0)
+    # The point lies at x = 0 of a ray that starts there.
+    return dr.select(inside, falloff(ray_geometry(point, away, light), light, type(away.x)(0)), 0)

@@ -27,6 +27,9 @@ import numpy as np
 from realtime.numerics.error_free import two_product, two_sum
 from realtime.numerics.host_numbers import host_numbers
 
+TILE = 16  #: rays in a tile of neighbouring pixels
+SIDE = 4  #: of a tile [pixels]
+
 
 @dataclass(frozen=True)
 class PixelGrid:
@@ -135,7 +138,7 @@ def resized_camera(camera: Camera, width: int, height: int) -> Camera:
     return replace(camera, width=width, height=height, left=left, up=up, left_low=left_low, up_low=up_low, grid=grid)
 
 
-def tiled_pixels(width: int, height: int, tile: int = 4):
+def tiled_pixels(width: int, height: int, tile: int = SIDE):
     """Return the pixel numbers (row times width + column) in square tiles, (width times height,), uint32.
 
     A packet of 16 lanes then covers 4 x 4 pixels, which Embree's coherent traversal rewards; 16 packets cover 16 x 16

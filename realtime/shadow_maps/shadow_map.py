@@ -13,6 +13,7 @@ Directions are computed in float64 and rounded once, to the float32 that rays ar
 closely meets the same surface whatever the precision of the method, and one map can stand for both.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +21,7 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.errors import InputError
+from realtime.memory import check_memory
 from realtime.numerics.array_types import bytes_of
 from realtime.parameters import parameter
 from realtime.scene.lights import Light
@@ -61,6 +63,12 @@ def map_memory(light: Light, size: int) -> int:
     """Return how much the distances of the shadow map of a light take [bytes]."""
     number = bytes_of(type(light.position.x))
     return number * light_faces(light) * (size + 1) ** 2
+
+
+def check_maps(lights: Sequence[Light], size: int, needed: int | None = None) -> None:
+    """Refuse maps of some lights that need more memory than the machine has; `needed` bytes, or what distances take."""
+    needed = sum(map_memory(light, size) for light in lights) if needed is None else needed
+    check_memory(f"map: {size} texels for {len(lights)} light(s)", needed, "use a smaller map")
 
 
 def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:

@@ -346,13 +346,13 @@ def _animation(
         moves=tuple(animation.moves),
         move_ms=moving,
         render_ms=rendering,
-        recordings={stage: getattr(getattr(renderer, stage), "n_recordings", 0) for stage in STAGES},
+        recordings={stage: getattr(getattr(renderer.stages, stage), "n_recordings", 0) for stage in STAGES},
         device=variant,
         files=tuple(str(_numbered(path, number, frames)) for path in files for number in range(1, frames + 1)),
     )
 
 
-STAGES = ("surface", "shade", "cull", "render", "passes")  #: the frozen functions of a `FrameRenderer`
+STAGES = ("surface", "shade", "render")  #: the recorded functions of a frame
 
 
 def _numbered(path: Path, number: int, frames: int) -> Path:
@@ -364,7 +364,7 @@ def _numbered(path: Path, number: int, frames: int) -> Path:
 def _plan(scene: Any, pixels: Any, changes: Any, precision: str, chosen: "Configuration") -> "Plan":
     """Return what a scene needs of a method."""
     from realtime.methods.registry import find_method
-    from realtime.methods.shadow_planes.method import prepare_shadow_planes
+    from realtime.methods.shadow_planes.method import ShadowPlanes
     from realtime.methods.shadow_planes.plane_counts import caster_plan, describe_casters
     from realtime.parameters import values
     from realtime.scene.features import describe
@@ -381,7 +381,7 @@ def _plan(scene: Any, pixels: Any, changes: Any, precision: str, chosen: "Config
         points = replace(method.light_points, **own)
         words["light points"] = f"{points.points} of each area light, {points.pattern}"
         read = with_light_points(read, 1, "ring")  # the casters as the middle of each sees them
-    if method.prepare is prepare_shadow_planes:
+    if issubclass(method, ShadowPlanes):
         casters = caster_plan(read)
         words |= describe_casters(casters)
         _warn(casters.warnings)
@@ -392,11 +392,11 @@ def _warnings(renderer: Any) -> tuple[str, ...]:
     """Return the warnings on the casters of shadow planes, said on the error stream too."""
     from realtime.methods.shadow_planes.method import PlanePreparation
 
-    stages = renderer.groups.of_point if renderer.groups is not None else renderer
-    if stages is None or not isinstance(stages.prepare, PlanePreparation):
+    preparation = renderer.stages.prepare
+    if not isinstance(preparation, PlanePreparation):
         return ()
-    _warn(stages.prepare.casters.warnings)
-    return tuple(stages.prepare.casters.warnings)
+    _warn(preparation.casters.warnings)
+    return tuple(preparation.casters.warnings)
 
 
 def _warn(warnings: Any) -> None:

@@ -62,7 +62,7 @@ def _methods() -> Table:
     from realtime.methods.registry import METHODS
 
     rows = [
-        (each.name, each.summary, each.uses_kernel(each.parameters()), each.shadows, _defaults(each), each.source)
+        (each.name, each.summary, each().uses_kernel, each.shadows, _defaults(each), each.source)
         for each in METHODS.values()
     ]
     return table("", words("name", "what", "kernel", "shadows", "parameters", "source", how=_LONG), rows)
@@ -88,7 +88,9 @@ def _papers() -> Table:
 
 
 def _defaults(method: Any) -> str:
-    return _words(method.defaults)
+    from realtime.parameters import defaults
+
+    return _words(defaults(method))
 
 
 def _words(parameters: Mapping[str, Any]) -> str:

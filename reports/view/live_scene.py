@@ -18,7 +18,6 @@ from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
 from realtime.frame.incremental import FrameCache, next_frame
 from realtime.frame.renderer import Frame, FrameRenderer, image_frame
-from realtime.methods.interface.method import method_parameters
 from realtime.scene.read_scene import read_again, read_scene
 from reports.view.stages import timed_stages
 from validation.scenes.changes import Values, change_scene, changeable, isotropic_media
@@ -72,7 +71,7 @@ class LiveScene:
     @property
     def goes_on(self) -> bool:
         """Whether a frame builds on the last one, so that frames differ while nothing moves."""
-        return self.renderer.carries or self.renderer.passes is not None
+        return self.renderer.method.carries
 
     def choose(self, chosen: Configuration) -> float:
         """Render by another configuration from now on; return what its preparation takes [ms].
@@ -141,8 +140,8 @@ class LiveScene:
         renderer, times = timed_stages(self.renderer) if by_stage else (self.renderer, {})
         cache, moved = self._cache, dict(self._moved)
         if self._other_method and cache is not None:
-            keeps = renderer.groups is None and not moved["camera_moved"]
-            cache = FrameCache(cache.cast, None, None) if keeps else None
+            keeps = not moved["camera_moved"]
+            cache = FrameCache(cache.cast, None) if keeps else None
             moved["light_moved"] = True
         stages, self._cache = next_frame(renderer, self.scene, cache, geometry_moved=False, **moved)
         dr.sync_thread()
@@ -159,7 +158,7 @@ class LiveScene:
         key = self.chosen, self.scene.features
         if key not in self._renderers:
             made = prepared(self.scene, self.chosen)
-            self._renderers[key] = made if made.groups is not None else self._with_known_surface(made)
+            self._renderers[key] = self._with_known_surface(made) if len(made.structures) == 1 else made
             while len(self._renderers) > _KEPT:
                 self._renderers.popitem(last=False)
         self._renderers.move_to_end(key)
@@ -167,8 +166,11 @@ class LiveScene:
 
     def _with_known_surface(self, made: FrameRenderer) -> FrameRenderer:
         """Return a renderer that casts and shades by the functions that another one has recorded."""
-        chosen, _ = method_parameters(made.method, dict(self.chosen.parameters))
-        key = self.scene.features, made.method.provides_visibility(chosen), made.method.by_source(chosen)
+        key = self.scene.features, made.method.provides_visibility, made.method.by_source
         known = self._surfaces.setdefault(key, made)
+        structures = {
+            lights: replace(stages, surface=known.stages.surface, shade=known.stages.shade)
+            for lights, stages in made.structures.items()
+        }
         # The pixels too: a recorded function tells arrays apart by how they lie in memory.
-        return replace(made, pixel=known.pixel, surface=known.surface, shade=known.shade)
+        return replace(made, pixel=known.pixel, structures=structures)

@@ -18,7 +18,7 @@ from analytic.errors import InputError, nearest
 from realtime.errors import InputError as MethodError
 from realtime.methods.interface.method import method_parameters
 from realtime.methods.registry import METHODS, find_method
-from realtime.parameters import values
+from realtime.parameters import defaults, values
 from reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure
 from reports.view.live_scene import LiveScene, Shown
 from reports.view.picture import LAYERS, Pictures, rgba
@@ -352,9 +352,9 @@ def sparing(method: str, kernel: Any, given: Mapping[str, Any]) -> Configuration
     record = find_method(method)
     own, light_points = method_parameters(record, given)
     now = values(light_points) | values(own)
-    usual = values(record.light_points) | record.defaults
+    usual = values(record.light_points) | defaults(record)
     differing = {name: now[name] for name in given if now[name] != usual[name]}
-    return configuration(method, str(kernel) if kernel and record.uses_kernel(own) else None, differing)
+    return configuration(method, str(kernel) if kernel and own.uses_kernel else None, differing)
 
 
 def _chooses(message: Mapping[str, Any]) -> tuple[Any, ...]:

@@ -8,16 +8,14 @@ from typing import Any
 
 import drjit as dr
 
-from realtime.frame.renderer import FrameRenderer
+from realtime.frame.renderer import FrameRenderer, Stages
 
-#: The stages of a `FrameRenderer`, in their order, and what the page calls them.
+#: The `Stages` of a frame, in their order, and what the page calls them.
 WORDS = {
     "prepare": "shadow maps or planes",
     "surface": "camera rays and surface",
     "shade": "surface, rays kept",
-    "cull": "tiles",
     "render": "airlight",
-    "passes": "passes over the image",
 }
 
 
@@ -28,14 +26,11 @@ def timed_stages(renderer: FrameRenderer) -> tuple[FrameRenderer, dict[str, floa
 
 
 def _timed(renderer: FrameRenderer, times: dict[str, float]) -> FrameRenderer:
-    if renderer.groups is not None:
-        groups = renderer.groups
-        ordinary = tuple(_timed(part, times) for part in groups.ordinary)
-        of_point = groups.of_point and _timed(groups.of_point, times)
-        renderer = replace(renderer, groups=replace(groups, ordinary=ordinary, of_point=of_point))
-    stages: dict[str, Any] = {name: getattr(renderer, name) for name in WORDS}
-    clocked: dict[str, Any] = {name: _clocked(name, stage, times) for name, stage in stages.items() if stage}
-    return replace(renderer, **clocked)
+    def clocked(stages: Stages) -> Stages:
+        timed: dict[str, Any] = {name: _clocked(name, getattr(stages, name), times) for name in WORDS}
+        return replace(stages, **timed)
+
+    return replace(renderer, structures={key: clocked(stages) for key, stages in renderer.structures.items()})
 
 
 def _clocked(name: str, stage: Callable[..., Any], times: dict[str, float]) -> Callable[..., Any]:

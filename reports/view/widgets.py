@@ -6,7 +6,7 @@ from typing import Any
 
 from realtime.area_lights.points import LightPoints
 from realtime.kernels.registry import KERNELS
-from realtime.methods.interface.method import Method, method_parameters
+from realtime.methods.interface.method import method_parameters
 from realtime.methods.registry import METHODS, find_method
 from realtime.parameters import limits_of
 from validation.scenes.changes import Changeable
@@ -49,8 +49,7 @@ def parameter_widgets(chosen: Configuration, *, area_lights: bool) -> list[dict[
 
 def calls_kernel(chosen: Configuration) -> bool:
     """Return whether a method calls a kernel with its parameters."""
-    method: Method = find_method(chosen.method)
-    return method.uses_kernel(method_parameters(method, dict(chosen.parameters))[0])
+    return method_parameters(find_method(chosen.method), dict(chosen.parameters))[0].uses_kernel
 
 
 def scene_widgets(there: dict[str, Changeable]) -> list[dict[str, Any]]:

@@ -28,7 +28,6 @@ from realtime.frame.renderer import (
     FrameRenderer,
     render_frame,
     run_cast_and_shade,
-    run_cull,
     run_method,
     run_shade,
 )
@@ -129,13 +128,12 @@ def fractions(times: list[Timing]) -> dict[str, list[float]]:
     times
         Of `_stage_works`.
     """
-    silhouettes, surface, unshadowed, host, in_tiles, airlight = (milliseconds(time) for time in times)
+    silhouettes, surface, unshadowed, host, airlight = (milliseconds(time) for time in times)
 
     def less(whole: list[float], part: list[float]) -> list[float]:
         return [max(0.0, whole[at] - part[other]) for at, other in ((0, 0), (1, 2), (2, 1))]
 
-    sorting = [rest + tiles for rest, tiles in zip(less(host, silhouettes), in_tiles)]
-    stages = silhouettes, surface, unshadowed, sorting, less(airlight, unshadowed)
+    stages = silhouettes, surface, unshadowed, less(host, silhouettes), less(airlight, unshadowed)
     sums = [sum(stage[at] for stage in stages) for at in range(3)]
     found = {}
     for name, (middle, low, high) in zip(STAGES, stages):
@@ -148,7 +146,7 @@ def fractions(times: list[Timing]) -> dict[str, list[float]]:
 
 
 def _stage_works(renderer: FrameRenderer, kernel: str) -> list[Callable[[], Any]]:
-    """Return the work of silhouettes, scene, unshadowed airlight, all on the host, tile lists, and airlight."""
+    """Return the work of silhouettes, scene, unshadowed airlight, all on the host, and airlight."""
     scene, cached = renderer.scene, first_frame(renderer)
     cast = cached.cast
     by_light = run_shade(renderer, cast)
@@ -157,16 +155,16 @@ def _stage_works(renderer: FrameRenderer, kernel: str) -> list[Callable[[], Any]
     return [
         lambda: _silhouettes(renderer, scene),
         lambda: dr.eval(run_cast_and_shade(renderer)),
-        lambda: dr.eval(run_method(plain, (), cast, (), ())),
+        lambda: dr.eval(run_method(plain, plain.prepare(scene), cast, by_light)),
         lambda: renderer.prepare(scene),
-        lambda: run_cull(renderer, cached.state, cast.distance),
-        lambda: dr.eval(run_method(renderer, cached.state, cast, by_light, cached.lists)),
+        lambda: dr.eval(run_method(renderer, cached.state, cast, by_light)),
     ]
 
 
 def _silhouettes(renderer: FrameRenderer, scene: Scene) -> None:
-    assert isinstance(renderer.prepare, PlanePreparation)
-    occluders, camera = renderer.prepare.standing(scene), read_camera(scene.camera)
+    preparation = renderer.stages.prepare
+    assert isinstance(preparation, PlanePreparation)
+    occluders, camera = preparation.standing(scene), read_camera(scene.camera)
     for light in scene.lights:
         position = np.array(light.position, dtype=np.float64).ravel()
         silhouette(occluders, position, used=components_in_view(occluders, camera, position))

@@ -99,7 +99,7 @@ def time_frames(scene: Scene, *, seconds: float = 1.0) -> dict[str, Timing]:
 
     def work() -> None:
         cast, by_light = run_cast_and_shade(renderer)
-        dr.eval(run_method(renderer, cache.state, cast, by_light, cache.lists, None, cache.carried))
+        dr.eval(run_method(renderer, cache.state, cast, by_light, cache.carried))
 
     maps = time_repeated(lambda: renderer.prepare(scene), seconds=seconds)
     frame = time_repeated(work, seconds=seconds)
@@ -168,7 +168,8 @@ def _searched_from(scene: Scene, aside: float) -> list[tuple[Array, Array, Array
     cache = first_frame(renderer)
     start = _each(cache.carried, lambda collector: _beside(collector, aside))
     cast, by_light = run_cast_and_shade(renderer)
-    *_, extra, _, carried = run_method(renderer, cache.state, cast, by_light, cache.lists, None, start)
+    rendered = run_method(renderer, cache.state, cast, by_light, start)
+    extra, carried = rendered.extra, rendered.carried
     assert extra is not None
     dr.eval(extra, carried)
     shape = scene.camera.height, scene.camera.width

@@ -224,7 +224,7 @@ def _filter_errors(renderer: FrameRenderer, shadow_map: ShadowMap, heights: Arra
     dr.eval(cast, by_light)
 
     def airlight(mesh: VolumeMesh) -> Array:
-        return image_frame(renderer, evaluated(cast, by_light, run_method(renderer, (mesh,), cast, by_light))).airlight
+        return image_frame(renderer, evaluated(cast, run_method(renderer, ((mesh,),), cast, by_light))).airlight
 
     def adaptive(divided: list[Any]) -> VolumeMesh:
         return adaptive_mesh(shadow_map, light, heights, triangles(divided))

@@ -17,7 +17,7 @@ from realtime.frame.renderer import FrameRenderer, frame_renderer
 from realtime.kernels.registry import KERNELS, Kernel
 from realtime.methods.interface.method import method_parameters
 from realtime.methods.registry import find_method
-from realtime.methods.user_method import method_file, own_errors, user_object
+from realtime.methods.user_method import method_file, user_errors, user_object
 from realtime.parameters import values
 from realtime.scene.read_scene import Scene
 from reference.storage.kept import code_digest
@@ -129,7 +129,7 @@ def configuration(
         chosen, light_points = method_parameters(record, parameters or {})
     except MethodError as error:
         raise InputError(str(error)) from error
-    uses_kernel = record.uses_kernel(chosen)
+    uses_kernel = chosen.uses_kernel
     if not uses_kernel and kernel is not None:
         raise InputError(f"method {method}: got the kernel {kernel!r}, but this method calls no kernel: leave it out")
     if uses_kernel:
@@ -230,7 +230,7 @@ def _imported(name: str) -> Callable[..., Any]:
 
     @wraps(kernel)
     def guarded(*arguments: Any, **parameters: Any) -> Any:
-        with own_errors(f"kernel {name}"):
+        with user_errors(f"kernel {name}"):
             return kernel(*arguments, **parameters)
 
     return guarded

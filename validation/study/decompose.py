@@ -139,7 +139,7 @@ def _configurations(chosen: Configuration, size: tuple[int, int]) -> Iterator[tu
         yield "kernel", chosen
     method = find_method(chosen.method)
     parameters, _ = method_parameters(method, dict(chosen.parameters))
-    for cause, better in method.error_causes(parameters, size):
+    for cause, better in parameters.error_causes(size):
         if better is None:
             yield cause, None
             return

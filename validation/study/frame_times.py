@@ -18,7 +18,6 @@ from realtime.frame.renderer import (
     frame_with_part,
     parts,
     run_cast_and_shade,
-    run_cull,
     run_method,
     run_shade,
     run_stages,
@@ -100,7 +99,7 @@ class FrameTimes:
     """The times of a frame and of its stages [ms]."""
 
     frame: Timing = column("frame", "ms", "a whole frame while nothing moves: shadow maps or planes are there")
-    airlight: Timing = column("airlight", "ms", "tiles and airlight: the kernel with its ray set-up, or the marching")
+    airlight: Timing = column("airlight", "ms", "airlight: the kernel with its ray set-up, or the marching")
     surface: Timing | None = column("rays + surface", "ms", "camera rays and lit surface", default=None)
     light_moved: Timing | None = column(
         "light moved", "ms", "a frame after the light moved: shadow maps or planes again, all stages", default=None
@@ -195,8 +194,7 @@ def brief_times(renderer: FrameRenderer) -> tuple[FrameTimes, float]:
     dr.eval(cast, by_light)
 
     def airlight():
-        lists = run_cull(renderer, state, cast.distance)
-        return evaluated(cast, by_light, run_method(renderer, state, cast, by_light, lists))
+        return evaluated(cast, run_method(renderer, state, cast, by_light))
 
     return FrameTimes(frame, _brief(airlight)), preparation.ms
 
@@ -224,24 +222,19 @@ def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
         done()
         state = renderer.prepare(there)
         done()
-        of_parts = np.zeros(4)
+        of_parts = np.zeros(3)
         for part in in_parts:
             cast, by_light = run_cast_and_shade(part)
             dr.eval(cast, by_light)
             done()
             dr.eval(run_shade(part, cast))
             done()
-            # Of many groups of lights in a large image, the lists would take most of the memory.
-            apart = part.groups is None or len(in_parts) == 1
-            lists = run_cull(part, state, cast.distance) if apart else None
+            dr.eval(run_method(part, state, cast, by_light))
             done()
-            dr.eval(run_method(part, state, cast, by_light, lists))
-            done()
-            of_parts += np.diff(times[-5:])
+            of_parts += np.diff(times[-4:])
         steps.append([*np.diff(times[:3]), *of_parts])
-    move, prepare, surface, shade, in_tiles, rest = np.array(steps).T
+    move, prepare, surface, shade, airlight = np.array(steps).T
     needed = renderer.method.prepared_from
-    airlight = in_tiles + rest
     light_moved = prepare + surface + airlight
     return FrameTimes(
         frame=timing_of(surface + airlight),
@@ -250,7 +243,7 @@ def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
         light_moved=timing_of(light_moved),
         objects_moved=timing_of(move + light_moved),
         light_moved_camera_kept=timing_of(shade + airlight + prepare * bool(needed & {"light", "look"})),
-        colours_changed=timing_of(shade + rest + prepare * ("look" in needed)),
+        colours_changed=timing_of(shade + airlight + prepare * ("look" in needed)),
     )
 
 

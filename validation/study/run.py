@@ -191,7 +191,7 @@ def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> Ren
     if timed_scene is not None and first > 1e3 * _LONG:
         timed_scene = None
         notes.append(f"timed at {scene.camera.width} x {scene.camera.height}: larger frames take minutes")
-    if chosen.own and not isinstance(renderer.render, Frozen):
+    if chosen.own and not isinstance(renderer.stages.render, Frozen):
         notes.append("not frozen: its Python runs again for every frame")
     shown = renderer if timed_scene is None else prepared(timed_scene, chosen)
     took: list[float] = []
@@ -269,9 +269,7 @@ def _too_long(renderer: FrameRenderer, cell: Cell, took: float) -> str | None:
     if limit is None or not (chosen.own or took * len(light_groups(renderer)) > _DOUBTFUL * limit):
         return None
     states, milliseconds, _ = timed(lambda: renderer.prepare(renderer.scene))
-    preparation = 1e-3 * milliseconds
-    if renderer.groups is not None:
-        preparation *= len(states) / sum(state is not None for state in states)
+    preparation = 1e-3 * milliseconds * len(states) / sum(state is not None for state in states)
     del states
     words = f"more than the limit of {limit:g} s"
     if preparation > limit:

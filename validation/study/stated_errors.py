@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.methods.registry import METHODS
+from realtime.parameters import defaults
 from realtime.scene.phase import Tabulated
 from realtime.scene.read_scene import Scene
 from reference.quadrature.segments import AMBIENT, camera_segments, optical_depth, scattering_range
@@ -55,8 +56,8 @@ def stated_bound(chosen: Configuration, scene: Scene) -> float | None:
 
     Points in the place of lights with extent are an approximation.
     """
-    defaults = METHODS[chosen.method].defaults if chosen.method in METHODS else {}
-    usual = all(defaults.get(name, value) == value for name, value in chosen.parameters if name != "map")
+    usual_values = defaults(METHODS[chosen.method]) if chosen.method in METHODS else {}
+    usual = all(usual_values.get(name, value) == value for name, value in chosen.parameters if name != "map")
     plain = usual and chosen.kernel == "exact" and not scene.area_lights
     whole_rays = chosen.method in ("unshadowed", "light-volumes") and not scene.features.shadows
     if not plain or not (chosen.method == "shadow-planes" or whole_rays):

@@ -59,6 +59,7 @@ from typing import Any
 
 from analytic.errors import InputError, nearest
 from realtime.methods.registry import FOG_METHODS, METHODS
+from realtime.parameters import defaults
 from validation.scenes.changes import change_words
 from validation.scenes.loading import parse_size
 from validation.scenes.random.ranges import ranges_from, read_ranges
@@ -335,7 +336,7 @@ def _of_method(
     for name, several in lists.items():
         if not several:
             raise InputError(f"parameters.{method}.{name}: got no value; leave it out for the default")
-    has_map = "map" in METHODS[method].defaults if method in METHODS else False
+    has_map = "map" in defaults(METHODS[method]) if method in METHODS else False
     if has_map and sides != [None]:
         lists["map"] = list(sides)
     for combination in itertools.product(*lists.values()):
@@ -357,7 +358,7 @@ def map_side(chosen: Configuration) -> int | None:
     """Return the side of the shadow map of a configuration [pixels]; None for a method without one."""
     if chosen.method not in METHODS:
         return None
-    known = METHODS[chosen.method].defaults | dict(chosen.parameters)
+    known = defaults(METHODS[chosen.method]) | dict(chosen.parameters)
     uses = "map" in known and known.get("shadow", "map") == "map"
     return int(known["map"]) if uses and isinstance(known["map"], int) else None
 

@@ -34,7 +34,6 @@ def light_of_orders(
     behind,
     search: Search,
     last: tuple[Collector, ...] | None = None,
-    place: Any = None,
     active: Any = True,
 ) -> OrdersLight:
     """Search the collectors of all sets of orders, and return their light.
@@ -47,13 +46,11 @@ def light_of_orders(
         How many sets there are, numbers from 0 on.
     last
         The `OrdersLight.collectors` of the last frame; None where a search starts with nothing.
-    place
-        Which entry of `last` belongs to each point, by default its own number.
     """
     cold = cold_start(light_map, point)
     lights = []
     for number in range(sets):
-        start = cold if last is None else _warm(cold, last[number], point, place, active)
+        start = cold if last is None else _warm(cold, last[number], point)
         light = collector_light(
             light_map,
             transport,
@@ -71,10 +68,8 @@ def light_of_orders(
     return OrdersLight(tuple(light.radiance for light in lights), tuple(kept))
 
 
-def _warm(cold: Collector, last: Collector, point, place: Any, active) -> Collector:
+def _warm(cold: Collector, last: Collector, point) -> Collector:
     """Return the collector with which a search starts: the last frame's where there is one."""
     way, width = last.centre, last.width
-    if place is not None:
-        way, width = dr.gather(type(way), way, place, active), dr.gather(type(width), width, place, active)
     there = width > 0
     return Collector(dr.select(there, point + way, cold.centre), dr.select(there, width, cold.width))

@@ -12,12 +12,10 @@ is interpolated is not the airlight but the share of it that is lit: the publish
 point light the airlight itself goes as 1 / distance, and as the phase function. A share lies between 0 and 1, so no
 pixel between samples is brighter than it is without shadows.
 
-The sampling is no wrapper around other methods, as `realtime.tiles.adaptive_sampling` is. Slices are cut for one light
-and hold its tree, by which samples and pixels alike are walked, and samples lie between the centres of pixels, where
-lists of tiles, which bound the sixteen rays of a tile alone, miss what concerns them.
+The sampling is no wrapper around other methods, as `realtime.frame.adaptive_sampling` is. Slices are cut for one light
+and hold its tree, by which samples and pixels alike are walked, and samples lie between the centres of pixels.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import drjit as dr
@@ -45,17 +43,15 @@ from realtime.methods.epipolar.slices import (
     slice_coordinate,
 )
 from realtime.methods.epipolar.walk import sum_lit_intervals
-from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
-from realtime.methods.interface.view import View, rays_in_media
+from realtime.methods.interface.method import Method
+from realtime.methods.interface.view import View
 from realtime.numerics.array_types import PerMetre, bytes_of
-from realtime.parameters import Parameters, parameter
+from realtime.parameters import parameter
 from realtime.scene.camera import Camera
 from realtime.scene.lights import Light
-from realtime.scene.read_scene import Scene
 from realtime.shadow_maps.projection import light_faces
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth, map_memory, map_size
-from realtime.tiles.layout import Layout
 
 _MOST = 65536  # slices, and samples of a slice
 
@@ -63,8 +59,30 @@ _NEXT = 6.0  #: pixels from the image of a light within which nothing is interpo
 
 
 @dataclass(frozen=True)
-class MinMaxParameters(Parameters):
-    """The parameters of one-dimensional min/max mipmaps."""
+class EpipolarMap:
+    """What the method needs beyond the view, for one light."""
+
+    shadow_map: ShadowMap
+    heights: PerMetre  #: inverse planar depths at the corners of its texels [1/m]
+
+
+@dataclass(frozen=True)
+class MinMax(Method):
+    """The airlight by one-dimensional min/max mipmaps.
+
+    Valid for lights anywhere; the epipole may lie in the image, where the pixels next to the light are the least
+    accurate. Shadows are those of the map, sampled once more along the slices.
+
+    References
+    ----------
+    Chen, Baran, Durand, Jarosz 2011, *Real-time volumetric shadows using 1D min-max mipmaps*, I3D. Yusov 2013,
+    *Practical implementation of light scattering effects using epipolar sampling and 1D min/max binary trees*, GDC.
+    """
+
+    name = "min-max"
+    summary = "epipolar slices with 1D min/max trees over the shadow map; airlight interpolated between samples"
+    source = "Chen, Baran, Durand, Jarosz 2011; Yusov 2013"
+    prepared_from = frozenset({"geometry", "light"})
 
     map: int = map_size(
         512,
@@ -92,77 +110,43 @@ class MinMaxParameters(Parameters):
         choices=("slices", "pixels"),
     )
 
+    def check(self, scene):
+        """Refuse maps and slices that need more memory than the machine has."""
+        if not scene.features.shadows:
+            return
+        map, slices, samples = self.map, self.slices, self.samples
+        held = sum(2 * map_memory(light, map) for light in scene.lights)
+        drawn = (_memory_of_slices(scene.camera, light, map, slices, samples) for light in scene.lights)
+        what = f"map: {map} texels, slices: {slices or _usual_slices(scene.camera)}"
+        advice = "use a smaller map, or fewer slices"
+        check_memory(f"{what} for {len(scene.lights)} light(s)", held + max(drawn, default=0), advice)
 
-@dataclass(frozen=True)
-class EpipolarMap:
-    """What the method needs beyond the view, for one light."""
+    def prepare(self, scene, light):
+        """Return the shadow map of a light."""
+        shadow_map = cast_shadow_map(scene.geometry, light, self.map)
+        heights = inverse_depth(shadow_map)
+        dr.eval(heights)
+        return EpipolarMap(shadow_map, heights)
 
-    shadow_map: ShadowMap
-    heights: PerMetre  #: inverse planar depths at the corners of its texels [1/m]
-
-
-def min_max(view: View, state: tuple[EpipolarMap, ...], lists, *, kernel, parameters: MinMaxParameters) -> Layers:
-    """Return the airlight of every ray by one-dimensional min/max mipmaps [W/(m^2 sr)].
-
-    Parameters
-    ----------
-    view
-        The frame.
-    state
-        By light its shadow map, from `prepare_min_max`.
-    lists
-        Not used: what concerns a ray is the line of its slice.
-    kernel
-        An airlight kernel, see `realtime.kernels`.
-    parameters
-        Values of the parameters.
-
-    Notes
-    -----
-    Valid for lights anywhere; the epipole may lie in the image, where the pixels next to the light are the least
-    accurate. Shadows are those of the map, sampled once more along the slices.
-
-    References
-    ----------
-    Chen, Baran, Durand, Jarosz 2011, *Real-time volumetric shadows using 1D min-max mipmaps*, I3D. Yusov 2013,
-    *Practical implementation of light scattering effects using epipolar sampling and 1D min/max binary trees*, GDC.
-    """
-    total = type(view.medium.albedo)(0)
-    for number, light in enumerate(view.lights):
-        airlight = _ray_airlight(view, number, kernel)
+    def airlight(self, view, light, state, kernel):
+        """Return the airlight of every ray [W/(m^2 sr)]."""
+        airlight = ray_airlight(view, light, kernel)
         if not view.features.shadows:
-            total += airlight.radiance(airlight.integral(*airlight.segment))
-            continue
+            return airlight.radiance(airlight.integral(*airlight.segment))
         camera = view.camera
-        cut = image_slices(camera, light, parameters.slices or _usual_slices(camera))
-        heights = slice_heights(state[number].shadow_map, state[number].heights, cut, light)
+        cut = image_slices(camera, light, self.slices or _usual_slices(camera))
+        heights = slice_heights(state.shadow_map, state.heights, cut, light)
         point = image_point(camera, view.direction)
-        if parameters.sampling == "pixels":
-            total += airlight.radiance(_lit_integral(airlight, heights, _nearest(cut, point)))
-            continue
+        if self.sampling == "pixels":
+            return airlight.radiance(_lit_integral(airlight, heights, _nearest(cut, point)))
         depth = _depth_image(cut, point, view.distance)
-        drawn = mark_samples(cut, depth, count=_whole_words(parameters.samples, camera), step=parameters.step)
-        shares = _sampled_shares(view, number, kernel, drawn, heights)
-        total += airlight.radiance(_interpolated(airlight, drawn, shares, heights, point))
-    return Layers(total)
+        drawn = mark_samples(cut, depth, count=_whole_words(self.samples, camera), step=self.step)
+        shares = _sampled_shares(view, light, kernel, drawn, heights)
+        return airlight.radiance(_interpolated(airlight, drawn, shares, heights, point))
 
-
-def prepare_min_max(scene: Scene, parameters: MinMaxParameters) -> Callable[[Scene], tuple[EpipolarMap, ...]]:
-    """Return the function that casts the shadow map of every light of a frame.
-
-    Raises
-    ------
-    InputError
-        For more memory than the machine has.
-    """
-    map, slices, samples = parameters.map, parameters.slices, parameters.samples
-    if not scene.features.shadows:
-        return lambda scene: ()
-    held = sum(2 * map_memory(light, map) for light in scene.lights)
-    drawn = max((_memory_of_slices(scene, light, map, slices, samples) for light in scene.lights), default=0)
-    what = f"map: {map} texels, slices: {slices or _usual_slices(scene.camera)}"
-    check_memory(f"{what} for {len(scene.lights)} light(s)", held + drawn, "use a smaller map, or fewer slices")
-    return lambda scene: tuple(_epipolar_map(scene, light, map) for light in scene.lights)
+    def error_causes(self, size):
+        """Return the causes of its errors, see `Method.error_causes`."""
+        return ("resolution", {"sampling": "pixels"}), ("map", None)
 
 
 def _usual_slices(camera: Camera) -> int:
@@ -175,26 +159,12 @@ def _whole_words(samples: int, camera: Camera) -> int:
     return (count + WORD - 1) // WORD * WORD
 
 
-def _memory_of_slices(scene: Scene, light: Light, size: int, slices: int, samples: int) -> int:
+def _memory_of_slices(camera: Camera, light: Light, size: int, slices: int, samples: int) -> int:
     """Return about how much the slices of a light take [bytes]: per leaf its value, two bounds, four of the tree."""
     number = bytes_of(type(light.position.x))
     leaves = size if light_faces(light) == 1 else 2 * size
-    lanes = _whole_words(samples, scene.camera)
-    return (slices or _usual_slices(scene.camera)) * (number * 7 * leaves + lanes * (4 + 3 * number))
-
-
-def _epipolar_map(scene: Scene, light: Light, size: int) -> EpipolarMap:
-    shadow_map = cast_shadow_map(scene.geometry, light, size)
-    heights = inverse_depth(shadow_map)
-    dr.eval(heights)
-    return EpipolarMap(shadow_map, heights)
-
-
-def _ray_airlight(view: View, number: int, kernel) -> RayAirlight:
-    """Return the airlight of one light along the rays of a view."""
-    light = view.lights[number]
-    media = rays_in_media(replace(view, lights=(light,)), kernel=kernel)[0] if view.features.bounded else None
-    return ray_airlight(view, light, kernel, media)
+    lanes = _whole_words(samples, camera)
+    return (slices or _usual_slices(camera)) * (number * 7 * leaves + lanes * (4 + 3 * number))
 
 
 def _lit_integral(airlight: RayAirlight, heights: SliceHeights, number, active=True):
@@ -218,7 +188,7 @@ def _depth_image(slices: Slices, point, distance):
     return image
 
 
-def _sampled_shares(view: View, number: int, kernel, samples: Samples, heights: SliceHeights):
+def _sampled_shares(view: View, light: Light, kernel, samples: Samples, heights: SliceHeights):
     """Return by sample, of those that are marked, the share of its airlight that is lit."""
     marked, count = marked_samples(samples)
     camera = view.camera
@@ -228,8 +198,8 @@ def _sampled_shares(view: View, number: int, kernel, samples: Samples, heights: 
         sample = dr.gather(mi.UInt32, marked, lane)
         (i, j), slice_number, depth = sample_ray(samples, sample)
         direction = dr.normalize(camera.forward + camera.left * i + camera.up * j)
-        seen = replace(view, direction=direction, direction_low=None, distance=depth, layout=Layout.SOME)
-        airlight = _ray_airlight(seen, number, kernel)
+        seen = replace(view, direction=direction, direction_low=type(direction)(0), distance=depth)
+        airlight = ray_airlight(seen, light, kernel)
         share = _lit_integral(airlight, heights, slice_number) / airlight.integral(*airlight.segment)
         dr.scatter(shares, dr.select(dr.isfinite(share), share, no_value(share)), sample)
         return lane

@@ -30,7 +30,7 @@ from realtime.methods.froxel_fog.media import piece_length
 from realtime.methods.interface.view import View
 from realtime.numerics.array_types import PerRay
 from realtime.numerics.fast_exp import exp_bounded
-from realtime.rays.ray_light import falloff, ray_geometry
+from realtime.rays.ray_light import profile
 from realtime.scene.lights import Light
 from realtime.scene.medium import per_extinction, transmittance
 
@@ -170,7 +170,9 @@ def _weight(view: View, light: Light, points: FroxelPoints, lit: Any) -> Any:
     r = dr.sqrt(square) if light.w else Float(1)
     # At the light itself there is no direction: any will do.
     cosine = dr.dot(toward, points.unit) * dr.rcp(dr.maximum(r, 1e-15))
-    strength = (dr.rcp(dr.maximum(square, points.least)) if light.w else Float(1)) * _profile(light, points.point)
+    strength = (dr.rcp(dr.maximum(square, points.least)) if light.w else Float(1)) * profile(
+        light, points.point, -toward * dr.rsqrt(dr.maximum(square, 1e-30))
+    )
     if not view.features.bounded:
         strength = dr.select(lit, strength * medium.phase.evaluate(cosine), 0)
         return strength * transmittance(medium, r)
@@ -182,18 +184,3 @@ def _weight(view: View, light: Light, points: FroxelPoints, lit: Any) -> Any:
         sigma_t = filling.sigma_t[0] if len(filling.sigma_t) == 1 else Color(*filling.sigma_t)
         density += filling.albedo * (sigma_t * (share * filling.phase.evaluate(cosine)))
     return dr.select(points.some & lit, strength * kept * density, 0)
-
-
-def _profile(light: Light, point: Any) -> Any:
-    """Return the relative intensity of a light towards points."""
-    if light.facing is not None:
-        away = point - light.position
-        return dr.maximum(dr.dot(light.normal, away) * dr.rsqrt(dr.maximum(dr.squared_norm(away), 1e-30)), 0)
-    if light.cone is None:
-        return type(point.x)(1)
-    away = dr.normalize(point - light.position)
-    inside = dr.dot(light.axis, away) > light.cos_cutoff
-    if light.beam is None:
-        return dr.select(inside, type(point.x)(1), 0)
-    # The point lies at x = 0 of a ray that starts there.
-    return dr.select(inside, falloff(ray_geometry(point, away, light), light, type(point.x)(0)), 0)

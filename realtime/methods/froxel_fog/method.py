@@ -11,7 +11,6 @@ Wronski 2014, *Volumetric fog: unified, compute shader based solution to atmosph
 *Physically-based and unified volumetric rendering in Frostbite*.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import drjit as dr
@@ -25,22 +24,35 @@ from realtime.methods.froxel_fog.history import averaged, frame_shift
 from realtime.methods.froxel_fog.injection import Visibility, scattered_light
 from realtime.methods.froxel_fog.light_points import LightPointTable, tabulated
 from realtime.methods.froxel_fog.media import column_pieces
-from realtime.methods.interface.layers import Layers
-from realtime.methods.interface.method import ErrorCause
+from realtime.methods.interface.method import Layers, Method
 from realtime.methods.interface.view import View
 from realtime.numerics.array_types import bytes_of
-from realtime.parameters import Parameters, parameter
+from realtime.parameters import parameter
 from realtime.scene.lights import Light
-from realtime.scene.read_scene import Scene
 from realtime.shadow_maps.hemisphere_map import maps_memory
-from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, lit_in_map, map_memory, map_size
+from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, check_maps, lit_in_map, map_memory, map_size
 
 _NUMBERS = 16  # of a froxel: scattered light, airlight, history, four each, and as much on the way
 
 
 @dataclass(frozen=True)
-class FroxelFogParameters(Parameters):
-    """The parameters of froxel fog."""
+class FroxelShadows:
+    """What the froxels of a frame need of its lights."""
+
+    maps: tuple[ShadowMap, ...]  #: of the lights without extent; () where rays are cast
+    tables: tuple[LightPointTable, ...]  #: of the others
+
+
+@dataclass(frozen=True)
+class FroxelFog(Method):
+    """The airlight by froxels."""
+
+    name = "froxel-fog"
+    summary = "scattered light in a grid along the view, summed front to back: what engines ship"
+    source = "Wronski 2014; Hillaire 2015"
+    prepared_from = frozenset({"geometry", "light"})
+    uses_kernel = False
+    at_once = True
 
     width: int = parameter(160, "froxels across the image", least=1, most=4096)
     height: int = parameter(90, "froxels down the image", least=1, most=4096)
@@ -82,94 +94,65 @@ class FroxelFogParameters(Parameters):
         """Froxels across, down and in depth."""
         return self.width, self.height, self.slices
 
+    @property
+    def casts_rays(self):
+        """Shadow rays are cast from the froxels."""
+        return self.shadow == "ray"
 
-@dataclass(frozen=True)
-class FroxelShadows:
-    """What the froxels of a frame need of its lights."""
+    @property
+    def carries(self):
+        """Frames hand on what they held, or their number."""
+        return self.history > 0 or self.jitter != "none"
 
-    maps: tuple[ShadowMap, ...]  #: of the lights without extent; () where rays are cast
-    tables: tuple[LightPointTable, ...]  #: of the others
+    def check(self, scene):
+        """Refuse a grid and maps that need more memory than the machine has."""
+        across, down, deep = self.grid_size
+        Float = type(scene.camera.origin.x)
+        froxels = _NUMBERS * bytes_of(Float) * across * down * deep
+        check_memory(f"a grid of {across} x {down} x {deep} froxels", froxels, "use fewer")
+        if self.shadow == "map" and scene.features.shadows:
+            samples = sum(light.source is not None for light in scene.lights)
+            maps = sum(map_memory(light, self.map) for light in scene.lights if light.source is None)
+            check_maps(scene.lights, self.map, froxels + maps + maps_memory(Float, samples, self.point_map))
 
+    def preparation(self, scene):
+        """Return what makes tables of light samples and, if they are asked for, shadow maps."""
+        if self.shadow != "map" or not scene.features.shadows:
+            return lambda now: FroxelShadows((), tabulated(now.lights))
 
-def prepare_froxel_fog(scene: Scene, parameters: FroxelFogParameters) -> Callable[[Scene], FroxelShadows]:
-    """Return the function that casts a shadow map for every light of a frame, if they are asked for.
+        def cast(now):
+            ordinary = [light for light in now.lights if light.source is None]
+            first = {light.source: light for light in now.lights}
+            tables = (
+                table.with_maps(now.geometry, first[table.source], self.point_map) for table in tabulated(now.lights)
+            )
+            return FroxelShadows(
+                tuple(cast_shadow_map(now.geometry, light, self.map) for light in ordinary), tuple(tables)
+            )
 
-    Raises
-    ------
-    InputError
-        If grid and maps need more memory than the machine has.
-    """
-    across, down, deep = parameters.grid_size
-    number = bytes_of(type(scene.camera.origin.x))
-    froxels = _NUMBERS * number * across * down * deep
-    check_memory(f"a grid of {across} x {down} x {deep} froxels", froxels, "use fewer")
-    if parameters.shadow != "map" or not scene.features.shadows:
-        return lambda scene: FroxelShadows((), tabulated(scene.lights))
-    map = parameters.map
-    points = sum(light.source is not None for light in scene.lights)
-    needed = froxels + maps_memory(type(scene.camera.origin.x), points, parameters.point_map)
-    needed += sum(map_memory(light, map) for light in scene.lights if light.source is None)
-    check_memory(f"map: {map} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
+        return cast
 
-    def cast(scene: Scene) -> FroxelShadows:
-        ordinary = [light for light in scene.lights if light.source is None]
-        first = {light.source: light for light in scene.lights}
-        tables = (
-            table.with_maps(scene.geometry, first[table.source], parameters.point_map)
-            for table in tabulated(scene.lights)
-        )
-        return FroxelShadows(tuple(cast_shadow_map(scene.geometry, light, map) for light in ordinary), tuple(tables))
+    def render(self, view, state, kernel):
+        """Return the airlight of every ray by froxels [W/(m^2 sr)]."""
+        last = view.carried
+        grid = view_grid(view, size=self.grid_size, near=self.near, far=self.far, distribution=self.distribution)
+        dr.eval(grid.far, grid.near)
+        pieces = column_pieces(view, grid, dr.arange(mi.UInt32, grid.columns))
+        shift = frame_shift(last if self.jitter == "frames" else None, type(view.distance))
+        visible = _visibility(view, state, self.shadow)
+        scattered = scattered_light(view, grid, pieces, shift=shift, tables=state.tables, visible=visible)
+        carried = None
+        if self.carries:
+            scattered, carried = averaged(scattered, grid, last, weight=self.history)
+        dr.eval(scattered, carried)
+        return Layers(airlight_at_pixels(view, grid, accumulated(view, grid, scattered, pieces)), carried=carried)
 
-    return cast
+    def error_causes(self, size):
+        """Return the causes of its errors, see `Method.error_causes`.
 
-
-def froxel_fog(view: View, state: FroxelShadows, lists, *, kernel, parameters: FroxelFogParameters) -> Layers:
-    """Return the airlight of every ray by froxels [W/(m^2 sr)].
-
-    Parameters
-    ----------
-    view
-        The frame.
-    state
-        From `prepare_froxel_fog`.
-    lists, kernel
-        Not used.
-    parameters
-        Values of the parameters.
-    """
-    last = view.carried
-    grid = view_grid(
-        view,
-        size=parameters.grid_size,
-        near=parameters.near,
-        far=parameters.far,
-        distribution=parameters.distribution,
-    )
-    dr.eval(grid.far, grid.near)
-    pieces = column_pieces(view, grid, dr.arange(mi.UInt32, grid.columns))
-    Float = type(view.distance)
-    shift = frame_shift(last if parameters.jitter == "frames" else None, Float)
-    visible = _visibility(view, state, parameters.shadow)
-    scattered = scattered_light(view, grid, pieces, shift=shift, tables=state.tables, visible=visible)
-    carried = None
-    if hands_on(parameters):
-        scattered, carried = averaged(scattered, grid, last, weight=parameters.history)
-    dr.eval(scattered, carried)
-    volume = accumulated(view, grid, scattered, pieces)
-    return Layers(airlight_at_pixels(view, grid, volume), carried=carried)
-
-
-def hands_on(parameters: FroxelFogParameters) -> bool:
-    """Return whether frames hand anything on: what they held, or their number."""
-    return parameters.history > 0 or parameters.jitter != "none"
-
-
-def froxel_errors(parameters: FroxelFogParameters, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
-    """Return the causes of its errors, as `realtime.methods.interface.method.Method.error_causes` has them.
-
-    With a column a pixel nothing is left of the columns' error; then what is left is that of the slices.
-    """
-    return ("map", {"shadow": "ray"}), ("resolution", {"width": size[0], "height": size[1]}), ("steps", None)
+        With a column a pixel nothing is left of the columns' error; then what is left is that of the slices.
+        """
+        return ("map", {"shadow": "ray"}), ("resolution", {"width": size[0], "height": size[1]}), ("steps", None)
 
 
 def _visibility(view: View, shadows: FroxelShadows, shadow: str) -> Visibility:

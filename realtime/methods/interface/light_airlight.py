@@ -6,8 +6,8 @@ from typing import Any
 
 from realtime.bounded_media.airlight import MediaRay
 from realtime.kernels.registry import airlight_integral, gamma
-from realtime.methods.interface.view import View, bounded_radiance, radiance
-from realtime.rays.ray_light import RayGeometry, ray_geometry
+from realtime.methods.interface.view import View, bounded_radiance, radiance, ray_in_media
+from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 
 
@@ -18,12 +18,14 @@ def integral_type(view: View) -> Any:
 
 
 def ray_airlight(
-    view: View, light: Light, kernel, media: MediaRay | None = None, *, geometry: Any = None
+    view: View, light: Light, kernel, *, form: str = "kernel", geometry: RayGeometry | None = None
 ) -> "RayAirlight":
-    """Return the airlight of a light along the rays of a view; `media` where they are bounded, `geometry` if known."""
-    if geometry is None:
-        geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
-    return RayAirlight(view, light, geometry, kernel, media)
+    """Return the airlight of a light along the rays of a view.
+
+    `form` is that of `realtime.methods.interface.view.ray_in_media`, `geometry` that of the rays if it is known.
+    """
+    media = ray_in_media(view, light, form, kernel=kernel)
+    return RayAirlight(view, light, view.geometry(light) if geometry is None else geometry, kernel, media)
 
 
 @dataclass(frozen=True)
@@ -52,9 +54,9 @@ class RayAirlight:
 
     def radiance(self, integral):
         """Return the radiance of an integral [W/(m^2 sr)]."""
-        return (
-            bounded_radiance(self.light, integral) if self.media else radiance(self.view.medium, self.light, integral)
-        )
+        if self.media:
+            return bounded_radiance(self.light, integral)
+        return radiance(self.view.medium, self.light, integral)
 
     def gamma(self, x):
         """Return the `integral` from the camera to the distance `x` [m]."""

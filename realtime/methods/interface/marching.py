@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The airlight integral of one light by the midpoint rule, with one visibility test a step: what marchers sum up.
+"""The midpoint rule along rays, which marchers share, and the airlight integral of one light by it.
 
 Where nothing ends uniform steps, they stop at 20 optical depths, where e^-20 = 2e-9 is left.
 
@@ -22,53 +22,94 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.bounded_media.airlight import MediaRay
-from realtime.methods.interface.view import View
-from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff, ray_geometry
-from realtime.scene.lights import Light
-from realtime.scene.medium import OPTICAL_REACH, least_extinction, per_extinction
+from realtime.methods.interface.light_airlight import RayAirlight
+from realtime.rays.ray_light import distance_to_light, falloff
+from realtime.scene.medium import OPTICAL_REACH, Medium, least_extinction, per_extinction
 
 _LEAST_HEIGHT = 2.0**-10  # h over g, of the docstring
 
 
 @dataclass(frozen=True)
-class EqualAngles:
-    """A segment of every ray in the angle at a light."""
+class Steps:
+    """Equal steps of a variable u along every ray: the distance itself, or the angle at a light."""
 
-    foot: Any  #: of the light over the ray [m]
-    height: Any  #: h [m]
-    begin: Any  #: theta where the segment begins
-    end: Any  #: theta where it ends
+    x0: Any  #: where the first begins [m]
+    x1: Any  #: where the last ends [m]
+    begin: Any  #: u where the first begins
+    width: Any  #: of a step, 0 where a ray has none
+    foot: Any = None  #: of the light over the ray [m]; None: u is the distance
+    height: Any = None  #: h [m]
 
-    def place(self, theta: Any) -> Any:
+    def place(self, u: Any) -> Any:
         """Return x [m]."""
-        return dr.fma(self.height, dr.tan(theta), self.foot)
+        return u if self.foot is None else dr.fma(self.height, dr.tan(u), self.foot)
 
     def stretch(self, x: Any) -> Any:
-        """Return dx/dtheta [m]."""
+        """Return dx/du [m]."""
+        if self.foot is None:
+            return 1
         return dr.fma(self.height, self.height, dr.square(x - self.foot)) / self.height
 
 
-def equal_angles(foot: Any, height: Any, x0: Any, x1: Any) -> EqualAngles:
-    """Return segments from `x0` to `x1` [m], which may be infinite, in the angle at a light."""
-    gap = dr.maximum(dr.maximum(x0 - foot, foot - x1), 0)
-    height = dr.maximum(height, _LEAST_HEIGHT * gap)
-    end = dr.select(dr.isfinite(x1), dr.atan2(x1 - foot, height), 0.5 * dr.pi)
-    return EqualAngles(foot, height, dr.atan2(x0 - foot, height), end)
+def steps_between(x0: Any, x1: Any, steps: int, light: tuple[Any, Any] | None = None, asked: Any = True) -> Steps:
+    """Return equal steps from `x0` to `x1` [m].
+
+    `light` is the foot [m] and the height [m] of one at whose angle the steps are to be equal; then `x1` may be
+    infinite. Rays that are not `asked` stay on the spot.
+    """
+    if light is None:
+        begin, end, place = x0, x1, (None, None)
+    else:
+        foot, height = light
+        gap = dr.maximum(dr.maximum(x0 - foot, foot - x1), 0)
+        height = dr.maximum(height, _LEAST_HEIGHT * gap)
+        end = dr.select(dr.isfinite(x1), dr.atan2(x1 - foot, height), 0.5 * dr.pi)
+        begin, place = dr.atan2(x0 - foot, height), (foot, height)
+    walks = asked & (x1 > x0)
+    return Steps(x0, x1, dr.select(walks, begin, 0), dr.select(walks, (end - begin) / steps, 0), *place)
 
 
-def marched_integral(
-    view: View, light: Light, media: MediaRay | None, *, steps: int, spacing: str, lit: Callable[[Any], Any]
-) -> Any:
+def midpoint_sum(steps: Steps, count: int, zero: Any, sample: Callable[[Any], Any], shift: Any = 0.5) -> Any:
+    """Return the sum of `sample(x)` dx over the steps of every ray, in one loop: the kernel does not grow with them.
+
+    Parameters
+    ----------
+    steps, count
+        The steps, and how many.
+    zero
+        The sum of nothing, one for each ray.
+    sample
+        The integrand at distances [m].
+    shift
+        Where in a step it is asked, from 0 to 1.
+    """
+    Float = type(steps.width)
+
+    def step(index, total):
+        x = steps.place(dr.fma(Float(index) + shift, steps.width, steps.begin))
+        return index + 1, total + sample(x) * steps.stretch(x)
+
+    _, total = dr.while_loop(
+        state=(mi.UInt32(0), zero + dr.zeros(Float, dr.width(steps.width))),
+        cond=lambda index, total: index < count,
+        body=step,
+        labels=("index", "total"),
+    )
+    return total * steps.width
+
+
+def optical_end(medium: Medium, x0: Any, x1: Any) -> Any:
+    """Return where uniform steps from `x0` to `x1` [m] stop."""
+    return dr.minimum(x1, x0 + OPTICAL_REACH / least_extinction(medium))
+
+
+def marched_integral(airlight: RayAirlight, *, steps: int, spacing: str, lit: Callable[[Any], Any]) -> Any:
     """Return the airlight integral of a light along every ray by midpoint steps.
 
     Parameters
     ----------
-    view
-        The rays.
-    light
-        Any light.
-    media
-        The rays in bounded media; None where there are none.
+    airlight
+        The rays and the light.
     steps
         Of every ray.
     spacing
@@ -81,16 +122,39 @@ def marched_integral(
     integral
         J [1/m]; in bounded media albedo sigma_t J [1/m^2].
     """
-    x0, x1 = type(view.distance)(0), view.distance
-    if media and not light.w:
-        return _march_parallel(view, media, within(media, x0, x1), steps=steps, lit=lit)
-    geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
-    x0, x1 = geometry.lit_segment(x0, x1)
+    view, light, geometry, media = airlight.view, airlight.light, airlight.geometry, airlight.media
+    medium = view.medium
+    between = marched_steps(airlight, steps, spacing)
+
+    def sample(x):
+        reached = (between.width > 0) & lit(view.origin + view.direction * x)
+        if media and not light.w:
+            return dr.select(reached, media.source(x), 0)
+        r = distance_to_light(geometry, x)
+        weight = dr.rcp(dr.square(r))
+        if media:
+            return dr.select(reached, weight * media.source(x), 0)
+        weight *= medium.phase.evaluate((geometry.foot - x) / r)
+        if light.varies:
+            weight *= falloff(geometry, light, x)
+        return dr.select(reached, per_extinction(medium, lambda sigma_t: weight * dr.exp(-sigma_t * (x + r))), 0)
+
+    zero = type(view.distance)(0) if len(medium.sigma_t) == 1 and not media else type(medium.albedo)(0)
+    return midpoint_sum(between, steps, zero, sample)
+
+
+def marched_steps(airlight: RayAirlight, steps: int, spacing: str) -> Steps:
+    """Return the steps of rays where a light could reach them and something scatters."""
+    view, media = airlight.view, airlight.media
+    x0, x1 = airlight.segment if airlight.light.w else (type(view.distance)(0), view.distance)
     if spacing == "uniform" and not view.medium.clear:
-        x1 = dr.minimum(x1, x0 + OPTICAL_REACH / least_extinction(view.medium))
+        x1 = optical_end(view.medium, x0, x1)
     if media and view.medium.clear:
         x0, x1 = within(media, x0, x1)
-    return _march(view, light, geometry, (x0, x1), steps=steps, spacing=spacing, lit=lit, media=media)
+    at_light = None
+    if spacing == "equiangular" and airlight.light.w:
+        at_light = airlight.geometry.foot, airlight.geometry.height
+    return steps_between(x0, x1, steps, at_light)
 
 
 def within(media: MediaRay, x0, x1) -> tuple[Any, Any]:
@@ -105,61 +169,3 @@ def within(media: MediaRay, x0, x1) -> tuple[Any, Any]:
     begin, end = dr.maximum(first, x0), dr.minimum(last, x1)
     meets = end > begin
     return dr.select(meets, begin, 0), dr.select(meets, end, 0)
-
-
-def _march(
-    view: View, light: Light, geometry: RayGeometry, segment, *, steps: int, spacing: str, lit, media: MediaRay | None
-):
-    """Sum the steps of every ray in one loop, so that the kernel does not grow with their number."""
-    x0, x1 = segment
-    Float = type(geometry.height)
-    foot, medium = geometry.foot, view.medium
-    angles = None if spacing == "uniform" else equal_angles(foot, geometry.height, x0, x1)
-    begin, end = (angles.begin, angles.end) if angles else (x0, x1)
-    width = (end - begin) / steps
-
-    def step(index, total):
-        u = dr.fma(Float(index) + 0.5, width, begin)
-        x = angles.place(u) if angles else u
-        r = distance_to_light(geometry, x)
-        weight = dr.rcp(dr.square(r))
-        if angles:
-            weight *= angles.stretch(x)
-        point = view.origin + view.direction * x
-        if media:
-            term = weight * media.source(x)
-            return index + 1, total + dr.select((width > 0) & lit(point), term, 0)
-        weight *= medium.phase.evaluate((foot - x) / r)
-        if light.varies:
-            weight *= falloff(geometry, light, x)
-        term = per_extinction(medium, lambda sigma_t: weight * dr.exp(-sigma_t * (x + r)))
-        return index + 1, total + dr.select((width > 0) & lit(point), term, 0)
-
-    total = Float(0) if len(medium.sigma_t) == 1 and not media else type(medium.albedo)(0)
-    _, total = dr.while_loop(
-        state=(mi.UInt32(0), total + dr.zeros(Float, dr.width(width))),
-        cond=lambda index, total: index < steps,
-        body=step,
-        labels=("index", "total"),
-    )
-    return total * width
-
-
-def _march_parallel(view: View, media: MediaRay, segment, *, steps: int, lit):
-    """Sum equal steps of every ray under a directional light; see `_march`."""
-    x0, x1 = segment
-    Float = type(view.distance)
-    width = (x1 - x0) / steps
-
-    def step(index, total):
-        x = dr.fma(Float(index) + 0.5, width, x0)
-        reached = (width > 0) & lit(view.origin + view.direction * x)
-        return index + 1, total + dr.select(reached, media.source(x), 0)
-
-    _, total = dr.while_loop(
-        state=(mi.UInt32(0), type(view.medium.albedo)(0) + dr.zeros(Float, dr.width(width))),
-        cond=lambda index, total: index < steps,
-        body=step,
-        labels=("index", "total"),
-    )
-    return total * width

@@ -1,14 +1,29 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The record of a method: its stages, and what a user and a frame must know of it."""
+"""A method: its parameters, what it makes of a scene, and the airlight of a light.
+
+A method is a frozen dataclass derived from `Method`; its fields are its parameters. It answers two questions, each for
+one light: `prepare`, what has to be made of the scene once, such as a shadow map, and `airlight`, which radiance the
+lit media scatter into each camera ray. What a frame must know beyond that are class attributes or properties with
+defaults, so that a method names only what it has. A user's plain function becomes such a class too
+(`realtime.methods.user_method`).
+
+A frame shows
+
+    surface * visibility * transmittance + in_scattered + transmittance * background,
+
+in which `surface` is the light of a lamp that the visible surface reflects to the camera, through the medium of the
+scene and without shadows, summed over the lamps.
+"""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar
 
 from realtime.area_lights.points import LightPoints
-from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.view import View
-from realtime.parameters import Parameters, defaults, read_parameters, values
+from realtime.numerics.array_types import PerRay
+from realtime.parameters import Parameters, defaults, parameter, read_parameters, values
+from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene
 
 #: What of a scene may change from frame to frame; `look` is all that moves nothing: the medium and the lights' colours.
@@ -17,103 +32,140 @@ MOVABLE = ("camera", "geometry", "light", "look")
 #: What runs before a frame when things moved: a function of the scene as it is now that returns the method's state.
 Preparation = Callable[[Scene], Any]
 
-
-def never(parameters: Any) -> bool:
-    """Return False, whatever the parameters."""
-    return False
-
-
-def always(parameters: Any) -> bool:
-    """Return True, whatever the parameters."""
-    return True
-
-
 #: A cause of errors, and the values of parameters with which it is gone; None: all that the method has left.
 ErrorCause = tuple[str, Mapping[str, Any] | None]
 
 
-def no_causes(parameters: Any, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
-    """Return no cause of errors, whatever the parameters and the size of the image."""
-    return ()
+@dataclass(frozen=True)
+class Layers:
+    """What a method says of every ray. What it leaves out costs nothing."""
+
+    in_scattered: PerRay  #: radiance that the media scatter into the ray, a colour [W/(m^2 sr)]
+    #: By light, or by source (`Method.by_source`), which fraction of it reaches the surface: 0 to 1, or a mask; None:
+    #: shadow rays say it.
+    visibility: tuple[PerRay, ...] | None = None
+    transmittance: PerRay | None = None  #: of what the method adds to the scene's media; None: all passes
+    background: PerRay | None = None  #: radiance from behind all media, 0 where a surface hides it [W/(m^2 sr)]
+    #: Further layers of the image by their names, radiance [W/(m^2 sr)] or fractions, only where the view asks for them
+    extra: Mapping[str, PerRay] | None = None
+    carried: Any = None  #: arrays that the next frame finds in its view; see `Method.carries`
 
 
 @dataclass(frozen=True)
-class Method:
-    """A method under its name: its stages in the order in which they run, then what a user and a frame must know.
+class Method(Parameters):
+    """A method with the values of its parameters.
 
-    In a scene where nothing casts a shadow `cull` does not run, and lists are ().
+    Most methods have `prepare` and `airlight`. One that looks at all lights together overrides `preparation` and
+    `render` instead.
     """
 
-    name: str
-    #: ``render(view, state, lists, *, kernel, parameters)``: the layers of every ray.
-    render: Callable[..., Layers]
-    summary: str
-    source: str
-    parameters: type[Parameters] = Parameters
-    #: ``prepare(scene, parameters)`` checks what parameters ask of the scene and returns what makes the state: by light
-    #: a shadow map, or shadow planes. It runs in every scene, and makes no maps where nothing casts a shadow. None: the
-    #: state is ().
-    prepare: Callable[[Scene, Any], Preparation] | None = None
-    #: What `prepare` looks at; while that stands still, its state is kept.
-    prepared_from: frozenset[str] = frozenset(MOVABLE)
-    #: ``cull(view, state, parameters)``: by light lists of what concerns each tile, from camera, geometry and lights,
-    #: without their colours and the media. None: there is nothing to sort, the lists are ().
-    cull: Callable[[View, Any, Any], Any] | None = None
-    #: ``f(layers, g_buffer, history, *, camera, parameters)`` -> layers: functions over the whole image, run in turn
-    #: on what `render` returned. All arrays have an entry per pixel, row by row; `history` is None in the first frame.
-    passes: tuple[Callable[..., Layers], ...] = ()
-    passes_read_depth_alone: bool = False  #: whether they leave out normals and albedos, which the G-buffer then lacks
-    #: Parameters -> whether `render` hands arrays of any sizes on to the next frame, as `Layers.carried`.
-    carries: Callable[[Any], bool] = never
-    runs_passes: Callable[[Any], bool] = always  #: parameters -> whether these run
-    uses_kernel: Callable[[Any], bool] = always  #: parameters -> whether `render` calls an airlight kernel
-    shadows: bool = True  #: whether it knows shadows; one that does not is wrong where there are occluders
-    provides_visibility: Callable[[Any], bool] = never  #: parameters -> whether its layers have a visibility
-    #: Whether it knows clouds of any shape and a sky. Then it says itself how the media dim the surfaces, and `prepare`
-    #: runs where nothing casts a shadow too.
-    renders_clouds: bool = False
-    layers: tuple[str, ...] = ()  #: the names that `Layers.extra` may have, where a frame asks for further layers
-    casts_rays: Callable[[Any], bool] = never  #: parameters -> whether it casts rays
-    frozen: Callable[[Any], bool] = always  #: parameters -> whether Dr.Jit can record it once and replay it
-    #: Parameters -> whether it computes each ray by itself, on any layout: then a frame may interpolate. It has the
-    #: parameter `tolerance`, `realtime.tiles.adaptive_sampling.tolerance`. None: it has not.
-    by_rays: Callable[[Any], bool] | None = None
-    #: ``error_causes(parameters, (width, height))``: the causes of its errors in an image of that size [pixels], in the
-    #: order in which `airlight study decomposition` takes them away, one on top of the other.
-    error_causes: Callable[[Any, tuple[int, int]], tuple[ErrorCause, ...]] = no_causes
-    #: Parameters -> whether it is given all lights of a frame at once, the points of lights with extent among them. If
-    #: not, and if it has no passes over the image, it is given one light point after another, and where there are many
-    #: lights one after another: what it returns is added up, and it is recorded once for all of one structure.
-    lights_at_once: Callable[[Any], bool] = never
-    #: Parameters -> whether its visibility has one entry for all points of a light with extent, and one for each other
-    #: light: then surfaces are shaded by source too.
-    by_source: Callable[[Any], bool] = never
-    light_points: LightPoints = field(default_factory=LightPoints)  #: how it renders lights with extent by default
+    name: ClassVar[str] = ""
+    summary: ClassVar[str] = "a method of one's own"  #: what it does, for tables
+    source: ClassVar[str] = "one's own"  #: the paper
+    shadows: ClassVar[bool] = True  #: whether it knows shadows; one that does not is wrong where there are occluders
+    #: Whether it knows clouds of any shape and a sky. Then it says itself how the media attenuate the surfaces.
+    renders_clouds: ClassVar[bool] = False
+    layers: ClassVar[tuple[str, ...]] = ()  #: the names that `Layers.extra` may have
+    light_points: ClassVar[LightPoints] = LightPoints()  #: how it renders area lights by default
+
+    # What a frame must know. Each may be a property that follows from the parameters.
+    prepared_from: ClassVar[frozenset[str]] = frozenset(MOVABLE)  #: what `prepare` looks at; else its state is kept
+    uses_kernel: ClassVar[bool] = True  #: whether it calls an airlight kernel
+    casts_rays: ClassVar[bool] = False  #: whether it asks `View.visible` or the geometry
+    provides_visibility: ClassVar[bool] = False  #: whether it says which surfaces its lights reach
+    by_rays: ClassVar[bool] = False  #: whether each ray is computed by itself, so that any pixels can be rendered alone
+    frozen: ClassVar[bool] = True  #: whether Dr.Jit can record it once and replay it
+    at_once: ClassVar[bool] = False  #: whether it is given all lights and light samples of a frame at once
+    by_source: ClassVar[bool] = False  #: whether its visibility has one entry for all samples of an area light
+    carries: ClassVar[bool] = False  #: whether it hands arrays on to the next frame, as `Layers.carried`
+
+    def check(self, scene: Scene) -> None:
+        """Refuse a scene, by `InputError`, that the method with these parameters cannot render."""
+
+    def prepare(self, scene: Scene, light: Light) -> Any:
+        """Return what `airlight` needs of a scene and one light; it is asked only where something casts a shadow."""
+
+    def airlight(self, view: View, light: Light, state: Any, kernel: Any) -> Any:
+        """Return the radiance that one light has scattered into every ray [W/(m^2 sr)].
+
+        Parameters
+        ----------
+        view
+            The rays.
+        light
+            One of `view.lights`.
+        state
+            From `prepare`; None where nothing casts a shadow.
+        kernel
+            An airlight kernel, see `realtime.kernels`; None where `uses_kernel` is false.
+
+        Returns
+        -------
+        radiance
+            A colour. Where `provides_visibility`, a pair: that, and which fraction of the light reaches the surface.
+        """
+        raise NotImplementedError
+
+    def preparation(self, scene: Scene) -> Preparation:
+        """Return what makes the state of all lights; what it needs of the scene once is read here."""
+        if not scene.features.shadows:
+            return no_state
+        return lambda now: tuple(self.prepare(now, light) for light in now.lights)
+
+    def render(self, view: View, state: Any, kernel: Any) -> Layers:
+        """Return the layers of every ray: the sum over the lights."""
+        total, visibility = type(view.medium.albedo)(0), []
+        for light, own in zip(view.lights, state or (None,) * len(view.lights), strict=True):
+            found = self.airlight(view, light, own, kernel)
+            if self.provides_visibility:
+                found, reached = found
+                visibility.append(reached)
+            total += found
+        return Layers(total, tuple(visibility) if self.provides_visibility else None)
 
     @property
-    def defaults(self) -> dict[str, Any]:
-        """The defaults of its parameters by their names."""
-        return defaults(self.parameters)
+    def interpolated(self) -> float:
+        """How far airlight may be interpolated between the corners of tiles, see `tolerance`."""
+        return getattr(self, "tolerance", 0.0)
+
+    def error_causes(self, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
+        """Return the causes of its errors in an image of that size [pixels].
+
+        They come in the order in which `airlight study decomposition` takes them away, one on top of the other.
+        """
+        return ()
 
 
-def method_parameters(method: Method, given: Mapping[str, Any]) -> tuple[Any, LightPoints]:
-    """Return the parameters of a method, and those of lights with extent, which all methods have in common.
+def no_state(scene: Scene) -> tuple[()]:
+    """Return the state of a method that makes none."""
+    return ()
 
-    Parameters
-    ----------
-    method
-        The method.
-    given
-        Values by name; a word is converted to the type of the default.
+
+def tolerance() -> Any:
+    """Return the field of the parameter that every method has whose rays can be interpolated."""
+    return parameter(
+        0.0,
+        "what may be interpolated between the corners of tiles, as a share of the airlight; 0: nothing, every pixel is "
+        "computed",
+        least=0,
+        below=1,
+        wanted="a share of the airlight from 0 up to 1",
+    )
+
+
+def method_parameters(method: type[Method], given: Mapping[str, Any]) -> tuple[Method, LightPoints]:
+    """Return a method with its parameters, and those of area lights, which all methods have in common.
+
+    `given` are values by name; a word is converted to the type of the default.
 
     Raises
     ------
     InputError
         As `realtime.parameters.read_parameters`.
     """
-    common = [item.name for item in fields(LightPoints) if item.name not in method.defaults]
+    common = [item.name for item in fields(LightPoints) if item.name not in defaults(method)]
     own = {name: value for name, value in given.items() if name not in common}
     asked = {name: value for name, value in given.items() if name in common}
-    chosen = read_parameters(method.name, method.parameters, own, others=common)
+    chosen = read_parameters(method.name, method, own, others=common)
     read = values(read_parameters(method.name, LightPoints, asked))
     return chosen, replace(method.light_points, **{name: read[name] for name in asked})

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a method is given: the view of a frame."""
+"""What a method is given: the camera rays of a frame, the lights and the media."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -12,20 +11,16 @@ from realtime.bounded_media.pieces import camera_pieces
 from realtime.errors import InputError
 from realtime.kernels.bounded import ConstantLeg, bounded_form
 from realtime.numerics.array_types import Metres, PerRay
-from realtime.scene.camera import Camera
+from realtime.rays.ray_light import RayGeometry, ray_geometry
+from realtime.scene.camera import Camera, ray_directions
 from realtime.scene.features import SceneFeatures
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
-from realtime.tiles.layout import Layout
 
 
 @dataclass(frozen=True)
 class View:
-    """The rays of a frame and all that scatters light into them, as Dr.Jit arrays with one entry per pixel.
-
-    A method's `realtime.methods.interface.method.Method.render` makes `Layers` of it; a user's plain function, the
-    in-scattered radiance alone.
-    """
+    """The rays of a frame and all that scatters light into them, as Dr.Jit arrays with one entry per pixel."""
 
     origin: Any  #: start of the rays [m]
     direction: PerRay  #: unit directions
@@ -34,20 +29,42 @@ class View:
     lights: tuple[Light, ...]
     medium: Medium
     features: SceneFeatures  #: what the scene needs; a method leaves out the rest
-    visible: Callable[..., Any]  #: (point, light or what else has a `shadow_ray`, asked=True) -> whether it is lit
     camera: Camera
     pixel: PerRay  #: pixel number of every ray: row times width plus column
-    layout: Layout  #: how the rays lie in the image
-    tile: PerRay  #: the number of every ray's tile, of sixteen that follow one another where all are there
-    rays: Callable[[Any], tuple[Any, Any]]  #: lanes -> the directions of their rays, and their low parts
-    visible_triangle: Callable[[], tuple[Any, Any, Any]]  #: -> corners [m], barycentric weights, whether there is one
-    part: Callable[[], Callable[..., "View"]]  #: -> (pixel, distance, tile, layout) -> the view of some of the rays
-    surfaces: tuple[PerRay, ...] | None = (
-        None  #: by light, what the visible surface sends back unshadowed, for a method that provides visibility
-    )
+    scene: Any = None  #: the Mitsuba scene, for casting rays; None where the method says that it casts none
+    surfaces: tuple[PerRay, ...] | None = None  #: by light, what the visible surface sends back unshadowed
     prepared: Any = ()  #: for a user's plain function: what its `prepare` made
     extra_layers: bool = False  #: whether the image is to have `Layers.extra`
     carried: Any = None  #: the `Layers.carried` of the last frame; None in the first
+
+    def visible(self, point, light: Any, asked=True):
+        """Return whether a light, or what else has a `shadow_ray`, reaches points [m], by rays where they are `asked`.
+
+        Raises
+        ------
+        InputError
+            For a method that says that it casts no rays.
+        """
+        if self.scene is None:
+            raise InputError("visible: the method says that it casts no rays, and asks for some; wanted `casts_rays`")
+        return ~self.scene.ray_test(light.shadow_ray(point), asked)
+
+    def geometry(self, light: Light) -> RayGeometry:
+        """Return where the rays pass a light: foot, height, and what of them it could reach."""
+        return ray_geometry(self.origin, self.direction, light, low=self.direction_low)
+
+    def of_pixels(self, pixel: PerRay, distance: Metres) -> "View":
+        """Return the view of other pixels of the image; `distance` [m] is that to their visible surfaces."""
+        direction, low = ray_directions(self.camera, pixel)
+        return replace(self, direction=direction, direction_low=low, distance=distance, pixel=pixel)
+
+
+def camera_view(
+    camera: Camera, pixel: PerRay, distance: Metres, *, features: SceneFeatures, scene, medium: Medium, lights
+) -> View:
+    """Return what a method is given for some pixels; `distance` [m] is that to the visible surface."""
+    direction, low = ray_directions(camera, pixel)
+    return View(camera.origin, direction, low, distance, tuple(lights), medium, features, camera, pixel, scene)
 
 
 def radiance(medium: Medium, light: Light, integral):
@@ -56,13 +73,13 @@ def radiance(medium: Medium, light: Light, integral):
     return medium.albedo * light.intensity * (sigma_t * (integral * (0.25 * dr.inv_pi)))
 
 
-def rays_in_media(view: View, form: str = "kernel", *, kernel: Any = None) -> tuple[MediaRay, ...]:
-    """Return the rays of a view in bounded media, by light.
+def ray_in_media(view: View, light: Light, form: str = "kernel", *, kernel: Any = None) -> MediaRay | None:
+    """Return the rays of a view in bounded media, lit by one light; None where no media have bounds.
 
     Parameters
     ----------
-    view
-        The frame.
+    view, light
+        The rays, and a light.
     form
         One of `realtime.bounded_media.airlight.FORMS`, or 'kernel': 'paper' for a light that has a place and a kernel
         that has a form for bounded media, otherwise 'exact'.
@@ -74,26 +91,9 @@ def rays_in_media(view: View, form: str = "kernel", *, kernel: Any = None) -> tu
     InputError
         For what a published form refuses.
     """
-    polynomial = media_polynomial(kernel)
-    pieces = camera_pieces(view.medium, view.origin, view.direction)
-    place = {"origin": view.origin, "direction": view.direction, "low": view.direction_low}
-    return tuple(
-        _ray_in_media(view.medium, light, place, pieces=pieces, form=form, polynomial=polynomial)
-        for light in view.lights
-    )
-
-
-def media_polynomial(kernel: Any) -> Any:
-    """Return the form of a kernel for bounded media, for `realtime.bounded_media.airlight.lit_ray`, or None."""
-    bounded = bounded_form(kernel)
-    if bounded is None:
+    if not view.features.bounded:
         return None
-    return lambda geometry, x0, x1, light, phase, leg: bounded(geometry, x0, x1, light, phase, ConstantLeg(*leg))
-
-
-def _ray_in_media(
-    medium: Medium, light: Light, place: dict[str, Any], *, form: str, polynomial: Any, **known
-) -> MediaRay:
+    medium, polynomial = view.medium, media_polynomial(kernel)
     if form == "kernel":
         form = "exact" if polynomial is None or not light.w else "paper"
         if form != "exact" and not medium.clear:
@@ -103,9 +103,11 @@ def _ray_in_media(
             )
     else:
         check_form(medium, form)
+    pieces = camera_pieces(medium, view.origin, view.direction)
+    place = {"origin": view.origin, "direction": view.direction, "low": view.direction_low, "pieces": pieces}
     if form == "exact":
-        return lit_ray(medium, light, **place, form=form, **known)
-    ray = lit_ray(medium, light, **place, form=form, polynomial=polynomial, **known)
+        return lit_ray(medium, light, **place, form=form)
+    ray = lit_ray(medium, light, **place, form=form, polynomial=polynomial)
     if polynomial is not None:
         # What it refuses must be raised here, not in a branch. Nothing is computed that nobody reads.
         zero = type(ray.geometry.height)(0)
@@ -113,6 +115,14 @@ def _ray_in_media(
             leg = bounded.medium.sigma_t[0], zero, bounded.mean_distance, form == "printed"
             polynomial(ray.geometry, zero, zero, light, bounded.medium.phase, leg)
     return ray
+
+
+def media_polynomial(kernel: Any) -> Any:
+    """Return the form of a kernel for bounded media, for `realtime.bounded_media.airlight.lit_ray`, or None."""
+    bounded = bounded_form(kernel)
+    if bounded is None:
+        return None
+    return lambda geometry, x0, x1, light, phase, leg: bounded(geometry, x0, x1, light, phase, ConstantLeg(*leg))
 
 
 def bounded_radiance(light: Light, scattered):

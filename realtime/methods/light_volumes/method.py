@@ -20,34 +20,44 @@ how it is crossed:
   `adaptive` one has fewer triangles where the map is flat (`realtime.methods.light_volumes.published.tessellation`).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 
 from realtime.errors import InputError
-from realtime.memory import check_memory
-from realtime.methods.interface.layers import Layers
-from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
-from realtime.methods.interface.view import View, rays_in_media
+from realtime.methods.interface.light_airlight import integral_type, ray_airlight
+from realtime.methods.interface.method import Method, tolerance
 from realtime.methods.light_volumes.jump_search import with_walls
 from realtime.methods.light_volumes.published.mesh import THRESHOLD, memory_needed, volume_mesh
 from realtime.methods.light_volumes.published.signed_sum import mesh_airlight
 from realtime.methods.light_volumes.walk import sum_lit_intervals
 from realtime.numerics.array_types import bytes_of
-from realtime.parameters import Parameters, parameter
+from realtime.parameters import parameter
 from realtime.scene.lights import Light
-from realtime.scene.read_scene import Scene
-from realtime.shadow_maps.inverse_depth_field import InverseDepthField, inverse_depth_field, level_start
+from realtime.shadow_maps.inverse_depth_field import inverse_depth_field, level_start
 from realtime.shadow_maps.projection import light_faces
-from realtime.shadow_maps.shadow_map import cast_shadow_map, map_memory, map_size
-from realtime.tiles.adaptive_sampling import tolerance
+from realtime.shadow_maps.shadow_map import cast_shadow_map, check_maps, map_memory, map_size
 
 
 @dataclass(frozen=True)
-class LightVolumeParameters(Parameters):
-    """The parameters of light volumes."""
+class LightVolumes(Method):
+    """The airlight in light volumes.
+
+    Valid for all lights and any shapes that rays can be cast against; the map of a directional light covers the media,
+    and its shadows on surfaces always come from rays. Exact with respect to the shadow map: what it misses of the scene
+    falls as the size of a texel. A map without hits lights everything; a light inside a closed occluder lights nothing
+    outside it. Bounded media are for evaluation=walk; they have nodes of their own, but for a polynomial kernel.
+
+    References
+    ----------
+    Billeter, Sintorn, Assarsson 2010, *Real time volumetric shadows using polygonal light volumes*, High Performance
+    Graphics.
+    """
+
+    name = "light-volumes"
+    summary = "the volume between the light and its shadow map, crossed without marching"
+    source = "Billeter, Sintorn, Assarsson 2010"
+    prepared_from = frozenset({"geometry", "light"})
 
     map: int = map_size(512, "texels on a side of a face of the shadow map, a power of two")
     evaluation: str = parameter(
@@ -83,97 +93,59 @@ class LightVolumeParameters(Parameters):
                 "evaluation=mesh with it"
             )
 
+    @property
+    def by_rays(self):
+        """A mesh is drawn over the whole image."""
+        return self.evaluation == "walk"
 
-def light_volumes(view: View, state: tuple[Any, ...], lists, *, kernel, parameters: LightVolumeParameters) -> Layers:
-    """Return the airlight of every ray in the light volumes, and by light whether it reaches the visible surface.
+    @property
+    def frozen(self):
+        """The crossings of a mesh are counted on the way."""
+        return self.evaluation == "walk"
 
-    Parameters
-    ----------
-    view
-        The frame.
-    state
-        By light its height field, or its mesh, from `prepare_light_volumes`.
-    lists
-        Not used.
-    kernel
-        An airlight kernel, see `realtime.kernels`.
-    parameters
-        Values of the parameters.
+    @property
+    def provides_visibility(self):
+        """Rays that walk over the map find out which surfaces are lit."""
+        return self.evaluation == "walk" and self.surface == "map"
 
-    Notes
-    -----
-    Valid for all lights and any shapes that rays can be cast against; the map of a directional light covers the media,
-    and its shadows on surfaces always come from rays. Exact with respect to the shadow map:
-    what it misses of the scene falls as the size of a texel (`validation.study.maps`). A map that sees nothing
-    lights everything; a light inside a closed occluder lights nothing outside it. Bounded media are for
-    evaluation=walk; they have nodes of their own, but for a polynomial kernel.
+    def check(self, scene):
+        """Refuse a mesh in bounded media, and more memory than the machine has."""
+        if self.evaluation == "mesh" and scene.features.bounded:
+            raise InputError(
+                "evaluation=mesh: the scene has a medium with bounds, wanted one medium that fills all space; use "
+                "evaluation=walk"
+            )
+        if scene.features.shadows:
+            check_maps(
+                scene.lights, self.map, sum(_memory_of(light, self.map, self.evaluation) for light in scene.lights)
+            )
 
-    References
-    ----------
-    Billeter, Sintorn, Assarsson 2010, *Real time volumetric shadows using polygonal light volumes*, High Performance
-    Graphics.
-    """
-    total = type(view.medium.albedo)(0)
-    lit = []
-    in_media = rays_in_media(view, kernel=kernel) if view.features.bounded else ()
-    for number, light in enumerate(view.lights):
-        if parameters.evaluation == "mesh" and view.features.shadows:
-            total += mesh_airlight(view, light, state[number], kernel=kernel)
-            continue
-        airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None)
-        if view.features.shadows:
-            value, reached = _walk(state[number], airlight)
-        else:
-            value, reached = airlight.radiance(airlight.integral(*airlight.segment)), True
-        total += value
-        # A surface may be beside the map of a directional light, whose shadows on surfaces come from rays.
-        lit.append(reached if light.w else True)
-    return Layers(total, tuple(lit) if finds_lit_surfaces(parameters) else None)
-
-
-def finds_lit_surfaces(parameters: LightVolumeParameters) -> bool:
-    """Return whether the method, with these parameters, says which surfaces are lit."""
-    return parameters.evaluation == "walk" and parameters.surface == "map"
-
-
-def _walk(heights: InverseDepthField, airlight: RayAirlight):
-    """Return the airlight of one light along the rays [W/(m^2 sr)], and whether it reaches their ends."""
-    view = airlight.view
-    zero = dr.zeros(integral_type(view), dr.width(view.distance))
-    away = view.origin - airlight.light.position
-    place = {"away": away, "direction": view.direction, "segment": airlight.segment}
-    value, reached = sum_lit_intervals(heights, **place, integral=airlight.integral, zero=zero)
-    return airlight.radiance(value), reached
-
-
-def prepare_light_volumes(scene: Scene, parameters: LightVolumeParameters) -> Callable[[Scene], tuple[Any, ...]]:
-    """Return the function that makes the height field, or the mesh, of every light of a frame.
-
-    Raises
-    ------
-    InputError
-        For a mesh in bounded media, and more memory than the machine has.
-    """
-    map, evaluation = parameters.map, parameters.evaluation
-    if evaluation == "mesh" and scene.features.bounded:
-        raise InputError(
-            "evaluation=mesh: the scene has a medium with bounds, wanted one medium that fills all space; use "
-            "evaluation=walk"
-        )
-    if not scene.features.shadows:
-        return lambda scene: ()
-    needed = sum(_memory_of(light, map, evaluation) for light in scene.lights)
-    check_memory(f"map: {map} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
-
-    def volume(scene: Scene, light: Light):
-        shadow_map = cast_shadow_map(scene.geometry, light, map)
-        if evaluation == "walk":
+    def prepare(self, scene, light):
+        """Return the height field of a light, or its mesh."""
+        shadow_map = cast_shadow_map(scene.geometry, light, self.map)
+        if self.evaluation == "walk":
             heights = inverse_depth_field(shadow_map)
-            return with_walls(heights, scene.geometry, light) if parameters.walls == "upright" else heights
-        tessellation, threshold = parameters.tessellation, parameters.threshold
-        return volume_mesh(shadow_map, light, tessellation=tessellation, threshold=threshold)
+            return with_walls(heights, scene.geometry, light) if self.walls == "upright" else heights
+        return volume_mesh(shadow_map, light, tessellation=self.tessellation, threshold=self.threshold)
 
-    return lambda scene: tuple(volume(scene, light) for light in scene.lights)
+    def airlight(self, view, light, state, kernel):
+        """Return the airlight of every ray, and whether the light reaches the visible surface if that is asked."""
+        if self.evaluation == "mesh" and view.features.shadows:
+            return mesh_airlight(view, light, state, kernel=kernel)
+        airlight, reached = ray_airlight(view, light, kernel), True
+        if view.features.shadows:
+            zero = dr.zeros(integral_type(view), dr.width(view.distance))
+            ray = {"away": view.origin - light.position, "direction": view.direction, "segment": airlight.segment}
+            value, reached = sum_lit_intervals(state, **ray, integral=airlight.integral, zero=zero)
+        else:
+            value = airlight.integral(*airlight.segment)
+        radiance = airlight.radiance(value)
+        # A surface may be beside the map of a directional light, whose shadows on surfaces come from rays.
+        return (radiance, reached if light.w else True) if self.provides_visibility else radiance
+
+    def error_causes(self, size):
+        """Return the causes of its errors, see `Method.error_causes`."""
+        return ("resolution", {"tolerance": 0.0}), ("map", None)
 
 
 def _memory_of(light: Light, size: int, evaluation: str) -> int:

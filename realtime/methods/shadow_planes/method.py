@@ -28,12 +28,12 @@ from functools import partial
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.airlight import FORMS, MediaRay, ambient_radiance
+from realtime.bounded_media.airlight import FORMS, ambient_radiance
+from realtime.bounded_media.pieces import camera_pieces
 from realtime.errors import InputError
-from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
-from realtime.methods.interface.method import Preparation
-from realtime.methods.interface.view import View, rays_in_media
+from realtime.methods.interface.method import Layers, Method, no_state, tolerance
+from realtime.methods.interface.view import View
 from realtime.methods.shadow_planes.pixel_rays import aim_at, read_spot, seen_rays
 from realtime.methods.shadow_planes.plane_table import PlaneIndex, index_planes
 from realtime.methods.shadow_planes.published_crossings import Buffer, reaches, sum_crossings
@@ -43,18 +43,33 @@ from realtime.methods.shadow_planes.silhouettes import components_in_view, cone_
 from realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_intervals
 from realtime.numerics.array_types import ArrayTypes, types_of
 from realtime.numerics.host_numbers import host_numbers
-from realtime.parameters import Parameters, parameter
+from realtime.parameters import parameter
 from realtime.scene.camera import HostCamera, read_camera
 from realtime.scene.light_points import source_shape
 from realtime.scene.lights import Light, host_position
 from realtime.scene.mesh_adjacency import Casters, read_casters, with_positions
 from realtime.scene.read_scene import Scene
-from realtime.tiles.adaptive_sampling import tolerance
 
 
 @dataclass(frozen=True)
-class ShadowPlaneParameters(Parameters):
-    """The parameters of shadow planes."""
+class ShadowPlanes(Method):
+    """The airlight between shadow planes.
+
+    Valid for all lights and casters that are triangle meshes, closed or not. Shadows are those of the triangles, exact
+    to rounding, with order=exact. Bounded media have nodes of their own, but for a polynomial kernel. With buffer=8bit
+    the in-scattered radiance is what the buffer holds less the lit surfaces.
+
+    References
+    ----------
+    Biri, Arques, Michelin 2006, *Real time rendering of atmospheric scattering and volumetric shadows*, Journal of
+    WSCG 14.
+    """
+
+    name = "shadow-planes"
+    summary = "silhouettes extruded to planes; lit segments between their crossings"
+    source = "Biri, Arques, Michelin 2006"
+    prepared_from = frozenset({"camera", "geometry", "light"})
+    provides_visibility = True
 
     order: str = parameter(
         "exact", "how shadow within shadow is decided, see below", choices=("exact", "paper", "none")
@@ -119,9 +134,126 @@ class ShadowPlaneParameters(Parameters):
             )
 
     @property
+    def by_rays(self):
+        """Gamma at vertices is that of the whole image."""
+        return self.evaluation == "pixel"
+
+    @property
+    def casts_rays(self):
+        """Rays say which triangle a surface is of."""
+        return self.evaluation == "vertex"
+
+    @property
+    def at_once(self):
+        """What is no light's own, and a buffer that rounds, hold for the sum of all lights."""
+        return self.buffer == "8bit" or self.ambient > 0
+
+    @property
     def segments(self) -> bool:
         """Whether the lit segments of a ray are known, so that each can be integrated by itself."""
         return self.order == "exact" and self.evaluation == "pixel" and self.buffer == "float"
+
+    def preparation(self, scene):
+        """Read the casters of a scene and return what finds the shadow planes of a frame.
+
+        Raises
+        ------
+        InputError
+            For casters without triangles.
+        """
+        casters = read_casters(scene.geometry, scene.area_lights)
+        return PlanePreparation(casters, self.cone, self.order) if scene.features.shadows else no_state
+
+    def check(self, scene):
+        """Refuse bounded media that vertices cannot have."""
+        if scene.features.bounded and self.evaluation == "vertex":
+            check_vertices(scene.medium, scene.lights)
+
+    def airlight(self, view, light, state, kernel):
+        """Return the airlight of every ray between shadow planes, and whether the light reaches the visible surface."""
+        if not view.features.shadows:
+            airlight = ray_airlight(view, light, kernel, form=self.media)
+            return airlight.radiance(airlight.integral(type(view.distance)(0), view.distance)), True
+        airlight, rays, cone = self._rays(view, light, state, kernel)
+        if self.segments:
+            value, reached = _segments(state, rays, airlight, differences=self.sum == "gamma")
+        else:
+            value, reached = self._drawn(state, rays, airlight, cone=cone)
+        # Frames cast rays for the shadows of a light at infinity on surfaces.
+        return value, reached if light.w else True
+
+    def render(self, view, state, kernel):
+        """Return the layers of every ray; see `airlight`."""
+        if self.buffer == "8bit":
+            return self._buffered(view, state, kernel)
+        layers = super().render(view, state, kernel)
+        if not self.ambient:
+            return layers
+        return replace(layers, in_scattered=layers.in_scattered + _ambient_fog(view, self.ambient))
+
+    def error_causes(self, size):
+        """Return the causes of its errors, see `Method.error_causes`."""
+        return (
+            ("buffer", {"buffer": "float"}),
+            ("resolution", {"tolerance": 0.0, "evaluation": "pixel"}),
+            ("order", {"order": "exact"}),
+        )
+
+    def _rays(self, view: View, light: Light, index: PlaneIndex, kernel) -> tuple[RayAirlight, RayPlanes, bool]:
+        """Return the airlight of a light, the rays among its planes, and whether planes bound its cone."""
+        cone = bool(self.cone and light.cone is not None and not light.varies)
+        light = light.without_cone() if cone else light
+        seen = seen_rays(index.aim, view.camera, view.pixel, index.distance, light)
+        rays = ray_planes(index, seen.x, seen.y, seen.z, ray_end=index.distance / view.distance)
+        return ray_airlight(view, light, kernel, form=self.media, geometry=seen.geometry), rays, cone
+
+    def _buffered(self, view: View, state, kernel) -> Layers:
+        """Return what the buffer of 8 bits holds after all passes, less the lit surfaces."""
+        buffer, Color = Buffer(self.white), type(view.medium.albedo)
+        total, surfaces = Color(0), Color(0)  # what the buffer holds, and what of that are surfaces
+        lit = []
+        for number, light in enumerate(view.lights):
+            index = state[number] if view.features.shadows else None
+            reached = True
+            if index is not None:
+                airlight, rays, cone = self._rays(view, light, index, kernel)
+                reached = reaches(index, rays, view.distance) if light.w else mi.Bool(True)
+            surface = Color(0) if view.surfaces is None else dr.select(reached, view.surfaces[number], 0)
+            surfaces += surface
+            total = buffer.stored(total + surface)
+            if number == 0 and self.ambient:  # that of the first light is that of all
+                total = buffer.stored(total + _ambient_fog(view, self.ambient))
+            if index is None:
+                total = buffer.stored(total + self.airlight(view, light, None, kernel)[0])
+            else:
+                total, _ = self._drawn(index, rays, airlight, cone=cone, buffer=buffer, start=total)
+            lit.append(reached if light.w else True)
+        return Layers(total - surfaces, tuple(lit))
+
+    def _drawn(self, index: PlaneIndex, rays: RayPlanes, airlight: RayAirlight, *, cone: bool, buffer=None, start=None):
+        """Add up the Gammas of one light, in a buffer or not, and say whether it reaches the surface."""
+        view, media = airlight.view, airlight.media
+        if media is None or self.evaluation == "pixel":
+            gammas = self._gammas(index, airlight, cone=cone)
+            return sum_crossings(index, rays, view.distance, gammas, order=self.order, buffer=buffer, start=start)
+        media = replace(media, light=airlight.light, geometry=airlight.geometry)
+        start = type(view.medium.albedo)(0) if start is None else start
+        how = {"rows": self.rows, "cone": cone, "order": self.order, "buffer": buffer, "start": start}
+        return sum_in_media(view, media, index, rays, **how), reaches(index, rays, view.distance)
+
+    def _gammas(self, index: PlaneIndex, airlight: RayAirlight, *, cone: bool):
+        """Return the functions that give the radiance of Gamma at a crossing, and at the surface."""
+        view, light, kernel = airlight.view, airlight.light, airlight.kernel
+
+        def at(x):
+            return airlight.radiance(airlight.gamma(x))
+
+        if self.evaluation == "pixel":
+            return lambda number, rays, x: at(x), at
+        return (
+            mesh_gamma(view, index, light, kernel=kernel, rows=self.rows, cone=cone),
+            lambda x: surface_gamma(view, light, kernel=kernel, otherwise=at(x)),
+        )
 
 
 @dataclass(frozen=True)
@@ -152,20 +284,6 @@ class PlanePreparation:
     def standing(self, scene: Scene) -> Casters:
         """Return the casters where they are in a scene."""
         return with_positions(self.casters, scene.positions)
-
-
-def prepare_shadow_planes(scene: Scene, parameters: ShadowPlaneParameters) -> Preparation:
-    """Read the casters of a scene and return the function that finds the shadow planes of a frame.
-
-    Raises
-    ------
-    InputError
-        For casters without triangles.
-    """
-    casters = read_casters(scene.geometry, scene.area_lights)
-    if not scene.features.shadows:
-        return lambda scene: ()
-    return PlanePreparation(casters, parameters.cone, parameters.order)
 
 
 def plane_finder(
@@ -201,149 +319,11 @@ def plane_finder(
     return find
 
 
-def shadow_planes(
-    view: View,
-    state: tuple[PlaneIndex, ...],
-    lists,
-    *,
-    kernel,
-    parameters: ShadowPlaneParameters,
-) -> Layers:
-    """Return the airlight of every ray between shadow planes, and by light whether it reaches the visible surface.
-
-    Parameters
-    ----------
-    view
-        The frame.
-    state
-        By light its shadow planes, from `prepare_shadow_planes`.
-    lists
-        Not used.
-    kernel
-        An airlight kernel, see `realtime.kernels`.
-    parameters
-        Values of the parameters.
-
-    Raises
-    ------
-    InputError
-        For bounded media that an evaluation does not know.
-
-    Notes
-    -----
-    Valid for all lights and casters that are triangle meshes, closed or not. Shadows are those of the
-    triangles, exact to rounding, with order=exact. Bounded media have nodes of their own, but for a polynomial kernel.
-    With buffer=8bit the in-scattered radiance is what the buffer holds less the lit surfaces.
-
-    References
-    ----------
-    Biri, Arques, Michelin 2006, *Real time rendering of atmospheric scattering and volumetric shadows*, Journal of
-    WSCG 14.
-    """
-    total = type(view.medium.albedo)(0)
-    lit = []
-    in_media: tuple[MediaRay, ...] = ()
-    if view.features.bounded:
-        if parameters.evaluation == "vertex":
-            check_vertices(view)
-        in_media = rays_in_media(view, parameters.media, kernel=kernel)
-    buffer = Buffer(parameters.white) if parameters.buffer == "8bit" else None
-    surfaces = type(view.medium.albedo)(0)  # what of them the buffer shows
-    for number, light in enumerate(view.lights):
-        cone = bool(parameters.cone and light.cone is not None and not light.varies and view.features.shadows)
-        if cone:
-            light = light.without_cone()  # planes bound it
-        media = in_media[number] if in_media else None
-        if not view.features.shadows:
-            airlight = ray_airlight(view, light, kernel, media)
-            value = airlight.radiance(airlight.integral(type(view.distance)(0), view.distance))
-            if buffer:
-                surface = _surface(view, number, True)
-                surfaces += surface
-                total = _with_surface(view, buffer, total, surface, _fog_of(number, parameters), in_media)
-                total = buffer.stored(total + value)
-            else:
-                total += value
-            lit.append(True)
-            continue
-        index = state[number]
-        seen = seen_rays(index.aim, view.camera, view.pixel, index.distance, light)
-        ray_end = index.distance / view.distance
-        rays = ray_planes(index, seen.x, seen.y, seen.z, ray_end=ray_end)
-        airlight = ray_airlight(view, light, kernel, media, geometry=seen.geometry)
-        if parameters.segments:
-            differences = parameters.sum == "gamma"
-            value, reached = _segments(index, rays, airlight, differences=differences)
-            total += value
-        elif buffer:
-            reached = reaches(index, rays, view.distance) if light.w else mi.Bool(True)
-            surface = _surface(view, number, reached)
-            surfaces += surface
-            total = _with_surface(view, buffer, total, surface, _fog_of(number, parameters), in_media)
-            planes = index, rays
-            total, _ = _drawn(planes, airlight, parameters, cone=cone, buffer=buffer, start=total)
-        else:
-            planes = index, rays
-            value, reached = _drawn(planes, airlight, parameters, cone=cone, buffer=None, start=None)
-            total += value
-        # Frames cast rays for the shadows of a light at infinity on surfaces.
-        lit.append(reached if light.w else True)
-    if buffer:
-        total -= surfaces
-    elif parameters.ambient:
-        total += _ambient_fog(view, parameters.ambient, in_media)
-    return Layers(total, tuple(lit))
-
-
-def _drawn(
-    planes: tuple[PlaneIndex, RayPlanes],
-    airlight: RayAirlight,
-    parameters: ShadowPlaneParameters,
-    *,
-    cone: bool,
-    buffer: Buffer | None,
-    start,
-):
-    """Add up the Gammas of one light, in a buffer or not, and say whether it reaches the surface."""
-    view, media = airlight.view, airlight.media
-    if media is None or parameters.evaluation == "pixel":
-        gammas = _gammas(planes[0], airlight, parameters=parameters, cone=cone)
-        return sum_crossings(*planes, view.distance, gammas, order=parameters.order, buffer=buffer, start=start)
-    media = replace(media, light=airlight.light, geometry=airlight.geometry)
-    start = type(view.medium.albedo)(0) if start is None else start
-    value = sum_in_media(
-        view,
-        media,
-        *planes,
-        rows=parameters.rows,
-        cone=cone,
-        order=parameters.order,
-        buffer=buffer,
-        start=start,
-    )
-    return value, reaches(*planes, view.distance)
-
-
-def _surface(view: View, number: int, reached):
-    """Return what the visible surface sends back of a light, 0 where nobody knows."""
-    return type(view.medium.albedo)(0) if view.surfaces is None else dr.select(reached, view.surfaces[number], 0)
-
-
-def _fog_of(number: int, parameters: ShadowPlaneParameters) -> float:
-    """Return the ambient light in stage 2 of a light: that of the first is that of all."""
-    return parameters.ambient if number == 0 else 0.0
-
-
-def _with_surface(view: View, buffer: Buffer, total, surface, ambient: float, in_media: tuple[MediaRay, ...]):
-    """Return the buffer after stage 2 of a light."""
-    total = buffer.stored(total + surface)
-    return buffer.stored(total + _ambient_fog(view, ambient, in_media)) if ambient else total
-
-
-def _ambient_fog(view: View, ambient: float, in_media: tuple[MediaRay, ...]):
+def _ambient_fog(view: View, ambient: float):
     """Return the radiance of a constant light field in the media [W/(m^2 sr)]."""
-    if in_media:
-        return ambient_radiance(in_media[0].pieces, view.distance, ambient)
+    if view.features.bounded:
+        pieces = camera_pieces(view.medium, view.origin, view.direction)
+        return ambient_radiance(pieces, view.distance, ambient)
     distance = dr.minimum(view.distance, 1e30)
     for_channel = [1 - dr.exp(-sigma_t * distance) for sigma_t in view.medium.sigma_t]
     return view.medium.albedo * ambient * type(view.medium.albedo)(*for_channel)
@@ -359,18 +339,3 @@ def _segments(index: PlaneIndex, rays: RayPlanes, airlight: RayAirlight, *, diff
     zero = dr.zeros(integral_type(view), dr.width(view.distance))
     value, reached = sum_lit_intervals(index, rays, airlight.segment, integral, zero)
     return airlight.radiance(value), reached
-
-
-def _gammas(index: PlaneIndex, airlight: RayAirlight, *, parameters: ShadowPlaneParameters, cone: bool):
-    """Return the functions that give the radiance of Gamma at a crossing, and at the surface."""
-    view, light, kernel = airlight.view, airlight.light, airlight.kernel
-
-    def at(x):
-        return airlight.radiance(airlight.gamma(x))
-
-    if parameters.evaluation == "pixel":
-        return lambda number, rays, x: at(x), at
-    return (
-        mesh_gamma(view, index, light, kernel=kernel, rows=parameters.rows, cone=cone),
-        lambda x: surface_gamma(view, light, kernel=kernel, otherwise=at(x)),
-    )

@@ -25,7 +25,6 @@ import mitsuba as mi
 
 from realtime.methods.shadow_planes.plane_table import PlaneIndex
 from realtime.methods.shadow_planes.sweep import RayPlanes, read_plane
-from realtime.tiles.candidate_lists import over_lists
 
 
 @dataclass(frozen=True)
@@ -194,4 +193,10 @@ def _layers_at_end(index: PlaneIndex, ray: RayPlanes, ray_end):
         quotient, crossed, gain, _ = read_plane(index, ray, k, k < ray.count)
         return layers + dr.select(crossed & (quotient > ray_end), gain, 0)
 
-    return over_lists(ray.count, look, dr.zeros(Float, width) + Float(index.layers))
+    _, layers = dr.while_loop(
+        state=(dr.zeros(mi.UInt32, width), dr.zeros(Float, width) + Float(index.layers)),
+        cond=lambda k, layers: k < ray.count,
+        body=lambda k, layers: (k + 1, look(k, layers)),
+        labels=("k", "layers"),
+    )
+    return layers

@@ -25,6 +25,7 @@ with kinks at the bounds that no vertex knows of. Nodes that stand in for a poly
 What absorbs before the medium on the way to the camera is a factor of the ray; the paper does not mention it.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -36,11 +37,13 @@ from realtime.errors import InputError
 from realtime.methods.interface.view import View, bounded_radiance
 from realtime.methods.shadow_planes.plane_table import PlaneIndex
 from realtime.methods.shadow_planes.published_crossings import Buffer, Entry, sum_crossings
-from realtime.methods.shadow_planes.published_mesh import mesh_gamma, surface_gamma
+from realtime.methods.shadow_planes.published_mesh import mesh_gamma, surface_gamma, visible_triangle
 from realtime.methods.shadow_planes.sweep import RayPlanes
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium
 
 
-def check_vertices(view: View) -> None:
+def check_vertices(medium: Medium, lights: Sequence[Light]) -> None:
     """Refuse bounded media whose Gamma no vertices can have.
 
     Raises
@@ -48,7 +51,7 @@ def check_vertices(view: View) -> None:
     InputError
         For a medium around them, and for a directional light.
     """
-    if not view.medium.clear or not all(light.w for light in view.lights):
+    if not medium.clear or not all(light.w for light in lights):
         raise InputError(
             "evaluation=vertex: wanted bounded media in clear air, and lights that have a place; use evaluation=pixel"
         )
@@ -81,7 +84,7 @@ def sum_in_media(
     start
         What is in the buffer before, or 0.
     """
-    triangle = view.visible_triangle()
+    triangle = visible_triangle(view)
     Color, total = type(view.medium.albedo), start
     for number in range(len(view.medium.bounded_media)):
         piece = media.pieces[number]

@@ -131,11 +131,35 @@ def surface_gamma(view: View, light: Light, *, kernel, otherwise, gamma_of: Gamm
     gamma_of
         In place of the kernel, Gamma at points.
     triangle
-        What `view.visible_triangle` returns, if that was asked before.
+        What `visible_triangle` returns, if that was asked before.
     """
-    corners, weights, seen = triangle or view.visible_triangle()
+    corners, weights, seen = triangle or visible_triangle(view)
     total = sum(
         dr.select(seen, weight, 0) * (gamma_of(corner) if gamma_of else gamma_at(view, light, corner, kernel=kernel))
         for corner, weight in zip(corners, weights)
     )
     return dr.select(seen, total, otherwise)
+
+
+def visible_triangle(view: View):
+    """Return the triangles that the rays of a view hit first.
+
+    Returns
+    -------
+    corners
+        Three positions [m].
+    weights
+        Barycentric coordinates of the hit in them.
+    seen
+        Whether a triangle is hit.
+    """
+    ray = mi.Ray3f(mi.Point3f(view.origin), mi.Vector3f(view.direction))
+    hit = view.scene.ray_intersect_preliminary(ray, coherent=True)
+    mesh = mi.MeshPtr(hit.shape)
+    seen = hit.is_valid() & hit.shape.is_mesh()
+    mesh = dr.select(seen, mesh, dr.zeros(mi.MeshPtr))
+    face = mesh.face_indices(hit.prim_index, seen)
+    corners = [type(view.direction)(mesh.vertex_position(vertex, seen)) for vertex in (face.x, face.y, face.z)]
+    Float = type(view.direction.x)
+    u, v = Float(hit.prim_uv.x), Float(hit.prim_uv.y)
+    return corners, (1 - u - v, u, v), seen

@@ -25,8 +25,17 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.intervals.lit_intervals import LitIntervals, add_waiting, close_interval, no_intervals, sum_at_end
-from realtime.intervals.nearest_crossings import exchange, filled, insert, pop
+from realtime.intervals.lit_intervals import (
+    LitIntervals,
+    add_waiting,
+    close_interval,
+    exchange,
+    filled,
+    insert,
+    no_intervals,
+    pop,
+    sum_at_end,
+)
 from realtime.methods.shadow_planes.plane_table import (
     FULL,
     GAIN_SHIFT,

@@ -18,12 +18,12 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.interface.marching import OPTICAL_REACH, equal_angles
+from realtime.methods.interface.marching import midpoint_sum, optical_end, steps_between
 from realtime.methods.interface.view import View
 from realtime.methods.soft_shafts.light_sources import SourceState, frame_at
 from realtime.methods.soft_shafts.parameters import SoftShaftsParameters
 from realtime.numerics.fast_exp import exp_bounded
-from realtime.scene.medium import least_extinction, per_extinction
+from realtime.scene.medium import per_extinction
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps
 
 
@@ -77,44 +77,31 @@ def _of_point(view: View, state: SourceState, number: Any, shift: Any, p: SoftSh
     along = sum(o * d for o, d in zip(origin, direction))
     begin, end = Float(0), view.distance
     if p.spacing == "uniform":
-        end = dr.minimum(end, OPTICAL_REACH / least_extinction(medium))
+        end = optical_end(medium, begin, end)
     # The plane of the light point cuts the ray.
     meets = -origin[2] / direction[2]
     begin = dr.select(direction[2] > 0, dr.maximum(meets, begin), begin)
     end = dr.select(direction[2] < 0, dr.minimum(meets, end), end)
     lit_part = (end > begin) & ((direction[2] != 0) | (origin[2] > 0))
-    angles = None
+    at_light = None
     if p.spacing == "equiangular":
         (oa, ob, oc), (da, db, dc) = origin, direction
         height = dr.sqrt(dr.square(ob * dc - oc * db) + dr.square(oc * da - oa * dc) + dr.square(oa * db - ob * da))
-        angles = equal_angles(-along, height, begin, end)
-        begin, end = angles.begin, angles.end
-    begin, end = dr.select(lit_part, begin, 0), dr.select(lit_part, end, 0)
-    width = (end - begin) / p.steps
+        at_light = -along, height
+    steps = steps_between(begin, end, p.steps, at_light, asked=lit_part)
 
-    def step(index: Any, total: Any):
-        u = dr.fma(Float(index) + shift, width, begin)
-        x = angles.place(u) if angles else u
+    def sample(x: Any):
         a, b, c = (dr.fma(d, x, o) for o, d in zip(origin, direction))
         inverse = dr.rsqrt(dr.fma(a, a, dr.fma(b, b, c * c)))
         r = dr.fma(a, a, dr.fma(b, b, c * c)) * inverse
         weight = dr.maximum(c, 0) * inverse * medium.phase.evaluate(-(along + x) * inverse) * dr.square(inverse)
-        if angles:
-            weight *= angles.stretch(x)
         lit = lit_part
         if view.features.shadows and p.shadow == "map":
             assert isinstance(state.maps, HemisphereMaps)
             lit = lit & state.maps.lit(number, (a, b, c), lit_part)
         elif view.features.shadows and p.shadow == "ray":
             lit = lit & view.visible(view.origin + view.direction * x, frame)
-        term = per_extinction(medium, lambda sigma_t: weight * exp_bounded(-sigma_t * (x + r)))
-        return index + 1, total + dr.select(lit, term, 0)
+        return dr.select(lit, per_extinction(medium, lambda sigma_t: weight * exp_bounded(-sigma_t * (x + r))), 0)
 
     nothing = per_extinction(medium, lambda sigma_t: dr.zeros(Float, dr.width(view.distance)))
-    _, total = dr.while_loop(
-        state=(mi.UInt32(0), nothing),
-        cond=lambda index, total: index < p.steps,
-        body=step,
-        labels=("index", "total"),
-    )
-    return total * dr.select(lit_part, width, 0)
+    return midpoint_sum(steps, p.steps, nothing, sample, shift)

@@ -35,10 +35,10 @@ from realtime.image_filters.raster import Raster
 from realtime.image_filters.separable import separable
 from realtime.image_filters.tile_average import tile_average
 from realtime.image_filters.upsample import small_pixels, upsample
-from realtime.memory import check_memory
-from realtime.methods.interface.layers import Layers
+from realtime.methods.interface.light_airlight import ray_airlight
 from realtime.methods.interface.marching import marched_integral
-from realtime.methods.interface.view import View, bounded_radiance, radiance, rays_in_media
+from realtime.methods.interface.method import Layers
+from realtime.methods.interface.view import View, bounded_radiance, radiance
 from realtime.methods.soft_shafts.light_sources import SourceState, frame_at, source_state
 from realtime.methods.soft_shafts.march import Share, integral_of_points
 from realtime.methods.soft_shafts.parameters import AUTO, SoftShaftsParameters
@@ -54,121 +54,86 @@ from realtime.methods.soft_shafts.surfaces import (
 )
 from realtime.numerics.array_types import two_numbers
 from realtime.scene.lights import sources_of
-from realtime.scene.read_scene import Scene
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps, maps_memory
-from realtime.shadow_maps.shadow_map import lit_in_map, map_memory
-from realtime.tiles.layout import Layout
+from realtime.shadow_maps.shadow_map import check_maps, lit_in_map, map_memory
 
 _MOST_AUTO = 8.0  # the widest filter of hd=auto [pixels]
 _LEAST_AUTO, _LEAST_SHARED = 0.3, 0.5  # its narrowest, and that where pixels share the points [pixels]
 
 
 @dataclass(frozen=True)
-class SoftShaftsState:
-    """What is made when lights or shapes move: a record for each source."""
-
-    sources: tuple[SourceState, ...]
-
-
-def prepare_soft_shafts(scene: Scene, parameters: SoftShaftsParameters) -> Callable[[Scene], SoftShaftsState]:
-    """Return the function that makes the tables of light points of a frame, and their maps.
-
-    Raises
-    ------
-    InputError
-        For a `scale` that does not divide the image, more points than a tile has pixels where these share them, and
-        maps that need more memory than the machine has.
-    """
-    camera, sources = scene.camera, sources_of(scene.lights)
-    size, scale = parameters.map, parameters.scale
-    if camera.width % scale or camera.height % scale:
-        raise InputError(
-            f"scale: got {scale} and an image of {camera.width} x {camera.height}, wanted one that divides both sides"
-        )
-    most = max(len(source) for source in sources)
-    if parameters.interleave and (most > 16 or 16 % most):
-        raise InputError(f"interleave: got {most} points of a light, wanted 1, 2, 4, 8 or 16, of which a tile has each")
-    with_maps = parameters.shadow == "map" or parameters.surfaces == "map" or parameters.hd == AUTO
-    with_maps = with_maps and scene.features.shadows
-    if with_maps:
-        needed = sum(
-            map_memory(light, size) if light.facing is None else maps_memory(type(camera.origin.x), 1, size)
-            for light in scene.lights
-        )
-        check_memory(f"map: {size} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
-
-    asked = {"with_maps": with_maps, "for_surfaces": parameters.surfaces == "map"}
-
-    def prepare(scene: Scene) -> SoftShaftsState:
-        return SoftShaftsState(
-            tuple(
-                source_state(scene.geometry, [scene.lights[number] for number in source], size, **asked)
-                for source in sources
-            )
-        )
-
-    return prepare
-
-
-def soft_shafts(view: View, state: SoftShaftsState, lists, *, kernel, parameters: SoftShaftsParameters) -> Layers:
-    """Return the airlight of every ray [W/(m^2 sr)] and the share of each light that reaches its surface.
-
-    Parameters
-    ----------
-    view
-        The frame, all pixels of an image.
-    state
-        From `prepare_soft_shafts`.
-    lists, kernel
-        Not used.
-    parameters
-        Values of the parameters.
+class SoftShafts(SoftShaftsParameters):
+    """The airlight of every ray, and the share of each light that reaches its surface.
 
     References
     ----------
     Ali 2016, reconstructed from captions: Figs. 4.8, 4.9 (points, `hd`, `hr`), 4.19 (taps), 5.8 (R1 to R4).
     """
-    width, height = view.camera.width, view.camera.height
-    color = type(view.medium.albedo)
-    if dr.width(view.pixel) != width * height:
-        # A first tile, with which a frame tries what a method refuses.
-        nothing = dr.zeros(color, dr.width(view.pixel))
-        return Layers(nothing, tuple(dr.full(mi.Bool, True, dr.width(view.pixel)) for _ in view.lights))
-    frame = _Frame(view, state, parameters)
-    total, visibility = dr.zeros(color, width * height), []
-    for number, source in enumerate(sources_of(view.lights)):
-        total += frame.airlight(number, source)
-        visibility += frame.visibility(number, source)
-    return Layers(total, tuple(visibility))
 
+    def check(self, scene):
+        """Refuse a `scale` that does not divide the image, more samples than share a tile, and maps without room."""
+        camera, sources = scene.camera, sources_of(scene.lights)
+        size, scale = self.map, self.scale
+        if camera.width % scale or camera.height % scale:
+            raise InputError(
+                f"scale: got {scale} and an image of {camera.width} x {camera.height}, wanted one that divides both "
+                "sides"
+            )
+        most = max(len(source) for source in sources)
+        if self.interleave and (most > 16 or 16 % most):
+            raise InputError(
+                f"interleave: got {most} points of a light, wanted 1, 2, 4, 8 or 16, of which a tile has each"
+            )
+        if self._with_maps and scene.features.shadows:
+            one = maps_memory(type(camera.origin.x), 1, size)
+            needed = sum(map_memory(light, size) if light.facing is None else one for light in scene.lights)
+            check_maps(scene.lights, size, needed)
 
-def shares_by_source(parameters: SoftShaftsParameters) -> bool:
-    """Return whether all points of a light have one share: without filter each has its own, and the sum is exact."""
-    return parameters.filter != "none" or parameters.interleave
+    @property
+    def _with_maps(self) -> bool:
+        return self.shadow == "map" or self.surfaces == "map" or self.hd == AUTO
+
+    def preparation(self, scene):
+        """Return what makes the tables of light samples of a frame, and their maps: a record for each source."""
+        asked = {
+            "with_maps": self._with_maps and scene.features.shadows,
+            "for_surfaces": self.surfaces == "map",
+        }
+
+        def prepare(now):
+            by_source = ([now.lights[number] for number in source] for source in sources_of(now.lights))
+            return tuple(source_state(now.geometry, lights, self.map, **asked) for lights in by_source)
+
+        return prepare
+
+    def render(self, view, state, kernel):
+        """Return the layers of every ray."""
+        frame = _Frame(view, state, self)
+        total, visibility = dr.zeros(type(view.medium.albedo), dr.width(view.pixel)), []
+        for number, source in enumerate(sources_of(view.lights)):
+            total += frame.airlight(number, source)
+            visibility += frame.visibility(number, source)
+        return Layers(total, tuple(visibility))
 
 
 class _Frame:
     """The images of one frame while it is recorded: all pixels row by row, and the few that airlight is computed in."""
 
-    def __init__(self, view: View, state: SoftShaftsState, parameters: SoftShaftsParameters):
+    def __init__(self, view: View, states: tuple[SourceState, ...], parameters: SoftShaftsParameters):
         width, height, scale = view.camera.width, view.camera.height, parameters.scale
         self.view, self.parameters = view, parameters
-        self.states = state.sources
+        self.states = states
         self.raster = Raster(width, height)
         depth = dr.empty(type(view.distance), width * height)
         dr.scatter(depth, view.distance, view.pixel)
-        part = view.part()
 
         def rays(pixel: Any) -> View:
-            return part(
-                pixel, dr.gather(type(depth), depth, pixel), dr.arange(mi.UInt32, dr.width(pixel)) // 16, Layout.SOME
-            )
+            return view.of_pixels(pixel, dr.gather(type(depth), depth, pixel))
 
         self.rays = rays
         self.whole = rays(dr.arange(mi.UInt32, width * height))
         self.few_raster = Raster(width // scale, height // scale)
         self.few = rays(small_pixels(self.few_raster, scale, width))
-        self.media = rays_in_media(self.few) if view.features.bounded else [None] * len(view.lights)
         self.depth = depth_guide(self.whole.distance, parameters.hz)
         self.few_depth = depth_guide(self.few.distance, parameters.hz)
 
@@ -179,9 +144,7 @@ class _Frame:
         if view.features.bounded or lights[0].facing is None:
             integral = sum(
                 marched_integral(
-                    few,
-                    few.lights[light],
-                    self.media[light],
+                    ray_airlight(few, few.lights[light], None),
                     steps=p.steps,
                     spacing=p.spacing,
                     lit=self._lit(number, light, place),
@@ -211,7 +174,7 @@ class _Frame:
         view, p, whole = self.view, self.parameters, self.whole
         lights = [view.lights[light] for light in source]
         if not view.features.shadows or not view.features.surfaces:
-            count = 1 if shares_by_source(p) else len(source)
+            count = 1 if p.by_source else len(source)
             return [dr.full(mi.Bool, True, self.raster.count) for _ in range(count)]
         there = dr.isfinite(view.distance)
         point = view.origin + view.direction * dr.select(there, view.distance, 0)

@@ -5,9 +5,10 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from realtime.area_lights.points import LightPoints
 from realtime.errors import InputError
-from realtime.methods.interface.method import ErrorCause
-from realtime.parameters import Parameters, parameter
+from realtime.methods.interface.method import Method
+from realtime.parameters import parameter
 from realtime.shadow_maps.shadow_map import map_size
 
 AUTO = "auto"
@@ -45,8 +46,18 @@ def check_range(value: Any) -> None:
 
 
 @dataclass(frozen=True)
-class SoftShaftsParameters(Parameters):
-    """The parameters of soft shafts."""
+class SoftShaftsParameters(Method):
+    """The parameters of soft shafts, and what follows from them."""
+
+    name = "soft-shafts"
+    summary = "few points of a light, visibility in few levels, smoothed by bilateral filters"
+    source = "Ali 2016, reconstructed from captions"
+    prepared_from = frozenset({"geometry", "light"})
+    uses_kernel = False
+    casts_rays = True
+    provides_visibility = True
+    at_once = True
+    light_points = LightPoints(5, "ring")
 
     steps: int = parameter(32, "steps of every ray and light point", least=1)
     spacing: str = parameter(
@@ -99,15 +110,19 @@ class SoftShaftsParameters(Parameters):
         """The standard deviation of the filter [pixels], not a number for `auto`."""
         return math.nan if self.hd == AUTO else float(self.hd)
 
+    @property
+    def by_source(self):
+        """All points of a light have one share: without filter each has its own, and the sum is exact."""
+        return self.filter != "none" or self.interleave
 
-def soft_shaft_errors(parameters: SoftShaftsParameters, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
-    """Return the causes of its errors, as `realtime.methods.interface.method.Method.error_causes` has them."""
-    plain = {"filter": "none"} | ({"hd": "5"} if parameters.hd == AUTO else {})
-    without = "shadows" if parameters.shadow == "none" else "map"
-    return (
-        ("filter", plain),
-        ("interleaving", {"interleave": False}),
-        ("resolution", {"scale": 1}),
-        (without, {"shadow": "ray"}),
-        ("steps", None),
-    )
+    def error_causes(self, size):
+        """Return the causes of its errors, see `Method.error_causes`."""
+        plain = {"filter": "none"} | ({"hd": "5"} if self.hd == AUTO else {})
+        without = "shadows" if self.shadow == "none" else "map"
+        return (
+            ("filter", plain),
+            ("interleaving", {"interleave": False}),
+            ("resolution", {"scale": 1}),
+            (without, {"shadow": "ray"}),
+            ("steps", None),
+        )

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a frame keeps of the last one: the images are those of frames made afresh, bit by bit."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import drjit as dr
 import mitsuba as mi
@@ -11,8 +11,7 @@ import pytest
 from realtime.frame.incremental import next_frame
 from realtime.frame.renderer import FrameRenderer, frame_renderer, image_frame, run_stages
 from realtime.kernels.registry import KERNELS
-from realtime.methods.interface.layers import Layers
-from realtime.methods.interface.method import never
+from realtime.methods.interface.method import Method
 from realtime.methods.registry import METHODS
 from realtime.scene.animate import (
     closed_shapes,
@@ -127,14 +126,17 @@ def test_images_are_those_of_frames_made_afresh(variant, scene, method, paramete
 def test_what_a_method_of_ones_own_prepares_is_made_anew_unless_it_says_otherwise(variant):
     """It may have looked at the medium."""
 
-    def of_medium(scene, parameters):
-        return lambda scene: tuple(scene.medium.sigma_t[0] for _ in scene.lights)
+    @dataclass(frozen=True)
+    class OfMedium(Method):
+        uses_kernel = False
 
-    def render(view, state, lists, *, kernel, parameters):
-        return Layers(type(view.medium.albedo)(state[0] + 0 * view.direction.x))
+        def prepare(self, scene, light):
+            return scene.medium.sigma_t[0]
 
-    own = replace(METHODS["unshadowed"], render=render, prepare=of_medium, uses_kernel=never)
-    renderer = frame_renderer(sphere_scene(), own)
+        def airlight(self, view, light, state, kernel):
+            return type(view.medium.albedo)(state + 0 * view.direction.x)
+
+    renderer = frame_renderer(sphere_scene(), OfMedium)
     _, kept = next_frame(renderer, renderer.scene, None, **STILL)
     thick = replace(renderer.scene, medium=thicker_medium(renderer.scene.medium, 2.0))
     stages, _ = next_frame(renderer, thick, kept, **STILL)
@@ -148,5 +150,6 @@ def test_frames_replay_whatever_moves(variant):
     _, kept = next_frame(renderer, renderer.scene, None, **STILL)
     for now, moved in frames(renderer.scene, STEPS):
         _, kept = next_frame(renderer, now, kept, **moved)
-    assert renderer.surface.n_recordings <= 2
-    assert [stage.n_recordings for stage in (renderer.shade, renderer.render)] == [1, 1]
+    stages = renderer.stages
+    assert stages.surface.n_recordings <= 2
+    assert [stage.n_recordings for stage in (stages.shade, stages.render)] == [1, 1]

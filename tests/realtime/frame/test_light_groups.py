@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lights with extent in frames: every method renders their points, and frames follow moves."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import mitsuba as mi
 import numpy as np
@@ -10,8 +10,7 @@ import pytest
 from realtime.area_lights.shape import turned_area_light
 from realtime.frame.incremental import next_frame
 from realtime.frame.renderer import image_frame, light_groups, render_frame, run_stages
-from realtime.methods.interface.layers import Layers
-from realtime.methods.interface.method import Method
+from realtime.methods.interface.method import Layers, Method
 from realtime.methods.registry import METHODS
 from realtime.scene.animate import with_area_lights
 from realtime.scene.light_points import with_light_points
@@ -73,7 +72,7 @@ def test_many_lights_one_by_one_are_all_at_once(variant):
     method = METHODS["unshadowed"]
     apart = frames.renderer(scene, method)
     assert len(light_groups(apart)) == len(scene.lights) == 2
-    one = frames.renderer(scene, replace(method, lights_at_once=lambda parameters: True))
+    one = frames.renderer(scene, at_once(method))
     assert len(light_groups(one)) == 1
     wanted, frame = render_frame(one), render_frame(apart)
     np.testing.assert_allclose(frame.airlight, wanted.airlight, rtol=1e-5, atol=1e-5 * wanted.airlight.mean())
@@ -104,21 +103,32 @@ def test_a_black_lamp_shadows_others_and_not_itself(variant):
     assert planes.airlight.mean() < 0.97 * clear.airlight.mean()
 
 
-def test_what_a_method_shows_of_no_light_is_added_once(variant):
-    def render(view, state, lists, *, kernel, parameters):
-        light = sum(light.intensity for light in view.lights) * view.distance * 0 + sum(
-            light.intensity for light in view.lights
-        )
+@dataclass(frozen=True)
+class Veil(Method):
+    """A method of the tests."""
+
+    name = "veil"
+    uses_kernel = False
+
+    def render(self, view, state, kernel):
+        light = sum(light.intensity for light in view.lights)
+        light = light + 0 * view.distance * light
         return Layers(light, transmittance=type(view.distance)(0.5), background=type(view.medium.albedo)(0.25))
 
-    method = Method("veil", render, "a veil", "none", uses_kernel=lambda parameters: False)
+
+def at_once(method):
+    """Return a method that is given all lights together."""
+    return dataclass(frozen=True)(type("AtOnce", (method,), {"at_once": True}))
+
+
+def test_what_a_method_shows_of_no_light_is_added_once(variant):
+    method = Veil
     scene = scene_of(changes={"size": (16, 12), "ball": None, "floor": None})
     frame = frames.render(scene, method, points=4)
     np.testing.assert_allclose(frame.surface, 0.125, rtol=1e-6)
     light = scene.area_lights[0]
     np.testing.assert_allclose(frame.airlight[0, 0], light.radiance * light.area, rtol=1e-5)
-    at_once = replace(method, lights_at_once=lambda parameters: True)
-    again = frames.render(scene, at_once, points=4)
+    again = frames.render(scene, at_once(method), points=4)
     np.testing.assert_allclose(again.surface, frame.surface, rtol=1e-6)
     np.testing.assert_allclose(again.airlight, frame.airlight, rtol=1e-6)
 

@@ -16,6 +16,7 @@ import drjit as dr
 import numpy as np
 import pytest
 from realtime.frame.renderer import render_frame
+from realtime.parameters import defaults
 from realtime.methods.registry import METHODS
 from realtime.scene.read_scene import read_scene
 from tests.helpers.transport_formula import use_formula
@@ -28,7 +29,7 @@ use_formula(pytest.MonkeyPatch())
 fog, clouds = (read_scene(load_scene(name, (128, 96)).scene) for name in ("sphere-spot", "cumulus"))
 for method in METHODS.values():
     scene = clouds if method.renders_clouds else fog
-    chosen = configuration(method.name, None, {"map": 128} if "map" in method.defaults else {})
+    chosen = configuration(method.name, None, {"map": 128} if "map" in defaults(method) else {})
     frames = []
     for threads in (2, 1):
         dr.set_thread_count(threads)

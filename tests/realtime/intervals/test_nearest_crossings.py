@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from realtime.intervals.nearest_crossings import exchange, filled, insert
+from realtime.intervals.lit_intervals import exchange, filled, insert
 from realtime.numerics.aligned import aligned_array
 
 RAYS, COUNT, PLACES = 16, 9, 4

@@ -180,7 +180,7 @@ def test_the_last_frame_s_collectors_go_on(variant):
         errors.append(np.abs(airlight - whole).mean() / whole.mean())
     assert errors[0] > 0.02
     assert errors[-1] < 2e-3
-    assert renderer.render.n_recordings <= 3
+    assert renderer.stages.render.n_recordings <= 3
 
 
 @pytest.mark.claim("collector-shade", tolerance="1 % in the middle of the shade and beside it")

@@ -152,7 +152,7 @@ def test_what_is_not_lit_from_infinity_is_refused():
 @pytest.mark.parametrize("name", FOG_METHODS)
 def test_methods_for_fog_refuse_clouds_and_skies_and_name_who_takes_them(name):
     method = METHODS[name]
-    kernel = {"kernel": exact} if method.uses_kernel(method.parameters()) else {}
+    kernel = {"kernel": exact} if method().uses_kernel else {}
     wanted = rf"method {name}: .*use cloud-collectors or cloud-octaves"
     with pytest.raises(InputError, match=wanted):
         frame_renderer(read_scene(loaded()), method, **kernel)

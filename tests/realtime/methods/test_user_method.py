@@ -3,16 +3,14 @@
 
 import re
 
-import mitsuba as mi
 import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from realtime.frame.renderer import frame_renderer
+from realtime.frame.renderer import frame_renderer, render_frame
 from realtime.methods.registry import find_method
 from realtime.numerics.recorded import Frozen
-from realtime.scene.read_scene import read_scene
-from tests.helpers import frames
+from realtime.parameters import defaults
 from tests.helpers.scenes import tiny_scene
 
 SOURCE = """
@@ -20,9 +18,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from realtime.errors import InputError
-from realtime.methods.interface.layers import Layers
-from realtime.methods.interface.method import Method, always, never
-from realtime.methods.registry import METHODS
+from dataclasses import dataclass
+from realtime.methods.interface.method import Layers, Method
 
 NUMBER = 3
 
@@ -61,9 +58,13 @@ def ready(view, size=2): return mi.Color3f(view.prepared[0])
 ready.prepare = lambda scene, size: lambda scene: (float(size),)
 def unready(view): return 1
 unready.prepare = lambda scene: None
-def full(view, state, lists, *, kernel, parameters): return Layers(2)
-record = Method("theirs", full, "", "", uses_kernel=never)
-lights = Method("lights", full, "", "", uses_kernel=never, provides_visibility=always)
+@dataclass(frozen=True)
+class Record(Method):
+    uses_kernel = False
+    def render(self, view, state, kernel): return Layers(2)
+@dataclass(frozen=True)
+class Lights(Record):
+    provides_visibility = True
 """
 
 
@@ -82,19 +83,29 @@ def own(tmp_path):
 @pytest.fixture
 def render(own, variant):
     """Render the tiny scene by a method of that file."""
-    scene = frames.read(tiny_scene())
-    return lambda name, **parameters: frames.render(scene, find_method(f"{own}:{name}"), **parameters).airlight
+    import mitsuba as mi
+
+    from realtime.kernels.registry import KERNELS
+    from realtime.scene.read_scene import read_scene
+
+    scene = read_scene(mi.load_dict(tiny_scene()))
+
+    def rendered(name, **parameters):
+        renderer = frame_renderer(scene, find_method(f"{own}:{name}"), kernel=KERNELS["exact"].function, **parameters)
+        return render_frame(renderer).airlight
+
+    return rendered
 
 
 @pytest.mark.claim("own-method-parameters")
 def test_the_signature_decides(own):
     method = find_method(f"{own}:calls")
-    assert method.uses_kernel(None)
-    assert method.defaults == {"steps": 7, "share": 0.5, "word": "a", "on": True}
-    assert (method.shadows, method.frozen({}), method.casts_rays({})) == (False, True, True)
+    assert method.uses_kernel
+    assert defaults(method) == {"steps": 7, "share": 0.5, "word": "a", "on": True}
+    assert (method.shadows, method.frozen, method.casts_rays) == (False, True, True)
     method = find_method(f"{own}:divides")
-    assert not method.uses_kernel(None)
-    assert (method.defaults, method.shadows, method.frozen({})) == ({}, True, False)
+    assert not method.uses_kernel
+    assert (defaults(method), method.shadows, method.frozen) == ({}, True, False)
     assert (method.summary, method.source) == ("Divide by zero.", own)
 
 
@@ -107,7 +118,7 @@ def test_the_signature_decides(own):
         ("constant", (2, 2, 2)),
         ("calls", (1, 1, 1)),
         ("ready", (2, 2, 2)),
-        ("record", (2, 2, 2)),
+        ("Record", (2, 2, 2)),
     ],
 )
 def test_what_is_returned_becomes_an_image(render, name, wanted):
@@ -130,7 +141,7 @@ def test_a_function_of_each_ray_by_itself_is_interpolated(render):
         ("nothing", "returned a NoneType; wanted the radiance of every pixel"),
         ("turned", "returned an array of shape (3, 192) for 192 pixels"),
         ("dark", "of 1 of 192 pixels is not finite, first in column 15 of row 11: nan, nan, nan"),
-        ("lights", "returned the visibility of 0 lights, wanted that of 1"),
+        ("Lights", "returned the visibility of 0 lights, wanted that of 1"),
         ("unready", "`prepare` returned a NoneType; wanted a function of the scene"),
     ],
 )
@@ -189,6 +200,10 @@ def test_faults_in_the_file_are_told_with_their_line(tmp_path, monkeypatch):
 
 @pytest.mark.claim("own-method-frozen")
 def test_only_a_method_that_says_so_is_frozen(own, variant):
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+
     scene = read_scene(mi.load_dict(tiny_scene()))
-    assert not isinstance(frame_renderer(scene, find_method(f"{own}:constant")).render, Frozen)
-    assert isinstance(frame_renderer(scene, find_method(f"{own}:calls"), kernel=print).render, Frozen)
+    assert not isinstance(frame_renderer(scene, find_method(f"{own}:constant")).stages.render, Frozen)
+    assert isinstance(frame_renderer(scene, find_method(f"{own}:calls"), kernel=print).stages.render, Frozen)

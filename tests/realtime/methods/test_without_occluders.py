@@ -5,15 +5,13 @@ Its kernels do not grow with the points of a light with extent, and its airlight
 """
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
 import pytest
 
 from realtime.frame.renderer import frame_renderer, render_frame, run_cast_and_shade, run_method
 from realtime.kernels.exact import exact
 from realtime.methods.registry import FOG_METHODS, METHODS
-from realtime.methods.user_method import own_method
-from realtime.scene.camera import ray_directions
+from realtime.methods.user_method import user_method
 from realtime.scene.light_points import with_light_points
 from realtime.scene.read_scene import read_scene
 from tests.helpers.lamps import lamp
@@ -31,6 +29,8 @@ POINTS = 4
 @pytest.fixture(scope="module")
 def empty(variant):
     """A lamp with extent in fog, and nothing else."""
+    import mitsuba as mi
+
     return read_scene(mi.load_dict(tiny_scene(lamp=lamp(), ball=None, floor=None)))
 
 
@@ -42,7 +42,7 @@ def rendered(scene, method, points):
     cast, by_light = run_cast_and_shade(renderer)
     dr.kernel_history_clear()
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
-        airlight = run_method(renderer, state, cast, by_light)[0]
+        airlight = run_method(renderer, state, cast, by_light).airlight
         dr.eval(airlight)
         kernels = [launch for launch in dr.kernel_history() if launch["type"] == dr.KernelType.JIT]
     pixel = np.array(renderer.pixel)
@@ -52,6 +52,8 @@ def rendered(scene, method, points):
 
 def sum_over_points(scene):
     """Return the airlight of the points by a hundred Gauss-Legendre nodes in the angle at each, for endless rays."""
+    from realtime.scene.camera import ray_directions
+
     lit = with_light_points(scene, POINTS, "sobol")
     pixel = dr.arange(type(dr.zeros(dr.uint32_array_t(lit.camera.origin.x))), 16 * 12)
     direction = np.array(ray_directions(lit.camera, pixel)[0], dtype=np.float64).T
@@ -87,4 +89,4 @@ def test_kernels_do_not_grow_with_the_points_of_a_light(empty, name):
 def test_a_users_method_is_prepared(empty, tmp_path):
     path = tmp_path / "prepared.py"
     path.write_text("def mine(view): return view.prepared\nmine.prepare = lambda scene: lambda scene: 7.0\n")
-    assert (render_frame(frame_renderer(empty, own_method(f"{path}:mine"), points=1)).airlight == 7).all()
+    assert (render_frame(frame_renderer(empty, user_method(f"{path}:mine"), points=1)).airlight == 7).all()

@@ -50,6 +50,6 @@ def test_a_frame_whose_objects_move_is_recorded_at_most_twice(variant):
     objects = read_objects(scene, ("pens", "flag"))
     for _ in range(8):
         moved = replace(renderer, scene=turned_objects(scene, objects, np.eye(3)))
-        dr.eval(run_stages(moved, ()))
-    assert 1 <= renderer.surface.n_recordings <= 2
-    assert 1 <= renderer.render.n_recordings <= 2
+        dr.eval(run_stages(moved, moved.prepare(moved.scene)))
+    assert 1 <= renderer.stages.surface.n_recordings <= 2
+    assert 1 <= renderer.stages.render.n_recordings <= 2

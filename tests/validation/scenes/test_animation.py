@@ -68,8 +68,9 @@ def test_frames_record_nothing_and_compile_nothing(variant, name, moves, method)
         assert kernels
         if number:
             assert not compiled
-    assert renderer.render.n_recordings == 1
-    assert all(getattr(stage, "n_recordings", 1) == 1 for stage in (renderer.surface, renderer.shade, renderer.cull))
+    stages = renderer.stages
+    assert stages.render.n_recordings == 1
+    assert all(getattr(stage, "n_recordings", 1) == 1 for stage in (stages.surface, stages.shade))
 
 
 @pytest.mark.parametrize(
@@ -86,11 +87,12 @@ def test_what_stands_still_is_kept(variant, moves, casts, prepared_frames):
     def counted(name):
         def run(*arguments):
             calls[name] += 1
-            return getattr(renderer, name)(*arguments)
+            return getattr(renderer.stages, name)(*arguments)
 
         return run
 
-    counting, kept = replace(renderer, surface=counted("surface"), prepare=counted("prepare")), None
+    stages = replace(renderer.stages, surface=counted("surface"), prepare=counted("prepare"))
+    counting, kept = replace(renderer, structures=dict.fromkeys(renderer.structures, stages)), None
     for moved in animate(scene, animation, 4):
         _, kept = next_frame(counting, moved, kept, **moved_parts(animation))
     assert calls == {"surface": casts, "prepare": prepared_frames}

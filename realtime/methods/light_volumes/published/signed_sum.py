@@ -17,7 +17,7 @@ from realtime.kernels.registry import airlight_integral
 from realtime.methods.interface.view import View, radiance
 from realtime.methods.light_volumes.published.mesh import VolumeMesh
 from realtime.methods.light_volumes.published.raster import BATCH, Crossings, signed_crossings
-from realtime.rays.ray_light import RayGeometry, ray_geometry
+from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
 
@@ -117,7 +117,7 @@ def mesh_airlight(view: View, light: Light, mesh: VolumeMesh, *, kernel, batch: 
     ----------
     Billeter, Sintorn, Assarsson 2010, eq. 3.
     """
-    geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
+    geometry = view.geometry(light)
     lane = dr.zeros(mi.UInt32, view.camera.width * view.camera.height)
     dr.scatter(lane, dr.arange(mi.UInt32, dr.width(view.pixel)), view.pixel)
     distance = view.distance

@@ -130,8 +130,8 @@ def test_any_map(variant, kind, data):
     count = int(np.max(vertex)) + 1
     heights = data.draw(st.lists(st.sampled_from(HEIGHTS), min_size=count, max_size=count))
     drawn_map = with_heights(shadow_map, np.array(heights)[vertex])
-    walked = image_frame(walk, run_stages(walk, (inverse_depth_field(drawn_map),)))
-    drawn = image_frame(mesh, run_stages(mesh, (volume_mesh(drawn_map, walk.scene.lights[0]),)))
+    walked = image_frame(walk, run_stages(walk, ((inverse_depth_field(drawn_map),),)))
+    drawn = image_frame(mesh, run_stages(mesh, ((volume_mesh(drawn_map, walk.scene.lights[0]),),)))
     wanted = oracle_airlight(read_truth(loaded), [drawn_map], distance=walked.distance)
     # As in the frames above; what is lit may be next to nothing, so the scale is the light's.
     scale = np.max(np.array(walk.scene.lights[0].intensity))
@@ -162,7 +162,7 @@ def test_any_walls_in_any_map(variant, kind, data):
     drawn_map = with_heights(shadow_map, heights)
     walls = any_walls(rng, drawn_map.faces, data.draw(st.sampled_from([0.0, 0.2, 0.5, 1.0])))
     field = walled_heights(inverse_depth_field(drawn_map), mi.UInt32(walls), mi.UInt32(np.flatnonzero(walls)))
-    walked = image_frame(walk, run_stages(walk, (field,)))
+    walked = image_frame(walk, run_stages(walk, ((field,),)))
     wanted = oracle_airlight(read_truth(loaded), [drawn_map], distance=walked.distance, walls=[walls])
     scale = np.max(np.array(walk.scene.lights[0].intensity))
     assert np.max(np.abs(walked.airlight - wanted)) < 1e-7 * scale

@@ -4,23 +4,17 @@
 from dataclasses import dataclass
 from types import SimpleNamespace
 
-import drjit as dr
-import mitsuba as mi
 import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
+from realtime.frame.adaptive_sampling import adaptive_layers, tile_corners
 from realtime.frame.renderer import frame_renderer, render_frame
 from realtime.kernels.registry import KERNELS
-from realtime.methods.interface.layers import Layers
-from realtime.methods.interface.method import Method, always, never
+from realtime.methods.interface.method import Layers, Method
+from realtime.methods.interface.method import tolerance as tolerance_parameter
 from realtime.methods.registry import METHODS
-from realtime.parameters import Parameters
-from realtime.scene.camera import tiled_pixels
-from realtime.scene.read_scene import read_scene
-from realtime.tiles.adaptive_sampling import between_corners, tile_corners
-from realtime.tiles.adaptive_sampling import tolerance as tolerance_parameter
 from tests.helpers.scenes import tiny_scene
 
 SIZE = 48, 32
@@ -28,9 +22,14 @@ SIZE = 48, 32
 
 def image_of(function, tolerance, *, depth=None, lit=None):
     """Return the image of a function of column and row between corners, and how many pixels were computed."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from realtime.scene.camera import tiled_pixels
+
     width, height = SIZE
     pixel = mi.UInt32(tiled_pixels(width, height))
-    corners = tile_corners(pixel, SimpleNamespace(width=width, height=height), tolerance, by_rays=True, lights=1)
+    corners = tile_corners(pixel, SimpleNamespace(width=width, height=height), by_rays=True, lights=1)
     values, lights, distance = (
         np.ascontiguousarray(np.broadcast_to(entry, (height, width)).ravel(), dtype=kind)
         for entry, kind in (
@@ -42,14 +41,14 @@ def image_of(function, tolerance, *, depth=None, lit=None):
     table, light = mi.Float(values), mi.UInt32(lights)
     computed = dr.zeros(mi.UInt32, width * height)
 
-    def sample(pixel, distance, tile, layout):
+    def render(pixel, distance, last):
         value = dr.gather(mi.Float, table, pixel)
         dr.scatter(computed, mi.UInt32(1), pixel)
-        return (mi.Color3f(value, 2 * value, 0.5 * value),), (dr.gather(mi.UInt32, light, pixel) != 0,)
+        return Layers(mi.Color3f(value, 2 * value, 0.5 * value), (dr.gather(mi.UInt32, light, pixel) != 0,))
 
-    (color,), (reached,) = between_corners(
-        corners, pixel, dr.gather(mi.Float, mi.Float(distance), pixel), sample, width=width, tolerance=tolerance
-    )
+    far = dr.gather(mi.Float, mi.Float(distance), pixel)
+    layers = adaptive_layers(render, corners, pixel, far, width=width, tolerance=tolerance, last=None)
+    color, (reached,) = layers.in_scattered, layers.visibility
     order, image = np.array(pixel), np.empty((width * height, 3))
     image[order] = np.array(color).T
     shown = np.empty(width * height, dtype=bool)
@@ -130,6 +129,10 @@ def test_frames_err_by_about_the_tolerance(variant, method, parameters):
 
 
 def frame(method, parameters, size=(96, 72)):
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+
     chosen = METHODS[method]
     turned = mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).rotate([1, 2, 3], 40).scale(0.33)
     scene = read_scene(mi.load_dict(tiny_scene(size=size, ball={"type": "cube", "to_world": turned})))
@@ -138,30 +141,35 @@ def frame(method, parameters, size=(96, 72)):
 
 
 @dataclass(frozen=True)
-class LayeredParameters(Parameters):
-    """The parameters of a method of the tests."""
+class Layered(Method):
+    """Layers that are smooth over the image, and a mask that is not."""
+
+    name = "layered"
+    uses_kernel = False
+    provides_visibility = True
+    by_rays = True
 
     tolerance: float = tolerance_parameter()
 
+    def render(self, view, state, kernel):
+        across, up = view.direction.x, view.direction.z
+        Color = type(view.medium.albedo)
+        return Layers(
+            Color(2 + across, 3 + up, 4 - up),
+            (0.6 + 0.2 * across, up > 0.1),
+            Color(0.5 + 0.1 * up),
+            Color(1 + 0.3 * across),
+        )
+
 
 def test_every_layer_is_interpolated(variant):
-    """Layers that are smooth over the image, and a mask that is not."""
+    import mitsuba as mi
 
-    def smooth(view, state, lists, *, kernel, parameters):
-        across, up = view.direction.x, view.direction.z
-        return Layers(
-            mi.Color3f(2 + across, 3 + up, 4 - up),
-            (0.6 + 0.2 * across, up > 0.1),
-            mi.Color3f(0.5 + 0.1 * up),
-            mi.Color3f(1 + 0.3 * across),
-        )
+    from realtime.scene.read_scene import read_scene
 
     two = tiny_scene(size=(48, 36)) | {"second": tiny_scene()["lamp"] | {"position": [-1.1, -0.9, 2.3]}}
     scene = read_scene(mi.load_dict(two))
-    method = Method(
-        "layered", smooth, "", "", LayeredParameters, uses_kernel=never, provides_visibility=always, by_rays=always
-    )
-    whole, parted = (render_frame(frame_renderer(scene, method, tolerance=tolerance)) for tolerance in (0.0, 0.02))
+    whole, parted = (render_frame(frame_renderer(scene, Layered, tolerance=tolerance)) for tolerance in (0.0, 0.02))
     for layer in ("airlight", "surface"):
         interpolated, wanted = getattr(parted, layer), getattr(whole, layer)
         np.testing.assert_allclose(interpolated, wanted, rtol=0.02)
