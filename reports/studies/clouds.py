@@ -4,7 +4,7 @@
 import json
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -232,10 +232,31 @@ def transport(phase: str = "mie-modified", *, albedo: float = 1.0, progress: Pro
     from reports.machine.environment import activate
 
     activate()
-    from validation.slab.canonical import canonical_record
+    from realtime.clouds.canonical.sets import set_name
+    from realtime.clouds.canonical.tables import RANKS, canonical_tables
+    from validation.slab.phases import phase_pair
 
+    pair = phase_pair(phase)
+    told: list[str] = []
     with telling(progress, "transport") as tell:
-        record = canonical_record(phase, albedo, progress=tell)
+
+        def making(share: float, what: str) -> None:
+            told.append(what)
+            tell(share, what)
+
+        tables = canonical_tables(pair.deterministic, albedo, progress=making)
+    record: dict[str, Any] = {
+        "phase": pair.name,
+        "albedo": albedo,
+        "bytes": int(tables.size),
+        "seconds": tables.seconds,
+        "kept": not told,
+        "grid": asdict(tables.grid),
+        "sets": [
+            {"orders": set_name(number), "bytes": int(part.nbytes + shapes.nbytes), "coefficients": sum(RANKS[number])}
+            for number, (part, shapes) in enumerate(zip(tables.coefficients, tables.shapes, strict=True))
+        ],
+    }
     columns = (*words("orders"), *numbers(coefficients="products", mb="MB"))
     rows = [{**row, "mb": row["bytes"] / 1e6} for row in record["sets"]]
     where = "from the cache" if record["kept"] else "made now"

@@ -5,6 +5,5 @@ Read in this order:
 
 - `phases.py`: phase functions by name or from a file, for both sides;
 - `request.py`: what is asked for, and what is refused;
-- `light.py`: the numbers of both sides by name;
-- `canonical.py`: the tables of the canonical transport by name: size and time.
+- `light.py`: the numbers of both sides by name.
 """
