@@ -163,7 +163,10 @@ class LightPaths:
         found = self._none(x)
         for side, end in enumerate((nearest + half, nearest - half)[:sides]):
             number = self._plane_towards(dr.fma(away, end, point) / radius)
-            found = replace(found, planes=(number, number))
+            # The first walk may have met a plane of the other side: the second goes on from there.
+            unset = (found.least[0] == _FAR, found.largest[0] == -_FAR)[side]
+            planes = tuple(dr.select(unset, number, plane) for plane in found.planes)
+            found = replace(found, planes=planes)
             found = self._descend(step(number, self._line(self.bounded.planes, number, self.active), found), step, side)
         # The walk may begin on the other side, with no neighbour on its own.
         lost = found.least[0] == _FAR

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from realtime.bounded_media.airlight import lit_ray
+from realtime.bounded_media.light_paths import LightPaths
 from realtime.bounded_media.pieces import camera_pieces
 from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import array_types
@@ -15,13 +16,14 @@ from realtime.scene.medium import Medium
 from realtime.scene.phase import Isotropic
 from realtime.scene.read_media import make_bounded_medium
 from tests.helpers.kernel_values import opaque, phase_of
-from validation.scenes.meshes import gem, placed, prism, rotation
+from validation.scenes.meshes import gem, icosphere, placed, prism, rotation, scaled
 
 TURN = rotation((0.3, 1.0, 0.2), 27.3)
 CENTRE = np.array([0.1, 0.2, 0.3])
 #: Triangles with many at two corners; quads and two faces of twelve edges.
 SOLIDS = {
     "gem": gem(13, 5),
+    "ball": scaled(icosphere(2), (0.97, 0.79, 1.13)),
     "column": prism(np.array([[np.cos(a), np.sin(a)] for a in np.arange(12) * np.pi / 6]), 1.9),
 }
 
@@ -86,3 +88,25 @@ def test_panels_against_a_sum_over_small_steps(variant, name):
             phase = (1 - 0.36) / (1.36 - 1.2 * cosine) ** 1.5
             expected = sigma_t * np.mean(phase * np.exp(-depth) / r**2) * (end[ray] - begin[ray])
             assert panels[ray] == pytest.approx(expected, rel=close)
+
+
+@pytest.mark.parametrize("name", ["gem", "ball"])
+def test_paths_to_points_by_a_walk_over_the_facets(variant, name):
+    """Points anywhere: what a walk finds from facet to facet, and what all planes say of the same paths."""
+    light, types = np.array([1.7, 0.4, 2.9]), array_types("double")
+    body = make_bounded_medium(
+        Medium((types.scalar(1.0),), types.color(1.0), Isotropic()),
+        bounds_of(name),
+        types,
+    )
+    rng = np.random.default_rng(11)
+    points = CENTRE + rng.normal(size=(4000, 3)) * 1.2
+    start = types.vector(*(aligned_array(types.scalar, c) for c in (points - np.array(body.centre).ravel()).T))
+    for w, toward in ((1.0, light - np.array(body.centre).ravel()), (0.0, light / np.linalg.norm(light))):
+        towards = types.vector(*(float(c) for c in toward))
+        paths = LightPaths(body, w, towards, start, dr.zeros(types.vector))
+        zero = types.scalar(0)
+        r = dr.norm(towards - start) if w else types.scalar(1)
+        lengths = np.array(paths.length_at(zero, r)), np.array(paths.length(paths.envelopes_at(zero), zero, r))
+        assert np.count_nonzero(lengths[1]) > 400
+        assert lengths[0] == pytest.approx(lengths[1], abs=1e-12)
