@@ -39,7 +39,7 @@ def anew(scene):
 
 
 def recordings(scene):
-    return {name: getattr(getattr(scene.renderer, name), "n_recordings", 0) for name in STAGES}
+    return {name: getattr(getattr(scene.renderer.stages, name), "n_recordings", 0) for name in STAGES}
 
 
 @pytest.mark.claim("view-shows-the-scene", tolerance="bit by bit")

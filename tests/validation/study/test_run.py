@@ -94,11 +94,12 @@ def test_preparation_is_timed_when_what_was_prepared_before_is_gone(monkeypatch)
 
         def prepare(scene):
             assert not any(each() for each in alive)
-            state = renderer.prepare(scene)
-            alive.append(weakref.ref(state))
+            state = renderer.stages.prepare(scene)
+            alive.append(weakref.ref(state[0]))
             return state
 
-        return replace(renderer, prepare=prepare)
+        stages = replace(renderer.stages, prepare=prepare)
+        return replace(renderer, structures=dict.fromkeys(renderer.structures, stages))
 
     monkeypatch.setattr(module, "prepared", counted)
     row, _ = row_of("sphere-spot", configuration("soft-shafts"))
