@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, maximum_filter, minimum_filter
+from scipy.ndimage import binary_dilation, laplace, maximum_filter, minimum_filter
 
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import TruthScene
@@ -22,7 +22,7 @@ _MOST = 0.9  # fraction of the squared error that is most of it
 _FEW = 0.01  # fraction of the pixels that counts as few
 _BESIDE = 3.0  # pixels from a light
 _STEP = 1.5  # ratio of neighbours across an edge
-_DEEPER = 1.1  # ratio of the distances of neighbours across the outline of a shape
+_BENT = 0.05  # of the largest of one over the depth: by how much it bends at the outline of a shape
 _WIDE = 4  # pixels from an outline: as far as low resolutions and filters carry an error
 _MORE = 1.7  # how much larger the error is where it lies than all over the image
 _SHARE = 0.5  # of the error, that lies there
@@ -93,9 +93,9 @@ def error_place(reference: Array, image: Array, light_pixels: Array) -> ErrorPla
     return ErrorPlace(count, float(below[count - 1]), (column, row), kind, left, count <= max(1, _FEW * squared.size))
 
 
-def at_edges(values: Array, step: float = _STEP) -> Bools:
+def at_edges(values: Array) -> Bools:
     """Return where a pixel or one beside it is much larger than another of these, (height, width)."""
-    return np.asarray(maximum_filter(values, 3, mode="nearest") > step * minimum_filter(values, 3, mode="nearest"))
+    return np.asarray(maximum_filter(values, 3, mode="nearest") > _STEP * minimum_filter(values, 3, mode="nearest"))
 
 
 def place_words(predictor: Predictor, explanation: Explanation) -> str:
@@ -109,11 +109,16 @@ def place_words(predictor: Predictor, explanation: Explanation) -> str:
         pixel = angle.reshape(height, width)
         step = float(np.median(np.abs(np.diff(pixel, axis=1)))) or math.inf
         regions.append((f"beside {words}", (angle < 2 * _BESIDE * step)[predictor.pixels]))
-    distance = surface_hits(truth).distance.reshape(height, width)
-    outline = at_edges(np.where(np.isfinite(distance), distance, 1e9), _DEEPER)
+    # One over the depth is linear in the image of a plane: what bends it is an outline.
+    depth = surface_hits(truth).distance * (truth.direction @ predictor.view.axis)
+    inverse = (1 / depth).reshape(height, width)
+    outline = np.abs(laplace(inverse, mode="nearest")) > _BENT * inverse.max()
     wide = binary_dilation(outline, iterations=max(1, min(_WIDE, min(height, width) // 12) - 1))
     regions.append(("at the edges of shapes", wide[row, column]))
-    found = [words for words, here in regions if _lies(size, here)]
+    # Relative errors, and radiance: beside a light the latter is most of all, at an outline in the dark the former.
+    shown, predicted = predictor.shown(explanation.guess), predictor.predicted(explanation.guess)
+    amount = np.nan_to_num(np.abs(shown - predicted).mean(axis=1))
+    found = [words for words, here in regions if _lies(size, here) or _lies(amount, here)]
     if found:
         return " and ".join(found)
     for words, angle in _angles(truth):
@@ -136,7 +141,7 @@ def _lies(size: Array, here: Bools) -> bool:
         return False
     inside, outside = float(size[here].mean()), float(size[~here].mean())
     share = float(size[here].sum() / size.sum())
-    return inside > _MORE * outside and (share > _SHARE or (inside > 4 * outside and share > 0.1))
+    return inside > _MORE * outside and (share > _SHARE or (inside > 4 * outside and share > 0.05))
 
 
 def _angles(truth: TruthScene) -> list[tuple[str, Array]]:
