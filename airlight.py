@@ -19,6 +19,7 @@ if __name__ == "__main__":  # before all that takes time: what a signal meets du
     start()
 
 import importlib
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from reports import __version__
@@ -44,7 +45,7 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from reports.api.report import paper as paper
     from reports.api.report import report as report
     from reports.api.sweep import sweep as sweep
-    from reports.commands.list import list_ as list
+    from reports.commands.list import list_ as list  # noqa: F401 - exported
     from reports.machine.doctor import doctor as doctor
     from reports.machine.environment import MissingError as MissingError
     from reports.machine.environment import activate as activate
@@ -109,7 +110,7 @@ def __getattr__(name: str) -> Any:
     return getattr(importlib.import_module(module), own or name)
 
 
-def __dir__() -> list[str]:
+def __dir__() -> Sequence[str]:
     return sorted(__all__)
 
 

@@ -123,7 +123,7 @@ def compare(
     files = [Path(path) for path in several(output)]
     scene = reference if _is_scene(reference) else None
     if scene is None and _is_scene(test) and not Path(str(test)).is_file():
-        raise InputError(f"compare: the scene stands first: airlight compare {test} {reference}")
+        raise InputError(f"compare: the scene stands first: airlight compare {test!s} {reference!s}")
     own = {"holds": holds, "pixel": pixel, "diagnose": diagnose or None, "fit": fit}
     for name, value in own.items():
         if value is not None and scene is None:

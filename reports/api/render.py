@@ -377,7 +377,7 @@ def _plan(scene: Any, pixels: Any, changes: Any, precision: str, chosen: "Config
     words, notes = describe(read.features), tuple(read.features.notes)
     method = find_method(chosen.method)
     if read.area_lights:
-        own = {name: value for name, value in chosen.parameters if name in values(method.light_points)}
+        own: dict[str, Any] = {name: value for name, value in chosen.parameters if name in values(method.light_points)}
         points = replace(method.light_points, **own)
         words["light points"] = f"{points.points} of each area light, {points.pattern}"
         read = with_light_points(read, 1, "ring")  # the casters as the middle of each sees them

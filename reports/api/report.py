@@ -182,7 +182,14 @@ def report(
     'The reference is confirmed by our own Mitsuba integrator in 1 of 1 comparisons: ...'
     """
     if from_ is not None:
-        measures = {"quick": quick, "full": full, "kernel": kernel, "set": settings, "images": images, "fresh": fresh}
+        measures: dict[str, Any] = {
+            "quick": quick,
+            "full": full,
+            "kernel": kernel,
+            "set": settings,
+            "images": images,
+            "fresh": fresh,
+        }
         measures |= {"method_limit": method_limit != LIMIT, "cluster": cluster, "force": force}
         if figures is None:
             measures |= {"a scene": scenes, "method": method}
@@ -194,7 +201,13 @@ def report(
         raise InputError("report: got both quick and full; give one of them, or neither for the default")
     effort = "quick" if quick else "full" if full else "default"
     target = Path(FOLDER if output is None else output)
-    how = {"images": images, "fresh": fresh, "method_limit": method_limit, "cluster": cluster, "force": force}
+    how: dict[str, Any] = {
+        "images": images,
+        "fresh": fresh,
+        "method_limit": method_limit,
+        "cluster": cluster,
+        "force": force,
+    }
     asked = (several(scenes), several(method), several(kernel), settings)
     data = _measured(target, effort, *asked, progress=progress, **how)
     written = _figures(target, figures, [], []) if figures else ()

@@ -89,9 +89,11 @@ def _command(function: Callable[..., Any], *, markdown: bool, endings: Sequence[
     own = inspect.signature(function).parameters
     scope = inspect.unwrap(function).__globals__
     words = {each.arg_name: _plain(each.description) for each in docstring_parser.parse(function.__doc__ or "").params}
-    positional, named = [], []
+    positional: list[inspect.Parameter] = []
+    named: list[inspect.Parameter] = []
     for at, each in enumerate(own.values()):
-        kind, annotation, default = inspect.Parameter.KEYWORD_ONLY, each.annotation, each.default
+        kind: Any = inspect.Parameter.KEYWORD_ONLY
+        annotation, default = each.annotation, each.default
         if each.name == "progress":
             continue
         if each.kind is inspect.Parameter.VAR_KEYWORD:
@@ -112,7 +114,7 @@ def _command(function: Callable[..., Any], *, markdown: bool, endings: Sequence[
             how["negative"] = f"--no-{each.name}"
         shown = each.replace(kind=kind, annotation=Annotated[annotation, Parameter(**how)], default=default)
         (named if kind is inspect.Parameter.KEYWORD_ONLY else positional).append(shown)
-    extra = {"output": _OUTPUT} if endings else {}
+    extra: dict[str, Any] = {"output": _OUTPUT} if endings else {}
     if function not in (view, run_tests):
         extra |= {"json": _JSON, "markdown": _MARKDOWN} if markdown else {"json": _JSON}
     for name, annotation in extra.items():
@@ -234,7 +236,8 @@ def _add_studies(app: App, words: Sequence[str]) -> None:
     from reports.studies.result import ENDINGS
 
     group = Group("Studies", sort_key=0)
-    how = {"help_format": "plaintext", "default_parameter": app.default_parameter, "version_flags": ()}
+    how: dict[str, Any] = {"help_format": "plaintext", "version_flags": ()}
+    how["default_parameter"] = app.default_parameter
     for number, name in enumerate(STUDIES):
         function = find_study(name)
         asked = name in words[:1]

@@ -115,7 +115,8 @@ def _shafts(quick: bool, progress: Progress) -> PaperFigure:
     scene = read_scene(load_scene(SCENE, size).scene)
     chosen = {name: {**RENDERINGS, **VARIANTS}[name] for name in _SHAFTS}
     times = timings(scene, chosen, 0.05 if quick else 0.6)
-    factor, shown, images, rows = exposure(reference.image), [], {}, []
+    factor, shown, rows = exposure(reference.image), [], []
+    images: dict[str, Any] = {}
     for (name, values), time in zip(chosen.items(), times.values()):
         image = rendered(scene, values)
         images[name.replace(" ", "-")] = image
@@ -134,7 +135,8 @@ def _cloud_images(quick: bool, progress: Progress) -> PaperFigure:
 
     size, samples = ((24, 18), 16) if quick else (SIZE, SAMPLES)
     scenes = {name: "Fig. 12" for name in RESULTS} | {GAP: "Fig. 11a", LOBES: "Fig. 11b"}
-    above, below, images = [], [], {}
+    above, below = [], []
+    images: dict[str, Any] = {}
     for at, (name, figure) in enumerate(scenes.items()):
         part = part_of(progress, at / len(scenes), (at + 1) / len(scenes), before=f"{name}, ")
         pair = pair_of(shown(name, size), samples, part)

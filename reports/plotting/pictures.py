@@ -57,7 +57,7 @@ class ToneCurve:
         )
 
 
-def tone_curve(radiance: NDArray[np.float64]) -> ToneCurve:
+def tone_curve(radiance: NDArray[np.floating]) -> ToneCurve:
     """Return the curve of previews that suits an image: its mean becomes 0.3, its 99.9th percentile white."""
     finite = radiance[np.all(np.isfinite(radiance), axis=-1)]
     mean = float(np.maximum(finite, 0).mean()) if finite.size else 0.0

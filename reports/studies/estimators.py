@@ -124,7 +124,8 @@ def _draw_convergence(rows: list[dict[str, Any]], column: str) -> Any:
     for name, colour, marker in zip(_CONVERGING, ("blue", "vermillion"), "os"):
         own = [row for row in rows if row["estimator"] == name]
         samples, errors = (np.array([row[key] for row in own]) for key in ("samples", "relative_rmse"))
-        order, style = own[0]["order"], {"color": COLOURS[colour], "marker": marker}
+        order = own[0]["order"]
+        style: dict[str, Any] = {"color": COLOURS[colour], "marker": marker}
         panel.plot(samples, errors, linestyle="none", label=f"{name}: order {order:.3g}, wanted 0.5", **style)
         level = np.exp(np.mean(np.log(errors * samples**order)))
         panel.plot(samples, level * samples**-order, color=COLOURS[colour])

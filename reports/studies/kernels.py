@@ -57,7 +57,7 @@ def kernels(*, kernel: Kernels = (), phase: str | None = None, rays: int = 480_0
     from validation.metrics.errors import plain
 
     phases = PHASES if phase is None else ((phase, phase_from_words(phase).g),)
-    named = [kernel_name(each) for each in several(kernel)] or None
+    named = [kernel_name(each) or "" for each in several(kernel)] or None
     with telling(progress, "kernels") as tell:
         found = bench_kernels(named, phases=phases, rays=rays, progress=counted(tell))
     data = plain(found)
@@ -213,7 +213,7 @@ def _draw_errors(rows: Sequence[Mapping[str, Any]], column: str) -> Any:
         panel.set_axis_off()
     figure.supxlabel("optical depth of the distance to the light [1]", fontsize="medium")
     figure.supylabel("angle from the light [degrees]", fontsize="medium")
-    scale = {"label": "relative error of J [1]", "aspect": 40, "extend": "both", "shrink": 0.8}
+    scale: dict[str, Any] = {"label": "relative error of J [1]", "aspect": 40, "extend": "both", "shrink": 0.8}
     figure.colorbar(ScalarMappable(norm, "cividis"), ax=panels, **scale)
     return figure
 
@@ -495,8 +495,7 @@ def integrals(
 
 
 def _cases(cases: Any, phase: str | None) -> "tuple[Cases, tuple[int, ...]]":
-    from analytic.case_columns import cases_from_columns
-    from analytic.cases import Cases, read_cases
+    from analytic.cases import Cases, cases_from_columns, read_cases
 
     if isinstance(cases, str | os.PathLike):
         cases = read_cases(Path(cases), phase=phase)

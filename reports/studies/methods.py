@@ -147,7 +147,12 @@ def methods(
     with telling(progress, "methods") as tell:
         for at, scene in enumerate(loaded):
             step = part_of(tell, at / len(loaded), (at + 1) / len(loaded))
-            how = {"seconds": seconds, "flip": flip, "limit": method_limit if apart else None, "margin": margin}
+            how: dict[str, Any] = {
+                "seconds": seconds,
+                "flip": flip,
+                "limit": method_limit if apart else None,
+                "margin": margin,
+            }
             data, of_scene = _methods_in(scene, chosen, progress=step, **how)
             benched.append(data)
             rows += of_scene
@@ -357,7 +362,7 @@ def _split(loaded: Any, chosen: list[Any], *, limit: float | None, progress: Any
                 return frame_of(cell).airlight
             return in_own_process(frame_of, cell, name=each.method, limit=limit).airlight
 
-        entry = {"label": each.label, "method": each.method, "kernel": each.kernel}
+        entry: dict[str, Any] = {"label": each.label, "method": each.method, "kernel": each.kernel}
         entry |= {"parameters": dict(each.parameters)}
         try:
             found = decompose(scene, each, truth, render=own, exact=exact)
