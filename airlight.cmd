@@ -2,7 +2,7 @@
 rem SPDX-License-Identifier: BSD-3-Clause
 rem
 rem The twin of the launcher `airlight` for Windows: runs `airlight` from `.venv` beside this file, which the first start
-rem makes from the versions of requirements.lock. AIRLIGHT_PYTHON names another Python than the newest that is found.
+rem makes from the versions of requirements.lock (`airlight test`: and requirements-test.lock). AIRLIGHT_PYTHON names another Python than the newest that is found.
 rem Exit status 3: something is missing. What is missing of LLVM is named by `airlight doctor`, with the line to type.
 rem Nobody has tried this file on Windows yet. Its line ends must stay CR LF: cmd.exe loses labels otherwise.
 
@@ -45,11 +45,18 @@ if errorlevel 1 goto failed
 if errorlevel 1 goto failed
 copy /y "%root%requirements.lock" "%venv%\requirements.lock" >nul
 copy /y "%root%pyproject.toml" "%venv%\pyproject.toml" >nul
-for /f "skip=1 delims=" %%l in ('""%python%" "%root%airlight.py" doctor --missing"') do (
+for /f "skip=1 delims=" %%l in ('""%python%" -m reports.machine.doctor"') do (
     echo airlight: system libraries are missing: %%l>&2
 )
 
 :run
+if not "%~1"=="test" goto start
+fc /b "%root%requirements-test.lock" "%venv%\requirements-test.lock" >nul 2>&1 && goto start
+"%python%" -m pip --disable-pip-version-check --no-input -qq install -r "%root%requirements-test.lock"
+if errorlevel 1 goto failed
+copy /y "%root%requirements-test.lock" "%venv%\requirements-test.lock" >nul
+
+:start
 "%python%" "%root%airlight.py" %*
 exit /b %errorlevel%
 

@@ -28,7 +28,7 @@ case "$*" in
     *"import ensurepip"*) [ ! -e "$here/no-ensurepip" ] ;;
     "-m venv "*) echo venv >>"$here/log"; mkdir -p "$3/bin" && ln -s "$(readlink -f "$0")" "$3/bin/python" ;;
     "-m pip "*) echo pip >>"$here/log"; [ ! -e "$here/pip-fails" ] ;;
-    *"doctor --missing") cat "$here/missing" 2>/dev/null || echo ;;
+    *"-m reports.machine.doctor") cat "$here/missing" 2>/dev/null || echo ;;
     -c*) true ;;
     *) printf 'ran'; for word; do printf ' <%s>' "$word"; done; echo ;;
 esac
@@ -45,7 +45,7 @@ def machine(tmp_path):
     project.mkdir()
     programs.mkdir()
     shutil.copy(ROOT / "airlight", project)
-    for name in ("requirements.lock", "pyproject.toml", "airlight.py"):
+    for name in ("requirements.lock", "requirements-test.lock", "pyproject.toml", "airlight.py"):
         (project / name).write_text(f"{name}\n")
     _program(programs / "python3.11", _PYTHON)
     for name in ["sh", "cksum", "dirname", "basename", "readlink", "mkdir", "ln", "rm", "cat", "head", "tail", "flock"]:
@@ -92,6 +92,18 @@ def test_new_versions_are_installed_on_top(machine):
     (machine / "a project" / "requirements.lock").write_text("other\n")
     assert "updating" in _start(machine).stderr
     assert _log(machine) == ["pip", "pip"]
+
+
+def test_the_packages_of_the_tests_wait_for_the_first_test(machine):
+    _start(machine, "list")
+    assert _log(machine) == ["venv", "pip", "pip"]
+    assert "packages of the tests" in _start(machine, "test", "-q").stderr
+    assert _log(machine) == ["pip"]
+    assert _start(machine, "test").stderr == _start(machine, "list").stderr == ""
+    assert _log(machine) == []
+    (machine / "a project" / "requirements-test.lock").write_text("other\n")
+    _start(machine, "test")
+    assert _log(machine) == ["pip"]
 
 
 def test_an_interrupted_first_start_is_repaired(machine):

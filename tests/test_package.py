@@ -29,7 +29,8 @@ def _python(code: str, cwd: Path = ROOT) -> str:
 
 @pytest.mark.claim("locked-dependencies")
 def test_the_lock_pins_what_the_project_asks_for_and_all_that_it_needs():
-    lines = (ROOT / "requirements.lock").read_text().splitlines()
+    locks = ("requirements.lock", "requirements-test.lock")
+    lines = [line for lock in locks for line in (ROOT / lock).read_text().splitlines()]
     pinned = [Requirement(line) for line in lines if line and not line.startswith("#")]
     here = [wanted for wanted in pinned if wanted.marker is None or wanted.marker.evaluate()]
     locked = {canonicalize_name(wanted.name): str(wanted.specifier).removeprefix("==") for wanted in here}
@@ -40,7 +41,7 @@ def test_the_lock_pins_what_the_project_asks_for_and_all_that_it_needs():
     while waiting:
         wanted = waiting.pop()
         name = canonicalize_name(wanted.name)
-        assert name in locked, f"{wanted} is not in requirements.lock"
+        assert name in locked, f"{wanted} is in neither lock"
         assert wanted.specifier.contains(locked[name], prereleases=True), f"{wanted}, locked is {locked[name]}"
         if name in checked:
             continue
@@ -50,7 +51,7 @@ def test_the_lock_pins_what_the_project_asks_for_and_all_that_it_needs():
         except PackageNotFoundError:
             pytest.skip(f"{wanted.name} is not installed here, so what it needs is unknown")
         waiting += [need for need in needs if need.marker is None or need.marker.evaluate({"extra": ""})]
-    assert checked == set(locked), "requirements.lock holds what nothing needs"
+    assert checked == set(locked), "a lock holds what nothing needs"
 
 
 def test_importing_everything_sets_no_variant_and_fails_nowhere():

@@ -3,9 +3,8 @@
 
 Read in this order:
 
-- `worker.py`: what runs in a worker: one task at a time, within its time;
 - `connect.py`: processes of this machine, or a scheduler with workers of our version;
-- `run.py`: every task ends in one outcome, whatever happens to workers and scheduler;
+- `run.py`: groups of tasks as futures, what a worker does of one, and one rule for processes that die;
 - `cells.py`: the cells of a sweep as tasks;
-- `references.py`: truths and batches for the cache of this machine.
+- `references.py`: references and batches for the cache of this machine.
 """

@@ -18,8 +18,7 @@ from PIL import Image
 
 from realtime.scene.read_scene import Scene, read_scene
 from reports import __version__
-from reports.cluster.run import Group, Outcome, Task
-from reports.cluster.worker import is_alone
+from reports.cluster.run import Group, Outcome, Task, is_alone
 from reports.machine.environment import processor
 from reports.machine.quick_compilation import in_full
 from reports.plotting.pictures import error_map, exposure, tone_mapped
@@ -78,7 +77,7 @@ def timing_groups(
         missing = {key: cell for key, cell in wanted.items() if store.row(key)[FRAME_MS] is None}
         tasks = tuple(Task(key, times_of, (cell,), study.limit, alone=True) for key, cell in missing.items())
         if tasks:
-            yield Group(tasks, together=True), missing
+            yield Group(tasks), missing
 
 
 def cell_groups(
@@ -118,7 +117,7 @@ def _group(study: Study, cells: dict[str, Cell]) -> Group:
     image = next(iter(cells.values())).image
     words = " ".join((image.scene, *image.medium, f"{image.size[0]}x{image.size[1]}"))
     tasks = tuple(Task(key, row_of, (cell, key), study.limit) for key, cell in cells.items())
-    return Group(tasks, Task(f"{NO_TRUTH}{words}", reference_of, (image,), study.limit), together=True)
+    return Group(tasks, Task(f"{NO_TRUTH}{words}", reference_of, (image,), study.limit))
 
 
 @lru_cache(maxsize=1)

@@ -5,7 +5,6 @@ import logging
 import re
 import signal
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -105,54 +104,29 @@ def connected(place: Place, *, quick: bool = False) -> Iterator[Cluster]:
     _quiet()
     with ExitStack() as stack:
         client = stack.enter_context(_local(place.workers, quick=quick) if place.workers else _remote(place))
-        _wait_for_workers(client, place)
         check_workers(client)
         yield Cluster(client, place)
 
 
-def reconnected(place: Place, patience: float) -> Any:
-    """Return a new client of a scheduler that went away; None if it does not come back in time, with a worker."""
-    from analytic.errors import InputError
-
-    until = time.monotonic() + patience
-    while not place.workers and time.monotonic() < until:
-        with suppress(InputError):
-            client = _client(place, timeout=min(_PATIENCE, max(1.0, until - time.monotonic())))
-            with suppress(Exception):
-                client.wait_for_workers(1, timeout=max(1.0, until - time.monotonic()))
-                return client
-            _close(client)
-        time.sleep(0.5)
-    return None
-
-
-def check_workers(client: Any) -> dict[str, dict[str, Any]]:
-    """Return the facts of all workers by address.
-
-    Raises
-    ------
-    InputError
-        For those that have another version of airlight, or none.
-    """
+def check_workers(client: Any) -> None:
+    """Raise InputError for workers that have another version of airlight, or none, by address."""
     from analytic.errors import InputError
     from reports import __version__
-    from reports.cluster.worker import facts
+    from reports.cluster.run import facts
     from reports.machine.environment import activate
     from validation.study.keys import made_here
 
     own = made_here(__version__, activate())
-    told: dict[str, Any] = client.run(facts, on_error="return")
     wrong = []
-    for address, answer in told.items():
+    for address, answer in client.run(facts, on_error="return").items():
         if isinstance(answer, OSError):  # it went away meanwhile
             continue
         if isinstance(answer, BaseException):
             wrong.append(f"worker {address} cannot do the work ({type(answer).__name__}: {answer})")
-        elif own.differences(answer["made"]):
-            wrong.append(f"worker {address} has {', '.join(own.differences(answer['made']))}")
+        elif own.differences(answer):
+            wrong.append(f"worker {address} has {', '.join(own.differences(answer))}")
     if wrong:
         raise InputError(f"{'; '.join(wrong)}: install the same airlight there, or stop it")
-    return {address: answer for address, answer in told.items() if isinstance(answer, dict)}
 
 
 @contextmanager
@@ -166,14 +140,12 @@ def _local(workers: int, *, quick: bool = False) -> Iterator[Any]:
     alone = workers == 1
     # Dask would pause a worker near its limit, and wait for memory that only the next task gives back.
     memory = {f"distributed.worker.memory.{name}": False for name in ("target", "spill", "pause")}
-    # Other tasks' deaths count against a task that only waited on the same worker: we count ourselves.
-    counts: dict[str, object] = {"distributed.scheduler.allowed-failures": 10}
-    # No truth waits behind another that takes minutes while somebody has nothing to do.
+    # What became of a group whose process died is decided by `reports.cluster.run`.
+    counts: dict[str, object] = {"distributed.scheduler.allowed-failures": 0}
+    # No group waits behind another that takes minutes while a worker has nothing to do.
     counts["distributed.scheduler.worker-saturation"] = 1.0
-    # Whoever has nothing to do takes the next image, not half of another's: both would compile the same kernels.
-    counts["distributed.scheduler.work-stealing"] = False
     # Dask lets the C library give every freed block back, and arrays of a frame's size come as new, zeroed pages: a
-    # quarter of a sweep's time was the kernel's. `reports.cluster.worker` gives memory back where there is much of it.
+    # quarter of a sweep's time was the kernel's. `reports.cluster.run` gives memory back where there is much of it.
     counts["distributed.nanny.pre-spawn-environ"] = {
         "MALLOC_TRIM_THRESHOLD_": _KEPT,
         "MALLOC_MMAP_THRESHOLD_": _KEPT,
@@ -231,43 +203,29 @@ def _without_interrupts() -> Iterator[None]:
 
 @contextmanager
 def _remote(place: Place) -> Iterator[Any]:
-    client = _client(place, timeout=_PATIENCE)
-    try:
-        yield client
-    finally:
-        _close(client)
-
-
-def _client(place: Place, *, timeout: float) -> Any:
     from distributed import Client
 
     from analytic.errors import InputError
 
     given = {"address": place.address} if place.address else {"scheduler_file": str(place.file)}
     try:
-        return Client(**given, timeout=timeout, set_as_default=False)
+        client = Client(**given, timeout=_PATIENCE, set_as_default=False)
     except (OSError, TimeoutError, ValueError, KeyError) as error:
         words = " ".join(str(error).split()) or type(error).__name__
         raise InputError(
             f"--cluster: no scheduler answers at {place.words} ({words}): start `dask scheduler`, or give its address"
         ) from None
-
-
-def _close(client: Any) -> None:
-    with suppress(Exception):
-        client.close(timeout=2)
-
-
-def _wait_for_workers(client: Any, place: Place) -> None:
-    from analytic.errors import InputError
-
     try:
         client.wait_for_workers(1, timeout=_WORKERS)
+        yield client
     except TimeoutError:
         raise InputError(
             f"--cluster: the scheduler at {place.words} has no worker: start `dask worker` with its address, in an "
             "environment that has airlight"
         ) from None
+    finally:
+        with suppress(Exception):
+            client.close(timeout=2)
 
 
 def _quiet() -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: any Dask scheduler will do, a worker of another version is refused by name, a scheduler may come back."""
+"""Claim: any Dask scheduler will do, a worker of another version is refused by name."""
 
 import os
 import re
@@ -8,8 +8,6 @@ import signal
 import socket
 import subprocess
 import sys
-import threading
-import time
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -17,7 +15,7 @@ import pytest
 
 from analytic.errors import InputError
 from reports import __version__
-from reports.cluster.connect import Cluster, Place, connected, parse_place
+from reports.cluster.connect import Place, connected, parse_place
 from validation.study.keys import made_here
 
 pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
@@ -84,39 +82,6 @@ def _ended(*processes):
     finally:
         for process in running:
             _kill(process)
-
-
-@pytest.mark.slow
-@pytest.mark.claim("sweeps-lose-nothing", tolerance="none: every task has one outcome, with its value")
-def test_a_scheduler_that_comes_back_is_sent_what_was_open(tmp_path):
-    port = _free_port()
-    address = f"tcp://127.0.0.1:{port}"
-    connect._quiet()
-    with _ended(_scheduler(port), _worker(address)) as running:
-        client = connect._client(Place(address=address), timeout=60)
-
-        def restart():
-            for process in running:
-                _kill(process)
-            time.sleep(0.5)
-            running[:] = [_scheduler(port), _worker(address)]
-
-        timer = threading.Timer(2.0, restart)
-        ended = {}
-        groups = [
-            Group(tuple(Task(f"{g}-{n}", tasks.add, (n,)) for n in range(4)), Task(f"t{g}", tasks.square, (g, 0.1)))
-            for g in range(40)
-        ]
-        try:
-            client.wait_for_workers(1, timeout=60)
-            timer.start()
-            for outcome in run_groups(Cluster(client, Place(address=address)), groups, patience=90):
-                assert outcome.task.name not in ended
-                ended[outcome.task.name] = (outcome.status, outcome.value)
-        finally:
-            timer.join()
-            client.close(timeout=2)
-    assert ended == {f"{g}-{n}": ("done", g * g + n) for g in range(40) for n in range(4)}
 
 
 def other_version(tmp_path):

@@ -55,7 +55,7 @@ def test_values_refusals_and_faults(cluster):
 
 
 def test_what_belongs_together_is_done_by_one_process_and_all_have_work(cluster):
-    groups = [Group(tuple(Task(f"{g}-{n}", tasks.process, (0.05,)) for n in range(4)), together=True) for g in range(8)]
+    groups = [Group(tuple(Task(f"{g}-{n}", tasks.process, (0.05,)) for n in range(4))) for g in range(8)]
     ended = outcomes(cluster, *groups)
     processes = [{ended[task.name].value for task in group.tasks} for group in groups]
     assert [len(each) for each in processes] == [1] * len(groups)
@@ -109,7 +109,6 @@ def test_twenty_kills_during_two_hundred_tasks(cluster):
         Group(
             tuple(Task(f"{g}-{n}", tasks.add, (n,)) for n in range(10)),
             Task(f"truth {g}", tasks.square, (g, 0.2)),
-            together=g % 2 > 0,
         )
         for g in range(20)
     ]
