@@ -96,7 +96,8 @@ def other_version(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.claim("workers-of-one-version", tolerance="none")
-def test_a_worker_of_another_version_that_joins_a_run_is_sent_away_and_its_work_done(tmp_path, variant):
+def test_a_worker_of_another_version_that_joins_a_run_is_sent_away_and_its_work_done(tmp_path, monkeypatch, variant):
+    monkeypatch.setattr(connect, "_PATIENCE", 120.0)  # of a busy machine
     port = _free_port()
     address = f"tcp://127.0.0.1:{port}"
     other = other_version(tmp_path)
