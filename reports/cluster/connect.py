@@ -112,7 +112,6 @@ def check_workers(client: Any) -> None:
     """Raise InputError for workers that have another version of airlight, or none, by address."""
     from analytic.errors import InputError
     from reports import __version__
-    from reports.cluster.run import facts
     from reports.machine.environment import activate
     from validation.study.keys import made_here
 
@@ -232,3 +231,12 @@ def _quiet() -> None:
     """Let Dask's own words go: what concerns the user is said by the command."""
     for name in ("distributed", "tornado", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
+def facts() -> Any:
+    """Return what a worker is made of, `validation.study.keys.Made`."""
+    from reports import __version__
+    from reports.machine.environment import activate
+    from validation.study.keys import made_here
+
+    return made_here(__version__, activate())

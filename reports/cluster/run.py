@@ -24,7 +24,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
-from reports.cluster.connect import Cluster
+from reports.cluster.connect import Cluster, facts
 
 PATIENCE = 120.0  #: how long a worker is waited for where none is left [s]
 ALONE = "alone"  #: the Dask resource of a worker on whose host nothing else runs
@@ -276,15 +276,6 @@ def do_group(group: Group, made: Any, topic: str, key: str) -> "list[Outcome] | 
         ended = [done(task, *values) for task in group.tasks]
         _give_back(worker)
         return ended
-
-
-def facts() -> Any:
-    """Return what a worker is made of, `validation.study.keys.Made`."""
-    from reports import __version__
-    from reports.machine.environment import activate
-    from validation.study.keys import made_here
-
-    return made_here(__version__, activate())
 
 
 def is_alone(worker: Any) -> bool:

@@ -156,7 +156,6 @@ SMALL = {"scene": "open-fog", "size": (8, 6)}
         ("reference", SMALL | {"samples": 64}, "samples: is for single-scatter"),
         ("reference", SMALL | {"estimator": "volpath", "samples": 64, "seconds": 1}, "samples and seconds exclude"),
         ("reference", SMALL | {"pixel": "corner"}, "'centre' or 'area'"),
-        ("bench", SMALL | {"methods": "unshadow"}, "did you mean 'unshadowed'"),
         ("compare", {"reference": ONES, "test": np.ones((2, 3, 3))}, "two sizes"),
         ("compare", {"reference": ONES, "test": ONES, "margin": 0.1}, "a margin wants standard errors"),
         ("compare", {"reference": [["a"]], "test": ONES}, "the reference: got list"),
