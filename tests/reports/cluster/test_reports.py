@@ -12,8 +12,9 @@ from reports.report.measure import write_report
 from validation.study.configuration import configuration
 from validation.study.study import Checks, Measure, Study
 
-#: Names of what is measured by the clock.
-TIMES = {"created", "seconds", "parts", "measured", "stages", "times", "environment", "claims"}
+#: What is measured by the clock or of the memory, and how much of it was there before: a cluster leaves the references.
+TIMES = {"created", "seconds", "parts", "measured", "stages", "times", "environment", "claims", "memory", "cost"}
+TIMES |= {"kept", "computed"}
 
 
 def without_times(data):
