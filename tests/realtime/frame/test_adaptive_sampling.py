@@ -4,6 +4,8 @@
 from dataclasses import dataclass
 from types import SimpleNamespace
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
@@ -15,6 +17,8 @@ from realtime.kernels.registry import KERNELS
 from realtime.methods.interface.method import Layers, Method
 from realtime.methods.interface.method import tolerance as tolerance_parameter
 from realtime.methods.registry import METHODS
+from realtime.scene.camera import tiled_pixels
+from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
 
 SIZE = 48, 32
@@ -22,11 +26,6 @@ SIZE = 48, 32
 
 def image_of(function, tolerance, *, depth=None, lit=None):
     """Return the image of a function of column and row between corners, and how many pixels were computed."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.scene.camera import tiled_pixels
-
     width, height = SIZE
     pixel = mi.UInt32(tiled_pixels(width, height))
     corners = tile_corners(pixel, SimpleNamespace(width=width, height=height), by_rays=True, lights=1)
@@ -129,10 +128,6 @@ def test_frames_err_by_about_the_tolerance(variant, method, parameters):
 
 
 def frame(method, parameters, size=(96, 72)):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-
     chosen = METHODS[method]
     turned = mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).rotate([1, 2, 3], 40).scale(0.33)
     scene = read_scene(mi.load_dict(tiny_scene(size=size, ball={"type": "cube", "to_world": turned})))
@@ -163,10 +158,6 @@ class Layered(Method):
 
 
 def test_every_layer_is_interpolated(variant):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-
     two = tiny_scene(size=(48, 36)) | {"second": tiny_scene()["lamp"] | {"position": [-1.1, -0.9, 2.3]}}
     scene = read_scene(mi.load_dict(two))
     whole, parted = (render_frame(frame_renderer(scene, Layered, tolerance=tolerance)) for tolerance in (0.0, 0.02))

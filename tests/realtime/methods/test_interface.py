@@ -4,6 +4,7 @@
 from dataclasses import dataclass, replace
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -23,8 +24,6 @@ NAME = "tests.helpers.veil:Veil"
 
 @pytest.fixture
 def scene(variant):
-    import mitsuba as mi
-
     return read_scene(mi.load_dict(tiny_scene(size=SIZE)))
 
 

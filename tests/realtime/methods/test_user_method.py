@@ -3,14 +3,17 @@
 
 import re
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from realtime.errors import InputError
 from realtime.frame.renderer import frame_renderer, render_frame
+from realtime.kernels.registry import KERNELS
 from realtime.methods.registry import find_method
 from realtime.numerics.recorded import Frozen
 from realtime.parameters import defaults
+from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
 
 SOURCE = """
@@ -83,11 +86,6 @@ def own(tmp_path):
 @pytest.fixture
 def render(own, variant):
     """Render the tiny scene by a method of that file."""
-    import mitsuba as mi
-
-    from realtime.kernels.registry import KERNELS
-    from realtime.scene.read_scene import read_scene
-
     scene = read_scene(mi.load_dict(tiny_scene()))
 
     def rendered(name, **parameters):
@@ -200,10 +198,6 @@ def test_faults_in_the_file_are_told_with_their_line(tmp_path, monkeypatch):
 
 @pytest.mark.claim("own-method-frozen")
 def test_only_a_method_that_says_so_is_frozen(own, variant):
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-
     scene = read_scene(mi.load_dict(tiny_scene()))
     assert not isinstance(frame_renderer(scene, find_method(f"{own}:constant")).stages.render, Frozen)
     assert isinstance(frame_renderer(scene, find_method(f"{own}:calls"), kernel=print).stages.render, Frozen)

@@ -5,6 +5,7 @@ Its kernels do not grow with the points of a light with extent, and its airlight
 """
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -12,6 +13,7 @@ from realtime.frame.renderer import frame_renderer, render_frame, run_cast_and_s
 from realtime.kernels.exact import exact
 from realtime.methods.registry import FOG_METHODS, METHODS
 from realtime.methods.user_method import user_method
+from realtime.scene.camera import ray_directions
 from realtime.scene.light_points import with_light_points
 from realtime.scene.read_scene import read_scene
 from tests.helpers.lamps import lamp
@@ -29,8 +31,6 @@ POINTS = 4
 @pytest.fixture(scope="module")
 def empty(variant):
     """A lamp with extent in fog, and nothing else."""
-    import mitsuba as mi
-
     return read_scene(mi.load_dict(tiny_scene(lamp=lamp(), ball=None, floor=None)))
 
 
@@ -52,8 +52,6 @@ def rendered(scene, method, points):
 
 def sum_over_points(scene):
     """Return the airlight of the points by a hundred Gauss-Legendre nodes in the angle at each, for endless rays."""
-    from realtime.scene.camera import ray_directions
-
     lit = with_light_points(scene, POINTS, "sobol")
     pixel = dr.arange(type(dr.zeros(dr.uint32_array_t(lit.camera.origin.x))), 16 * 12)
     direction = np.array(ray_directions(lit.camera, pixel)[0], dtype=np.float64).T

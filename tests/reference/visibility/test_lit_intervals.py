@@ -7,7 +7,10 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+import reference.quadrature.light_airlight as light_airlight
+import reference.quadrature.ray_values as quadrature
 from analytic.errors import InputError
+from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_truth
 from reference.scene.shapes import Disks, Shapes
 from reference.visibility.candidates import Ball, near_shapes
@@ -16,6 +19,7 @@ from reference.visibility.lit_intervals import Obstacles, lit_intervals, reaches
 from reference.visibility.planes import rays_at
 from tests.helpers.polygons import box_scene, rays_of
 from tests.helpers.scenes import tiny_scene
+from validation.scenes.loading import load_scene
 
 
 def unit(vector):
@@ -176,9 +180,6 @@ def test_the_certificate_is_clean_and_notices_a_fault(variant):
 
 @pytest.mark.claim("shadow-ray-certificate")
 def test_doubt_widens_the_bound(variant, monkeypatch):
-    import reference.quadrature.light_airlight as light_airlight
-    import reference.quadrature.ray_values as quadrature
-
     truth, rays, _, _ = setup(box_scene())
     light = truth.lights[0]
     plain = quadrature.ray_values(truth)
@@ -210,10 +211,6 @@ def test_surfaces_are_reached_as_rays_are(variant):
 @pytest.mark.claim("bound-in-every-pixel", tolerance="1e-5 relative")
 def test_a_built_in_scene_is_certain_to_1e_minus_5(variant):
     """The figure to reach, at a size for tests: every bound below 1e-5 of its pixel, and nothing contradicted."""
-    from reference.quadrature.image import quadrature_image
-    from reference.scene.read import read_truth
-    from validation.scenes.loading import load_scene
-
     image = quadrature_image(read_truth(load_scene("colonnade", size=(32, 24)).scene))
     reached = image.airlight_bound < 1e-5 * image.airlight
     assert np.mean(reached[image.airlight > 0]) > 0.999

@@ -9,6 +9,7 @@ import pytest
 
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
+from realtime.errors import InputError as RefusedByMethods
 from realtime.scene.read_scene import read_scene
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_truth
@@ -62,8 +63,6 @@ def test_a_cylinder_is_one_mesh_for_all(load):
 
 
 def mi_traverse(shape):
-    import mitsuba as mi
-
     return mi.traverse(shape)
 
 
@@ -325,9 +324,6 @@ def test_a_room_of_fog_behind_a_window_is_a_box(load):
 
 
 def test_a_window_without_a_whole_room_is_refused(load):
-    from realtime.errors import InputError as RefusedByMethods
-    from realtime.scene.read_scene import read_scene
-
     open_room = load(*room(without="left"), camera=CAMERA.format(""))
     with pytest.raises(RefusedByMethods, match="'window' bounds a medium and is a Rectangle"):
         read_scene(open_room)
