@@ -20,15 +20,17 @@ class Frozen:
     """A function frozen by `drjit.freeze`, during whose calls nothing is collected."""
 
     def __init__(self, function: Callable[..., Any], **options):
-        self._raised: Exception | None = None
+        # Not an attribute: a function that held this object would be collected at any moment, with the scenes it holds.
+        raised: list[Exception] = []
 
         def recorded(*args):
             try:
                 return function(*args)
             except Exception as error:
-                self._raised = error
+                raised.append(_without_frames(error))
                 return None
 
+        self._raised = raised
         self._recorded = dr.freeze(recorded, **options)
 
     def __call__(self, *args):
@@ -40,13 +42,21 @@ class Frozen:
         finally:
             if enabled:
                 gc.enable()
-        raised, self._raised = self._raised, None
-        if raised is not None:
+        if self._raised:
             self._recorded.clear()
-            raise raised
+            raise self._raised.pop()
         return result
 
     @property
     def n_recordings(self) -> int:
         """How often the function was recorded."""
         return self._recorded.n_recordings
+
+
+def _without_frames(error: Exception) -> Exception:
+    """Return an exception whose chain holds no frames: their arrays must not outlive the recording."""
+    link: BaseException | None = error
+    while link is not None:
+        link.__traceback__ = None
+        link = link.__cause__ or link.__context__
+    return error

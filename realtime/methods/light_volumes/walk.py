@@ -205,7 +205,8 @@ def _next_texel(way: _Way, walk: _Walk) -> _Walk:
     x, second = distance_at(line.ray, dr.select(whole, t, here.t)), distance_at(line.ray, here.second)
     intervals, opened = _changed(walk.intervals, (x, second), walk.opened, walk.lit, (crosses, twice))
     ahead, end, there = _neighbour(way, i, j, shift)
-    i, j, t = (dr.select(found, new, old) for new, old in zip((*ahead, end), (i, j, t)))
+    goes_on = found & there
+    i, j, t = (dr.select(goes_on, new, old) for new, old in zip((*ahead, end), (i, j, t)))
     return _Walk(i, j, t, shift, walk.lit ^ crosses ^ twice, opened, intervals, done | (found & ~there))
 
 
@@ -236,7 +237,9 @@ def _step(way: _Way, node, was_lit, found, whole):
     # One level up where the neighbour is beyond the parent too.
     up = over & (shift < heights.finest) & ((((i ^ ahead[0]) | (j ^ ahead[1])) >> shift) > 1)
     shift = dr.select(down, shift - 1, dr.select(up, shift + 1, shift))
-    i, j, t = (dr.select(over, new, old) for new, old in zip((*ahead, end), (i, j, t)))
+    # A ray at the end of its line stays in its last node: it is looked at with the others, and must be in the map.
+    goes_on = over & there
+    i, j, t = (dr.select(goes_on, new, old) for new, old in zip((*ahead, end), (i, j, t)))
     return i, j, t, shift, over & ~there, ~over & ~down, whole
 
 
