@@ -68,6 +68,6 @@ def test_a_method_of_ones_own_is_rendered_by_its_caller(variant):
         asked.append(chosen.method)
         return np.ones((20, 24, 3))
 
-    whole = split("tests.helpers.veil:VEIL", render=render)
-    assert asked == ["tests.helpers.veil:VEIL"]
+    whole = split("tests.helpers.veil:Veil", render=render)
+    assert asked == ["tests.helpers.veil:Veil"]
     assert causes(whole) == [("rest", "truth")]
