@@ -42,8 +42,8 @@ def test_what_a_fault_names_is_there(variant, mutation):
     assert rewritten(change) if isinstance(change, Rewrite) else replacements(change)
 
 
-def test_there_are_ninety_faults_and_each_estimator_has_some():
-    assert len(set(NAMES)) == len(NAMES) == 90
+def test_there_are_many_faults_and_each_estimator_has_some():
+    assert len(set(NAMES)) == len(NAMES) == 88
     assert {mutation.estimator for mutation in MUTATIONS} == set(ESTIMATORS)
     assert {mutation.stage for mutation in MUTATIONS} == set(stages.MARGINS)
 
