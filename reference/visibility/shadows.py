@@ -24,7 +24,8 @@ range in which a ray is looked at is cut to that before (`reference.visibility.l
 
 **What is left.** Neighbours in a mesh mostly follow one another in its list: a shadow that touches the one before it
 becomes part of it as it is found. Then t begins at the beginning of a ray: shadows that begin before t and end after it
-move t to their end, until none does; the ray is lit from t to where the next shadow begins, and t moves there. Nothing
+move t to their end, until none does; the ray is lit from t to where the next shadow begins, and t moves there. The list
+is gone through forwards and backwards in turn, since shadows of a mesh mostly come in one order or the other. Nothing
 is sorted. Gaps below 1e-12 of a distance are rounding: touching triangles share the coordinates of their vertices.
 """
 
@@ -44,8 +45,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 MERGE = 1e-12  #: gaps between shadows below this share of 1 + |x| are rounding
-_SLOTS = 8  # lit intervals of a ray; more where they do not suffice
-_SHADOWS = 64  # shadows of a ray; more where they do not suffice
+_SLOTS = 16  # lit intervals of a ray; more where they do not suffice
 _STORED = 1 << 23  # shadows of all lanes at once
 
 
@@ -100,22 +100,19 @@ def lit_parts(
         )
     ]
     lists = [mi.UInt32(each[2].astype(np.uint32)) for each in (near.triangles, near.spheres, near.disks)]
-    parts = []
-    shadows, slots = _SHADOWS, _SLOTS
-    first = 0
+    ranges = [(begin[of], end[of]) for begin, end, _ in (near.triangles, near.spheres, near.disks)]
+    shadows = max(1, int(sum(end - begin for begin, end in ranges).max(initial=0)))  # a shape casts one at most
+    parts, slots, first = [], _SLOTS, 0
     while first < len(of):
         block = slice(first, min(len(of), first + max(1, _STORED // shadows)))
-        spans = [(begin[of[block]], end[of[block]]) for begin, end, _ in (near.triangles, near.spheres, near.disks)]
+        spans = [(begin[block], end[block]) for begin, end in ranges]
         found = _compiled(rays[block], (ends[0][block], ends[1][block]), (data, lists, spans), (shadows, slots))
-        most, used = found[:2]
-        if most > shadows:
-            shadows = 1 << (most - 1).bit_length()
-            continue
+        used = found[0]
         if used.max(initial=0) > slots:
             slots = 1 << (int(used.max()) - 1).bit_length()
             continue
         filled = np.flatnonzero(np.arange(slots) < used[:, None])
-        parts.append((first + filled // slots, found[2][filled], found[3][filled]))
+        parts.append((first + filled // slots, found[1][filled], found[2][filled]))
         first = block.stop
     if not parts:
         return np.empty(0, np.int64), np.empty(0), np.empty(0)
@@ -123,15 +120,14 @@ def lit_parts(
     return ray, low, high
 
 
-def _compiled(rays: Rays, ends: tuple, lists: tuple, sizes: tuple[int, int]) -> tuple[int, Index, Array, Array]:
-    """Return the most shadows of a lane, how many lit parts each has, and where they begin and end."""
+def _compiled(rays: Rays, ends: tuple, lists: tuple, sizes: tuple[int, int]) -> tuple[Index, Array, Array]:
+    """Return how many lit parts each lane has, and where they begin and end."""
     shadows, slots = sizes
     count = len(rays.foot)
     low, high = mi.Float64(ends[0]), mi.Float64(np.maximum(*ends))
     origin = mi.Vector3d(*(float(c) for c in rays.origin))
-    w, room, most = mi.Float64(float(rays.w)), mi.UInt32(shadows), mi.UInt32(slots)
-    stride = mi.UInt32(count)
-    dr.make_opaque(origin, w, room, most, stride)
+    w, most, stride = mi.Float64(float(rays.w)), mi.UInt32(slots), mi.UInt32(count)
+    dr.make_opaque(origin, w, most, stride)
     direction, across = mi.Vector3d(rays.direction.T), mi.Vector3d(-rays.normal.T)
     lanes = _Lanes(
         origin, direction, across, dr.cross(direction, across), mi.Float64(rays.foot), mi.Float64(rays.height), w
@@ -140,8 +136,8 @@ def _compiled(rays: Rays, ends: tuple, lists: tuple, sizes: tuple[int, int]) -> 
     lows, highs = dr.empty(mi.Float64, count * shadows), dr.empty(mi.Float64, count * shadows)
 
     def store(number: Any, start: Any, finish: Any, active: Any) -> None:
-        dr.scatter(lows, start, number * stride + lane, active & (number < room))
-        dr.scatter(highs, finish, number * stride + lane, active & (number < room))
+        dr.scatter(lows, start, number * stride + lane, active)
+        dr.scatter(highs, finish, number * stride + lane, active)
 
     # The shadow that was found last is held back: the next one may go on from it.
     state = (dr.zeros(mi.UInt32, count), dr.full(mi.Float64, dr.inf, count), dr.full(mi.Float64, -dr.inf, count))
@@ -170,15 +166,13 @@ def _compiled(rays: Rays, ends: tuple, lists: tuple, sizes: tuple[int, int]) -> 
     store(known, held0, held1, casts)
     known += dr.select(casts, mi.UInt32(1), mi.UInt32(0))
     dr.eval(known, lows, highs)
-    found = int(np.array(dr.max(known))[0])
-    if found > shadows:
-        return found, np.empty(0, np.int64), np.empty(0), np.empty(0)
     begins, finishes = dr.zeros(mi.Float64, count * slots), dr.zeros(mi.Float64, count * slots)
     at = lane * most
 
-    def body(t, used):
+    def body(t, used, back):
         def turn(j, t, after, moved):
-            start, finish = (dr.gather(mi.Float64, column, j * stride + lane) for column in (lows, highs))
+            number = dr.select(back, known - 1 - j, j)
+            start, finish = (dr.gather(mi.Float64, column, number * stride + lane) for column in (lows, highs))
             limit = t + MERGE * (1 + dr.abs(t))
             covers = (start <= limit) & (finish > t)
             after = dr.select(start > limit, dr.minimum(after, start), after)
@@ -194,11 +188,12 @@ def _compiled(rays: Rays, ends: tuple, lists: tuple, sizes: tuple[int, int]) -> 
         here = wide & (used < most)
         dr.scatter(begins, t, at + used, here)
         dr.scatter(finishes, after, at + used, here)
-        return dr.select(lit, after, t), used + dr.select(wide, mi.UInt32(1), mi.UInt32(0))
+        return dr.select(lit, after, t), used + dr.select(wide, mi.UInt32(1), mi.UInt32(0)), ~back
 
-    _, used = dr.while_loop((mi.Float64(low), dr.zeros(mi.UInt32, count)), lambda t, used: t < high, body)
+    state = mi.Float64(low), dr.zeros(mi.UInt32, count), dr.full(mi.Bool, False, count)
+    _, used, _ = dr.while_loop(state, lambda t, used, back: t < high, body)
     dr.eval(used, begins, finishes)
-    return found, np.array(used, dtype=np.int64), np.array(begins), np.array(finishes)
+    return np.array(used, dtype=np.int64), np.array(begins), np.array(finishes)
 
 
 def _triangle(lanes: _Lanes, corners: Any, number: Any) -> tuple[Any, Any]:
