@@ -101,7 +101,7 @@ def test_the_cells_of_the_notebook_page_run_and_display(variant, tmp_path, monke
 @pytest.fixture
 def fog(tmp_path):
     """The examples of docs/your-method.md as files; the first one's path."""
-    for name, block in zip(("fog", "plain", "kernel"), blocks(DOCS / "your-method.md", "python"), strict=True):
+    for name, block in zip(("fog", "plain", "part", "kernel"), blocks(DOCS / "your-method.md", "python"), strict=True):
         (tmp_path / f"{name}.py").write_text(block, encoding="utf-8")
     return tmp_path / "fog.py"
 

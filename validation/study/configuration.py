@@ -57,6 +57,7 @@ SHARED_POINTS: tuple[tuple[str, int | float | str], ...] = (
     ("guide", "depth"),
     ("hd", "auto"),
     ("hz", 0.02),
+    ("narrow", 16.0),
 )
 
 #: The configurations that `bench` and `report` measure by default. Those that say their light points are left out where

@@ -59,6 +59,7 @@ from realtime.shadow_maps.shadow_map import check_maps, lit_in_map, map_memory
 
 _MOST_AUTO = 8.0  # the widest filter of hd=auto [pixels]
 _LEAST_AUTO, _LEAST_SHARED = 0.3, 0.5  # its narrowest, and that where pixels share the points [pixels]
+_GROUP = 4  # how many light points a pixel of a narrow penumbra asks
 
 
 @dataclass(frozen=True)
@@ -185,13 +186,20 @@ class _Frame:
             return [there & self._reached(state, place, light, point) for place, light in enumerate(lights)]
         if p.interleave:
             number = self._share(self.raster, lights).number
-            lit = self._over_tiles(reached_surfaces(whole, state, lambda _: number, 1, p)).share
+            own = reached_surfaces(whole, state, lambda _: number, 1, p)
+            if p.narrow:
+                # With the means over tiles: who asks for it later would cast its rays again.
+                dr.schedule(own.lit, own.all)
+            lit = self._over_tiles(own).share
         else:
             lit = reached_surfaces(whole, state, lambda index: index, len(lights), p).share
         if p.hd == AUTO:
             dr.eval(lit)
             width = self._penumbra_width(state, len(lights))
             dr.eval(width)
+            if p.interleave and p.narrow:
+                lit = self._where_narrow(lit, width, own, number, state, len(lights))
+                del own  # two images that the filter needs not
             lit = self._smooth_by_width(lit, width, len(lights))
         elif p.filter != "none":
             there, levels = dr.isfinite(whole.distance), state.flat and not p.interleave
@@ -211,6 +219,24 @@ class _Frame:
         """Return the means over a tile: the share is then one mean over another."""
         sums = two_numbers(type(self.view.distance))(reached.lit, reached.all)
         return Reached(*tile_average(sums, self.raster, guides=(self.depth,)))
+
+    def _where_narrow(self, lit: Any, width: Any, own: Reached, number: Any, state: SourceState, points: int) -> Any:
+        """Return the fraction with that of a few points where penumbrae are narrow: neighbours then ask the others.
+
+        Pixels side by side lie in other groups of `_GROUP` points, four of which the filter that follows brings
+        together. Of its own group a pixel has asked one point before.
+        """
+        p = self.parameters
+        group = min(_GROUP, points)
+        asked = (lit > 0) & (lit < 1) & (width < p.narrow)
+
+        def other(index: Any) -> Any:
+            return number // group * group + (number + 1 + index) % group
+
+        more = reached_surfaces(self.whole, state, other, group - 1, p, asked)
+        lit = dr.select(asked, Reached(own.lit + more.lit, own.all + more.all).share, lit)
+        dr.eval(lit)
+        return lit
 
     def _smooth_by_width(self, lit: Any, width: Any, points: int) -> Any:
         p = self.parameters

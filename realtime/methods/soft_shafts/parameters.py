@@ -78,6 +78,12 @@ class SoftShaftsParameters(Method):
     interleave: bool = parameter(
         False, "each pixel of a tile of 4 x 4 takes one of the light points and a shift of the steps of its own"
     )
+    narrow: float = parameter(
+        0.0,
+        "with `interleave` and `hd=auto`: in penumbrae narrower than this every pixel asks four light points",
+        least=0,
+        unit="pixels",
+    )
     filter: str = parameter("bilateral", "of visibility and airlight", choices=("bilateral", "gauss", "none"))
     form: str = parameter(
         "direct", "of the filter: as it is defined, or along rows and then columns", choices=("direct", "separable")

@@ -60,8 +60,9 @@ def reached_surfaces(
     number_of: Callable[[Any], Any],
     count: int,
     p: SoftShaftsParameters,
+    asked: Any = True,
 ) -> Reached:
-    """Return what of a light with extent reaches the surfaces of a view.
+    """Return what of a light with extent reaches the surfaces of a view, where they are `asked` for; others return 0.
 
     Parameters
     ----------
@@ -75,7 +76,7 @@ def reached_surfaces(
         The parameters.
     """
     Float = type(view.distance)
-    there = dr.isfinite(view.distance)
+    there = dr.isfinite(view.distance) & asked
     place = view.origin + view.direction * dr.select(there, view.distance, 0)
     if count == 1:
         return Reached(*_of_point(view, state, place, there, number_of(mi.UInt32(0)), p))

@@ -237,7 +237,7 @@ def test_every_kind_that_is_kept_is_in_the_table():
     text = "".join(path.read_text(encoding="utf-8") for path in module._modules().values())
     kinds = set(re.findall(r'key_of\(\s*"([a-z-]+)"', text)) | set(re.findall(r'_key\(\s*"([a-z-]+)"', text))
     assert kinds - {"report-paper"} <= functions().keys()
-    assert {"quadrature", "kernel-rays", "sweep-truth", "row", "page", "report-method", "report-scaling"} <= kinds
+    assert {"quadrature", "kernel-rays", "sweep-truth", "row", "page", "report-scaling"} <= kinds
 
 
 @pytest.mark.claim("report-kept")
