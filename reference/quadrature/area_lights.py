@@ -123,7 +123,8 @@ def area_airlight(
                 total[..., replicate] += got["radiance"]
                 if part != PILOT:
                     bound[active] += got["bound"]
-                    checks.append(RandomChecks(*(int(value) for value in got["checks"][:4]), float(got["checks"][4])))
+                    checked, disagreements, refined, left = (int(value) for value in got["checks"][:4])
+                    checks.append(RandomChecks(checked, disagreements, refined, left, float(got["checks"][4])))
                 done += 1
                 tell(done / rounds)
         return total
@@ -167,7 +168,7 @@ def _scattered(beam: Beam, active: Index, square: Array, shadow_scale: float) ->
             parts = sum_media(truth, rays, stretches, segments, **how)
         else:
             sums = stretch_sums(truth.medium, rays, stretches, **how)
-            parts = tuple(sums_of(lit.ray, values, len(weight)) for values in sums)
+            parts = sums_of(lit.ray, sums[0], len(weight)), sums_of(lit.ray, sums[1], len(weight))
         parts = parts[0], parts[1] + worth_of_doubt(truth, rays, lit)
         value, error = ((part * weight[:, None]).reshape(-1, each, 3).sum(axis=1) * light.radiance for part in parts)
         return rows, lit.random_checks, value, error

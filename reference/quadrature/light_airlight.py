@@ -64,7 +64,7 @@ def light_airlight(
         radiance, bound = sum_intervals(truth.medium, light, rays, lit, shadow_scale)
     else:
         stretches = lit_stretches(light, rays, lit)
-        named = {"profile": profile_of(light, rays), "shadow_scale": shadow_scale, "edge": lit.edge}
+        named: dict[str, Any] = {"profile": profile_of(light, rays), "shadow_scale": shadow_scale, "edge": lit.edge}
         radiance, bound = (part * light.intensity for part in sum_media(truth, rays, stretches, segments, **named))
     in_front = (rays.foot > 0) & (rays.foot < distance)
     angle = np.where(in_front, np.arctan2(rays.height, rays.foot), np.pi)

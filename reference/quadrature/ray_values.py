@@ -30,7 +30,7 @@ from reference.quadrature.light_airlight import directional_airlight, light_airl
 from reference.quadrature.replicates import Keep, PointPlan
 from reference.quadrature.surface import lit_surface, surface_hits
 from reference.scene.directional_light import DirectionalLight
-from reference.scene.read import TruthScene
+from reference.scene.read import TruthLight, TruthScene
 from reference.scene.shapes import Shapes, read_shapes
 from reference.visibility.certificate import RandomChecks, reached_by_shadow_rays
 from reference.visibility.exact_distance import exact_distance
@@ -118,7 +118,8 @@ def ray_values(
     reached: list[NDArray[np.bool_]] = []
     how = {"checks": checks, "shapes": shapes}
     total = len(truth.lights) + len(truth.directional) + 2 * _STEPS * bool(truth.area)
-    for number, light in enumerate((*truth.lights, *truth.directional)):
+    lights: list[TruthLight | DirectionalLight] = [*truth.lights, *truth.directional]
+    for number, light in enumerate(lights):
         if isinstance(light, DirectionalLight):
             received = directional_airlight(truth, light, hits.distance, **how)
         else:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from reference.quadrature.segments import optical_depth
 from reference.scene.area_light import is_area
 from reference.scene.directional_light import DirectionalLight, is_directional
-from reference.scene.read import TruthScene
+from reference.scene.read import TruthLight, TruthScene
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -86,7 +86,8 @@ def lit_surface(
     emitters = [emitter for emitter in truth.scene.emitters() if not is_area(emitter)]
     emitters = sorted(emitters, key=is_directional)
     facing = interaction.is_valid()
-    for emitter, light, reaches in zip(emitters, (*truth.lights, *truth.directional), reached, strict=True):
+    lights: list[TruthLight | DirectionalLight] = [*truth.lights, *truth.directional]
+    for emitter, light, reaches in zip(emitters, lights, reached, strict=True):
         towards, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
         reflected = interaction.bsdf().eval(mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing)
         radiance = np.array(reflected * arriving, dtype=np.float64).reshape(3, -1).T

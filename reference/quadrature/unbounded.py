@@ -2,6 +2,7 @@
 """The airlight of lit intervals in one unbounded medium, added up for every ray, with an error bound."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +42,12 @@ def sum_intervals(
         And the bound of its error, (rays, 3) each [W/(m^2 sr)].
     """
     stretches = lit_stretches(light, rays, lit)
-    how = {"profile": profile_of(light, rays), "shadow_scale": shadow_scale, "rtol": rtol, "edge": lit.edge}
+    how: dict[str, Any] = {
+        "profile": profile_of(light, rays),
+        "shadow_scale": shadow_scale,
+        "rtol": rtol,
+        "edge": lit.edge,
+    }
     values, errors = stretch_sums(medium, rays, stretches, **how)
     count = len(rays.foot)
     return sums_of(stretches[0], values, count) * light.intensity, sums_of(
@@ -83,7 +89,7 @@ def stretch_sums(
     known: dict[float, tuple[Array, Array]] = {}
     for channel, sigma_t in enumerate(medium.sigma_t.tolist()):
         if sigma_t not in known:
-            how = {"shadow_scale": shadow_scale, "weight": weight, "rtol": rtol}
+            how: dict[str, Any] = {"shadow_scale": shadow_scale, "weight": weight, "rtol": rtol}
             value, error = airlight_segments(foot, height, x0, np.maximum(x0, x1), sigma_t, medium.phase, **how)
             known[sigma_t] = value, error + edge * _edge_worth((foot, height), (x0, x1), sigma_t, medium)
         factor = medium.albedo[channel] * sigma_t / (4 * np.pi)

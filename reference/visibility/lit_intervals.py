@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The lit parts of camera rays up to the visible surface, exact, and checked by random shadow rays."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -83,7 +83,9 @@ def lit_intervals(
     ray, x0, x1 = lit_parts(rays, (low, high), known.near, known.shapes, of)
     inner = x0 > ends[0][ray] + _END * (1 + np.abs(x0)), x1 * (1 + _END) + _END < ends[1][ray]
     transitions = int(inner[0].sum() + inner[1].sum())
-    lit = LitIntervals(ray, x0, x1, transitions, **({} if known.shapes.count else {"edge": 0.0}))
+    lit = LitIntervals(ray, x0, x1, transitions)
+    if not known.shapes.count:
+        lit = replace(lit, edge=0.0)
     if not checks:
         return lit
     how = {"occluders": known.scene, "shapes": known.shapes, "checks": checks, "every": every, "normal": normal}

@@ -101,7 +101,7 @@ def lit_parts(
     ]
     lists = [mi.UInt32(each[2].astype(np.uint32)) for each in (near.triangles, near.spheres, near.disks)]
     ranges = [(begin[of], end[of]) for begin, end, _ in (near.triangles, near.spheres, near.disks)]
-    shadows = max(1, int(sum(end - begin for begin, end in ranges).max(initial=0)))  # a shape casts one at most
+    shadows = max(1, int(np.sum([end - begin for begin, end in ranges], axis=0).max(initial=0)))
     parts, slots, first = [], _SLOTS, 0
     while first < len(of):
         block = slice(first, min(len(of), first + max(1, _STORED // shadows)))
@@ -273,7 +273,7 @@ def _disk(lanes: _Lanes, disks: Any, number: Any) -> tuple[Any, Any]:
     middle = centre - beside * away
     half = _half_chord(radius, dr.abs(beside)) / within * along
     ends = [(dr.dot(point, lanes.direction), dr.dot(point, lanes.across)) for point in (middle - half, middle + half)]
-    return _segment(lanes, *ends, dr.abs(beside) < radius)
+    return _segment(lanes, ends[0], ends[1], dr.abs(beside) < radius)
 
 
 def _half_chord(radius: Any, distance: Any) -> Any:

@@ -116,7 +116,7 @@ def seen_image(
     truth = read_truth(scene)
     values = np.asarray(judged.values, dtype=np.float64)
     values = np.broadcast_to(values.reshape(-1, values.shape[-1]), (judged.size[0] * judged.size[1], 3)).copy()
-    finite = np.isfinite(values).all(axis=1)
+    finite: Bools = np.asarray(np.isfinite(values).all(axis=1))
     used: Bools = finite.copy()
     chosen = image.with_data(None if mask is None else np.asarray(mask) != 0)
     if chosen is not None:
