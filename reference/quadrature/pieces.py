@@ -85,6 +85,8 @@ def _parts(truth: TruthScene, rays: Rays, segments: Segments, ray: Index, x0: Ar
 
 def _cut(truth: TruthScene, rays: Rays, parts: Pieces, ray: Index, x: Array) -> Pieces:
     """Cut parts of rays, given by ray and distance, at kinks."""
+    if not len(parts.ray):  # of a batch of rays none is lit within the media
+        return parts
     # The part in which each kink lies is the last one that begins before it.
     everything = np.lexsort((np.concatenate([parts.x0, x]), np.concatenate([parts.ray, ray])))
     begins = everything < len(parts.ray)

@@ -146,7 +146,7 @@ def _view(scene: Scene, view: str, texels: int, tessellation: str) -> dict[str, 
         volume = time_repeated(lambda: dr.eval(run_method(renderer, ready, cast, by_light)), seconds=_SECONDS, least=3)
         found: dict[str, Any] = {f"{named} fps": _rate(renderer), f"{named} volume": milliseconds(volume)}
         if tessellation == "static":
-            return found | {f"{view} triangles": sum(len(mesh.triangles) for mesh in ready)}
+            return found | {f"{view} triangles": sum(len(mesh.triangles) for of_group in ready for mesh in of_group)}
         return found | {f"{named} {name}": time for name, time in _passes(scene, texels).items()}
 
     names = (f"{named} fps", f"{named} volume")
