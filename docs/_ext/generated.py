@@ -26,7 +26,7 @@ PARTS = {
     "methods": listed.methods,
     "parameters": listed.parameters,
     "light-points": listed.light_points,
-    "figures": listed.figures,
+    "studies": listed.studies,
     "sweep-columns": listed.sweep_columns,
     "kernels": listed.kernels,
     "method": measured.method,

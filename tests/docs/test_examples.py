@@ -55,7 +55,7 @@ def test_the_tutorial_ends_with_a_figure(variant, tmp_path, monkeypatch, capfd):
     page = DOCS / "scene-to-figure.md"
     (tmp_path / "gate.xml").write_text(blocks(page, "xml")[0], encoding="utf-8")
     run_commands(page, capfd)
-    for name in ("gate.png", "reference.exr", "gate-report/report.html", "figures/strip.pdf"):
+    for name in ("gate.png", "reference.exr", "gate-report/report.html", "gate-report/strip.pdf"):
         assert (tmp_path / name).stat().st_size > 1000, name
     # Several per cent with 32 steps, as the page says.
     (relative,) = re.findall(r"^rmse .* relative ([\d.]+) %$", capfd.readouterr().out, flags=re.MULTILINE)
@@ -68,11 +68,18 @@ def test_a_method_and_an_image_are_validated_as_the_page_says(variant, tmp_path,
     """Both end in a report and a chart: the function with its point, the image without a time."""
     monkeypatch.chdir(tmp_path)
     page = DOCS / "validate-your-method.md"
+
+    def methods_of(folder):
+        return json.loads((tmp_path / folder / "report.json").read_text(encoding="utf-8"))["scenes"][0]["methods"]
+
     (tmp_path / "fog.py").write_text(blocks(page, "python")[0], encoding="utf-8")
     run_commands(page, capfd)
-    chart = (tmp_path / "figures/frame-speed.csv").read_text(encoding="utf-8")
-    assert "fog.py:marched" in chart
-    measured = json.loads((tmp_path / "engine/report.json").read_text(encoding="utf-8"))["scenes"][0]["methods"]
+    assert (tmp_path / "validation/frame-speed.pdf").stat().st_size > 1000
+    assert "fog.py:marched" in (tmp_path / "validation/methods-table.tex").read_text(encoding="utf-8")
+    (marched,) = (entry for entry in methods_of("validation") if entry["label"].startswith("fog.py:marched"))
+    assert marched["times"]["frame"]["median_ms"] > 0
+    assert marched["error"]["relative_rmse"] > 0
+    measured = methods_of("engine")
     (image,) = (entry for entry in measured if entry["kind"] == "image")
     assert image["error"]["relative_rmse"] > 0
     assert image["times"] is None
@@ -101,7 +108,7 @@ def test_the_cells_of_the_notebook_page_run_and_display(variant, tmp_path, monke
 @pytest.fixture
 def fog(tmp_path):
     """The examples of docs/your-method.md as files; the first one's path."""
-    for name, block in zip(("fog", "plain", "part", "kernel"), blocks(DOCS / "your-method.md", "python"), strict=True):
+    for name, block in zip(("fog", "plain", "kernel"), blocks(DOCS / "your-method.md", "python"), strict=True):
         (tmp_path / f"{name}.py").write_text(block, encoding="utf-8")
     return tmp_path / "fog.py"
 

@@ -33,7 +33,6 @@ class Loaded(HTMLParser):
 
 
 @pytest.mark.claim("docs-without-a-network")
-@pytest.mark.slow
 def test_pages_build_and_load_nothing_from_a_network(tmp_path):
     """Sphinx checks links, names of functions, formulas, and that each claim has a test."""
     command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", "-d", str(tmp_path / "trees")]
