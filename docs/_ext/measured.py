@@ -150,12 +150,21 @@ def cycles() -> str:
         "| scene | injected fault | expected name | named first | words | error | left |",
         "| --- | --- | --- | --- | --- | ---: | ---: |",
     ]
-    for row in rows:
-        first = f"`{row['first']}`" if row["right"] else f"**`{row['first']}`**"
-        says = row["says"] + (f" (with {' and '.join(row['together'])})" if row["together"] else "")
-        cells = [row["scene"], row["words"], f"`{row['planted']}`", first, says]
-        lines.append(f"| {' | '.join([*cells, *(f'{100 * row[key]:.2g} %' for key in ('residual', 'left'))])} |")
-    return "\n".join([*lines, ""])
+    return "\n".join([*lines, *(f"| {row['scene']} {_diagnosed(row)}" for row in rows), ""])
+
+
+def _diagnosed(row: dict[str, Any]) -> str:
+    """Return the cells of an injected fault and of what the diagnosis said."""
+    first = f"`{row['first']}`" if row["right"] else f"**`{row['first']}`**"
+    says = row["says"] + (f" (with {' and '.join(row['together'])})" if row["together"] else "")
+    cells = [
+        row["words"],
+        f"`{row['planted']}`",
+        first,
+        says,
+        *(f"{100 * row[key]:.2g} %" for key in ("residual", "left")),
+    ]
+    return f"| {' | '.join(cells)} |"
 
 
 def numpy_faults() -> str:
@@ -169,9 +178,4 @@ def numpy_faults() -> str:
         "| injected fault | expected name | named first | words | error | left |",
         "| --- | --- | --- | --- | ---: | ---: |",
     ]
-    for row in rows:
-        first = f"`{row['first']}`" if row["right"] else f"**`{row['first']}`**"
-        says = row["says"] + (f" (with {' and '.join(row['together'])})" if row["together"] else "")
-        cells = [row["words"], f"`{row['planted']}`", first, says]
-        lines.append(f"| {' | '.join([*cells, *(f'{100 * row[key]:.2g} %' for key in ('residual', 'left'))])} |")
-    return "\n".join([*lines, ""])
+    return "\n".join([*lines, *map(_diagnosed, rows), ""])

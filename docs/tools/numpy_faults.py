@@ -72,36 +72,40 @@ ORIGIN, TARGET, FOV = np.array([0.35, -5.15, 1.45]), np.array([0.05, 0.4, 0.85])
 BALL, RADIUS, HALF = np.array([0.45, 0.6, 0.55]), 0.53, (8.3, 7.7)
 
 
+def _triple(values: Any) -> str:
+    return ", ".join(f"{value:g}" for value in values)
+
+
 def scene_xml(engine: Engine) -> str:
     """Return the scene as Mitsuba reads it."""
-    rgb = lambda values: ", ".join(f"{v:g}" for v in values)  # noqa: E731
     lights = "".join(
-        f'<emitter type="point" id="lamp-{n}"><point name="position" value="{rgb(lamp.place)}"/>'
-        f'<rgb name="intensity" value="{rgb(lamp.intensity)}"/></emitter>'
+        f'<emitter type="point" id="lamp-{n}"><point name="position" value="{_triple(lamp.place)}"/>'
+        f'<rgb name="intensity" value="{_triple(lamp.intensity)}"/></emitter>'
         if lamp.axis is None
-        else f'<emitter type="spot" id="lamp-{n}"><transform name="to_world"><lookat origin="{rgb(lamp.place)}" '
-        f'target="{rgb(np.add(lamp.place, lamp.axis))}" up="0, 1, 0"/></transform><rgb name="intensity" '
-        f'value="{rgb(lamp.intensity)}"/><float name="cutoff_angle" value="{math.degrees(lamp.cutoff):.9g}"/>'
+        else f'<emitter type="spot" id="lamp-{n}"><transform name="to_world"><lookat origin="{_triple(lamp.place)}" '
+        f'target="{_triple(np.add(lamp.place, lamp.axis))}" up="0, 1, 0"/></transform><rgb name="intensity" '
+        f'value="{_triple(lamp.intensity)}"/><float name="cutoff_angle" value="{math.degrees(lamp.cutoff):.9g}"/>'
         f'<float name="beam_width" value="{math.degrees(lamp.cutoff):.9g}"/></emitter>'
         for n, lamp in enumerate(engine.lamps)
     )
     return f"""<scene version="3.0.0">
     <medium type="homogeneous" id="fog"><rgb name="sigma_t" value="{engine.sigma_t}"/>
-        <rgb name="albedo" value="{rgb(engine.albedo)}"/>
+        <rgb name="albedo" value="{_triple(engine.albedo)}"/>
         <phase type="hg"><float name="g" value="0.35"/></phase></medium>
     <sensor type="perspective"><float name="fov" value="49"/><ref name="medium" id="fog"/>
         <transform name="to_world">
-            <lookat origin="{rgb(ORIGIN)}" target="{rgb(TARGET)}" up="0, 0, 1"/></transform>
+            <lookat origin="{_triple(ORIGIN)}" target="{_triple(TARGET)}" up="0, 0, 1"/></transform>
         <film type="hdrfilm"><integer name="width" value="{_SIZE[0]}"/>
             <integer name="height" value="{_SIZE[1]}"/></film></sensor>
     {lights}
     <shape type="rectangle" id="floor">
         <transform name="to_world"><scale x="{HALF[0]}" y="{HALF[1]}" z="1"/></transform>
-        <bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="{rgb(engine.floor)}"/></bsdf></bsdf>
+        <bsdf type="twosided">
+            <bsdf type="diffuse"><rgb name="reflectance" value="{_triple(engine.floor)}"/></bsdf></bsdf>
     </shape>
-    <shape type="sphere" id="ball"><point name="center" value="{rgb(BALL)}"/>
+    <shape type="sphere" id="ball"><point name="center" value="{_triple(BALL)}"/>
         <float name="radius" value="{RADIUS}"/>
-        <bsdf type="diffuse"><rgb name="reflectance" value="{rgb(engine.ball)}"/></bsdf></shape>
+        <bsdf type="diffuse"><rgb name="reflectance" value="{_triple(engine.ball)}"/></bsdf></shape>
 </scene>"""
 
 

@@ -114,7 +114,7 @@ def _next_of(
     """Do what `next_frame` does for the scene of a renderer; a `state` was made for it before, where it is not None."""
     geometry_moved |= light_moved and any(light.opaque for light in renderer.scene.area_lights)
     moved = {"camera": camera_moved, "geometry": geometry_moved, "light": light_moved, "look": True}
-    finish: Callable[[], Any] = lambda: state  # noqa: E731
+    finish: Callable[[], Any] | None = None
     if state is None:
         if cache is None or cache.state is None or any(moved[what] for what in renderer.method.prepared_from):
             finish = _started(renderer)
@@ -126,7 +126,8 @@ def _next_of(
     else:
         cast = run_cast_and_shade(renderer)[0] if cast is None else cast
         by_light = run_shade(renderer, cast)
-    state = finish()
+    if finish is not None:
+        state = finish()
     rendered = run_method(renderer, state, cast, by_light, cache.carried if cache else None)
     return evaluated(cast, rendered), FrameCache(cast, state, rendered.carried, rendered.extra)
 

@@ -26,7 +26,7 @@ class Frozen:
         def recorded(*args):
             try:
                 return function(*args)
-            except Exception as error:
+            except Exception as error:  # of any kind: `__call__` raises it when the recording has ended
                 raised.append(_without_frames(error))
                 return None
 

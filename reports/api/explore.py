@@ -187,9 +187,9 @@ def view(
     if not 0 <= port <= 65535:
         raise InputError(f"port: got {port}, wanted a number from 0 to 65535; 0 is any free one")
     from reports.machine.environment import activate
-    from validation.study.configuration import configuration
+    from validation.study.configuration import Configuration, configuration
 
-    chosen = configuration(method, kernel_name(kernel), parameters)  # type: ignore[arg-type]
+    chosen = method if isinstance(method, Configuration) else configuration(method, kernel_name(kernel), parameters)
     changes, pixels = changes_of(change), pixels_of(size)
     variant = activate()
     from reports.view.session import Session

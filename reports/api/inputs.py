@@ -66,7 +66,7 @@ def one_error(function: Callable[_P, _R]) -> Callable[_P, _R]:
     def wrapped(*arguments: _P.args, **named: _P.kwargs) -> _R:
         try:
             return function(*arguments, **named)
-        except Exception as error:
+        except Exception as error:  # only InputError is changed; naming it here would import `realtime` at each start
             from realtime.errors import InputError as RealtimeInputError
 
             if isinstance(error, RealtimeInputError):

@@ -229,6 +229,31 @@ def check_limit(limit: float) -> None:
         raise InputError(f"method_limit: got {limit:g}, wanted a time above 0, such as 300 [s]")
 
 
+def _ready(
+    scene: Any,
+    pixels: Any,
+    changes: Any,
+    precision: str,
+    chosen: "Configuration",
+    frames: int,
+    layers: bool,
+    force: bool,
+    progress: Progress,
+) -> tuple[Any, Any, Any, bool]:
+    """Return a scene, loaded and read, what renders it, and whether with the further layers of the method."""
+    from realtime.methods.registry import find_method
+    from realtime.scene.read_scene import read_scene
+    from reports.api.scenes import opened
+    from validation.study.configuration import prepared
+
+    loaded = opened(scene, pixels, changes)
+    read = read_scene(loaded.scene, precision)
+    _check_work(loaded.name, read, chosen, frames, force=force)
+    note(progress, read.features.notes)
+    layered = layers and bool(find_method(chosen.method).layers)
+    return loaded, read, prepared(read, chosen, extra_layers=layered), layered
+
+
 def _frame(
     scene: Any,
     pixels: Any,
@@ -244,11 +269,8 @@ def _frame(
     import drjit as dr
 
     from realtime.frame.samples import render_samples
-    from realtime.methods.registry import find_method
     from realtime.scene.features import describe
-    from realtime.scene.read_scene import read_scene
     from reports.api.results import Rendering, sealed
-    from reports.api.scenes import opened
     from reports.machine.environment import activate
     from validation.study.configuration import prepared
     from validation.study.cost import TIMED
@@ -256,12 +278,9 @@ def _frame(
     from validation.study.run import layered_frame
 
     variant = activate()
-    loaded = opened(scene, pixels, changes)
-    read = read_scene(loaded.scene, precision)
-    _check_work(loaded.name, read, chosen, samples + (TIMED if timed else 0), force=force)
-    note(progress, read.features.notes)
-    layered = samples == 1 and bool(find_method(chosen.method).layers)
-    renderer = prepared(read, chosen, extra_layers=layered)
+    count = samples + (TIMED if timed else 0)
+    given = scene, pixels, changes, precision, chosen, count
+    loaded, read, renderer, layered = _ready(*given, layers=samples == 1, force=force, progress=progress)
     warnings = _warnings(renderer)
     with telling(progress, f"{loaded.name}: {samples} rays a pixel") as tell:
         frame = render_samples(renderer, samples, lambda done: tell(done, "the picture"))
@@ -303,25 +322,19 @@ def _animation(
 
     import numpy as np
 
-    from realtime.methods.registry import find_method
-    from realtime.scene.read_scene import read_scene
     from reports.api.results import Animation, write_image
-    from reports.api.scenes import opened
     from reports.machine.environment import activate
     from reports.plotting.pictures import tone_curve
     from validation.scenes.animation import animate, moved_parts, parse_moves
-    from validation.study.configuration import prepared
     from validation.study.frame_times import timed_image
     from validation.study.run import layered_frame
 
     variant = activate()
-    loaded = opened(scene, pixels, changes)
-    read = read_scene(loaded.scene, precision)
-    animation = loaded.animation if moves is None else replace(loaded.animation, moves=parse_moves(moves))
-    _check_work(loaded.name, read, chosen, frames, force=force)
-    note(progress, read.features.notes)
-    layered = any(path.suffix.lower() == ".exr" for path in files) and bool(find_method(chosen.method).layers)
-    renderer = prepared(read, chosen, extra_layers=layered)
+    given = scene, pixels, changes, precision, chosen, frames
+    asked = None if moves is None else parse_moves(moves)
+    layers = any(path.suffix.lower() == ".exr" for path in files)
+    loaded, read, renderer, _ = _ready(*given, layers=layers, force=force, progress=progress)
+    animation = loaded.animation if asked is None else replace(loaded.animation, moves=asked)
     _warnings(renderer)
     costs: list[tuple[float, float]] = []
     kept = curve = None  # all frames share the tone curve of the first, so that a light that fades looks it
