@@ -13,7 +13,6 @@ Read in this order:
 - `geometry.py`: foot and height of a ray over a light, and the changes of variables x, theta, q, w;
 - `kronrod.py`: nodes and weights of the Gauss-Kronrod pair;
 - `panels.py`: the airlight integral of millions of segments, in NumPy, each with its error estimate;
-- `area_light.py`: closed forms for lights with extent;
 - `series.py`: the power series behind the polynomial of Biri 2006;
 - `cases.py`: tables of cases in CSV files or in memory.
 """

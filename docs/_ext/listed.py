@@ -28,9 +28,9 @@ def table(headers: Sequence[str], rows: Sequence[Sequence[str]], words: int = 1)
 _RESULTS = (
     "reports.api.results.Rendering",
     "reports.api.results.Reference",
-    "reports.api.results.ImageComparison",
-    "reports.api.results.SceneComparison",
-    "reports.api.results.Fitted",
+    "reports.api.comparisons.ImageComparison",
+    "reports.api.comparisons.SceneComparison",
+    "reports.api.comparisons.Fitted",
     "reports.api.report.Report",
     "reports.studies.result.Study",
     "reports.studies.methods.MethodsStudy",

@@ -26,7 +26,7 @@ from reports.api.inputs import (
 
 if TYPE_CHECKING:
     from reference.storage.exr import Image
-    from reports.api.results import Diagnosed, Fitted, ImageComparison, SceneComparison
+    from reports.api.comparisons import Diagnosed, Fitted, ImageComparison, SceneComparison
 
 _ENDINGS = (".exr", ".png")
 
@@ -258,7 +258,7 @@ def _two_images(
 ) -> "ImageComparison":
     from reference.storage.exr import layer as image_layer
     from reference.storage.exr import read_exr
-    from reports.api.results import ImageComparison, write_difference
+    from reports.api.comparisons import ImageComparison, write_difference
     from validation.comparison.images import common_layer, compare_files, compare_images
 
     if layer is None:
@@ -287,7 +287,7 @@ def _two_images(
 def _with_scene(
     scene: str, path: Path, *, mask: Any, files: list[Path], progress: Any, **options: Any
 ) -> "SceneComparison":
-    from reports.api.results import SceneComparison, write_difference
+    from reports.api.comparisons import SceneComparison, write_difference
     from validation.engine.judge import compare_scene
 
     if mask is not None and not isinstance(mask, str | os.PathLike):
@@ -300,7 +300,7 @@ def _with_scene(
 
 
 def _diagnose(scene: str, path: Path, *, progress: Any, **how: Any) -> "Diagnosed":
-    from reports.api.results import Diagnosed
+    from reports.api.comparisons import Diagnosed
     from validation.engine.diagnose import diagnose_file
 
     with telling(progress, "diagnosis") as tell:
@@ -317,7 +317,7 @@ def _fit(
     from reports.machine.environment import activate
 
     activate()
-    from reports.api.results import Fitted
+    from reports.api.comparisons import Fitted
     from validation.engine.judged_layer import judged_layer
     from validation.engine.seen import scene_of_size
     from validation.fit.fit import fit_image

@@ -6,7 +6,6 @@ the precision of what made them: float32 from a method in single precision, floa
 truth, whose error is far below what float32 can hold; `.numpy(numpy.float32)` converts.
 """
 
-import json
 import math
 import os
 from abc import abstractmethod
@@ -23,11 +22,7 @@ from analytic.errors import InputError
 from reference.storage.exr import TOTAL, Image
 from reference.storage.exr import layer as image_layer
 from reports.plotting.pictures import (
-    ERROR_CEILING,
-    ERROR_FLOOR,
     ToneCurve,
-    error_map,
-    exposure,
     png_bytes,
     preview,
     tone_curve,
@@ -36,12 +31,8 @@ from reports.plotting.pictures import (
 )
 from reports.tables.methods import rate_words
 from reports.tables.record import Result
-from reports.tables.table import Column, Interval, Table, number, table
-from validation.comparison.images import Comparison
-from validation.engine.diagnose import Diagnosis
-from validation.engine.judge import EngineComparison
-from validation.fit.fit import Fit
-from validation.metrics.errors import FLOOR, Metrics, colours, plain
+from reports.tables.table import number
+from validation.metrics.errors import plain
 from validation.study.frame_times import FrameTimes
 
 Array = NDArray[np.floating]
@@ -340,263 +331,6 @@ class Reference(LayeredImage):
     def title(self) -> str:
         """Title of the reference."""
         return f"{self.scene}, the reference by {self.estimator}"
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class ImageComparison(Comparison, Pictured):
-    """How far an image is from a reference: the numbers of `airlight compare`, and the images."""
-
-    reference: Array  #: the layer of the reference, (height, width[, channels]) [W/(m^2 sr)]
-    test: Array  #: the same layer of the image under test
-    names: tuple[str, str] = ("the reference", "the test image")
-    files: tuple[tuple[str, str], ...] = ()  #: differences that were written, and what they show
-
-    @property
-    def passed(self) -> bool:
-        """Whether the test image has no fault; `failures` names the faults."""
-        return not self.failures
-
-    @cached_property
-    def error(self) -> Array:
-        """The signed relative error (test - ref) / max(ref, 0.001 mean(ref)), of the shape of the images."""
-        reference, test = (np.asarray(values, dtype=np.float64) for values in (self.reference, self.test))
-        finite = np.isfinite(reference) & np.isfinite(test)
-        mean = float(reference[finite].mean()) if finite.any() else math.nan
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return read_only((test - reference) / np.maximum(reference, FLOOR * mean))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight compare --json` prints."""
-        return self.to_json() | _differences(self.files)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The numbers, a line for each group."""
-        return [self.summary(), *_difference_lines(self.files)]
-
-    def numpy(self, dtype: DTypeLike | None = None) -> Array:
-        """Return `error` as an array of one's own, which can be written to."""
-        return np.array(self.error, dtype=dtype)
-
-    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Array:
-        return as_array(self.error, dtype, copy)
-
-    def picture(self) -> NDArray[np.uint8]:
-        """Return the map of the signed relative error, see `reports.plotting.pictures.error_map`, (height, width,
-        3).
-        """
-        reference, test = self._colours()
-        return error_map(reference, test)
-
-    def _colours(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        shape = (*self.reference.shape[:2], -1)
-        reference, test = (np.asarray(v, dtype=np.float64).reshape(shape) for v in (self.reference, self.test))
-        return colours(reference), colours(test)
-
-    def _repr_html_(self) -> str:
-        from reports.tables.record import block, bullets, facts_table, picture
-
-        reference, test = self._colours()
-        factor, width = exposure(reference), reference.shape[1]
-        shown = [
-            picture(png_bytes(tone_mapped(values, factor)), width, alt=f"{name}, {self.layer}", caption=name)
-            for name, values in zip(self.names, (reference, test))
-        ]
-        scale = f"relative error: blue too dark, red too bright, logarithmic from {ERROR_FLOOR:g} to {ERROR_CEILING:g}"
-        shown.append(picture(self._png, width, alt=f"signed relative error of the {self.layer}", caption=scale))
-        return block(
-            self.title, *shown, facts_table(self._rows()), bullets([f"failed: {why}" for why in self.failures])
-        )
-
-    def _rows(self) -> list[tuple[str, str]]:
-        m = self.metrics
-        rows = [
-            ("relative RMSE", _percent(m.relative_rmse)),
-            ("relative bias", _percent(m.relative_bias)),
-            ("relative error, median, 99 %, largest", f"{number(m.p50)}, {number(m.p99)}, {number(m.max)}"),
-            ("pixels, masked, not finite, negative", f"{m.pixels}, {self.masked}, {m.nonfinite}, {m.negative}"),
-        ]
-        if self.statistics is not None:
-            low, high = self.statistics.relative_bias_ci
-            rows.append(("95 % interval of the bias", f"{_percent(low)} to {_percent(high)}"))
-            rows.append(("bias that would have been detected", _percent(self.statistics.detectable_bias)))
-        if self.flip is not None:
-            rows.append(("HDR-FLIP", f"none: {self.flip.note}" if self.flip.value is None else number(self.flip.value)))
-        return rows
-
-    @property
-    def title(self) -> str:
-        """What is compared with what."""
-        return f"{self.layer} of {self.names[1]} against {self.names[0]}"
-
-    def __repr__(self) -> str:
-        m = self.metrics
-        verdict = "passed" if self.passed else f"failed: {'; '.join(self.failures)}"
-        return (
-            f"ImageComparison({self.title}: relative RMSE {m.relative_rmse:.3g}, "
-            f"relative bias {m.relative_bias:.3g}, {verdict})"
-        )
-
-
-@dataclass(frozen=True, repr=False)
-class SceneComparison(Result):
-    """How far an image is from the reference of a scene."""
-
-    compared: EngineComparison
-    files: tuple[tuple[str, str], ...] = ()  #: differences that were written, and what they show
-
-    @property
-    def title(self) -> str:
-        """What is compared with what."""
-        return f"{self.compared.layer} of {self.compared.path} against {self.compared.scene}"
-
-    @property
-    def passed(self) -> bool:
-        """Whether the image has no fault."""
-        return not self.compared.failures
-
-    @property
-    def metrics(self) -> Metrics:
-        """The errors."""
-        return self.compared.comparison.metrics
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight compare SCENE --json` prints."""
-        return self.compared.to_json() | _differences(self.files)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The numbers, a line for each group."""
-        return [*self.compared.summary().split("\n"), *_difference_lines(self.files)]
-
-
-@dataclass(frozen=True, repr=False)
-class Diagnosed(Result):
-    """What is wrong with an image of a scene: with each of airlight and surfaces where it has both as layers."""
-
-    diagnoses: tuple[Diagnosis, ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight compare SCENE --diagnose --json` prints: with several layers, a list of all too."""
-        several = [diagnosis.to_json()["diagnosis"] for diagnosis in self.diagnoses]
-        return {"diagnosis": several[0]} | ({"layers": several} if len(several) > 1 else {})
-
-    @property
-    def passed(self) -> bool:
-        """Whether all pixels of the image are finite."""
-        return not any(diagnosis.failures for diagnosis in self.diagnoses)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The faults, ranked by evidence."""
-        first, *others = (diagnosis.lines for diagnosis in self.diagnoses)
-        return first + [line for lines in others for line in ("", *lines)]
-
-
-_FITTED = (
-    Column("name", "parameter", words=True),
-    Column("value", "value", digits=6),
-    Column("interval", "95 % interval", digits=6),
-    Column("scene", "in the scene", digits=6),
-)
-
-
-@dataclass(frozen=True, repr=False)
-class Fitted(Result):
-    """The parameters of the fog that explain an image."""
-
-    fit: Fit
-
-    def __getitem__(self, name: str) -> Mapping[str, Any]:
-        """Return 'value', 'low', 'high' and 'scene' of a parameter; lists where its channels differ."""
-        parameters: dict[str, Any] = self.to_dict()["parameters"]
-        return parameters[name]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight compare SCENE --fit NAMES --json` prints."""
-        numbers: dict[str, Any] = json.loads(json.dumps(self.fit.to_json()))
-        return numbers
-
-    @property
-    def title(self) -> str:
-        """What was fitted."""
-        values = ", ".join(f"{each.name}={each.value:.6g}" for each in self.fit.parameters)
-        return f"{self.fit.path} as {self.fit.scene}: {values}; relative RMSE left {self.fit.residual:.3g}"
-
-    @property
-    def tables(self) -> Sequence[Table]:
-        """The parameters with their intervals; channels have a row each."""
-        rows: list[dict[str, Any]] = []
-        for name, each in self.to_dict()["parameters"].items():
-            word, colon, place = name.partition(":")
-            several = {"": each}
-            if isinstance(each["value"], list):
-                several = {f".{c}": {key: value[i] for key, value in each.items()} for i, c in enumerate("rgb")}
-            for channel, of_it in several.items():
-                ends = Interval.of((of_it["low"], of_it["high"]))
-                rows.append({**of_it, "name": f"{word}{channel}{colon}{place}", "interval": ends})
-        return [table("Parameters that explain the image", _FITTED, rows)]
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """What the image cannot tell apart, and what is left over."""
-        return self.fit.lines
-
-    @property
-    def passed(self) -> bool:
-        """Whether all pixels of the image are finite."""
-        return not self.fit.failures
-
-
-def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None) -> str:
-    """Write how a test image differs from a reference, whole or not at all; return in words what the file shows.
-
-    Parameters
-    ----------
-    path
-        Ends in .exr: test - reference [W/(m^2 sr)] in R, G, B, and (test - reference) / max(reference, 0.001
-        mean(reference)) in the layer `relative`. Ends in .png: the latter in the false colours of a report,
-        `reports.plotting.pictures.error_map`.
-    reference, test
-        Radiance [W/(m^2 sr)], (height, width, 3).
-    kept
-        Pixels to show, truth values (height, width); all by default. The others, and in EXR files also those that are
-        not finite, have no difference.
-    """
-    reference, test = (np.asarray(values, dtype=np.float64) for values in (reference, test))
-    if kept is not None:
-        test = np.where(np.asarray(kept)[..., None], test, reference)
-    if path.suffix.lower() == ".png":
-        write_png(path, error_map(reference, test))
-        return (
-            f"signed relative error, blue too dark, red too bright, from {ERROR_FLOOR:g} (white) to {ERROR_CEILING:g}"
-        )
-    from reference.storage.exr import write_exr
-
-    finite = np.isfinite(reference) & np.isfinite(test)
-    difference = np.subtract(test, reference, out=np.zeros_like(test), where=finite)
-    seen = finite if kept is None else finite & np.asarray(kept)[..., None]
-    mean = float(reference[seen].mean()) if seen.any() else 0.0
-    floor = np.maximum(np.where(finite, reference, 0), FLOOR * mean)
-    relative = np.divide(difference, floor, out=np.zeros_like(test), where=floor > 0)
-    attributes: dict[str, str | int | float] = {
-        "airlight:difference": "test - reference",
-        "airlight:not_finite": int((~finite.all(axis=-1)).sum()),
-    }
-    write_exr(path, Image({"total": difference, "relative": relative}, attributes=attributes))
-    return "test - reference in R, G, B, over the reference in the layer relative"
-
-
-def _differences(files: Sequence[tuple[str, str]]) -> dict[str, Any]:
-    return {"difference": files[-1][0]} if files else {}
-
-
-def _difference_lines(files: Sequence[tuple[str, str]]) -> list[str]:
-    return [f"wrote            {path}: {shown}" for path, shown in files]
-
-
-def _percent(value: float) -> str:
-    return f"{number(100 * value)} %"
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)

@@ -12,8 +12,8 @@ from analytic.errors import InputError, nearest
 STUDIES = {
     "methods": "methods",
     "decomposition": "methods",
-    "scaling": "methods",
-    "map-size": "methods",
+    "scaling": "growth",
+    "map-size": "growth",
     "kernels": "kernels",
     "kernel-errors": "kernels",
     "stability": "kernels",

@@ -7,7 +7,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from reports.tables.table import Table
+    pass
 
 
 def colours_wanted() -> bool:
@@ -41,14 +41,3 @@ def print_json(data: Any) -> None:
     except UnicodeEncodeError:
         text = json.dumps(data, indent=2, allow_nan=False)
     print(text)
-
-
-def print_table(table: "Table", *, as_markdown: bool = False) -> None:
-    """Print a table: as wide as the terminal, as it needs where piped, or as Markdown."""
-    from reports.tables.drawing import markdown, text
-
-    if as_markdown:
-        print(f"\n{markdown(table)}", end="")
-        return
-    width = terminal_width()
-    print(text(table, width=width, styled=width is not None and colours_wanted()), end="")

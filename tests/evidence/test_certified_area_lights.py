@@ -6,13 +6,13 @@ import json
 import numpy as np
 import pytest
 
-from analytic.area_light import sphere_airlight
 from analytic.phase import PhaseFunction
 from reference.quadrature.unbounded import sum_intervals
 from reference.scene.read import TruthLight, TruthMedium
 from reference.visibility.certificate import LitIntervals
 from reference.visibility.planes import Rays, cone_interval
 from tests.evidence.certified import area_lights
+from tests.evidence.closed_forms import sphere_airlight
 
 
 @pytest.fixture(scope="module")

@@ -20,11 +20,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from analytic.area_light import disk_share, polygon_in_disk, polygon_overlap
 from analytic.geometry import foot_and_height
 from reference.quadrature.ray_values import ray_values
 from reference.quadrature.replicates import PointPlan
 from tests.evidence.certified.model import SIZE, FogLight, load_fog, mitsuba_dict
+from tests.evidence.closed_forms import disk_share, polygon_in_disk, polygon_overlap
 from tests.evidence.known_answers import (
     BOX,
     SCENES,

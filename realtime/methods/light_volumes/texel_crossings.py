@@ -78,15 +78,6 @@ def passage(heights, face, line: Line, texel) -> Passage:
     return Passage(place, four, walls, (begin, end), (d0, d1), ray.stops & ends)
 
 
-def may_cross(line: Line, over: Passage):
-    """Return whether a ray crosses the height field in a texel; a line that ends beside a wall may do so."""
-    from_light, to_light = over.lit
-    bends = (_on_diagonal(line, over)[1] > 0) != from_light
-    if over.walls is not None:
-        bends = dr.select(over.walls == 0, bends, over.ends)
-    return (over.t[0] < over.t[1]) & ((from_light != to_light) | bends)
-
-
 def texel_crossings(line: Line, over: Passage) -> TexelCrossings:
     """Return where a ray crosses the height field in a texel: over its two triangles, or its two parts beside a wall.
 

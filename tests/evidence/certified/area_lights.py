@@ -10,7 +10,7 @@ the ray and towards the foot of the ray. Over the part of the ray where that is 
     J = int exp(-sigma_t (x + r)) p(c) cos_l / r^2 dx      [1/m]
 
 is taken by tanh-sinh over x, and over w = asinh((x - foot)/h) by Gauss and Legendre with more digits; both must agree
-to 15 digits. A sphere of radiance 1 gives K of `analytic.area_light`: over directions within its cone, and over
+to 15 digits. A sphere of radiance 1 gives K of `tests.evidence.closed_forms`: over directions within its cone, and over
 distances to its surface.
 """
 

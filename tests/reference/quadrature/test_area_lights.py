@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.special import roots_legendre
 
-from analytic.area_light import sphere_airlight
 from reference.quadrature import area_lights
 from reference.quadrature.area_lights import area_surface, beams_of
 from reference.quadrature.image import quadrature_image
@@ -20,6 +19,7 @@ from reference.scene.read import read_truth
 from reference.visibility.before_light import before_light
 from reference.visibility.certificate import segments_blocked
 from reference.visibility.exact_distance import exact_distance
+from tests.evidence.closed_forms import sphere_airlight
 from tests.helpers.area_lights import (
     NULL,
     airlight_replicates,

@@ -10,11 +10,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analytic.area_light import sphere_airlight
 from reference.quadrature.area_lights import area_surface, beams_of
 from reference.quadrature.replicates import PILOT, REPLICATES, PointPlan, replicate_means, standard_error
 from reference.quadrature.surface import surface_hits
 from reference.visibility.exact_distance import exact_distance
+from tests.evidence.closed_forms import sphere_airlight
 from tests.helpers.area_lights import airlight_replicates, fixed, fog, lamp, lit_room, turned
 
 STUDENT = 2.3646  #: standard errors to either side that hold 95 % with seven degrees of freedom

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from analytic.area_light import polygon_in_disk, polygon_overlap, sphere_airlight, sphere_fluence
+from tests.evidence.closed_forms import polygon_in_disk, polygon_overlap, sphere_airlight, sphere_fluence
 
 #: Foot at 0, from -2 to 3, attenuation from -2 on; computed twice in mpmath, over directions and over the cap.
 CERTIFIED = [

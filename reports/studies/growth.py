@@ -1,0 +1,351 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Studies of growth: times and memory with the work, errors with the size of the shadow map."""
+
+import math
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from analytic.errors import InputError
+from reports.api.inputs import (
+    File,
+    KernelLike,
+    Kernels,
+    MethodLike,
+    Methods,
+    Progress,
+    Scenes,
+    Size,
+    Values,
+    Words,
+    kernel_name,
+    listed,
+    one_error,
+    pixels_of,
+    several,
+    telling,
+)
+from reports.machine.own_process import LIMIT
+from reports.machine.progress import counted, part_of
+from reports.studies.result import FRACTION, Study, with_environment
+from reports.tables.table import number, numbers, table
+
+_KEPT = Path(__file__).resolve().parents[2] / "validation/baselines/scaling"  # what `study scaling --json` printed
+_EARLIER = "what `study scaling --json` printed, or a report.json of `report --full`"
+
+
+@one_error
+def scaling(
+    scenes: Scenes = ("colonnade",),
+    *,
+    kinds: Words = "size,triangles,lights,map",
+    method: Methods = (),
+    kernel: Kernels = (),
+    settings: Values = (),
+    size: Size = (800, 600),
+    against: File | None = None,
+    method_limit: float = LIMIT,
+    progress: Progress = None,
+) -> Study:
+    """Time methods as their work grows.
+
+    Returns times, memory and exponents by pixels, triangles, lights, bounded media or texels of the map. Exit status 1
+    if a time jumps, or grows with a higher power of the work than before.
+
+    Parameters
+    ----------
+    scenes
+        Built-in scenes, random:SEED and Mitsuba XML files.
+    kinds
+        Some of size,triangles,lights,media,map.
+    method
+        As of `airlight study methods`; one configuration of each method with shadows by default.
+    kernel
+        Airlight kernel of the methods; may be given several times.
+    settings
+        NAME=VALUE, a parameter of each method that `--method` names; may be given several times.
+    size
+        Width and height [pixels], or WxH.
+    against
+        What this study printed before as JSON, to compare with; the baseline of the scene by default.
+    method_limit
+        A user method that is named is stopped after so long [s].
+    progress
+        Called with (fraction done, what); True shows a bar.
+    """
+    from validation.study.ladders import KINDS, ladder
+
+    wanted = listed("kinds", kinds)
+    for kind in wanted:
+        if kind not in KINDS:
+            raise InputError(f"kinds: got {kind!r}, wanted some of {','.join(KINDS)}")
+    names = [str(name) for name in several(scenes)]
+    earlier = _earlier(None if against is None else Path(against), names)
+    from reports.machine.environment import activate
+
+    activate()
+    from reports.api.render import asked_configurations
+    from reports.report.others import scaling_data
+    from reports.tables.scaling import cliffs, grown, scaling_tables
+    from validation.study.growth import METHODS, study_scaling
+
+    chosen, _ = asked_configurations(method, kernel, settings, usual=METHODS, limit=method_limit)
+    pixels = pixels_of(size)
+    assert pixels is not None
+    # Scenes that have nothing of a kind are refused before an hour of work, not after.
+    ladders = [(name, kind, ladder(kind, name, pixels)) for name in names for kind in wanted]
+    records: list[dict[str, Any]] = []
+    with telling(progress, "scaling") as tell:
+        for at, (name, kind, steps) in enumerate(ladders):
+            part = part_of(tell, at / len(ladders), (at + 1) / len(ladders))
+            found = study_scaling(kind, steps, chosen, progress=counted(part))
+            records += [scaling_data(name, pixels, each) for each in found]
+    return Study(
+        name="scaling",
+        data=with_environment(scaling=records),
+        drawn=tuple(scaling_tables(records)),
+        wrong=(*cliffs(records), *grown(earlier, records)),
+        draw=partial(_draw_scaling, records),
+    )
+
+
+def _earlier(against: Path | None, names: list[str]) -> list[dict[str, Any]]:
+    """Return the records of an earlier run: of the file that the user names, or the baselines of built-in scenes.
+
+    A baseline is what `airlight study scaling SCENE --json` printed once.
+    """
+    from reports.data.json_files import read_json
+    from reports.tables.scaling import is_record
+
+    kept = [_KEPT / f"{name}.json" for name in names]
+    files = [path for path in kept if path.is_file()] if against is None else [against]
+    records = []
+    for path in files:
+        data = read_json(path, _EARLIER)
+        found = data.get("scaling") if isinstance(data, dict) else None
+        if not isinstance(found, list) or not found or not all(map(is_record, found)):
+            raise InputError(f"{path}: it holds no `scaling`; wanted {_EARLIER}")
+        records += found
+    return records
+
+
+def _draw_scaling(records: list[dict[str, Any]], column: str) -> Any:
+    """Return the time of a frame over its work, by kind of work, with the fitted exponents and the camera rays."""
+    from reports.plotting.figure import new_figure
+    from reports.plotting.style import WIDTHS, method_style
+    from reports.tables.scaling import WORK
+
+    kinds = list(dict.fromkeys(record["kind"] for record in records))
+    width, double = WIDTHS[column], column == "double"
+    across = min(len(kinds), 2 if double else 1)
+    down = -(-len(kinds) // across)
+    figure = new_figure(width, (0.42 if double else 0.9) * width * down)
+    panels = figure.subplots(down, across, squeeze=False).ravel()
+    for panel, kind in zip(panels, kinds):
+        costs: list[Any] = []
+        for record in (each for each in records if each["kind"] == kind):
+            costs = record["costs"]
+            label = f"{record['label']}: power {record['growth']['frame']['exponent'] or math.nan:.2f}"
+            times = [cost["frame"]["median_ms"] for cost in costs]
+            panel.plot([cost["work"] for cost in costs], times, label=label, **method_style(record["label"].split()[0]))
+        rays = [cost["rays"]["median_ms"] for cost in costs]
+        panel.plot([cost["work"] for cost in costs], rays, color="0.6", linestyle=":", label="camera rays")
+        panel.set(xscale="log", yscale="log", xlabel=f"{WORK[kind]} [1]", ylabel="time of a frame [ms]")
+        panel.legend(loc="best")
+    for panel in panels[len(kinds) :]:
+        panel.remove()
+    figure.suptitle(", ".join(dict.fromkeys(record["scene"] for record in records)))
+    return figure
+
+
+# The size of the shadow map
+
+_SHARES = numbers(relative_rmse="rel. RMSE", relative_bias="rel. bias", p50="", p99="", max="", how=FRACTION)
+_FLICKER = (
+    *numbers("map"),
+    *numbers(texels="texels a frame", how={"digits": 2}),
+    *numbers("flicker", relative_rmse="rel. RMSE", how=FRACTION),
+)
+
+
+@one_error
+def map_size(
+    scenes: Scenes = (),
+    *,
+    method: MethodLike = "light-volumes",
+    kernel: KernelLike | None = None,
+    settings: Values = (),
+    sizes: Words = "32,64,128,256,512,1024,2048,4096",
+    size: Size = (160, 120),
+    flicker: bool = False,
+    frames: int = 9,
+    step: float = 1e-3,
+    method_limit: float = LIMIT,
+    force: bool = False,
+    progress: Progress = None,
+) -> Study:
+    """Measure error and flicker against the size of the shadow map.
+
+    Also returns the slope of the relative RMSE, fitted to the logarithms. With `--flicker` the light circles slowly,
+    and the change of the image from frame to frame is measured, less that of the reference.
+
+    Parameters
+    ----------
+    scenes
+        Built-in scenes, random:SEED and Mitsuba XML files; all built-in scenes for fog by default.
+    method
+        A method with a shadow map.
+    kernel
+        Airlight kernel of the method.
+    settings
+        NAME=VALUE, a parameter of the method; may be given several times. Errors of other causes must be well below
+        that of the largest map.
+    sizes
+        Of the shadow map [texels], with commas.
+    size
+        Width and height of the image [pixels], or WxH.
+    flicker
+        Also move the light and measure how it flickers.
+    frames
+        Of the moving light, at least 2.
+    step
+        By how much the light turns from frame to frame [rad].
+    method_limit
+        A user method that is named is stopped after so long [s].
+    force
+        Start also what will take more than an hour, or more memory than there is.
+    progress
+        Called with (fraction done, what); True shows a bar.
+    """
+    from realtime.shadow_maps.shadow_map import check_size
+    from reports.machine.environment import activate
+    from validation.study.configuration import parse_settings
+
+    try:
+        texels = sorted({int(word) for word in listed("sizes", sizes)})
+    except ValueError:
+        raise InputError(f"sizes: got {sizes!r}, wanted sizes in texels, for example 128,256,512") from None
+    for each in texels:
+        check_size(each)
+    parameters = dict(settings) if isinstance(settings, Mapping) else parse_settings(several(settings))
+    if "map" in parameters:
+        raise InputError(f"set: got map={parameters['map']}, wanted it in sizes: the map's size is what varies")
+    pixels, name = pixels_of(size), kernel_name(kernel)
+    from reports.api.render import checked_configuration
+
+    largest, apart = checked_configuration(method, kernel, parameters | {"map": texels[-1]}, limit=method_limit)
+    activate()
+    moves = {"frames": frames, "step": step} if flicker else None
+    call: Any = _map_study
+    if apart:
+        from reports.machine.own_process import in_own_process
+
+        call = partial(in_own_process, _map_study, name=largest.method, limit=method_limit)
+        progress = progress is True
+    from validation.scenes.registry import FOG_SCENES
+
+    names = several(scenes) or list(FOG_SCENES)
+    studied = call(names, pixels, texels, method, name, parameters, moves, force, progress)
+    return _map_result(studied, pixels)
+
+
+def _map_study(
+    names: list[Any],
+    pixels: Any,
+    texels: list[int],
+    method: Any,
+    kernel: str | None,
+    parameters: dict[str, Any],
+    moves: dict[str, Any] | None,
+    force: bool,
+    progress: Progress,
+) -> list[tuple[str, Any, Any]]:
+    """Return of every scene its name, the errors, and the flicker where the light moves."""
+    from realtime.scene.read_scene import read_scene
+    from reports.api.scenes import opened
+    from validation.study.configuration import configuration, prepared
+    from validation.study.cost import check_work, frame_work, truth_work
+    from validation.study.maps import map_errors, map_flicker
+
+    loaded = [opened(name, pixels) for name in names]
+    images = 1 + (moves["frames"] if moves else 0)
+    works = [truth_work(pixels, lights=len(each.scene.emitters()), images=images) for each in loaded]
+    works += [frame_work(pixels, frames=images * len(texels)) for _ in loaded]
+    check_work(f"map-size, {pixels[0]} x {pixels[1]}", works, force=force)
+    largest = configuration(method, kernel, parameters | {"map": texels[-1]})
+    for each in loaded:  # refuse unusable scenes, and maps that exceed the memory, before any work
+        prepared(read_scene(each.scene), largest)
+    studied = []
+    with telling(progress, "map-size") as tell:
+        for at, each in enumerate(loaded):
+            part = counted(part_of(tell, at / len(loaded), (at + 1) / len(loaded), before=f"{each.name}, "))
+            how: dict[str, Any] = {"kernel": kernel, "parameters": parameters, "sizes": texels, "progress": part}
+            errors = map_errors(each.scene, method, **how)
+            about = each.animation.about
+            moving = map_flicker(each.scene, method, about=about, **how, **moves) if moves else None
+            studied.append((each.name, errors, moving))
+    return studied
+
+
+def _map_result(studied: list[tuple[str, Any, Any]], pixels: Any) -> Study:
+    from validation.metrics.errors import plain
+
+    tables, said, rows, data = [], [], [], []
+    for name, errors, moving in studied:
+        label = errors.configuration.label
+        title = f"{name}, {pixels[0]} x {pixels[1]}, {label}"
+        of_scene = [{"map": size, **vars(metrics)} for size, metrics in zip(errors.sizes, errors.metrics, strict=True)]
+        rows += [{"scene": name, "label": label, **row} for row in of_scene]
+        tables.append(table(f"{title}: error", (*numbers("map"), *_SHARES), of_scene))
+        said.append(f"{name}: the relative RMSE {_trend(errors.slope)}.")
+        if moving is not None:
+            columns = (moving.sizes, moving.texels, moving.flicker, moving.errors)
+            tables.append(table(f"{title}: flicker of a moving light", _FLICKER, zip(*columns, strict=True)))
+            change = number(moving.truth_change, 2)
+            said.append(f"{name}: the flicker {_trend(moving.slope)}; the reference itself changes by {change}.")
+        data.append({"name": name, "method": label, "errors": plain(errors), "flicker": plain(moving)})
+    return Study(
+        name="map-size",
+        data=with_environment(size=list(pixels), scenes=data),
+        drawn=tuple(tables),
+        said=tuple(said),
+        rows=tuple(rows),
+        draw=partial(_draw_maps, studied),
+    )
+
+
+def _trend(slope: Any) -> str:
+    """Return how errors change with the size of the map, as the predicate of a sentence."""
+    if math.isnan(slope.order):
+        return "follows no law: too few errors above 0"
+    spread = "" if math.isnan(slope.standard_error) else f" +- {slope.standard_error:.1g}"
+    if abs(slope.order) < 0.01:
+        return "does not depend on the size"
+    if slope.order < 0:
+        return f"does not fall: it grows as size^{-slope.order:.2f}{spread}"
+    return f"falls as size^-{slope.order:.2f}{spread}"
+
+
+def _draw_maps(studied: list[tuple[str, Any, Any]], column: str) -> Any:
+    """Return the error over the size of the map, a line for each scene, with the fitted slope."""
+    import numpy as np
+
+    from reports.plotting.figure import name_sizes, new_figure
+    from reports.plotting.style import WIDTHS, scene_styles
+
+    width = WIDTHS[column]
+    figure = new_figure(width, 0.45 * width if column == "double" else 1.05 * width)
+    panel = figure.subplots()
+    for (name, errors, _), style in zip(studied, scene_styles()):
+        sizes, values, order = np.array(errors.sizes), np.array(errors.errors), errors.slope.order
+        label = f"{name}: order {order:.2f} ± {errors.slope.standard_error:.2f}"
+        panel.plot(sizes, values, linestyle="none", label=label, **style)
+        if np.isfinite(order):
+            level = np.exp(np.mean(np.log(values[values > 0]) + order * np.log(sizes[values > 0])))
+            panel.plot(sizes, level * sizes**-order, color=style["color"])
+    panel.set(xscale="log", yscale="log", title=studied[0][1].configuration.label)
+    panel.set(xlabel="side of the shadow map [texels]", ylabel="relative RMSE of the airlight [1]")
+    name_sizes(panel, studied[0][1].sizes)
+    panel.legend(loc="best")
+    return figure
