@@ -54,9 +54,13 @@ class Frozen:
 
 
 def _without_frames(error: Exception) -> Exception:
-    """Return an exception whose chain holds no frames: their arrays must not outlive the recording."""
-    link: BaseException | None = error
-    while link is not None:
-        link.__traceback__ = None
-        link = link.__cause__ or link.__context__
+    """Return an exception whose causes hold no frames: their arrays must not outlive the recording."""
+    links: list[BaseException | None] = [error]
+    seen = set()  # Dr.Jit may wrap an exception in one that has the first as its context: a circle
+    while links:
+        link = links.pop()
+        if link is not None and id(link) not in seen:
+            seen.add(id(link))
+            link.__traceback__ = None
+            links += [link.__cause__, link.__context__]
     return error

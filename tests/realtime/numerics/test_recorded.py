@@ -39,6 +39,18 @@ def test_nothing_is_collected_during_a_call(variant, collecting):
     assert seen
 
 
+def test_an_exception_whose_causes_form_a_circle_is_raised(variant):
+    """Dr.Jit raises from an exception one whose context leads back to it: a refusal hung."""
+    inner, outer = ValueError("inner"), RuntimeError("outer")
+    inner.__context__, outer.__cause__ = outer, inner
+
+    def refused(x):
+        raise outer
+
+    with pytest.raises(RuntimeError, match="outer"):
+        Frozen(refused)(dr.opaque(mi.Float, 1.0, 5))
+
+
 def test_a_frame_whose_objects_move_is_recorded_at_most_twice(variant):
     """Dr.Jit records anew where the memory of an array is aligned in another way, and NumPy's is by chance.
 
