@@ -85,12 +85,12 @@ def _ended(*processes):
 
 
 def other_version(tmp_path):
-    """Return a copy of the package with one more line in it."""
+    """Return a copy of the package whose code has one more statement: comments do not make another version."""
     other = tmp_path / "other"
     for name in ("analytic", "realtime", "reference", "validation", "reports", "tests"):
         shutil.copytree(ROOT / name, other / name, ignore=shutil.ignore_patterns("__pycache__", "data"))
-    changed = other / "analytic" / "geometry.py"
-    changed.write_text(changed.read_text() + "\n# another version\n")
+    changed = other / "realtime" / "scene" / "read_scene.py"
+    changed.write_text(changed.read_text() + "\nOTHER_VERSION = True\n")
     return other
 
 
