@@ -15,8 +15,7 @@ from realtime.clouds.canonical.sets import SETS
 from realtime.clouds.canonical.tables import Grid, canonical_tables
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
 from realtime.numerics.array_types import array_types
-from tests.helpers.canonical_errors import look_up_errors, random_points, transport_at
-from validation.slab.phases import phase_pair
+from tests.helpers.canonical_errors import transport_at
 
 PHASE, ALBEDO = HenyeyGreensteinPhase(0.5), 0.95
 GRID = Grid(thicknesses=21, depths=13, suns=5, directions=17, azimuths=8)
@@ -70,18 +69,6 @@ def test_at_entries_look_ups_are_the_computation(look_up):
         assert sigma == pytest.approx(exact[3, number], rel=6e-3)
         off = np.hypot(c_x - exact[1, number], c_y - exact[2, number]) / exact[3, number]
         assert off.max() < 0.01
-
-
-@pytest.mark.slow
-@pytest.mark.claim("clouds-tables-figure", tolerance="1 % of T and 2 % of sigma in c at 95 % of 2000 points, each set")
-def test_whole_tables_keep_to_their_figure(variant):
-    phase = phase_pair("mie-modified").deterministic
-    tables = canonical_tables(phase, 1.0)
-    assert tables.size <= 32e6
-    types = array_types("single")
-    for row in look_up_errors(on_device(tables, types), types, random_points(phase, 1.0, 2000)):
-        assert row["T"]["p95"] <= 0.01
-        assert row["c"]["p95"] <= 0.02
 
 
 @pytest.mark.claim("clouds-outside")
