@@ -13,6 +13,7 @@ Read in this order:
 - `geometry.py`: foot and height of a ray over a light, and the changes of variables x, theta, q, w;
 - `kronrod.py`: nodes and weights of the Gauss-Kronrod pair;
 - `panels.py`: the airlight integral of millions of segments, in NumPy, each with its error estimate;
+- `height_fog.py`: media whose density depends on height alone: optical depths, suns in closed form, lights at places;
 - `series.py`: the power series behind the polynomial of Biri 2006;
 - `cases.py`: tables of cases in CSV files or in memory.
 """

@@ -27,6 +27,7 @@ more, and Gauss's three nodes are right to rho^(-6) = 2e-11: Kronrod's seven do 
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -145,12 +146,15 @@ def _integrate_chunk(columns: list[Array], rows: Index, integrand: _Integrand, r
     regular = np.flatnonzero((x0 < x1) & ~through_light)
     if len(regular):
         segments = _segments([c[regular] for c in columns], rows[regular], integrand)
-        value[regular], error[regular] = _adapt(segments, integrand, rtol)
+        evaluate = partial(_evaluate, segments, integrand)
+        count = len(regular)
+        first = _first_panels(segments, integrand.phase.kinks)
+        value[regular], error[regular] = adapted(first, evaluate, np.arange(count), count, rtol)
     return value, error
 
 
-def _segments(columns: list[Array], rows: Index, integrand: _Integrand) -> _Segments:
-    """Change variables to w, without cancellation, and cut off what the exponential or 1/cosh w makes negligible.
+def log_distance(foot: Array, height: Array, x0: Array, x1: Array) -> tuple[Array, Array, Array, Array]:
+    """Return segments in w, without cancellation.
 
     With A and B the values of w at the ends, sinh(A - B) = sinh A cosh B - cosh A sinh B = (s1 r0 - s0 r1)/h^2. Since
     (s1 r0)^2 - (s0 r1)^2 = h^2 (s1^2 - s0^2), the width of a segment that does not hold the foot is
@@ -158,19 +162,36 @@ def _segments(columns: list[Array], rows: Index, integrand: _Integrand) -> _Segm
         w1 - w0 = asinh( (x1 - x0) (s0 + s1) / (s1 r0 + s0 r1) ),
 
     all sums being of one sign. Of a segment that holds the foot it is the sum of two positive terms.
+
+    Parameters
+    ----------
+    foot, height, x0, x1
+        As in `airlight_segments`, arrays of one shape [m].
+
+    Returns
+    -------
+    start, scale, width, height
+        w0, E at w0, w1 - w0, which may be infinite [1], and the height, above 0 [m].
     """
-    foot, height, x0, x1, sigma_t = columns
     s0, s1 = x0 - foot, x1 - foot
     beside = np.where(s0 > 0, s0, np.where(s1 < 0, -s1, 0.0))
     height = np.maximum(height, _NEAR_ZERO * beside)
     start = np.arcsinh(s0 / height)
-    folds = _folds(integrand)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         r0, r1 = np.hypot(height, s0), np.hypot(height, s1)
         apart = np.arcsinh((x1 - x0) * (s0 + s1) / (s1 * r0 + s0 * r1))
         width = np.where(s0 * s1 > 0, apart, np.arcsinh(s1 / height) - start)
         width = np.where(np.isinf(x1), np.inf, width)
         scale = np.where(s0 > 0, (s0 + r0) / height, height / (r0 - s0))
+    return start, scale, width, height
+
+
+def _segments(columns: list[Array], rows: Index, integrand: _Integrand) -> _Segments:
+    """Change variables to w, and cut off what the exponential or 1/cosh w makes negligible."""
+    foot, height, x0, x1, sigma_t = columns
+    start, scale, width, height = log_distance(foot, height, x0, x1)
+    folds = _folds(integrand)
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         thickness = 0.5 * (1 + integrand.shadow_scale) * sigma_t * height * scale
         width = np.minimum(width, np.log1p(folds / thickness))
     # 1/cosh w falls by an e-fold for each unit of w behind the foot.
@@ -190,38 +211,61 @@ def _folds(integrand: _Integrand) -> float:
 
 
 @dataclass(frozen=True)
-class _Panels:
+class Panels:
     """Panels and what the two rules gave for them, arrays of shape (m,)."""
 
-    owner: Index  # row of the segment in its chunk
-    start: Array  # distance in w from the start of the segment
+    owner: Index  #: row of the segment in its chunk
+    start: Array  #: distance in w from the start of the segment
     width: Array
     value: Array
     error: Array
-    noise: Array  # rounding error of the value
+    noise: Array  #: rounding error of the value
 
 
-def _adapt(segments: _Segments, integrand: _Integrand, rtol: float) -> tuple[Array, Array]:
-    """Halve the panels of all segments that miss the tolerance until none does, or only rounding is left."""
-    n = len(segments.foot)
-    panels = _evaluate(segments, integrand, *_first_panels(segments, integrand.phase.kinks))
+def adapted(
+    first: tuple[Index, Array, Array],
+    evaluate: Callable[[Index, Array, Array], Panels],
+    row: Index,
+    count: int,
+    rtol: float,
+) -> tuple[Array, Array]:
+    """Halve the panels of all sums that miss the tolerance until none does, or only rounding is left.
+
+    Parameters
+    ----------
+    first
+        Segment, start and width of the first panels.
+    evaluate
+        Integrates such panels.
+    row
+        To which of `count` sums each segment belongs.
+    count
+        Number of sums.
+    rtol
+        Relative tolerance of each [1].
+
+    Returns
+    -------
+    value, error
+        The sums and estimates of their errors, (count,).
+    """
+    panels = evaluate(*first)
     for _ in range(_HALVINGS):
-        value = _summed(panels.owner, panels.value, n)
-        error = _summed(panels.owner, panels.error, n)
-        allowed = rtol * np.abs(value)
-        missed = error > allowed
+        owner = row[panels.owner]
+        allowed = rtol * np.abs(_summed(owner, panels.value, count))
+        missed = _summed(owner, panels.error, count) > allowed
         if not missed.any():
             break
-        share = allowed / np.maximum(np.bincount(panels.owner, minlength=n), 1)
-        halve = missed[panels.owner] & (panels.error > share[panels.owner]) & (panels.error > panels.noise)
+        share = allowed / np.maximum(np.bincount(owner, minlength=count), 1)
+        halve = missed[owner] & (panels.error > share[owner]) & (panels.error > panels.noise)
         if not halve.any():
             break
         width = 0.5 * panels.width[halve]
         starts = np.concatenate([panels.start[halve], panels.start[halve] + width])
-        halves = _evaluate(segments, integrand, np.tile(panels.owner[halve], 2), starts, np.tile(width, 2))
+        halves = evaluate(np.tile(panels.owner[halve], 2), starts, np.tile(width, 2))
         panels = _joined(panels, ~halve, halves)
-    value = _summed(panels.owner, panels.value, n)
-    return value, _summed(panels.owner, panels.error + panels.noise, n)
+    owner = row[panels.owner]
+    return _summed(owner, panels.value, count), _summed(owner, panels.error + panels.noise, count)
 
 
 def _summed(owner: Index, values: Array, n: int) -> Array:
@@ -245,14 +289,14 @@ def _first_panels(segments: _Segments, kinks: Array) -> tuple[Index, Array, Arra
     return np.repeat(owner, count), np.repeat(start, count) + number * width, width
 
 
-def _evaluate(segments: _Segments, integrand: _Integrand, owner: Index, start: Array, width: Array) -> _Panels:
+def _evaluate(segments: _Segments, integrand: _Integrand, owner: Index, start: Array, width: Array) -> Panels:
     """Integrate panels by both rules, a block at a time so that the arrays stay in the cache."""
     both = np.empty((len(owner), 2))
     noise = np.empty(len(owner))
     for pair, block in blocks_by_rule(width, _CHUNK):
         panels = owner[block], start[block], width[block]
         both[block], noise[block] = _evaluate_block(segments, integrand, pair, *panels)
-    return _Panels(owner, start, width, both[:, 0], np.abs(both[:, 0] - both[:, 1]), noise * np.abs(both[:, 0]))
+    return Panels(owner, start, width, both[:, 0], np.abs(both[:, 0] - both[:, 1]), noise * np.abs(both[:, 0]))
 
 
 def blocks_by_rule(width: Array, most: int) -> Iterator[tuple[Pair, Index]]:
@@ -302,10 +346,10 @@ def _evaluate_block(
     return (f @ pair.weights) * scale[:, None], np.finfo(float).eps * size
 
 
-def _joined(panels: _Panels, keep: NDArray[np.bool_], more: _Panels) -> _Panels:
+def _joined(panels: Panels, keep: NDArray[np.bool_], more: Panels) -> Panels:
     """Return the panels that are kept followed by more."""
     fields = ("owner", "start", "width", "value", "error", "noise")
-    return _Panels(*(np.concatenate([getattr(panels, f)[keep], getattr(more, f)]) for f in fields))
+    return Panels(*(np.concatenate([getattr(panels, f)[keep], getattr(more, f)]) for f in fields))
 
 
 def _checked(foot: ArrayLike, height: ArrayLike, x0: ArrayLike, x1: ArrayLike, sigma_t: ArrayLike) -> tuple[Array, ...]:

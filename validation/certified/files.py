@@ -14,6 +14,7 @@ FILES = {
     "airlight_integral.csv": "the airlight integral to 20 digits, by foot and height of the light over the ray",
     "airlight_integral_rays.csv": "the airlight integral to 20 digits, by ray and light",
     "airlight_integral_droplets.csv": "the airlight integral in fog of droplets to 18 digits",
+    "height_fog_rays.csv": "airlight in exponential height fog to 20 digits, of point lights and suns",
     "airlight_slopes.csv": "derivatives of the airlight integral to 17 digits",
 }
 

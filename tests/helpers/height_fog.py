@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The certified rays of height fog, and fog and rays drawn at random for the laws."""
+
+import csv
+from dataclasses import dataclass
+
+import numpy as np
+
+from analytic.geometry import foot_and_height
+from analytic.height_fog import HeightFog, HeightRays, Layer, height_fog_segments, height_fog_sun
+from analytic.phase import PhaseFunction
+from validation.certified.files import certified_data
+
+
+@dataclass(frozen=True)
+class Row:
+    """A ray of the file."""
+
+    tag: str
+    sun: bool
+    fog: HeightFog
+    phase: PhaseFunction
+    origin: np.ndarray
+    direction: np.ndarray
+    light: np.ndarray  #: [m], or the unit direction towards the sun
+    x0: float
+    x1: float
+    value: float
+
+    def airlight(self, **how) -> float:
+        """K by the module under test."""
+        return airlight(
+            self.fog, self.phase, self.origin, self.direction, self.light, self.x0, self.x1, self.sun, **how
+        )
+
+
+def rows() -> list[Row]:
+    with certified_data("height_fog_rays.csv").open(newline="") as file:
+        return [_row(cells) for cells in csv.DictReader(file)]
+
+
+def _row(cells) -> Row:
+    number = {name: float(cell) for name, cell in cells.items() if name not in ("tag", "light", "value")}
+    origin, direction, light = (np.array([number[point + axis] for axis in "xyz"]) for point in "odl")
+    sun = cells["light"] == "sun"
+    layers = tuple(Layer(*(number[f"{name}_{i}"] for name in ("sigma", "z", "H"))) for i in (1, 2))
+    return Row(
+        cells["tag"],
+        sun,
+        HeightFog(layers, number["sigma_0"], bool(number["clamped"])),
+        PhaseFunction("hg", g=number["g"]),
+        origin,
+        direction / np.linalg.norm(direction),
+        light / np.linalg.norm(light) if sun else light,
+        number["x0"],
+        number["x1"],
+        float(cells["value"]),
+    )
+
+
+def airlight(fog, phase, origin, direction, light, x0, x1, sun=False, **how) -> float:
+    if sun:
+        ends = {"sun": float(light[2]), "phase": phase(light @ direction)}
+        return float(height_fog_sun(fog, origin[2], direction[2], x0, x1, **ends))
+    foot, height = foot_and_height(origin, direction, light)
+    rays = HeightRays(origin[2], direction[2], foot, height, light[2])
+    return float(height_fog_segments(fog, rays, x0, x1, phase, **how)[0][0])
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """One ray in fog, drawn at random."""
+
+    fog: HeightFog
+    phase: PhaseFunction
+    origin: np.ndarray
+    direction: np.ndarray
+    light: np.ndarray
+    x0: float
+    x1: float
+    sun: bool
+
+    def airlight(self, **how) -> float:
+        return airlight(
+            self.fog, self.phase, self.origin, self.direction, self.light, self.x0, self.x1, self.sun, **how
+        )
+
+
+def drawn(seed: int, count: int = 40) -> list[Drawn]:
+    """Return rays with lights and suns, in one or two layers, every other clamped; under suns without a constant."""
+    random, found = np.random.default_rng(seed), []
+    for number in range(count):
+        sun = number % 2 == 1
+        unit = random.normal(size=(2, 3))
+        unit /= np.linalg.norm(unit, axis=1)[:, None]
+        layers = tuple(
+            Layer(*(float(v) for v in (random.uniform(0.01, 0.3), random.uniform(-3, 3), random.uniform(0.7, 20))))
+            for _ in range(1 + number // 2 % 2)
+        )
+        fog = HeightFog(layers, 0.0 if sun else float(random.uniform(0, 0.05)), bool(number // 4 % 2))
+        light = random.normal(size=3) * 5
+        if sun:
+            light = unit[1] * [1, 1, 0] + [0, 0, random.uniform(0.05, 2)]
+            light /= np.linalg.norm(light)
+        x0 = float(random.uniform(0, 3))
+        ends = x0, x0 + float(random.uniform(1, 12))
+        phase = PhaseFunction("hg", g=float(random.uniform(-0.8, 0.8)))
+        found.append(Drawn(fog, phase, random.normal(size=3) * 3, unit[0], light, *ends, sun))
+    return found
