@@ -34,7 +34,7 @@ def refresh(report: Path | None, kernels: Path | None) -> None:
     if report is not None:
         kept |= kept_of_report(read_report(report))
     if kernels is not None:
-        costs = _read_object(kernels, "what `airlight study kernels --json` prints")
+        costs = _read_object(kernels, "what `airlight study kernels -o FILE.json` writes")
         kept["kernels"] = kept_of_kernels(costs, kernels)
     write_text(DATA, json.dumps(kept, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     before, rest = README.read_text(encoding="utf-8").split("<!-- results: begin -->\n")
@@ -131,13 +131,13 @@ def kept_of_kernels(costs: dict[str, Any], path: Path) -> dict[str, Any]:
             "costs": [{name: row[name] for name in _COST} for row in rows],
         }
     except (KeyError, TypeError) as error:
-        raise InputError(f"{path}: wanted what `airlight study kernels --json` prints, {error} is missing") from error
+        raise InputError(f"{path}: {error} is missing of what `airlight study kernels -o FILE.json` writes") from error
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--report", type=Path, help="a folder that `airlight report` wrote")
-    parser.add_argument("--kernels", type=Path, help="what `airlight study kernels --json` printed")
+    parser.add_argument("--kernels", type=Path, help="what `airlight study kernels -o FILE.json` wrote")
     chosen = parser.parse_args()
     activate()  # counting shapes and triangles loads the scenes
     refresh(chosen.report, chosen.kernels)

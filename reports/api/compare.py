@@ -3,7 +3,7 @@
 
 import dataclasses
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -15,7 +15,6 @@ from reports.api.inputs import (
     Mask,
     Progress,
     SceneLike,
-    Values,
     Words,
     listed,
     one_error,
@@ -43,11 +42,8 @@ def compare(
     margin: float | None = None,
     by_order: bool = False,
     all_metrics: bool = False,
-    flip: bool = False,
-    exposure: float | None = None,
     diagnose: bool = False,
     fit: Words | None = None,
-    start: Values = (),
     output: Files = (),
     progress: Progress = None,
 ) -> "ImageComparison | SceneComparison | Diagnosed | Fitted":
@@ -83,18 +79,13 @@ def compare(
     by_order
         Of two images: compare the layers by order of scattering too, such as airlight_3_4.
     all_metrics
-        Also the errors by the formulas of other tools and the colour differences.
-    flip
-        Also HDR-FLIP, by the package flip-evaluator.
-    exposure
-        Of the colour differences and HDR-FLIP [stops]; from the reference by default.
+        Also the errors by the formulas of other tools, the colour differences, and HDR-FLIP by flip-evaluator.
     diagnose
         With a scene: say what is wrong with the image, in place of how far it is.
     fit
         With a scene: which parameters to fit, such as sigma_t,albedo (each also with .r, .g or .b), phase.g, intensity,
-        exposure, light.x, light.y, light.z; of one medium or light NAME as sigma_t:NAME.
-    start
-        With `fit`: NAME=VALUE to begin with; may be given several times, the scene's own by default.
+        exposure, light.x, light.y, light.z; of one medium or light NAME as sigma_t:NAME. As sigma_t=0.1 it begins
+        with that value, else with the scene's.
     output
         Write the difference: a .png file shows the signed relative error of each pixel in false colours, an .exr file
         has the values.
@@ -116,7 +107,7 @@ def compare(
     True
     >>> compared.passed, compared.error.shape
     (True, (24, 32, 3))
-    >>> fitted = airlight.compare("open-fog", exact, fit="sigma_t,intensity", start={"sigma_t": 1.0})
+    >>> fitted = airlight.compare("open-fog", exact, fit="sigma_t=1,intensity")
     >>> abs(fitted["sigma_t"]["value"] / 0.173 - 1) < 1e-4
     True
     """
@@ -128,8 +119,8 @@ def compare(
     for name, value in own.items():
         if value is not None and scene is None:
             raise InputError(f"{name}: goes with a scene in the place of the reference; two images are what they are")
-    about = {"output": files or None, "margin": margin, "exposure": exposure, "by_order": by_order or None}
-    about |= {"flip": flip or None, "all_metrics": all_metrics or None}
+    about = {"output": files or None, "margin": margin, "by_order": by_order or None}
+    about |= {"all_metrics": all_metrics or None}
     given = [name for name, value in about.items() if value is not None]
     if diagnose and fit is not None:
         raise InputError("diagnose, fit: are two questions; give one of them")
@@ -138,8 +129,6 @@ def compare(
         raise InputError(f"{asked}: {', '.join(given)} is about a comparison; leave one out")
     if diagnose and mask is not None:
         raise InputError("diagnose: looks at all pixels; leave out the mask")
-    if start and fit is None:
-        raise InputError("start: is where a fit begins; add fit, such as --fit sigma_t,albedo")
     if scene is not None and by_order:
         raise InputError(
             "by_order: compares two images; make the reference by airlight reference SCENE --estimator cloud-paths"
@@ -147,13 +136,12 @@ def compare(
     for path in files:
         _check_difference(path)
     if fit is not None:
-        return _fit(scene, test, fit, layer=layer, holds=holds, pixel=pixel, mask=mask, start=start, progress=progress)
+        return _fit(scene, test, fit, layer=layer, holds=holds, pixel=pixel, mask=mask, progress=progress)
     options: dict[str, Any] = {
         "mask": mask,
         "margin": margin,
         "all_metrics": all_metrics,
-        "flip": flip,
-        "exposure": exposure,
+        "flip": all_metrics,
     }
     if scene is None:
         return _two_images(reference, test, layer, by_order=by_order, files=files, **options)
@@ -308,11 +296,13 @@ def _diagnose(scene: str, path: Path, *, progress: Any, **how: Any) -> "Diagnose
 
 
 def _fit(
-    scene: Any, image: Any, parameters: Any, *, layer: str | None, mask: Any, start: Any, progress: Any, **how: Any
+    scene: Any, image: Any, parameters: Any, *, layer: str | None, mask: Any, progress: Any, **how: Any
 ) -> "Fitted":
-    names = listed("fit", parameters)
-    words = [f"{name}={value}" for name, value in start.items()] if isinstance(start, Mapping) else several(start)
-    starts = named_values("start", words, float, "NAME=VALUE, such as sigma_t=0.1")
+    words = listed("fit", parameters)
+    names = [word.partition("=")[0].strip() for word in words]
+    starts = named_values(
+        "fit", [word for word in words if "=" in word], float, "NAME or NAME=VALUE, such as sigma_t=0.1"
+    )
     layers, name = as_image(image, layer, "the image")  # before Mitsuba starts
     from reports.machine.environment import activate
 

@@ -148,7 +148,6 @@ def view(
     size: Size = "640x480",
     host: str = "127.0.0.1",
     port: int = 0,
-    open_: bool = False,
     **parameters: Any,
 ) -> None:
     """Show a scene live in the browser.
@@ -176,8 +175,6 @@ def view(
         The address to listen at.
     port
         The port to listen at; 0 is any free one.
-    open_
-        Open the page in the browser, too.
     parameters
         Parameters of the method.
     """
@@ -207,10 +204,6 @@ def view(
             ) from error
         server.start()
         print(f"{server.address}\nCtrl-C ends the view.", flush=True)
-        if open_:
-            import webbrowser
-
-            webbrowser.open(server.address)
         session.run()
     finally:
         session.truth.end()

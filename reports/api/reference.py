@@ -47,7 +47,6 @@ def reference(
     orders: str | None = None,
     merge: Files = (),
     cluster: str | None = None,
-    force: bool = False,
     progress: Progress = None,
 ) -> "Reference":
     """Compute the reference of a scene, with its error.
@@ -89,8 +88,6 @@ def reference(
         Let workers compute: local[:N] processes, tcp://HOST:PORT or tls://HOST:PORT of a Dask scheduler, or its
         scheduler file. A tcp scheduler authenticates nobody and its workers run what they are sent: use it only on a
         network that you trust; tls takes the certificates of Dask's configuration.
-    force
-        Start also what will take more than an hour, or more memory than there is.
     progress
         Called with (fraction done, what); True shows a bar.
 
@@ -151,7 +148,7 @@ def reference(
 
     loaded = opened(scene, pixels_of(size), changes)
     note(progress, scene_notes(loaded.scene))
-    _check_work(loaded, estimator, pixel, budget, clouds=wanted is not None, force=force)
+    _check_work(loaded, estimator, pixel, budget, clouds=wanted is not None)
 
     def compute(tell: Callable[[float, str], None], workers: "Cluster | None" = None) -> "Reference":
         elsewhere = None
@@ -170,7 +167,7 @@ def reference(
             return compute(tell, workers)
 
 
-def _check_work(loaded: Any, estimator: str, pixel: str, budget: "Budget | None", *, clouds: bool, force: bool) -> None:
+def _check_work(loaded: Any, estimator: str, pixel: str, budget: "Budget | None", *, clouds: bool) -> None:
     from validation.study.cost import check_work, sampled_work, truth_work
 
     size = loaded.size if loaded.scene.sensors() else (1, 1)
@@ -179,7 +176,7 @@ def _check_work(loaded: Any, estimator: str, pixel: str, budget: "Budget | None"
         work = truth_work(size, lights=len(loaded.scene.emitters()), images=area)
     else:
         work = sampled_work(size, budget.samples or 64, clouds=clouds)
-    check_work(f"reference {loaded.name}, {size[0]} x {size[1]}, {estimator}", [work], force=force)
+    check_work(f"reference {loaded.name}, {size[0]} x {size[1]}, {estimator}", [work])
 
 
 def _elsewhere(

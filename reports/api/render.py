@@ -27,7 +27,6 @@ from reports.api.inputs import (
     several,
     telling,
 )
-from reports.machine.own_process import LIMIT
 
 if TYPE_CHECKING:
     from reports.api.results import Animation, Plan, Rendering
@@ -86,8 +85,6 @@ def render(
     output: Files = (),
     plan: bool = False,
     timed: bool = False,
-    method_limit: float = LIMIT,
-    force: bool = False,
     progress: Progress = None,
     **parameters: Any,
 ) -> "Rendering | Animation | Plan":
@@ -123,10 +120,6 @@ def render(
         Return what the scene needs of the method, and render nothing.
     timed
         Also measure what a frame costs, which takes some seconds.
-    method_limit
-        A user method that is named is stopped after so long [s].
-    force
-        Start also what will take more than an hour, or more memory than there is.
     progress
         Called with (fraction done, what); True shows a bar.
     parameters
@@ -151,7 +144,7 @@ def render(
     from reports.machine.environment import activate
 
     activate()  # a user's module may need a variant when it is imported
-    named = checked_configuration(method, kernel, parameters, limit=method_limit)
+    named = checked_configuration(method, kernel, parameters)
     chosen, apart = named
     pixels, changes = pixels_of(size), changes_of(change)
     shown = progress if isinstance(progress, bool) else None
@@ -159,13 +152,13 @@ def render(
     if apart and isinstance(scene, str):
         from reports.machine.own_process import in_own_process
 
-        call, progress = partial(in_own_process, name=chosen.method, limit=method_limit), shown
+        call, progress = partial(in_own_process, name=chosen.method), shown
     if plan:
         return call(_plan, scene, pixels, changes, precision, chosen)
     how = (scene, pixels, changes, precision, chosen)
     if frames is not None:
-        return call(_animation, *how, files, frames, animate, force, progress)
-    rendered: Rendering = call(_frame, *how, samples, timed, force, progress)
+        return call(_animation, *how, files, frames, animate, progress)
+    rendered: Rendering = call(_frame, *how, samples, timed, progress)
     for path in files:
         rendered.save(path)
     return replace(rendered, files=tuple(map(str, files)))
@@ -202,17 +195,17 @@ def _check(
         ensure_writable(path if frames is None else _numbered(path, 1, frames))
 
 
-def checked_configuration(
-    method: Any, kernel: Any = None, parameters: Any = None, *, limit: float = LIMIT
-) -> "tuple[Configuration, bool]":
+def checked_configuration(method: Any, kernel: Any = None, parameters: Any = None) -> "tuple[Configuration, bool]":
     """Return a configuration, checked, and whether its code is a user's that is named.
 
     Such code is imported in a process of its own, never here.
     """
     from validation.study.configuration import Configuration, configuration
 
-    check_limit(limit)
     if isinstance(method, Configuration):
+        given = [name for name, value in (("kernel", kernel), ("parameters", parameters)) if value]
+        if given:
+            raise InputError(f"{' and '.join(given)}: a configuration has its own; leave that out")
         return method, method.own
     name = kernel_name(kernel)
     apart = (isinstance(method, str) and ":" in method) or (isinstance(kernel, str) and ":" in kernel)
@@ -220,13 +213,7 @@ def checked_configuration(
         return configuration(method, name, parameters or {}), False
     from reports.machine.own_process import in_own_process
 
-    return in_own_process(configuration, method, name, parameters or {}, name=method, limit=limit), True
-
-
-def check_limit(limit: float) -> None:
-    """Refuse a limit that nothing can keep."""
-    if not 0 < limit < float("inf"):
-        raise InputError(f"method_limit: got {limit:g}, wanted a time above 0, such as 300 [s]")
+    return in_own_process(configuration, method, name, parameters or {}, name=method), True
 
 
 def _ready(
@@ -237,7 +224,6 @@ def _ready(
     chosen: "Configuration",
     frames: int,
     layers: bool,
-    force: bool,
     progress: Progress,
 ) -> tuple[Any, Any, Any, bool]:
     """Return a scene, loaded and read, what renders it, and whether with the further layers of the method."""
@@ -248,7 +234,7 @@ def _ready(
 
     loaded = opened(scene, pixels, changes)
     read = read_scene(loaded.scene, precision)
-    _check_work(loaded.name, read, chosen, frames, force=force)
+    _check_work(loaded.name, read, chosen, frames)
     note(progress, read.features.notes)
     layered = layers and bool(find_method(chosen.method).layers)
     return loaded, read, prepared(read, chosen, extra_layers=layered), layered
@@ -262,7 +248,6 @@ def _frame(
     chosen: "Configuration",
     samples: int,
     timed: bool,
-    force: bool,
     progress: Progress,
 ) -> "Rendering":
     """Render a frame, and time it where that is asked for."""
@@ -280,7 +265,7 @@ def _frame(
     variant = activate()
     count = samples + (TIMED if timed else 0)
     given = scene, pixels, changes, precision, chosen, count
-    loaded, read, renderer, layered = _ready(*given, layers=samples == 1, force=force, progress=progress)
+    loaded, read, renderer, layered = _ready(*given, layers=samples == 1, progress=progress)
     warnings = _warnings(renderer)
     with telling(progress, f"{loaded.name}: {samples} rays a pixel") as tell:
         frame = render_samples(renderer, samples, lambda done: tell(done, "the picture"))
@@ -314,7 +299,6 @@ def _animation(
     files: list[Path],
     frames: int,
     moves: str | None,
-    force: bool,
     progress: Progress,
 ) -> "Animation":
     """Render the frames of an animation and write each as soon as it is done."""
@@ -333,7 +317,7 @@ def _animation(
     given = scene, pixels, changes, precision, chosen, frames
     asked = None if moves is None else parse_moves(moves)
     layers = any(path.suffix.lower() == ".exr" for path in files)
-    loaded, read, renderer, _ = _ready(*given, layers=layers, force=force, progress=progress)
+    loaded, read, renderer, _ = _ready(*given, layers=layers, progress=progress)
     animation = loaded.animation if asked is None else replace(loaded.animation, moves=asked)
     _warnings(renderer)
     costs: list[tuple[float, float]] = []
@@ -419,7 +403,7 @@ def _warn(warnings: Any) -> None:
         print(f"airlight: warning: {warning}", file=sys.stderr)
 
 
-def _check_work(name: str, scene: Any, chosen: "Configuration", frames: int, *, force: bool) -> None:
+def _check_work(name: str, scene: Any, chosen: "Configuration", frames: int) -> None:
     from validation.study.configuration import rendered_lights
     from validation.study.cost import check_work, frame_work, steps_of
 
@@ -427,11 +411,11 @@ def _check_work(name: str, scene: Any, chosen: "Configuration", frames: int, *, 
     marches = chosen.method == "ray-march" or "steps" in dict(chosen.parameters)
     steps = steps_of(chosen.parameters) if marches else 0
     work = frame_work(size, lights=rendered_lights(scene, chosen), steps=steps, frames=frames)
-    check_work(f"render {name}, {size[0]} x {size[1]}, {chosen.label}", [work], force=force)
+    check_work(f"render {name}, {size[0]} x {size[1]}, {chosen.label}", [work])
 
 
 def asked_configurations(
-    methods: Any, kernels: Any, settings: Any, *, usual: Any = None, limit: float = LIMIT
+    methods: Any, kernels: Any, settings: Any, *, usual: Any = None
 ) -> "tuple[list[Configuration], bool]":
     """Return what to measure, and whether all user code among it is named, so that it can run in other processes.
 
@@ -446,8 +430,6 @@ def asked_configurations(
         Parameters of every method, by name or as NAME=VALUE.
     usual
         Of 'all'; the standard configurations of every built-in method by default.
-    limit
-        Of user methods that are named [s].
 
     Raises
     ------
@@ -459,7 +441,6 @@ def asked_configurations(
     from realtime.methods.registry import FOG_METHODS
     from validation.study.configuration import Configuration, chosen_configurations, configuration, parse_settings
 
-    check_limit(limit)
     given = dict(settings) if isinstance(settings, Mapping) else parse_settings(several(settings))
     named_kernels = several(kernels)
     option = "set" if given else "kernel" if named_kernels else ""
@@ -476,7 +457,7 @@ def asked_configurations(
             chosen += [configuration(method, kernel_name(kernel), given) for kernel in named_kernels or (None,)]
             apart = False
         elif option or ":" in method:
-            chosen += [checked_configuration(method, k, given, limit=limit)[0] for k in named_kernels or (None,)]
+            chosen += [checked_configuration(method, k, given)[0] for k in named_kernels or (None,)]
         else:
             chosen += chosen_configurations([method])
     return list(dict.fromkeys(chosen)), apart and not any(callable(kernel) for kernel in named_kernels)

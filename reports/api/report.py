@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight.report`, `airlight.diff` and `airlight.paper`: the error report, two of them compared, claims of papers."""
 
+import math
 import os
 import shlex
 import sys
@@ -12,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from analytic.errors import InputError, nearest
 from reports.api.inputs import File, Kernels, Methods, Progress, Scenes, Values, note, one_error, several, telling
-from reports.machine.own_process import LIMIT
 from reports.tables.drawing import html, sentence_in_text
 from reports.tables.record import Result, block, bullets
 from reports.tables.table import Table
@@ -119,9 +119,7 @@ def report(
     from_: File | None = None,
     figures: Literal["single", "double"] | None = None,
     fresh: bool = False,
-    method_limit: float = LIMIT,
     cluster: str | None = None,
-    force: bool = False,
     progress: Progress = None,
 ) -> Report:
     """Measure methods in scenes and write the report, one page.
@@ -158,14 +156,10 @@ def report(
         Also write figures and a LaTeX table for a paper, for a column of this width.
     fresh
         Measure again what is cached by earlier runs.
-    method_limit
-        A user method that is named is stopped after so long in a scene [s].
     cluster
         Let workers compute references and their checks: local[:N] processes, tcp://HOST:PORT or tls://HOST:PORT of a
         Dask scheduler, or its scheduler file. A tcp scheduler authenticates nobody and its workers run what they are
         sent: use it only on a network that you trust.
-    force
-        Start also what will take more than an hour, or more memory than there is.
     progress
         Called with (fraction done, what); True shows a bar.
 
@@ -190,7 +184,7 @@ def report(
             "images": images,
             "fresh": fresh,
         }
-        measures |= {"method_limit": method_limit != LIMIT, "cluster": cluster, "force": force}
+        measures |= {"cluster": cluster}
         if figures is None:
             measures |= {"a scene": scenes, "method": method}
         for name, value in measures.items():
@@ -204,9 +198,7 @@ def report(
     how: dict[str, Any] = {
         "images": images,
         "fresh": fresh,
-        "method_limit": method_limit,
         "cluster": cluster,
-        "force": force,
     }
     asked = (several(scenes), several(method), several(kernel), settings)
     data = _measured(target, effort, *asked, progress=progress, **how)
@@ -243,9 +235,7 @@ def _measured(
     *,
     images: Any,
     fresh: bool,
-    method_limit: float,
     cluster: str | None,
-    force: bool,
     progress: Any,
 ) -> dict[str, Any]:
     """Measure and write a report; unusable input is refused before the work begins."""
@@ -270,7 +260,7 @@ def _measured(
     if len(asked) == 1 and asked[0].endswith(".toml"):
         study, asked = read_study(Path(asked[0])), []
     names, shown = scenes_of_images(asked or None, images, tuple(study.scene_names()))
-    chosen, apart = asked_configurations(methods, kernels, settings, usual=study.configurations, limit=method_limit)
+    chosen, apart = asked_configurations(methods, kernels, settings, usual=study.configurations)
     if methods and all(isinstance(name, str) and ":" in name for name in methods):
         note(progress, ["what --method names is measured alone; --method all adds the built-in methods"])
     note(progress, notes_on(names))
@@ -279,7 +269,7 @@ def _measured(
     sizes = [images_size(tuple(several)) for several in shown.values()]
     works = [truth_work(size) for size in sizes]
     works += [frame_work(size, steps=100, frames=8 * len(chosen)) for size in sizes]
-    check_work("report --images", works, force=force)
+    check_work("report --images", works)
     gc.freeze()  # modules live as long as the process: what looks for garbage before each frame need not look there
     typed = shlex.join(["airlight", *sys.argv[1:]])
     command = typed if progress is True else f"airlight.report(output={str(target)!r}, ..)"
@@ -290,7 +280,7 @@ def _measured(
             images=shown,
             command=command,
             fresh=fresh,
-            method_limit=method_limit if apart else None,
+            apart=apart,
             progress=tell,
             cluster=None if place is None else stack.enter_context(connected(place)),
         )
@@ -345,7 +335,6 @@ def diff(
     *,
     error_tolerance: float = 0.02,
     time_tolerance: float = 0.25,
-    times: bool = True,
     common: bool = False,
 ) -> ReportDifference:
     """Compare two reports: what got slower or less accurate.
@@ -366,16 +355,14 @@ def diff(
     error_tolerance
         Relative change of an error that is noise; that of a maximum is twice as wide.
     time_tolerance
-        Relative change of a time that is noise, on a quiet machine.
-    times
-        Compare times too.
+        Relative change of a time that is noise, on a quiet machine; inf compares no times.
     common
         Compare what both reports hold; what is missing from the new one is no loss.
     """
     from reports.data.reader import read_report
     from reports.diff.compare import compare_reports
 
-    tolerance = time_tolerance if times else None
+    tolerance = None if time_tolerance == math.inf else time_tolerance
     reports = read_report(Path(old)), read_report(Path(new))
     return ReportDifference(
         compare_reports(*reports, error_tolerance=error_tolerance, time_tolerance=tolerance, common=common)
@@ -429,7 +416,6 @@ class PaperClaims(Result):
 def paper(
     name: str | None = None,
     *,
-    numbers: bool = False,
     figures: File | None = None,
     quick: bool = False,
     fresh: bool = False,
@@ -444,9 +430,8 @@ def paper(
     Parameters
     ----------
     name
-        biri, billeter, ali or bouthors; all by default.
-    numbers
-        Show the numbers without a verdict too: rates of graphics cards beside ours.
+        biri, billeter, ali or bouthors, with its numbers that have no verdict too, such as rates of graphics cards; the
+        verdicts of all by default.
     figures
         Also draw the pictures of the papers in our scenes, PDF and PNG with their data, into this folder.
     quick
@@ -480,4 +465,4 @@ def paper(
 
         with telling(progress, "figures") as tell:
             written = write_figures(Path(figures), name, rows, quick=quick, progress=tell)
-    return PaperClaims(tuple(rows), len(chosen) - len(rows), numbers, describe_environment(), written)
+    return PaperClaims(tuple(rows), len(chosen) - len(rows), name is not None, describe_environment(), written)

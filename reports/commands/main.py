@@ -2,7 +2,7 @@
 """The command line: each command is the public function of `airlight` of the same name.
 
 Cyclopts reads a function's signature and its docstring, so that the docstring is the help. What is added here is said
-of all commands alike: --json and --markdown print the result's data and tables, -o writes it to files. A command
+of all commands alike: --json prints the result's data, -o writes it to files. A command
 returns a result (`reports.tables.record`), which is printed and decides the exit status. To add a command, write a
 public function in `reports/api/`, name it in `airlight.py`, and add it to its panel in `_PANELS`.
 
@@ -42,6 +42,7 @@ from reports.machine.environment import (
 )
 from reports.studies.registry import STUDIES, find_study
 from reports.studies.registry import study as run_study
+from reports.studies.result import ENDINGS as STUDY_ENDINGS
 from reports.tables.record import Result
 from reports.tables.terminal import colours_wanted, print_json, terminal_width
 
@@ -64,6 +65,9 @@ cuda_ad_rgb or llvm_ad_rgb; the first that works by default.
 AIRLIGHT_CACHE_DIR is the folder of what is cached between runs, ~/.cache/airlight by default; \
 AIRLIGHT_CACHE_SIZE is how large it may become, 4GiB by default. See airlight doctor.
 
+AIRLIGHT_FORCE=1 starts also what will take more than an hour, or more memory than there is. \
+AIRLIGHT_METHOD_LIMIT is how long a user method may take for a scene, 300 [s] by default.
+
 NO_COLOR turns off colours and bold letters.
 
 Exit status: 0 done, 1 a check failed, 2 wrong usage or input, 3 something is missing on this machine.
@@ -73,7 +77,6 @@ _SET = Annotated[
     Parameter(name="--set", help="NAME=VALUE, a parameter of the method; may be given several times."),
 ]
 _JSON = Annotated[bool, Parameter(name="--json", help="Print JSON.")]
-_MARKDOWN = Annotated[bool, Parameter(name="--markdown", help="Print tables for a README, dated.")]
 _OUTPUT = Annotated[Files, Parameter(name=("--output", "-o"), help="A file to write; may be given several times.")]
 _SPELT = {"output": ("--output", "-o"), "settings": "--set"}  #: options that are not written as their parameter
 _ENDINGS = {reference: (".exr",)}  #: of what -o writes, where it is not a study
@@ -84,7 +87,7 @@ def _shown_default(value: Any) -> Any:
     return None if value in (None, False, (), "") else ", ".join(value) if isinstance(value, tuple) else str(value)
 
 
-def _command(function: Callable[..., Any], *, markdown: bool, endings: Sequence[str] = ()) -> Callable[..., int]:
+def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Callable[..., int]:
     """Return a function as a command: with options for its output, without what only Python can give."""
     own = inspect.signature(function).parameters
     scope = inspect.unwrap(function).__globals__
@@ -115,14 +118,14 @@ def _command(function: Callable[..., Any], *, markdown: bool, endings: Sequence[
         shown = each.replace(kind=kind, annotation=Annotated[annotation, Parameter(**how)], default=default)
         (named if kind is inspect.Parameter.KEYWORD_ONLY else positional).append(shown)
     extra: dict[str, Any] = {"output": _OUTPUT} if endings else {}
-    if function not in (view, run_tests):
-        extra |= {"json": _JSON, "markdown": _MARKDOWN} if markdown else {"json": _JSON}
+    if function not in (view, run_tests) and endings != STUDY_ENDINGS:
+        extra["json"] = _JSON
     for name, annotation in extra.items():
         default = () if name == "output" else False
         named.append(inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=annotation, default=default))
 
     def command(*arguments: Any, **options: Any) -> int:
-        printed = {name: options.pop(name, False) for name in ("json", "markdown") if name in extra}
+        json = options.pop("json", False)
         files = [Path(path) for path in options.pop("output", ())] if endings else []
         settings = options.pop("settings", ()) if "settings" not in own else ()
         if settings:
@@ -135,7 +138,7 @@ def _command(function: Callable[..., Any], *, markdown: bool, endings: Sequence[
         result = function(*arguments, **options)
         for path in files:
             result.save(path)
-        return result if isinstance(result, int) else _printed(result, files, **printed)
+        return result if isinstance(result, int) else _printed(result, files, json=json)
 
     command.__signature__ = inspect.Signature([*positional, *named])  # type: ignore[attr-defined]
     return command
@@ -165,19 +168,13 @@ def _check_files(files: Sequence[Path], endings: Sequence[str]) -> None:
         ensure_writable(path)
 
 
-def _printed(result: Result | None, files: Sequence[Path], *, json: bool = False, markdown: bool = False) -> int:
+def _printed(result: Result | None, files: Sequence[Path], *, json: bool) -> int:
     """Print a result, and return the exit status."""
     if result is None:
         return DONE
-    if json and markdown:
-        from analytic.errors import InputError
-
-        raise InputError("got both --json and --markdown; give one of them")
     if json:
         data = result.to_dict()
         print_json({**data, "output": str(files[-1])} if files and isinstance(data, dict) else data)
-    elif markdown:
-        _print_markdown(result)
     else:
         width = terminal_width()
         print(result.text(width=width, styled=width is not None and colours_wanted()), end="")
@@ -187,17 +184,6 @@ def _printed(result: Result | None, files: Sequence[Path], *, json: bool = False
     for fault in result.faults:
         print(f"airlight: error: {fault}", file=sys.stderr)
     return result.status
-
-
-def _print_markdown(result: Any) -> None:
-    import time
-
-    from reports.machine.environment import describe_environment, machine_in_words
-    from reports.tables.drawing import markdown
-
-    print(f"{time.strftime('%Y-%m-%d')}, {machine_in_words(describe_environment())}.")
-    for table in result.tables:
-        print(f"\n{markdown(table)}", end="")
 
 
 def make_app(words: Sequence[str] = ()) -> App:
@@ -223,18 +209,13 @@ def make_app(words: Sequence[str] = ()) -> App:
             if asked and function is run_study:
                 _add_studies(sub, words[1:])
             elif asked:
-                made = _command(
-                    function, markdown=function in (describe, paper, sweep), endings=_ENDINGS.get(function, ())
-                )
-                sub.default(made)
+                sub.default(_command(function, endings=_ENDINGS.get(function, ())))
             app.command(sub)
     return app
 
 
 def _add_studies(app: App, words: Sequence[str]) -> None:
     """Add the studies to `airlight study`."""
-    from reports.studies.result import ENDINGS
-
     group = Group("Studies", sort_key=0)
     how: dict[str, Any] = {"help_format": "plaintext", "version_flags": ()}
     how["default_parameter"] = app.default_parameter
@@ -243,7 +224,7 @@ def _add_studies(app: App, words: Sequence[str]) -> None:
         asked = name in words[:1]
         sub = App(name=name, help=_help(function, whole=asked), group=group, sort_key=number, **how)
         if asked:
-            sub.default(_command(function, markdown=True, endings=ENDINGS))
+            sub.default(_command(function, endings=STUDY_ENDINGS))
         app.command(sub)
 
 
@@ -284,6 +265,9 @@ def run(arguments: Sequence[str]) -> int:
         return _fail("the current folder was deleted: change into another folder, then run this again", WRONG_INPUT)
     try:
         words = _with_variant(list(arguments))
+        if words[:1] == ["test"] and "--" not in words:  # pytest has options of its own
+            ours = [word for word in words[1:] if word in ("--all", "--help", "-h")]
+            words = ["test", *ours, "--", *(word for word in words[1:] if word not in ours)]
         app = make_app(words)
         status = app(words or ["--help"], exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()

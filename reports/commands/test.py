@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 RECORD = "docs/data/full_run.json"  #: of the last run of all tiers, in the checkout
 
 
-def run_tests(*arguments: str, all_: bool = False, workers: int | None = None) -> int:
+def run_tests(*arguments: str, all_: bool = False) -> int:
     """Run the fast tests of the source checkout, or all tests.
 
     The fast tests compile kernels quickly, unless AIRLIGHT_COMPILATION=full asks for what everything else runs. Images
@@ -24,11 +24,10 @@ def run_tests(*arguments: str, all_: bool = False, workers: int | None = None) -
     Parameters
     ----------
     arguments
-        For pytest; paths are relative to the checkout.
+        For pytest, its options too; paths are relative to the checkout. Two processes share the tests if there are two
+        cores; -n 0 is this one.
     all_
         Also the slow and the statistical tests, injected faults and baselines.
-    workers
-        Processes that share the tests; 0 for this one; 2 by default if there are two cores.
     """
     from reports.machine import quick_compilation
     from reports.machine.environment import MissingError, prepare, threads
@@ -39,8 +38,7 @@ def run_tests(*arguments: str, all_: bool = False, workers: int | None = None) -
             f"there are no tests in {root}, they come with the source only: clone it and run `./airlight test` there"
         )
     variant = prepare().variant
-    shared = (2 if threads() > 1 else 0) if workers is None else workers
-    sharing = ["-n", str(shared), "--dist", "worksteal"] if shared else []
+    sharing = ["-n", "2", "--dist", "worksteal"] if threads() > 1 else []
     os.chdir(root)
     if not all_ and variant == "llvm_ad_rgb" and quick_compilation.VARIABLE not in os.environ:
         os.environ.update(quick_compilation.settings())  # of processes that have not begun

@@ -8,6 +8,7 @@ command's own. The process leads a group, so that all that the user's code start
 caller, however that ends.
 """
 
+import math
 import os
 import pickle
 import signal
@@ -25,7 +26,7 @@ from reports.machine import quick_compilation
 from reports.machine.environment import VARIANT_VARIABLE
 
 _POSIX = os.name == "posix"
-LIMIT = 300.0  #: seconds that a user's method may take for one scene, or one command
+_LIMIT, _LIMIT_VARIABLE = 300.0, "AIRLIGHT_METHOD_LIMIT"  # that a user's method may take for one scene or command [s]
 
 
 class EndedError(InputError):
@@ -36,7 +37,7 @@ def in_own_process(
     function: Callable[..., Any],
     *arguments: Any,
     name: str,
-    limit: float | None = LIMIT,
+    limit: float | None = None,
     what: str = "method",
     quick: bool = False,
 ) -> Any:
@@ -51,7 +52,7 @@ def in_own_process(
     name
         Of the user's method, or of the work, for messages.
     limit
-        After so long the process is ended [s]; None: never.
+        After so long the process is ended [s]: math.inf is never, None what the environment says of user methods.
     what
         Has this name, for messages.
     quick
@@ -66,6 +67,7 @@ def in_own_process(
     MissingError
         As the function.
     """
+    seconds = method_limit() if limit is None else limit
     # -P: modules of ours come before those of the user's folder.
     with subprocess.Popen(
         [sys.executable, "-P", "-m", "reports.machine.own_process", str(os.getpid())],
@@ -75,9 +77,11 @@ def in_own_process(
         start_new_session=_POSIX,
     ) as process:
         try:
-            answer, _ = process.communicate(pickle.dumps((sys.argv, function, arguments)), limit)
+            answer, _ = process.communicate(
+                pickle.dumps((sys.argv, function, arguments)), None if seconds == math.inf else seconds
+            )
         except subprocess.TimeoutExpired:
-            hint = f"did not end within {limit:g} s and was stopped; --method-limit allows more"
+            hint = f"did not end within {seconds:g} s and was stopped; {_LIMIT_VARIABLE}={2 * seconds:g} allows more"
             raise EndedError(f"{what} {name}: {hint}") from None
         finally:
             _end(process)
@@ -92,6 +96,15 @@ def in_own_process(
 
         add_spent(loaded)
     return value
+
+
+def method_limit() -> float:
+    """Return how long a user's method may take for one scene, or one command [s]."""
+    given = os.environ.get(_LIMIT_VARIABLE) or str(_LIMIT)
+    with suppress(ValueError):
+        if 0 < float(given) < math.inf:
+            return float(given)
+    raise InputError(f"{_LIMIT_VARIABLE}: got {given!r}, wanted a time above 0, such as 300 [s]")
 
 
 def _environment() -> dict[str, str]:

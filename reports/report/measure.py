@@ -10,7 +10,6 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +49,7 @@ def write_report(
     images: Mapping[str, Sequence[EngineImage]] | None = None,
     command: str = "airlight report",
     fresh: bool = False,
-    method_limit: float | None = None,
+    apart: bool = False,
     progress: Progress | None = None,
     cluster: Cluster | None = None,
 ) -> dict[str, Any]:
@@ -68,9 +67,9 @@ def write_report(
         The command line that the page names under "how to reproduce".
     fresh
         Compute everything again, references, batches and rays too.
-    method_limit
-        Methods of the user's own run in processes of their own, so long at most in each scene [s], and what is at fault
-        there stands in their rows (`own_faults`). None: they run in this process, and a fault ends the report.
+    apart
+        Whether user methods run in processes of their own, where a fault becomes a row (`own_faults`). In this process
+        it ends the report.
     progress
         Called with (share done, what) now and then.
     cluster
@@ -93,7 +92,7 @@ def write_report(
     sizes = {name: images_size(tuple(several)) for name, several in shown.items()}
     target = ensure_folder(folder)
     environment, start = describe_environment(), time.monotonic()
-    apart = None if method_limit is None else partial(in_own_process, limit=method_limit)
+    process = in_own_process if apart else None
     seconds = dict.fromkeys(("scenes", "stability", "scaling", "papers"), 0.0)
     with fresh_results(time.time() if fresh else None), staged(target) as hidden:
         with _timed(seconds, "scenes"):
@@ -106,20 +105,20 @@ def write_report(
         with _timed(seconds, "scenes"):
             if cluster is not None:
                 bring_truths(cluster, [_picture(each, each.size) for each in studies])
-            ended = _try_own(studies[0], apart) if studies else {}
+            ended = _try_own(studies[0], process) if studies else {}
             for each, parts, span in zip(studies, of_scenes, spans):
                 step = part_of(progress, *span, before=f"{each.name}: ")
                 begins = {part: first for part, (first, _) in shares(parts).items()}
                 result = study_scene(
                     each,
                     images=shown.get(scene_stem(each.path), ()),
-                    apart=apart,
+                    apart=process,
                     ended=ended,
                     progress=lambda part, step=step, begins=begins: step(begins[part], part),  # type: ignore[misc]
                     spread=None if cluster is None else spread(cluster, _picture(each, each.study.checks.size)),
                     workers=threads(),
                 )
-                _raise_own_faults(result.rows, apart)
+                _raise_own_faults(result.rows, process)
                 results += result.results
                 studied.append(write_scene(result, hidden))
         by_kind: dict[str, list[Result]] = {}

@@ -2,6 +2,7 @@
 """The parts of a report that belong to no scene of it: the stability of kernels, how times grow, claims of papers."""
 
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -77,7 +78,7 @@ def _stability(rays: int, progress: Progress) -> Computed:
     from realtime.kernels.registry import KERNELS
     from validation.kernels.stability import stability
 
-    known = in_own_process(known_kernels, rays, what="study", name="of the kernels", limit=None, quick=True)
+    known = in_own_process(known_kernels, rays, what="study", name="of the kernels", limit=math.inf, quick=True)
     added = [name for name in KERNELS if name not in {kernel["kernel"] for kernel in known}]
     return {"kernels": known + (plain(stability(added, count=rays, progress=counted(progress))) if added else [])}, {}
 

@@ -61,8 +61,6 @@ def slab(
     depths: Depths | None = None,
     directions: Directions = "",
     photons: int = 0,
-    seed: int = 0,
-    force: bool = False,
     progress: Progress = None,
 ) -> SlabStudy:
     """Compute the light of a slab in sunlight by order of scattering.
@@ -90,10 +88,6 @@ def slab(
         Of the radiance, as MU:PHI with commas: mu positive upwards, phi [degrees] 0 forward.
     photons
         How many photons check the numbers.
-    seed
-        Of the photons.
-    force
-        Start also what will take more than an hour.
     progress
         Called with (fraction done, what); True shows a bar.
 
@@ -106,20 +100,21 @@ def slab(
     """
     from validation.slab.light import expected_seconds, slab_numbers
     from validation.slab.request import slab_request
+    from validation.study.cost import forced
 
     if photons != int(photons) or photons == 1 or photons < 0:
         raise InputError(f"photons: got {photons}, wanted a whole number from 2 on, for example 1000000")
-    if seed < 0:
-        raise InputError(f"seed: got {seed}, wanted a whole number from 0 on")
     chosen = orders if isinstance(orders, str) else several(orders)
     request = slab_request(
         tau, sun, phase=os.fspath(phase), albedo=albedo, orders=chosen, depths=depths, directions=directions
     )
     hours = expected_seconds(request, int(photons)) / 3600
-    if hours > 1 and not force:
-        raise InputError(f"photons: {photons} photons would take about {hours:.1f} hours; give fewer, or --force")
+    if hours > 1 and not forced():
+        raise InputError(
+            f"photons: {photons} photons would take about {hours:.1f} hours; give fewer, or set AIRLIGHT_FORCE=1"
+        )
     with telling(progress, "slab") as tell:
-        record = json.loads(json.dumps(slab_numbers(request, photons=int(photons), seed=seed, progress=tell)))
+        record = json.loads(json.dumps(slab_numbers(request, photons=int(photons), progress=tell)))
     total = record["total"]
     worst = max(_relative_errors(record, record["error"]), default=0.0)
     said = (

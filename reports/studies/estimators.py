@@ -11,9 +11,7 @@ from reports.tables.table import numbers, table, words
 
 
 @one_error
-def estimators(
-    scenes: Scenes = (), *, size: Size = (160, 120), force: bool = False, progress: Progress = None
-) -> Study:
+def estimators(scenes: Scenes = (), *, size: Size = (160, 120), progress: Progress = None) -> Study:
     """Time single-scatter and volpath at equal error.
 
     Parameters
@@ -22,8 +20,6 @@ def estimators(
         Built-in scenes, random:SEED and Mitsuba XML files; a thin fog and all built-in scenes for fog by default.
     size
         Width and height [pixels], or WxH.
-    force
-        Start also what will take more than an hour, or more memory than there is.
     progress
         Called with (fraction done, what); True shows a bar.
     """
@@ -42,7 +38,7 @@ def estimators(
     loaded = {str(name): opened(name, pixels).scene for name in several(scenes) or FOG_SCENES}
     if not several(scenes):
         loaded = {"open-fog, optical depth 0.2": thin_fog(pixels)} | loaded
-    check_work("estimators", [sampled_work(pixels, 1024) for _ in loaded], force=force)
+    check_work("estimators", [sampled_work(pixels, 1024) for _ in loaded])
     found = {}
     with telling(progress, "estimators") as tell:
         for at, (name, scene) in enumerate(loaded.items()):
@@ -57,11 +53,12 @@ def estimators(
 
 
 _SAMPLES = 16  # samples a pixel in each batch
+_SIZE, _BATCHES = (64, 48), 64
 _CONVERGING = ("single-scatter", "volpath")
 
 
 @one_error
-def convergence(scene: SceneLike = "open-fog", *, quick: bool = False, progress: Progress = None) -> Study:
+def convergence(scene: SceneLike = "open-fog", *, progress: Progress = None) -> Study:
     """Measure how the Monte Carlo estimators converge.
 
     The RMSE over all compared pixels of the mean of the first batches, against the quadrature, over the samples a
@@ -72,8 +69,6 @@ def convergence(scene: SceneLike = "open-fog", *, quick: bool = False, progress:
     ----------
     scene
         A built-in scene, random:SEED or a Mitsuba XML file.
-    quick
-        A smaller image and fewer samples.
     progress
         Called with (fraction done, what); True shows a bar.
     """
@@ -88,14 +83,13 @@ def convergence(scene: SceneLike = "open-fog", *, quick: bool = False, progress:
     from validation.estimates.monte_carlo import monte_carlo_batches
     from validation.study.maps import fitted_slope
 
-    image, batches = ((32, 24), 16) if quick else ((64, 48), 64)
-    loaded = opened(scene, image).scene
+    loaded = opened(scene, _SIZE).scene
     rows: list[dict[str, Any]] = []
     with telling(progress, "convergence") as tell:
         for at, estimator in enumerate(_CONVERGING):
             part = counted(part_of(tell, 0.5 * at, 0.5 + 0.5 * at))
             expected, mask = estimator_truth(loaded, estimator)
-            counts, errors = [2**k for k in range(1, batches.bit_length())], []
+            counts, errors = [2**k for k in range(1, _BATCHES.bit_length())], []
             for count in counts:  # every number of batches begins with those before
                 how: dict[str, Any] = {"batches": count, "samples": _SAMPLES, "progress": part}
                 mean = layer_mean(monte_carlo_batches(loaded, estimator, **how).batches, "airlight", mask)[mask]
@@ -107,8 +101,8 @@ def convergence(scene: SceneLike = "open-fog", *, quick: bool = False, progress:
                 for count, error in zip(samples, errors)
             ]
     columns = (*words("estimator"), *numbers("samples", relative_rmse="rel. RMSE", order="order"))
-    drawn = table(f"{scene}, {image[0]} x {image[1]}: convergence, wanted order 0.5", columns, rows)
-    data = with_environment(scene=str(scene), size=list(image), rows=rows)
+    drawn = table(f"{scene}, {_SIZE[0]} x {_SIZE[1]}: convergence, wanted order 0.5", columns, rows)
+    data = with_environment(scene=str(scene), size=list(_SIZE), rows=rows)
     return Study(name="convergence", data=data, drawn=(drawn,), rows=tuple(rows), draw=partial(_draw_convergence, rows))
 
 
@@ -137,12 +131,12 @@ def _draw_convergence(rows: list[dict[str, Any]], column: str) -> Any:
 
 #: Samples a pixel in each batch; volpath needs more of them until its batch means are nearly normal.
 _STANDARDISED = {"single-scatter": 64, "volpath": 256}
-_BATCHES = 64
+_Z_SIZE = (80, 60)
 _EDGE, _BINS = 5.0, 50  # of the histogram; values beyond are counted in the outermost bins
 
 
 @one_error
-def z_distribution(scene: SceneLike = "open-fog", *, quick: bool = False, progress: Progress = None) -> Study:
+def z_distribution(scene: SceneLike = "open-fog", *, progress: Progress = None) -> Study:
     """Measure how the standardised errors of the Monte Carlo estimators are distributed.
 
     z = (estimate - quadrature) / standard error, one value for each compared pixel, of the first channel that is lit.
@@ -153,8 +147,6 @@ def z_distribution(scene: SceneLike = "open-fog", *, quick: bool = False, progre
     ----------
     scene
         A built-in scene, random:SEED or a Mitsuba XML file.
-    quick
-        A smaller image.
     progress
         Called with (fraction done, what); True shows a bar.
     """
@@ -166,8 +158,7 @@ def z_distribution(scene: SceneLike = "open-fog", *, quick: bool = False, progre
 
     from reports.api.scenes import opened
 
-    image = (32, 24) if quick else (80, 60)
-    loaded = opened(scene, image).scene
+    loaded = opened(scene, _Z_SIZE).scene
     edges = np.linspace(-_EDGE, _EDGE, _BINS + 1)
     outer = edges.copy()
     outer[[0, -1]] = -np.inf, np.inf
@@ -183,8 +174,8 @@ def z_distribution(scene: SceneLike = "open-fog", *, quick: bool = False, progre
             keys = ("low", "high", "count", "expected")
             rows += [{"estimator": estimator, **dict(zip(keys, each))} for each in bins]
     columns = (*words("estimator"), *numbers("pixels", mean="mean of z", std="st. deviation of z"))
-    drawn = table(f"{scene}, {image[0]} x {image[1]}: standardised errors", columns, moments)
-    data = with_environment(scene=str(scene), size=list(image), batches=_BATCHES, estimators=moments, bins=rows)
+    drawn = table(f"{scene}, {_Z_SIZE[0]} x {_Z_SIZE[1]}: standardised errors", columns, moments)
+    data = with_environment(scene=str(scene), size=list(_Z_SIZE), batches=_BATCHES, estimators=moments, bins=rows)
     return Study(
         name="z-distribution", data=data, drawn=(drawn,), rows=tuple(rows), draw=partial(_draw_z, rows, moments)
     )

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Studies of growth: times and memory with the work, errors with the size of the shadow map."""
 
+import json
 import math
 from collections.abc import Mapping
 from functools import partial
@@ -9,7 +10,6 @@ from typing import Any
 
 from analytic.errors import InputError
 from reports.api.inputs import (
-    File,
     KernelLike,
     Kernels,
     MethodLike,
@@ -26,13 +26,12 @@ from reports.api.inputs import (
     several,
     telling,
 )
-from reports.machine.own_process import LIMIT
 from reports.machine.progress import counted, part_of
 from reports.studies.result import FRACTION, Study, with_environment
 from reports.tables.table import number, numbers, table
 
-_KEPT = Path(__file__).resolve().parents[2] / "validation/baselines/scaling"  # what `study scaling --json` printed
-_EARLIER = "what `study scaling --json` printed, or a report.json of `report --full`"
+_BASELINES = Path(__file__).resolve().parents[2] / "validation/baselines/scaling"
+_FRAMES, _TURN = 9, 1e-3  # of the light that circles; by how much it turns from frame to frame [rad]
 
 
 @one_error
@@ -44,8 +43,6 @@ def scaling(
     kernel: Kernels = (),
     settings: Values = (),
     size: Size = (800, 600),
-    against: File | None = None,
-    method_limit: float = LIMIT,
     progress: Progress = None,
 ) -> Study:
     """Time methods as their work grows.
@@ -67,10 +64,6 @@ def scaling(
         NAME=VALUE, a parameter of each method that `--method` names; may be given several times.
     size
         Width and height [pixels], or WxH.
-    against
-        What this study printed before as JSON, to compare with; the baseline of the scene by default.
-    method_limit
-        A user method that is named is stopped after so long [s].
     progress
         Called with (fraction done, what); True shows a bar.
     """
@@ -81,7 +74,7 @@ def scaling(
         if kind not in KINDS:
             raise InputError(f"kinds: got {kind!r}, wanted some of {','.join(KINDS)}")
     names = [str(name) for name in several(scenes)]
-    earlier = _earlier(None if against is None else Path(against), names)
+    earlier = _earlier(names)
     from reports.machine.environment import activate
 
     activate()
@@ -90,7 +83,7 @@ def scaling(
     from reports.tables.scaling import cliffs, grown, scaling_tables
     from validation.study.growth import METHODS, study_scaling
 
-    chosen, _ = asked_configurations(method, kernel, settings, usual=METHODS, limit=method_limit)
+    chosen, _ = asked_configurations(method, kernel, settings, usual=METHODS)
     pixels = pixels_of(size)
     assert pixels is not None
     # Scenes that have nothing of a kind are refused before an hour of work, not after.
@@ -110,24 +103,10 @@ def scaling(
     )
 
 
-def _earlier(against: Path | None, names: list[str]) -> list[dict[str, Any]]:
-    """Return the records of an earlier run: of the file that the user names, or the baselines of built-in scenes.
-
-    A baseline is what `airlight study scaling SCENE --json` printed once.
-    """
-    from reports.data.json_files import read_json
-    from reports.tables.scaling import is_record
-
-    kept = [_KEPT / f"{name}.json" for name in names]
-    files = [path for path in kept if path.is_file()] if against is None else [against]
-    records = []
-    for path in files:
-        data = read_json(path, _EARLIER)
-        found = data.get("scaling") if isinstance(data, dict) else None
-        if not isinstance(found, list) or not found or not all(map(is_record, found)):
-            raise InputError(f"{path}: it holds no `scaling`; wanted {_EARLIER}")
-        records += found
-    return records
+def _earlier(names: list[str]) -> list[dict[str, Any]]:
+    """Return the records of the baselines of built-in scenes, which `airlight study scaling SCENE -o` wrote once."""
+    files = [path for name in names if (path := _BASELINES / f"{name}.json").is_file()]
+    return [record for path in files for record in json.loads(path.read_text())["scaling"]]
 
 
 def _draw_scaling(records: list[dict[str, Any]], column: str) -> Any:
@@ -179,10 +158,6 @@ def map_size(
     sizes: Words = "32,64,128,256,512,1024,2048,4096",
     size: Size = (160, 120),
     flicker: bool = False,
-    frames: int = 9,
-    step: float = 1e-3,
-    method_limit: float = LIMIT,
-    force: bool = False,
     progress: Progress = None,
 ) -> Study:
     """Measure error and flicker against the size of the shadow map.
@@ -207,14 +182,6 @@ def map_size(
         Width and height of the image [pixels], or WxH.
     flicker
         Also move the light and measure how it flickers.
-    frames
-        Of the moving light, at least 2.
-    step
-        By how much the light turns from frame to frame [rad].
-    method_limit
-        A user method that is named is stopped after so long [s].
-    force
-        Start also what will take more than an hour, or more memory than there is.
     progress
         Called with (fraction done, what); True shows a bar.
     """
@@ -234,19 +201,19 @@ def map_size(
     pixels, name = pixels_of(size), kernel_name(kernel)
     from reports.api.render import checked_configuration
 
-    largest, apart = checked_configuration(method, kernel, parameters | {"map": texels[-1]}, limit=method_limit)
+    largest, apart = checked_configuration(method, kernel, parameters | {"map": texels[-1]})
     activate()
-    moves = {"frames": frames, "step": step} if flicker else None
+    moves = {"frames": _FRAMES, "step": _TURN} if flicker else None
     call: Any = _map_study
     if apart:
         from reports.machine.own_process import in_own_process
 
-        call = partial(in_own_process, _map_study, name=largest.method, limit=method_limit)
+        call = partial(in_own_process, _map_study, name=largest.method)
         progress = progress is True
     from validation.scenes.registry import FOG_SCENES
 
     names = several(scenes) or list(FOG_SCENES)
-    studied = call(names, pixels, texels, method, name, parameters, moves, force, progress)
+    studied = call(names, pixels, texels, method, name, parameters, moves, progress)
     return _map_result(studied, pixels)
 
 
@@ -258,7 +225,6 @@ def _map_study(
     kernel: str | None,
     parameters: dict[str, Any],
     moves: dict[str, Any] | None,
-    force: bool,
     progress: Progress,
 ) -> list[tuple[str, Any, Any]]:
     """Return of every scene its name, the errors, and the flicker where the light moves."""
@@ -272,7 +238,7 @@ def _map_study(
     images = 1 + (moves["frames"] if moves else 0)
     works = [truth_work(pixels, lights=len(each.scene.emitters()), images=images) for each in loaded]
     works += [frame_work(pixels, frames=images * len(texels)) for _ in loaded]
-    check_work(f"map-size, {pixels[0]} x {pixels[1]}", works, force=force)
+    check_work(f"map-size, {pixels[0]} x {pixels[1]}", works)
     largest = configuration(method, kernel, parameters | {"map": texels[-1]})
     for each in loaded:  # refuse unusable scenes, and maps that exceed the memory, before any work
         prepared(read_scene(each.scene), largest)

@@ -28,11 +28,12 @@ else:
 # What they cost
 
 _STATISTICS = {"median": "half of the rays", "p99": "99 % of the rays", "max": "worst ray"}
+_TIMED_RAYS = 480_000
 _SHOWN = (1e-7, 10.0)  # errors; those outside are drawn at the edge
 
 
 @one_error
-def kernels(*, kernel: Kernels = (), phase: str | None = None, rays: int = 480_000, progress: Progress = None) -> Study:
+def kernels(*, kernel: Kernels = (), phase: str | None = None, progress: Progress = None) -> Study:
     """Time airlight kernels alone and measure their errors.
 
     ns/ray: the kernel alone by Dr.Jit's history, median. The figure shows time against error in isotropic fog, a line
@@ -44,8 +45,6 @@ def kernels(*, kernel: Kernels = (), phase: str | None = None, rays: int = 480_0
         A kernel of `airlight list kernels`; may be given several times, all by default.
     phase
         The only phase function, such as hg-draine:12 or mie:6.
-    rays
-        How many.
     progress
         Called with (fraction done, what); True shows a bar.
     """
@@ -59,7 +58,7 @@ def kernels(*, kernel: Kernels = (), phase: str | None = None, rays: int = 480_0
     phases = PHASES if phase is None else ((phase, phase_from_words(phase).g),)
     named = [kernel_name(each) or "" for each in several(kernel)] or None
     with telling(progress, "kernels") as tell:
-        found = bench_kernels(named, phases=phases, rays=rays, progress=counted(tell))
+        found = bench_kernels(named, phases=phases, rays=_TIMED_RAYS, progress=counted(tell))
     data = plain(found)
     drawn = kernel_tables(data["costs"], data["levels"])
     said = ("ns/ray: the kernel alone by Dr.Jit's history, median.",)
@@ -103,6 +102,7 @@ def _draw_costs(costs: Sequence[Mapping[str, Any]], column: str) -> Any:
 
 # Their errors over depth and angle
 
+_GRID = (48, 37)  # depths times angles
 _DEPTHS = (1e-3, 30.0)  # optical depth of the distance to the light
 _ANGLES = (0.5, 179.5)  # [degrees]
 _REACH = 2.0  # length of the segment over the distance to the light
@@ -110,7 +110,7 @@ _FLOOR, _CEILING = 1e-7, 1.0  # ends of the colour scale: the rounding of float3
 
 
 @one_error
-def kernel_errors(*, quick: bool = False, progress: Progress = None) -> Study:
+def kernel_errors(*, progress: Progress = None) -> Study:
     """Measure the error of each kernel over the optical depth and the angle of a ray.
 
     A ray is described by the distance d from the camera to the light, as optical depth sigma_t d, and by the angle
@@ -119,8 +119,6 @@ def kernel_errors(*, quick: bool = False, progress: Progress = None) -> Study:
 
     Parameters
     ----------
-    quick
-        Fewer rays.
     progress
         Called with (fraction done, what); True shows a bar.
     """
@@ -134,7 +132,7 @@ def kernel_errors(*, quick: bool = False, progress: Progress = None) -> Study:
     from validation.kernels.values import evaluate_cases
     from validation.study.configuration import find_kernel
 
-    cases, depth, angle = _grid_rays(*((24, 18) if quick else (48, 37)))
+    cases, depth, angle = _grid_rays(*_GRID)
     rows: list[dict[str, Any]] = []
     with telling(progress, "kernel-errors") as tell:
         for at, name in enumerate(KERNELS):
@@ -221,11 +219,12 @@ def _draw_errors(rows: Sequence[Mapping[str, Any]], column: str) -> Any:
 # Where they break, in the manner of Boost's accuracy reports: Max = 3.2ε (Mean = 0.4ε)
 
 _EPSILON = {"single": 2.0**-23, "double": 2.0**-52}
+_TRIED_RAYS = 100_000
 _ALARM = {"alarm": True}
 
 
 @one_error
-def stability(*, kernel: Kernels = (), rays: int = 100_000, progress: Progress = None) -> Study:
+def stability(*, kernel: Kernels = (), progress: Progress = None) -> Study:
     """Look for rays on which kernels break.
 
     Tries every kernel on certified values and on rays of every magnitude. Prints the ray of each largest error in the
@@ -236,13 +235,9 @@ def stability(*, kernel: Kernels = (), rays: int = 100_000, progress: Progress =
     ----------
     kernel
         A kernel, 'name-N' or 'module:function'; may be given several times, all by default.
-    rays
-        How many are generated, from 64 to a million.
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    if not 64 <= rays <= 1_000_000:
-        raise InputError(f"rays: got {rays}, wanted a number from 64 to 1000000")
     from reports.machine.environment import activate
 
     activate()
@@ -252,7 +247,7 @@ def stability(*, kernel: Kernels = (), rays: int = 100_000, progress: Progress =
 
     named = [kernel_name(each) or "" for each in several(kernel)] or None
     with telling(progress, "stability") as tell:
-        found = run(named, count=rays, progress=counted(tell))
+        found = run(named, count=_TRIED_RAYS, progress=counted(tell))
     data = plain({"certified": CERTIFIED, "bar": Bar(), "kernels": found})
     drawn = [each for one in data["kernels"] for each in _stability_tables(one)]
     return Study(

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from functools import cache, partial
 from typing import Any
 
-from analytic.errors import InputError
 from reports.api.inputs import (
     Kernels,
     Methods,
@@ -19,12 +18,9 @@ from reports.api.inputs import (
     several,
     telling,
 )
-from reports.machine.own_process import LIMIT
 from reports.machine.progress import part_of
 from reports.studies.result import FRACTION, Study, with_environment
 from reports.tables.table import Row, Table, Value, numbers, table, words
-
-_BATCHES = 4096  # at most: a comparison ends earlier if its interval is narrow enough
 
 
 def _scenes(scenes: Any, size: Any) -> list[Any]:
@@ -42,7 +38,7 @@ class MethodsStudy(Study):
     `frame_low_ms` and `frame_high_ms`, `airlight_ms`, `surface_ms`, `light_moved_ms`, `objects_moved_ms`
     (after these moved), `light_moved_camera_kept_ms` (after the light moved, camera rays cached), `colours_changed_ms`
     (after only medium or colours changed) [ms]; of the airlight `relative_rmse`, `relative_bias`, `p50`, `p99`, `max`,
-    `nonfinite` and `negative`; `flip`; `refused`, why the method cannot render the scene, and `note`. Missing values
+    `nonfinite` and `negative`; `refused`, why the method cannot render the scene, and `note`. Missing values
     are None.
     """
 
@@ -74,10 +70,6 @@ def methods(
     settings: Values = (),
     size: Size | None = None,
     seconds: float = 0.6,
-    flip: bool = False,
-    margin: float | None = None,
-    method_limit: float = LIMIT,
-    force: bool = False,
     progress: Progress = None,
 ) -> MethodsStudy:
     """Time methods and measure their errors.
@@ -100,15 +92,6 @@ def methods(
         Width and height [pixels], or WxH; the scene's own by default.
     seconds
         Time to spend on each timing, of which every configuration has five [s].
-    flip
-        Also compute HDR-FLIP of all light.
-    margin
-        Also compare the reference with single-scatter (within 0.05 %) and volpath, whose relative bias must be shown to
-        be within this; the time grows like 1/margin^2. Exit status 1 if they do not confirm it.
-    method_limit
-        A user method that is named is stopped after so long in a scene [s].
-    force
-        Start also what will take more than an hour, or more memory than there is.
     progress
         Called with (fraction done, what); True shows a bar.
 
@@ -123,46 +106,32 @@ def methods(
     """
     from reports.machine.environment import activate
 
-    if margin is not None and not 0 < margin < 1:
-        raise InputError(f"margin: got {margin:g}, wanted a fraction between 0 and 1, such as 0.002 for 0.2 %")
     activate()
     from reports.api.render import asked_configurations
     from reports.data.own_faults import own_faults
-    from reports.tables.agreement import agreement_table
     from reports.tables.methods import methods_table
 
-    chosen, apart = asked_configurations(method, kernel, settings, limit=method_limit)
+    chosen, apart = asked_configurations(method, kernel, settings)
     loaded = _scenes(scenes, size)
-    _check_work("methods", loaded, chosen, force=force, progress=progress)
+    _check_work("methods", loaded, chosen, progress=progress)
     benched, rows = [], []
     with telling(progress, "methods") as tell:
         for at, scene in enumerate(loaded):
             step = part_of(tell, at / len(loaded), (at + 1) / len(loaded))
-            how: dict[str, Any] = {
-                "seconds": seconds,
-                "flip": flip,
-                "limit": method_limit if apart else None,
-                "margin": margin,
-            }
-            data, of_scene = _methods_in(scene, chosen, progress=step, **how)
+            data, of_scene = _methods_in(scene, chosen, seconds=seconds, apart=apart, progress=step)
             benched.append(data)
             rows += of_scene
     tables = [methods_table("{}, {} x {}".format(each["name"], *each["size"]), each["methods"]) for each in benched]
-    compared = [(f"{each['name']}, {one['layer']}", one) for each in benched for one in each["agreement"].values()]
-    if compared:
-        title = "Monte Carlo against the quadrature reference; volpath corrected for its shadow-ray epsilon"
-        tables.append(agreement_table(title, compared))
     return MethodsStudy(
         name="methods",
         data=with_environment(scenes=benched),
         drawn=tuple(tables),
         rows=tuple(rows),
         wrong=tuple(own_faults({"scenes": benched})),
-        good=all(one["statistics"]["equivalent"] for _, one in compared),
     )
 
 
-def _check_work(what: str, loaded: list[Any], chosen: list[Any], *, force: bool, progress: Any) -> None:
+def _check_work(what: str, loaded: list[Any], chosen: list[Any], *, progress: Any) -> None:
     from realtime.scene.read_scene import read_scene
     from validation.study.configuration import rendered_lights
     from validation.study.cost import check_work, frame_work, steps_of, truth_work
@@ -176,7 +145,7 @@ def _check_work(what: str, loaded: list[Any], chosen: list[Any], *, force: bool,
         for one in chosen:
             steps = steps_of(one.parameters) if one.method == "ray-march" else 0
             works.append(frame_work(at, lights=rendered_lights(scene, one), steps=steps))
-    check_work(what, works, force=force)
+    check_work(what, works)
 
 
 def _methods_in(
@@ -184,43 +153,32 @@ def _methods_in(
     chosen: list[Any],
     *,
     seconds: float,
-    flip: bool,
-    margin: float | None,
-    limit: float | None,
+    apart: bool,
     progress: Any,
 ) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Return what was measured in a scene, as in report.json, and as flat rows."""
     from realtime.scene.read_scene import read_scene
     from reports.machine.own_process import in_own_process
     from reports.report.scene import row_entry
-    from validation.estimates.agreement import agreements
     from validation.estimates.quadrature import truth_image
     from validation.metrics.errors import plain
-    from validation.scenes.loading import load_scene
     from validation.study.reference import of_image
     from validation.study.run import run
     from validation.study.scene import configurations_for
-    from validation.study.study import Cell, Measure, standard_study
+    from validation.study.study import Cell, Measure
 
-    done = 1.0 if margin is None else 0.6
     progress(0.0, f"{loaded.name}: the reference")
     scene, reference = read_scene(loaded.scene), of_image(truth_image(loaded.scene))
     size, path = (scene.camera.width, scene.camera.height), str(loaded.path or loaded.name)
-    wanted = Measure("stages", seconds, flip=flip, every_metric=False)
-    apart = None if limit is None else partial(in_own_process, limit=limit)
+    wanted = Measure("stages", seconds, every_metric=False)
     entries, rows = [], []
     useful = configurations_for(scene.features, chosen)
     for at, each in enumerate(useful):
-        progress(done * at / len(useful), f"{loaded.name}: {each.label}")
-        row, _ = run(Cell(path, size, (), each, wanted), scene, reference, apart=apart)
+        progress(at / len(useful), f"{loaded.name}: {each.label}")
+        row, _ = run(Cell(path, size, (), each, wanted), scene, reference, apart=in_own_process if apart else None)
         entries.append(row_entry(plain(row)))
         rows.append({**_flat(row, each), "scene": loaded.name})
-    agreed = {}
-    if margin is not None:
-        margins = {**standard_study("default").checks.margins, "volpath": margin}
-        small = load_scene(path, (160, 120)).scene
-        agreed = plain(agreements(small, margins, batches=_BATCHES, progress=part_of(progress, done, 1.0)))
-    return {"name": loaded.name, "size": list(size), "methods": entries, "agreement": agreed}, rows
+    return {"name": loaded.name, "size": list(size), "methods": entries}, rows
 
 
 def _flat(row: Any, chosen: Any) -> dict[str, Any]:
@@ -238,7 +196,7 @@ def _flat(row: Any, chosen: Any) -> dict[str, Any]:
     flat |= {f"{each.name}_ms": medians.get(each.name) for each in fields(FrameTimes)}
     for name in ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative"):
         flat[name] = error and plain(getattr(error, name))
-    return flat | {"flip": row.flip and row.flip.value, "refused": row.reason, "note": row.note}
+    return flat | {"refused": row.reason, "note": row.note}
 
 
 # Errors by cause
@@ -264,8 +222,6 @@ def decomposition(
     kernel: Kernels = (),
     settings: Values = (),
     size: Size | None = (240, 180),
-    method_limit: float = LIMIT,
-    force: bool = False,
     progress: Progress = None,
 ) -> Study:
     """Split the error of methods by its causes.
@@ -285,10 +241,6 @@ def decomposition(
         NAME=VALUE, a parameter of each method that `--method` names; may be given several times.
     size
         Width and height [pixels], or WxH.
-    method_limit
-        A user method that is named is stopped after so long in a scene [s].
-    force
-        Start also what will take more than an hour, or more memory than there is.
     progress
         Called with (fraction done, what); True shows a bar.
     """
@@ -299,14 +251,14 @@ def decomposition(
     from validation.study.configuration import configuration
 
     usual = [configuration(name, parameters=values) for name, values in _SPLIT]
-    chosen, apart = asked_configurations(method, kernel, settings, usual=usual, limit=method_limit)
+    chosen, apart = asked_configurations(method, kernel, settings, usual=usual)
     loaded = _scenes(scenes, size)
-    _check_work("decomposition", loaded, chosen, force=force, progress=progress)
+    _check_work("decomposition", loaded, chosen, progress=progress)
     data, tables, rows, drawn = [], [], [], []
     with telling(progress, "decomposition") as tell:
         for at, scene in enumerate(loaded):
             step = part_of(tell, at / len(loaded), (at + 1) / len(loaded))
-            entries, split = _split(scene, chosen, limit=method_limit if apart else None, progress=step)
+            entries, split = _split(scene, chosen, apart=apart, progress=step)
             width, height = scene.size
             data.append({"name": scene.name, "size": [width, height], "methods": entries})
             tables.append(_cause_table(f"{scene.name}, {width} x {height}: error of the airlight by cause", entries))
@@ -326,7 +278,7 @@ def decomposition(
     )
 
 
-def _split(loaded: Any, chosen: list[Any], *, limit: float | None, progress: Any) -> tuple[list[dict[str, Any]], Any]:
+def _split(loaded: Any, chosen: list[Any], *, apart: bool, progress: Any) -> tuple[list[dict[str, Any]], Any]:
     """Return the errors of a scene by cause, JSON-ready and with their images."""
     from realtime.errors import InputError as MethodError
     from realtime.scene.read_scene import read_scene
@@ -349,9 +301,9 @@ def _split(loaded: Any, chosen: list[Any], *, limit: float | None, progress: Any
 
         def own(configuration: Any, each: Any = each) -> Any:
             cell = Cell(str(loaded.path or loaded.name), loaded.size, (), configuration)
-            if limit is None:
+            if not apart:
                 return frame_of(cell).airlight
-            return in_own_process(frame_of, cell, name=each.method, limit=limit).airlight
+            return in_own_process(frame_of, cell, name=each.method).airlight
 
         entry: dict[str, Any] = {"label": each.label, "method": each.method, "kernel": each.kernel}
         entry |= {"parameters": dict(each.parameters)}

@@ -4,18 +4,18 @@
 from functools import partial
 from typing import Any
 
-from analytic.errors import InputError
 from reports.api.inputs import one_error
 from reports.studies.result import Study
 from reports.tables.table import numbers, table, words
 
+_RAYS = 100_000  # quasi-random, of which the fractions are counted
 _THICKNESSES = (0.1, 0.5, 2.0)
 _BIRI = ("isotropic", "rayleigh", "hazy", "murky")
 _CURVES = ("exact", "taylor", "taylor-printed")
 
 
 @one_error
-def polynomials(*, rays: int = 100_000) -> Study:
+def polynomials() -> Study:
     """Compare Biri's polynomials with the airlight kernel over the angle.
 
     For each phase function of Biri 2006 and some a = sigma_t height:
@@ -24,14 +24,7 @@ def polynomials(*, rays: int = 100_000) -> Study:
 
     exact, by the derived Taylor polynomial of degree 4 and by the one printed in the annex; and the fractions of rays
     that the three kernels integrate to within 1 % and 10 %.
-
-    Parameters
-    ----------
-    rays
-        Quasi-random rays of which the fractions are counted, from 64 to a million.
     """
-    if not 64 <= rays <= 1_000_000:
-        raise InputError(f"rays: got {rays}, wanted a number from 64 to 1000000")
     from reports.machine.environment import activate
 
     activate()
@@ -47,7 +40,7 @@ def polynomials(*, rays: int = 100_000) -> Study:
             for values in zip(theta.tolist(), *(curves[name].tolist() for name in _CURVES)):
                 rows.append({"phase": phase, "a": a, **dict(zip(("theta", *_CURVES), values))})
     names = ("phase", "region", "kernel", "rays", "within_1_percent", "within_10_percent")
-    within = [{name: getattr(each, name) for name in names} for each in printed_against_derived(rays)]
+    within = [{name: getattr(each, name) for name in names} for each in printed_against_derived(_RAYS)]
     percent = {"percent": True}
     columns = (
         *words("phase", "region", "kernel"),
@@ -55,7 +48,7 @@ def polynomials(*, rays: int = 100_000) -> Study:
         *numbers(within_1_percent="within 1 %", within_10_percent="within 10 %", how=percent),
     )
     drawn = table("Fractions of rays that a kernel integrates within an error", columns, within)
-    data = {"rays": rays, "within": within, "curves": rows}
+    data = {"rays": _RAYS, "within": within, "curves": rows}
     return Study(name="polynomials", data=data, drawn=(drawn,), rows=tuple(rows), draw=partial(_draw_polynomials, rows))
 
 

@@ -223,9 +223,7 @@ def _orders(kind: str, path: Path) -> list[list[str]]:
     """Return what to do with an input."""
     out = path.parent
     if kind == "rows":
-        printed = [
-            ["study", "integrals", str(path), "--precision", precision, "--json"] for precision in ("single", "double")
-        ]
+        printed = [["study", "integrals", str(path), "--precision", name] for name in ("single", "double")]
         return [*printed, ["study", "integrals", str(path), "-o", str(out / "rows.csv")]]
     sampled = ["--error", "0.3", "--estimator"]
     orders = [

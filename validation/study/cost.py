@@ -5,6 +5,7 @@ The costs are those of one processor thread, measured on two threads of an AMD E
 scene can be some times cheaper or dearer. That is enough to tell a minute from a day.
 """
 
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -58,13 +59,18 @@ def steps_of(parameters: Iterable[tuple[str, Any]]) -> float:
     return float(next((value for name, value in parameters if name == "steps"), 100))
 
 
-def check_work(what: str, works: Iterable[Work], *, force: bool) -> None:
+def forced() -> bool:
+    """Return whether the user starts what `check_work` refuses."""
+    return os.environ.get("AIRLIGHT_FORCE", "0") not in ("", "0")
+
+
+def check_work(what: str, works: Iterable[Work]) -> None:
     """Refuse what would take more than an hour, or more memory than the machine has, unless it is forced.
 
     `what` is asked for, as the message begins, which gives the time, the memory and what to do.
     """
     works = list(works)
-    if force or not works:
+    if forced() or not works:
         return
     threads = _GPU if (mi.variant() or "").startswith("cuda") else max(1, dr.thread_count())
     seconds, memory = sum(work.seconds for work in works) / threads, max(work.memory for work in works)
@@ -75,7 +81,7 @@ def check_work(what: str, works: Iterable[Work], *, force: bool) -> None:
     if usable is not None and memory > usable.size:
         reasons.append(f"needs about {memory / 1e9:.3g} GB of memory, of which {usable}")
     if reasons:
-        raise InputError(f"{what}: {' and '.join(reasons)}; ask for less, or add --force to start it nevertheless")
+        raise InputError(f"{what}: {' and '.join(reasons)}; ask for less, or set AIRLIGHT_FORCE=1 to start it")
 
 
 def _duration(seconds: float) -> str:

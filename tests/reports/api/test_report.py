@@ -27,7 +27,7 @@ def test_report_hands_on_what_it_was_given(variant, tmp_path, monkeypatch):
     assert report.claims == ("so",)
     assert given["study"].scenes == ("open-fog",)
     assert given["study"].name == "default"
-    assert given["method_limit"] is None  # a function runs here
+    assert not given["apart"]  # a function runs here
     names = [configuration.method.rpartition(":")[2] for configuration in given["study"].configurations]
     assert names == ["min-max", "brighter"]
     with pytest.raises(airlight.InputError, match="did you mean 'hall'"):

@@ -48,11 +48,10 @@ def test_the_margin_decides(files, capsys):
 
 def test_everything_at_once(files, capsys):
     images, mask = files
-    values = printed(capsys, *images, "--mask", mask, "--all-metrics", "--flip", "--exposure", "-0.5")
+    values = printed(capsys, *images, "--mask", mask, "--all-metrics")
     assert (values["pixels"], values["masked"]) == (14 * 20, 2 * 20)
     assert values["errors"]["values"] == 14 * 20 * 3
     assert values["errors_normalised"]["unit"] != 1
-    assert values["colour"]["exposure"] == -0.5
     # With a note where the package is missing, with a value where it is not.
     assert (values["flip"]["value"] is None) == bool(values["flip"]["note"])
 
@@ -103,8 +102,8 @@ def test_a_difference_is_written_as_values_and_as_a_picture(files, tmp_path, cap
 def test_the_command_and_python_find_the_fog_that_made_an_image(variant, tmp_path, capsys):
     path = tmp_path / "fog.exr"
     write_exr(path, Image({"airlight": truth_image(load_scene("open-fog", (32, 24)).scene).airlight}))
-    arguments = ["open-fog", str(path), "--fit", "sigma_t,intensity"]
-    data = printed(capsys, *arguments, "--start", "sigma_t=0.9")
+    arguments = ["open-fog", str(path), "--fit", "sigma_t=0.9,intensity"]
+    data = printed(capsys, *arguments)
     assert {"parameters", "residual", "explained", "confounded"} <= set(data)
     assert set(data["parameters"]) == {"sigma_t", "intensity"}
     sigma_t = data["parameters"]["sigma_t"]

@@ -27,7 +27,7 @@ def experiments(own_cache, monkeypatch):
 
 
 def test_verdicts_tables_and_json(variant, experiments, capfd):
-    assert cli.run(["paper", "bouthors", "--numbers"]) == 0
+    assert cli.run(["paper", "bouthors"]) == 0
     out = capfd.readouterr().out
     assert "not reproduced" in out
     assert "numbers beside ours" in out

@@ -89,7 +89,7 @@ def test_integrals_of_a_file_take_a_phase_function_by_words(variant, capfd, tmp_
 
 
 @pytest.mark.claim("kernels-are-named-by-kernel")
-def test_kernels_are_named_by_an_option(variant, capfd, monkeypatch):
+def test_kernels_are_named_by_an_option(variant, tmp_path, monkeypatch):
     asked = []
 
     def bench_kernels(names, **options):
@@ -97,14 +97,16 @@ def test_kernels_are_named_by_an_option(variant, capfd, monkeypatch):
         return {"costs": [], "levels": []}
 
     monkeypatch.setattr("validation.kernels.benchmark.bench_kernels", bench_kernels)
-    assert cli.run(["study", "kernels", "--kernel", "exact", "--kernel", "taylor-8", "--json"]) == 0
-    assert json.loads(capfd.readouterr().out)["kernels"] == {"costs": [], "levels": []}
-    assert cli.run(["study", "kernels", "--json"]) == 0
+    written = tmp_path / "kernels.json"
+    assert cli.run(["study", "kernels", "--kernel", "exact", "--kernel", "taylor-8", "-o", str(written)]) == 0
+    assert json.loads(written.read_text())["kernels"] == {"costs": [], "levels": []}
+    assert cli.run(["study", "kernels"]) == 0
     assert asked == [["exact", "taylor-8"], None]
 
 
-def test_kernel_errors_over_depth_and_angle(variant):
-    rows = airlight.study("kernel-errors", quick=True)
+def test_kernel_errors_over_depth_and_angle(variant, monkeypatch):
+    monkeypatch.setattr("reports.studies.kernels._GRID", (24, 18))
+    rows = airlight.study("kernel-errors")
     errors = {
         name: np.array([row["relative_error"] for row in rows if row["kernel"] == name]) for name in ("exact", "taylor")
     }
@@ -118,9 +120,10 @@ def test_kernel_errors_over_depth_and_angle(variant):
 def test_stability_fails_where_the_claim_is_broken(variant, monkeypatch, capsys):
     from realtime.kernels.registry import KERNELS
 
-    assert airlight.study("stability", kernel="taylor", rays=64).passed
+    monkeypatch.setattr("reports.studies.kernels._TRIED_RAYS", 64)
+    assert airlight.study("stability", kernel="taylor").passed
     monkeypatch.setitem(KERNELS, "exact", KERNELS["taylor"])
-    assert cli.run(["study", "stability", "--kernel", "exact", "--rays", "64"]) == 1
+    assert cli.run(["study", "stability", "--kernel", "exact"]) == 1
     assert "BROKEN: exact, airlight_integral.csv: float32 maximum" in capsys.readouterr().out
 
 
@@ -129,7 +132,7 @@ def test_stability_fails_where_the_claim_is_broken(variant, monkeypatch, capsys)
 
 def test_curves_meet_at_the_foot_and_leave_it(variant, tmp_path):
     """At theta = 0 all three are p(0); half a radian on, the derived polynomial is the closer one if isotropic."""
-    rows = airlight.study("polynomials", rays=256)
+    rows = airlight.study("polynomials")
     middle = [row for row in rows if row["theta"] == 0]
     assert len(middle) == 12
     for row in middle:
@@ -142,10 +145,10 @@ def test_curves_meet_at_the_foot_and_leave_it(variant, tmp_path):
         rows.save(tmp_path / "polynomials.txt")
 
 
-def test_slab_by_command_and_from_python(capfd):
+def test_slab_by_command_and_from_python(tmp_path):
     slab = ["study", "slab", "2", "30", "--phase", "hg:0.75", "--albedo", "0.9", "--orders", "1", "--photons", "50"]
-    assert cli.run([*slab, "--json"]) == 0
-    data = json.loads(capfd.readouterr().out)
+    assert cli.run([*slab, "-o", str(tmp_path / "slab.json")]) == 0
+    data = json.loads((tmp_path / "slab.json").read_text())
     assert (data["tau"], data["sun"], data["albedo"], data["phase"]) == (2, 30, 0.9, "hg:0.75")
     assert [row["orders"] for row in data["orders"]] == [row["orders"] for row in data["photons"]["orders"]] == ["1"]
     assert data["error"]["orders"][0]["reflectance"] < 1e-6
@@ -161,10 +164,10 @@ def test_slab_by_command_and_from_python(capfd):
 
 QUICK = {
     "phase-functions": {},
-    "polynomials": {"rays": 64},
+    "polynomials": {},
     "map-size": {"scenes": "omni-box", "size": (16, 12), "sizes": "32,64"},
-    "kernels": {"kernel": "taylor", "phase": "isotropic", "rays": 3000},
-    "convergence": {"quick": True},
+    "kernels": {"kernel": "taylor", "phase": "isotropic"},
+    "convergence": {},
     "slab": {"tau": 2, "sun": 30, "orders": "1,2", "photons": 50},
 }
 
@@ -172,8 +175,10 @@ QUICK = {
 @pytest.mark.slow
 @pytest.mark.claim("figures-repeat", tolerance="none: equal bytes")
 @pytest.mark.parametrize("name", QUICK)
-def test_a_figure_is_drawn_twice_to_the_same_bytes(name, variant, tmp_path):
+def test_a_figure_is_drawn_twice_to_the_same_bytes(name, variant, tmp_path, monkeypatch):
     """What is embedded are TrueType fonts, no date."""
+    monkeypatch.setattr("reports.studies.kernels._TIMED_RAYS", 3000)
+    monkeypatch.setattr("reports.studies.estimators._SIZE", (32, 24))
     found = airlight.study(name, **QUICK[name])
     first = found.save(tmp_path / "first.pdf", "single").read_bytes()
     assert found.save(tmp_path / "again.pdf", "single").read_bytes() == first
@@ -184,11 +189,12 @@ def test_a_figure_is_drawn_twice_to_the_same_bytes(name, variant, tmp_path):
 
 
 @pytest.mark.statistical
-def test_z_follows_its_law(variant):
+def test_z_follows_its_law(variant, monkeypatch):
     """Counts in bins against Student's law: chi-square; the seeds are fixed, the level is 1 in 10 000."""
     from scipy.stats import chi2
 
-    found = airlight.study("z-distribution", quick=True)
+    monkeypatch.setattr("reports.studies.estimators._Z_SIZE", (32, 24))
+    found = airlight.study("z-distribution")
     rows = [row for row in found if row["estimator"] == "single-scatter"]
     count, expected = (np.array([row[name] for row in rows]) for name in ("count", "expected"))
     assert count.sum() == found.data["estimators"][0]["pixels"]

@@ -7,28 +7,21 @@ import numpy as np
 import pytest
 
 import airlight
-import validation.estimates.agreement
+from reference.storage.files import temporary_folder
 from reports.commands import main as cli
 from tests.helpers.api import TINY, brighter
-from tests.helpers.reports import agreement, growth_record
+from tests.helpers.reports import growth_record
 
 
 def printed(capfd, *arguments, status=0):
-    assert cli.run(["study", *arguments, "--json"]) == status
-    return json.loads(capfd.readouterr().out)
+    with temporary_folder() as folder:
+        assert cli.run(["study", *arguments, "-o", str(folder / "study.json")]) == status
+        capfd.readouterr()
+        return json.loads((folder / "study.json").read_text())
 
 
-def test_methods_are_measured_and_an_unconfirmed_reference_ends_with_1(variant, capfd, monkeypatch):
-    asked = []
-
-    def agreements(scene, margins, **options):
-        asked.append(dict(margins))
-        return {"volpath airlight": agreement(False)}
-
-    monkeypatch.setattr(validation.estimates.agreement, "agreements", agreements)
-    arguments = ["methods", "open-fog", "--method", "unshadowed", "--size", "16x12", "--margin", "0.002"]
-    (scene,) = printed(capfd, *arguments, status=1)["scenes"]
-    assert asked == [{"single-scatter": 0.0005, "volpath": 0.002}]  # the margin is that of volpath alone
+def test_methods_are_measured_by_the_command(variant, capfd):
+    (scene,) = printed(capfd, "methods", "open-fog", "--method", "unshadowed", "--size", "16x12")["scenes"]
     assert {entry["method"] for entry in scene["methods"]} == {"unshadowed"}
     assert all(entry["times"]["frame"]["median_ms"] > 0 for entry in scene["methods"])
 
@@ -51,7 +44,7 @@ def test_python_gives_functions_and_configurations_and_gets_rows(variant):
     for row in table:
         assert row["scene"] == "open-fog"
         assert 0 < row["frame_low_ms"] <= row["frame_ms"] <= row["frame_high_ms"]
-        assert row["refused"] is row["flip"] is None
+        assert row["refused"] is None
         assert row["nonfinite"] == row["negative"] == 0
     columns = table.columns()
     assert set(map(len, columns.values())) == {2}
@@ -79,15 +72,17 @@ def test_errors_by_cause_are_printed_and_drawn(variant, capfd, tmp_path):
 def test_scaling_that_grows_more_steeply_than_before_ends_with_1(variant, capfd, monkeypatch, tmp_path):
     monkeypatch.setattr("validation.study.growth.study_scaling", lambda *given, **options: [growth_record()])
     monkeypatch.setattr("reports.report.others.scaling_data", lambda name, size, found: found)
-    before = tmp_path / "before.json"
-    arguments = ["scaling", "sphere-spot", "--kinds", "size", "--method", "unshadowed", "--against", str(before)]
+    monkeypatch.setattr("reports.studies.growth._BASELINES", tmp_path)
+    before = tmp_path / "sphere-spot.json"
+    arguments = ["scaling", "sphere-spot", "--kinds", "size", "--method", "unshadowed"]
     for exponent, status in ((0.47, 0), (0.1, 1)):
         before.write_text(json.dumps({"scaling": [growth_record(exponent=exponent)]}))
         assert printed(capfd, *arguments, status=status)["scaling"] == [growth_record()]
 
 
-def test_maps_print_errors_and_flicker_by_size(variant, capfd):
-    arguments = ["map-size", "omni-box", "--size", "16x12", "--sizes", "32,16", "--flicker", "--frames", "2"]
+def test_maps_print_errors_and_flicker_by_size(variant, capfd, monkeypatch):
+    monkeypatch.setattr("reports.studies.growth._FRAMES", 2)
+    arguments = ["map-size", "omni-box", "--size", "16x12", "--sizes", "32,16", "--flicker"]
     march = ["--method", "ray-march", "--set", "shadow=map", "--set", "steps=16"]
     (scene,) = printed(capfd, *arguments, *march)["scenes"]
     assert (scene["name"], scene["method"]) == ("omni-box", "ray-march (shadow=map, steps=16)")

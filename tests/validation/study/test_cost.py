@@ -14,15 +14,18 @@ def test_an_hour_and_the_memory_are_the_bounds(variant, monkeypatch):
     monkeypatch.setattr(expected_work.dr, "thread_count", lambda: 2)
     monkeypatch.setattr(expected_work, "usable_memory", lambda: Memory(10**9, "this machine has"))
     monkeypatch.setattr(expected_work.mi, "variant", lambda: "llvm_ad_rgb")
-    check_work("x", [Work(3600, 1e9), Work(3600, 1e9)], force=False)
-    with pytest.raises(InputError, match=r"^x: would take about 1 hours; ask for less, or add --force to start it"):
-        check_work("x", [Work(3700), Work(3600)], force=False)
+    check_work("x", [Work(3600, 1e9), Work(3600, 1e9)])
+    with pytest.raises(
+        InputError, match=r"^x: would take about 1 hours; ask for less, or set AIRLIGHT_FORCE=1 to start it"
+    ):
+        check_work("x", [Work(3700), Work(3600)])
     with pytest.raises(InputError, match=r"^x: needs about 2 GB of memory, of which this machine has 1 GB; ask"):
-        check_work("x", [Work(1, 2e9)], force=False)
+        check_work("x", [Work(1, 2e9)])
     with pytest.raises(InputError, match=r"about 6\.[0-9]* years and needs"):
-        check_work("x", [Work(4e8, 2e9)], force=False)
-    check_work("x", [Work(1e9, 2e9)], force=True)
-    check_work("x", [], force=False)
+        check_work("x", [Work(4e8, 2e9)])
+    check_work("x", [])
+    monkeypatch.setenv("AIRLIGHT_FORCE", "1")
+    check_work("x", [Work(1e9, 2e9)])
 
 
 @pytest.mark.parametrize(
@@ -43,5 +46,5 @@ def test_every_command_that_renders_asks(variant, tmp_path, monkeypatch, capsys,
     assert run(command) == 2
     err = capsys.readouterr().err
     assert err.count("\n") == 1
-    assert "add --force to start it nevertheless" in err
+    assert "set AIRLIGHT_FORCE=1 to start it" in err
     assert not list(tmp_path.iterdir())
