@@ -8,6 +8,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -241,7 +242,6 @@ def _measured(
     """Measure and write a report; unusable input is refused before the work begins."""
     import gc
 
-    from reference.storage.files import ensure_folder
     from reports.cluster.connect import check_library, connected, parse_place
     from reports.machine.environment import activate
 
@@ -250,7 +250,7 @@ def _measured(
         check_library()
     activate()
     from reports.api.render import asked_configurations
-    from reports.report.asked import notes_on, scenes_of_images
+    from reports.report.asked import scenes_of_images
     from reports.report.measure import write_report
     from validation.engine.images import images_size
     from validation.study.cost import check_work, frame_work, truth_work
@@ -263,8 +263,6 @@ def _measured(
     chosen, apart = asked_configurations(methods, kernels, settings, usual=study.configurations)
     if methods and all(isinstance(name, str) and ":" in name for name in methods):
         note(progress, ["what --method names is measured alone; --method all adds the built-in methods"])
-    note(progress, notes_on(names))
-    ensure_folder(target)  # not before the scenes are known to be right: a mistake leaves no empty folder
     # The sizes of an effort are known to be right; those of images are the user's.
     sizes = [images_size(tuple(several)) for several in shown.values()]
     works = [truth_work(size) for size in sizes]
@@ -282,6 +280,7 @@ def _measured(
             fresh=fresh,
             apart=apart,
             progress=tell,
+            noted=partial(note, progress),
             cluster=None if place is None else stack.enter_context(connected(place)),
         )
 

@@ -5,9 +5,8 @@ import os
 from collections.abc import Sequence
 
 from analytic.errors import InputError
-from realtime.scene.read_scene import read_scene
 from validation.engine.images import EngineImage, find_images
-from validation.scenes.loading import load_scene, scene_stem
+from validation.scenes.loading import scene_stem
 from validation.scenes.registry import SCENES
 
 
@@ -40,14 +39,3 @@ def scenes_of_images(
     if not wanted & set(shown):
         raise InputError(f"--images: {images} has no image of {', '.join(sorted(wanted))}, only of {', '.join(shown)}")
     return names, {name: several for name, several in shown.items() if name in wanted}
-
-
-def notes_on(scenes: Sequence[str]) -> list[str]:
-    """Return what to say of scenes before they are studied.
-
-    Raises
-    ------
-    InputError
-        If one of them cannot be read.
-    """
-    return [note for name in scenes for note in read_scene(load_scene(name, (8, 6)).scene).features.notes]

@@ -8,7 +8,7 @@ it stopped, and one in which nothing changed measures nothing. The files of a re
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -51,6 +51,7 @@ def write_report(
     fresh: bool = False,
     apart: bool = False,
     progress: Progress | None = None,
+    noted: Callable[[Sequence[str]], None] = lambda notes: None,
     cluster: Cluster | None = None,
 ) -> dict[str, Any]:
     """Study scenes and write the report.
@@ -72,6 +73,8 @@ def write_report(
         it ends the report.
     progress
         Called with (share done, what) now and then.
+    noted
+        Called with what is to be said of the scenes before they are studied.
     cluster
         Whose workers compute references and the batches that check them; methods run here.
 
@@ -90,13 +93,15 @@ def write_report(
     _refuse_twins(names)
     shown = dict(images or {})
     sizes = {name: images_size(tuple(several)) for name, several in shown.items()}
-    target = ensure_folder(folder)
     environment, start = describe_environment(), time.monotonic()
     process = in_own_process if apart else None
     seconds = dict.fromkeys(("scenes", "stability", "scaling", "papers"), 0.0)
+    with _timed(seconds, "scenes"):
+        studies = [open_scene(name, study.of(name).at(sizes.get(scene_stem(name))), machine()) for name in names]
+        noted([words for each in studies for words in each.scene.features.notes])
+    # Not before the scenes are known to be right: a mistake leaves no empty folder.
+    target = ensure_folder(folder)
     with fresh_results(time.time() if fresh else None), staged(target) as hidden:
-        with _timed(seconds, "scenes"):
-            studies = [open_scene(name, study.of(name).at(sizes.get(scene_stem(name))), machine()) for name in names]
         others = other_parts(study)
         of_scenes = [each.seconds() for each in studies]
         whole = [sum(each.values()) for each in of_scenes] + [part.seconds for part in others]
