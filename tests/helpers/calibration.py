@@ -22,10 +22,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binom
+from scipy.special import ndtr
+from scipy.stats import binom, nct
 
 from validation.statistics.comparison import Estimate, Statistics, compare_statistics
-from validation.statistics.p_values import power, uniformity_p
+from validation.statistics.p_values import student_quantile, uniformity_p
 
 Array = NDArray[np.float64]
 Law = Callable[[np.random.Generator, tuple[int, ...]], Array]  #: draws numbers of mean 0 and standard deviation 1
@@ -146,3 +147,16 @@ def _comparisons(experiment: Experiment, bias: float, spread: float) -> list[Sta
 def _profile(size: int) -> Array:
     """Return radiance that falls by a factor of a hundred from left to right."""
     return np.tile(np.geomspace(1.0, 0.01, size), (size, 1))
+
+
+def power(effect: float, freedom: float, level: float = 0.05) -> float:
+    """Return the probability that a two-sided test at a level finds an effect, given in standard errors.
+
+    The statistic (B - b)/se + b/se follows Student's non-central law with the parameter b/se, as se is itself estimated
+    with `freedom` degrees of freedom, and a shifted normal law for infinitely many. Both tails count, so an effect of
+    zero is found with the probability of the level.
+    """
+    critical = student_quantile(1 - level / 2, freedom)
+    if np.isfinite(freedom):
+        return float(nct.sf(critical, freedom, effect) + nct.cdf(-critical, freedom, effect))
+    return float(ndtr(effect - critical) + ndtr(-effect - critical))

@@ -4,7 +4,6 @@
 Read in this order:
 
 - `p_values.py`: p-values, and what to do with many of them;
-- `relative_bias.py`: the relative bias of a whole image and its interval;
 - `comparison.py`: all tests of one image against another;
 - `noise.py`: how far a number may move before that means something;
 - `intervals.py`: what few samples say of all: shares, quantiles, rank correlations.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtr, ndtri, stdtr, stdtrit
-from scipy.stats import binom, kstest, nct
+from scipy.stats import binom, kstest
 
 Array = NDArray[np.float64]
 
@@ -51,19 +51,6 @@ def two_sided_p(z: Array, freedom: Array) -> Array:
 def student_quantile(probability: float, freedom: float) -> float:
     """Return the quantile [1] at a `probability` of Student's law; of the normal law for an infinite `freedom`."""
     return float(stdtrit(freedom, probability) if np.isfinite(freedom) else ndtri(probability))
-
-
-def power(effect: float, freedom: float, level: float = 0.05) -> float:
-    """Return the probability that a two-sided test at a level finds an effect, given in standard errors.
-
-    The statistic (B - b)/se + b/se follows Student's non-central law with the parameter b/se, as se is itself estimated
-    with `freedom` degrees of freedom, and a shifted normal law for infinitely many. Both tails count, so an effect of
-    zero is found with the probability of the level.
-    """
-    critical = student_quantile(1 - level / 2, freedom)
-    if np.isfinite(freedom):
-        return float(nct.sf(critical, freedom, effect) + nct.cdf(-critical, freedom, effect))
-    return float(ndtr(effect - critical) + ndtr(-effect - critical))
 
 
 def sidak(level: float, tests: int) -> float:

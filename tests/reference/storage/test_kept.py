@@ -202,7 +202,7 @@ def functions():
         "sweep-truth": (sampled_reference, quadrature),
         "row": (run, "realtime.methods.ray_march"),
         "page": (packed_scene, "reports.page.image_codec"),
-        "scene-checks": (check_reference, "validation.statistics.relative_bias"),
+        "scene-checks": (check_reference, "validation.statistics.comparison"),
         "scene-multiple": (multiple_scattering_share, "reference.monte_carlo.volpath.integrator"),
         "cell": (_measured, "realtime.methods.ray_march"),
         "scene-image": (_image_measured, "validation.metrics.errors"),

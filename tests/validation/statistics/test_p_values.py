@@ -2,7 +2,8 @@
 import numpy as np
 import pytest
 
-from validation.statistics.p_values import binomial_p, power, sidak, student_quantile
+from tests.helpers.calibration import power
+from validation.statistics.p_values import binomial_p, sidak, student_quantile
 
 
 def test_power_of_no_effect_is_the_level():
