@@ -95,7 +95,7 @@ def convergence(scene: SceneLike = "open-fog", *, progress: Progress = None) -> 
                 mean = layer_mean(monte_carlo_batches(loaded, estimator, **how).batches, "airlight", mask)[mask]
                 errors.append(float(np.sqrt(np.mean((mean - expected) ** 2)) / expected.mean()))
             samples = [_SAMPLES * count for count in counts]
-            order = fitted_slope(samples, errors).order
+            order, _ = fitted_slope(samples, errors)
             rows += [
                 {"estimator": estimator, "samples": count, "relative_rmse": error, "order": order}
                 for count, error in zip(samples, errors)

@@ -4,6 +4,7 @@
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -214,7 +215,8 @@ def map_size(
 
     names = several(scenes) or list(FOG_SCENES)
     studied = call(names, pixels, texels, method, name, parameters, moves, progress)
-    return _map_result(studied, pixels)
+    shared = tuple(each for each in largest.parameters if each[0] != "map")
+    return _map_result(studied, pixels, texels, replace(largest, parameters=shared).label)
 
 
 def _map_study(
@@ -230,70 +232,85 @@ def _map_study(
     """Return of every scene its name, the errors, and the flicker where the light moves."""
     from realtime.scene.read_scene import read_scene
     from reports.api.scenes import opened
+    from validation.estimates.quadrature import truth_image
     from validation.study.configuration import configuration, prepared
     from validation.study.cost import check_work, frame_work, truth_work
-    from validation.study.maps import map_errors, map_flicker
+    from validation.study.maps import map_flicker
+    from validation.study.reference import of_image
+    from validation.study.run import run
+    from validation.study.study import Cell, Measure
 
     loaded = [opened(name, pixels) for name in names]
     images = 1 + (moves["frames"] if moves else 0)
     works = [truth_work(pixels, lights=len(each.scene.emitters()), images=images) for each in loaded]
     works += [frame_work(pixels, frames=images * len(texels)) for _ in loaded]
     check_work(f"map-size, {pixels[0]} x {pixels[1]}", works)
-    largest = configuration(method, kernel, parameters | {"map": texels[-1]})
+    by_size = [configuration(method, kernel, parameters | {"map": size}) for size in texels]
     for each in loaded:  # refuse unusable scenes, and maps that exceed the memory, before any work
-        prepared(read_scene(each.scene), largest)
+        prepared(read_scene(each.scene), by_size[-1])
     studied = []
     with telling(progress, "map-size") as tell:
         for at, each in enumerate(loaded):
             part = counted(part_of(tell, at / len(loaded), (at + 1) / len(loaded), before=f"{each.name}, "))
-            how: dict[str, Any] = {"kernel": kernel, "parameters": parameters, "sizes": texels, "progress": part}
-            errors = map_errors(each.scene, method, **how)
-            about = each.animation.about
-            moving = map_flicker(each.scene, method, about=about, **how, **moves) if moves else None
+            scene, reference = read_scene(each.scene), of_image(truth_image(each.scene))
+            errors = []
+            for number, chosen in enumerate(by_size):
+                part(number, len(by_size), chosen.label)
+                cell = Cell(each.name, pixels, (), chosen, Measure("none", every_metric=False))
+                row, _ = run(cell, scene, reference)
+                if row.error is None:
+                    raise InputError(f"{each.name}, {chosen.label}: {row.reason}")
+                errors.append(row.error)
+            how: dict[str, Any] = {"about": each.animation.about, "progress": part}
+            moving = map_flicker(each.scene, by_size, **how, **moves) if moves else None
             studied.append((each.name, errors, moving))
     return studied
 
 
-def _map_result(studied: list[tuple[str, Any, Any]], pixels: Any) -> Study:
+def _map_result(studied: list[tuple[str, Any, Any]], pixels: Any, texels: list[int], label: str) -> Study:
     from validation.metrics.errors import plain
+    from validation.study.maps import fitted_slope
 
-    tables, said, rows, data = [], [], [], []
+    tables, said, rows, data, drawn = [], [], [], [], []
     for name, errors, moving in studied:
-        label = errors.configuration.label
         title = f"{name}, {pixels[0]} x {pixels[1]}, {label}"
-        of_scene = [{"map": size, **vars(metrics)} for size, metrics in zip(errors.sizes, errors.metrics, strict=True)]
+        of_scene = [{"map": size, **vars(metrics)} for size, metrics in zip(texels, errors, strict=True)]
         rows += [{"scene": name, "label": label, **row} for row in of_scene]
         tables.append(table(f"{title}: error", (*numbers("map"), *_SHARES), of_scene))
-        said.append(f"{name}: the relative RMSE {_trend(errors.slope)}.")
+        order = fitted_slope(texels, [row["relative_rmse"] for row in of_scene])
+        said.append(f"{name}: the relative RMSE {_trend(*order)}.")
+        data.append({"name": name, "method": label, "errors": plain(of_scene), "order": plain(order), "flicker": None})
+        drawn.append((name, [row["relative_rmse"] for row in of_scene], *order))
         if moving is not None:
-            columns = (moving.sizes, moving.texels, moving.flicker, moving.errors)
-            tables.append(table(f"{title}: flicker of a moving light", _FLICKER, zip(*columns, strict=True)))
-            change = number(moving.truth_change, 2)
-            said.append(f"{name}: the flicker {_trend(moving.slope)}; the reference itself changes by {change}.")
-        data.append({"name": name, "method": label, "errors": plain(errors), "flicker": plain(moving)})
+            columns = (moving["texels"], moving["flicker"], moving["relative_rmse"])
+            tables.append(table(f"{title}: flicker of a moving light", _FLICKER, zip(texels, *columns, strict=True)))
+            order = fitted_slope(texels, moving["flicker"])
+            change = number(moving["truth_change"], 2)
+            said.append(f"{name}: the flicker {_trend(*order)}; the reference itself changes by {change}.")
+            data[-1]["flicker"] = plain({**moving, "order": order})
     return Study(
         name="map-size",
-        data=with_environment(size=list(pixels), scenes=data),
+        data=with_environment(size=list(pixels), maps=texels, scenes=data),
         drawn=tuple(tables),
         said=tuple(said),
         rows=tuple(rows),
-        draw=partial(_draw_maps, studied),
+        draw=partial(_draw_maps, label, texels, drawn),
     )
 
 
-def _trend(slope: Any) -> str:
+def _trend(order: float, standard_error: float) -> str:
     """Return how errors change with the size of the map, as the predicate of a sentence."""
-    if math.isnan(slope.order):
+    if math.isnan(order):
         return "follows no law: too few errors above 0"
-    spread = "" if math.isnan(slope.standard_error) else f" +- {slope.standard_error:.1g}"
-    if abs(slope.order) < 0.01:
+    spread = "" if math.isnan(standard_error) else f" +- {standard_error:.1g}"
+    if abs(order) < 0.01:
         return "does not depend on the size"
-    if slope.order < 0:
-        return f"does not fall: it grows as size^{-slope.order:.2f}{spread}"
-    return f"falls as size^-{slope.order:.2f}{spread}"
+    if order < 0:
+        return f"does not fall: it grows as size^{-order:.2f}{spread}"
+    return f"falls as size^-{order:.2f}{spread}"
 
 
-def _draw_maps(studied: list[tuple[str, Any, Any]], column: str) -> Any:
+def _draw_maps(label: str, texels: list[int], drawn: list[tuple[str, list[float], float, float]], column: str) -> Any:
     """Return the error over the size of the map, a line for each scene, with the fitted slope."""
     import numpy as np
 
@@ -303,15 +320,15 @@ def _draw_maps(studied: list[tuple[str, Any, Any]], column: str) -> Any:
     width = WIDTHS[column]
     figure = new_figure(width, 0.45 * width if column == "double" else 1.05 * width)
     panel = figure.subplots()
-    for (name, errors, _), style in zip(studied, scene_styles()):
-        sizes, values, order = np.array(errors.sizes), np.array(errors.errors), errors.slope.order
-        label = f"{name}: order {order:.2f} ± {errors.slope.standard_error:.2f}"
-        panel.plot(sizes, values, linestyle="none", label=label, **style)
+    sizes = np.array(texels)
+    for (name, errors, order, standard_error), style in zip(drawn, scene_styles()):
+        values = np.array(errors)
+        panel.plot(sizes, values, linestyle="none", label=f"{name}: order {order:.2f} ± {standard_error:.2f}", **style)
         if np.isfinite(order):
             level = np.exp(np.mean(np.log(values[values > 0]) + order * np.log(sizes[values > 0])))
             panel.plot(sizes, level * sizes**-order, color=style["color"])
-    panel.set(xscale="log", yscale="log", title=studied[0][1].configuration.label)
+    panel.set(xscale="log", yscale="log", title=label)
     panel.set(xlabel="side of the shadow map [texels]", ylabel="relative RMSE of the airlight [1]")
-    name_sizes(panel, studied[0][1].sizes)
+    name_sizes(panel, texels)
     panel.legend(loc="best")
     return figure

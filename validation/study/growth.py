@@ -26,7 +26,7 @@ from validation.clock import Timing, time_repeated
 from validation.study.configuration import Configuration, configuration, prepared
 from validation.study.frame_times import camera_rays
 from validation.study.ladders import Step
-from validation.study.maps import Slope, fitted_slope
+from validation.study.maps import fitted_slope
 from validation.study.run import REFUSALS, render
 from validation.study.study import Cell, Measure
 
@@ -136,7 +136,7 @@ def _cost(scene: Scene, step: Step, chosen: Configuration, seconds: float) -> Co
 def growth(kind: str, name: str, costs: Sequence[Cost]) -> Growth:
     """Return how one of `TIMES` grows with the work, from the costs of steps, the least work first."""
     times = [getattr(cost, name).median_ms for cost in costs]
-    fit: Slope = fitted_slope([cost.work for cost in costs], times)
+    order, standard_error = fitted_slope([cost.work for cost in costs], times)
     local = [
         (math.log(after / before) / math.log(second.work / first.work), second.work, after)
         for (first, second), (before, after) in zip(pairwise(costs), pairwise(times))
@@ -144,4 +144,4 @@ def growth(kind: str, name: str, costs: Sequence[Cost]) -> Growth:
     steepest, at, _ = max(local, default=(math.nan, math.nan, 0.0))
     most = GROWTH[kind][TIMES.index(name)] + CLIFF
     cliff = any(slope > most and time > _SHORT for slope, _, time in local)
-    return Growth(-fit.order, fit.standard_error, steepest, at, cliff)
+    return Growth(-order, standard_error, steepest, at, cliff)

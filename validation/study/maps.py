@@ -30,8 +30,8 @@ the error of a frame and falls as 1/N.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import islice
 from typing import Any
 
@@ -45,170 +45,92 @@ from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene, read_scene
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import TruthLight, TruthScene, read_truth
-from validation.estimates.quadrature import truth_image
-from validation.metrics.errors import Metrics, error_metrics
 from validation.scenes.animation import animate
 from validation.scenes.registry import Animation
-from validation.study.configuration import Configuration, configuration, prepared
+from validation.study.configuration import Configuration, prepared
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
 
-SIZES = (32, 64, 128, 256, 512, 1024, 2048, 4096)  #: of shadow maps [texels]
 
+def fitted_slope(sizes: ArrayLike, errors: ArrayLike) -> tuple[float, float]:
+    """Return the order at which errors fall with the texels along an edge of the map, and its standard error.
 
-@dataclass(frozen=True)
-class Slope:
-    """The slope of a straight line through the logarithms of errors and sizes: error ~ size^-order."""
-
-    order: float  #: NaN for fewer than two errors above 0
-    standard_error: float  #: of the order, from the scatter about the line; NaN for fewer than three errors above 0
-
-
-@dataclass(frozen=True)
-class MapErrors:
-    """Errors of the airlight by size of the shadow map."""
-
-    configuration: Configuration  #: with the parameters that all sizes share
-    sizes: tuple[int, ...]  #: [texels]
-    metrics: tuple[Metrics, ...]  #: by size, against the quadrature truth
-    slope: Slope  #: of the relative RMSE
-
-    @property
-    def errors(self) -> tuple[float, ...]:
-        """Relative RMSE by size."""
-        return tuple(error.relative_rmse for error in self.metrics)
-
-
-@dataclass(frozen=True)
-class MapFlicker:
-    """Flicker of the airlight by size of the shadow map."""
-
-    configuration: Configuration  #: with the parameters that all sizes share
-    sizes: tuple[int, ...]  #: [texels]
-    texels: tuple[float, ...]  #: by size, how many texels a shadow moves from frame to frame
-    flicker: tuple[float, ...]  #: by size, RMS of the image's change less the truth's, over the truth's mean
-    errors: tuple[float, ...]  #: by size, RMSE of all frames over the truth's mean
-    truth_change: float  #: RMS of the truth's own change over its mean
-    nonfinite: int  #: pixels that are left out, because some image has NaN or infinity there
-    slope: Slope  #: of the flicker
-
-
-def fitted_slope(sizes: ArrayLike, errors: ArrayLike) -> Slope:
-    """Return the order at which relative errors fall with the texels along an edge of the map, both (n,).
-
-    It is that of least squares of the logarithms; errors that are not positive and finite are left out.
+    Both are (n,), and the errors relative. The order is that of least squares of the logarithms, NaN for fewer than two
+    errors that are positive and finite; its standard error, from the scatter about the line, for fewer than three.
     """
     n, e = np.asarray(sizes, dtype=np.float64), np.asarray(errors, dtype=np.float64)
     counts = (e > 0) & np.isfinite(e)
     if counts.sum() < 2:
-        return Slope(math.nan, math.nan)
+        return math.nan, math.nan
     line = linregress(np.log(n[counts]), np.log(e[counts]))
-    return Slope(-float(line.slope), float(line.stderr) if counts.sum() > 2 else math.nan)
-
-
-def map_errors(
-    scene,
-    method: str,
-    *,
-    kernel: str | None = None,
-    parameters: Mapping[str, Any] | None = None,
-    sizes: Sequence[int] = SIZES,
-    progress: Progress | None = None,
-) -> MapErrors:
-    """Measure the error of a method in an `mi.Scene`, at its own size, against the size of its shadow map [texels].
-
-    Other errors of the method, such as that of the steps of a marcher, must be well below the error of the largest
-    map. A method without shadow maps is refused.
-    """
-    shared, by_size = _configurations(method, kernel, parameters, sizes)
-    read, truth = read_scene(scene), truth_image(scene).airlight
-    metrics = []
-    for number, (size, chosen) in enumerate(by_size.items()):
-        if progress is not None:
-            progress(number, len(by_size), f"{shared.label}, map {size}")
-        metrics.append(error_metrics(truth, render_frame(prepared(read, chosen)).airlight))
-    slope = fitted_slope(list(by_size), [error.relative_rmse for error in metrics])
-    return MapErrors(shared, tuple(by_size), tuple(metrics), slope)
+    return -float(line.slope), float(line.stderr) if counts.sum() > 2 else math.nan
 
 
 def map_flicker(
     scene,
-    method: str,
+    configurations: Sequence[Configuration],
     *,
-    kernel: str | None = None,
-    parameters: Mapping[str, Any] | None = None,
-    sizes: Sequence[int] = SIZES,
     frames: int = 9,
     step: float = 1e-3,
     about: tuple[float, float, float] | None = None,
     progress: Progress | None = None,
-) -> MapFlicker:
-    """Measure the flicker of the airlight under a slowly circling light, against the size of the shadow map.
+) -> dict[str, Any]:
+    """Measure the flicker of the airlight under a slowly circling light, for each size of the shadow map.
 
     Parameters
     ----------
-    scene, method, kernel, parameters, sizes, progress
-        As for `map_errors`.
+    scene
+        The `mi.Scene`, at its own size.
+    configurations
+        Of one method, each with its parameter `map`.
     frames
         Number of frames, at least 2.
     step
         By how much the light turns from frame to frame [rad], rounded to a whole fraction of a turn. As seen from the
-        light, what stands in the middle of its circle moves by this angle: `MapFlicker.texels` of 2 / size each.
+        light, what stands in the middle of its circle moves by this angle: by `texels` of 2 / size each.
     about
         A point on the axis of the circle, (3,) [m]; None: the middle of the scene.
+
+    Returns
+    -------
+    dict
+        `truth_change`, the root mean square of the change of the reference from frame to frame over its mean;
+        `nonfinite`, pixels that are left out because some image has NaN or infinity there; and lists, by
+        configuration: `texels`, by how many a shadow moves from frame to frame, `flicker`, the root mean square of the
+        change of the image less that of the reference, and `relative_rmse` of all frames, both over that mean.
 
     Raises
     ------
     InputError
-        As `map_errors`, and for fewer than two frames or a step that is not above 0 and below a radian.
+        For fewer than two frames or a step that is not above 0 and below a radian.
     """
     if frames < 2:
         raise InputError(f"frames: got {frames}, wanted at least 2: flicker is the difference between frames")
     if not 0 < step < 1:
         raise InputError(f"step: got {step:g}, wanted an angle above 0 and below 1 [rad]")
-    shared, by_size = _configurations(method, kernel, parameters, sizes)
     turn = round(2 * np.pi / step)
     read, known = read_scene(scene), read_truth(scene)
-    total = 1 + len(by_size)
+    total = 1 + len(configurations)
     if progress is not None:
         progress(0, total, "quadrature")
     truth = np.stack([_truth_of(known, moved) for moved in _frames(read, about, turn, frames)])
     images = []
-    for number, (size, chosen) in enumerate(by_size.items()):
+    for number, chosen in enumerate(configurations):
         if progress is not None:
-            progress(1 + number, total, f"{shared.label}, map {size}, moving light")
+            progress(1 + number, total, f"{chosen.label}, moving light")
         images.append(_rendered(read, chosen, _frames(read, about, turn, frames)))
     finite = np.isfinite(np.stack([truth, *images])).all(axis=(0, 1, 4))
     truth = truth[:, finite]
     errors = [image[:, finite] - truth for image in images]
     mean = float(truth.mean())
-    flicker = tuple(_rms(np.diff(error, axis=0)) / mean for error in errors)
-    return MapFlicker(
-        configuration=shared,
-        sizes=tuple(by_size),
-        texels=tuple(np.pi / turn * size for size in by_size),
-        flicker=flicker,
-        errors=tuple(_rms(error) / mean for error in errors),
-        truth_change=_rms(np.diff(truth, axis=0)) / mean,
-        nonfinite=int(np.sum(~finite)),
-        slope=fitted_slope(list(by_size), flicker),
-    )
-
-
-def _configurations(
-    method: str, kernel: str | None, parameters: Mapping[str, Any] | None, sizes: Sequence[int]
-) -> tuple[Configuration, dict[int, Configuration]]:
-    """Return the configuration that all sizes share, and that of every size."""
-    if not sizes:
-        raise InputError("sizes: got none, wanted at least one size of a shadow map, for example 512")
-    values = dict(parameters or {})
-    if "map" in values:
-        raise InputError(
-            f"parameters: got map={values['map']}, wanted it in `sizes`: this study varies the size of the map"
-        )
-    by_size = {size: configuration(method, kernel, values | {"map": size}) for size in sizes}
-    return configuration(method, kernel, values), by_size
+    return {
+        "truth_change": _rms(np.diff(truth, axis=0)) / mean,
+        "nonfinite": int(np.sum(~finite)),
+        "texels": [np.pi / turn * float(dict(chosen.parameters)["map"]) for chosen in configurations],
+        "flicker": [_rms(np.diff(error, axis=0)) / mean for error in errors],
+        "relative_rmse": [_rms(error) / mean for error in errors],
+    }
 
 
 def _frames(scene: Scene, about: tuple[float, float, float] | None, turn: int, frames: int) -> Iterator[Scene]:

@@ -84,9 +84,10 @@ def test_maps_print_errors_and_flicker_by_size(variant, capfd, monkeypatch):
     monkeypatch.setattr("reports.studies.growth._FRAMES", 2)
     arguments = ["map-size", "omni-box", "--size", "16x12", "--sizes", "32,16", "--flicker"]
     march = ["--method", "ray-march", "--set", "shadow=map", "--set", "steps=16"]
-    (scene,) = printed(capfd, *arguments, *march)["scenes"]
+    data = printed(capfd, *arguments, *march)
+    (scene,) = data["scenes"]
     assert (scene["name"], scene["method"]) == ("omni-box", "ray-march (shadow=map, steps=16)")
-    assert scene["errors"]["sizes"] == scene["flicker"]["sizes"] == [16, 32]
-    assert all(metrics["relative_rmse"] > 0 for metrics in scene["errors"]["metrics"])
+    assert data["maps"] == [metrics["map"] for metrics in scene["errors"]] == [16, 32]
+    assert all(metrics["relative_rmse"] > 0 for metrics in scene["errors"])
     assert all(value > 0 for value in scene["flicker"]["flicker"])
     assert scene["flicker"]["truth_change"] > 0
