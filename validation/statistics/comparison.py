@@ -294,7 +294,7 @@ def _largest(difference: Array, mean: float) -> float:
     return float(np.abs(difference).max(initial=0.0)) / mean if mean > 0 else float("nan")
 
 
-def _block_tests(expected: _Side, tested: _Side, family_level: float) -> dict[str, int]:
+def _block_tests(expected: _Side, tested: _Side, family_level: float) -> dict[str, Any]:
     """Test the sums over blocks of pixels."""
     difference = _block_sums(np.where(np.hypot(expected.error, tested.error) > 0, tested.mean - expected.mean, 0.0))
     variance = _block_sums(expected.error**2 + tested.error**2)
@@ -357,9 +357,9 @@ def _side(name: str, estimate: Estimate, chosen: NDArray[np.bool_], *, scale: fl
 
 def _relative_bias(reference: _Side, test: _Side, pixels: int) -> dict[str, Any]:
     """Pool the error of all pixels into one relative bias; everything is NaN if the reference is not bright."""
-    names = ("relative_bias_se", "relative_bias_freedom", "relative_bias_p")
-    names += ("reference_variance_share", "largest_share", "detectable_bias")
-    found: dict[str, Any] = dict.fromkeys(("relative_bias", *names), np.nan)
+    numbers = ("relative_bias", "relative_bias_se", "relative_bias_freedom", "relative_bias_p")
+    found: dict[str, Any] = dict.fromkeys(numbers, np.nan)
+    found |= dict.fromkeys(("reference_variance_share", "largest_share", "detectable_bias"), np.nan)
     found |= {"relative_bias_ci": (np.nan, np.nan), "relative_bias_ci_batches": None}
     bright = float(reference.mean.sum())
     if not bright > 0:
