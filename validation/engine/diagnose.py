@@ -34,7 +34,7 @@ from validation.engine.faults import faults_of
 from validation.engine.judged_layer import JudgedLayer, judged_layer
 from validation.engine.prediction import Predictor, SceneLight
 from validation.engine.search import Explanation, begin, explain
-from validation.engine.seen import Progress, layers_of, pixel_kinds, scene_of_size, seen_image
+from validation.engine.seen import Progress, best_kind, layers_of, pixel_kinds, scene_of_size, seen_image
 from validation.metrics.errors import plain
 from validation.scenes.loading import LoadedScene
 
@@ -172,19 +172,19 @@ def diagnose_image(
     light
         Of this scene, as other images of it have found it.
     """
-    kinds = pixel_kinds(image, pixel)
     judged = judged or judged_layer(image, path, name=layer, holds=holds)
     seen, wrong = seen_image(image, judged, loaded.scene)
     if not seen.used.any():
         raise InputError(f"{path}: the layer '{judged.name}' has no finite value; there is nothing to diagnose")
     light = light or SceneLight(seen.truth)
     shape = judged.size[1], judged.size[0]
-    begun = []
-    for kind in kinds:
+
+    def begun(kind: str) -> _Attempt:
         attempt = _Attempt(Predictor(replace(seen, area=kind == "area"), shape, light), kind, progress)
         attempt.try_faults(0)
-        begun.append(attempt)
-    attempt = min(begun, key=lambda each: each.chosen.error)
+        return attempt
+
+    attempt = best_kind(pixel_kinds(image, pixel), begun, lambda each: each.chosen.error)
     attempt.go_on()
     chosen, rows = attempt.ranked()
     rest = attempt.rest(chosen)
@@ -199,7 +199,7 @@ def diagnose_image(
         chosen.error,
         rest,
         "" if rest else place_words(attempt.predictor, chosen),
-        () if wrong is None else (str(wrong),),
+        wrong,
     )
 
 

@@ -40,7 +40,7 @@ from validation.comparison.images import BATCHES, Comparison, compare_images, re
 from validation.engine.error_place import ErrorPlace, error_place
 from validation.engine.hints import GAIN, OUTLIERS, Hints, find_hints
 from validation.engine.judged_layer import KINDS, JudgedLayer, expected_layer, judged_layer
-from validation.engine.seen import PIXELS, Progress, scene_of_size
+from validation.engine.seen import Progress, pixel_kinds, scene_of_size
 from validation.estimates.agreement import pixel_angle
 from validation.estimates.quadrature import truth_image
 from validation.estimates.reference_layers import reference_error, reference_layer
@@ -213,7 +213,8 @@ def compare_scene(
     layer, holds
         The layer to judge and what it holds, see `validation.engine.judged_layer.judged_layer`.
     pixel
-        'centre' or 'area', see `reference.quadrature.image.quadrature_image`; by default what fits.
+        'centre' or 'area', see `reference.quadrature.image.quadrature_image`; by default what the image says of itself,
+        or what fits.
     mask, all_metrics, flip, exposure
         See `validation.comparison.images.compare_files`.
     margin
@@ -265,13 +266,12 @@ def judge_image(
     """
     if margin is not None and not 0 < margin < math.inf:
         raise InputError(f"margin: got {margin}, wanted a relative bias above 0, such as 0.005")
-    if pixel is not None and pixel not in PIXELS:
-        raise InputError(f"pixel: got {pixel}, wanted 'centre' or 'area'")
+    kinds = pixel_kinds(image, pixel)
     if mask is not None and np.shape(mask) == judged.values.shape[:2]:
         judged = replace(judged, values=np.where(np.asarray(mask)[:, :, None], judged.values, np.nan))
-    fit = fit_pixel(judged, truth_of, pixel)
+    fit = fit_pixel(judged, truth_of, kinds)
     # Light of another kind says nothing of the pixels: either reference may fit it.
-    other = _other_light(judged, [truth_of(each) for each in ((fit.pixel,) if pixel else ("centre", fit.pixel))])
+    other = _other_light(judged, [truth_of(each) for each in (kinds[0], fit.pixel)])
     fit = replace(fit, hints=replace(fit.hints, words=(*fit.hints.words, *other)))
     name, with_errors = judged.name, f"{judged.name}_se" in image.layers
     layers = {name: image.layers[name]} | ({f"{name}_se": image.layers[f"{name}_se"]} if with_errors else {})
@@ -356,19 +356,19 @@ def _mean_square(values: NDArray[np.floating]) -> float:
     return float(np.mean(finite**2)) if finite.size else math.inf
 
 
-def fit_pixel(image: JudgedLayer, truth_of: TruthOf, pixel: str | None = None) -> PixelFit:
+def fit_pixel(image: JudgedLayer, truth_of: TruthOf, kinds: Sequence[str]) -> PixelFit:
     """Return the truth that fits an image.
 
     Parameters
     ----------
     truth_of
         Computes a truth; asked for the means only if the image does not fit the centres to `_EXACT`.
-    pixel
-        'centre' or 'area' where it is known; by default what fits.
+    kinds
+        What its pixels may be, see `validation.engine.seen.pixel_kinds`.
     """
-    if pixel is not None:
-        truth = truth_of(pixel)
-        return PixelFit(pixel, truth, find_hints(expected_layer(truth, image), image.values), None, None)
+    if len(kinds) == 1:
+        truth = truth_of(kinds[0])
+        return PixelFit(kinds[0], truth, find_hints(expected_layer(truth, image), image.values), None, None)
     at_centre = truth_of("centre")
     centre = expected_layer(at_centre, image)
     hints = find_hints(centre, image.values)

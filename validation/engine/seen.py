@@ -2,9 +2,9 @@
 """An image that is to be explained: its values, which pixels take part, and what a fog makes of these."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 Progress = Callable[[float, str], None]
+Found = TypeVar("Found")  #: what an attempt at an image is
 
 PIXELS = ("centre", "area")  #: what a pixel may be: the radiance at its centre, or the mean over its area
 
@@ -87,23 +88,10 @@ class Seen:
         return np.asarray(np.union1d(pixels, partners[self.used[partners]]), dtype=np.int64)
 
 
-@dataclass(frozen=True)
-class NotFinite:
-    """Pixels of an image that are NaN or infinite."""
-
-    count: int
-    column: int  #: of the first
-    row: int
-
-    def __str__(self) -> str:
-        many = f"{self.count} pixels are" if self.count > 1 else "1 pixel is"
-        return f"{many} NaN or infinite, the first in column {self.column}, row {self.row}, and left out"
-
-
 def seen_image(
     image: Image, judged: JudgedLayer, scene: Any, *, mask: Bools | None = None
-) -> tuple[Seen, NotFinite | None]:
-    """Return a layer of an image as what is to be explained, and which of its pixels are not finite.
+) -> tuple[Seen, tuple[str, ...]]:
+    """Return a layer of an image as what is to be explained, and what is wrong with the file: pixels not finite.
 
     Neither a fit nor a diagnosis explains an area light itself, whose radiance no fog makes: pixels that show one take
     no part, nor do those beside it, nor those that a file does not hold or a mask leaves out.
@@ -125,10 +113,13 @@ def seen_image(
     if (truth.area or truth.background is not None) and judged.holds == TOTAL and judged.emitted:
         lit = emitted_light(truth, surface_hits(truth).distance).any(axis=1).reshape(truth.height, truth.width)
         used &= ~binary_dilation(lit, np.ones((3, 3), dtype=bool)).ravel()
-    wrong = np.flatnonzero(~finite)
-    row, column = divmod(int(wrong[0]), truth.width) if len(wrong) else (0, 0)
     seen = Seen(truth, values, judged.holds, np.asarray(used), samples=needed_samples(truth))
-    return seen, NotFinite(len(wrong), column, row) if len(wrong) else None
+    wrong = np.flatnonzero(~finite)
+    if not len(wrong):
+        return seen, ()
+    row, column = divmod(int(wrong[0]), truth.width)
+    many = f"{len(wrong)} pixels are" if len(wrong) > 1 else "1 pixel is"
+    return seen, (f"{many} NaN or infinite, the first in column {column}, row {row}, and left out",)
 
 
 def layers_of(image: Image, path: str, name: str | None, holds: str | None) -> tuple[JudgedLayer, ...]:
@@ -148,6 +139,18 @@ def pixel_kinds(image: Image, pixel: str | None) -> tuple[str, ...]:
     if "airlight:method" in image.attributes:
         return ("centre",)
     return ("area",) if "airlight:spp" in image.attributes else PIXELS
+
+
+def best_kind(
+    kinds: Sequence[str], attempt: Callable[[str], Found], error: Callable[[Found], float], exact: float = 0.0
+) -> Found:
+    """Return the attempt at an image that leaves least of all kinds of pixels; one that leaves `exact` is the last."""
+    found: list[Found] = []
+    for kind in kinds:
+        found.append(attempt(kind))
+        if error(found[-1]) < exact:
+            break
+    return min(found, key=error)
 
 
 def needed_samples(truth: TruthScene) -> int:

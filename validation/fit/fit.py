@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from reference.storage.exr import Image
 from validation.engine.judged_layer import judged_layer
-from validation.engine.seen import Progress, Seen, at_places, pixel_kinds, seen_image
+from validation.engine.seen import Progress, Seen, at_places, best_kind, pixel_kinds, seen_image
 from validation.fit.confounding import Confounded, Group, confounded, confounded_groups
 from validation.fit.solve import (
     SIGMAS,
@@ -169,16 +169,14 @@ def fit_image(
             f"{path}: {int(seen.used.sum())} pixels of the layer '{judged.name}' say something; wanted at least "
             f"{fewest}, finite, not cut off at the brightest value, and left by the mask"
         )
-    results = []
-    for number, kind in enumerate(kinds):
-        tell = None if progress is None else _stage(progress, number, len(kinds))
-        results.append((kind, *_solved(replace(seen, area=kind == "area"), unknowns, tell)))
-        if _wrong(results[-1][3]) < _EXACT:
-            break
-    kind, model, groups, solution, unknowns = min(results, key=lambda result: _wrong(result[3]))
+
+    def solved(kind: str) -> tuple[str, ImageModel, tuple[Group, ...], Solution, tuple[Unknown, ...]]:
+        tell = None if progress is None else _stage(progress, kinds.index(kind), len(kinds))
+        return kind, *_solved(replace(seen, area=kind == "area"), unknowns, tell)
+
+    kind, model, groups, solution, unknowns = best_kind(kinds, solved, lambda each: _wrong(each[3]), _EXACT)
     fit = _fit((loaded.name, path, judged.holds, kind), model, groups, solution, unknowns)
-    failures = () if wrong is None else (str(wrong),)
-    return replace(fit, seconds=time.perf_counter() - started, failures=failures)
+    return replace(fit, seconds=time.perf_counter() - started, failures=wrong)
 
 
 def _cut_off(seen: Seen) -> NDArray[np.bool_]:
