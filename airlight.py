@@ -54,7 +54,7 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from reports.studies.registry import study as study
     from validation.certified.files import certified_data as certified_data
     from validation.estimates.budget import Budget as Budget
-    from validation.estimates.multiple_scattering import multiple_scattering_share as multiple_scattering_share
+    from validation.estimates.multiple_scattering import multiple_scattering_fraction as multiple_scattering_fraction
     from validation.metrics.errors import error_metrics as error_metrics
     from validation.scenes.registry import SCENES as SCENES
     from validation.study.configuration import configuration as configuration
@@ -94,7 +94,7 @@ _API = {
     "time_frame": "validation.study.frame_times",
     "error_metrics": "validation.metrics.errors",
     "Budget": "validation.estimates.budget",
-    "multiple_scattering_share": "validation.estimates.multiple_scattering",
+    "multiple_scattering_fraction": "validation.estimates.multiple_scattering",
     "certified_data": "validation.certified.files",
     "read_exr": "reference.storage.exr",
     "write_exr": "reference.storage.exr",

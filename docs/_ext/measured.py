@@ -127,7 +127,7 @@ def _scene(record: Any, kept: dict[str, Any] | None) -> str:
         lights = kept["plan"]["lights"]
         words.append(f"- {count['shapes']} shapes, {count['triangles']} triangles, lights: {lights}.")
         words.append(f"- Medium: {kept['plan']['medium']}; extinction: {kept['plan']['extinction']}.")
-        truth = kept["truth"]
+        truth = kept["reference"]
         if truth["relative_bound"] is not None:
             bound = number(truth["relative_bound"], 2)
             words.append(f"- Reference: mean airlight {number(truth['mean'])} W/(m^2 sr), relative bound {bound}.")

@@ -49,7 +49,7 @@ def _caption(present: dict[str, dict[str, Any]]) -> str:
         return f"What it renders, `{rendered['command']}`."
     text = (
         f"what it renders, `{rendered['command']}`, and its error: blue where it is too dark, red where it is too "
-        f"bright, white below 1e-4 of the truth, full colour from 1 on; relative RMSE "
+        f"bright, white below 1e-4 of the reference, full colour from 1 on; relative RMSE "
         f"{number(error['relative_rmse'], 2)}."
     )
     if "sketch" not in present:

@@ -60,7 +60,7 @@ _METHOD_SCENES = {
     "cloud-octaves": ("cumulus", ()),
     "cloud-collectors": ("stratocumulus", ()),
 }
-#: Methods without a map of their errors: the truth of clouds takes hours without noise.
+#: Methods without a map of their errors: the reference of clouds takes hours without noise.
 _NO_ERROR = ("cloud-octaves", "cloud-collectors")
 #: Clouds in other lights, by `cloud-collectors`: the scene, and what is changed in it.
 _VIEWS = {
@@ -171,7 +171,7 @@ def _pixels(picture: Picture) -> tuple[Pixels, dict[str, Any]]:
         return _rendered(picture, SIZE), {}
     if picture.kind == "method":
         return _rendered(picture, SMALL), {}
-    # The truth of a light with extent takes minutes: a third of the pixels along each side, drawn larger.
+    # The reference of a light with extent takes minutes: a third of the pixels along each side, drawn larger.
     coarser = COARSER if read_scene(load_scene(picture.scene, (8, 6)).scene).area_lights else 1
     loaded, frame = _frame(picture, (SMALL[0] // coarser, SMALL[1] // coarser))
     truth = truth_image(loaded.scene).airlight

@@ -32,7 +32,7 @@ def take_picture(path: Path) -> None:
             page.select_option("#beside", "error")
             page.locator("#wipe").fill("60")
             try:
-                page.wait_for_selector("html[data-truth=done]", timeout=_PATIENCE)
+                page.wait_for_selector("html[data-reference=done]", timeout=_PATIENCE)
                 page.wait_for_selector("#other[data-known='1']")
             except TimeoutError:
                 print("the truth is not whole: the machine has other work", file=sys.stderr)

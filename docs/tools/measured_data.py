@@ -2,8 +2,8 @@
 """What the documentation takes from a report: `python docs/tools/measured_data.py [--report DIR] [--kernels FILE]`.
 
 It writes the table of the README and `docs/data/report.json`: `report` (when, by which command, on which machine),
-`claims`, `scenes` (each with `counts`, `truth`, `multiple` and `methods`) and `kernels` (costs and errors of `airlight
-bench --kernels`, or null).
+`claims`, `scenes` (each with `counts`, `reference`, `multiple` and `methods`) and `kernels` (costs and errors of
+`airlight study kernels`, or null).
 """
 
 import argparse
@@ -97,7 +97,7 @@ def _kept_scene(scene: dict[str, Any]) -> dict[str, Any]:
         "size": scene["size"],
         "plan": scene["plan"],
         "counts": counts(scene["name"]),
-        "truth": scene["truth"],
+        "reference": scene["reference"],
         "multiple": scene["multiple"],
         "methods": [_kept_method(entry) for entry in built_in],
     }

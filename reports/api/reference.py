@@ -190,14 +190,14 @@ def _elsewhere(
     orders: str | None,
 ) -> Any:
     """Let workers compute what is not in the cache: a quadrature at once, batches as they are asked for."""
-    from reports.cluster.references import Picture, bring_truths, tracing
+    from reports.cluster.references import Picture, bring_references, tracing
     from validation.estimates.budget import batch_plan
     from validation.estimates.images import cloud_orders
 
     width, height = (int(side) for side in loaded.scene.sensors()[0].film().size())
     picture = Picture.of(str(loaded.path.resolve() if loaded.path else loaded.name), (width, height), changes)
     if budget is None:
-        bring_truths(workers, [picture], pixel=pixel)
+        bring_references(workers, [picture], pixel=pixel)
         return None
     batches, samples = batch_plan(budget, width * height)
     known = None if budget.samples is None else batches

@@ -287,7 +287,7 @@ def _measured(
 
 def _done(data: Mapping[str, Any]) -> str:
     """Say how long it took, and how much of it had been measured before."""
-    seconds, kept, computed = data["seconds"], data["kept"], data["computed"]
+    seconds, kept, computed = data["seconds"], data["cached"], data["computed"]
     if not kept:
         return f"{computed} results in {seconds:.0f} s"
     when = data["measured"]

@@ -3,7 +3,7 @@
 
 Arrays are (height, width, 3) of linear RGB radiance [W/(m^2 sr)], the first row at the top, and read-only. They keep
 the precision of what made them: float32 from a method in single precision, float64 from one in double and from the
-truth, whose error is far below what float32 can hold; `.numpy(numpy.float32)` converts.
+reference, whose error is far below what float32 can hold; `.numpy(numpy.float32)` converts.
 """
 
 import math
@@ -243,8 +243,8 @@ class Rendering(LayeredImage):
                 f"  {ms['frame']} a frame ({rate_words(self.times.frame.median_ms)}): surface {ms['surface']}, "
                 f"airlight {ms['airlight']}",
                 f"  {ms['light_moved']} after the light moved, {ms['objects_moved']} after objects moved",
-                f"  camera rays cached: {ms['light_moved_camera_kept']} after the light moved, {ms['colours_changed']} "
-                "after only medium or colours changed",
+                f"  camera rays cached: {ms['light_moved_camera_cached']} after the light moved, "
+                f"{ms['colours_changed']} after only medium or colours changed",
                 f"  {self.device}",
             ]
         data = self.to_dict()

@@ -104,7 +104,7 @@ def _from_mitsuba(scene: Any) -> OpenScene:
         raise InputError("scene: it has no sensor; add one of the type 'perspective'")
     name_shapes(scene)
     check_numbers(scene)
-    return OpenScene("scene", scene, "The user's own scene.", "")
+    return OpenScene("scene", scene, "The user's scene.", "")
 
 
 @one_error

@@ -50,7 +50,7 @@ class SweepRun(Result):
     def lines(self) -> Sequence[str]:
         """The counts, the problems and what to do next."""
         said = self.summary
-        lines = [self.title, f"  {said['kept']} were there, {said['computed']} computed, {said['left']} left"]
+        lines = [self.title, f"  {said['cached']} were there, {said['computed']} computed, {said['left']} left"]
         lines += [f"  {said['timed_alone']} timed alone"] if said["timed_alone"] else []
         lines += [f"  {status}: {number}" for status, number in sorted(said["counts"].items())]
         for each in said["problems"]:
@@ -208,7 +208,7 @@ def _run(
         "study": study.name,
         "scenes": study.scene_count,
         "cells": total,
-        "kept": total - parts[0]["missing"],
+        "cached": total - parts[0]["missing"],
         "computed": sum(counts.values()) - counts["lost"],
         "timed_alone": parts[1]["counts"]["done"] if len(parts) > 1 else 0,
         "counts": dict(counts),

@@ -26,7 +26,7 @@ from validation.properties.properties import scene_properties
 from validation.scenes.loading import LoadedScene
 from validation.study.keys import Made, cell_key, row_source
 from validation.study.reference import Reference, cell_reference, load_cell
-from validation.study.row import FRAME_MS, NO_TRUTH, Origin, row_values
+from validation.study.row import FRAME_MS, NO_REFERENCE, Origin, row_values
 from validation.study.rows import RowStore
 from validation.study.run import cell_row, render, run
 from validation.study.study import Cell, Study
@@ -117,7 +117,7 @@ def _group(study: Study, cells: dict[str, Cell]) -> Group:
     image = next(iter(cells.values())).image
     words = " ".join((image.scene, *image.medium, f"{image.size[0]}x{image.size[1]}"))
     tasks = tuple(Task(key, row_of, (cell, key), study.limit) for key, cell in cells.items())
-    return Group(tasks, Task(f"{NO_TRUTH}{words}", reference_of, (image,), study.limit))
+    return Group(tasks, Task(f"{NO_REFERENCE}{words}", reference_of, (image,), study.limit))
 
 
 @lru_cache(maxsize=1)
@@ -150,7 +150,7 @@ def _origin() -> Origin:
 
 
 def _picture(truth: NDArray[np.float64], test: NDArray[np.float64]) -> bytes:
-    """Return truth, image and error side by side as WebP."""
+    """Return reference, image and error side by side as WebP."""
     factor = exposure(truth)
     parts = [tone_mapped(truth, factor), tone_mapped(test, factor), error_map(truth, test)]
     shown = Image.fromarray(np.concatenate(parts, axis=1))

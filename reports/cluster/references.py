@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Truths and batches of references from a cluster: the cache of this machine gets them, and the rest is as without.
+"""References and batches of references from a cluster: the cache of this machine gets them, and the rest is as without.
 
 So the bytes of a file do not depend on where its numbers were computed. What workers did not bring, whatever became of
 them, is computed here.
@@ -26,7 +26,7 @@ from validation.estimates.quadrature import has_truth, keep_truth, truth_image
 from validation.scenes.loading import load_scene
 from validation.study.keys import Made, made_here
 
-_LIMIT = 6 * 3600.0  # of a truth or a batch [s]
+_LIMIT = 6 * 3600.0  # of a reference or a batch [s]
 _WAVE = 8  # batches that are asked for at once by worker, where their number is not known before
 
 
@@ -48,14 +48,14 @@ class Picture:
         return load_scene(self.scene, self.size, dict(self.changes)).scene
 
 
-def bring_truths(
+def bring_references(
     cluster: Cluster,
     pictures: Sequence[Picture],
     *,
     pixel: str = "centre",
     told: Callable[[int, int], None] = lambda done, total: None,
 ) -> None:
-    """Let workers compute the quadrature truths of scenes that are not in the cache, and keep them here.
+    """Let workers compute the quadrature references of scenes that are not in the cache, and keep them here.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def bring_truths(
         Called with (done, all) after each.
     """
     lacking = [picture for picture in pictures if not has_truth(picture.load(), pixel=pixel)]
-    named = {f"truth {number}": picture for number, picture in enumerate(lacking)}
+    named = {f"reference {number}": picture for number, picture in enumerate(lacking)}
     given = pixel, fresh_since()
     groups = [Group((Task(name, _truth, (picture, *given), _LIMIT),)) for name, picture in named.items()]
     for number, outcome in enumerate(run_groups(cluster, groups, made=_made()), 1):
@@ -118,7 +118,7 @@ def tracing(
 
 
 def spread(cluster: Cluster, picture: Picture) -> ElsewhereFor:
-    """Return what lets workers trace the batches that check a truth."""
+    """Return what lets workers trace the batches that check a reference."""
     return lambda estimator, samples, counts: tracing(cluster, picture, estimator, samples=samples, counts=counts)
 
 

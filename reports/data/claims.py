@@ -3,7 +3,7 @@
 
 A claim is {"kind", "text", "good"}: `good` is true or false for what is a verdict, null for what is a fact. The kinds:
 
-    truth          whether an estimator confirms the truth, with its margin and the worst of its intervals
+    reference          whether an estimator confirms the reference, with its margin and the worst of its intervals
     left-out       the light that single scattering leaves out
     image          the errors of an engine's images
     failed         values that are not finite or negative, lit intervals on which shadow rays disagree
@@ -62,7 +62,7 @@ def growth_claims(records: Sequence[Mapping[str, Any]]) -> list[Claim]:
 
 
 def confirmed(scenes: Scenes) -> bool:
-    """Return whether no comparison speaks against the truth, and each layer is confirmed by at least one."""
+    """Return whether no comparison speaks against the reference, and each layer is confirmed by at least one."""
     for scene in scenes:
         compared = list(scene["agreement"].values())
         if any(verdict(entry) is False for entry in compared):
@@ -84,11 +84,11 @@ def _methods(scenes: Scenes, *, images: bool = False) -> list[tuple[str, Mapping
 
 
 def _trust(scenes: Scenes) -> list[Claim]:
-    """Return a claim for each estimator that checked the truth."""
+    """Return a claim for each estimator that checked the reference."""
     compared = [(scene["name"], entry) for scene in scenes for entry in scene["agreement"].values()]
     if not compared:
         text = "There is no light to compare with Mitsuba's volpath: no airlight and no lit surface in any scene."
-        return [_claim("truth", text)]
+        return [_claim("reference", text)]
     estimators = dict.fromkeys(entry["estimator"] for _, entry in compared)
     return [_verdict(_WORDS[name], [pair for pair in compared if pair[1]["estimator"] == name]) for name in estimators]
 
@@ -98,10 +98,10 @@ def _verdict(words: str, compared: list[tuple[str, Mapping[str, Any]]]) -> Claim
     margin = 100 * compared[0][1]["statistics"]["margin"]
     if against:
         text = (
-            f"The truth is NOT confirmed within {margin:g} % by {words} in {', '.join(against)}: there the 95 % "
+            f"The reference is NOT confirmed within {margin:g} % by {words} in {', '.join(against)}: there the 95 % "
             "interval of the relative bias is not inside the margin."
         )
-        return _claim("truth", text, False)
+        return _claim("reference", text, False)
     open_ = [f"{name} ({entry['layer']})" for name, entry in compared if verdict(entry) is None]
     good = [pair for pair in compared if verdict(pair[1])]
     text = ""
@@ -109,8 +109,8 @@ def _verdict(words: str, compared: list[tuple[str, Mapping[str, Any]]]) -> Claim
         name, worst = max(good, key=lambda pair: worst_interval([pair[1]])[1])
         low, high = (100 * end for end in worst["statistics"]["relative_bias_ci"])
         text = (
-            f"The truth is confirmed by {words} in {len(good)} of {len(compared)} comparisons: every 95 % interval of "
-            f"the pooled relative bias lies within ±{margin:g} %; the worst is {low:+.2g}..{high:+.2g} %, in {name} "
+            f"The reference is confirmed by {words} in {len(good)} of {len(compared)} comparisons: every 95 % interval "
+            f"of the pooled relative bias lies within ±{margin:g} %; the worst is {low:+.2g}..{high:+.2g} %, in {name} "
             f"({worst['layer']})."
         )
     if open_:
@@ -118,12 +118,12 @@ def _verdict(words: str, compared: list[tuple[str, Mapping[str, Any]]]) -> Claim
             f"By {words} it is not decided within the time in {', '.join(open_)}: the 95 % interval is not narrow "
             f"enough there for a margin of ±{margin:g} %."
         )
-    return _claim("truth", text, None if open_ else True)
+    return _claim("reference", text, None if open_ else True)
 
 
 def _left_out(scenes: Scenes) -> Claim:
     shares = "; ".join(f"{scene['name']} {100 * scene['multiple']['medium']['value']:.2g} %" for scene in scenes)
-    text = f"Every method here scatters once. The share of the airlight that this leaves out: {shares}."
+    text = f"Every method here scatters once. The fraction of the airlight that this leaves out: {shares}."
     return _claim("left-out", text)
 
 
@@ -150,10 +150,12 @@ def _failed(scenes: Scenes) -> Iterator[Claim]:
         peers = [_pixels(name, m, count) for name, m in wrong if published_as(m)]
         if peers:
             yield _claim("published", f"As the papers have it, images with {words}: {'; '.join(peers)}.")
-    left = [f"{scene['name']} ({scene['truth']['left']})" for scene in scenes if scene.get("truth", {}).get("left")]
+    left = [
+        f"{scene['name']} ({scene['reference']['left']})" for scene in scenes if scene.get("reference", {}).get("left")
+    ]
     if left:
-        text = f"Random shadow rays disagree with lit intervals, and were not settled: {'; '.join(left)} of them."
-        yield _claim("failed", text + " They are counted in the bound of the truth.", False)
+        text = f"Random shadow rays disagree with lit intervals, and were not resolved: {'; '.join(left)} of them."
+        yield _claim("failed", text + " They are counted in the bound of the reference.", False)
 
 
 def _pixels(scene: str, m: Mapping[str, Any], count: str) -> str:

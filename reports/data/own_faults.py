@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What methods of the user's own did wrong, found in the rows of a report."""
+"""What user methods did wrong, found in the rows of a report."""
 
 from collections.abc import Mapping
 from typing import Any
 
 
 def own_fault(method: str, refused: str | None) -> str | None:
-    """Return what a method of the user's own did wrong: what it refuses by name is a result, its faults are not.
+    """Return what a user method did wrong: what it refuses by name is a result, its faults are not.
 
     They are in the words of `realtime.methods.user_method` and `reports.machine.own_process`, which begin with the name
     of the method.
@@ -15,6 +15,6 @@ def own_fault(method: str, refused: str | None) -> str | None:
 
 
 def own_faults(data: Mapping[str, Any]) -> list[str]:
-    """Return what methods of the user's own did wrong in a whole report, each once."""
+    """Return what user methods did wrong in a whole report, each once."""
     rows = (row for scene in data["scenes"] for row in scene["methods"] if row["kind"] == "function")
     return list(dict.fromkeys(filter(None, (own_fault(row["method"], row["refused"]) for row in rows))))

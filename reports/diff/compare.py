@@ -144,13 +144,15 @@ def _incomparable(old: Report, new: Report) -> Finding | None:
     if old["size"] != new["size"]:
         sizes = " and ".join("x".join(map(str, scene["size"])) for scene in (old, new))
         return Finding("note", old["name"], "", f"errors not compared: the images are {sizes} pixels")
-    before, after = (scene["truth"]["mean"] for scene in (old, new))
+    before, after = (scene["reference"]["mean"] for scene in (old, new))
     if before is None or after is None:
         return None
     # Each bound limits the mean absolute error, so the means differ by at most the sum of both bounds.
-    bounds = sum(scene["truth"].get("relative_bound") or 0.0 for scene in (old, new))
+    bounds = sum(scene["reference"].get("relative_bound") or 0.0 for scene in (old, new))
     if abs(after - before) > (bounds + FLOORS["mean"]) * abs(before):
-        words = "the truth moved (mean radiance): another scene by this name, or another truth; errors not compared"
+        words = (
+            "the reference moved (mean radiance): another scene by this name, or another reference; errors not compared"
+        )
         return Finding("worse", old["name"], "", words, before, after)
     return None
 
@@ -190,22 +192,22 @@ def _flip(old: Report, new: Report, tolerance: float) -> tuple[list[Change], int
 
 
 def _reference(old: Report, new: Report, gone: str) -> Iterator[Finding]:
-    """Compare the truth of a scene in two reports."""
+    """Compare the reference of a scene in two reports."""
     name = old["name"]
     if not confirmed([new]) and confirmed([old]):
-        yield Finding("worse", name, "", "the truth is no longer confirmed")
+        yield Finding("worse", name, "", "the reference is no longer confirmed")
     elif confirmed([new]) and not confirmed([old]):
-        yield Finding("better", name, "", "the truth is confirmed now")
+        yield Finding("better", name, "", "the reference is confirmed now")
     for key, agreement in old["agreement"].items():
         if key not in new["agreement"]:
             yield Finding(gone, name, "", f"the comparison with {key} is gone")
         elif verdict(agreement) is True and verdict(new["agreement"][key]) is None:
-            yield Finding("note", name, "", f"{key} ran out of time before it could confirm the truth")
+            yield Finding("note", name, "", f"{key} ran out of time before it could confirm the reference")
     if old["size"] == new["size"]:
         for key in ("disagreements", "left"):
-            before, after = old["truth"].get(key), new["truth"].get(key)
+            before, after = old["reference"].get(key), new["reference"].get(key)
             if before is not None and after is not None and after > before:
-                yield Finding("worse", name, "", f"lit intervals of the truth: {key}", before, after)
+                yield Finding("worse", name, "", f"lit intervals of the reference: {key}", before, after)
 
 
 def _whole(old: Report, new: Report) -> Iterator[Finding]:

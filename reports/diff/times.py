@@ -44,7 +44,7 @@ def compare_times(old: Report, new: Report, *, tolerance: float | None) -> TimeC
     notes = [Finding("note", "", "", change) for change in changes]
     if tolerance is None:
         return TimeComparison(0, machine, changes, 1.0, 1.0, 1.0, tuple(notes))
-    kept = new.get("kept")
+    kept = new.get("cached")
     if kept:
         notes.append(Finding("note", "", "", f"{kept} results of the new report were measured earlier and kept"))
     pairs, otherwise = _pairs(old, new)

@@ -88,7 +88,7 @@ def latex_table(scenes: Sequence[Mapping[str, Any]]) -> str:
     )
     tables = []
     for scene in scenes:
-        bound = (scene["truth"] or {}).get("relative_bound")
+        bound = (scene["reference"] or {}).get("relative_bound")
         known = f", reference known to {number(bound, 2, zeros=True)}" if bound else ""
         about = "{} \N{MULTIPLICATION SIGN} {}".format(*scene["size"]) + known
         rows = [_latex_row(entry) for entry in scene["methods"]]

@@ -73,7 +73,7 @@ def write_gltf(path: Path, loaded: LoadedScene) -> dict[str, Any]:
     Raises
     ------
     InputError
-        For a scene without a truth, a shape that cannot be made a mesh, and a file that cannot be written.
+        For a scene without a reference, a shape that cannot be made a mesh, and a file that cannot be written.
     """
     described = describe_scene(loaded)
     truth = read_truth(loaded.scene)

@@ -61,7 +61,7 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
     Raises
     ------
     InputError
-        For a scene without a truth, with the name of what is in the way.
+        For a scene without a reference, with the name of what is in the way.
     """
     notes = read_scene(loaded.scene).features.notes  # it refuses what `render` refuses, in its words
     truth = read_truth(loaded.scene)

@@ -121,7 +121,7 @@ def find_llvm(folders: Iterable[Path] | None = None) -> list[Llvm]:
     Returns
     -------
     list of Llvm
-        The user's own setting first, then those that work, then the newest.
+        The user's setting first, then those that work, then the newest.
     """
     setting = os.environ.get(LLVM_VARIABLE)
     seen: dict[str, Llvm] = {}

@@ -16,7 +16,7 @@ _PLAIN_EVERY = 10.0  # seconds between the lines of a plain stream
 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Progress]:
-    """Yield a function (share done, what) that shows how far the work is.
+    """Yield a function (fraction done, what) that shows how far the work is.
 
     Work that ends within two seconds shows nothing.
     """
@@ -34,7 +34,7 @@ def part_of(progress: Progress | None, first: float, last: float, *, before: str
     progress
         Callback of the whole work, or None.
     first, last
-        What share of the work is done when the part begins and when it ends.
+        What fraction of the work is done when the part begins and when it ends.
     before
         Put before what comes next.
     """

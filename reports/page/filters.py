@@ -10,7 +10,7 @@ from reports.tables.table import number as plain_number
 
 #: Kinds of claims as the page names them.
 KINDS = {
-    "truth": "Truth",
+    "reference": "Reference",
     "left-out": "Left out",
     "image": "Engine",
     "failed": "Failed",
@@ -80,12 +80,12 @@ def with_code(text: str) -> str:
 
 
 def kept_words(data: Mapping[str, Any]) -> str:
-    """Return how many results of a report were kept from earlier runs; empty where none was."""
-    kept, computed = data.get("kept") or 0, data.get("computed")
+    """Return how many results of a report are cached from earlier runs; empty where none was."""
+    kept, computed = data.get("cached") or 0, data.get("computed")
     if not kept:
         return ""
     of = f" of {kept + computed}" if computed is not None else ""
-    return f"{kept}{of} results were kept from earlier runs on this machine with the same code, not measured again"
+    return f"{kept}{of} results are cached from earlier runs on this machine with the same code"
 
 
 def viewer_words(index: Mapping[str, Any]) -> str:

@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 LAYERS = ("airlight", "surface")
 FLIP_LAYER = "flip"
 FLIP_LEVELS = 255  #: code of an HDR-FLIP of 1
-DARK = 1e-3  #: share of the reference's mean; darker pixels are compared with this floor, as in the tables
+DARK = 1e-3  #: fraction of the reference's mean; darker pixels are compared with this floor, as in the tables
 #: Precision of the differences and stride of the pixels, from the finest down.
 LADDER: tuple[tuple[Precision, int], ...] = (
     *((precision, 1) for precision in PRECISIONS),

@@ -124,7 +124,7 @@ def _lead(scenes: Sequence[Mapping[str, Any]], shown: Sequence[int]) -> int | No
 
     Of equals the first; `shown` are the places of the scenes that have images.
     """
-    return max(shown, key=lambda place: scenes[place]["truth"]["transitions"] or 0, default=None)
+    return max(shown, key=lambda place: scenes[place]["reference"]["transitions"] or 0, default=None)
 
 
 def _first_shown(methods: Sequence[Mapping[str, Any]]) -> int:

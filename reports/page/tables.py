@@ -38,7 +38,7 @@ def methods(scene: Data, timed: Sequence[int]) -> Table:
 
     explanation = (
         f"Times at {words(timed)} pixels, medians, below those of a frame their quartiles; errors at "
-        f"{words(scene['size'])} pixels, of the airlight against the truth, or of all light where an image has no "
+        f"{words(scene['size'])} pixels, of the airlight against the reference, or of all light where an image has no "
         "layers (total). A method that knows no shadows is marked; its error is then the light that shadows take away. "
         "Published peers, at the end, are papers as printed: their errors are theirs."
     )
@@ -49,7 +49,7 @@ def methods(scene: Data, timed: Sequence[int]) -> Table:
 
 
 def agreement(scene: Data) -> Table:
-    """Return what estimators say of the truth of a scene."""
+    """Return what estimators say of the reference of a scene."""
     explanation = (
         "Our own integrator, and Mitsuba's volpath against the same integral with the shadow ray shortened by the "
         "measured epsilon."
@@ -67,7 +67,7 @@ def seconds(scenes: Sequence[Data]) -> Table:
     columns = [Column("scene", "scene", words=True), *(Column(part, part, "s") for part in parts)]
     rows = [Row({"scene": scene["name"]} | {part: scene["seconds"][part] for part in parts}) for scene in scenes]
     return table(
-        "Where the time went", columns, rows, explanation="Of results that were kept, what they took when measured."
+        "Where the time went", columns, rows, explanation="Of cached results, what they took when they were measured."
     )
 
 
@@ -78,14 +78,17 @@ def facts(title: str, entries: Data) -> Table:
 
 
 def trust_words(scenes: Sequence[Data]) -> dict[str, str]:
-    """Return in few words, after a mark, whether the truth is confirmed."""
+    """Return in few words, after a mark, whether the reference is confirmed."""
     verdicts = [verdict(entry) for scene in scenes for entry in scene["agreement"].values()]
     if not verdicts:
-        return {"mark": MARKS[None][0], "words": "Truth not compared"}
+        return {"mark": MARKS[None][0], "words": "Reference not compared"}
     against, agree = verdicts.count(False), verdicts.count(True)
     if against:
-        return {"mark": MARKS[False][0], "words": f"Truth NOT confirmed in {against} of {len(verdicts)} comparisons"}
-    words = f"Truth confirmed in {agree} of {len(verdicts)} comparisons"
+        return {
+            "mark": MARKS[False][0],
+            "words": f"Reference NOT confirmed in {against} of {len(verdicts)} comparisons",
+        }
+    words = f"Reference confirmed in {agree} of {len(verdicts)} comparisons"
     return {"mark": MARKS[True if agree == len(verdicts) else None][0], "words": words}
 
 

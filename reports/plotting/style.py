@@ -2,7 +2,7 @@
 """How every chart looks: one colour and marker for each method and for each kernel, and the style sheets for papers.
 
 The colours are six of Okabe and Ito 2008, *Color Universal Design*, and two darker ones. Under normal sight and for
-whoever lacks one kind of cones (Machado, Oliveira, Fernandes 2009, severity 1) any two differ by more than
+anyone who lacks one kind of cones (Machado, Oliveira, Fernandes 2009, severity 1) any two differ by more than
 `LEAST_DIFFERENCE` in CIEDE2000; no chart leaves a distinction to the colour alone, each has its marker too. Variants of
 one method (its kernel, its parameters) keep colour and marker and differ by the filling of the marker.
 

@@ -18,7 +18,7 @@ from realtime.errors import InputError as MethodError
 from reference.storage.files import ensure_folder
 from reference.storage.kept import fresh_results
 from reports.cluster.connect import Cluster
-from reports.cluster.references import Picture, bring_truths, spread
+from reports.cluster.references import Picture, bring_references, spread
 from reports.data.claims import claims, growth_claims, unstudied
 from reports.data.own_faults import own_fault
 from reports.data.reader import SCHEMA, report_text
@@ -72,7 +72,7 @@ def write_report(
         Whether user methods run in processes of their own, where a fault becomes a row (`own_faults`). In this process
         it ends the report.
     progress
-        Called with (share done, what) now and then.
+        Called with (fraction done, what) now and then.
     noted
         Called with what is to be said of the scenes before they are studied.
     cluster
@@ -109,7 +109,7 @@ def write_report(
         studied, results = [], list[Result]()
         with _timed(seconds, "scenes"):
             if cluster is not None:
-                bring_truths(cluster, [_picture(each, each.size) for each in studies])
+                bring_references(cluster, [_picture(each, each.size) for each in studies])
             ended = _try_own(studies[0], process) if studies else {}
             for each, parts, span in zip(studies, of_scenes, spans):
                 step = part_of(progress, *span, before=f"{each.name}: ")
@@ -204,11 +204,11 @@ def _counts(results: Sequence[Result]) -> dict[str, Any]:
     kept = sum(result.cached for result in results)
     made = sorted(result.made for result in results)
     measured = {"first": date(made[0]), "last": date(made[-1])} if made else None
-    return {"kept": kept, "computed": len(results) - kept, "measured": measured}
+    return {"cached": kept, "computed": len(results) - kept, "measured": measured}
 
 
 def _try_own(study: SceneStudy, apart: Apart | None) -> dict[Configuration, str]:
-    """Render a small frame with every method of the user's own: what is at fault there is said before the work.
+    """Render a small frame with every user method: what is at fault there is said before the work.
 
     Returns those that ended their process, with how: they are not called again.
     """

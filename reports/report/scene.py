@@ -49,7 +49,7 @@ def write_scene(result: SceneResult, folder: Path) -> dict[str, Any]:
         "timed": list(study.study.measure.timed_size or size),
         "plan": describe(study.scene.features),
         "notes": list(study.scene.features.notes),
-        "truth": truth_data(truth),
+        "reference": truth_data(truth),
         "exposure": factor,
         "agreement": result.agreement,
         "multiple": result.multiple,
@@ -70,7 +70,7 @@ def _entry(judged: Judged, files: "_Files", stem: str, factor: float) -> dict[st
         "files": named,
         "measured": judged.results[0].measured,
         "seconds": round(sum(result.seconds for result in judged.results), 3),
-        "kept": all(result.cached for result in judged.results),
+        "cached": all(result.cached for result in judged.results),
     }
 
 

@@ -245,7 +245,7 @@ def transport(phase: str = "mie-modified", *, albedo: float = 1.0, progress: Pro
         "albedo": albedo,
         "bytes": int(tables.size),
         "seconds": tables.seconds,
-        "kept": not told,
+        "cached": not told,
         "grid": asdict(tables.grid),
         "sets": [
             {"orders": set_name(number), "bytes": int(part.nbytes + shapes.nbytes), "coefficients": sum(RANKS[number])}
@@ -254,7 +254,7 @@ def transport(phase: str = "mie-modified", *, albedo: float = 1.0, progress: Pro
     }
     columns = (*words("orders"), *numbers(coefficients="products", mb="MB"))
     rows = [{**row, "mb": row["bytes"] / 1e6} for row in record["sets"]]
-    where = "from the cache" if record["kept"] else "made now"
+    where = "from the cache" if record["cached"] else "made now"
     said = (
         f"{record['phase']}, albedo {record['albedo']:g}: {record['bytes'] / 1e6:.1f} MB, {where}; they took "
         f"{record['seconds']:.0f} s to make."

@@ -285,7 +285,7 @@ def _map_result(studied: list[tuple[str, Any, Any]], pixels: Any, texels: list[i
             columns = (moving["texels"], moving["flicker"], moving["relative_rmse"])
             tables.append(table(f"{title}: flicker of a moving light", _FLICKER, zip(texels, *columns, strict=True)))
             order = fitted_slope(texels, moving["flicker"])
-            change = number(moving["truth_change"], 2)
+            change = number(moving["reference_change"], 2)
             said.append(f"{name}: the flicker {_trend(*order)}; the reference itself changes by {change}.")
             data[-1]["flicker"] = plain({**moving, "order": order})
     return Study(

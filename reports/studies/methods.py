@@ -36,8 +36,9 @@ class MethodsStudy(Study):
 
     A row has `scene`, `width`, `height`, `label`, `method`, `kernel`; medians `frame_ms` with its quartiles
     `frame_low_ms` and `frame_high_ms`, `airlight_ms`, `surface_ms`, `light_moved_ms`, `objects_moved_ms`
-    (after these moved), `light_moved_camera_kept_ms` (after the light moved, camera rays cached), `colours_changed_ms`
-    (after only medium or colours changed) [ms]; of the airlight `relative_rmse`, `relative_bias`, `p50`, `p99`, `max`,
+    (after these moved), `light_moved_camera_cached_ms` (after the light moved, camera rays cached),
+    `colours_changed_ms` (after only medium or colours changed) [ms]; of the airlight `relative_rmse`, `relative_bias`,
+    `p50`, `p99`, `max`,
     `nonfinite` and `negative`; `refused`, why the method cannot render the scene, and `note`. Missing values
     are None.
     """

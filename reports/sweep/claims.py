@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claims: in what share of the scenes a configuration keeps an error, with the interval of that share.
+"""Claims: in what fraction of the scenes a configuration keeps an error, with the interval of that share.
 
 A scene counts as within an error if its image was made, all its pixels are finite, and the relative RMSE is at most
-the error. A refusal is no try: refused scenes are counted apart, and so are scenes that have no truth. A cell that
+the error. A refusal is no try: refused scenes are counted apart, and so are scenes that have no reference. A cell that
 failed, hung or died is a try that missed.
 
-Where truth and error differ by less than the truth's own error nothing is decided. Such a scene is within at the upper
-end of the interval and not at the lower one: the interval holds the share whatever the exact truth would have said.
+Where the target and the error differ by less than the error of the reference nothing is decided. Such a scene is within
+at the upper end of the interval and not at the lower one: the interval holds the fraction whatever an exact reference
+would have said.
 """
 
 from collections.abc import Sequence
@@ -29,9 +30,9 @@ class Claim:
     target: float  #: relative RMSE [1]
     tries: int  #: scenes that count
     within: int  #: of these, within the error for sure
-    undecided: int  #: of these, with an error nearer to the target than the truth is exact
+    undecided: int  #: of these, with an error nearer to the target than the reference is exact
     refused: int  #: scenes beside these
-    untold: int  #: further scenes that have no truth
+    untold: int  #: further scenes that have no reference
     low: float
     high: float
     level: float = LEVEL
@@ -47,9 +48,9 @@ class Claim:
         words = f"in {percent(self.share or 0.0, self.tries)} % of {scenes_words(self.tries)}, "
         words += f"{percent(self.low, self.tries)} to {percent(self.high, self.tries)} %"
         if self.undecided:
-            words += f"; the truth is not exact enough to tell in {scenes_words(self.undecided)}"
+            words += f"; the reference is not exact enough to tell in {scenes_words(self.undecided)}"
         words += f"; {self.refused} more refused" if self.refused else ""
-        return words + (f"; no truth of {self.untold} more" if self.untold else "")
+        return words + (f"; no reference of {self.untold} more" if self.untold else "")
 
     @property
     def text(self) -> str:
@@ -59,11 +60,11 @@ class Claim:
 
 
 def claim(sample: Sample, target: float, level: float = LEVEL) -> Claim:
-    """Return in what share of the scenes a configuration keeps a relative RMSE; `level` is of this claim alone [1]."""
+    """Return in what fraction of the scenes a relative RMSE is at most the target; `level` is of this claim [1]."""
     measured = sample.measured
     finite = measured & (sample.nonfinite == 0)
-    surely = finite & (sample.errors + sample.truth_errors <= target)
-    possibly = finite & (sample.errors - sample.truth_errors <= target)
+    surely = finite & (sample.errors + sample.reference_errors <= target)
+    possibly = finite & (sample.errors - sample.reference_errors <= target)
     tries = int(measured.sum()) + sample.count(*FAULTS)
     within, at_most = int(surely.sum()), int(possibly.sum())
     return Claim(

@@ -127,7 +127,7 @@ class Worst:
     relative_rmse: float | None  #: None where the image has no finite pixel
     p99: float | None
     relative_bias: float | None
-    truth_error: float | None
+    reference_error: float | None
     nonfinite: int
     properties: dict[str, float | None]
     command: str
@@ -151,7 +151,7 @@ def worst(sweep: Sweep, sample: Sample, properties: Sequence[str], count: int = 
             relative_rmse=float(sample.errors[place]) if np.isfinite(sample.errors[place]) else None,
             p99=known("error.p99", row),
             relative_bias=known("error.relative_bias", row),
-            truth_error=known("reference.error", row),
+            reference_error=known("reference.error", row),
             nonfinite=int(sample.nonfinite[place]),
             properties={name: known(f"{PROPERTY}{name}", row) for name in properties},
             command=sweep.texts("command")[row] or "",

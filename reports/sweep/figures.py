@@ -63,7 +63,7 @@ def distribution(said: Summary) -> "Figure | None":
 
 
 def shares(said: Summary) -> "Figure | None":
-    """Return in what share of the scenes each configuration is within an error, over the error: a panel a method.
+    """Return in what fraction of the scenes each configuration is within an error, over the error: a panel a method.
 
     None if nothing was measured.
     """
@@ -100,7 +100,7 @@ def shares(said: Summary) -> "Figure | None":
                 bbox_to_anchor=(0.5, -0.16),
             )
     figure.supxlabel(ERROR, fontsize=9)
-    figure.supylabel("share of the scenes within the error", fontsize=9)
+    figure.supylabel("fraction of the scenes within the error", fontsize=9)
     return figure
 
 
@@ -194,7 +194,7 @@ def _points(sample: Sample) -> tuple[Numbers, Numbers]:
 
 
 def _steps(sample: Sample, low: float, high: float) -> tuple[Numbers, Numbers]:
-    """Return the share of the measured scenes within an error; what has no finite error is never within."""
+    """Return the fraction of the measured scenes within an error; what has no finite error is never within."""
     errors = np.sort(_errors(sample))
     total = len(errors) + np.isinf(sample.errors).sum()
     # More steps than the panel has dots make the file larger and the line no truer.
@@ -217,7 +217,7 @@ def _own(sample: Sample) -> str:
 
 
 def _cut(name: str) -> str:
-    """Return a name that leaves room for a panel: that of a method of the user's own may be a path."""
+    """Return a name that leaves room for a panel: that of a user method may be a path."""
     return short(name, 38)
 
 

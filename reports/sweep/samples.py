@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from reports.sweep.read import Numbers, Sweep, Texts, natural
-from validation.study.row import FRAME_MS, NO_TRUTH
+from validation.study.row import FRAME_MS, NO_REFERENCE
 
 FAULTS = ("failed", "hung", "aborted")  #: what became of a cell that neither ended nor was refused
-UNTOLD = "no truth"  #: of a scene whose truth was not done, so that no method was asked
+UNTOLD = "no reference"  #: of a scene whose reference was not done, so that no method was asked
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Sample:
     rows: tuple[int, ...]  #: of the sweep: where each scene's cell with the largest error stands
     statuses: tuple[str, ...]  #: what became of each scene: that of its row, or `UNTOLD`
     errors: Numbers  #: relative RMSE [1]: infinite where the image has no finite pixel, NaN where nothing was measured
-    truth_errors: Numbers  #: the truth's own, over its mean [1]; 0 where it says nothing
+    reference_errors: Numbers  #: the reference's own, over its mean [1]; 0 where it says nothing
     nonfinite: Numbers  #: pixels with NaN or infinity, in all cells of a scene
     times: Numbers  #: of a frame [ms], see `comparable_times`; NaN elsewhere
 
@@ -55,7 +55,7 @@ def samples(sweep: Sweep) -> list[Sample]:
     """Return the sample of every configuration, sorted by method and label."""
     labels, scenes, statuses = sweep.texts("label"), sweep.texts("scene"), _statuses(sweep)
     methods, errors = sweep.texts("method"), errors_of(sweep)
-    truth_errors = np.nan_to_num(sweep.numbers("reference.error"), nan=0.0)
+    reference_errors = np.nan_to_num(sweep.numbers("reference.error"), nan=0.0)
     nonfinite = np.nan_to_num(sweep.numbers("error.nonfinite"), nan=0.0)
     times = np.where(comparable_times(sweep), sweep.numbers(FRAME_MS), np.nan)
     counted = np.isfinite(sweep.numbers("seed")) if drawn_at_random(sweep) else np.ones(len(sweep), dtype=bool)
@@ -82,7 +82,7 @@ def samples(sweep: Sweep) -> list[Sample]:
                 rows=worst,
                 statuses=tuple(statuses[places]),
                 errors=errors[places],
-                truth_errors=truth_errors[places],
+                reference_errors=reference_errors[places],
                 nonfinite=np.array([nonfinite[rows].sum() for rows in group.values()]),
                 times=times[places],
             )
@@ -106,8 +106,8 @@ def comparable_times(sweep: Sweep) -> "np.ndarray[tuple[int], np.dtype[np.bool_]
 def errors_of(sweep: Sweep) -> Numbers:
     """Return the relative RMSE of every row: NaN where nothing was measured, infinite where the image is unusable.
 
-    Where the truth is black, an image that is black too has no error, and any other an infinite one. An image without
-    a finite pixel has an infinite error.
+    Where the reference is black, an image that is black too has no error, and any other an infinite one. An image
+    without a finite pixel has an infinite error.
     """
     done = sweep.texts("status") == "done"
     relative, absolute = sweep.numbers("error.relative_rmse"), sweep.numbers("error.rmse")
@@ -164,9 +164,9 @@ def _size(sweep: Sweep, row: int) -> str:
 
 
 def _statuses(sweep: Sweep) -> Texts:
-    """Return what became of every row, and of those whose scene has no truth `UNTOLD`."""
+    """Return what became of every row, and of those whose scene has no reference `UNTOLD`."""
     reasons = zip(sweep.texts("status"), sweep.texts("reason"))
-    untold = [status in FAULTS and (reason or "").startswith(NO_TRUTH) for status, reason in reasons]
+    untold = [status in FAULTS and (reason or "").startswith(NO_REFERENCE) for status, reason in reasons]
     return np.where(untold, UNTOLD, sweep.texts("status"))
 
 

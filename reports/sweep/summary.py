@@ -34,7 +34,7 @@ class Fastest:
 
 
 @dataclass(frozen=True)
-class Truth:
+class ReferenceErrors:
     """What one estimator says of its own error."""
 
     estimator: str = column("reference")
@@ -80,7 +80,7 @@ class Summary:
     reasons: tuple[Reason, ...]
     checks: tuple[Check, ...]
     faults: tuple[Fault, ...]
-    truths: tuple[Truth, ...]
+    references: tuple[ReferenceErrors, ...]
     hosts: tuple[Host, ...]
     properties: tuple[Property, ...]
     versions: Mapping[str, tuple[str, ...]]
@@ -119,7 +119,7 @@ def summary_of(sweep: Sweep) -> Summary:
         reasons=tuple(reasons(sweep)),
         checks=tuple(checks(sweep)),
         faults=tuple(faults(sweep)),
-        truths=tuple(_truths(sweep)),
+        references=tuple(_references(sweep)),
         hosts=tuple(_hosts(sweep)),
         properties=tuple(_properties(sweep)),
         versions={name: tuple(sorted(set(sweep.texts(f"origin.{name}")) - {None})) for name in _VERSIONS},
@@ -212,7 +212,7 @@ def sound_words(said: Summary) -> str:
 def to_json(said: Summary) -> dict[str, Any]:
     """Return everything as plain data, for `--json`; nothing in it is infinite or NaN."""
     names = {sample.label: sample for sample in said.samples}
-    lists = ("correlations", "checks", "faults", "truths", "properties", "hosts")
+    lists = ("correlations", "checks", "faults", "references", "properties", "hosts")
     return {
         "schema": SCHEMA,
         "source": str(said.sweep.path),
@@ -267,7 +267,7 @@ def _fastest(made: Sequence[Sample], target: float) -> Fastest:
     return Fastest(target, tuple(counts), none, scenes)
 
 
-def _truths(sweep: Sweep) -> list[Truth]:
+def _references(sweep: Sweep) -> list[ReferenceErrors]:
     estimators, scenes = sweep.texts("reference.estimator"), sweep.texts("scene")
     errors = sweep.numbers("reference.error")
     made = []
@@ -275,7 +275,9 @@ def _truths(sweep: Sweep) -> list[Truth]:
         own = (estimators == estimator) & np.isfinite(errors)
         if own.any():
             values = errors[own]
-            made.append(Truth(estimator, len(set(scenes[own])), float(np.median(values)), float(values.max())))
+            made.append(
+                ReferenceErrors(estimator, len(set(scenes[own])), float(np.median(values)), float(values.max()))
+            )
     return made
 
 

@@ -12,14 +12,14 @@ from reports.sweep.claims import TARGETS, written
 from reports.sweep.correlations import property_words
 from reports.sweep.faults import Check, Fault
 from reports.sweep.samples import FAULTS, UNTOLD
-from reports.sweep.summary import Host, Property, Summary, Truth, quantiles
+from reports.sweep.summary import Host, Property, ReferenceErrors, Summary, quantiles
 from reports.tables.table import Column, Measured, Name, Table, numbers, table, words
 
 _SHARE = {"digits": 2, "share": True}
 
 
 def errors_table(said: Summary) -> Table:
-    """Return how wrong each configuration is, and in what share of the scenes it keeps an error."""
+    """Return how wrong each configuration is, and in what fraction of the scenes it keeps an error."""
     columns = (
         *words(name="method"),
         *(
@@ -27,7 +27,7 @@ def errors_table(said: Summary) -> Table:
             for target in reversed(TARGETS)
         ),
         *numbers(median="median error", most="95 % of scenes below", how=_SHARE),
-        *numbers(scenes="scenes", refused="refused", untold="no truth"),
+        *numbers(scenes="scenes", refused="refused", untold="no reference"),
         Column("lost", "not done", alarm=True),
     )
     rows = []
@@ -47,11 +47,13 @@ def errors_table(said: Summary) -> Table:
                 row[f"within_{claim.target:g}"] = Measured(claim.share, claim.low, claim.high)
         rows.append(row)
     explanation = (
-        "Error: relative RMSE of the airlight. Each share has its interval at 95 % confidence. Scenes that are "
-        "refused or have no truth are in no share; those that failed, hung or have pixels that are not finite are not "
-        "within."
+        "Error: relative RMSE of the airlight. Each fraction has its interval at 95 % confidence. Scenes that are "
+        "refused or have no reference are in no fraction; those that failed, hung or have pixels that are not finite "
+        "are not within."
     )
-    made = table("In what share of the scenes each method is within an error", columns, rows, explanation=explanation)
+    made = table(
+        "In what fraction of the scenes each method is within an error", columns, rows, explanation=explanation
+    )
     # A column of zeros, or of the same count in every row, says nothing.
     empty = {key for key in ("refused", "untold", "lost") if not any(row[key] for row in rows)}
     empty |= {"scenes"} if len({row["scenes"] for row in rows}) == 1 else set()
@@ -131,11 +133,13 @@ def faults_table(said: Summary, most: int = 30) -> Table:
     return _table_of("Images at fault", Fault, rows, explanation=explanation, how=how)
 
 
-def truths_table(said: Summary) -> Table:
+def references_table(said: Summary) -> Table:
     """Return what the references say of their own errors."""
     explanation = "Relative to the mean of the airlight: the quadrature's bound, or Monte Carlo's standard error."
     how = {"median": _SHARE, "largest": _SHARE}
-    return _table_of("Errors of the reference itself", Truth, said.truths, explanation=explanation, how=how)
+    return _table_of(
+        "Errors of the reference itself", ReferenceErrors, said.references, explanation=explanation, how=how
+    )
 
 
 def properties_table(said: Summary) -> Table:

@@ -13,7 +13,7 @@ Read in this order:
 - `methods.py`: what methods cost and how wrong they are; the fastest within an error
 - `papers.py`: verdicts on the claims of papers, and their numbers beside ours
 - `peers.py`: which configurations are a paper as published, errors included
-- `agreement.py`: the truth against Monte Carlo, the verdict, and the table of trust
+- `agreement.py`: the reference against Monte Carlo, the verdict, and the table of trust
 - `kernels.py`: costs, levels and orders of kernels
 - `scaling.py`: what methods cost as their work grows, and exponents
 - `checks.py`: the light that single scattering leaves out

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The truth against Monte Carlo: whether a comparison confirms it, all comparisons as a table, and how far to trust."""
+"""The reference against Monte Carlo: whether a comparison confirms it, all comparisons as a table."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -10,16 +10,21 @@ _UNCORRECTED = "the bias without the shadow-ray epsilon"
 _DETECTABLE = "the least bias that is found in nine runs of ten"
 _PERCENT = {"percent": True, "sign": True, "places": 3}
 COLUMNS = (
-    *words(name="the truth of", estimator="checked by"),
+    *words(name="the reference of", estimator="checked by"),
     *numbers("samples", how={"after": " M", "places": 0, "minor": True}),
-    *numbers(relative_bias="bias", how={**_PERCENT, "meaning": "mean of the estimator less the truth, over the truth"}),
+    *numbers(
+        relative_bias="bias",
+        how={**_PERCENT, "meaning": "mean of the estimator less the reference, over the reference"},
+    ),
     *numbers(interval="95 % interval", how={**_PERCENT, "meaning": "where 19 of 20 such runs find the bias"}),
     *numbers(uncorrected_bias="uncorrected", how={**_PERCENT, "minor": True, "meaning": _UNCORRECTED}),
     *numbers("margin", how={"percent": True, "meaning": "agreement: the whole interval lies inside it, either way"}),
     *numbers(detectable_bias="detectable", how={"percent": True, "digits": 2, "minor": True, "meaning": _DETECTABLE}),
     *numbers("rejected", how={"meaning": "pixels that differ by more than their noise explains"}),
     *numbers("masked", how={"meaning": "pixels left out: their ray passes close to a light"}),
-    *numbers(epsilon="shadow-ray epsilon", how={"meaning": "by what share Mitsuba's shadow rays end before the light"}),
+    *numbers(
+        epsilon="shadow-ray epsilon", how={"meaning": "by what fraction Mitsuba's shadow rays end before the light"}
+    ),
     *numbers(z_mean="z: mean", how={"meaning": "errors of pixels in units of their noise: 0 if there is no bias"}),
     *numbers(z_std="z: st. deviation", how={"meaning": "1 if the noise is as large as was estimated"}),
     *numbers(expected_rejections="expected", how={"digits": 2, "meaning": "how many would be rejected by chance"}),
@@ -33,10 +38,10 @@ BENCH = (
 
 
 def verdict(compared: Mapping[str, Any]) -> bool | None:
-    """Return whether a comparison confirms the truth; None where it ran out of time before it could tell.
+    """Return whether a comparison confirms the reference; None where it ran out of time before it could tell.
 
-    Out of time is what stopped before the intervals were as narrow as wanted. It can still speak against the truth: by
-    an interval that lies outside the margin as a whole.
+    Out of time is what stopped before the intervals were as narrow as wanted. It can still speak against the reference:
+    by an interval that lies outside the margin as a whole.
     """
     statistics = compared["statistics"]
     if statistics["equivalent"]:
@@ -63,7 +68,7 @@ def worst_interval(compared: Iterable[Mapping[str, Any]]) -> tuple[Mapping[str, 
 
 
 def trust_table(scenes: Sequence[Mapping[str, Any]]) -> Table:
-    """Return how far the truth of each scene can be trusted: its own bound, its checks, the estimators' intervals.
+    """Return how far the reference of each scene can be trusted: its own bound, its checks, the estimators' intervals.
 
     Parameters
     ----------
@@ -74,17 +79,17 @@ def trust_table(scenes: Sequence[Mapping[str, Any]]) -> Table:
     columns = (
         *words("scene"),
         *numbers(bound="bound of its error", how={"share": True, "digits": 2}),
-        *numbers(left="shadow rays not settled", how={"alarm": True}),
+        *numbers(left="unresolved shadow rays", how={"alarm": True}),
         *(Column(name, f"95 % interval by {name}", percent=True, sign=True, digits=2) for name in estimators),
         *(Column(f"{name} agrees", "inside its margin") for name in estimators),
     )
     order = ["scene", "bound", "left", *(key for name in estimators for key in (name, f"{name} agrees"))]
     return table(
-        "The truth of each scene",
+        "The reference of each scene",
         columns,
         (_trust(scene, estimators) for scene in scenes),
         explanation=(
-            "The truth is a quadrature in double precision, with a bound of its own error as a share of the mean "
+            "The reference is a quadrature in double precision, with a bound of its error as a fraction of the mean "
             "airlight. Two Monte Carlo estimators, which share no derivation with it, check it: the 95 % interval of "
             "their relative bias must lie inside a margin. Of several layers the worst interval is shown; each scene "
             "below has them all."
@@ -93,8 +98,8 @@ def trust_table(scenes: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def _trust(scene: Mapping[str, Any], estimators: Iterable[str]) -> Row:
-    values: dict[str, Value] = {"scene": scene["name"], "bound": scene["truth"]["relative_bound"]}
-    values["left"] = scene["truth"]["left"]
+    values: dict[str, Value] = {"scene": scene["name"], "bound": scene["reference"]["relative_bound"]}
+    values["left"] = scene["reference"]["left"]
     for name in estimators:
         compared = [entry for entry in scene["agreement"].values() if entry["estimator"] == name]
         if not compared:
@@ -110,7 +115,7 @@ def _trust(scene: Mapping[str, Any], estimators: Iterable[str]) -> Row:
 def agreement_table(
     title: str, compared: Iterable[tuple[str, Mapping[str, Any]]], *keys: str, explanation: str = ""
 ) -> Table:
-    """Return the table of comparisons of the truth, each with the name of what it compares.
+    """Return the table of comparisons of the reference, each with the name of what it compares.
 
     Parameters
     ----------

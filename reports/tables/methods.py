@@ -23,19 +23,21 @@ from reports.tables.table import (
 Entry = Mapping[str, Any]  #: of a method in a scene, as in report.json
 
 #: What is timed of a frame, by its name in report.json.
-TIMES = ("frame", "airlight", "surface", "light_moved", "objects_moved", "light_moved_camera_kept", "colours_changed")
+TIMES = ("frame", "airlight", "surface", "light_moved", "objects_moved", "light_moved_camera_cached", "colours_changed")
 ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite")
 
-_RELATIVE = "{} of the pixels err by less: |error| over the truth, or over a thousandth of its mean where that is more"
+_RELATIVE = (
+    "{} of the pixels err by less: |error| over the reference, or over a thousandth of its mean where that is more"
+)
 _MEANINGS = {
     "frame": "a whole frame while nothing moves: median and quartiles",
     "airlight": "the airlight alone, with the lists of tiles",
     "surface": "camera rays and the lit surface",
-    "light_moved": "a frame after the light moved, with shadow maps or planes anew",
+    "light_moved": "a frame after the light moved, with shadow maps or planes again",
     "objects_moved": "a frame after objects moved too",
-    "memory": "what a frame takes at its peak, prepared anew, with its image on the host, beyond what was there before",
-    "relative_rmse": "root of the mean squared error over the mean of the truth: errors of bright pixels weigh most",
-    "relative_bias": "mean error over the mean of the truth: below 0 the image as a whole is too dark",
+    "memory": "the peak of a frame that is prepared again, with its image on the host, beyond what was there before",
+    "relative_rmse": "root of the mean squared error over the reference's mean: errors of bright pixels weigh most",
+    "relative_bias": "mean error over the mean of the reference: below 0 the image as a whole is too dark",
     "p50": _RELATIVE.format("half"),
     "p99": _RELATIVE.format("99 of 100"),
     "max": _RELATIVE.format("all"),
@@ -54,7 +56,7 @@ COLUMNS = {
         *numbers("airlight", surface="rays + surface", how=_MS | _MINOR),
         *numbers(light_moved="light moved", objects_moved="objects moved", how=_MS | _MINOR),
         *numbers(
-            light_moved_camera_kept="light moved, camera rays kept",
+            light_moved_camera_cached="light moved, camera rays cached",
             colours_changed="colours changed",
             how=_MS | _MINOR,
         ),

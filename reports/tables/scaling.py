@@ -106,7 +106,7 @@ def _costs(scene: str, kind: str, records: list[Record]) -> Table:
     size = "" if kind == "size" else ", {} x {}".format(*records[0]["size"])
     explanation = (
         "Medians; rays alone: the camera rays without shading, the floor of a frame that casts them. Memory: what one "
-        "frame takes at its peak, prepared anew, with its image on the host."
+        "frame takes at its peak, prepared again, with its image on the host."
     )
     return table(f"{scene} by {WORK[kind]}{size}", columns, rows, explanation=explanation)
 

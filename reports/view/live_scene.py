@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A scene that changes from frame to frame, and no more than that is made anew.
+"""A scene that changes from frame to frame, and no more than that is made again.
 
 Camera, lights and media are opaque arrays, so their changes record nothing. A configuration has its own recorded
 functions: they are kept for the last few, and configurations share those that cast and shade, which know nothing of a
@@ -60,7 +60,7 @@ class LiveScene:
         self._surfaces.clear()
 
     def _lobes(self, changes: Mapping[str, Values]) -> set[str]:
-        """Return which isotropic media changes give a lobe: the scene is loaded anew for others."""
+        """Return which isotropic media changes give a lobe: the scene is loaded again for others."""
         return {name for name, value in changes.items() if name in self._isotropic and any(value)}
 
     @property

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The page and its socket over HTTP: nothing is served to whoever does not know the token in the address."""
+"""The page and its socket over HTTP: nothing is served to anyone who does not know the token in the address."""
 
 import http
 import json

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The loop of the view: it draws what the page asks for, and computes its truth while nothing moves.
+"""The loop of the view: it draws what the page asks for, and computes its reference while nothing moves.
 
 Threads of the server put what the page says into a list; this loop alone touches Dr.Jit. It takes all that has come
 since the last frame at once, so frames that nobody would see are not drawn, and it waits for the page to show a frame
@@ -40,8 +40,8 @@ from validation.study.configuration import Configuration, configuration
 
 _AHEAD = 2  # frames that are sent before the page has shown the first of them
 _QUIET = 0.15  # after so long without a change the page is told where all stands [s]
-_STILL = 0.4  # after so long the truth is begun [s]
-_NEWS = 0.4  # between two pictures of what is known of the truth [s]
+_STILL = 0.4  # after so long the reference is begun [s]
+_NEWS = 0.4  # between two pictures of what is known of the reference [s]
 _BY_STAGE = 8  # of so many frames one is timed by stage
 _STOPS = 20.0  # of exposure, brighter or darker
 _GOES_ON = 64  # frames drawn of a still scene where each builds on the last
@@ -136,7 +136,7 @@ class Session:
         waits = [60.0]
         if self._told < self._changed_at:
             waits.append(self._changed_at + _QUIET - now)
-        # Nothing is waited for that cannot come: without a frame no truth begins, and without a truth there is no news.
+        # Without a frame no reference begins, and without a reference there is no news to wait for.
         if self._truth_of is None and self._shown is not None:
             waits.append(self._changed_at + _STILL - now)
         if self._news and self._truth_of is not None and self._shown is not None:
@@ -198,7 +198,7 @@ class Session:
             self._show = {
                 "layer": layer if layer in LAYERS else "total",
                 "exposure": min(max(_number(given["exposure"]), -_STOPS), _STOPS),
-                "other": other if other in ("truth", "error") else "none",
+                "other": other if other in ("reference", "error") else "none",
                 "run": bool(given["run"]),
             }
             if message.get("expose"):
@@ -292,11 +292,11 @@ class Session:
             change_ms=None if self._asked_at is None else 1e3 * (now - self._asked_at),
         )
         if self._asked_at is not None:
-            self._changed_at = now  # whoever moves on waits for this frame first
+            self._changed_at = now  # anyone who moves on waits for this frame first
         self._asked_at = None
 
     def _after(self, page: Page) -> None:
-        """Tell where all stands, begin the truth and show what is known of it, when it is time."""
+        """Tell where all stands, begin the reference and show what is known of it, when it is time."""
         now = time.perf_counter()
         if self._told < self._changed_at and now >= self._changed_at + _QUIET:
             self._tell_state(page)

@@ -14,7 +14,7 @@ from realtime.frame.renderer import FrameRenderer, Stages
 WORDS = {
     "prepare": "shadow maps or planes",
     "surface": "camera rays and surface",
-    "shade": "surface, rays kept",
+    "shade": "surface, rays cached",
     "render": "airlight",
 }
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The truth of what is shown, computed by another process while nothing moves."""
+"""The reference of what is shown, computed by another process while nothing moves."""
 
 import os
 import pickle
@@ -17,7 +17,7 @@ from validation.scenes.changes import Values
 
 
 class TruthInBackground:
-    """A process that computes truths, and what it has found for the last task.
+    """A process that computes references, and what it has found for the last task.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class TruthInBackground:
         self._number = 0
         self.truth: KnownTruth | None = None
         self.done = False
-        self.failure = ""  #: why there is no truth, in one line
+        self.failure = ""  #: why there is no reference, in one line
         root = str(Path(__file__).resolve().parents[2])
         paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
         self.process = subprocess.Popen(
@@ -47,7 +47,7 @@ class TruthInBackground:
         self._listener.start()
 
     def start(self, scene: str, size: tuple[int, int], changes: Mapping[str, Values]) -> None:
-        """Compute the truth of a scene from now on.
+        """Compute the reference of a scene from now on.
 
         Parameters
         ----------
@@ -89,7 +89,7 @@ class TruthInBackground:
             while True:
                 self._take(pickle.load(given))
         with self._lock:
-            self.failure = self.failure or "the process that computes the truth has ended; start the view again"
+            self.failure = self.failure or "the process that computes the reference has ended; start the view again"
         self._told()
 
     def _take(self, answer: Answer) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""In which order the truth of an image is computed, and what is known of it on the way.
+"""In which order the reference of an image is computed, and what is known of it on the way.
 
 Pixels of a coarse grid come first, then those of grids of half its step. Within a grid the order is random, so that
 what is known is a fair sample of the image at any time, and the picture of it grows sharper.
@@ -27,7 +27,7 @@ def pixel_order(width: int, height: int) -> NDArray[np.int64]:
 
 @dataclass(frozen=True)
 class KnownTruth:
-    """What is known of the truth of an image; what is not is NaN."""
+    """What is known of the reference of an image; what is not is NaN."""
 
     airlight: Array  #: (height, width, 3) [W/(m^2 sr)]
     surface: Array  #: [W/(m^2 sr)]
@@ -44,12 +44,12 @@ class KnownTruth:
         return np.isfinite(self.airlight[..., 0])
 
     def add(self, pixels: NDArray[np.int64], airlight: Array, surface: Array, bound: Array) -> None:
-        """Note the truth of some pixels, (pixels, 3) each."""
+        """Note the reference of some pixels, (pixels, 3) each."""
         for layer, values in ((self.airlight, airlight), (self.surface, surface), (self.bound, bound)):
             layer.reshape(-1, 3)[pixels] = values
 
     def filled(self, layer: Array) -> Array:
-        """Return a layer of the truth, or of a frame: where the truth is not known, a near pixel where it is."""
+        """Return a layer of the reference, or of a frame; pixels that are not known take a near one that is."""
         known = self.known
         step = next((step for step in reversed(STEPS) if known[::step, ::step].all()), None)
         if step is None:
@@ -60,13 +60,13 @@ class KnownTruth:
 
 @dataclass(frozen=True)
 class ViewError:
-    """The error of the airlight of a frame against what is known of its truth, as shares of the truth's mean."""
+    """The error of the airlight of a frame against what is known of its reference, over the mean of that."""
 
     relative_rmse: float
     interval: float  #: half of the 95 % interval of that, for the pixels that are not known yet
     relative_bias: float
     p99: float  #: see `validation.metrics.errors`
-    bound: float  #: root mean square of the truth's own bound: the most by which it changes the error
+    bound: float  #: root mean square of the reference's own bound: the most by which it changes the error
     known: int  #: pixels
     pixels: int
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The process that computes the truth of what the view shows, and yields the processor to it.
+"""The process that computes the reference of what the view shows, and yields the processor to it.
 
 It reads tasks from its input and writes what it finds to its output, as pickles. A new task ends the one before it, at
 the next of its chunks. It ends when its input does, however the view has ended.
@@ -25,7 +25,7 @@ _FIRST, _MOST = 256, 20000  # rays
 
 @dataclass(frozen=True)
 class Task:
-    """A truth to compute."""
+    """A reference to compute."""
 
     number: int
     scene: str  #: name or path
@@ -35,7 +35,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Answer:
-    """What was found for a task: rays, the end, or why there is no truth."""
+    """What was found for a task: rays, the end, or why there is no reference."""
 
     task: int
     pixels: Any = None  #: numbers of pixels, (rays,)
@@ -55,12 +55,12 @@ def yield_processor() -> None:
 
 
 def answers(task: Task) -> Iterator[Answer]:
-    """Yield the truth of an image, rays after rays.
+    """Yield the reference of an image, rays after rays.
 
     Raises
     ------
     InputError
-        For a scene that has no truth.
+        For a scene that has no reference.
     """
     from reports.view.truth_order import pixel_order
     from validation.estimates.quadrature import truth_of_pixels

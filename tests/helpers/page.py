@@ -82,7 +82,7 @@ DATA: dict[str, Any] = checked(
                 published="Billeter 2010",
                 size=[WIDTH, HEIGHT],
                 plan={"shadows": "visibility tests", "medium": "unbounded"},
-                truth={
+                reference={
                     "mean": 0.98765,
                     "relative_bound": 1.2e-6,
                     "transitions": 4321,
@@ -103,7 +103,7 @@ DATA: dict[str, Any] = checked(
         computed=9,
         settings=settings(image=[WIDTH, HEIGHT], timed=[64, 48]),
         claims=[
-            {"kind": "truth", "text": "The truth is confirmed.", "good": True},
+            {"kind": "reference", "text": "The truth is confirmed.", "good": True},
             {"kind": "left-out", "text": "Every method here scatters once.", "good": None},
         ],
     )

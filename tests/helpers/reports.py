@@ -99,7 +99,7 @@ def entry(label: str, relative_rmse: float | None = 0.01, median: float = 2.0, *
         "files": {},
         "measured": WHEN,
         "seconds": 1.5,
-        "kept": False,
+        "cached": False,
     } | changes
 
 
@@ -163,7 +163,7 @@ def scene(name: str, methods: list[dict[str, Any]], **changes: Any) -> dict[str,
         "timed": [320, 240],
         "plan": {"shadows": "visibility tests", "medium": "unbounded", "lights": "1 point", "extinction": "one"},
         "notes": [],
-        "truth": truth(),
+        "reference": truth(),
         "exposure": 1.0,
         "agreement": {"volpath airlight": agreement()},
         "multiple": {"medium": share(0.123), "everything": share(0.21), "max_depth": 64, "batches": 4, "samples": 1},
@@ -173,7 +173,7 @@ def scene(name: str, methods: list[dict[str, Any]], **changes: Any) -> dict[str,
             "airlight": f"{name}/reference-airlight.png",
         },
         "methods": methods,
-        "seconds": {"truth": 0.5},
+        "seconds": {"reference": 0.5},
     } | changes
 
 
@@ -218,12 +218,12 @@ def report_of(scenes: list[dict[str, Any]], **changes: Any) -> dict[str, Any]:
         "command": "airlight report",
         "seconds": 2.0,
         "parts": {"scenes": 2.0},
-        "kept": 0,
+        "cached": 0,
         "computed": 4,
         "measured": {"first": WHEN, "last": WHEN},
         "settings": settings(),
         "environment": environment(),
-        "claims": [{"kind": "truth", "text": "The truth is confirmed by volpath.", "good": True}],
+        "claims": [{"kind": "reference", "text": "The truth is confirmed by volpath.", "good": True}],
         "scenes": scenes,
         "stability": [],
     } | changes
@@ -273,7 +273,7 @@ def report(seed: int | None = None, *, busy: float = 0.0, machine: float = 1.0) 
             )
             for place, label in enumerate(LABELS)
         ]
-        scenes.append(scene(name, methods, truth=truth(mean=0.127 + number)))
+        scenes.append(scene(name, methods, reference=truth(mean=0.127 + number)))
     return report_of(copy.deepcopy(scenes), stability=[stable("exact")])
 
 

@@ -116,7 +116,7 @@ class EngineComparison:
     size: tuple[int, int]  #: width and height [pixels]
     fit: PixelFit  #: what a pixel of the truth is, and what is wrong with the image as a whole
     expected: str  #: what the layer was compared with: 'airlight', 'surface', or 'total' for both
-    truth_error: float  #: bound of the error of the truth's airlight, with its standard error, relative to its mean
+    reference_error: float  #: bound of the error of the truth's airlight, with its standard error, relative to its mean
     comparison: Comparison
     place: ErrorPlace | None  #: where most of the error lies; None where there is none
     verdict: Verdict
@@ -157,7 +157,7 @@ class EngineComparison:
             "size": list(self.size),
             "pixel": self.pixel,
             "expected": self.expected,
-            "truth_error": plain(self.truth_error),
+            "reference_error": plain(self.reference_error),
             **self.comparison.to_json(),
             "factor": plain(self.hints.factor),
             "factor_rmse": plain(self.hints.factor_rmse),
@@ -175,7 +175,7 @@ class EngineComparison:
         pixel = "at pixel centres" if self.pixel == "centre" else "means over pixels"
         lines = [
             f"scene            {self.scene}, {self.size[0]} x {self.size[1]}; truth: {of}, {pixel}, airlight known to "
-            f"{self.truth_error:.2g} of its mean",
+            f"{self.reference_error:.2g} of its mean",
             f"pixels           {self.fit.words}",
             self.comparison.summary(),
         ]
@@ -296,7 +296,7 @@ def judge_image(
         size=judged.size,
         fit=fit,
         expected=judged.holds,
-        truth_error=relative_bound(fit.truth),
+        reference_error=relative_bound(fit.truth),
         comparison=comparison,
         place=error_place(wanted, test, lamp_distance(loaded, fit.truth)),
         verdict=judge(wanted, test, fit.hints, comparison.failures),

@@ -44,7 +44,7 @@ class MultipleScattering:
     samples: int  #: a pixel in each
 
 
-def multiple_scattering_share(
+def multiple_scattering_fraction(
     scene,
     *,
     max_depth: int = 64,

@@ -26,7 +26,7 @@ from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import Scene, read_scene
 from reference.monte_carlo.batches import LAYERS
 from validation.estimates.monte_carlo import monte_carlo_batches
-from validation.estimates.multiple_scattering import multiple_scattering_share
+from validation.estimates.multiple_scattering import multiple_scattering_fraction
 from validation.metrics.errors import error_metrics
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.parts import camera
@@ -52,7 +52,7 @@ def multiple_scattering() -> dict[str, Any]:
     described["fog"]["scale"] = _THIN
     scene = mi.load_dict(described)
     resize(scene, _SIZE)
-    thin = multiple_scattering_share(scene, batches=_BATCHES, samples=_SAMPLES).medium
+    thin = multiple_scattering_fraction(scene, batches=_BATCHES, samples=_SAMPLES).medium
     return {"left over": max(map(_left_over, _SCENES)), "thin": [thin.value, *thin.interval]}
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Configurations: a method with a kernel and the values of its parameters, by the names that a user gives.
 
-A kernel is named 'quadrature', 'quadrature-32', or as a user's own 'module:function' or 'file.py:function'.
+A kernel is named 'quadrature', 'quadrature-32', or as a user's 'module:function' or 'file.py:function'.
 """
 
 import sys
@@ -40,7 +40,7 @@ class Configuration:
 
     @property
     def own(self) -> bool:
-        """Whether the method or its kernel is the user's own, named 'module:function'."""
+        """Whether the method or its kernel is the user's, named 'module:function'."""
         return ":" in self.method or ":" in (self.kernel or "")
 
 
@@ -189,7 +189,7 @@ def find_kernel(name: str) -> Callable[..., Any]:
     """Return the kernel function of a name.
 
     The name is one of `realtime.kernels.registry.KERNELS`, 'name-N' for the same kernel with its first parameter
-    set to the whole number N, or a user's own, 'module:function' or 'path/to/file.py:function'. An unknown one is
+    set to the whole number N, or a user's, 'module:function' or 'path/to/file.py:function'. An unknown one is
     refused with the nearest.
     """
     if ":" in name:
@@ -238,7 +238,7 @@ def _imported(name: str) -> Callable[..., Any]:
 
 
 def user_code(chosen: Configuration) -> list[str]:
-    """Return digests of the user's own code in a configuration, with the modules of its folder that it imports."""
+    """Return digests of the user's code in a configuration, with the modules of its folder that it imports."""
     return [_user_digest(name) for name in (chosen.method, chosen.kernel) if name is not None and ":" in name]
 
 

@@ -2,7 +2,7 @@
 """What a command will take, estimated from counts before it starts, so that an hour or all memory is not a surprise.
 
 The costs are those of one processor thread, measured on two threads of an AMD EPYC on 22 November 2026 and rounded; a
-scene can be some times cheaper or dearer. That is enough to tell a minute from a day.
+scene can be some times cheaper or costlier. That is enough to tell a minute from a day.
 """
 
 import os
@@ -43,7 +43,7 @@ def frame_work(size: tuple[int, int], *, lights: int = 1, steps: float = 0, fram
 
 
 def truth_work(size: tuple[int, int], *, lights: int = 1, images: float = 1) -> Work:
-    """Return the work of some images of the quadrature truth."""
+    """Return the work of some images of the quadrature reference."""
     pixels = float(size[0]) * size[1]
     return Work(images * pixels * max(lights, 1) * _TRUTH, pixels * _TRUTH_BYTES)
 

@@ -4,12 +4,12 @@ r"""The error of an image by its causes: differences of renders, which add up to
 A method says which of its parameters make errors (`realtime.methods.interface.method.Method.error_causes`). They are
 taken away one on top of the other: R_0 is the image as asked for, R_1 that without the first cause, and so on to R_n,
 the best that the method can do. E is the exact sum over the same light points, by `shadow-planes` with the kernel
-`exact`, and T the truth. Then
+`exact`, and T the reference. Then
 
     R_0 - T = (R_0 - R_1) + (R_1 - R_2) + ... + (R_n - E) + (E - T),
 
 pixel by pixel: by its causes, the rest, and the light points in place of the light's extent. In a scene without lights
-with extent E is the truth. If the method says that its last cause is all that is left, that takes the rest.
+with extent E is the reference. If the method says that its last cause is all that is left, that takes the rest.
 
 With <a, b> the mean of a b over pixels and channels, the *share* of a part P in the error D = R_0 - T is
 
@@ -44,10 +44,10 @@ class Part:
     """A part of an error."""
 
     cause: str
-    without: str  #: what has this cause no more: values of parameters, 'exact sum' or 'truth'
+    without: str  #: what has this cause no more: values of parameters, 'exact sum' or 'reference'
     image: Array  #: signed, (height, width, 3) [W/(m^2 sr)]
-    relative_rmse: float  #: root of its mean square over the mean of the truth
-    relative_bias: float  #: its mean over that of the truth
+    relative_rmse: float  #: root of its mean square over the mean of the reference
+    relative_bias: float  #: its mean over that of the reference
     share: float  #: in the square of the whole error; NaN where there is none
 
 
@@ -64,7 +64,7 @@ class Decomposition:
     def whole(self) -> Part:
         """The error itself."""
         difference = self.image - self.truth
-        return _part("whole", "truth", difference, difference, self.truth)
+        return _part("whole", "reference", difference, difference, self.truth)
 
 
 def decompose(
@@ -114,9 +114,9 @@ def decompose(
         last, before = better, without
     if scene.area_lights:
         steps.append((left, "exact sum", last - best))
-        steps.append((POINTS, "truth", best - truth))
+        steps.append((POINTS, "reference", best - truth))
     else:
-        steps.append((left, "truth", last - truth))
+        steps.append((left, "reference", last - truth))
     whole = image - truth
     parts = tuple(_part(cause, without, part, whole, truth) for cause, without, part in steps)
     return Decomposition(chosen, truth, image, parts)

@@ -107,7 +107,7 @@ class FrameTimes:
     objects_moved: Timing | None = column(
         "objects moved", "ms", "a frame after the objects moved too: acceleration structure", default=None
     )
-    light_moved_camera_kept: Timing | None = column(
+    light_moved_camera_cached: Timing | None = column(
         "light moved, camera rays kept",
         "ms",
         "a frame after the light moved, with the camera rays of the last frame",
@@ -175,7 +175,7 @@ def time_frame(
         airlight=time_repeated(airlight, seconds=seconds),
         light_moved=few(moved_light(renderer)),
         objects_moved=few(objects_moved),
-        light_moved_camera_kept=few(moved_light_alone(renderer, cache)),
+        light_moved_camera_cached=few(moved_light_alone(renderer, cache)),
         colours_changed=few(changed_look(renderer, cache)),
     )
 
@@ -242,7 +242,7 @@ def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
         airlight=timing_of(airlight),
         light_moved=timing_of(light_moved),
         objects_moved=timing_of(move + light_moved),
-        light_moved_camera_kept=timing_of(shade + airlight + prepare * bool(needed & {"light", "look"})),
+        light_moved_camera_cached=timing_of(shade + airlight + prepare * bool(needed & {"light", "look"})),
         colours_changed=timing_of(shade + airlight + prepare * ("look" in needed)),
     )
 

@@ -56,7 +56,7 @@ def row_source() -> str:
 def cell_key(cell: Cell, made: Made, scenes: Mapping[str, str] | None = None) -> str:
     """Return the key of the row of a cell that these versions compute.
 
-    `scenes` are digests of scenes that were read before, by name: whoever has many cells of a file reads it once.
+    `scenes` are digests of scenes that were read before, by name: anyone who has many cells of a file reads it once.
     """
     return key_of(
         "row",

@@ -5,7 +5,7 @@
 |---|---|---|
 | `size` | pixels | the image has half, twice and four times the width and height |
 | `triangles` | triangles of opaque meshes | each is cut into four, with bumps (`validation.study.subdivision`) |
-| `lights` | lights without extent | each stands beside itself again, with its share of the intensity |
+| `lights` | lights without extent | each stands beside itself again, with its fraction of the intensity |
 | `media` | bounded media | the last ones are left out |
 | `map` | texels on a side of a shadow map | the parameter `map` |
 
@@ -91,7 +91,7 @@ def _lights(name: str, size: tuple[int, int]) -> list[Step]:
 
 
 def with_copies(scene: Scene, copies: int) -> Scene:
-    """Return a scene in which each light without extent stands several times, with its share of the intensity."""
+    """Return a scene in which each light without extent stands several times, with its fraction of the intensity."""
     here = np.array(scene.camera.origin, dtype=np.float64).ravel()
     lights = tuple(_copy(light, number, copies, here) for light in scene.lights for number in range(copies))
     kinds = [light.kind for light in lights]

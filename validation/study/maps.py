@@ -95,7 +95,7 @@ def map_flicker(
     Returns
     -------
     dict
-        `truth_change`, the root mean square of the change of the reference from frame to frame over its mean;
+        `reference_change`, the root mean square of the change of the reference from frame to frame over its mean;
         `nonfinite`, pixels that are left out because some image has NaN or infinity there; and lists, by
         configuration: `texels`, by how many a shadow moves from frame to frame, `flicker`, the root mean square of the
         change of the image less that of the reference, and `relative_rmse` of all frames, both over that mean.
@@ -125,7 +125,7 @@ def map_flicker(
     errors = [image[:, finite] - truth for image in images]
     mean = float(truth.mean())
     return {
-        "truth_change": _rms(np.diff(truth, axis=0)) / mean,
+        "reference_change": _rms(np.diff(truth, axis=0)) / mean,
         "nonfinite": int(np.sum(~finite)),
         "texels": [np.pi / turn * float(dict(chosen.parameters)["map"]) for chosen in configurations],
         "flicker": [_rms(np.diff(error, axis=0)) / mean for error in errors],

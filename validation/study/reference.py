@@ -3,7 +3,7 @@
 
 It is the quadrature at pixel centres. An area light needs many light samples, each as costly as a point light: it has
 fewer here than in `airlight reference`, and their standard error is part of the bound. A sixteenth of the pixels has a
-truth there, chosen by chance once for all: quantiles of errors need no more.
+reference there, chosen by chance once for all: quantiles of errors need no more.
 """
 
 from dataclasses import dataclass, replace
@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 # point takes as long as a point light does, and surfaces take as long again: these are left out.
 _PLAN = PointPlan(error=2e-2, first=2, most=4, surfaces=False)
 
-_SHARE = 16  # one pixel in so many has a truth where lights have an extent
+_SHARE = 16  # one pixel in so many has a reference where lights have an extent
 
 _LEAST = 64  # pixels that have one
 _SEED = 20261123  # of their choice
@@ -89,7 +89,7 @@ def cell_reference(loaded: LoadedScene) -> Reference:
     if not any(emitter.get_shape() is not None for emitter in loaded.scene.emitters()):
         spent = stopwatch()
         return of_image(truth_image(loaded.scene), spent())
-    key = key_of("sweep-truth", sampled_reference, scene=scene_digest(loaded.scene))
+    key = key_of("sweep-reference", sampled_reference, scene=scene_digest(loaded.scene))
     result = kept(key, lambda: sampled_reference(loaded.scene))
     some = result.arrays
     return Reference(some["airlight"], some["bound"], None, some["mask"], None, result.spent)
@@ -109,6 +109,6 @@ def sampled_reference(scene) -> dict[str, Array]:
     airlight[mask] = rays.airlight
     bound[mask] = rays.bound + _STANDARD_ERRORS * standard_error(rays.replicates)[:, :3]
     if not (np.isfinite(airlight).all() and np.isfinite(bound).all()):
-        raise InputError("the truth is not finite in some pixels: a light may lie on a ray; move it")
+        raise InputError("the reference is not finite in some pixels: a light may lie on a ray; move it")
     shape = truth.height, truth.width
     return {"airlight": airlight.reshape(*shape, 3), "bound": bound.reshape(*shape, 3), "mask": mask.reshape(shape)}

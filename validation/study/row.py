@@ -28,7 +28,7 @@ from validation.study.frame_times import FrameTimes
 STATUSES = ("done", "refused", "left out", "failed", "hung", "aborted")
 
 #: Begins the reason of a row whose scene has no reference: the method was not asked.
-NO_TRUTH = "truth of "
+NO_REFERENCE = "reference of "
 
 PROPERTY = "properties."  #: begins the names of the columns of properties
 FRAME_MS = "times.frame.median_ms"  #: the column of the time of a frame

@@ -44,7 +44,7 @@ Paint = Callable[[Array, Array], bytes | None]
 
 REFUSALS = (InputError, ReferenceInputError)  #: what methods and readers of scenes raise for what they cannot do
 PROBE = (64, 48)  #: size of the frame from which the time of a full-size frame is estimated [pixels]
-_DOUBTFUL = 0.5  # share of the limit: after a longer preparation, the time of a frame is estimated before it begins
+_DOUBTFUL = 0.5  # fraction of the limit: after a longer preparation, the time of a frame is estimated before it begins
 _RECORDED = 1.0  # in a first frame that takes less, its recording takes a part of time and memory that counts [s]
 _LONG = 25.0  # after a longer first frame, compilation included, no larger frame is timed [s]
 
@@ -260,7 +260,7 @@ def _errors(cell: Cell, frame: Frame, scene: Scene, reference: Reference, whole:
 def _too_long(renderer: FrameRenderer, cell: Cell, took: float) -> str | None:
     """Return why a frame would take longer than the limit, or None.
 
-    It is judged by its preparation once kernels are compiled and, where that takes long and for a user's own method,
+    It is judged by its preparation once kernels are compiled and, where that takes long and for a user's method,
     by the second frame of a small scene, whose preparation takes as long. Of many groups of lights only the first are
     prepared before the frame; the others take as long each. Nothing is judged where the making of the renderer, which
     `took` so long [s], says that it is far below the limit.

@@ -27,7 +27,7 @@ from reference.storage.kept import Kept, is_kept, key_of
 from validation.engine.images import EngineImage, image_times, measure_image
 from validation.estimates.agreement import agreements
 from validation.estimates.monte_carlo import ElsewhereFor
-from validation.estimates.multiple_scattering import multiple_scattering_share
+from validation.estimates.multiple_scattering import multiple_scattering_fraction
 from validation.estimates.quadrature import has_truth, kept_truth, truth_image
 from validation.metrics.errors import plain
 from validation.metrics.flip import flip_hdr
@@ -219,7 +219,7 @@ def study_scene(
         rows = list(pool.map(_with_flip, rows))
     rows += [_image(study, shown) for shown in images]
     results = (made, checks, multiple, *(result for row in rows for result in row.results))
-    seconds = {"truth": made.seconds, "agreement": checks.seconds, "multiple": multiple.seconds}
+    seconds = {"reference": made.seconds, "agreement": checks.seconds, "multiple": multiple.seconds}
     seconds["methods"] = round(sum(result.seconds for result in results[3:]), 3)
     return SceneResult(study, truth, checks.data, multiple.data, tuple(rows), seconds, results)
 
@@ -257,13 +257,13 @@ def _checks_key(study: SceneStudy) -> str:
 
 def _multiple_key(study: SceneStudy) -> str:
     asked = study.study.checks.multiple
-    return key_of("scene-multiple", multiple_scattering_share, scene=study.identity, multiple=asked)
+    return key_of("scene-multiple", multiple_scattering_fraction, scene=study.identity, multiple=asked)
 
 
 def _multiple(study: SceneStudy) -> Computed:
     batches, samples = study.study.checks.multiple
     with study.at(_MULTIPLE) as scene:
-        return plain(multiple_scattering_share(scene, batches=batches, samples=samples)), {}
+        return plain(multiple_scattering_fraction(scene, batches=batches, samples=samples)), {}
 
 
 def _cell_key(study: SceneStudy, chosen: Configuration) -> str:

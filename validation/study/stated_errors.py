@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""The errors that a method states for itself: what is further from the truth is a fault.
+r"""The errors that a method states for itself: what is further from the reference is a fault.
 
 What claims to be exact but for rounding, the kernel `exact` along whole rays where nothing casts a shadow and shadow
 planes in exact order, states three:

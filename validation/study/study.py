@@ -112,7 +112,7 @@ class Cell:
     @property
     def image(self) -> "Cell":
         """The cell that stands for all cells of the same image, which share a reference."""
-        return replace(self, chosen=Configuration("truth"), measure=Measure())
+        return replace(self, chosen=Configuration("reference"), measure=Measure())
 
 
 @dataclass(frozen=True)
@@ -211,7 +211,7 @@ class Study:
         return seed in self._seeds and name == f"{PREFIX}{seed}{self._options}"
 
     def images(self) -> Iterator[tuple[Cell, ...]]:
-        """Yield the cells of one image after the other: they share a truth."""
+        """Yield the cells of one image after the other: they share a reference."""
         for scene, size, medium in itertools.product(self.scene_names(), self.sizes, self.media):
             yield tuple(
                 Cell(scene, size, medium, each, replace(self.measure, flip=self.wants_flip(each)))

@@ -109,15 +109,15 @@ const percent = (share) => `${(100 * share).toPrecision(3)} %`;
 const small = (share) => `${(100 * share).toExponential(1)} %`;
 hear.error = ({failure, error, done}) => {
   const words = $("#error");
-  document.documentElement.dataset.truth = failure ? "failed" : done ? "done" : error ? "known" : "none";
-  if (failure) words.textContent = `No truth: ${failure}`;
-  else if (!error) words.textContent = "The truth begins when nothing moves.";
+  document.documentElement.dataset.reference = failure ? "failed" : done ? "done" : error ? "known" : "none";
+  if (failure) words.textContent = `No reference: ${failure}`;
+  else if (!error) words.textContent = "The reference begins when nothing moves.";
   else {
     const part = error.known === error.pixels ? "all pixels" : `${error.known} of ${error.pixels} pixels`;
     const interval = error.known === error.pixels ? "" : ` ± ${percent(error.interval)}`;
-    words.textContent = `Error of the airlight against the truth: RMSE ${percent(error.relative_rmse)}${interval}, ` +
+    words.textContent = `Error of the airlight against the reference: RMSE ${percent(error.relative_rmse)}${interval}, ` +
       `bias ${percent(error.relative_bias)} of the mean; 99 % of pixels within ${percent(error.p99)}; ${part}; ` +
-      `the truth's own bound ${small(error.bound)}.`;
+      `the reference's own bound ${small(error.bound)}.`;
     document.documentElement.dataset.rmse = error.relative_rmse;
   }
   $("#known").value = error ? error.known / error.pixels : 0;
@@ -245,7 +245,7 @@ const arrange = () => {
   $("#scale").hidden = beside !== "error";
   $("#left").textContent = beside === "none" ? "" : "method";
   $("#right").hidden = beside === "none";
-  $("#right").textContent = beside === "truth" ? "truth" : "error of the airlight";
+  $("#right").textContent = beside === "reference" ? "reference" : "error of the airlight";
 };
 const show = (more = {}) => {
   arrange();

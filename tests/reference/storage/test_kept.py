@@ -33,7 +33,7 @@ from reference.storage.kept import (
     stopwatch,
     store,
 )
-from validation.estimates.multiple_scattering import multiple_scattering_share
+from validation.estimates.multiple_scattering import multiple_scattering_fraction
 from validation.kernels.rays import _truth
 from validation.kernels.stability import stability
 from validation.metrics.flip import flip_hdr
@@ -199,11 +199,11 @@ def functions():
         "volpath": (volpath_batch, "reference.scene.read"),
         "cloud-paths": (cloud_paths_batch, "reference.monte_carlo.cloud_paths.walk"),
         "kernel-rays": (_truth, "analytic.panels"),
-        "sweep-truth": (sampled_reference, quadrature),
+        "sweep-reference": (sampled_reference, quadrature),
         "row": (run, "realtime.methods.ray_march"),
         "page": (packed_scene, "reports.page.image_codec"),
         "scene-checks": (check_reference, "validation.statistics.comparison"),
-        "scene-multiple": (multiple_scattering_share, "reference.monte_carlo.volpath.integrator"),
+        "scene-multiple": (multiple_scattering_fraction, "reference.monte_carlo.volpath.integrator"),
         "cell": (_measured, "realtime.methods.ray_march"),
         "scene-image": (_image_measured, "validation.metrics.errors"),
         "flip": (flip_hdr, "validation.metrics.errors"),
@@ -237,7 +237,7 @@ def test_every_kind_that_is_kept_is_in_the_table():
     text = "".join(path.read_text(encoding="utf-8") for path in module._modules().values())
     kinds = set(re.findall(r'key_of\(\s*"([a-z-]+)"', text)) | set(re.findall(r'_key\(\s*"([a-z-]+)"', text))
     assert kinds - {"report-paper"} <= functions().keys()
-    assert {"quadrature", "kernel-rays", "sweep-truth", "row", "page", "report-scaling"} <= kinds
+    assert {"quadrature", "kernel-rays", "sweep-reference", "row", "page", "report-scaling"} <= kinds
 
 
 @pytest.mark.claim("report-kept")

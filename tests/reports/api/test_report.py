@@ -18,7 +18,7 @@ def test_report_hands_on_what_it_was_given(variant, tmp_path, monkeypatch):
 
     def write(folder, study, **options):
         given.update(options, folder=folder, study=study)
-        made = {"claims": [{"text": "so"}], "scenes": [], "created": "", "seconds": 1, "kept": 0, "computed": 1}
+        made = {"claims": [{"text": "so"}], "scenes": [], "created": "", "seconds": 1, "cached": 0, "computed": 1}
         return made | {"measured": None}
 
     monkeypatch.setattr("reports.report.measure.write_report", write)

@@ -14,7 +14,7 @@ from validation.study.study import Checks, Measure, Study
 
 #: What is measured by the clock or of the memory, and how much of it was there before: a cluster leaves the references.
 TIMES = {"created", "seconds", "parts", "measured", "stages", "times", "environment", "claims", "memory", "cost"}
-TIMES |= {"kept", "computed"}
+TIMES |= {"cached", "computed"}
 
 
 def without_times(data):

@@ -114,8 +114,8 @@ CHANGES = [
     (_refused, ["hall shadow-planes (exact) refused: too many planes"]),
     (lambda new: (_refused(new), method(new).update(left_out=True)), []),  # a decision of who measured
     (lambda new: new["scenes"][0]["agreement"].update({"volpath airlight": agreement(False)}), None),
-    (lambda new: new["scenes"][0]["truth"].update(mean=1.001 * new["scenes"][0]["truth"]["mean"]), None),
-    (lambda new: new["scenes"][1]["truth"].update(disagreements=2), None),
+    (lambda new: new["scenes"][0]["reference"].update(mean=1.001 * new["scenes"][0]["reference"]["mean"]), None),
+    (lambda new: new["scenes"][1]["reference"].update(disagreements=2), None),
     (lambda new: new["claims"][0].update(good=False), None),
     (lambda new: new["stability"][0].update(broken=["float32 maximum 0.1 > 0.01"]), None),
     (lambda new: method(new, "fog", "ray-march (steps=100)").update(error=errors(1e-4)), []),  # another is the fastest
@@ -131,7 +131,7 @@ def test_a_change_is_worse_one_way_and_not_the_other(change, expected):
         assert len(found) >= 1
     else:
         assert found == expected
-    if found and "truth moved" not in found[0]:
+    if found and "reference moved" not in found[0]:
         assert words(compare_reports(new, report())) == []
 
 

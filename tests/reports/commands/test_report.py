@@ -63,7 +63,7 @@ def handed_on(monkeypatch):
     def write(folder, study, **options):
         given.update(options, folder=folder, scenes=study.scenes, configurations=study.configurations)
         claims = [{"text": "`--full` has all."}]
-        return {"claims": claims, "scenes": [], "seconds": 1.2, "kept": 0, "computed": 3, "measured": None}
+        return {"claims": claims, "scenes": [], "seconds": 1.2, "cached": 0, "computed": 3, "measured": None}
 
     monkeypatch.setattr("reports.report.measure.write_report", write)
     return given
@@ -102,7 +102,7 @@ def test_a_report_goes_on_without_methods_that_are_at_fault(variant, mine, capfd
     assert "warning: method fog_of_mine:darkens" not in printed.err
     assert run(["report", *options, "--method", "fog_of_mine:exits", "--method", "fog_of_mine:half", "--json"]) == 1
     again = {row["method"].partition(":")[2]: row for row in json.loads(capfd.readouterr().out)["scenes"][0]["methods"]}
-    assert (again["exits"]["kept"], again["half"]["kept"]) == (False, True)
+    assert (again["exits"]["cached"], again["half"]["cached"]) == (False, True)
 
 
 def _measured(handed_on):

@@ -59,7 +59,12 @@ def test_a_killed_sweep_goes_on_and_a_second_computes_nothing(tmp_path):
     ran = _run(study, "-o", folder, "--cluster", "local:2", "--json")
     assert ran.returncode == 0, ran.stderr
     summary = json.loads(ran.stdout)
-    assert (summary["cells"], summary["kept"], summary["computed"], summary["left"]) == (8, len(kept), 8 - len(kept), 0)
+    assert (summary["cells"], summary["cached"], summary["computed"], summary["left"]) == (
+        8,
+        len(kept),
+        8 - len(kept),
+        0,
+    )
     rows = _rows(folder)
     assert len({row["key"] for row in rows}) == len(rows) == 8
     assert {row["status"] for row in rows} == {"done"}
@@ -68,7 +73,7 @@ def test_a_killed_sweep_goes_on_and_a_second_computes_nothing(tmp_path):
     assert {row["properties.lights"] is None for row in rows} == {False}
     assert all(row["picture"][:4] == b"RIFF" for row in rows)
     again = json.loads(_run(study, "-o", folder, "--json").stdout)
-    assert (again["kept"], again["computed"]) == (8, 0)
+    assert (again["cached"], again["computed"]) == (8, 0)
     assert _rows(folder) == rows
 
 
@@ -87,7 +92,7 @@ def test_times_of_a_process_alone_are_added_to_the_errors_of_all(tmp_path):
         row = store.row(rows[0]["key"])
         store.add(row | {FRAME_MS: None, "cost.alone": None})
     again = json.loads(_run(study, "-o", folder, "--cluster", "local:2", "--json").stdout)
-    assert (again["kept"], again["computed"], again["timed_alone"]) == (6, 0, 1)
+    assert (again["cached"], again["computed"], again["timed_alone"]) == (6, 0, 1)
     assert {row["cost.alone"] for row in _rows(folder)} == {True}
 
 

@@ -46,7 +46,7 @@ def scenes():
 
 @pytest.mark.claim("claims-follow")
 def test_claims_on_a_truth_that_is_confirmed():
-    assert [(claim["kind"], claim["good"]) for claim in claims(scenes())] == [("truth", True), ("left-out", None)]
+    assert [(claim["kind"], claim["good"]) for claim in claims(scenes())] == [("reference", True), ("left-out", None)]
     assert "confirmed by Mitsuba's volpath in 3 of 3 comparisons" in texts(scenes())[0]
     assert claims([]) == []
 
@@ -92,7 +92,7 @@ def test_out_of_time_can_still_speak_against_the_truth():
 def test_what_failed_is_named_with_its_pixels():
     data = scenes()
     data[0]["methods"][0]["error"] |= {"nonfinite": 3, "negative": 2}
-    data[1]["truth"]["left"] = 7
+    data[1]["reference"]["left"] = 7
     failed = [claim for claim in claims(data) if claim["kind"] == "failed"]
     assert [claim["good"] for claim in failed] == [False] * 3
     assert all(words in claim["text"] for words, claim in zip(("fast in fog (3", "fast in fog (2", "hall (7)"), failed))

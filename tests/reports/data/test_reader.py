@@ -14,7 +14,7 @@ from tests.helpers.reports import checked, entry, report_of, scene, settings
 def small_report():
     """The content of a report of one scene and one method."""
     methods = [entry("unshadowed (exact)", knows_shadows=False, files={"exr": "fog/unshadowed-exact.exr"})]
-    claim = {"kind": "truth", "text": "It is so.", "good": True}
+    claim = {"kind": "reference", "text": "It is so.", "good": True}
     fog = scene("fog", methods, size=[4, 3], timed=[4, 3], agreement={})
     return checked(report_of([fog], settings=settings(image=[4, 3], timed=[4, 3]), claims=[claim]))
 

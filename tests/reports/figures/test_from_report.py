@@ -52,7 +52,7 @@ def report(tmp_path_factory):
         methods.append(method(label, error, files={"exr": f"{label[:5]}.exr"}))
     methods += [engine("engine", 0.1) | {"layer": "airlight"}, refused("refused_one", "no such media")]
     files = {"exr": "reference.exr", "picture": "reference.png", "airlight": "reference-airlight.png"}
-    studied = scene("a_scene", methods, size=[32, 24], truth=truth_of(relative_bound=4e-11), files=files)
+    studied = scene("a_scene", methods, size=[32, 24], reference=truth_of(relative_bound=4e-11), files=files)
     data = report_of(
         [studied],
         created="2031-01-02 03:04:05 +0000",

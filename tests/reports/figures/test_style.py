@@ -31,7 +31,7 @@ def lab(hexadecimal: str, sight: str):
 def test_any_two_colours_differ_for_every_sight(sight):
     import colour
 
-    seen = {name: lab(value, sight) for name, value in (COLOURS | {"truth": "#000000", "paper": "#ffffff"}).items()}
+    seen = {name: lab(value, sight) for name, value in (COLOURS | {"reference": "#000000", "paper": "#ffffff"}).items()}
     for first, other in combinations(seen, 2):
         difference = float(colour.delta_E(seen[first], seen[other], method="CIE 2000"))
         assert difference > LEAST_DIFFERENCE, (first, other, sight, difference)

@@ -138,12 +138,12 @@ def again(written, tmp_path, **options):
 @pytest.mark.claim("report-kept")
 def test_a_second_report_is_kept_in_full(written, variant, tmp_path):
     repeated = again(written, tmp_path)
-    assert (repeated["kept"], repeated["computed"]) == (3 + len(CHOSEN), 0)
+    assert (repeated["cached"], repeated["computed"]) == (3 + len(CHOSEN), 0)
     assert repeated["measured"] == written.data["measured"]
     (scene,), (scene_after,) = written.data["scenes"], repeated["scenes"]
-    assert [m["kept"] for m in scene_after["methods"]] == [True] * len(CHOSEN)
+    assert [m["cached"] for m in scene_after["methods"]] == [True] * len(CHOSEN)
     for before, after in zip(scene["methods"], scene_after["methods"], strict=True):
-        assert before | {"kept": True} == after
+        assert before | {"cached": True} == after
     assert {name: scene[name] for name in scene if name != "methods"} == {
         name: scene_after[name] for name in scene_after if name != "methods"
     }
@@ -171,9 +171,9 @@ def test_fresh_computes_truths_and_batches_again_too(written, variant, tmp_path,
     monkeypatch.setattr("validation.estimates.quadrature.quadrature_image", counted(quadrature_image))
     monkeypatch.setattr("validation.estimates.monte_carlo.single_scatter_batch", counted(single_scatter_batch))
     multiple = written.data["scenes"][0]["multiple"]
-    monkeypatch.setattr("validation.study.scene.multiple_scattering_share", lambda scene, **options: multiple)
+    monkeypatch.setattr("validation.study.scene.multiple_scattering_fraction", lambda scene, **options: multiple)
     repeated = again(written, tmp_path, fresh=True, configurations=(MARCH,), checks=checks)
-    assert (repeated["kept"], repeated["computed"]) == (0, 3 + 1)
+    assert (repeated["cached"], repeated["computed"]) == (0, 3 + 1)
     assert set(calls) == {quadrature_image, single_scatter_batch}
     # The same numbers, but for the times.
     before, (after,) = written.data["scenes"][0]["methods"][-1], repeated["scenes"][0]["methods"]
@@ -189,21 +189,21 @@ def test_a_changed_scene_is_measured_again(written, variant, tmp_path, monkeypat
     """In a cache of its own: what it finds anew replaces what was kept."""
     multiple = written.data["scenes"][0]["multiple"]
     monkeypatch.setattr("validation.study.scene.agreements", lambda scene, margins, **options: {})
-    monkeypatch.setattr("validation.study.scene.multiple_scattering_share", lambda scene, **options: multiple)
+    monkeypatch.setattr("validation.study.scene.multiple_scattering_fraction", lambda scene, **options: multiple)
     path = tmp_path / "mine.xml"
     counts = []
     for sigma_t in ("0.31", "0.37"):
         path.write_text(SCENE.replace("0.31", sigma_t))
         measured = again(written, tmp_path, scenes=(str(path),), configurations=())
-        counts.append((measured["kept"], measured["computed"]))
+        counts.append((measured["cached"], measured["computed"]))
     assert counts == [(0, 3), (0, 3)]
-    assert measured["scenes"][0]["truth"]["mean"] != written.data["scenes"][0]["truth"]["mean"]
+    assert measured["scenes"][0]["reference"]["mean"] != written.data["scenes"][0]["reference"]["mean"]
 
 
 def test_a_random_scene_with_meshes_on_any_path_has_a_safe_folder(written, variant, tmp_path, monkeypatch, own_cache):
     multiple = written.data["scenes"][0]["multiple"]
     monkeypatch.setattr("validation.study.scene.agreements", lambda scene, margins, **options: {})
-    monkeypatch.setattr("validation.study.scene.multiple_scattering_share", lambda scene, **options: multiple)
+    monkeypatch.setattr("validation.study.scene.multiple_scattering_fraction", lambda scene, **options: multiple)
     folder = tmp_path / "C:my, 5% meshes"
     folder.mkdir()
     mi.load_dict({"type": "cube"}).write_ply(str(folder / "a.ply"))

@@ -90,4 +90,4 @@ def test_maps_print_errors_and_flicker_by_size(variant, capfd, monkeypatch):
     assert data["maps"] == [metrics["map"] for metrics in scene["errors"]] == [16, 32]
     assert all(metrics["relative_rmse"] > 0 for metrics in scene["errors"])
     assert all(value > 0 for value in scene["flicker"]["flicker"])
-    assert scene["flicker"]["truth_change"] > 0
+    assert scene["flicker"]["reference_change"] > 0

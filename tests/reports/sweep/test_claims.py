@@ -46,29 +46,29 @@ def test_what_is_no_number_misses_and_a_refusal_is_no_try(sweep_of):
 def test_scene_without_a_truth_is_no_try(sweep_of):
     several = [
         row("random:0", relative_rmse=1e-5),
-        row("random:1", status="hung", reason="truth of random:1 160x120: stopped after 600 s"),
+        row("random:1", status="hung", reason="reference of random:1 160x120: stopped after 600 s"),
         row("random:2", status="hung", reason="stopped after 600 s"),
-        row("random:3", status="hung", reason="truth of random:3 160x120: stopped after 600 s"),
+        row("random:3", status="hung", reason="reference of random:3 160x120: stopped after 600 s"),
         row("random:3", medium="m", relative_rmse=1e-5),
     ]
     made = claim(samples(sweep_of(several))[0], 1e-3)
     assert (made.tries, made.within, made.untold) == (3, 2, 1)
-    assert made.text.endswith("; no truth of 1 more.")
+    assert made.text.endswith("; no reference of 1 more.")
 
 
 @pytest.mark.claim("sweep-tries")
 def test_what_the_truth_cannot_tell_widens_the_interval_on_one_side(sweep_of):
     several = [row(f"random:{n}", relative_rmse=1e-4) for n in range(10)]
     several += [
-        row("random:10", relative_rmse=9e-4, truth_error=2e-4),
-        row("random:11", relative_rmse=1.1e-3, truth_error=2e-4),
-        row("random:12", relative_rmse=5e-3, truth_error=2e-4),
+        row("random:10", relative_rmse=9e-4, reference_error=2e-4),
+        row("random:11", relative_rmse=1.1e-3, reference_error=2e-4),
+        row("random:12", relative_rmse=5e-3, reference_error=2e-4),
     ]
     made = claim(samples(sweep_of(several))[0], 1e-3)
     assert (made.tries, made.within, made.undecided) == (13, 10, 2)
     assert made.low == binomial_interval(10, 13)[0]
     assert made.high == binomial_interval(12, 13)[1]
-    assert made.text.endswith("the truth is not exact enough to tell in 2 scenes.")
+    assert made.text.endswith("the reference is not exact enough to tell in 2 scenes.")
 
 
 @pytest.mark.claim("sweep-properties")

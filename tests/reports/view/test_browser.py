@@ -63,8 +63,8 @@ def test_the_page_moves_changes_and_shows_the_error(browser):
         page.fill('[aria-label="steps"]', "0")
         page.keyboard.press("Enter")
         page.wait_for_function("() => document.querySelector('#mistake').textContent.includes('steps: got 0')")
-        page.select_option("#beside", "truth")
-        page.wait_for_selector("html[data-truth=done]", timeout=120_000)
+        page.select_option("#beside", "reference")
+        page.wait_for_selector("html[data-reference=done]", timeout=120_000)
         assert "all pixels" in page.inner_text("#error")
         assert np.abs(pixels(page, "#method") - pixels(page, "#other")).mean() < 2
         second, _ = watched(browser)

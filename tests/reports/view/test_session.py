@@ -129,7 +129,7 @@ def test_the_commands_on_the_page_show_what_is_shown(view, tmp_path, monkeypatch
 @pytest.mark.claim("view-error", tolerance="1e-5 relative: EXR rounds to float32")
 def test_the_error_is_that_of_compare_and_begins_again_when_the_scene_changes(view, tmp_path, capfd):
     session, page = view("sphere-spot", "ray-march", steps=7)
-    ask(session, page, kind="show", other="truth")
+    ask(session, page, kind="show", other="reference")
     turns(session, lambda: page.others and any(said.get("done") for said in page.said if said["kind"] == "error"))
     error = page.last("error")["error"]
     assert error["known"] == error["pixels"] == SIZE[0] * SIZE[1]

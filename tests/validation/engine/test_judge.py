@@ -66,7 +66,7 @@ def test_airlight_is_compared_where_there_is_one(scene, truth, write):
     )
     assert verdict.comparison.metrics.relative_rmse < 1e-6  # the file is float32
     assert (verdict.failures, verdict.hints.words) == ((), ())
-    assert 0 <= verdict.truth_error < 1e-6
+    assert 0 <= verdict.reference_error < 1e-6
     verdict = compare_scene(scene, write(airlight=truth.airlight, surface=2 * truth.surface), layer="surface")
     np.testing.assert_allclose(verdict.comparison.metrics.relative_bias, 1, rtol=1e-6)
 
@@ -152,7 +152,7 @@ def test_the_references_own_standard_errors_count_as_those_of_its_file(tmp_path,
     assert by_scene.reference_variance_share == pytest.approx(by_file.reference_variance_share, rel=1e-5)
     assert by_scene.relative_bias_ci == pytest.approx(by_file.relative_bias_ci, rel=1e-5, abs=1e-7)
     assert by_file.reference_variance_share > 0.9
-    assert compared.truth_error > truth.airlight_se.mean() / truth.airlight.mean()
+    assert compared.reference_error > truth.airlight_se.mean() / truth.airlight.mean()
 
 
 @pytest.mark.parametrize("size", [(32, 24), (64, 48), (31, 23), (1, 1)])

@@ -8,7 +8,7 @@ import pytest
 from reference.monte_carlo.volpath.integrator import volpath_batch
 from reference.scene.read import read_truth
 from tests.helpers.scenes import tiny_scene
-from validation.estimates.multiple_scattering import left_out, multiple_scattering_share
+from validation.estimates.multiple_scattering import left_out, multiple_scattering_fraction
 
 
 def scene(albedo=0.9, sigma_t=0.31, **changes):
@@ -33,7 +33,9 @@ def test_the_nth_scattering_grows_with_the_nth_power_of_the_albedo(variant):
 
 
 def test_share_grows_with_the_optical_depth(variant):
-    thin, thick = (multiple_scattering_share(scene(sigma_t=s), max_depth=6, batches=6, samples=8) for s in (0.01, 0.6))
+    thin, thick = (
+        multiple_scattering_fraction(scene(sigma_t=s), max_depth=6, batches=6, samples=8) for s in (0.01, 0.6)
+    )
     assert 0 < thin.medium.value < 0.1 < thick.medium.value < 1
     assert thick.everything.value > 0
     for share in (thin.medium, thick.medium, thick.everything):

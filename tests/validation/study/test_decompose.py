@@ -55,8 +55,8 @@ def test_the_parts_add_up_to_the_whole(variant, method, kernel, parameters):
 def test_a_cause_that_is_gone_takes_its_part_along(variant):
     coarse = split("ray-march", steps=9, shadow="map", map=16)
     better = split("ray-march", steps=9)
-    assert causes(coarse) == [("map", "shadow=ray"), ("steps", "truth")]
-    assert causes(better) == [("steps", "truth")]
+    assert causes(coarse) == [("map", "shadow=ray"), ("steps", "reference")]
+    assert causes(better) == [("steps", "reference")]
     np.testing.assert_array_equal(coarse.parts[1].image, better.parts[0].image)
     np.testing.assert_array_equal(coarse.parts[0].image, coarse.image - better.image)
 
@@ -70,4 +70,4 @@ def test_a_method_of_ones_own_is_rendered_by_its_caller(variant):
 
     whole = split("tests.helpers.veil:Veil", render=render)
     assert asked == ["tests.helpers.veil:Veil"]
-    assert causes(whole) == [("rest", "truth")]
+    assert causes(whole) == [("rest", "reference")]
