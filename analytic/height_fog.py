@@ -411,8 +411,8 @@ def _evaluate_block(
     cosh = 0.5 * (growth + 1 / growth)
     r = parts.height[part, None] * cosh
     near = z + shadow_scale * (rays.light - z)
-    depth = fog.optical_depth(rays.origin, z, x) + fog.optical_depth(z, near, shadow_scale * r)
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):  # depths beyond the largest number leave nothing
+        depth = fog.optical_depth(rays.origin, z, x) + fog.optical_depth(z, near, shadow_scale * r)
         f = np.exp(np.nan_to_num(fog.log_density(z) - depth, nan=-np.inf, neginf=-np.inf)) / r
     if not phase.is_constant:
         behind, ahead = growth / (2 * cosh), 1 / (2 * cosh * growth)  # e^|w|/(2 cosh w) and e^-|w|/(2 cosh w)

@@ -3,6 +3,7 @@
 
 Read in this order:
 
+- `height_fog.py`: sums over lit stretches in height fog;
 - `unbounded.py`: sums over lit stretches in one medium without bounds;
 - `segments.py`: media in convex bounds along rays and shadow segments;
 - `pieces.py`: smooth pieces of lit stretches in bounded media;

@@ -8,17 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.quadrature.bounded import sum_media
+from reference.quadrature.height_fog import height_fog_exit, sun_stretch_sums
 from reference.quadrature.segments import Segments, camera_segments, scattering_range
-from reference.quadrature.unbounded import lit_stretches, profile_of, sum_intervals
+from reference.quadrature.unbounded import lit_stretches, profile_of, sum_intervals, sums_of
 from reference.scene.directional_light import DirectionalLight
+from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthLight, TruthScene
-from reference.scene.shapes import Shapes
+from reference.scene.shapes import Shapes, read_shapes
 from reference.visibility.candidates import Ball
 from reference.visibility.certificate import LitIntervals, coordinates
 from reference.visibility.lit_intervals import lit_intervals, obstacles, reaches
 from reference.visibility.planes import Rays, cone_interval, rays_at
 
 Array = NDArray[np.float64]
+
+_LEAST_SINE = 1e-4  # between a ray and a sun in height fog: closer ones are looked at no further
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,7 @@ class LitRays:
     lit: LitIntervals  #: up to the surface, in the cone of a spot
     segments: Segments | None  #: the media along the rays, where these have bounds
     shapes: Shapes  #: what can stand in the light
+    end: Array  #: up to where the rays were looked at, (rays,) [m]
 
 
 def light_airlight(
@@ -96,7 +101,7 @@ def lit_rays(
         normal = np.broadcast_to(light.axis, truth.direction.shape)
     known = obstacles(truth, Ball(light.position), distance, shapes)
     lit = lit_intervals(rays, ends, known, checks=checks, normal=normal)
-    return LitRays(rays, lit, camera_segments(truth, distance) if truth.media else None, known.shapes)
+    return LitRays(rays, lit, camera_segments(truth, distance) if truth.media else None, known.shapes, ends[1])
 
 
 def directional_airlight(truth: TruthScene, light: DirectionalLight, distance: Array, **how: Any) -> LightAirlight:
@@ -105,6 +110,17 @@ def directional_airlight(truth: TruthScene, light: DirectionalLight, distance: A
     rays, lit = found.rays, found.lit
     none = np.zeros((len(distance), 3))
     angle = np.full(len(distance), np.pi)
+    if isinstance(truth.medium, HeightMedium):
+        # Behind all that could stand in the light, a ray is lit or not as at the end of what was looked at.
+        goes_on = reaches(lit, found.end) & np.isinf(distance)
+        last = lit.high * (1 + 1e-6) >= found.end[lit.ray]
+        leaves = height_fog_exit(truth.medium, truth.origin, truth.direction)
+        high = np.where(goes_on[lit.ray] & last, leaves[lit.ray], lit.high)
+        edge = lit.edge * coordinates(rays, found.shapes)
+        parts = sun_stretch_sums(truth.medium, rays, (lit.ray, lit.low, high), edge)
+        radiance, bound = (sums_of(lit.ray, part, len(distance)) * light.irradiance for part in parts)
+        bound = bound + worth_of_doubt(truth, rays, lit) * light.irradiance
+        return LightAirlight(radiance, bound, angle, lit, reaches(lit, distance))
     if found.segments is None:
         return LightAirlight(none, none, angle, lit, reaches(lit, distance))
     # What the uncertainty of coordinates is worth on a ray, through an edge or a kink; at most all of the ray.
@@ -122,12 +138,18 @@ def lit_parallel_rays(
 ) -> LitRays:
     """Return which parts of the rays a directional light reaches; see `lit_rays`."""
     segments = camera_segments(truth, distance) if truth.media else None
-    last = scattering_range(segments)[1] if segments is not None else np.full(len(distance), -np.inf)
-    end = np.where(np.isfinite(distance), distance, np.maximum(last, 0.0))
     rays = rays_at(truth.origin, truth.direction, -light.direction, w=0)
+    if isinstance(truth.medium, HeightMedium):
+        shapes = read_shapes(truth.occluders) if shapes is None else shapes
+        # No shadow falls on a ray where it has left the light's cylinder about all shapes.
+        clear = coordinates(rays, shapes) * np.minimum(1.0, rays.height / _LEAST_SINE)
+        last = np.minimum(height_fog_exit(truth.medium, truth.origin, truth.direction), clear)
+    else:
+        last = scattering_range(segments)[1] if segments is not None else np.full(len(distance), -np.inf)
+    end = np.where(np.isfinite(distance), distance, np.maximum(last, 0.0))
     known = obstacles(truth, Ball(-light.direction, w=0), end, shapes)
     lit = lit_intervals(rays, (np.zeros_like(end), end), known, checks=checks)
-    return LitRays(rays, lit, segments, known.shapes)
+    return LitRays(rays, lit, segments, known.shapes, end)
 
 
 def worth_of_doubt(truth: TruthScene, rays: Rays, lit: LitIntervals) -> Array:
@@ -141,5 +163,5 @@ def worth_of_doubt(truth: TruthScene, rays: Rays, lit: LitIntervals) -> Array:
     part = part / rays.height[ray] if rays.w else part
     for medium in (truth.medium, *truth.media):
         strongest = medium.phase(np.linspace(-1, 1, 1001)).max()
-        np.add.at(worth, ray, part[:, None] * medium.albedo * medium.sigma_t * strongest / (4 * np.pi))
+        np.add.at(worth, ray, part[:, None] * medium.albedo * medium.largest * strongest / (4 * np.pi))
     return worth

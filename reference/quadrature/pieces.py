@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from reference.quadrature.segments import AMBIENT, Segments, optical_depth
 from reference.quadrature.unbounded import Stretches
-from reference.scene.read import TruthMedium, TruthScene
+from reference.scene.read import TruthMedium, TruthScene, homogeneous_around
 from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ _UNDERFLOW = 745.0  # optical depth after which nothing is left
 
 def medium_of(truth: TruthScene, number: int) -> TruthMedium:
     """Return the medium of this number."""
-    return truth.medium if number == AMBIENT else truth.media[number]
+    return homogeneous_around(truth) if number == AMBIENT else truth.media[number]
 
 
 def by_medium(truth: TruthScene, name: str, numbers: Index) -> Array:

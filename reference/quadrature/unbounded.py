@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.panels import airlight_segments
+from reference.quadrature.height_fog import height_stretch_sums
+from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthLight, TruthMedium
 from reference.visibility.certificate import LitIntervals
 from reference.visibility.planes import Rays, cone_interval, falloff
@@ -19,14 +21,19 @@ Profile = Callable[[Array, Index], Array]  # distances, (m, k) [m], and rays, (m
 
 
 def sum_intervals(
-    medium: TruthMedium, light: TruthLight, rays: Rays, lit: LitIntervals, shadow_scale: float, rtol: float = 1e-10
+    medium: TruthMedium | HeightMedium,
+    light: TruthLight,
+    rays: Rays,
+    lit: LitIntervals,
+    shadow_scale: float,
+    rtol: float = 1e-10,
 ) -> tuple[Array, Array]:
     """Integrate every lit interval and add up the intervals of each ray.
 
     Parameters
     ----------
     medium
-        The medium without bounds.
+        The medium without bounds, or height fog.
     light
         A point or spot light.
     rays, lit
@@ -56,7 +63,7 @@ def sum_intervals(
 
 
 def stretch_sums(
-    medium: TruthMedium,
+    medium: TruthMedium | HeightMedium,
     rays: Rays,
     stretches: Stretches,
     *,
@@ -82,6 +89,9 @@ def stretch_sums(
     edge
         Relative uncertainty of the distance of both ends from the light.
     """
+    if isinstance(medium, HeightMedium):
+        how: dict[str, Any] = {"profile": profile, "shadow_scale": shadow_scale, "rtol": rtol, "edge": edge}
+        return height_stretch_sums(medium, rays, stretches, **how)
     ray, x0, x1 = stretches
     foot, height = rays.foot[ray], rays.height[ray]
     weight = None if profile is None else lambda x, row: profile(x, ray[row])
@@ -89,7 +99,7 @@ def stretch_sums(
     known: dict[float, tuple[Array, Array]] = {}
     for channel, sigma_t in enumerate(medium.sigma_t.tolist()):
         if sigma_t not in known:
-            how: dict[str, Any] = {"shadow_scale": shadow_scale, "weight": weight, "rtol": rtol}
+            how = {"shadow_scale": shadow_scale, "weight": weight, "rtol": rtol}
             value, error = airlight_segments(foot, height, x0, np.maximum(x0, x1), sigma_t, medium.phase, **how)
             known[sigma_t] = value, error + edge * _edge_worth((foot, height), (x0, x1), sigma_t, medium)
         factor = medium.albedo[channel] * sigma_t / (4 * np.pi)

@@ -9,6 +9,7 @@ Read in this order:
 - `convex_bounds.py`: convex bounds of media, read and checked;
 - `directional_light.py`: directional lights: direction and irradiance;
 - `area_light.py`: lights with extent, read and checked;
+- `height_fog.py`: media whose density depends on height;
 - `read.py`: the whole scene: lights, media, camera rays;
 - `closed_mesh.py`: whether meshes bound bodies apart from one another;
 - `cloud_density.py`: clouds whose density differs from place to place;

@@ -34,6 +34,14 @@ def endless_medium(emitter) -> str:
     )
 
 
+def sun_below(emitter) -> str:
+    """Return why a directional light at or below the horizon is refused in height fog."""
+    return (
+        f"light '{emitter.id()}' is directional and shines from the horizon or below: each of its light paths through "
+        "height fog, which has no sides, is infinitely deep; wanted a light from above the horizon"
+    )
+
+
 def read_directional(emitter) -> DirectionalLight:
     """Read a directional emitter: its direction from the transform, its irradiance by asking at a point."""
     matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)

@@ -19,7 +19,14 @@ from analytic.phase import PhaseFunction
 from reference.scene.area_light import TruthAreaLight, is_area, read_area_light
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from reference.scene.convex_bounds import Bounds, holds, in_surface, overlap, read_bounds
-from reference.scene.directional_light import DirectionalLight, endless_medium, is_directional, read_directional
+from reference.scene.directional_light import (
+    DirectionalLight,
+    endless_medium,
+    is_directional,
+    read_directional,
+    sun_below,
+)
+from reference.scene.height_fog import NO_EXTINCTION, HeightMedium, is_height_fog, read_height_fog
 
 Array = NDArray[np.float64]
 
@@ -52,6 +59,11 @@ class TruthMedium:
     phase: PhaseFunction
     plugin: Any  #: Mitsuba's medium, None for a vacuum
 
+    @property
+    def largest(self) -> Array:
+        """Its largest extinction, which is that of all places, RGB [1/m]."""
+        return self.sigma_t
+
 
 CLEAR_AIR = TruthMedium(np.zeros(3), np.zeros(3), PhaseFunction("isotropic"), None)
 
@@ -74,10 +86,10 @@ class TruthScene:
     height: int  #: [pixels]
     origin: Array  #: the pinhole [m], (3,)
     direction: Array  #: unit directions through the pixel centres, (pixels, 3), row by row
-    medium: TruthMedium  #: the medium without bounds, a vacuum of extinction 0 where there is none
+    medium: TruthMedium | HeightMedium  #: without sides, a vacuum of extinction 0 where there is none
     lights: tuple[TruthLight, ...]  #: point and spot lights
     media: tuple[BoundedMedium, ...] = ()  #: the media with bounds, disjoint
-    directional: tuple[DirectionalLight, ...] = ()  #: directional lights; all media then have bounds
+    directional: tuple[DirectionalLight, ...] = ()  #: directional lights; all media then have bounds, or a cap
     area: tuple[TruthAreaLight, ...] = ()  #: lights with extent
     background: Any = None  #: Mitsuba's emitter around the scene, seen behind it and lighting nothing; not in `scene`
 
@@ -110,8 +122,12 @@ def read_truth(scene) -> TruthScene:
     media = tuple(_read_bounded(shape) for shape in boundaries)
     _check_disjoint(media)
     medium = _read_ambient(sensor, origin, media, boundaries)
-    if far and np.any(medium.sigma_t > 0):
-        raise InputError(endless_medium(far[0]))
+    suns = tuple(read_directional(emitter) for emitter in far)
+    for emitter, sun in zip(far, suns, strict=True):
+        if not isinstance(medium, HeightMedium) and np.any(medium.sigma_t > 0):
+            raise InputError(endless_medium(emitter))
+        if isinstance(medium, HeightMedium) and not -sun.direction @ medium.up > 0:
+            raise InputError(sun_below(emitter))
     return TruthScene(
         scene=scene if background is None else _without(scene, background),
         occluders=scene_of(opaque, scene),
@@ -122,10 +138,23 @@ def read_truth(scene) -> TruthScene:
         medium=medium,
         lights=lights,
         media=media,
-        directional=tuple(read_directional(emitter) for emitter in far),
+        directional=suns,
         area=area,
         background=background,
     )
+
+
+def homogeneous_around(truth: TruthScene) -> TruthMedium:
+    """Return the medium without bounds, where it has one extinction.
+
+    Raises
+    ------
+    InputError
+        For height fog.
+    """
+    if isinstance(truth.medium, HeightMedium):
+        raise InputError(NO_EXTINCTION)
+    return truth.medium
 
 
 def _background(scene):
@@ -198,7 +227,9 @@ def _check_disjoint(media: tuple[BoundedMedium, ...]) -> None:
                 )
 
 
-def _read_ambient(sensor, origin: Array, media: tuple[BoundedMedium, ...], boundaries: list[Any]) -> TruthMedium:
+def _read_ambient(
+    sensor, origin: Array, media: tuple[BoundedMedium, ...], boundaries: list[Any]
+) -> TruthMedium | HeightMedium:
     """Return the medium without bounds; refuse a camera or a boundary that says otherwise."""
     own = sensor.get_medium()
     ambient = own
@@ -218,6 +249,13 @@ def _read_ambient(sensor, origin: Array, media: tuple[BoundedMedium, ...], bound
                 f"the exterior medium of shape '{medium.name}' is not what surrounds the others or the camera; wanted "
                 "the medium that the camera references as exterior of all shapes, or none at all"
             )
+    if is_height_fog(ambient):
+        if media:
+            raise InputError(
+                f"shape '{media[0].name}' bounds a medium in height fog; wanted height fog alone: remove the medium of "
+                "the shape, or take a medium of type 'homogeneous' around it"
+            )
+        return read_height_fog(ambient, *read_scattering(ambient))
     if ambient is not None:
         return read_medium(ambient, "the medium")
     if not media:
@@ -234,6 +272,8 @@ def _read_bounded(shape) -> BoundedMedium:
 
 def read_medium(medium, name: str) -> TruthMedium:
     """Read a homogeneous medium; messages call it by `name`."""
+    if is_height_fog(medium):
+        raise InputError(f"{name} is height fog, which has no sides; wanted it in the sensor, and no shape around it")
     if not medium.is_homogeneous():
         raise InputError(f"{name} is a {medium.class_name()}; wanted a medium of type 'homogeneous'")
     parameters = mi.traverse(medium)

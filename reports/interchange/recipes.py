@@ -18,6 +18,7 @@ _CYCLES = (
     "surfaces: Diffuse BSDF of the reflectance, Roughness 0; Shadow Terminator offsets 0",
     "`--json` has all of this as names and values of Blender's Python, `properties`",
 )
+_HEIGHT_FOG = "media: height fog was not tried"
 _LUXCORE = (
     "`path.pathdepth.total` 1, `path.clamping.variance.maxvalue` 0, `film.filter.type` BOX of width 0.5, output RGB",
     "its images are a pixel too low: move `scene.camera.screenwindow` up by one",
@@ -32,13 +33,14 @@ def recipes(described: dict[str, Any]) -> dict[str, list[str]]:
     described
         What `reports.interchange.scene.describe_scene` found, `lights`, `medium`, `bounded_media` and `camera`.
     """
-    media = [medium for medium in (described["medium"], *described["bounded_media"]) if medium is not None]
+    every = [medium for medium in (described["medium"], *described["bounded_media"]) if medium is not None]
+    media = [medium for medium in every if "layers" not in medium]
     phases = {medium["phase"]["name"] for medium in media}
     lights = described["lights"]
     cycles = [_cycles_light(light, _name(number, lights)) for number, light in enumerate(lights)]
-    cycles += [_cycles_media(phases)] if media else []
+    cycles += [_cycles_media(phases)] if media else [_HEIGHT_FOG] if every else []
     luxcore = [_luxcore_light(light, _name(number, lights)) for number, light in enumerate(lights)]
-    luxcore += [_luxcore_media(phases)] if media else []
+    luxcore += [_luxcore_media(phases)] if media else [_HEIGHT_FOG] if every else []
     longer = (
         "horizontal" if described["camera"]["fov_horizontal"] >= described["camera"]["fov_vertical"] else "vertical"
     )

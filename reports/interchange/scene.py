@@ -7,10 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from realtime.scene.features import scene_notes
 from realtime.scene.read_scene import read_scene
 from reference.scene.area_light import TruthAreaLight
 from reference.scene.camera import camera_matrix
 from reference.scene.directional_light import DirectionalLight
+from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthLight, TruthMedium, TruthScene, read_truth
 from reports.interchange.cycles import cycles_properties
 from reports.interchange.recipes import recipes
@@ -63,8 +65,10 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
     InputError
         For a scene without a reference, with the name of what is in the way.
     """
-    notes = read_scene(loaded.scene).features.notes  # it refuses what `render` refuses, in its words
     truth = read_truth(loaded.scene)
+    fog = isinstance(truth.medium, HeightMedium)
+    # Reading refuses what `render` refuses, in its words.
+    notes = scene_notes(loaded.scene) if fog else read_scene(loaded.scene).features.notes
     camera = _camera(loaded.scene.sensors()[0], truth)
     described = {
         "scene": loaded.name,
@@ -146,14 +150,28 @@ def _camera(sensor: Any, truth: TruthScene) -> dict[str, Any]:
     }
 
 
-def _medium(medium: TruthMedium) -> dict[str, Any] | None:
+def _medium(medium: TruthMedium | HeightMedium) -> dict[str, Any] | None:
     """Return the numbers of a medium, None for a vacuum."""
     if medium.plugin is None:
         return None
-    sigma_t, albedo = (np.array(_numbers(values)) for values in (medium.sigma_t, medium.albedo))
     phase: dict[str, Any] = {"name": medium.phase.name}
     phase |= {"g": _number(medium.phase.g)} if medium.phase.name == "hg" else {}
     phase |= {"table": _numbers(medium.phase.table)} if medium.phase.table is not None else {}
+    if isinstance(medium, HeightMedium):
+        return {
+            "layers": [
+                dict(zip(("sigma_t", "base", "scale_height"), map(_number, layer), strict=True))
+                for layer in medium.layers
+            ],
+            "constant": _number(medium.constant),
+            "clamped": medium.clamped,
+            "floor": _number(medium.floor),
+            "cap": _number(medium.cap),
+            "up": up_axis(medium.up),
+            "albedo": _numbers(medium.albedo),
+            "phase": phase | {"formula": _PHASES[medium.phase.name]},
+        }
+    sigma_t, albedo = (np.array(_numbers(values)) for values in (medium.sigma_t, medium.albedo))
     return {
         "sigma_t": _numbers(sigma_t),
         "albedo": _numbers(albedo),

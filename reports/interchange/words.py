@@ -84,14 +84,28 @@ def _medium(name: str, medium: Mapping[str, Any] | None) -> Iterator[Cells]:
             yield "", "bounds", f"a sphere about {_vector(bounds['centre'])}, radius {bounds['radius']:.7g}"
         else:
             yield "", "bounds", f"a convex mesh of {bounds['facets']} facets; -o writes it"
-    yield "", "extinction", f"sigma_t {_colour(medium['sigma_t'])} 1/m"
-    yield "", "albedo", _colour(medium["albedo"])
-    yield "", "scattering", f"sigma_s = albedo sigma_t = {_colour(medium['sigma_s'])} 1/m"
-    yield "", "absorption", f"sigma_a = sigma_t - sigma_s = {_colour(medium['sigma_a'])} 1/m"
-    yield "", "mean free path", f"{_colour(medium['mean_free_path'])} m"
+    if "layers" in medium:
+        yield from _height_fog(medium)
+    else:
+        yield "", "extinction", f"sigma_t {_colour(medium['sigma_t'])} 1/m"
+        yield "", "albedo", _colour(medium["albedo"])
+        yield "", "scattering", f"sigma_s = albedo sigma_t = {_colour(medium['sigma_s'])} 1/m"
+        yield "", "absorption", f"sigma_a = sigma_t - sigma_s = {_colour(medium['sigma_a'])} 1/m"
+        yield "", "mean free path", f"{_colour(medium['mean_free_path'])} m"
     phase = medium["phase"]
     g = f", g = {phase['g']:.7g}" if "g" in phase else ""
     yield "", "phase function", f"{phase['name']}{g}: {phase['formula']}; its integral over the sphere is 1"
+
+
+def _height_fog(medium: Mapping[str, Any]) -> Iterator[Cells]:
+    """Yield height fog by its layers; the height is that along its axis up."""
+    yield "", "height", f"along {medium['up']}, from {medium['floor']:.7g} m to {medium['cap']:.7g} m, without sides"
+    below = ", constant below" if medium["clamped"] else ""
+    for number, layer in enumerate(medium["layers"], 1):
+        numbers = f"sigma_t {layer['sigma_t']:.7g} 1/m at {layer['base']:.7g} m{below}"
+        yield "", f"layer {number}", f"{numbers}; falls to 1/e in {layer['scale_height']:.7g} m"
+    yield "", "everywhere", f"sigma_t {medium['constant']:.7g} 1/m"
+    yield "", "albedo", _colour(medium["albedo"])
 
 
 def _light(light: Mapping[str, Any]) -> Iterator[Cells]:

@@ -3,6 +3,7 @@
 
 import itertools
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -48,13 +49,16 @@ def test_optical_depths_against_quadrature_of_the_density():
         rise, origin = ray.direction[2], ray.origin[2]
         marks = sorted((z - origin) / rise for z in fog.kinks)
         ends = [ray.x0, *(x for x in marks if ray.x0 < x < ray.x1), ray.x1]
-        parts = [
-            quad(lambda x: fog.density(origin + rise * x), a, b, epsrel=1e-11)[0] for a, b in itertools.pairwise(ends)
-        ]
+        density = partial(_density, fog, origin, rise)
+        parts = [quad(density, a, b, epsrel=1e-11)[0] for a, b in itertools.pairwise(ends)]
         depth = fog.optical_depth(origin + rise * ray.x0, origin + rise * ray.x1, ray.x1 - ray.x0)
         assert close(depth, sum(parts), 1e-9) or abs(depth - sum(parts)) < 1e-13  # of quad
         assert close(fog.column(-2.0), quad(fog.density, -2.0, 5.0)[0], 1e-7) or fog.cap > 5
     assert np.isinf(HeightFog((), 0.1).column(0.0))
+
+
+def _density(fog, origin, rise, x):
+    return fog.density(origin + rise * x)
 
 
 def test_phi_near_zero_and_far_out():

@@ -11,6 +11,21 @@ from analytic.height_fog import HeightFog, HeightRays, Layer, height_fog_segment
 from analytic.phase import PhaseFunction
 from validation.certified.files import certified_data
 
+#: Two layers between a floor under the ground and a cap.
+FOG = """<volume type="heightfog" name="sigma_t">
+    <float name="sigma_1" value="0.13"/><float name="z_1" value="0.3"/><float name="H_1" value="2.7"/>
+    <float name="sigma_2" value="0.02"/><float name="z_2" value="1.3"/><float name="H_2" value="9.7"/>
+    <transform name="to_world"><scale x="40" y="40" z="43"/><translate x="-20" y="-20" z="-0.5"/></transform>
+</volume>"""
+LAMP = """<emitter type="point" id="lamp"><point name="position" x="0.4" y="0.9" z="4.7"/>
+    <rgb name="intensity" value="37, 31, 23"/></emitter>"""
+SPOT = """<emitter type="spot" id="spot">
+    <transform name="to_world"><lookat origin="-3.1, 3.3, 6.2" target="-2.7, 0.2, 0" up="0, 1, 0"/></transform>
+    <rgb name="intensity" value="61, 71, 97"/>
+    <float name="cutoff_angle" value="27"/><float name="beam_width" value="17"/></emitter>"""
+SUN = """<emitter type="directional" id="sun"><vector name="direction" x="0.5" y="0.3" z="-0.45"/>
+    <rgb name="irradiance" value="3, 2.6, 2.1"/></emitter>"""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -107,3 +122,23 @@ def drawn(seed: int, count: int = 40) -> list[Drawn]:
         phase = PhaseFunction("hg", g=float(random.uniform(-0.8, 0.8)))
         found.append(Drawn(fog, phase, random.normal(size=3) * 3, unit[0], light, *ends, sun))
     return found
+
+
+def fog_xml(*parts: str, size: tuple[int, int] = (24, 18), fog: str = FOG) -> str:
+    """Return a scene file: height fog over ground, a ball and a post, and further parts."""
+    width, height = size
+    return f"""<scene version="3.0.0">
+    <medium type="heterogeneous" id="fog">{fog}
+        <rgb name="albedo" value="0.9, 0.85, 0.7"/>
+        <phase type="hg"><float name="g" value="0.35"/></phase>
+    </medium>
+    <sensor type="perspective"><float name="fov" value="50"/><ref id="fog" name="medium"/>
+        <transform name="to_world"><lookat origin="-13.7, -4.1, 2.3" target="0.3, 0.7, 2.9" up="0, 0, 1"/></transform>
+        <film type="hdrfilm"><integer name="width" value="{width}"/><integer name="height" value="{height}"/></film>
+    </sensor>
+    <shape type="rectangle" id="ground"><transform name="to_world"><scale value="60"/></transform></shape>
+    <shape type="sphere" id="ball">
+        <point name="center" x="-1.3" y="-0.4" z="2.1"/><float name="radius" value="0.9"/></shape>
+    <shape type="cube" id="post"><transform name="to_world">
+        <scale x="0.3" y="0.3" z="2.1"/><translate x="1.1" y="2.1" z="2.1"/></transform></shape>
+    {"".join(parts)}</scene>"""

@@ -93,7 +93,7 @@ def _scatters(truth: TruthScene, light: TruthLight) -> bool:
     """Return whether there is a medium where a light is: beside it the airlight is finite."""
     inside = [medium for medium in truth.media if holds(medium.bounds, light.position)]
     medium = inside[0] if inside else truth.medium
-    return bool(np.any(medium.sigma_t * medium.albedo * light.intensity > 0))
+    return bool(np.any(medium.largest * medium.albedo * light.intensity > 0))
 
 
 def _looks_along(light: TruthLight, direction: Array) -> NDArray[np.bool_]:

@@ -20,7 +20,7 @@ from reference.quadrature.surface import surface_hits
 from reference.scene.area_light import TruthAreaLight, is_area
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from reference.scene.directional_light import DirectionalLight, is_directional
-from reference.scene.read import TruthLight, TruthMedium, TruthScene
+from reference.scene.read import TruthLight, TruthMedium, TruthScene, homogeneous_around
 from reference.scene.shapes import read_shapes
 from reference.visibility.before_light import before_light
 from reference.visibility.exact_distance import exact_distance
@@ -226,7 +226,7 @@ def scattering_paths(
         paths.append(LightPaths(source.name, np.asarray(source.intensity), Places.joined(nodes), Places.joined(lit)))
         if progress is not None:
             progress((number + 1) / len(sources), "lit intervals")
-    return ScatteringPaths(view, (truth.medium, *truth.media), tuple(paths))
+    return ScatteringPaths(view, (homogeneous_around(truth), *truth.media), tuple(paths))
 
 
 @dataclass(frozen=True)

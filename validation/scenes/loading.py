@@ -19,6 +19,7 @@ from analytic.errors import InputError, nearest
 from reference.storage.scene_digest import scene_digest
 from validation.scenes.changes import change_scene, isotropic_media
 from validation.scenes.files.read import read_file
+from validation.scenes.height_fog import register_height_fog
 from validation.scenes.lobes import scene_with_lobes
 from validation.scenes.numbers import check_numbers
 from validation.scenes.random.ranges import FILE as RANGES
@@ -63,6 +64,7 @@ def load_scene(
         For an unknown name, a missing or malformed file, a size that no image can have, and a change that the scene
         cannot have. Whether methods and reference support the scene is checked when they read it.
     """
+    register_height_fog()
     record = find_record(name_or_path)
     path = Path()
     if record is not None:

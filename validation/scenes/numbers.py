@@ -20,6 +20,7 @@ LARGEST_LIGHT = 1e18  #: of an intensity [W/sr] or an irradiance [W/m^2]
 
 _LIGHT = ("intensity", "irradiance", "radiance")
 _NOT_NEGATIVE = (*_LIGHT, "sigma_t", "albedo", "scale")
+_PLACES = ("z_1", "z_2", "floor", "cap", "up")  # of height fog
 _CLIP = ("near_clip", "far_clip")  # no method takes them
 _NO_MATTER = ("vertex_texcoords",)
 _LEAST_SCALE = 1e-15  # of an axis of a transform [m]
@@ -80,7 +81,7 @@ def _check(name: str, key: str, values: NDArray[np.float64]) -> None:
         return
     light = any(word in _LIGHT for word in words)
     largest = np.inf if words[-1] in _CLIP else LARGEST_LIGHT if light else LARGEST_LENGTH
-    least = 0.0 if any(word in _NOT_NEGATIVE for word in words) else -largest
+    least = 0.0 if any(word in _NOT_NEGATIVE for word in words) and words[-1] not in _PLACES else -largest
     wrong = ~((values >= least) & (values <= largest))
     if wrong.any():
         given = f"{values[wrong].ravel()[0]:g}"

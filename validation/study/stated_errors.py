@@ -35,7 +35,7 @@ from reference.quadrature.segments import AMBIENT, camera_segments, optical_dept
 from reference.quadrature.surface import surface_hits
 from reference.scene.convex_bounds import normals_at
 from reference.scene.directional_light import DirectionalLight
-from reference.scene.read import TruthLight, TruthMedium, TruthScene, read_truth
+from reference.scene.read import TruthLight, TruthMedium, TruthScene, homogeneous_around, read_truth
 from reference.visibility.line_crossings import crossings
 from validation.study.configuration import Configuration
 
@@ -182,7 +182,7 @@ def _scattered(
 def _media(truth: TruthScene, ray: NDArray[np.int64], x: Array, distance: Array) -> list[tuple[TruthMedium, Any]]:
     """Return media and which places are in them; a place at a bound is on either side of it."""
     if not truth.media:
-        return [(truth.medium, np.ones(len(x), dtype=bool))]
+        return [(homogeneous_around(truth), np.ones(len(x), dtype=bool))]
     segments = camera_segments(truth, distance)
     slack = END * x
     inside = [
@@ -190,7 +190,7 @@ def _media(truth: TruthScene, ray: NDArray[np.int64], x: Array, distance: Array)
         for start, end, number in zip(segments.start, segments.end, segments.medium)
     ]
     numbers = [AMBIENT, *range(len(truth.media))]
-    media = [truth.medium, *truth.media]
+    media = [homogeneous_around(truth), *truth.media]
     return [
         (medium, np.any([which & (of == number) for of, which in inside], axis=0))
         for number, medium in zip(numbers, media, strict=True)

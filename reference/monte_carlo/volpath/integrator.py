@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.monte_carlo.batches import Batches, check_samples, single_batch
+from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthMedium, TruthScene
 
 Array = NDArray[np.float64]
@@ -82,6 +83,7 @@ def volpath_batch(
     in_air, on_surface = np.full((2, truth.width * truth.height), samples) if counts is None else counts
     if truth.directional and not truth.scene.bbox().valid():  # of rectangles alone, merged, in Mitsuba 3.9.1
         raise InputError("volpath: the scene's bounding box is not valid, so its directional lights start within it")
+    _check_sun(truth)
     hidden = {"hide_emitters": True} if truth.area else {}
     integrator = mi.load_dict({"type": "volpath", "max_depth": max_depth, "rr_depth": 1000} | hidden)
     with black_surfaces(truth.occluders):
@@ -93,6 +95,20 @@ def volpath_batch(
         # The same paths once more, now with light from surfaces; the difference is what these add.
         surface = trace(truth, integrator, 2 * seed, in_air) - airlight
     return single_batch(seed, samples, np.stack([airlight, surface]))
+
+
+def _check_sun(truth: TruthScene) -> None:
+    """Refuse height fog whose light paths to a sun Mitsuba would cut: they are twice the radius of all shapes long."""
+    if not isinstance(truth.medium, HeightMedium):
+        return
+    fog, radius = truth.medium, float(truth.scene.bbox().bounding_sphere().radius)
+    for sun in truth.directional:
+        needed = 0.5 * (fog.cap - fog.floor) / float(-sun.direction @ truth.medium.up)
+        if radius < needed:
+            raise InputError(
+                f"volpath: the light paths of a sun end within the height fog, since the shapes of the scene have a "
+                f"radius of {radius:.4g} m; wanted {needed:.4g} m: lower the cap, or add ground"
+            )
 
 
 @contextmanager
@@ -127,7 +143,7 @@ def trace(truth: TruthScene, integrator, seed: int, counts: Counts, *, scatterin
     """
     image = np.zeros((len(counts), 3))
     parts = _parts(counts)
-    extinctions = np.stack([medium.sigma_t for medium in (truth.medium, *truth.media)], axis=1)
+    extinctions = np.stack([medium.largest for medium in (truth.medium, *truth.media)], axis=1)
     for number, sigma_t in enumerate(dict.fromkeys(map(tuple, extinctions))):
         channels = np.all(extinctions == sigma_t, axis=1)
         with _grey_media(truth, int(np.argmax(channels)), scattering) as medium:
@@ -169,7 +185,7 @@ def _trace_pixels(truth: TruthScene, integrator, medium, pixels: slice, seed: in
 @contextmanager
 def _grey_media(truth: TruthScene, channel: int, scattering: bool) -> Iterator[Any]:
     """Give all media the extinction of one channel for a while; yield the medium in which camera rays begin."""
-    if not truth.media:
+    if isinstance(truth.medium, TruthMedium) and not truth.media:
         yield _grey_medium(truth.medium, float(truth.medium.sigma_t[channel]), scattering)
         return
     own: list[tuple[Any, dict[str, Any]]] = []
@@ -181,7 +197,7 @@ def _grey_media(truth: TruthScene, channel: int, scattering: bool) -> Iterator[A
                 # The extinction of a grid is grey already.
                 known = (key for key in _VALUES if key in parameters)
                 own.append((medium.plugin, {key: type(parameters[key])(parameters[key]) for key in known}))
-                sigma_t = float(medium.sigma_t[channel]) / float(parameters["scale"] or 1.0)
+                sigma_t = float(medium.largest[channel]) / float(parameters["scale"] or 1.0)
                 _set_values(medium.plugin, sigma_t, medium.albedo if scattering else np.zeros(3))
         yield truth.scene.sensors()[0].get_medium()
     finally:

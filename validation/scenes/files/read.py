@@ -12,7 +12,7 @@ import mitsuba as mi
 from analytic.errors import InputError
 from reference.storage.files import temporary_folder
 from validation.scenes.files.kinds import check_kinds
-from validation.scenes.files.media import give_extinction, pass_where_no_material
+from validation.scenes.files.media import give_extinction, grey_height_fog, pass_where_no_material
 from validation.scenes.files.nodes import kind, name_nodes, properties, references
 from validation.scenes.files.references import leave_out_media, touching
 from validation.scenes.files.shapes import (
@@ -51,6 +51,7 @@ def read_file(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> 
         raise
     except Exception as error:  # Mitsuba raises RuntimeError for all bad input; Python plugins raise anything
         reason = re.sub(r"^\[[^\]]*\]\s*", "", " ".join(str(error).split()))
+        reason = re.sub(r".*Traceback .*?\w*Error: ", "", reason)  # what a plugin in Python said
         if "invalid lookat" in reason:
             reason += ': it looks along its own up; write another up, for example up="0, 1, 0"'
         raise InputError(f"scene {path}: Mitsuba cannot read it: {reason}") from error
@@ -99,6 +100,7 @@ def _mend(state: Any) -> None:
     check_kinds(state)
     for note in give_extinction(state):
         mi.Log(mi.LogLevel.Warn, note)
+    grey_height_fog(state)
     pass_where_no_material(state)
     write_out_instances(state)
 

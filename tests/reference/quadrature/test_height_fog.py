@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The reference in height fog: against homogeneous fog, steps that know the density alone, Mitsuba; injected faults."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analytic.height_fog import HeightFog
+from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.quadrature.height_fog import fog_of
+from reference.quadrature.image import quadrature_image
+from reference.quadrature.replicates import PointPlan
+from reference.scene.height_fog import HeightMedium
+from reference.scene.read import TruthMedium, read_truth
+from reference.scene.shadow_epsilon import measure_shadow_epsilon
+from tests.evidence.injected import Wrap, injected
+from tests.helpers.height_fog import LAMP, SPOT, SUN, fog_xml
+from validation.scenes.loading import load_scene
+
+PANEL = """<shape type="rectangle" id="panel">
+    <transform name="to_world"><scale value="0.7"/><lookat origin="2, -2, 5" target="0, 0, 1" up="0, 1, 0"/></transform>
+    <emitter type="area"><rgb name="radiance" value="11, 9, 7"/></emitter></shape>"""
+BATCHES = 40
+
+
+@pytest.fixture
+def scene(variant, tmp_path):
+    def load(*lights, size=(24, 18)):
+        path = tmp_path / "fog.xml"
+        path.write_text(fog_xml(*lights, size=size))
+        return load_scene(str(path)).scene
+
+    return load
+
+
+@pytest.mark.claim("height-fog-reference", tolerance="1e-6 relative: the height of the scene over H = 1e8 m")
+def test_a_large_scale_height_is_the_image_of_homogeneous_fog(scene):
+    truth = read_truth(scene(LAMP, SPOT, PANEL, size=(8, 6)))
+    plain = TruthMedium(np.full(3, 0.06), truth.medium.albedo, truth.medium.phase, truth.medium.plugin)
+    deep = replace(truth.medium, layers=((0.06, 0.0, 1e8),), constant=0.0, floor=-np.inf, cap=np.inf)
+    how = {"checks": 0, "plan": PointPlan(error=0.0, first=4, most=4)}
+    images = [quadrature_image(replace(truth, medium=medium), **how) for medium in (plain, deep)]
+    for layer in ("airlight", "surface", "emitted"):
+        expected, found = (getattr(image, layer) for image in images)
+        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9 * expected.max())
+
+
+@pytest.mark.claim("height-fog-reference", tolerance="1e-6 relative: the trapezoidal rule with 2e5 steps")
+def test_the_sun_by_steps_that_know_the_density_alone(scene):
+    truth = read_truth(scene(SUN))
+    image = quadrature_image(truth, checks=0)
+    fog, sun = fog_of(truth.medium), truth.directional[0]
+    heights = np.linspace(fog.cap, truth.origin[2], 200001)
+    above = _running_sum(fog.density(heights), -heights)
+    for column in (0, 11, 23):  # of the uppermost row, on which nothing casts a shadow
+        direction = truth.direction[column]
+        x = np.linspace(0, (fog.cap - truth.origin[2]) / direction[2], 200001)
+        z = np.minimum(truth.origin[2] + direction[2] * x, fog.cap)
+        to_sun = np.interp(z, heights[::-1], above[::-1]) / -sun.direction[2]
+        depth = _running_sum(fog.density(z), x) + to_sun
+        f = fog.density(z) * np.exp(-depth) * truth.medium.phase(-sun.direction @ direction)
+        expected = np.trapezoid(f, x) * truth.medium.albedo * sun.irradiance / (4 * np.pi)
+        np.testing.assert_allclose(image.airlight[0, column], expected, rtol=1e-6)
+
+
+def _running_sum(values, x):
+    return np.concatenate([[0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(x))])
+
+
+def test_bounds_are_below_a_millionth_of_the_mean(scene):
+    image = quadrature_image(read_truth(scene(LAMP, SPOT, SUN)))
+    assert image.airlight_bound.max() < 1e-6 * image.airlight.mean()
+    assert image.left == 0
+
+
+def _biases(truth, image, batches):
+    """Relative biases of airlight and surface, pixels near the lamp left out, and half of their 95 % intervals."""
+    away = (image.light_angle > 0.12)[..., None]
+    found = []
+    for number, layer in enumerate((image.airlight, image.surface)):
+        means = np.array([np.sum(each.mean[number].reshape(layer.shape) * away) for each in batches])
+        ratio = means / np.sum(layer * away)
+        found.append((ratio.mean() - 1, 2.02 * ratio.std(ddof=1) / np.sqrt(len(ratio))))  # Student, 39 degrees
+    return found
+
+
+#: Faults that the comparison with volpath must find, by name.
+FAULTS = {
+    "height of the wrong light path": Wrap(
+        "analytic.height_fog:height_fog_segments",
+        lambda function, fog, rays, *others, **named: function(fog, replace(rays, light=rays.origin), *others, **named),
+    ),
+    "1/H for H": Wrap(
+        "reference.scene.height_fog:read_height_fog", lambda f, *a: _scale_heights(f(*a), lambda h: 1 / h)
+    ),
+    "ln 2 left out": Wrap(
+        "reference.scene.height_fog:read_height_fog", lambda f, *a: _scale_heights(f(*a), lambda h: h * np.log(2))
+    ),
+    "density at the camera for the mean": Wrap(
+        "analytic.height_fog:HeightFog.optical_depth",
+        lambda function, self, start, end, length: self.density(start) * length,
+    ),
+    "the sun's path without its cosine": Wrap(
+        "analytic.height_fog:height_fog_sun",
+        lambda function, fog, *others, sun, phase: function(_flat(fog, sun), *others, sun=sun, phase=phase),
+    ),
+}
+
+
+def _scale_heights(medium: HeightMedium, change) -> HeightMedium:
+    return replace(medium, layers=tuple((sigma_t, base, change(scale)) for sigma_t, base, scale in medium.layers))
+
+
+class _Flat(HeightFog):
+    """Fog whose light paths to the sun are as long as they are high."""
+
+    sun: float
+
+    def column(self, z):
+        return super().column(z) * self.sun
+
+
+def _flat(fog: HeightFog, sun: float) -> HeightFog:
+    flat = _Flat(fog.layers, fog.constant, fog.clamped, fog.floor, fog.cap)
+    object.__setattr__(flat, "sun", sun)
+    return flat
+
+
+@pytest.mark.slow
+@pytest.mark.claim("height-fog-volpath", tolerance="1 % of the image, 95 % intervals of 40 batches")
+def test_volpath_agrees_and_injected_faults_are_found(scene):
+    loaded = scene(LAMP, SUN)
+    truth = read_truth(loaded)
+    batches = [volpath_batch(truth, seed, 256) for seed in range(BATCHES)]
+
+    def outside(changes=()):
+        with injected(*changes):
+            found = read_truth(loaded) if changes else truth
+            image = quadrature_image(found, checks=0, shadow_scale=1 - measure_shadow_epsilon())
+        return [abs(bias) + half > 0.01 for bias, half in _biases(truth, image, batches)]
+
+    assert not any(outside())
+    for name, change in FAULTS.items():
+        assert any(outside([change])), name
