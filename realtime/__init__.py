@@ -13,12 +13,12 @@ Rooms:
 - `numerics/`: array types, error-free arithmetic, fast functions, Gauss-Legendre nodes;
 - `droplets/`: phase functions of the droplets of fog and clouds;
 - `area_lights/`: area lights, and the samples that stand for them;
-- `scene/`: camera, lights, media, phase functions and meshes, read from Mitsuba; the features of a scene; what moves;
+- `scene/`: camera, lights, phase functions and meshes, read from Mitsuba; the features of a scene; what moves;
+- `scene/media/`: media; a new one, such as height fog, goes there, and its page says what it must write;
 - `rays/`: the geometry of rays and lights, and the cone of a spot;
 - `shadow_maps/`: shadow maps and the field of inverse depth over them;
 - `image_filters/`: Gaussian, bilateral and joint bilateral filters of whole images, and up-sampling;
-- `kernels/`: the airlight integral between two distances along a ray;
-- `bounded_media/`: rays, light paths and airlight in bounded media;
+- `kernels/`: the airlight integral between two distances along a ray in a homogeneous medium;
 - `intervals/`: the lit intervals of rays and their sum;
 - `clouds/`: light scattered more than once;
 - `methods/`: the methods, and in `methods/interface/` what all of them share with frames;
@@ -38,8 +38,9 @@ Rooms:
    passes the light, in terms of `rays/ray_light.py` and, for a spot, `rays/spot_cone.py`.
 7. `methods/shadow_planes/sweep.py` walks along the planes of each ray and finds its lit intervals
    (`intervals/lit_intervals.py`).
-8. `methods/interface/light_airlight.py` asks `kernels/registry.py` for the integral over each interval:
-   `kernels/exact.py`, for which `kernels/preparation.py` made tables ready if it has any.
+8. The medium (`scene/media/homogeneous.py` of the protocol in `scene/media/medium.py`) is asked for the integral over
+   each interval and calls the kernel that `kernels/registry.py` has under a name: `kernels/exact.py`, for which
+   `kernels/preparation.py` made tables ready if it has any.
 9. Behind the stages the renderer adds up what is lit of the surfaces and the airlight and brings both to the host;
    `frame/light_on_ray.py` checks that all of it is finite.
 """

@@ -6,7 +6,7 @@ Biri, Arques, Michelin 2006, section 5.1.2, with the extinction to the eye of eq
     L = rho I cos(theta_p) / (pi r_p^2) exp(-sigma_t r_p) exp(-sigma_t distance),
 
 zero where a shadow ray is blocked; of a directional light rho E cos(theta_p) / pi arrives at once. With bounded media
-both exponents are sums over the media that the two legs cross (`realtime.bounded_media.pieces`). A one-sided
+both exponents are sums over the media that the two legs cross (`realtime.scene.media.bounded`). A one-sided
 surface is black from behind, as in Mitsuba's `diffuse`.
 
 What is cast depends on camera and geometry alone, and serves many frames (`realtime.frame.incremental`). So there are
@@ -21,14 +21,12 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.pieces import camera_insides, optical_depths, path_transmittance
 from realtime.numerics.array_types import Metres, PerRay
-from realtime.numerics.fast_exp import exp_bounded
 from realtime.numerics.recorded import Frozen
 from realtime.rays.ray_light import profile
 from realtime.scene.camera import ray_directions
 from realtime.scene.lights import Light, sources_of
-from realtime.scene.medium import Medium, per_extinction, transmittance
+from realtime.scene.media.medium import Medium, Rays
 from realtime.scene.read_scene import Scene
 from realtime.scene.triangle_table import Facets, facet_at, facet_number
 
@@ -43,7 +41,7 @@ class Cast:
     triangle: PerRay | None = None  #: its number in the table of facets, where there is one
     uv: PerRay | None = None  #: barycentric coordinates in it, where its normals are interpolated
     hit: Any = None  #: without a table, Mitsuba's preliminary intersection
-    insides: tuple[Metres, ...] = ()  #: what of the ray up to there lies in each bounded medium [m]
+    crossed: tuple[Any, ...] = ()  #: `Rays.crossed`
 
 
 @dataclass
@@ -108,7 +106,7 @@ def _ray(origin, direction):
     return mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
 
 
-def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light, depths=None, shadows: bool = True):
+def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light, depths, shadows: bool = True):
     """Return the radiance that the visible surface sends to the eye through the medium, from one light [W/(m^2 sr)].
 
     Parameters
@@ -120,8 +118,7 @@ def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light,
     medium, light
         What the light crosses and where it comes from.
     depths
-        With bounded media, the optical depths of the camera rays, from
-        `realtime.bounded_media.pieces.optical_depths`.
+        The optical depths of the camera rays, by channel.
     shadows
         Whether to cast shadow rays; a method that finds out otherwise what is lit leaves them to that.
     """
@@ -130,23 +127,19 @@ def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light,
     if shadows:
         lit &= ~scene.ray_test(light.shadow_ray_from(surface.interaction), lit)
     reflected = surface.albedo * arriving * (dr.inv_pi * cosine / dr.square(r) if light.w else dr.inv_pi * cosine)
-    if medium.bounded_media:
-        kept = path_transmittance(medium, light, depths=depths, point=surface.point, active=lit)
-    elif medium.clear:
-        kept = 1
-    else:
-        kept = transmittance(medium, dr.select(lit, surface.distance + r, 0))
+    both = zip(depths, medium.depth_to_light(light, surface.point, r, active=lit), strict=True)
+    kept = medium.transmittance([camera + own for camera, own in both])
     return dr.select(lit, reflected * kept, type(medium.albedo)(0))
 
 
-def lit_by_points(scene, surface: VisibleSurface, *, medium: Medium, lights: Sequence[Light], shadows: bool):
+def lit_by_points(scene, surface: VisibleSurface, *, medium: Medium, lights: Sequence[Light], depths, shadows: bool):
     """Return the sum of `lit_surface` over the points of a light with extent [W/(m^2 sr)].
 
     What they have in common is taken out of the sum: their intensity, the albedo and the leg to the eye.
 
     Parameters
     ----------
-    scene, surface, shadows
+    scene, surface, depths, shadows
         As for `lit_surface`.
     medium
         Without bounded media in it.
@@ -165,10 +158,9 @@ def lit_by_points(scene, surface: VisibleSurface, *, medium: Medium, lights: Seq
             reached = surface.seen & (strength > 0)
             reached &= ~scene.ray_test(light.shadow_ray_from(surface.interaction), reached)
             strength = dr.select(reached, strength, 0)
-        return per_extinction(medium, lambda sigma_t: strength * exp_bounded(-sigma_t * r))
+        return strength * medium.transmittance(medium.depth_to_light(light, surface.point, r, active=surface.seen))
 
-    total = sum(weight(light) for light in lights)
-    kept = transmittance(medium, dr.select(surface.seen, surface.distance, 0))
+    total, kept = sum(weight(light) for light in lights), medium.transmittance(depths)
     reflected = surface.albedo * lights[0].intensity * (dr.inv_pi * kept * total)
     return dr.select(surface.seen, reflected, type(medium.albedo)(0))
 
@@ -220,16 +212,14 @@ def surface_stages(
     def cast_all(geometry, facets, pixel, camera, medium) -> Cast:
         direction, _ = ray_directions(camera, pixel)
         cast = cast_rays(geometry, facets, camera.origin, direction)
-        if not (medium.bounded_media and through_media):
-            return cast
-        insides = camera_insides(medium, camera.origin, direction, cast.distance)
-        return replace(cast, insides=insides)
+        return replace(cast, crossed=medium.rays(camera.origin, direction).crossed if through_media else ())
 
     def shade_all(geometry, facets, pixel, camera, medium, lights, cast):
         direction, _ = ray_directions(camera, pixel)
         seen = visible_surface(cast, facets, camera.origin, direction, color=type(medium.albedo))
         medium = medium if through_media else replace(medium, bounded_media=())
-        depths = optical_depths(medium, cast.distance, cast.insides) if medium.bounded_media else None
+        rays = Rays(camera.origin, direction, None, cast.crossed)
+        depths = medium.optical_depth(rays, 0, dr.select(seen.seen, cast.distance, 0))
         shown = {"medium": medium, "depths": depths}
 
         def lit(number: int):
@@ -241,7 +231,7 @@ def surface_stages(
             if medium.bounded_media:
                 return sum(lit(number) for number in source)
             points = [lights[number] for number in source]
-            return lit_by_points(geometry, seen, medium=medium, lights=points, shadows=asked[source[0]])
+            return lit_by_points(geometry, seen, lights=points, shadows=asked[source[0]], **shown)
 
         if provides_visibility and not by_source:
             return tuple(lit(number) for number in range(len(lights)))

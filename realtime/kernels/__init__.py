@@ -5,7 +5,6 @@ Read in this order:
 
 - `registry.py`: what a kernel is, and the kernels by name;
 - `preparation.py`: tables that a kernel needs on the device before a frame is recorded;
-- `bounded.py`: the form of a kernel for bounded media, where it has one;
 - `quadrature.py`: Gauss-Legendre nodes in w = asinh(q/h);
 - `exact.py`: the default: as few nodes as a segment needs;
 - `short_segments.py`: its rule for segments that are short compared with their distance from the light;

@@ -40,7 +40,7 @@ from realtime.kernels.quadrature import path_over_height
 from realtime.numerics.array_types import is_single, smallest
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.medium import Medium, per_extinction
+from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import PHASES
 
 _EULER = 0.57721566490153286
@@ -50,7 +50,7 @@ _EULER = 0.57721566490153286
 _REGIONS = {4: (1.0, 12, 42), 8: (2.0, 30, 90)}
 
 
-def closed_form(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
+def closed_form(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light):
     """Return the airlight integral J by complex exponential integrals [1/m].
 
     Raises
@@ -96,7 +96,7 @@ def closed_form(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
     def integral(sigma_t):
         return (2 / h) * (_tail(foot, h, x0, sigma_t, polynomial) - _tail(foot, h, x1, sigma_t, polynomial))
 
-    return per_extinction(medium, integral)
+    return medium.per_extinction(integral)
 
 
 def _tail(foot, h, x, sigma_t, polynomial):

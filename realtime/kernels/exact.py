@@ -35,16 +35,16 @@ from realtime.kernels.quadrature import path_interval, quadrature
 from realtime.kernels.short_segments import FEW, MORE, extent, serves, short_segment
 from realtime.numerics.array_types import is_single
 from realtime.numerics.gauss_legendre import unit_nodes
-from realtime.rays.ray_light import RayGeometry, falloff_beside, smooth_subsegments
+from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.medium import Medium, per_extinction
+from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import Phase
 
 #: In float64: nodes of the isotropic case, and of each panel of the others; the phase function says how many panels.
 _ISOTROPIC_DOUBLE, _PANEL_NODES = 40, 24
 
 
-def exact(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
+def exact(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light):
     """Return the airlight integral J to the accuracy of the arithmetic [1/m].
 
     Notes
@@ -65,7 +65,7 @@ def exact(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
         values = _in_single(geometry, (x0, x1), medium.sigma_t, medium.phase, light)
         J = values[0] if len(values) == 1 else type(medium.albedo)(*values)
     else:
-        J = per_extinction(medium, lambda sigma_t: _in_double(geometry, (x0, x1), sigma_t, medium, light))
+        J = medium.per_extinction(lambda sigma_t: _in_double(geometry, (x0, x1), sigma_t, medium, light))
     meets = (geometry.height == 0) & (x0 <= geometry.foot) & (geometry.foot <= x1) & (x0 < x1)
     return dr.select(meets, dr.inf, J)
 
@@ -94,10 +94,10 @@ def _in_single(geometry: RayGeometry, segment, extinctions, phase: Phase, light:
     )
 
 
-def _in_double(geometry: RayGeometry, segment, sigma_t, medium: Medium, light: Light):
+def _in_double(geometry: RayGeometry, segment, sigma_t, medium: Homogeneous, light: Light):
     if medium.phase.constant and not light.varies:
         x0, x1 = segment
-        grey = Medium((sigma_t,), medium.albedo, medium.phase)
+        grey = Homogeneous((sigma_t,), medium.albedo, medium.phase)
         return quadrature(geometry, x0, x1, grey, light, nodes=_ISOTROPIC_DOUBLE)
     return _over_subsegments(geometry, segment, (sigma_t,), medium.phase, light)[0]
 
@@ -105,7 +105,7 @@ def _in_double(geometry: RayGeometry, segment, sigma_t, medium: Medium, light: L
 def _over_subsegments(geometry: RayGeometry, segment, extinctions, phase: Phase, light: Light):
     """Return one value per extinction."""
     parts = [
-        _subsegment(geometry, a, b, extinctions, phase, light) for a, b in smooth_subsegments(geometry, light, *segment)
+        _subsegment(geometry, a, b, extinctions, phase, light) for a, b in geometry.smooth_subsegments(light, *segment)
     ]
     return [sum(values) for values in zip(*parts)]
 
@@ -119,7 +119,7 @@ def _subsegment(geometry: RayGeometry, x0, x1, extinctions, phase: Phase, light:
     width = dr.asinh((difference / scale) * ((f0 + f1) / dr.fma(f1, c0, f0 * c1)))
 
     def weight(e):
-        return falloff_beside(geometry, light, 0.5 * h * (e - dr.rcp(e)))
+        return geometry.falloff_beside(light, 0.5 * h * (e - dr.rcp(e)))
 
     add_up = panels_mean if is_single(Float) else _double_mean
     decays = [sigma_t * h for sigma_t in extinctions]

@@ -33,12 +33,13 @@ import numpy as np
 from realtime.errors import InputError
 from realtime.numerics.array_types import is_single, smallest
 from realtime.numerics.fast_exp import exp_bounded
-from realtime.rays.ray_light import RayGeometry, falloff_beside, smooth_subsegments
+from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.medium import Medium, optical_reach, per_extinction
+from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.medium import optical_reach
 
 
-def quadrature(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, nodes: int = 16):
+def quadrature(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, nodes: int = 16):
     """Return the airlight integral J by Gauss-Legendre quadrature in w [1/m].
 
     Parameters
@@ -55,18 +56,18 @@ def quadrature(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, n
     return sum_panels(geometry, _panels(geometry, x0, x1, medium, light), medium, light, nodes)
 
 
-def sum_panels(geometry: RayGeometry, panels, medium: Medium, light: Light, nodes: int):
+def sum_panels(geometry: RayGeometry, panels, medium: Homogeneous, light: Light, nodes: int):
     """Return the sum of the panels' integrals, one value per extinction."""
-    return per_extinction(
-        medium, lambda sigma_t: sum(_panel(geometry, a, b, sigma_t, medium, light, nodes) for a, b in panels)
+    return medium.per_extinction(
+        lambda sigma_t: sum(_panel(geometry, a, b, sigma_t, medium, light, nodes) for a, b in panels)
     )
 
 
-def _panels(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
+def _panels(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light):
     if not medium.phase.constant and not light.varies:
         split = dr.clip(geometry.foot, x0, x1)
         return [(x0, split), (split, x1)]
-    return smooth_subsegments(geometry, light, x0, x1)
+    return geometry.smooth_subsegments(light, x0, x1)
 
 
 @lru_cache
@@ -78,7 +79,7 @@ def _positive_nodes(nodes: int) -> tuple[tuple[float, float], ...]:
     return tuple((float(x), float(w)) for x, w in zip(xi, weight) if x > 0)
 
 
-def _panel(geometry: RayGeometry, x0, x1, sigma_t, medium: Medium, light: Light, nodes: int):
+def _panel(geometry: RayGeometry, x0, x1, sigma_t, medium: Homogeneous, light: Light, nodes: int):
     h, e0, e1, difference = path_interval(geometry, x0, x1, sigma_t)
     c0, c1 = dr.sqrt(dr.fma(e0, e0, 1)), dr.sqrt(dr.fma(e1, e1, 1))
     half = 0.5 * dr.asinh(difference * ((e0 + e1) / dr.fma(e1, c0, e0 * c1)))
@@ -156,6 +157,6 @@ def _pairs(geometry: RayGeometry, ray, panel, *, phase, light: Light, nodes):
             value = factor * inverse * phase.evaluate(dr.fma(2 * inverse, inverse, -1))
             if light.varies:
                 e = dr.fma(sign * c_mid, sh, e_mid * ch)
-                value *= falloff_beside(geometry, light, 0.5 * h * (e - dr.rcp(e)))
+                value *= geometry.falloff_beside(light, 0.5 * h * (e - dr.rcp(e)))
             total += weight * value
     return total

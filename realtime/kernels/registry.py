@@ -4,9 +4,9 @@
 A kernel is a function ``kernel(geometry, x0, x1, medium, light, **parameters) -> J [1/m]``. `geometry` is a
 `realtime.rays.ray_light.RayGeometry`, ``x0 <= x1`` [m] bound the lit part of the ray (`x1` may be infinite), and the
 result has one value per ray for a grey medium, a colour for a coloured one. The in-scattered radiance is ``albedo
-sigma_t intensity J / (4 pi)``. `airlight_integral` clips the segment to the cone of a spot before it calls the kernel;
-where the intensity falls off inside the cone (``light.varies``), the kernel weighs its integrand by
-`realtime.rays.ray_light.falloff`.
+sigma_t intensity J / (4 pi)``. `realtime.scene.media.homogeneous` clips the segment to the cone of a spot before it
+calls the kernel; where the intensity falls off inside the cone (``light.varies``), the kernel weighs its integrand by
+`RayGeometry.falloff`.
 
 `KERNELS` is the registry: add a `Kernel` to it and every method, command and report knows it.
 """
@@ -23,9 +23,6 @@ from realtime.kernels.quadrature import quadrature
 from realtime.kernels.stepping import equiangular, quadrature_theta, uniform
 from realtime.kernels.table import table
 from realtime.kernels.taylor import taylor
-from realtime.rays.ray_light import RayGeometry
-from realtime.scene.lights import Light
-from realtime.scene.medium import Medium
 
 
 @dataclass(frozen=True)
@@ -109,34 +106,3 @@ KERNELS: dict[str, Kernel] = {
         "Pegoraro and Parker 2009; Pegoraro, Schott, Parker 2009",
     ),
 }
-
-
-def gamma(kernel, geometry: RayGeometry, x, *, medium: Medium, light: Light):
-    """Return Gamma(x) = J(0, x), the airlight from the camera to a point, which shadow planes and volumes add up [1/m].
-
-    A difference of two Gammas carries the rounding of both: J(x0, x1) itself is better where it can be had.
-
-    References
-    ----------
-    Biri, Arques, Michelin 2006, section 4.2.
-    """
-    return airlight_integral(kernel, geometry, type(x)(0), x, medium=medium, light=light)
-
-
-def airlight_integral(kernel, geometry: RayGeometry, x0, x1, *, medium: Medium, light: Light):
-    """Return J over the part of [x0, x1] that the light's cone reaches [1/m].
-
-    Parameters
-    ----------
-    kernel
-        A kernel function, see the module.
-    geometry, x0, x1
-        The rays and their lit segments [m].
-    medium, light
-        What fills the scene and what lights it.
-
-    Notes
-    -----
-    Valid where the kernel is.
-    """
-    return kernel(geometry, *geometry.lit_segment(x0, x1), medium, light)

@@ -18,29 +18,30 @@ import mitsuba as mi
 from realtime.errors import InputError
 from realtime.numerics.array_types import smallest
 from realtime.numerics.gauss_legendre import unit_nodes
-from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff
+from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.medium import OPTICAL_REACH, Medium, least_extinction, per_extinction
+from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.medium import OPTICAL_REACH
 
 
-def uniform(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, steps: int = 100):
+def uniform(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, steps: int = 100):
     """Return the airlight integral J by midpoint steps in the distance [1/m].
 
     Valid where a step is shorter than the distance to the light, everywhere on the ray. An unbounded ray is cut after
     20 optical depths; through a vacuum it has no step length, and the result means nothing.
     """
     _check("steps", steps)
-    thinnest = dr.maximum(least_extinction(medium), smallest(type(x1)))
+    thinnest = dr.maximum(medium.least_extinction(), smallest(type(x1)))
     x1 = dr.select(dr.isinf(x1), x0 + OPTICAL_REACH / thinnest, x1)
 
     def term(sigma_t, x):
-        r = distance_to_light(geometry, x)
+        r = geometry.distance_to_light(x)
         return _integrand(geometry, medium, light, sigma_t, x, r) / dr.square(r)
 
-    return per_extinction(medium, lambda sigma_t: _midpoints(lambda x: term(sigma_t, x), x0, x1 - x0, steps))
+    return medium.per_extinction(lambda sigma_t: _midpoints(lambda x: term(sigma_t, x), x0, x1 - x0, steps))
 
 
-def equiangular(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, steps: int = 16):
+def equiangular(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, steps: int = 16):
     """Return the airlight integral J by midpoint steps in the angle at the light [1/m].
 
     Valid for any ray that does not meet the light (height above 0); thick media need many steps, since a few angles
@@ -60,10 +61,10 @@ def equiangular(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, 
 
         return _midpoints(term, theta0, theta1 - theta0, steps) / geometry.height
 
-    return per_extinction(medium, integral)
+    return medium.per_extinction(integral)
 
 
-def quadrature_theta(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, nodes: int = 16):
+def quadrature_theta(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, nodes: int = 16):
     """Return the airlight integral J by Gauss-Legendre quadrature in theta [1/m].
 
     The range is split at the foot point unless the phase function is isotropic. Valid for rays that do not meet the
@@ -85,7 +86,7 @@ def quadrature_theta(geometry: RayGeometry, x0, x1, medium: Medium, light: Light
             total += weight * _at_angle(geometry, medium, light, sigma_t, theta)
         return total * (width / h)
 
-    return per_extinction(medium, lambda sigma_t: sum(panel(sigma_t, a, b) for a, b in panels))
+    return medium.per_extinction(lambda sigma_t: sum(panel(sigma_t, a, b) for a, b in panels))
 
 
 def _check(name: str, count: int) -> None:
@@ -93,15 +94,15 @@ def _check(name: str, count: int) -> None:
         raise InputError(f"{name}: got {count!r}, wanted a whole number of at least 1")
 
 
-def _at_angle(geometry: RayGeometry, medium: Medium, light: Light, sigma_t, theta):
+def _at_angle(geometry: RayGeometry, medium: Homogeneous, light: Light, sigma_t, theta):
     x = dr.fma(geometry.height, dr.tan(theta), geometry.foot)
-    return _integrand(geometry, medium, light, sigma_t, x, distance_to_light(geometry, x))
+    return _integrand(geometry, medium, light, sigma_t, x, geometry.distance_to_light(x))
 
 
-def _integrand(geometry: RayGeometry, medium: Medium, light: Light, sigma_t, x, r):
+def _integrand(geometry: RayGeometry, medium: Homogeneous, light: Light, sigma_t, x, r):
     """Return exp(-sigma_t (x + r)) p times the falloff of a spot."""
     value = dr.exp(-sigma_t * (x + r)) * medium.phase.evaluate((geometry.foot - x) / r)
-    return value * falloff(geometry, light, x) if light.varies else value
+    return value * geometry.falloff(light, x) if light.varies else value
 
 
 def _midpoints(term, begin, length, steps: int):

@@ -42,7 +42,7 @@ from realtime.kernels.preparation import prepared_by
 from realtime.numerics.array_types import four_numbers
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.medium import Medium, per_extinction
+from realtime.scene.media.homogeneous import Homogeneous
 
 FORMS = ("sun", "tail")
 _LARGEST_U = 10.0  # of Sun's table
@@ -76,7 +76,7 @@ def _check(form: str, size: int) -> None:
 
 @prepared_by(upload_table)
 def table(
-    geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, form: str = "sun", size: int = 64, tables=None
+    geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, form: str = "sun", size: int = 64, tables=None
 ):
     """Return the airlight integral J as the difference of two reads of a table [1/m].
 
@@ -132,7 +132,7 @@ def table(
         )
     records = upload_table(type(geometry.height), form=form, size=size) if tables is None else tables
     difference = _sun if form == "sun" else _tail
-    return per_extinction(medium, lambda sigma_t: difference(geometry, (x0, x1), sigma_t, records, size))
+    return medium.per_extinction(lambda sigma_t: difference(geometry, (x0, x1), sigma_t, records, size))
 
 
 def _sun(geometry: RayGeometry, ends, sigma_t, records, size: int):

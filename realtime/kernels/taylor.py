@@ -44,11 +44,11 @@ import drjit as dr
 import numpy as np
 
 from realtime.errors import InputError
-from realtime.kernels.bounded import ConstantLeg, bounded_by, tangent_series
 from realtime.numerics.array_types import largest
-from realtime.rays.ray_light import RayGeometry, falloff
+from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.medium import Medium, per_extinction
+from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.published_form import ConstantLeg, bounded_by, tangent_series
 from realtime.scene.phase import PHASES, Phase, series_product
 
 PRINTED_PHASES = ("isotropic", "rayleigh", "hazy", "murky")
@@ -66,7 +66,7 @@ def taylor_bounded(
     degree: int = 4,
     printed: bool = False,
 ):
-    """Return the airlight integral of a bounded medium by the polynomial, see `realtime.kernels.bounded` [1/m].
+    """Return the airlight integral of a bounded medium by the polynomial (`realtime.scene.media.published_form`) [1/m].
 
     Valid near theta = 0, as `taylor`, and as far as a constant stands for the light's way in the medium. The paper
     prints no coefficients for the derived exponent.
@@ -89,7 +89,7 @@ def taylor_bounded(
 
 
 @bounded_by(taylor_bounded)
-def taylor(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, degree: int = 4, printed: bool = False):
+def taylor(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, degree: int = 4, printed: bool = False):
     """Return the airlight integral J by the Taylor polynomial about the foot [1/m].
 
     Parameters
@@ -119,7 +119,7 @@ def taylor(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, degre
         total = _polynomial(geometry, x0, x1, light, coefficients)
         return total * dr.exp(-sigma_t * geometry.foot - a) / h
 
-    return per_extinction(medium, integral)
+    return medium.per_extinction(integral)
 
 
 def _coefficients(a, phase: Phase, degree: int, *, printed: bool) -> list:
@@ -214,7 +214,7 @@ def _weighted(geometry: RayGeometry, light: Light, angles, coefficients):
         value = coefficients[-1]
         for c in reversed(coefficients[:-1]):
             value = dr.fma(value, theta, c)
-        total += float(weight) * value * falloff(geometry, light, geometry.foot + geometry.height * dr.tan(theta))
+        total += float(weight) * value * geometry.falloff(light, geometry.foot + geometry.height * dr.tan(theta))
     return total * half
 
 

@@ -36,7 +36,7 @@ from realtime.methods.interface.view import View
 from realtime.parameters import parameter
 from realtime.scene.density import Density
 from realtime.scene.lights import Light
-from realtime.scene.medium import Clouds
+from realtime.scene.media.bounded import Clouds
 from realtime.scene.phase import HenyeyGreenstein, Phase, named_phase
 from realtime.scene.read_scene import Scene
 

@@ -32,10 +32,10 @@ import mitsuba as mi
 
 from realtime.errors import InputError
 from realtime.intervals.lit_intervals import add_waiting, close_interval, no_intervals, sum_at_end
-from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.methods.interface.marching import marched_integral, marched_steps
 from realtime.methods.interface.method import Method, tolerance
 from realtime.parameters import parameter
+from realtime.scene.media.medium import LitRays
 from realtime.shadow_maps.shadow_map import cast_shadow_map, check_maps, lit_in_map, map_size
 
 _DUE = 3  # in the last bits of a step's number: there an interval that has ended is integrated
@@ -97,16 +97,15 @@ class RayMarch(Method):
 
     def airlight(self, view, light, state, kernel):
         """Return the airlight of every ray by marching [W/(m^2 sr)]."""
-        airlight = ray_airlight(view, light, kernel if self.uses_kernel else None)
+        airlight = view.lit_by(light, kernel if self.uses_kernel else None)
 
         def lit(point):
             if self.shadow == "none" or not view.features.shadows:
                 return True
             return lit_in_map(state, light, point) if self.shadow == "map" else view.visible(point, light)
 
-        if self.sum == "transitions":
-            return airlight.radiance(_lit_runs(airlight, steps=self.steps, spacing=self.spacing, lit=lit))
-        return airlight.radiance(marched_integral(airlight, steps=self.steps, spacing=self.spacing, lit=lit))
+        integral = _lit_runs if self.sum == "transitions" else marched_integral
+        return airlight.radiance(integral(airlight, view.distance, steps=self.steps, spacing=self.spacing, lit=lit))
 
     def error_causes(self, size):
         """Return the causes of its errors, see `Method.error_causes`."""
@@ -114,29 +113,28 @@ class RayMarch(Method):
         return ("resolution", {"tolerance": 0.0}), (without, {"shadow": "ray"}), ("steps", None)
 
 
-def _lit_runs(airlight: RayAirlight, *, steps: int, spacing: str, lit) -> Any:
+def _lit_runs(airlight: LitRays, distance, *, steps: int, spacing: str, lit) -> Any:
     """Integrate the runs of cells whose middles are lit."""
-    view = airlight.view
-    Float, lanes = type(view.distance), dr.width(view.distance)
-    cells = marched_steps(airlight, steps, spacing)
+    Float, lanes = type(distance), dr.width(distance)
+    cells = marched_steps(airlight, distance, steps, spacing)
     meets = cells.width > 0  # rays that miss all bodies march on the spot, where a map can be asked
     x0, x1 = cells.x0, cells.x1
 
     def step(index, was_lit, opened, intervals):
         border = dr.select(index == 0, x0, dr.maximum(cells.place(dr.fma(Float(index), cells.width, cells.begin)), x0))
         x = cells.place(dr.fma(Float(index) + 0.5, cells.width, cells.begin))
-        now = meets & lit(view.origin + view.direction * x)
+        now = meets & lit(airlight.rays.at(x))
         closes = was_lit & ~now
-        intervals = add_waiting(intervals, airlight.integral, closes | ((index & _DUE) == _DUE))
+        intervals = add_waiting(intervals, airlight.airlight, closes | ((index & _DUE) == _DUE))
         intervals = close_interval(intervals, border, closes, begin=opened)
         return index + 1, now, dr.select(now & ~was_lit, border, opened), intervals
 
     start = x0 + dr.zeros(Float, lanes)
-    intervals = no_intervals(dr.zeros(integral_type(view), lanes), start)
+    intervals = no_intervals(airlight.nothing(lanes), start)
     _, was_lit, opened, intervals = dr.while_loop(
         state=(mi.UInt32(0), dr.full(mi.Bool, False, lanes), +start, intervals),
         cond=lambda index, was_lit, opened, intervals: index < steps,
         body=step,
         labels=("index", "was_lit", "opened", "intervals"),
     )
-    return sum_at_end(intervals, airlight.integral, x1, opened=opened, lit=was_lit, active=meets)
+    return sum_at_end(intervals, airlight.airlight, x1, opened=opened, lit=was_lit, active=meets)

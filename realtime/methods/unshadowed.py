@@ -3,7 +3,6 @@
 
 from dataclasses import dataclass
 
-from realtime.methods.interface.light_airlight import ray_airlight
 from realtime.methods.interface.method import Method
 
 
@@ -26,8 +25,8 @@ class Unshadowed(Method):
 
     def airlight(self, view, light, state, kernel):
         """Return the airlight of every ray as if nothing cast a shadow [W/(m^2 sr)]."""
-        airlight = ray_airlight(view, light, kernel)
-        return airlight.radiance(airlight.integral(type(view.distance)(0), view.distance))
+        airlight = view.lit_by(light, kernel)
+        return airlight.radiance(airlight.gamma(view.distance))
 
     def error_causes(self, size):
         """Return shadows, which nothing takes away."""

@@ -59,6 +59,53 @@ class RayGeometry:
         """
         return (x0, x1) if self.enter is None else _clip(self.enter, self.leave, x0, x1)
 
+    def distance_to_light(self, x):
+        """Return r(x) = sqrt(height^2 + (x - foot)^2), the distance from the light to the point at `x` [m]."""
+        s = x - self.foot
+        return dr.sqrt(dr.fma(s, s, self.height * self.height))
+
+    def smooth_subsegments(self, light: Light, x0, x1):
+        """Cut [x0, x1] [m] where a soft spot's `falloff` has kinks, at the cone of the beam; others are one piece.
+
+        A ray that misses the beam is cut where it is closest to the axis: the closer it passes, the more like a kink.
+        Of an endless ray that stays in the beam the last piece, which is empty, lies at its beginning: at infinity
+        kernels would multiply 0 by infinity. Valid for any segment.
+        """
+        if light.beam is None:
+            return [(x0, x1)]
+        inner0, inner1 = _clip(self.beam_enter, self.beam_leave, x0, x1)
+        crosses = self.slant > _PARALLEL
+        closest = dr.clip(self.foot + dr.select(crosses, self.slide / self.slant, 0), x0, x1)
+        misses = crosses & (inner0 >= inner1)
+        inner0, inner1 = dr.select(misses, closest, inner0), dr.select(misses, closest, inner1)
+        stays = dr.isinf(inner1)
+        return [(x0, inner0), (inner0, inner1), (dr.select(stays, x0, inner1), dr.select(stays, x0, x1))]
+
+    def falloff_beside(self, light: Light, s):
+        """Return `falloff` at `s` = x - foot [m]: of a light point, close to which x has not the digits."""
+        if light.facing is None:
+            return self.falloff(light, self.foot + s)
+        square = dr.fma(s, s, dr.square(self.height))
+        return dr.clip(dr.fma(self.axial, s, self.offset) * dr.rsqrt(square), 0, 1)
+
+    def falloff(self, light: Light, x):
+        """Return the relative intensity of a light at the point at `x`, for one that varies [1].
+
+        Of a light point it is the cosine at its normal, 0 behind its plane. Of a spot it is Mitsuba's profile, linear
+        in the angle: one inside the beam, zero outside the cut-off; between the two, (cutoff - angle) / (cutoff -
+        beam). The angle is that of the distances from the axis and along it: near the axis a cosine alone has lost it.
+        """
+        s = x - self.foot
+        if light.facing is not None:
+            return self.falloff_beside(light, s)
+        t = dr.fma(self.slant, s, -self.slide)
+        away = dr.sqrt(dr.fma(t, t, dr.square(self.gap)))
+        along = dr.fma(self.axial, s, self.offset)
+        # Compute one angle: at the dim edge the difference of two angles would cancel.
+        cos, sin = light.cone.cos, dr.sqrt(light.cone.square_sin)
+        within = dr.atan2(sin * along - cos * away, dr.fma(cos, along, sin * away))
+        return dr.clip(within * light.inverse_transition, 0, 1)
+
 
 def ray_geometry(origin, direction, light: Light, *, low=None) -> RayGeometry:
     """Return foot and height of rays with respect to one light, and where they are in what it lights.
@@ -119,60 +166,9 @@ def _spot_geometry(away, direction, direction_low, light: Light) -> RayGeometry:
     return replace(geometry, beam_enter=begin, beam_leave=end, **axis_distance(ray))
 
 
-def distance_to_light(geometry: RayGeometry, x):
-    """Return r(x) = sqrt(height^2 + (x - foot)^2), the distance from the light to the point at `x` [m]."""
-    s = x - geometry.foot
-    return dr.sqrt(dr.fma(s, s, geometry.height * geometry.height))
-
-
-def smooth_subsegments(geometry: RayGeometry, light: Light, x0, x1):
-    """Cut [x0, x1] [m] where a soft spot's `falloff` has kinks, at the cone of the beam; one piece for other lights.
-
-    A ray that misses the beam is cut where it is closest to the axis: the closer it passes, the more like a kink. Of an
-    endless ray that stays in the beam the last piece, which is empty, lies at its beginning: at infinity kernels would
-    multiply 0 by infinity. Valid for any segment.
-    """
-    if light.beam is None:
-        return [(x0, x1)]
-    inner0, inner1 = _clip(geometry.beam_enter, geometry.beam_leave, x0, x1)
-    crosses = geometry.slant > _PARALLEL
-    closest = dr.clip(geometry.foot + dr.select(crosses, geometry.slide / geometry.slant, 0), x0, x1)
-    misses = crosses & (inner0 >= inner1)
-    inner0, inner1 = dr.select(misses, closest, inner0), dr.select(misses, closest, inner1)
-    stays = dr.isinf(inner1)
-    return [(x0, inner0), (inner0, inner1), (dr.select(stays, x0, inner1), dr.select(stays, x0, x1))]
-
-
 def _clip(enter, leave, x0, x1):
     begin = dr.clip(enter, x0, x1)
     return begin, dr.maximum(dr.clip(leave, x0, x1), begin)
-
-
-def falloff_beside(geometry: RayGeometry, light: Light, s):
-    """Return `falloff` at `s` = x - foot [m]: of a light point, close to which x has not the digits."""
-    if light.facing is None:
-        return falloff(geometry, light, geometry.foot + s)
-    square = dr.fma(s, s, dr.square(geometry.height))
-    return dr.clip(dr.fma(geometry.axial, s, geometry.offset) * dr.rsqrt(square), 0, 1)
-
-
-def falloff(geometry: RayGeometry, light: Light, x):
-    """Return the relative intensity of a light at the point at `x`, for one that varies [1].
-
-    Of a light point it is the cosine at its normal, 0 behind its plane. Of a spot it is Mitsuba's profile, linear in
-    the angle: one inside the beam, zero outside the cut-off; between the two, (cutoff - angle) / (cutoff - beam). The
-    angle is that of the distances from the axis and along it: near the axis a cosine alone has lost it.
-    """
-    s = x - geometry.foot
-    if light.facing is not None:
-        return falloff_beside(geometry, light, s)
-    t = dr.fma(geometry.slant, s, -geometry.slide)
-    away = dr.sqrt(dr.fma(t, t, dr.square(geometry.gap)))
-    along = dr.fma(geometry.axial, s, geometry.offset)
-    # Compute one angle: at the dim edge the difference of two angles would cancel.
-    cos, sin = light.cone.cos, dr.sqrt(light.cone.square_sin)
-    within = dr.atan2(sin * along - cos * away, dr.fma(cos, along, sin * away))
-    return dr.clip(within * light.inverse_transition, 0, 1)
 
 
 def profile(light: Light, point, away):
@@ -185,4 +181,4 @@ def profile(light: Light, point, away):
     if light.beam is None:
         return dr.select(inside, type(away.x)(1), 0)
     # The point lies at x = 0 of a ray that starts there.
-    return dr.select(inside, falloff(ray_geometry(point, away, light), light, type(away.x)(0)), 0)
+    return dr.select(inside, ray_geometry(point, away, light).falloff(light, type(away.x)(0)), 0)

@@ -6,8 +6,8 @@ Read in this order:
 - `camera.py`: from a pixel to a ray;
 - `phase.py`: phase functions, which say their values, widths and series;
 - `density.py`: clouds whose density differs from place to place;
-- `medium.py`: homogeneous media, one without bounds or several with;
 - `lights.py`: point, spot and directional lights as homogeneous positions;
+- `media/`: media, which answer for themselves: extinction, optical depths, airlight;
 - `named_shapes.py`: a Mitsuba scene of some shapes, under their names;
 - `closed_mesh.py`: closed meshes of any shape: their flaws by the name of an edge, and what lies inside;
 - `convex_bounds.py`: the convex bounds of media;

@@ -22,7 +22,7 @@ from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import types_of
 from realtime.scene.directional_extent import directional_fields, extent_spheres
 from realtime.scene.lights import DirectionalExtent, Light
-from realtime.scene.medium import Medium
+from realtime.scene.media.medium import Medium
 from realtime.scene.mesh_adjacency import Casters
 from realtime.scene.read_scene import Scene
 from realtime.scene.triangle_table import Facets, read_facets, with_rotations
@@ -110,17 +110,7 @@ def thicker_medium(medium: Medium, factor: float) -> Medium:
     """
     if not 0 <= factor < np.inf:
         raise InputError(f"factor of the extinction: got {factor!r}, wanted a finite value of 0 or more")
-    sigma = tuple(dr.opaque(type(value), factor * float(value[0])) for value in medium.sigma_t)
-    bounded_media = tuple(
-        replace(bounded_medium, medium=thicker_medium(bounded_medium.medium, factor))
-        for bounded_medium in medium.bounded_media
-    )
-    clouds = medium.clouds
-    if clouds is not None:
-        thicker = tuple(value * factor for value in clouds.sigma_t)
-        dr.make_opaque(thicker)
-        clouds = replace(clouds, sigma_t=thicker)
-    return replace(medium, sigma_t=sigma, bounded_media=bounded_media, clouds=clouds)
+    return medium.thicker(factor)
 
 
 @dataclass(frozen=True)

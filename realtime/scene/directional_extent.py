@@ -22,7 +22,7 @@ from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import ArrayTypes
 from realtime.scene.closed_mesh import ClosedMesh
 from realtime.scene.lights import DirectionalExtent, with_low
-from realtime.scene.medium import BoundedMedium
+from realtime.scene.media.light_paths import BoundedMedium
 
 Array = NDArray[np.float64]
 

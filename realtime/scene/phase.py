@@ -29,7 +29,7 @@ class Reach:
     panel: float = 0.4  #: widest panel of `realtime.kernels.panels`, in v
     few: float = 0.1  #: longest segment for four nodes of `realtime.kernels.short_segments`, over its distance
     more: float = 0.2  #: and for eight nodes
-    turn: float = 0.25  #: of the largest angle of a panel at the light, `realtime.bounded_media.panels`
+    turn: float = 0.25  #: of the largest angle of a panel at the light, `realtime.scene.media.bounded_rays`
 
 
 class Phase:
@@ -466,11 +466,6 @@ def _droplets(name: str, Float, radius: float = 6.0, gamma: float = 2.0, wavelen
     if name == Mie.name:
         return Mie(entries, table.peak, width)
     return ModifiedMie(entries, math.tan(math.radians(0.5 * CUT)), width, 1 - share_cut(radius, gamma, wavelength))
-
-
-def evaluate(phase: Phase, cos_scatter):
-    """Return the value of a phase function at `cos_scatter` [1]; see `Phase.evaluate`."""
-    return phase.evaluate(cos_scatter)
 
 
 def series_product(left, right, degree: int) -> list[Any]:

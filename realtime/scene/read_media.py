@@ -29,7 +29,10 @@ from realtime.scene.convex_bounds import (
     touches,
 )
 from realtime.scene.density import DensityGrid, density_on_device, read_density
-from realtime.scene.medium import BoundedMedium, Clouds, Medium
+from realtime.scene.media.bounded import BoundedMedia, Clouds
+from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.light_paths import BoundedMedium
+from realtime.scene.media.medium import Medium
 from realtime.scene.named_shapes import scene_of
 from realtime.scene.phase import HenyeyGreenstein, Isotropic, Phase, named_phase, tabulated
 
@@ -149,7 +152,9 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[Cl
     clouds = _clouds(media, boundaries, types) if around is None else None
     if clouds is not None and uneven:
         clouds = replace(clouds, density=density_on_device(grids, types))
-    return replace(_in_channels(ambient, channels), bounded_media=bounded_media, clouds=clouds), meshes
+    ambient = _in_channels(ambient, channels)
+    surrounding = ambient.sigma_t, ambient.albedo, ambient.phase
+    return BoundedMedia(*surrounding, bounded_media, clear=around is None, clouds=clouds), meshes
 
 
 def _closed_meshes(
@@ -172,7 +177,7 @@ def _first_cloud(shapes: Sequence[tuple[Bounds | None, ClosedMesh | None]], unev
     return next(iter((*concave, *uneven)))
 
 
-def _clouds(media: list[Medium], boundaries, types: ArrayTypes) -> Clouds:
+def _clouds(media: list[Homogeneous], boundaries, types: ArrayTypes) -> Clouds:
     """Return bounded media as tables with an entry for each; equal phase functions are one."""
     keys = [_phase_key(shape.interior_medium().phase_function()) for shape in boundaries]
     distinct = list(dict.fromkeys(keys))
@@ -230,7 +235,7 @@ def _check_disjoint(bounds: list[Bounds]) -> None:
                 )
 
 
-def make_bounded_medium(medium: Medium, bounds: Bounds, types: ArrayTypes) -> BoundedMedium:
+def make_bounded_medium(medium: Homogeneous, bounds: Bounds, types: ArrayTypes) -> BoundedMedium:
     """Return a medium within bounds."""
     centre = types.vector(*(float(c) for c in bounds.centre))
     radius, distance = (dr.opaque(types.scalar, value) for value in (bounds.radius, mean_distance(bounds)))
@@ -250,13 +255,13 @@ def make_bounded_medium(medium: Medium, bounds: Bounds, types: ArrayTypes) -> Bo
     )
 
 
-def _clear(types: ArrayTypes) -> Medium:
+def _clear(types: ArrayTypes) -> Homogeneous:
     albedo = types.color(0.0)
     dr.make_opaque(albedo)
-    return Medium((dr.opaque(types.scalar, 0.0),), albedo, Isotropic(), clear=True)
+    return Homogeneous((dr.opaque(types.scalar, 0.0),), albedo, Isotropic())
 
 
-def _in_channels(medium: Medium, channels: int) -> Medium:
+def _in_channels(medium: Homogeneous, channels: int) -> Homogeneous:
     """Return a grey medium with its extinction repeated: media of one scene have equally many."""
     if len(medium.sigma_t) == channels:
         return medium
@@ -265,7 +270,7 @@ def _in_channels(medium: Medium, channels: int) -> Medium:
     return replace(medium, sigma_t=tuple(dr.opaque(type(grey), float(grey[0])) for _ in range(channels)))
 
 
-def _filling(medium, grid: DensityGrid | None, types: ArrayTypes) -> Medium:
+def _filling(medium, grid: DensityGrid | None, types: ArrayTypes) -> Homogeneous:
     """Return the medium of a boundary, one with a grid by its largest extinction."""
     if grid is None:
         return _homogeneous(medium, types)
@@ -275,7 +280,7 @@ def _filling(medium, grid: DensityGrid | None, types: ArrayTypes) -> Medium:
     _check_albedo(albedo)
     color = types.color(*(float(value) for value in albedo))
     dr.make_opaque(color)
-    return Medium((dr.opaque(types.scalar, grid.largest),), color, _read_phase(medium.phase_function(), types))
+    return Homogeneous((dr.opaque(types.scalar, grid.largest),), color, _read_phase(medium.phase_function(), types))
 
 
 def _require_constant(medium, *coefficients: str) -> None:
@@ -292,7 +297,7 @@ def _check_albedo(albedo) -> None:
         raise InputError(f"the medium's albedo is {albedo.tolist()}; wanted values from 0 to 1")
 
 
-def _homogeneous(medium, types: ArrayTypes) -> Medium:
+def _homogeneous(medium, types: ArrayTypes) -> Homogeneous:
     if not medium.is_homogeneous():
         raise InputError(f"the medium is a {medium.class_name()}; wanted a medium of type 'homogeneous'")
     _require_constant(medium, "sigma_t", "albedo")
@@ -309,7 +314,7 @@ def _homogeneous(medium, types: ArrayTypes) -> Medium:
     sigma = tuple(dr.opaque(types.scalar, float(value)) for value in (extinction[:1] if grey else extinction))
     color = types.color(*(float(value) for value in albedo))
     dr.make_opaque(color)
-    return Medium(sigma, color, _read_phase(medium.phase_function(), types))
+    return Homogeneous(sigma, color, _read_phase(medium.phase_function(), types))
 
 
 def _read_phase(phase, types: ArrayTypes) -> Phase:

@@ -23,7 +23,7 @@ from realtime.scene.closed_mesh import ClosedMesh
 from realtime.scene.directional_extent import directional_fields, distance_before, media_spheres, mesh_spheres
 from realtime.scene.features import SceneFeatures, backgrounds, scene_notes
 from realtime.scene.lights import Light, spot_fields
-from realtime.scene.medium import Medium
+from realtime.scene.media.medium import Medium
 from realtime.scene.read_media import opaque_scene, read_medium, sort_shapes
 from realtime.scene.triangle_table import Facets, read_facets
 
@@ -278,11 +278,11 @@ def _scene_features(
         # A light never shadows itself.
         shadows=len(opaque) > (1 if len(area_lights) == 1 and area_lights[0].opaque and not lights else 0),
         surfaces=bool(opaque),
-        extinctions=len(medium.sigma_t),
+        extinctions=medium.channels,
         isotropic=all(phase.constant for phase in phases),
         bounded=bool(medium.bounded_media),
         clear=medium.clear,
-        vacuum=any(float(sigma_t[0]) == 0 for sigma_t in medium.sigma_t),
+        vacuum=medium.vacuum,
         point_lights=sum(light.kind == "point" for light in lights),
         spot_lights=sum(light.kind == "spot" for light in lights),
         directional_lights=sum(light.kind == "directional" and light.sky is None for light in lights),

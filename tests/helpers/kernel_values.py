@@ -13,7 +13,7 @@ from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import ArrayTypes, array_types
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.medium import Medium
+from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import Phase, named_phase
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ def kernel_values(kernel, rays, name="isotropic", g: Any = 0.0, *, precision="si
     types = array_types(precision)
     columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(column, dtype=np.float64)) for column in rays))
     foot, height, x0, x1, sigma_t = (aligned_array(types.scalar, np.array(column)) for column in columns)
-    medium = Medium((sigma_t,), types.color(1), phase_of(name, g, types.scalar))
+    medium = Homogeneous((sigma_t,), types.color(1), phase_of(name, g, types.scalar))
     geometry = RayGeometry(foot, height, None, None)
     return np.array(kernel(geometry, x0, x1, medium, Light(None, None), **parameters), dtype=np.float64)
 

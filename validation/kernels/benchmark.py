@@ -24,7 +24,7 @@ from realtime.numerics.aligned import aligned_array
 from realtime.numerics.recorded import Frozen
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.medium import Medium
+from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import named_phase
 from validation.clock import time_repeated
 from validation.kernels.errors import relative_error
@@ -193,7 +193,7 @@ def _frozen(function: Kernel, cases: Cases, rays: int | None = None) -> Callable
         g=dr.opaque(mi.Float, float(cases.g[0])) if name == "hg" else None,
         values=mi.Float(np.asarray(TABLE)) if name == "tabulated" else None,
     )
-    medium = Medium((dr.opaque(mi.Float, float(cases.sigma_t[0])),), dr.opaque(mi.Color3f, 1), phase)
+    medium = Homogeneous((dr.opaque(mi.Float, float(cases.sigma_t[0])),), dr.opaque(mi.Color3f, 1), phase)
     light = Light(dr.opaque(mi.Vector3f, 0), dr.opaque(mi.Color3f, 1))
     columns = (cases.foot, cases.height, cases.x0, cases.x1)
     foot, height, x0, x1 = (aligned_array(mi.Float, column[part]) for column in columns)

@@ -17,7 +17,7 @@ from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import array_types
 from realtime.rays.ray_light import RayGeometry, ray_geometry
 from realtime.scene.lights import Light
-from realtime.scene.medium import Medium
+from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import named_phase
 
 Array = NDArray[np.float64]
@@ -80,7 +80,7 @@ def evaluate_rows(
         values=column(np.asarray(table)) if name == "tabulated" else None,
         Float=types.scalar,
     )
-    medium = Medium((column(cases.sigma_t[rows]),), types.color(1), phase)
+    medium = Homogeneous((column(cases.sigma_t[rows]),), types.color(1), phase)
     if cases.light is None or cases.origin is None or cases.direction is None:
         light = Light(types.vector(0), types.color(intensity))
         geometry = RayGeometry(column(cases.foot[rows]), column(cases.height[rows]), None, None)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.scene.camera import read_camera, resized_camera
-from realtime.scene.medium import BoundedMedium, Medium
+from realtime.scene.media.light_paths import BoundedMedium
 from realtime.scene.read_scene import Scene
 
 Array = NDArray[np.float64]
@@ -153,7 +153,7 @@ def lit_points(geometry: Any, light: LightPlace, points: Array) -> NDArray[np.bo
     return lit
 
 
-def _mean_extinction(medium: Medium) -> float:
+def _mean_extinction(medium: Any) -> float:
     """Return the mean extinction of the channels [1/m]."""
     return float(np.mean([float(sigma_t[0]) for sigma_t in medium.sigma_t]))
 

@@ -17,7 +17,7 @@ import mitsuba as mi
 
 from realtime.clouds.bounds.surfaces import CloudSurfaces, outward_normal
 from realtime.numerics.array_types import Metres, PerRay
-from realtime.scene.medium import Clouds
+from realtime.scene.media.bounded import Clouds
 
 _STEP = 4e-6  # beyond a crossing, of the distance and of the largest coordinate
 

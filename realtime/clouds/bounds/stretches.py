@@ -14,7 +14,7 @@ import mitsuba as mi
 from realtime.clouds.bounds.crossings import Crossing, next_crossing
 from realtime.clouds.bounds.surfaces import CloudSurfaces
 from realtime.numerics.array_types import Metres, PerRay, chosen_value
-from realtime.scene.medium import Clouds
+from realtime.scene.media.bounded import Clouds
 
 KEPT = 4  #: stretches of a ray; of 480 000 camera rays of `stratocumulus` 0.1 % have more
 

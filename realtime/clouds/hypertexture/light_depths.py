@@ -25,7 +25,7 @@ from realtime.clouds.hypertexture.march import march, marched_depths, middle_den
 from realtime.clouds.single_scattering.march import exact_leg
 from realtime.numerics.array_types import Metres, bytes_of
 from realtime.scene.lights import Light
-from realtime.scene.medium import Clouds
+from realtime.scene.media.bounded import Clouds
 from realtime.shadow_maps.projection import Projection, light_projection
 from realtime.shadow_maps.shadow_map import texel_rays
 

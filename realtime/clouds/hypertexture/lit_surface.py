@@ -28,7 +28,7 @@ from realtime.clouds.bounds.surfaces import CloudSurfaces
 from realtime.clouds.hypertexture.march import march, middle_density, voxel
 from realtime.clouds.light_maps.surfaces import LitSurfaces
 from realtime.scene.lights import Light
-from realtime.scene.medium import Clouds
+from realtime.scene.media.bounded import Clouds
 from realtime.shadow_maps.shadow_map import check_size, texel_rays
 
 

@@ -17,7 +17,7 @@ from realtime.clouds.bounds.crossings import next_crossing
 from realtime.clouds.bounds.surfaces import CloudSurfaces
 from realtime.clouds.single_scattering.spacing import SPREAD
 from realtime.numerics.array_types import Metres
-from realtime.scene.medium import Clouds
+from realtime.scene.media.bounded import Clouds
 
 #: A depth behind which nothing shows: exp(-20) = 2e-9.
 OPAQUE = 20.0

@@ -28,7 +28,7 @@ from realtime.clouds.single_scattering.march import Beam, CloudRays, scattered, 
 from realtime.clouds.single_scattering.opacity import add_printed, nothing_printed, printed_opacity
 from realtime.clouds.single_scattering.spacing import SPREAD
 from realtime.numerics.array_types import chosen_value
-from realtime.scene.medium import Clouds
+from realtime.scene.media.bounded import Clouds
 
 
 def with_densities(rays: CloudRays, stride: Any) -> CloudRays:

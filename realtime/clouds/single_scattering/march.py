@@ -31,7 +31,7 @@ from realtime.clouds.bounds.surfaces import CloudSurfaces
 from realtime.clouds.single_scattering.spacing import node_depth, node_share
 from realtime.numerics.array_types import chosen_value
 from realtime.scene.lights import Light
-from realtime.scene.medium import Clouds
+from realtime.scene.media.bounded import Clouds
 
 _BETWEEN = -1.0  # in place of a distance, between two stretches
 _SERIES = 0.02  # below it (1 - exp(-d))/d is summed up: d^4/120 is left, 1e-9

@@ -20,7 +20,7 @@ import drjit as dr
 
 from realtime.clouds.bounds.crossings import optical_depths, sum_over_stretches
 from realtime.clouds.bounds.surfaces import CloudSurfaces
-from realtime.scene.medium import Clouds
+from realtime.scene.media.bounded import Clouds
 
 
 def opacity(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end) -> Any:

@@ -29,7 +29,7 @@ from realtime.clouds.single_scattering.opacity import opacity_of
 from realtime.clouds.uniform_sky.escapes import COSINES, THICKEST, THICKNESSES, THINNEST, escapes
 from realtime.numerics.array_types import types_of
 from realtime.scene.lights import Light
-from realtime.scene.medium import Clouds
+from realtime.scene.media.bounded import Clouds
 from realtime.scene.mesh_adjacency import mesh_triangles
 from realtime.scene.read_scene import Scene
 

@@ -43,13 +43,13 @@ from realtime.methods.epipolar.slices import (
     slice_coordinate,
 )
 from realtime.methods.epipolar.walk import sum_lit_intervals
-from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.methods.interface.method import Method
 from realtime.methods.interface.view import View
 from realtime.numerics.array_types import PerMetre, bytes_of
 from realtime.parameters import parameter
 from realtime.scene.camera import Camera
 from realtime.scene.lights import Light
+from realtime.scene.media.medium import LitRays
 from realtime.shadow_maps.projection import light_faces
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth, map_memory, map_size
 
@@ -130,9 +130,9 @@ class MinMax(Method):
 
     def airlight(self, view, light, state, kernel):
         """Return the airlight of every ray [W/(m^2 sr)]."""
-        airlight = ray_airlight(view, light, kernel)
+        airlight = view.lit_by(light, kernel)
         if not view.features.shadows:
-            return airlight.radiance(airlight.integral(*airlight.segment))
+            return airlight.radiance(airlight.gamma(view.distance))
         camera = view.camera
         cut = image_slices(camera, light, self.slices or _usual_slices(camera))
         heights = slice_heights(state.shadow_map, state.heights, cut, light)
@@ -167,12 +167,12 @@ def _memory_of_slices(camera: Camera, light: Light, size: int, slices: int, samp
     return (slices or _usual_slices(camera)) * (number * 7 * leaves + lanes * (4 + 3 * number))
 
 
-def _lit_integral(airlight: RayAirlight, heights: SliceHeights, number, active=True):
+def _lit_integral(airlight: LitRays, heights: SliceHeights, number, active=True):
     """Return the integral over the lit intervals of rays, each in a slice; 0 where not `active`."""
-    x0, x1 = airlight.segment
-    zero = dr.zeros(integral_type(airlight.view), dr.width(airlight.view.distance))
+    x0, x1 = airlight.segment(airlight.rays.distance)
+    zero = airlight.nothing(dr.width(airlight.rays.distance))
     ends = x0, dr.select(active, x1, x0)
-    return sum_lit_intervals(heights, number, airlight.geometry, ends, airlight.integral, zero)
+    return sum_lit_intervals(heights, number, airlight.geometry, ends, airlight.airlight, zero)
 
 
 def _nearest(slices: Slices, point):
@@ -192,36 +192,32 @@ def _sampled_shares(view: View, light: Light, kernel, samples: Samples, heights:
     """Return by sample, of those that are marked, the share of its airlight that is lit."""
     marked, count = marked_samples(samples)
     camera = view.camera
-    shares = dr.empty(integral_type(view), dr.width(marked))
+    shares = dr.empty(type(view.lit_by(light).nothing(1)), dr.width(marked))
 
     def computed(lane):
         sample = dr.gather(mi.UInt32, marked, lane)
         (i, j), slice_number, depth = sample_ray(samples, sample)
         direction = dr.normalize(camera.forward + camera.left * i + camera.up * j)
-        seen = replace(view, direction=direction, direction_low=type(direction)(0), distance=depth)
-        airlight = ray_airlight(seen, light, kernel)
-        share = _lit_integral(airlight, heights, slice_number) / airlight.integral(*airlight.segment)
+        rays = view.medium.rays(view.origin, direction, type(direction)(0))
+        seen = replace(view, **vars(rays), distance=depth)
+        airlight = seen.lit_by(light, kernel)
+        share = _lit_integral(airlight, heights, slice_number) / airlight.gamma(airlight.rays.distance)
         dr.scatter(shares, dr.select(dr.isfinite(share), share, no_value(share)), sample)
         return lane
 
     lane = spread(dr.width(marked))
-    if view.features.bounded:
-        # The planes of bounded media are written to a table first, which no branch may do: empty room repeats the last
-        # sample.
-        computed(dr.minimum(lane, dr.maximum(count, 1) - 1))
-    else:
-        # Most of the room is empty: a branch steps over it.
-        dr.if_stmt(args=(lane,), cond=lane < count, true_fn=computed, false_fn=lambda lane: lane)
+    # Most of the room is empty: a branch steps over it.
+    dr.if_stmt(args=(lane,), cond=lane < count, true_fn=computed, false_fn=lambda lane: lane)
     dr.eval(shares)
     return shares
 
 
-def _interpolated(airlight: RayAirlight, samples: Samples, shares, heights: SliceHeights, point):
+def _interpolated(airlight: LitRays, samples: Samples, shares, heights: SliceHeights, point):
     """Return the integral of every pixel: the share of the samples around it, or its own where they do not fit."""
-    share, fits = between_samples(samples, shares, point, airlight.view.distance)
+    share, fits = between_samples(samples, shares, point, airlight.rays.distance)
     # Next to a light, samples gather most of their airlight at other places than the pixel, and where it lies on a
     # surface they end before it, or beyond.
-    pixel = dr.norm(airlight.view.camera.left)
+    pixel = dr.norm(airlight.rays.camera.left)
     fits &= airlight.geometry.height > _NEXT * pixel * dr.abs(airlight.geometry.foot)
     own = _lit_integral(airlight, heights, _nearest(samples.slices, point), ~fits)
-    return dr.select(fits, share * airlight.integral(*airlight.segment), own)
+    return dr.select(fits, share * airlight.gamma(airlight.rays.distance), own)

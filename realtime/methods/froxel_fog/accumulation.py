@@ -29,9 +29,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.pieces import Piece
 from realtime.methods.froxel_fog.grid import Grid, trilinear
-from realtime.methods.froxel_fog.media import piece_length
 from realtime.methods.interface.view import View
 from realtime.numerics.array_types import PerRay, four_numbers
 from realtime.scene.camera import row_and_column
@@ -40,7 +38,7 @@ _THIN = 0.1  # optical depth of a slice up to which the series serves
 _TERMS = 8  # of it: 0.1^8/9! = 3e-14 is left out
 
 
-def accumulated(view: View, grid: Grid, scattered: PerRay, pieces: tuple[Piece, ...]) -> Any:
+def accumulated(view: View, grid: Grid, scattered: PerRay) -> Any:
     """Return the airlight up to the begin and the end of each slice, (slices + 1) values a column, four numbers each.
 
     Parameters
@@ -49,25 +47,18 @@ def accumulated(view: View, grid: Grid, scattered: PerRay, pieces: tuple[Piece, 
         The frame and its froxels.
     scattered
         By froxel, a colour [W/(m^3 sr)], evaluated.
-    pieces
-        Of the columns, from `realtime.methods.froxel_fog.media.column_pieces`.
     """
     Float, Color, medium = type(view.distance), type(scattered), view.medium
     column = dr.arange(mi.UInt32, grid.columns)
-    stretch = dr.norm(grid.column_ray(column))
+    middle = grid.column_ray(column)
+    stretch = dr.norm(middle)
+    rays = medium.rays(view.origin, middle / stretch)
     volume = dr.zeros(Float, 4 * (grid.slices + 1) * grid.columns)
 
     def step(number, x, kept, total):
         end = grid.depth((Float(number) + 1) / grid.slices) * stretch
         thickness = end - x
-        if pieces:
-            lengths = [piece_length(piece, x, end) for piece in pieces]
-            depths = [
-                sum(piece.medium.sigma_t[channel] * length for piece, length in zip(pieces, lengths))
-                for channel in range(len(medium.sigma_t))
-            ]
-        else:
-            depths = [sigma_t * thickness for sigma_t in medium.sigma_t]
+        depths = medium.optical_depth(rays, x, end)
         source = dr.gather(Color, scattered, number * grid.columns + column)
         passed = [dr.exp(-depth) for depth in depths]
         weights = [
@@ -83,7 +74,7 @@ def accumulated(view: View, grid: Grid, scattered: PerRay, pieces: tuple[Piece, 
         state=(
             mi.UInt32(0),
             dr.zeros(Float, grid.columns),
-            [dr.full(Float, 1, grid.columns) for _ in medium.sigma_t],
+            [dr.full(Float, 1, grid.columns) for _ in range(medium.channels)],
             dr.zeros(Color, grid.columns),
         ),
         cond=lambda number, x, kept, total: number < grid.slices,

@@ -24,7 +24,7 @@ from realtime.methods.interface.view import View
 from realtime.numerics.array_types import Metres, PerRay, four_numbers
 from realtime.scene.camera import Camera
 from realtime.scene.lights import Light
-from realtime.scene.medium import Medium, least_extinction
+from realtime.scene.media.medium import Medium
 
 _NEAR = 1 / 8  # of `far`, where it is not given
 _OPTICAL_REACH = 3.0  # optical depth behind a light that is worth slices: e^-6 = 0.25 % of the light comes back from it
@@ -118,7 +118,7 @@ def _frame_depth(view: View) -> Metres:
 
 def _reach(view: View, light: Light, medium: Medium) -> Metres:
     away = light.position - view.camera.origin
-    reach = dr.minimum(_OPTICAL_REACH / least_extinction(medium), _REACH * dr.norm(away))
+    reach = dr.minimum(medium.length_of(_OPTICAL_REACH), _REACH * dr.norm(away))
     return dr.maximum(dr.dot(away, view.camera.forward), 0) + reach
 
 

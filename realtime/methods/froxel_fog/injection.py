@@ -23,16 +23,13 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.pieces import Piece, path_transmittance
 from realtime.methods.froxel_fog.grid import Grid
 from realtime.methods.froxel_fog.light_points import LightPointTable
-from realtime.methods.froxel_fog.media import piece_length
 from realtime.methods.interface.view import View
 from realtime.numerics.array_types import PerRay
-from realtime.numerics.fast_exp import exp_bounded
 from realtime.rays.ray_light import profile
 from realtime.scene.lights import Light
-from realtime.scene.medium import per_extinction, transmittance
+from realtime.scene.media.medium import Rays
 
 #: (point, light, its number among all lights) -> whether it is lit.
 Visibility = Callable[[Any, Light, int], Any]
@@ -47,14 +44,13 @@ class FroxelPoints:
     point: Any  #: [m]
     unit: Any  #: from the camera there, of unit length
     least: Any  #: b^2 [m^2]
-    filled: tuple[tuple[Any, Any], ...]  #: media, and the share of the froxels that each fills
-    some: Any  #: whether any does
+    rays: Rays  #: the middle ray of the column
+    ends: tuple[Any, Any]  #: where it enters and leaves the froxel [m]
 
 
 def scattered_light(
     view: View,
     grid: Grid,
-    pieces: tuple[Piece, ...],
     *,
     shift: tuple[Any, Any, Any],
     tables: tuple[LightPointTable, ...],
@@ -66,8 +62,6 @@ def scattered_light(
     ----------
     view, grid
         The frame and its froxels.
-    pieces
-        Of the columns, from `realtime.methods.froxel_fog.media.column_pieces`.
     shift
         Of the points from the middles of the froxels, in parts of a froxel across, down and in depth.
     tables
@@ -75,7 +69,7 @@ def scattered_light(
     visible
         Which light reaches which point.
     """
-    points = _froxel_points(view, grid, pieces, shift)
+    points = _froxel_points(view, grid, shift)
     total = dr.zeros(type(view.medium.albedo), grid.columns * grid.slices)
     loops = () if view.features.bounded else tables
     for number, light in enumerate(view.lights):
@@ -88,14 +82,10 @@ def scattered_light(
     for table in loops:
         like = next(light for light in view.lights if light.source == table.source)
         total += like.intensity * _sum_over_points(view, table, like, points)
-    if not view.features.bounded:
-        medium = view.medium
-        sigma_t = medium.sigma_t[0] if len(medium.sigma_t) == 1 else type(total)(*medium.sigma_t)
-        total = medium.albedo * (sigma_t * total)
-    return total * (0.25 * dr.inv_pi)
+    return view.medium.unit * total * (0.25 * dr.inv_pi)
 
 
-def _froxel_points(view: View, grid: Grid, pieces: tuple[Piece, ...], shift: tuple[Any, Any, Any]) -> FroxelPoints:
+def _froxel_points(view: View, grid: Grid, shift: tuple[Any, Any, Any]) -> FroxelPoints:
     Float = type(view.distance)
     lane = dr.arange(mi.UInt32, grid.columns * grid.slices)
     number = lane // grid.columns
@@ -103,16 +93,11 @@ def _froxel_points(view: View, grid: Grid, pieces: tuple[Piece, ...], shift: tup
     ray = grid.column_ray(column, shift[:2])
     begin, end = grid.depth(Float(number) / grid.slices), grid.depth((Float(number) + 1) / grid.slices)
     point = dr.fma(ray, dr.lerp(begin, end, 0.5 + shift[2]), view.origin)
-    filled: list[tuple[Any, Any]] = []
-    if view.features.bounded:
-        middle = dr.norm(grid.column_ray(column))
-        for piece in pieces:
-            share = piece_length(piece, begin * middle, end * middle, column) / ((end - begin) * middle)
-            filled.append((piece.medium, share))
-    some = sum((share for _, share in filled), Float(0)) > 0 if filled else dr.mask_t(Float)(True)
-    return FroxelPoints(
-        point, ray * dr.rsqrt(dr.squared_norm(ray)), _least_square(grid, begin, end), tuple(filled), some
-    )
+    middle = grid.column_ray(column)
+    length = dr.norm(middle)
+    rays = view.medium.rays(view.origin, middle / length)
+    unit = ray * dr.rsqrt(dr.squared_norm(ray))
+    return FroxelPoints(point, unit, _least_square(grid, begin, end), rays, (begin * length, end * length))
 
 
 def _sum_over_points(view: View, table: LightPointTable, like: Light, points: FroxelPoints) -> Any:
@@ -131,15 +116,14 @@ def _sum_over_points(view: View, table: LightPointTable, like: Light, points: Fr
         # At the light itself there is no direction: any will do.
         inverse = dr.rsqrt(dr.maximum(square, 1e-30))
         strength = dr.maximum(c, 0) * inverse * dr.rcp(dr.maximum(square, points.least))
-        strength *= medium.phase.evaluate(-dr.dot(away, points.unit) * inverse)
+        value = strength * medium.mean_source(points.rays, *points.ends, _at(-dr.dot(away, points.unit) * inverse))
         if view.features.shadows:
             lit = view.visible(points.point, frame) if table.maps is None else table.maps.lit(number, (a, b, c))
-            strength = dr.select(lit, strength, 0)
-        r = square * inverse
-        return number + 1, total + per_extinction(medium, lambda sigma_t: strength * exp_bounded(-sigma_t * r))
+            value = dr.select(lit, value, 0)
+        depths = medium.depth_to_light(frame, points.point, square * inverse)
+        return number + 1, total + value * medium.transmittance(depths)
 
-    grey = len(medium.sigma_t) == 1
-    Value = type(view.distance) if grey else type(medium.albedo)
+    Value = type(view.lit_by(like).nothing(1))
     _, total = dr.while_loop(
         state=(mi.UInt32(0), dr.zeros(Value, dr.width(points.point))),
         cond=lambda number, total: number < table.count,
@@ -160,11 +144,8 @@ def _least_square(grid: Grid, begin: Any, end: Any) -> Any:
 
 
 def _weight(view: View, light: Light, points: FroxelPoints, lit: Any) -> Any:
-    """Return what S is for a unit of intensity without its factor 1/(4 pi); in one medium also without albedo sigma_t.
-
-    In a grey medium without bounds it is a number, otherwise a colour.
-    """
-    medium, Float, Color = view.medium, type(view.distance), type(view.medium.albedo)
+    """Return what S is for a unit of intensity without its factor 1/(4 pi), in parts of the medium's `unit`."""
+    medium, Float = view.medium, type(view.distance)
     toward = light.toward(points.point)
     square = dr.squared_norm(toward)
     r = dr.sqrt(square) if light.w else Float(1)
@@ -173,14 +154,11 @@ def _weight(view: View, light: Light, points: FroxelPoints, lit: Any) -> Any:
     strength = (dr.rcp(dr.maximum(square, points.least)) if light.w else Float(1)) * profile(
         light, points.point, -toward * dr.rsqrt(dr.maximum(square, 1e-30))
     )
-    if not view.features.bounded:
-        strength = dr.select(lit, strength * medium.phase.evaluate(cosine), 0)
-        return strength * transmittance(medium, r)
-    depths = [dr.zeros(Float, dr.width(points.point)) for _ in medium.sigma_t]
-    reached = points.some & (strength > 0)
-    kept = path_transmittance(medium, light, depths=depths, point=points.point, active=reached)
-    density = Color(0)
-    for filling, share in points.filled:
-        sigma_t = filling.sigma_t[0] if len(filling.sigma_t) == 1 else Color(*filling.sigma_t)
-        density += filling.albedo * (sigma_t * (share * filling.phase.evaluate(cosine)))
-    return dr.select(points.some & lit, strength * kept * density, 0)
+    value = strength * medium.mean_source(points.rays, *points.ends, _at(cosine))
+    some = lit & (sum(value) > 0 if dr.depth_v(value) > 1 else value > 0)
+    depths = medium.depth_to_light(light, points.point, r, active=some)
+    return dr.select(some, value * medium.transmittance(depths), 0)
+
+
+def _at(cosine: Any) -> Any:
+    return lambda phase: phase.evaluate(cosine)

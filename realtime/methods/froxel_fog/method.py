@@ -23,7 +23,6 @@ from realtime.methods.froxel_fog.grid import view_grid
 from realtime.methods.froxel_fog.history import averaged, frame_shift
 from realtime.methods.froxel_fog.injection import Visibility, scattered_light
 from realtime.methods.froxel_fog.light_points import LightPointTable, tabulated
-from realtime.methods.froxel_fog.media import column_pieces
 from realtime.methods.interface.method import Layers, Method
 from realtime.methods.interface.view import View
 from realtime.numerics.array_types import bytes_of
@@ -137,15 +136,14 @@ class FroxelFog(Method):
         last = view.carried
         grid = view_grid(view, size=self.grid_size, near=self.near, far=self.far, distribution=self.distribution)
         dr.eval(grid.far, grid.near)
-        pieces = column_pieces(view, grid, dr.arange(mi.UInt32, grid.columns))
         shift = frame_shift(last if self.jitter == "frames" else None, type(view.distance))
         visible = _visibility(view, state, self.shadow)
-        scattered = scattered_light(view, grid, pieces, shift=shift, tables=state.tables, visible=visible)
+        scattered = scattered_light(view, grid, shift=shift, tables=state.tables, visible=visible)
         carried = None
         if self.carries:
             scattered, carried = averaged(scattered, grid, last, weight=self.history)
         dr.eval(scattered, carried)
-        return Layers(airlight_at_pixels(view, grid, accumulated(view, grid, scattered, pieces)), carried=carried)
+        return Layers(airlight_at_pixels(view, grid, accumulated(view, grid, scattered)), carried=carried)
 
     def error_causes(self, size):
         """Return the causes of its errors, see `Method.error_causes`.

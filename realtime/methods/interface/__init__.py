@@ -5,6 +5,5 @@ Read in this order:
 
 - `method.py`: a method with its parameters, the layers that it returns, and the formula of a frame.
 - `view.py`: the rays of a frame, the lights and the media, as a method sees them.
-- `light_airlight.py`: the airlight of one light along the rays, whatever fills the scene: what methods sum up.
 - `marching.py`: the same integral by midpoint steps: what marchers sum up.
 """

@@ -21,10 +21,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.airlight import MediaRay
-from realtime.methods.interface.light_airlight import RayAirlight
-from realtime.rays.ray_light import distance_to_light, falloff
-from realtime.scene.medium import OPTICAL_REACH, Medium, least_extinction, per_extinction
+from realtime.scene.media.medium import LitRays
 
 _LEAST_HEIGHT = 2.0**-10  # h over g, of the docstring
 
@@ -98,18 +95,13 @@ def midpoint_sum(steps: Steps, count: int, zero: Any, sample: Callable[[Any], An
     return total * steps.width
 
 
-def optical_end(medium: Medium, x0: Any, x1: Any) -> Any:
-    """Return where uniform steps from `x0` to `x1` [m] stop."""
-    return dr.minimum(x1, x0 + OPTICAL_REACH / least_extinction(medium))
-
-
-def marched_integral(airlight: RayAirlight, *, steps: int, spacing: str, lit: Callable[[Any], Any]) -> Any:
+def marched_integral(airlight: LitRays, distance: Any, *, steps: int, spacing: str, lit: Callable[[Any], Any]) -> Any:
     """Return the airlight integral of a light along every ray by midpoint steps.
 
     Parameters
     ----------
-    airlight
-        The rays and the light.
+    airlight, distance
+        The rays and the light, and where the rays end [m].
     steps
         Of every ray.
     spacing
@@ -120,52 +112,21 @@ def marched_integral(airlight: RayAirlight, *, steps: int, spacing: str, lit: Ca
     Returns
     -------
     integral
-        J [1/m]; in bounded media albedo sigma_t J [1/m^2].
+        In parts of the medium's `unit`.
     """
-    view, light, geometry, media = airlight.view, airlight.light, airlight.geometry, airlight.media
-    medium = view.medium
-    between = marched_steps(airlight, steps, spacing)
+    between = marched_steps(airlight, distance, steps, spacing)
 
     def sample(x):
-        reached = (between.width > 0) & lit(view.origin + view.direction * x)
-        if media and not light.w:
-            return dr.select(reached, media.source(x), 0)
-        r = distance_to_light(geometry, x)
-        weight = dr.rcp(dr.square(r))
-        if media:
-            return dr.select(reached, weight * media.source(x), 0)
-        weight *= medium.phase.evaluate((geometry.foot - x) / r)
-        if light.varies:
-            weight *= falloff(geometry, light, x)
-        return dr.select(reached, per_extinction(medium, lambda sigma_t: weight * dr.exp(-sigma_t * (x + r))), 0)
+        reached = (between.width > 0) & lit(airlight.rays.at(x))
+        return dr.select(reached, airlight.source(x), 0)
 
-    zero = type(view.distance)(0) if len(medium.sigma_t) == 1 and not media else type(medium.albedo)(0)
-    return midpoint_sum(between, steps, zero, sample)
+    return midpoint_sum(between, steps, airlight.nothing(dr.width(distance)), sample)
 
 
-def marched_steps(airlight: RayAirlight, steps: int, spacing: str) -> Steps:
+def marched_steps(airlight: LitRays, distance: Any, steps: int, spacing: str) -> Steps:
     """Return the steps of rays where a light could reach them and something scatters."""
-    view, media = airlight.view, airlight.media
-    x0, x1 = airlight.segment if airlight.light.w else (type(view.distance)(0), view.distance)
-    if spacing == "uniform" and not view.medium.clear:
-        x1 = optical_end(view.medium, x0, x1)
-    if media and view.medium.clear:
-        x0, x1 = within(media, x0, x1)
-    at_light = None
-    if spacing == "equiangular" and airlight.light.w:
-        at_light = airlight.geometry.foot, airlight.geometry.height
+    light, geometry = airlight.light, airlight.geometry
+    x0, x1 = airlight.segment(distance) if light.w else (type(distance)(0), distance)
+    x0, x1 = airlight.medium.part(airlight.rays, x0, x1, uniform=spacing == "uniform")
+    at_light = (geometry.foot, geometry.height) if spacing == "equiangular" and light.w else None
     return steps_between(x0, x1, steps, at_light)
-
-
-def within(media: MediaRay, x0, x1) -> tuple[Any, Any]:
-    """Return the part of a segment [m] from the first to the last bounded medium; 0 and 0 where a ray meets none.
-
-    An endless ray that meets none would begin at infinity, where a map has no place and a step no length.
-    """
-    first, last = x1, x0
-    for piece in media.pieces:
-        first = dr.minimum(first, piece.begin)
-        last = dr.maximum(last, dr.select(dr.isfinite(piece.begin), piece.end, x0))
-    begin, end = dr.maximum(first, x0), dr.minimum(last, x1)
-    meets = end > begin
-    return dr.select(meets, begin, 0), dr.select(meets, end, 0)

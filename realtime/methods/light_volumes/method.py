@@ -25,7 +25,6 @@ from dataclasses import dataclass
 import drjit as dr
 
 from realtime.errors import InputError
-from realtime.methods.interface.light_airlight import integral_type, ray_airlight
 from realtime.methods.interface.method import Method, tolerance
 from realtime.methods.light_volumes.jump_search import with_walls
 from realtime.methods.light_volumes.published.mesh import THRESHOLD, memory_needed, volume_mesh
@@ -132,13 +131,13 @@ class LightVolumes(Method):
         """Return the airlight of every ray, and whether the light reaches the visible surface if that is asked."""
         if self.evaluation == "mesh" and view.features.shadows:
             return mesh_airlight(view, light, state, kernel=kernel)
-        airlight, reached = ray_airlight(view, light, kernel), True
+        airlight, reached = view.lit_by(light, kernel), True
         if view.features.shadows:
-            zero = dr.zeros(integral_type(view), dr.width(view.distance))
-            ray = {"away": view.origin - light.position, "direction": view.direction, "segment": airlight.segment}
-            value, reached = sum_lit_intervals(state, **ray, integral=airlight.integral, zero=zero)
+            segment, zero = airlight.segment(view.distance), airlight.nothing(dr.width(view.distance))
+            ray = {"away": view.origin - light.position, "direction": view.direction, "segment": segment}
+            value, reached = sum_lit_intervals(state, **ray, integral=airlight.airlight, zero=zero)
         else:
-            value = airlight.integral(*airlight.segment)
+            value = airlight.gamma(view.distance)
         radiance = airlight.radiance(value)
         # A surface may be beside the map of a directional light, whose shadows on surfaces come from rays.
         return (radiance, reached if light.w else True) if self.provides_visibility else radiance

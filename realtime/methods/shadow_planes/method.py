@@ -28,17 +28,14 @@ from functools import partial
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.airlight import FORMS, ambient_radiance
-from realtime.bounded_media.pieces import camera_pieces
 from realtime.errors import InputError
-from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.methods.interface.method import Layers, Method, no_state, tolerance
 from realtime.methods.interface.view import View
 from realtime.methods.shadow_planes.pixel_rays import aim_at, read_spot, seen_rays
 from realtime.methods.shadow_planes.plane_table import PlaneIndex, index_planes
 from realtime.methods.shadow_planes.published_crossings import Buffer, reaches, sum_crossings
 from realtime.methods.shadow_planes.published_media import check_vertices, sum_in_media
-from realtime.methods.shadow_planes.published_mesh import mesh_gamma, surface_gamma
+from realtime.methods.shadow_planes.published_mesh import gamma_at, mesh_gamma, surface_gamma, visible_triangle
 from realtime.methods.shadow_planes.silhouettes import components_in_view, cone_ring
 from realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_intervals
 from realtime.numerics.array_types import ArrayTypes, types_of
@@ -47,6 +44,8 @@ from realtime.parameters import parameter
 from realtime.scene.camera import HostCamera, read_camera
 from realtime.scene.light_points import source_shape
 from realtime.scene.lights import Light, host_position
+from realtime.scene.media.bounded_rays import FORMS, BoundedRays
+from realtime.scene.media.medium import LitRays
 from realtime.scene.mesh_adjacency import Casters, read_casters, with_positions
 from realtime.scene.read_scene import Scene
 
@@ -172,13 +171,13 @@ class ShadowPlanes(Method):
     def airlight(self, view, light, state, kernel):
         """Return the airlight of every ray between shadow planes, and whether the light reaches the visible surface."""
         if not view.features.shadows:
-            airlight = ray_airlight(view, light, kernel, form=self.media)
-            return airlight.radiance(airlight.integral(type(view.distance)(0), view.distance)), True
+            airlight = view.lit_by(light, kernel, form=self.media)
+            return airlight.radiance(airlight.gamma(view.distance)), True
         airlight, rays, cone = self._rays(view, light, state, kernel)
         if self.segments:
-            value, reached = _segments(state, rays, airlight, differences=self.sum == "gamma")
+            value, reached = _segments(view, state, rays, airlight, differences=self.sum == "gamma")
         else:
-            value, reached = self._drawn(state, rays, airlight, cone=cone)
+            value, reached = self._drawn(view, state, rays, airlight, cone=cone)
         # Frames cast rays for the shadows of a light at infinity on surfaces.
         return value, reached if light.w else True
 
@@ -189,7 +188,7 @@ class ShadowPlanes(Method):
         layers = super().render(view, state, kernel)
         if not self.ambient:
             return layers
-        return replace(layers, in_scattered=layers.in_scattered + _ambient_fog(view, self.ambient))
+        return replace(layers, in_scattered=layers.in_scattered + self._ambient_fog(view))
 
     def error_causes(self, size):
         """Return the causes of its errors, see `Method.error_causes`."""
@@ -199,13 +198,17 @@ class ShadowPlanes(Method):
             ("order", {"order": "exact"}),
         )
 
-    def _rays(self, view: View, light: Light, index: PlaneIndex, kernel) -> tuple[RayAirlight, RayPlanes, bool]:
+    def _rays(self, view: View, light: Light, index: PlaneIndex, kernel) -> tuple[LitRays, RayPlanes, bool]:
         """Return the airlight of a light, the rays among its planes, and whether planes bound its cone."""
         cone = bool(self.cone and light.cone is not None and not light.varies)
         light = light.without_cone() if cone else light
         seen = seen_rays(index.aim, view.camera, view.pixel, index.distance, light)
         rays = ray_planes(index, seen.x, seen.y, seen.z, ray_end=index.distance / view.distance)
-        return ray_airlight(view, light, kernel, form=self.media, geometry=seen.geometry), rays, cone
+        return view.lit_by(light, kernel, form=self.media, geometry=seen.geometry), rays, cone
+
+    def _ambient_fog(self, view: View):
+        """Return the radiance of a constant light field in the media [W/(m^2 sr)]."""
+        return self.ambient * view.medium.ambient(view, dr.minimum(view.distance, 1e30))
 
     def _buffered(self, view: View, state, kernel) -> Layers:
         """Return what the buffer of 8 bits holds after all passes, less the lit surfaces."""
@@ -222,37 +225,37 @@ class ShadowPlanes(Method):
             surfaces += surface
             total = buffer.stored(total + surface)
             if number == 0 and self.ambient:  # that of the first light is that of all
-                total = buffer.stored(total + _ambient_fog(view, self.ambient))
+                total = buffer.stored(total + self._ambient_fog(view))
             if index is None:
                 total = buffer.stored(total + self.airlight(view, light, None, kernel)[0])
             else:
-                total, _ = self._drawn(index, rays, airlight, cone=cone, buffer=buffer, start=total)
+                total, _ = self._drawn(view, index, rays, airlight, cone=cone, buffer=buffer, start=total)
             lit.append(reached if light.w else True)
         return Layers(total - surfaces, tuple(lit))
 
-    def _drawn(self, index: PlaneIndex, rays: RayPlanes, airlight: RayAirlight, *, cone: bool, buffer=None, start=None):
+    def _drawn(
+        self, view: View, index: PlaneIndex, rays: RayPlanes, airlight: LitRays, *, cone: bool, buffer=None, start=None
+    ):
         """Add up the Gammas of one light, in a buffer or not, and say whether it reaches the surface."""
-        view, media = airlight.view, airlight.media
-        if media is None or self.evaluation == "pixel":
-            gammas = self._gammas(index, airlight, cone=cone)
+        if not isinstance(airlight, BoundedRays) or self.evaluation == "pixel":
+            gammas = self._gammas(view, index, airlight, cone=cone)
             return sum_crossings(index, rays, view.distance, gammas, order=self.order, buffer=buffer, start=start)
-        media = replace(media, light=airlight.light, geometry=airlight.geometry)
         start = type(view.medium.albedo)(0) if start is None else start
         how = {"rows": self.rows, "cone": cone, "order": self.order, "buffer": buffer, "start": start}
-        return sum_in_media(view, media, index, rays, **how), reaches(index, rays, view.distance)
+        return sum_in_media(view, airlight, index, rays, **how), reaches(index, rays, view.distance)
 
-    def _gammas(self, index: PlaneIndex, airlight: RayAirlight, *, cone: bool):
+    def _gammas(self, view: View, index: PlaneIndex, airlight: LitRays, *, cone: bool):
         """Return the functions that give the radiance of Gamma at a crossing, and at the surface."""
-        view, light, kernel = airlight.view, airlight.light, airlight.kernel
 
         def at(x):
             return airlight.radiance(airlight.gamma(x))
 
         if self.evaluation == "pixel":
             return lambda number, rays, x: at(x), at
+        gamma = partial(gamma_at, view, airlight.light, kernel=airlight.kernel)
         return (
-            mesh_gamma(view, index, light, kernel=kernel, rows=self.rows, cone=cone),
-            lambda x: surface_gamma(view, light, kernel=kernel, otherwise=at(x)),
+            mesh_gamma(index, airlight.light, gamma, rows=self.rows, cone=cone),
+            lambda x: surface_gamma(visible_triangle(view), gamma, at(x)),
         )
 
 
@@ -319,23 +322,12 @@ def plane_finder(
     return find
 
 
-def _ambient_fog(view: View, ambient: float):
-    """Return the radiance of a constant light field in the media [W/(m^2 sr)]."""
-    if view.features.bounded:
-        pieces = camera_pieces(view.medium, view.origin, view.direction)
-        return ambient_radiance(pieces, view.distance, ambient)
-    distance = dr.minimum(view.distance, 1e30)
-    for_channel = [1 - dr.exp(-sigma_t * distance) for sigma_t in view.medium.sigma_t]
-    return view.medium.albedo * ambient * type(view.medium.albedo)(*for_channel)
-
-
-def _segments(index: PlaneIndex, rays: RayPlanes, airlight: RayAirlight, *, differences: bool):
+def _segments(view: View, index: PlaneIndex, rays: RayPlanes, airlight: LitRays, *, differences: bool):
     """Sum the lit segments of one light."""
-    view = airlight.view
 
     def integral(a, b):
-        return airlight.gamma(b) - airlight.gamma(a) if differences else airlight.integral(a, b)
+        return airlight.gamma(b) - airlight.gamma(a) if differences else airlight.airlight(a, b)
 
-    zero = dr.zeros(integral_type(view), dr.width(view.distance))
-    value, reached = sum_lit_intervals(index, rays, airlight.segment, integral, zero)
+    zero = airlight.nothing(dr.width(view.distance))
+    value, reached = sum_lit_intervals(index, rays, airlight.segment(view.distance), integral, zero)
     return airlight.radiance(value), reached

@@ -31,16 +31,16 @@ from typing import Any
 
 import drjit as dr
 
-from realtime.bounded_media.airlight import MediaRay, lit_ray
-from realtime.bounded_media.pieces import Piece, camera_pieces
 from realtime.errors import InputError
-from realtime.methods.interface.view import View, bounded_radiance
+from realtime.methods.interface.view import View
 from realtime.methods.shadow_planes.plane_table import PlaneIndex
 from realtime.methods.shadow_planes.published_crossings import Buffer, Entry, sum_crossings
 from realtime.methods.shadow_planes.published_mesh import mesh_gamma, surface_gamma, visible_triangle
 from realtime.methods.shadow_planes.sweep import RayPlanes
+from realtime.rays.ray_light import ray_geometry
 from realtime.scene.lights import Light
-from realtime.scene.medium import Medium
+from realtime.scene.media.bounded_rays import BoundedRays, Piece, camera_pieces
+from realtime.scene.media.medium import Medium
 
 
 def check_vertices(medium: Medium, lights: Sequence[Light]) -> None:
@@ -59,7 +59,7 @@ def check_vertices(medium: Medium, lights: Sequence[Light]) -> None:
 
 def sum_in_media(
     view: View,
-    media: MediaRay,
+    media: BoundedRays,
     index: PlaneIndex,
     rays: RayPlanes,
     *,
@@ -95,21 +95,19 @@ def sum_in_media(
         own = replace(media, pieces=(_alone(media, piece, begin),))
 
         def at(x, own=own, factor=factor, meets=meets):
-            return dr.select(meets, factor * bounded_radiance(own.light, own.gamma(x)), 0)
+            return dr.select(meets, factor * own.radiance(own.published_gamma(x)), 0)
 
         def at_vertex(point, number=number):
             return _vertex_gamma(view, media, number, point)
 
-        on_planes = mesh_gamma(view, index, media.light, kernel=None, rows=rows, cone=cone, gamma_of=at_vertex)
+        on_planes = mesh_gamma(index, media.light, at_vertex, rows=rows, cone=cone)
 
         def at_plane(plane, ray, x, on_planes=on_planes, factor=factor):
             return factor * on_planes(plane, ray, x)
 
         def at_end(x, at=at, at_vertex=at_vertex, piece=piece, factor=factor):
             exit_gamma = at(x)
-            surface = surface_gamma(
-                view, media.light, kernel=None, otherwise=exit_gamma, gamma_of=at_vertex, triangle=triangle
-            )
+            surface = surface_gamma(triangle, at_vertex, exit_gamma)
             on_triangle = triangle[2] & (view.distance < piece.end)
             return dr.select(on_triangle, factor * surface, exit_gamma)
 
@@ -119,31 +117,24 @@ def sum_in_media(
     return total
 
 
-def _alone(media: MediaRay, piece: Piece, begin) -> Piece:
+def _alone(media: BoundedRays, piece: Piece, begin) -> Piece:
     """Return a piece without what absorbs before it; the published forms continue it without end."""
     none = tuple(type(begin)(0) for _ in piece.before)
     end = piece.end if media.form == "exact" else type(begin)(dr.inf)
     return replace(piece, begin=begin, end=end, before=none)
 
 
-def _vertex_gamma(view: View, media: MediaRay, number: int, point) -> Any:
+def _vertex_gamma(view: View, media: BoundedRays, number: int, point) -> Any:
     """Return the radiance of Gamma of one medium up to points [W/(m^2 sr)]."""
     offset = point - view.origin
     distance = dr.norm(offset)
     direction = offset / distance
-    piece = camera_pieces(view.medium, view.origin, direction)[number]
+    rays = view.medium.rays(view.origin, direction)
+    piece = camera_pieces(view.medium, rays)[number]
     begin = piece.begin
     if media.form != "exact":
         toward = view.medium.bounded_media[number].centre - view.origin
         begin = dr.select(dr.isfinite(begin), begin, dr.maximum(dr.dot(toward, direction), 0))
-    pieces = (_alone(media, piece, begin),)
-    ray = lit_ray(
-        view.medium,
-        media.light,
-        origin=view.origin,
-        direction=direction,
-        pieces=pieces,
-        form=media.form,
-        polynomial=media.polynomial,
-    )
-    return bounded_radiance(media.light, ray.gamma(distance))
+    geometry = ray_geometry(view.origin, direction, media.light)
+    own = replace(media, rays=rays, geometry=geometry, pieces=(_alone(media, piece, begin),))
+    return own.radiance(own.published_gamma(distance))

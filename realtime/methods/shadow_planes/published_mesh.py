@@ -25,8 +25,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.kernels.registry import gamma
-from realtime.methods.interface.view import View, radiance
+from realtime.methods.interface.view import View
 from realtime.methods.shadow_planes.plane_table import PlaneIndex
 from realtime.methods.shadow_planes.silhouettes import NEARNESS
 from realtime.rays.ray_light import ray_geometry
@@ -42,36 +41,26 @@ def gamma_at(view: View, light: Light, point, *, kernel):
     """Return the radiance of Gamma from the camera to points [W/(m^2 sr)]."""
     offset = point - view.origin
     distance = dr.norm(offset)
-    geometry = ray_geometry(view.origin, offset / distance, light)
-    return radiance(view.medium, light, gamma(kernel, geometry, distance, medium=view.medium, light=light))
+    rays = view.medium.rays(view.origin, offset / distance)
+    airlight = view.medium.lit(rays, light, ray_geometry(rays.origin, rays.direction, light), kernel=kernel)
+    return airlight.radiance(airlight.gamma(distance))
 
 
-def mesh_gamma(
-    view: View,
-    index: PlaneIndex,
-    light: Light,
-    *,
-    kernel,
-    rows: int,
-    cone: bool = False,
-    gamma_of: Gamma | None = None,
-):
+def mesh_gamma(index: PlaneIndex, light: Light, gamma: Gamma, *, rows: int, cone: bool = False):
     """Return the function (plane, ray, x) that interpolates Gamma on the meshes of the planes.
 
     Parameters
     ----------
-    view, index, light, kernel
-        The frame, the planes of a light, and what evaluates Gamma.
+    index, light, gamma
+        The planes of a light, and Gamma.
     rows
         Of the planes of casters.
     cone
         Whether planes of a cone are among them.
-    gamma_of
-        In place of the kernel, Gamma at points.
     """
     further = math.ceil(-math.log(NEARNESS) / math.log(RATIO)) if cone else 0
     casters_rows, rows = rows, rows + further
-    Float, Vector = type(view.distance), type(view.direction)
+    Float, Vector = type(index.distance), type(light.position)
     planes = dr.width(index.ends) // 6
     lane = dr.arange(mi.UInt32, planes * 2 * rows)
     row, end = lane % rows, lane // rows
@@ -79,7 +68,7 @@ def mesh_gamma(
         row = dr.minimum(row, _last_row(index, end // 2, casters_rows, rows))
     corner = Vector(*(dr.gather(Float, index.ends, end * 3 + k) for k in range(3))) * RATIO ** Float(row)
     point = light.position + index.x_axis * corner.x + index.y_axis * corner.y + index.z_axis * corner.z
-    values = gamma_of(point) if gamma_of else gamma_at(view, light, point, kernel=kernel)
+    values = gamma(point)
     dr.eval(values)
     Color = type(values)
 
@@ -119,25 +108,10 @@ def _last_row(index: PlaneIndex, plane, rows: int, rows_of_cone: int):
     return dr.select(of_cone, mi.UInt32(rows_of_cone - 1), mi.UInt32(rows - 1))
 
 
-def surface_gamma(view: View, light: Light, *, kernel, otherwise, gamma_of: Gamma | None = None, triangle=None):
-    """Return Gamma at the visible surface, interpolated between the vertices of its triangle.
-
-    Parameters
-    ----------
-    view, light, kernel
-        The frame, a light, a kernel.
-    otherwise
-        Gamma where no triangle is seen.
-    gamma_of
-        In place of the kernel, Gamma at points.
-    triangle
-        What `visible_triangle` returns, if that was asked before.
-    """
-    corners, weights, seen = triangle or visible_triangle(view)
-    total = sum(
-        dr.select(seen, weight, 0) * (gamma_of(corner) if gamma_of else gamma_at(view, light, corner, kernel=kernel))
-        for corner, weight in zip(corners, weights)
-    )
+def surface_gamma(triangle, gamma: Gamma, otherwise):
+    """Return Gamma at visible triangles, interpolated between their vertices, or what it is where none is seen."""
+    corners, weights, seen = triangle
+    total = sum(dr.select(seen, weight, 0) * gamma(corner) for corner, weight in zip(corners, weights))
     return dr.select(seen, total, otherwise)
 
 

@@ -18,12 +18,10 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.interface.marching import midpoint_sum, optical_end, steps_between
+from realtime.methods.interface.marching import midpoint_sum, steps_between
 from realtime.methods.interface.view import View
 from realtime.methods.soft_shafts.light_sources import SourceState, frame_at
 from realtime.methods.soft_shafts.parameters import SoftShaftsParameters
-from realtime.numerics.fast_exp import exp_bounded
-from realtime.scene.medium import per_extinction
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps
 
 
@@ -54,7 +52,7 @@ def integral_of_points(
         The parameters.
     """
     Float = type(view.distance)
-    nothing = per_extinction(view.medium, lambda sigma_t: dr.zeros(Float, dr.width(view.distance)))
+    nothing = view.lit_by(view.lights[0]).nothing(dr.width(view.distance))
     if share is not None:
         return points * _of_point(view, state, share.number, share.shift, p)
 
@@ -75,9 +73,7 @@ def _of_point(view: View, state: SourceState, number: Any, shift: Any, p: SoftSh
     frame = frame_at(state.frames, number)
     origin, direction = frame.local(view.origin - frame.position), frame.local(view.direction)
     along = sum(o * d for o, d in zip(origin, direction))
-    begin, end = Float(0), view.distance
-    if p.spacing == "uniform":
-        end = optical_end(medium, begin, end)
+    begin, end = medium.part(view, Float(0), view.distance, uniform=p.spacing == "uniform")
     # The plane of the light point cuts the ray.
     meets = -origin[2] / direction[2]
     begin = dr.select(direction[2] > 0, dr.maximum(meets, begin), begin)
@@ -94,14 +90,15 @@ def _of_point(view: View, state: SourceState, number: Any, shift: Any, p: SoftSh
         a, b, c = (dr.fma(d, x, o) for o, d in zip(origin, direction))
         inverse = dr.rsqrt(dr.fma(a, a, dr.fma(b, b, c * c)))
         r = dr.fma(a, a, dr.fma(b, b, c * c)) * inverse
-        weight = dr.maximum(c, 0) * inverse * medium.phase.evaluate(-(along + x) * inverse) * dr.square(inverse)
+        weight = dr.maximum(c, 0) * inverse * dr.square(inverse)
+        value = weight * medium.source(view, x, lambda phase: phase.evaluate(-(along + x) * inverse))
         lit = lit_part
         if view.features.shadows and p.shadow == "map":
             assert isinstance(state.maps, HemisphereMaps)
             lit = lit & state.maps.lit(number, (a, b, c), lit_part)
         elif view.features.shadows and p.shadow == "ray":
-            lit = lit & view.visible(view.origin + view.direction * x, frame)
-        return dr.select(lit, per_extinction(medium, lambda sigma_t: weight * exp_bounded(-sigma_t * (x + r))), 0)
+            lit = lit & view.visible(view.at(x), frame)
+        return dr.select(lit, value * medium.both_ways(view, x, frame, r), 0)
 
-    nothing = per_extinction(medium, lambda sigma_t: dr.zeros(Float, dr.width(view.distance)))
+    nothing = view.lit_by(view.lights[0]).nothing(dr.width(view.distance))
     return midpoint_sum(steps, p.steps, nothing, sample, shift)

@@ -35,10 +35,9 @@ from realtime.image_filters.raster import Raster
 from realtime.image_filters.separable import separable
 from realtime.image_filters.tile_average import tile_average
 from realtime.image_filters.upsample import small_pixels, upsample
-from realtime.methods.interface.light_airlight import ray_airlight
 from realtime.methods.interface.marching import marched_integral
 from realtime.methods.interface.method import Layers
-from realtime.methods.interface.view import View, bounded_radiance, radiance
+from realtime.methods.interface.view import View
 from realtime.methods.soft_shafts.light_sources import SourceState, frame_at, source_state
 from realtime.methods.soft_shafts.march import Share, integral_of_points
 from realtime.methods.soft_shafts.parameters import AUTO, SoftShaftsParameters
@@ -145,7 +144,8 @@ class _Frame:
         if view.features.bounded or lights[0].facing is None:
             integral = sum(
                 marched_integral(
-                    ray_airlight(few, few.lights[light], None),
+                    few.lit_by(few.lights[light]),
+                    few.distance,
                     steps=p.steps,
                     spacing=p.spacing,
                     lit=self._lit(number, light, place),
@@ -166,9 +166,7 @@ class _Frame:
             place = {"column": view.pixel - row * self.raster.width, "row": row}
             own = depth_guide(view.distance, p.hz)
             integral = upsample(integral, self.few_depth, own.values, self.few_raster, scale=p.scale, **place)
-        if view.features.bounded:
-            return bounded_radiance(lights[0], integral)
-        return radiance(view.medium, lights[0], integral)
+        return view.medium.radiance(lights[0], integral)
 
     def visibility(self, number: int, source: list[int]) -> list[Any]:
         """Return the share of a source that reaches the surfaces, or one for each of its lights."""

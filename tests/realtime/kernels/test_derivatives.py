@@ -14,7 +14,7 @@ from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import array_types
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.medium import Medium
+from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import named_phase
 from tests.evidence.certified.integral import SLOPES, certified_slopes, integrate_certified
 
@@ -33,7 +33,9 @@ def forward(kernel, phase, inputs, number, precision):
     columns = [aligned_array(types.scalar, column) for column in inputs]
     dr.enable_grad(columns[number])
     foot, height, x0, x1, sigma_t, g = columns
-    medium = Medium((sigma_t,), types.color(1), named_phase(phase, g=g if phase == "hg" else None, Float=types.scalar))
+    medium = Homogeneous(
+        (sigma_t,), types.color(1), named_phase(phase, g=g if phase == "hg" else None, Float=types.scalar)
+    )
     J = kernel(RayGeometry(foot, height, None, None), x0, x1, medium, Light(None, None))
     dr.forward(columns[number])
     return np.array(dr.grad(J), dtype=np.float64)

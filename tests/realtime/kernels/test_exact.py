@@ -9,12 +9,12 @@ import pytest
 from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction
 from realtime.kernels.exact import exact
-from realtime.kernels.registry import KERNELS, airlight_integral
+from realtime.kernels.registry import KERNELS
 from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import array_types
 from realtime.rays.ray_light import RayGeometry, ray_geometry
 from realtime.scene.lights import Light, spot_fields
-from realtime.scene.medium import Medium
+from realtime.scene.media.homogeneous import Homogeneous
 from tests.helpers.kernel_values import (
     kernel_values,
     opaque,
@@ -76,7 +76,7 @@ def test_the_colours_of_a_medium_are_those_of_grey_ones(name):
     columns = [aligned_array(types.scalar, column) for column in (foot, height, x0, x1)]
     for extinctions in ((0.2, 0.3, 0.5), (0.0, 0.01, 8.0), (1e-3, 30.0, 1.0)):
         channels = opaque(tuple(types.scalar(extinction) for extinction in extinctions))
-        medium = Medium(channels, types.color(1), phase_of(name, 0.8, types.scalar))
+        medium = Homogeneous(channels, types.color(1), phase_of(name, 0.8, types.scalar))
         colour = np.array(exact(RayGeometry(*columns[:2]), *columns[2:], medium, Light(None, None)), dtype=np.float64)
         for channel, sigma_t in zip(colour, extinctions, strict=True):
             seen = sigma_t * (x0 + np.hypot(x0 - foot, height)) < 70  # what is dimmer is not worth a number
@@ -92,9 +92,9 @@ def in_soft_spot(origin, direction, *, cutoff, beam, precision, kernel=exact, na
     light = opaque(Light(types.vector(0), types.color(1), **fields))
     vectors = (types.vector(*(aligned_array(types.scalar, row) for row in v)) for v in (origin, direction))
     rays = ray_geometry(*vectors, light)
-    medium = opaque(Medium((types.scalar(0.3),), types.color(1), phase_of(name, 0, types.scalar)))
+    medium = opaque(Homogeneous((types.scalar(0.3),), types.color(1), phase_of(name, 0, types.scalar)))
     zero, far = (aligned_array(types.scalar, np.full(len(origin[0]), x)) for x in (0.0, end))
-    return np.array(airlight_integral(kernel, rays, zero, far, medium=medium, light=light)), rays
+    return np.array(kernel(rays, *rays.lit_segment(zero, far), medium, light)), rays
 
 
 @pytest.mark.parametrize(("cutoff", "beam"), [(40, 0.0), (20, 0.4), (60, 50), (80, 5)])

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from realtime.kernels.registry import KERNELS, airlight_integral
+from realtime.kernels.registry import KERNELS
 from realtime.numerics.array_types import array_types
 from realtime.rays.ray_light import ray_geometry
 from realtime.scene.lights import Facing, Light, with_low
-from realtime.scene.medium import Medium
+from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import HenyeyGreenstein, Isotropic
 
 COUNT = 500
@@ -75,9 +75,9 @@ def integrals(rays, kernel, precision, isotropic):
     direction, direction_low = with_low(rays["direction"], types)
     geometry = ray_geometry(vector(rays["origin"]), vector(direction), light, low=vector(direction_low))
     phase = Isotropic() if isotropic else HenyeyGreenstein(number("g"))
-    medium = Medium((number("sigma_t"),), types.color(1), phase)
+    medium = Homogeneous((number("sigma_t"),), types.color(1), phase)
     x0, x1 = number("x0"), number("x1")
-    return np.array(airlight_integral(KERNELS[kernel].function, geometry, x0, x1, medium=medium, light=light)).ravel()
+    return np.array(KERNELS[kernel].function(geometry, *geometry.lit_segment(x0, x1), medium, light)).ravel()
 
 
 @pytest.mark.claim(

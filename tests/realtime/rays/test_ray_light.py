@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from realtime.numerics.array_types import array_types
-from realtime.rays.ray_light import falloff, ray_geometry
+from realtime.rays.ray_light import ray_geometry
 from realtime.scene.lights import Light, spot_fields, with_low
 from tests.helpers.kernel_values import opaque, vectors
 
@@ -87,7 +87,7 @@ def test_falloff_near_the_axis_and_the_edge(variant, cutoff, beam):
     away = origin + x[:, None] * direction - light
     exact = np.arctan2(np.linalg.norm(np.cross(axis, away), axis=1), away @ axis)
     wanted = np.clip((angle - exact) / (angle - np.deg2rad(beam)), 0, 1)
-    profile = np.array(falloff(geometry, lamp, types.scalar(x)))
+    profile = np.array(geometry.falloff(lamp, types.scalar(x)))
     # Distances of up to 10 m, rounded, over a distance from the light of 0.5 m or more; measured 9e-7.
     assert np.max(np.abs(profile - wanted)) * (angle - np.deg2rad(beam)) < 2e-6
     assert np.mean((wanted > 0) & (wanted < 1)) > 0.05

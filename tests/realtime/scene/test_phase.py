@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analytic.phase import PhaseFunction, phase_from_words
-from realtime.scene.phase import evaluate, named_phase
+from realtime.scene.phase import named_phase
 
 
 def phases():
@@ -21,7 +21,7 @@ def test_against_the_analytic_side(variant):
     """The same functions written twice, in float32 here and in float64 there."""
     cosine = np.linspace(-1, 1, 2001).astype(np.float32)
     for name, g, phase in phases():
-        value = np.broadcast_to(np.array(evaluate(phase, mi.Float(cosine)), dtype=np.float64), cosine.shape)
+        value = np.broadcast_to(np.array(phase.evaluate(mi.Float(cosine)), dtype=np.float64), cosine.shape)
         expected = PhaseFunction(name, g=g)(cosine.astype(np.float64))
         # float32: the sharpest lobe, g = 0.97, amplifies the rounding of 1 - g by 3/2 g/(1 - g).
         assert np.max(np.abs(value / expected - 1)) < 1e-5, (name, g)

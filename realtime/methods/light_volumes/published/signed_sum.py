@@ -7,45 +7,31 @@ at D, and crossings behind it count as crossings at D.
 """
 
 from collections.abc import Iterable
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
-from realtime.kernels.registry import airlight_integral
-from realtime.methods.interface.view import View, radiance
+from realtime.methods.interface.view import View
 from realtime.methods.light_volumes.published.mesh import VolumeMesh
 from realtime.methods.light_volumes.published.raster import BATCH, Crossings, signed_crossings
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.medium import Medium
+from realtime.scene.media.medium import LitRays
 
 
-def crossing_sum(
-    batches: Iterable[Crossings],
-    *,
-    kernel,
-    geometry: RayGeometry,
-    distance,
-    medium: Medium,
-    light: Light,
-    lane: Any = None,
-) -> Any:
+def crossing_sum(batches: Iterable[Crossings], airlight: LitRays, distance, *, lane: Any = None) -> Any:
     """Return J along the lit parts of rays, the signed sum over their crossings [1/m].
 
     Parameters
     ----------
     batches
         From `realtime.methods.light_volumes.published.raster.signed_crossings`.
-    kernel
-        An airlight kernel function, see `realtime.kernels`.
-    geometry, distance
-        The rays and the distances to the visible surface, one entry per pixel [m].
-    medium, light
-        What fills the scene and what lights it; the cone of a spot clips every crossing.
+    airlight, distance
+        The rays with the light, whose cone clips every crossing, and the distances to the visible surface [m].
     lane
-        By pixel number its entry in `geometry` and `distance`; None where entries are in the order of the image.
+        By pixel number its entry among the rays; None where they are in the order of the image.
 
     Notes
     -----
@@ -58,16 +44,16 @@ def crossing_sum(
     point next to the light is lit and 0 where it is not. No other term contains the airlight about the light, and
     crossings at the surface cost nothing. Terms have the precision of the rays and are added up in float64.
     """
-    Float = type(distance)
-    grey = len(medium.sigma_t) == 1
-    total = dr.zeros(mi.Float64 if grey else mi.Color3d, dr.width(distance))
+    Float, geometry = type(distance), airlight.geometry
+    zero = airlight.nothing(1)
+    total = dr.zeros(mi.Color3d if dr.depth_v(zero) > 1 else mi.Float64, dr.width(distance))
     beyond = dr.zeros(mi.Float64, dr.width(distance))
 
     def add(index, x0, x1, sign):
         dr.eval(index, x0, x1, sign)  # All calls then share one kernel; compiling it takes longer than running it.
         columns = (getattr(geometry, field.name) for field in fields(RayGeometry))
         rays = RayGeometry(*(None if column is None else dr.gather(Float, column, index) for column in columns))
-        term = airlight_integral(kernel, rays, x0, x1, medium=medium, light=light)
+        term = replace(airlight, geometry=rays).airlight(x0, x1)
         dr.scatter_add(total, type(total)(term) * sign, index)
         dr.eval(total)
 
@@ -89,7 +75,7 @@ def crossing_sum(
     if dr.width(whole):
         zero = dr.opaque(Float, 0, dr.width(whole))
         add(whole, zero, dr.gather(Float, distance, whole), dr.gather(mi.Float64, beyond, whole))
-    return Float(total) if grey else type(medium.albedo)(total)
+    return type(zero)(total)
 
 
 def mesh_airlight(view: View, light: Light, mesh: VolumeMesh, *, kernel, batch: int = BATCH):
@@ -117,12 +103,10 @@ def mesh_airlight(view: View, light: Light, mesh: VolumeMesh, *, kernel, batch: 
     ----------
     Billeter, Sintorn, Assarsson 2010, eq. 3.
     """
-    geometry = view.geometry(light)
+    airlight = view.lit_by(light, kernel)
     lane = dr.zeros(mi.UInt32, view.camera.width * view.camera.height)
     dr.scatter(lane, dr.arange(mi.UInt32, dr.width(view.pixel)), view.pixel)
     distance = view.distance
-    dr.eval(geometry, lane, distance)  # every crossing reads them
-    rays = {"geometry": geometry, "distance": distance, "medium": view.medium, "light": light, "lane": lane}
-    return radiance(
-        view.medium, light, crossing_sum(signed_crossings(mesh, view.camera, batch=batch), kernel=kernel, **rays)
-    )
+    dr.eval(airlight.geometry, lane, distance)  # every crossing reads them
+    crossings = signed_crossings(mesh, view.camera, batch=batch)
+    return airlight.radiance(crossing_sum(crossings, airlight, distance, lane=lane))

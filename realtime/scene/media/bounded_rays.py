@@ -8,7 +8,7 @@ a piece of the medium j, over a lit segment of it,
 
 without r of a light at infinity, with the true optical depths on both paths. Camera: what is behind it when the ray
 enters the piece is one number a ray, then sigma_j (x - x_j). Light: the path from the light to x has the length l_k in
-the medium k (`realtime.bounded_media.light_paths`), and
+the medium k (`realtime.scene.media.light_paths`), and
 
     tau_light = sigma_0 r + sum_k (sigma_k - sigma_0) l_k,        sigma_0 = 0 in clear air.
 
@@ -41,9 +41,9 @@ x - x_n + R with x = t + h tan theta gives
 
 That is ``media=paper``. ``media=printed`` is the first equation with t for the r before the integral, which alone can
 be meant, and the exponent within it as it stands. A kernel may have a polynomial for either
-(`realtime.kernels.bounded`); without one they are summed over panels. The paper has each medium alone: the light
-reaches a body through clear air, however many bodies are before it. What is before the body on the camera's side is one
-factor for a ray, and is kept.
+(`realtime.scene.media.published_form`); without one they are summed over panels. The paper has each medium alone: the
+light reaches a body through clear air, however many bodies are before it. What is before the body on the camera's side
+is one factor for a ray, and is kept.
 
 References
 ----------
@@ -58,15 +58,14 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.light_paths import Envelopes, LightPaths, beyond
-from realtime.bounded_media.pieces import Piece, paths_from
 from realtime.errors import InputError
 from realtime.numerics.array_types import chosen_value, is_single
 from realtime.numerics.fast_exp import exp_bounded
 from realtime.numerics.gauss_legendre import unit_nodes
-from realtime.rays.ray_light import RayGeometry, falloff, ray_geometry, smooth_subsegments
 from realtime.scene.lights import Light
-from realtime.scene.medium import Medium, least_extinction, optical_reach
+from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.light_paths import Envelopes, LightPaths, beyond, paths_from
+from realtime.scene.media.medium import LitRays, Medium, Rays, optical_reach
 
 FORMS = ("exact", "paper", "printed")
 _NODES, _NODES_DOUBLE = 4, 6
@@ -77,18 +76,24 @@ _NEARER, _FARTHER = 0.5, 0.8
 
 
 @dataclass(frozen=True)
-class MediaRay:
-    """Camera rays in bounded media, and one light."""
+class Piece:
+    """A part of every ray that lies in one medium."""
 
-    medium: Medium
-    light: Light
-    geometry: RayGeometry
-    origin: Any  #: the camera, one for all lanes [m]
-    direction: Any  #: unit directions
-    pieces: tuple[Piece, ...]
+    medium: Homogeneous
+    number: Any  #: of the bounded medium; None between them
+    begin: Any  #: distance from the camera [m], infinite or equal to `end` where the ray misses it
+    end: Any  #: [m]
+    before: tuple[Any, ...]  #: optical depth from the camera to `begin`, by channel [1]
+
+
+@dataclass(frozen=True)
+class BoundedRays(LitRays):
+    """Rays in bounded media, and one light: integrals are sums of albedo_j sigma_j J_j, RGB [1/m^2]."""
+
+    pieces: tuple[Piece, ...] = ()
     form: str = "exact"  #: of `FORMS`
     #: For the published forms what takes the place of panels, or None: a function (geometry, x0, x1, light, phase,
-    #: (sigma_t, depth, R, printed)) -> J, see `realtime.kernels.bounded`.
+    #: (sigma_t, depth, R, printed)) -> J, see `realtime.scene.media.published_form`.
     polynomial: Any = None
 
     def airlight(self, x0, x1):
@@ -108,28 +113,12 @@ class MediaRay:
             )
         return total
 
-    def gamma(self, x):
+    def published_gamma(self, x):
         """Return the integral from where the ray enters the one piece up to the distance x, and beyond, RGB [1/m^2]."""
         if self.polynomial is None:
             return self.airlight(type(x)(0), x)
         (piece,) = self.pieces
         return _published_sum(self, piece, *self.geometry.lit_segment(piece.begin, dr.maximum(x, piece.begin)))
-
-    def source(self, x):
-        """Return albedo sigma exp(-tau) p at the distance x of the rays, RGB [1/m], 0 where nothing scatters."""
-        Color = type(self.medium.albedo)
-        r = self.distance_to_light(x)
-        lengths = []
-        if self.form == "exact":
-            for path in paths_from(self.medium, self.light, self.origin, self.direction):
-                lengths.append((path.bounded.medium, path.length_at(x, r)))
-        total = dr.zeros(Color, dr.width(x))
-        for piece in self.pieces:
-            kept = [exp_bounded(-depth) for depth in _depths(self, piece, x, r, lengths)]
-            value = piece.medium.albedo * Color(*(s * part for s, part in zip(piece.medium.sigma_t, kept)))
-            inside = (x >= piece.begin) & (x < piece.end)
-            total += dr.select(inside, value * _scattered(self, piece, x, r), 0)
-        return total
 
     def distance_to_light(self, x):
         """Return r at a distance x of the rays [m]; 1 for a light at infinity."""
@@ -144,69 +133,50 @@ class MediaRay:
         return dr.maximum(self.geometry.height, 1e-15)
 
 
-def lit_ray(
-    medium: Medium,
-    light: Light,
-    *,
-    origin,
-    direction,
-    pieces: tuple[Piece, ...],
-    low=None,
-    form: str = "exact",
-    polynomial: Any = None,
-) -> MediaRay:
-    """Return camera rays in bounded media with one light; see the fields of `MediaRay`.
+def camera_pieces(medium: Any, rays: Rays) -> tuple[Piece, ...]:
+    """Return the pieces of camera rays in which something scatters."""
+    Float = type(rays.direction.x)
 
-    `low` is what rounding took from `direction`, if it is known, and `pieces` come from `camera_pieces`.
+    def piece(own: Homogeneous, number, begin, end):
+        before = medium.optical_depth(rays, 0, dr.select(dr.isfinite(begin), begin, 0))
+        return Piece(own, number, begin, end, before)
 
-    Raises
-    ------
-    InputError
-        For the published form with a light at infinity.
-    """
-    if not light.w and form != "exact":
-        raise InputError(f"media={form}: the published approximation is of lights with a place; use media=exact")
-    geometry = ray_geometry(origin, direction, light, low=low)
-    return MediaRay(medium, light, geometry, origin, direction, pieces, form, polynomial)
-
-
-def ambient_radiance(ray_pieces: tuple[Piece, ...], distance, ambient: float):
-    """Return the light of a constant field in the media, RGB [W/(m^2 sr)]: albedo ambient (1 - exp(-tau)) a piece.
-
-    `ambient` is the radiance of the field [W/(m^2 sr)]; what lies beyond `distance` [m] counts nothing.
-    """
-    total = type(ray_pieces[0].medium.albedo)(0)
-    for piece in ray_pieces:
-        length = dr.maximum(dr.minimum(dr.minimum(piece.end, distance), 1e30) - piece.begin, 0)
-        kept = [dr.exp(-tau) - dr.exp(-dr.fma(s, length, tau)) for s, tau in zip(piece.medium.sigma_t, piece.before)]
-        channels = [dr.select(length > 0, value, 0) for value in kept]
-        total += piece.medium.albedo * (ambient * type(total)(*channels))
-    return total
+    pieces = [
+        piece(bounded.medium, number, *ends)
+        for number, (bounded, ends) in enumerate(zip(medium.bounded_media, rays.crossed, strict=True))
+    ]
+    if not medium.clear:
+        around = Homogeneous(medium.sigma_t, medium.albedo, medium.phase)
+        starts = [dr.zeros(Float, dr.width(rays.direction)), *(leave for _, leave in rays.crossed)]
+        for begin in starts:
+            end = Float(dr.inf)
+            for enter, _ in rays.crossed:
+                end = dr.minimum(end, dr.select(enter >= begin, enter, dr.inf))
+            # A camera within a bounded medium has no gap before it.
+            inside = reduce(or_, [(enter <= begin) & (begin < leave) for enter, leave in rays.crossed])
+            pieces.append(piece(around, None, begin, dr.select(inside, begin, end)))
+    return tuple(pieces)
 
 
-def check_form(medium: Medium, form: str) -> None:
-    """Refuse a form that is unknown or does not fit the media.
-
-    Raises
-    ------
-    InputError
-        For a name that is not in `FORMS`, and for the published form in media that another one surrounds.
-    """
+def check_form(medium: Medium, form: str, light: Light) -> None:
+    """Refuse a form that is unknown or does not fit the media or the light."""
     if form not in FORMS:
         raise InputError(f"media: got {form!r}, wanted one of {', '.join(FORMS)}")
     if form != "exact" and medium.bounded_media and not medium.clear:
         raise InputError(f"media={form}: wanted clear air around the bounded media; use media=exact")
+    if not light.w and form != "exact":
+        raise InputError(f"media={form}: the published approximation is of lights with a place; use media=exact")
 
 
-def _integral(ray: MediaRay, piece: Piece, x0, x1):
+def _integral(ray: BoundedRays, piece: Piece, x0, x1):
     """Integrate one segment in one piece."""
     if ray.polynomial is not None:
         return _published_sum(ray, piece, x0, x1)
     Float = type(x0)
-    x1 = dr.minimum(x1, x0 + optical_reach(Float) / least_extinction(piece.medium))
+    x1 = dr.minimum(x1, x0 + optical_reach(Float) / piece.medium.least_extinction())
     if ray.form != "exact":
         return _panels(ray, piece, x0, x1, [])
-    paths = paths_from(ray.medium, ray.light, ray.origin, ray.direction, own=piece.number, segment=(x0, x1))
+    paths = paths_from(ray.medium, ray.light, ray.rays.origin, ray.rays.direction, own=piece.number, segment=(x0, x1))
     others = [path.active for path in paths if not path.own]
     if len(others) == len(paths) or not others:
         return _panels(ray, piece, x0, x1, paths)
@@ -218,12 +188,12 @@ def _integral(ray: MediaRay, piece: Piece, x0, x1):
     )
 
 
-def _panels(ray: MediaRay, piece: Piece, x0, x1, paths: list[LightPaths]):
+def _panels(ray: BoundedRays, piece: Piece, x0, x1, paths: list[LightPaths]):
     """Sum the panels of a segment whose light paths meet none but the media of `paths`."""
     Float, Color = type(x0), type(ray.medium.albedo)
     bends = [x for path in paths for x in path.grazed_at()]
     if ray.light.varies:
-        bends += [end for _, end in smooth_subsegments(ray.geometry, ray.light, x0, x1)]
+        bends += [end for _, end in ray.geometry.smooth_subsegments(ray.light, x0, x1)]
 
     def panel(turn, x, envelopes, totals):
         at = beyond(x)
@@ -271,7 +241,7 @@ def _after(own: Envelopes, change, x) -> Envelopes:
     )
 
 
-def _longest(ray: MediaRay, piece: Piece, paths: list[LightPaths], envelopes, x):
+def _longest(ray: BoundedRays, piece: Piece, paths: list[LightPaths], envelopes, x):
     """Return the length of the longest panel that begins at x [m]."""
     r, h = ray.distance_to_light(x), ray.height
     longest, rate = type(x)(dr.inf), reduce(dr.maximum, piece.medium.sigma_t)
@@ -294,7 +264,7 @@ def _longest(ray: MediaRay, piece: Piece, paths: list[LightPaths], envelopes, x)
     return dr.minimum(longest, (_DEPTH if is_single(type(x)) else _DEPTH_DOUBLE) / rate)
 
 
-def _panel(ray: MediaRay, piece: Piece, paths: list[LightPaths], envelopes, x0, x1) -> list[Any]:
+def _panel(ray: BoundedRays, piece: Piece, paths: list[LightPaths], envelopes, x0, x1) -> list[Any]:
     """Return the integrals of p exp(-tau) / r^2 over a panel, by channel."""
     Float, w = type(x0), ray.light.w
     length = scale = x1 - x0
@@ -321,17 +291,13 @@ def _panel(ray: MediaRay, piece: Piece, paths: list[LightPaths], envelopes, x0, 
     return [scale * total for total in totals]
 
 
-def _scattered(ray: MediaRay, piece: Piece, x, r):
+def _scattered(ray: BoundedRays, piece: Piece, x, r):
     """Return the phase function times the spot's profile [1]."""
-    if not ray.light.w:
-        # Narrow lobes need both halves of the angle between ray and light, which is one for a ray.
-        down, up = (0.25 * dr.squared_norm(v) for v in (ray.light.axis + ray.direction, ray.light.axis - ray.direction))
-        return piece.medium.phase.evaluate_half(down, up)
-    phase = piece.medium.phase.evaluate((ray.geometry.foot - x) / r)
-    return phase * falloff(ray.geometry, ray.light, x) if ray.light.varies else phase
+    phase = ray.angle(x - ray.geometry.foot, r)(piece.medium.phase)
+    return phase * ray.geometry.falloff(ray.light, x) if ray.light.varies else phase
 
 
-def _depths(ray: MediaRay, piece: Piece, x, r, lengths) -> list[Any]:
+def _depths(ray: BoundedRays, piece: Piece, x, r, lengths) -> list[Any]:
     """Return the optical depth of both paths at x, by channel; `lengths` of the light's by medium [m]."""
     if ray.form != "exact":
         return _published_depths(ray, piece, x, r)
@@ -346,7 +312,7 @@ def _depths(ray: MediaRay, piece: Piece, x, r, lengths) -> list[Any]:
     return depths
 
 
-def _published_depths(ray: MediaRay, piece: Piece, x, r) -> list[Any]:
+def _published_depths(ray: BoundedRays, piece: Piece, x, r) -> list[Any]:
     """Return the exponents with the constant R for the light's path, by channel."""
     distance = ray.medium.bounded_media[piece.number].mean_distance
     constants = [before + s * (distance - piece.begin) for before, s in zip(piece.before, piece.medium.sigma_t)]
@@ -358,7 +324,7 @@ def _published_depths(ray: MediaRay, piece: Piece, x, r) -> list[Any]:
     return [dr.fma(sigma, depth, constant) for sigma, constant in zip(piece.medium.sigma_t, constants)]
 
 
-def _published_sum(ray: MediaRay, piece: Piece, x0, x1):
+def _published_sum(ray: BoundedRays, piece: Piece, x0, x1):
     """Return albedo sigma J over a segment with the constant R, by the polynomial of a kernel, a colour [1/m^2].
 
     The segment may lie before the medium: there the exponent is continued, as section 4.2 does that begins all
@@ -375,7 +341,7 @@ def _published_sum(ray: MediaRay, piece: Piece, x0, x1):
             channels.append(sigma * ray.polynomial(ray.geometry, x0, x1, ray.light, piece.medium.phase, constants))
         return piece.medium.albedo * Color(*channels)
 
-    segments = smooth_subsegments(ray.geometry, ray.light, x0, x1)
+    segments = ray.geometry.smooth_subsegments(ray.light, x0, x1)
     if len(segments) == 1:
         return integral(x0, x1)
     # A loop: the integral is long, and its code need not be there for each segment.

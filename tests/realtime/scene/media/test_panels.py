@@ -5,14 +5,14 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from realtime.bounded_media.airlight import lit_ray
-from realtime.bounded_media.light_paths import LightPaths
-from realtime.bounded_media.pieces import camera_pieces
 from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import array_types
+from realtime.rays.ray_light import ray_geometry
 from realtime.scene.convex_bounds import mesh_bounds
 from realtime.scene.lights import Light
-from realtime.scene.medium import Medium
+from realtime.scene.media.bounded import BoundedMedia
+from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.light_paths import LightPaths
 from realtime.scene.phase import Isotropic
 from realtime.scene.read_media import make_bounded_medium
 from tests.helpers.kernel_values import opaque, phase_of
@@ -60,12 +60,12 @@ def chords(name, light, g, *, sigma_t, precision):
     types = array_types(precision)
     start, direction, low, high = lines_in(name, light)
     part = np.where(np.arange(len(low)) % 2, 0.37, 1.0) * (high - low)
-    inner = opaque(Medium((types.scalar(sigma_t),), types.color(1.0), phase_of("hg", g, types.scalar)))
+    inner = opaque(Homogeneous((types.scalar(sigma_t),), types.color(1.0), phase_of("hg", g, types.scalar)))
     body = make_bounded_medium(inner, bounds_of(name), types)
-    medium = Medium((dr.opaque(types.scalar, 0.0),), types.color(0.0), Isotropic(), (body,), clear=True)
+    medium = BoundedMedia((dr.opaque(types.scalar, 0.0),), types.color(0.0), Isotropic(), (body,), clear=True)
     lamp = opaque(Light(types.vector(*(float(c) for c in light)), types.color(1.0)))
     origin, d = (types.vector(*(aligned_array(types.scalar, c) for c in v.T)) for v in (start + light, direction))
-    ray = lit_ray(medium, lamp, origin=origin, direction=d, pieces=camera_pieces(medium, origin, d))
+    ray = medium.lit(medium.rays(origin, d), lamp, ray_geometry(origin, d, lamp))
     return ray, aligned_array(types.scalar, low), aligned_array(types.scalar, low + part)
 
 
@@ -95,7 +95,7 @@ def test_paths_to_points_by_a_walk_over_the_facets(variant, name):
     """Points anywhere: what a walk finds from facet to facet, and what all planes say of the same paths."""
     light, types = np.array([1.7, 0.4, 2.9]), array_types("double")
     body = make_bounded_medium(
-        Medium((types.scalar(1.0),), types.color(1.0), Isotropic()),
+        Homogeneous((types.scalar(1.0),), types.color(1.0), Isotropic()),
         bounds_of(name),
         types,
     )

@@ -48,12 +48,29 @@ import mitsuba as mi
 from realtime.numerics.array_types import four_numbers
 from realtime.scene.convex_bounds import CELLS
 from realtime.scene.lights import Light
-from realtime.scene.medium import BoundedMedium
+from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.medium import Medium
 
 _FAR = 1e30  #: e of no plane
 _FEW = 16  #: planes that are read faster than walked over
 _UNROLLED = 4  #: neighbours of a plane, as many as facets of boxes have
 _STEEP, _LEAST, _MOST = 0.2, 0.002, 0.25  #: of the square of half a chord in a panel; panels over the radius
+
+
+@dataclass(frozen=True)
+class BoundedMedium:
+    """A homogeneous medium within convex bounds (`realtime.scene.convex_bounds`)."""
+
+    medium: Homogeneous
+    planes: Any  #: four numbers a half space: its outward normal, and its distance from `centre` [m]; None for a sphere
+    count: int  #: half spaces
+    centre: Any  #: of the sphere, or of one that holds the medium [m]
+    radius: Any  #: of that sphere [m]
+    mean_distance: Any  #: R, see `realtime.scene.convex_bounds.mean_distance` [m]
+    neighbours: Any = None  #: `sides` numbers a half space: planes that share an edge with it, or itself; None: sphere
+    beside: Any = None  #: `planes` of the neighbours
+    sides: int = 0
+    starts: Any = None  #: by cell of directions a half space, see `realtime.scene.convex_bounds.radial_planes`
 
 
 @dataclass
@@ -355,9 +372,22 @@ class LightPaths:
         return state
 
 
-def homogeneous_vector(light: Light, point):
-    """Return L - w P: from a point to the light [m], or the direction to a light at infinity."""
-    return light.position - point if light.w else -light.axis
+def paths_from(
+    medium: Medium, light: Light, origin, direction, *, own=None, segment: tuple[Any, Any] | None = None, active=True
+) -> list[LightPaths]:
+    """Return the paths from a light to the points of rays, by bounded medium.
+
+    `own` is the number of the medium in which the points lie, if it is known; `segment` the ends of what the points
+    lie on [m], if they are within one; `active` the lanes to compute.
+    """
+    paths = []
+    for number, bounded in enumerate(medium.bounded_media):
+        toward = light.toward(bounded.centre)
+        path = LightPaths(bounded, light.w, toward, origin - bounded.centre, direction, active, own=number == own)
+        if segment is not None and not path.own:
+            path = replace(path, active=active & path.near_segment(*segment))
+        paths.append(path)
+    return paths
 
 
 def beyond(x):

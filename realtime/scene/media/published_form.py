@@ -2,8 +2,8 @@
 r"""Kernels that know bounded media: the polynomial of Biri 2006, section 4.2.
 
 In a bounded medium the paper puts a constant R for the distance r from the light in the exponent, and x - x_n for x,
-with x_n where the ray enters. `realtime.bounded_media.airlight` says what is printed and what follows; with a = sigma_t
-h, b = sigma_t R and the angle theta at the light,
+with x_n where the ray enters. `realtime.scene.media.bounded_rays` says what is printed and what follows; with a =
+sigma_t h, b = sigma_t R and the angle theta at the light,
 
     J = exp(-sigma_t (foot + R - x_n))/h int f(theta) dtheta,
 
@@ -56,7 +56,11 @@ def bounded_form(kernel: Any) -> Callable[..., Any] | None:
     function, parameters = (kernel.func, kernel.keywords) if isinstance(kernel, partial) else (kernel, {})
     bounded = getattr(function, "bounded", None)
     known = {name: value for name, value in parameters.items() if name != "tables"}
-    return None if bounded is None else partial(bounded, **known)
+    if bounded is None:
+        return None
+    return lambda geometry, x0, x1, light, phase, leg: bounded(
+        geometry, x0, x1, light, phase, ConstantLeg(*leg), **known
+    )
 
 
 def tangent_series(a: Any, degree: int) -> list[Any]:

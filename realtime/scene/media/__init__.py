@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Media: what fills space, and what it answers. Methods find lit intervals and ask the medium for the rest.
+
+**A new medium** is a frozen dataclass derived from `Medium` whose fields are Dr.Jit arrays, `albedo` and `phase` among
+them. It must write
+
+- `channels` and `vacuum`: one extinction or three, and whether a ray can leave the medium without end;
+- `extinction(rays, x)`: at distances along rays, by channel;
+- `optical_depth(rays, x0, x1)`: of segments, by channel, in closed form where it has one; x1 may be infinite;
+- `length_of(depth)`: after which length no uniform step is needed;
+- `thicker(factor)`: itself, with more extinction.
+
+With these every method of lit intervals, the marchers, soft shafts, froxels, surfaces and user methods render it: the
+airlight of a segment has 16 Gauss-Legendre nodes in w = asinh((x - foot)/height) on each side of the foot, and paths to
+lights their `optical_depth`. It may write, because it knows better,
+
+- `lit`: rays with a light, a class derived from `LitRays` that has its own `airlight(x0, x1)`: a closed form, panels
+  where the medium is thick, a kernel (`realtime.kernels` are those of the homogeneous medium);
+- `depth_to_light`: of whole paths from points to a light;
+- `rays`: what of rays is found once, as where they enter and leave its parts, for `Rays.crossed`;
+- `source` and `unit`: what scatters, and what of it is the same everywhere and is left out of integrals;
+- `mean_source`, `part`, `ambient`: of froxels, of steps, of a constant field.
+
+`realtime.scene.read_media` makes it of what Mitsuba loaded. Point, spot and area lights have a `position`; a light at
+infinity (`light.w == 0`) has an `axis`, its rays' direction, and is let in by
+`realtime.scene.read_scene._read_directional`. Its source is not divided by r^2.
+
+Read in this order:
+
+- `medium.py`: the protocol, `Medium`, and rays with one light, `LitRays`;
+- `homogeneous.py`: one extinction everywhere, and the kernels;
+- `bounded.py`: homogeneous media with bounds, in clear air or in another; clouds;
+- `light_paths.py`: how much of the paths from a light to the points of a ray lies in a convex medium;
+- `bounded_rays.py`: their airlight, by few nodes between the bends of these paths;
+- `published_form.py`: the polynomial of Biri 2006 for bounded media, which kernels may have.
+"""

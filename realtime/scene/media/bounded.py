@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Bounded media: homogeneous, convex and disjoint, in clear air or in a homogeneous medium around them.
+
+A ray enters and leaves each of them once. What its segments cross follows from these two distances, found once a ray
+(`crossed`), and what the path to a light crosses from `realtime.scene.media.light_paths`; an optical depth is
+
+    tau = sigma_0 length + sum_k (sigma_k - sigma_0) l_k,        sigma_0 = 0 in clear air.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import drjit as dr
+
+from realtime.errors import InputError
+from realtime.scene.density import Density
+from realtime.scene.media.bounded_rays import BoundedRays, camera_pieces, check_form
+from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.light_paths import BoundedMedium, chord, paths_from
+from realtime.scene.media.medium import Rays
+from realtime.scene.media.published_form import bounded_form
+from realtime.scene.phase import Phase
+
+
+@dataclass(frozen=True)
+class Clouds:
+    """Media within closed bounds of any shape, disjoint, in clear air: tables with an entry for each."""
+
+    sigma_t: tuple[Any, ...]  #: extinction [1/m], by channel; the largest of a cloud with a density
+    albedo: Any  #: single-scattering albedos, RGB [1]
+    phases: tuple[Phase, ...]  #: those that differ
+    phase: Any  #: the number of each cloud's phase function
+    density: Density | None = None  #: from place to place; None where all clouds are homogeneous
+
+
+@dataclass(frozen=True)
+class BoundedMedia(Homogeneous):
+    """A homogeneous medium or clear air with bounded media in it. They have as many extinctions as it has."""
+
+    bounded_media: tuple[BoundedMedium, ...] = ()
+    clear: bool = False
+    clouds: Clouds | None = None
+
+    def rays(self, origin, direction, low=None):
+        """Return rays with the distances at which they enter and leave each medium [m]."""
+        return Rays(origin, direction, low, tuple(chord(own, origin, direction) for own in self.bounded_media))
+
+    def extinction(self, rays, x):
+        """Return that of the medium in which a point lies [1/m]."""
+        at = list(self.sigma_t)
+        for own, (enter, leave) in zip(self.bounded_media, rays.crossed, strict=True):
+            inside = (x >= enter) & (x < leave)
+            at = [dr.select(inside, sigma, around) for sigma, around in zip(own.medium.sigma_t, at)]
+        return tuple(at)
+
+    def optical_depth(self, rays, x0, x1):
+        """Return the optical depth of segments [m], by channel [1]."""
+        depths = [type(x1)(0) if self.clear else sigma * (x1 - x0) for sigma in self.sigma_t]
+        for own, (enter, leave) in zip(self.bounded_media, rays.crossed, strict=True):
+            begin, end = dr.maximum(enter, x0), dr.minimum(leave, x1)
+            depths = self._with_length(depths, own, dr.select(end > begin, end - begin, 0))
+        return tuple(depths)
+
+    def depth_to_light(self, light, point, r, active=True):
+        """Return the optical depth from points [m] to a light, by channel [1]."""
+        zero, r = type(point.x)(0), r if light.w else type(point.x)(1)
+        depths = [sigma * r if light.w and not self.clear else zero for sigma in self.sigma_t]
+        for path in paths_from(self, light, point, dr.zeros(type(point)), active=active):
+            length = replace(path, active=active & path.near_points()).length_at(zero, r)
+            depths = self._with_length(depths, path.bounded, length)
+        return tuple(depths)
+
+    def _with_length(self, depths, own: BoundedMedium, length):
+        return [
+            dr.fma(sigma - around, length, depth)
+            for depth, sigma, around in zip(depths, own.medium.sigma_t, self.sigma_t, strict=True)
+        ]
+
+    def source(self, rays, x, angle):
+        """Return albedo sigma_t p of the medium in which a point lies, RGB [1/m]."""
+        return self._scattered(rays, angle, lambda enter, leave: dr.select((x >= enter) & (x < leave), 1, type(x)(0)))
+
+    def mean_source(self, rays, x0, x1, angle):
+        """Return `source` by the part of a segment that lies in each medium: an edge dims it."""
+
+        def part(enter, leave):
+            return dr.maximum(dr.minimum(leave, x1) - dr.maximum(enter, x0), 0) / (x1 - x0)
+
+        return self._scattered(rays, angle, part)
+
+    def _scattered(self, rays, angle, part):
+        total, around = type(self.albedo)(0), 1
+        for own, ends in zip(self.bounded_media, rays.crossed, strict=True):
+            inside, medium = part(*ends), own.medium
+            total += medium.unit * (inside * angle(medium.phase))
+            around = around - inside
+        return total if self.clear else total + super().unit * (around * angle(self.phase))
+
+    @property
+    def unit(self):
+        """Nothing: media differ."""
+        return 1
+
+    def part(self, rays, x0, x1, *, uniform):
+        """Return the part of a segment [m] from the first to the last bounded medium, in clear air."""
+        if not self.clear:
+            return super().part(rays, x0, x1, uniform=uniform)
+        # An endless ray that meets none would begin at infinity, where a map has no place and a step no length.
+        first, last = x1, x0
+        for enter, leave in rays.crossed:
+            first = dr.minimum(first, enter)
+            last = dr.maximum(last, dr.select(dr.isfinite(enter), leave, x0))
+        begin, end = dr.maximum(first, x0), dr.minimum(last, x1)
+        meets = end > begin
+        return dr.select(meets, begin, 0), dr.select(meets, end, 0)
+
+    def ambient(self, rays, distance):
+        """Return the light of a constant field of radiance 1: albedo (exp(-tau_0) - exp(-tau_1)) a piece, RGB."""
+        total = type(self.albedo)(0)
+        for piece in camera_pieces(self, rays):
+            length = dr.maximum(dr.minimum(dr.minimum(piece.end, distance), 1e30) - piece.begin, 0)
+            ends = zip(piece.medium.sigma_t, piece.before)
+            channels = [dr.select(length > 0, dr.exp(-tau) - dr.exp(-dr.fma(s, length, tau)), 0) for s, tau in ends]
+            total += piece.medium.albedo * type(total)(*channels)
+        return total
+
+    def thicker(self, factor):
+        """Return it, the bounded media and the clouds with the extinction times a factor."""
+        bounded_media = tuple(replace(own, medium=own.medium.thicker(factor)) for own in self.bounded_media)
+        clouds = self.clouds
+        if clouds is not None:
+            sigma_t = tuple(own * factor for own in clouds.sigma_t)
+            dr.make_opaque(sigma_t)
+            clouds = replace(clouds, sigma_t=sigma_t)
+        return replace(super().thicker(factor), bounded_media=bounded_media, clouds=clouds)
+
+    def lit(self, rays, light, geometry, *, kernel=None, form="kernel"):
+        """Return rays with one light.
+
+        `form` is one of `realtime.scene.media.bounded_rays.FORMS`, or 'kernel': 'paper' for a light that has a place
+        and a kernel that has a form for bounded media, otherwise 'exact', which asks no kernel.
+
+        Raises
+        ------
+        InputError
+            For what a published form refuses.
+        """
+        if not self.bounded_media:  # what clouds fill is for their methods
+            return super().lit(rays, light, geometry, kernel=kernel)
+        polynomial = bounded_form(kernel)
+        if form == "kernel":
+            form = "exact" if polynomial is None or not light.w else "paper"
+            if form != "exact" and not self.clear:
+                raise InputError(
+                    "kernel: got a polynomial, which has each medium in clear air; wanted clear air around the bounded "
+                    "media, or another kernel"
+                )
+        else:
+            check_form(self, form, light)
+        pieces = camera_pieces(self, rays)
+        if form == "exact" or polynomial is None:
+            return BoundedRays(self, light, rays, geometry, kernel, pieces, form)
+        # What it refuses must be raised here, not in a branch. Nothing is computed that nobody reads.
+        zero = type(geometry.height)(0)
+        for own in self.bounded_media:
+            leg = own.medium.sigma_t[0], zero, own.mean_distance, form == "printed"
+            polynomial(geometry, zero, zero, light, own.medium.phase, leg)
+        return BoundedRays(self, light, rays, geometry, kernel, pieces, form, polynomial)

@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What every medium answers: the protocol between media and all that renders in them (the page of this room)."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+
+from realtime.numerics.array_types import is_single
+from realtime.numerics.fast_exp import exp_bounded
+from realtime.numerics.gauss_legendre import unit_nodes
+from realtime.scene.lights import Light
+
+OPTICAL_REACH = 20.0  #: optical depths after which float32 has nothing left of light: e^-20 = 2e-9
+_NODES = 16  # of each part of a segment in a medium that has no integral of its own
+
+#: Returns the value of a phase function at the angle by which light is scattered.
+Angle = Callable[[Any], Any]
+
+
+@dataclass(frozen=True)
+class Rays:
+    """Rays in a medium, made by `Medium.rays`."""
+
+    origin: Any  #: one for all rays, or one each [m]
+    direction: Any  #: unit directions
+    direction_low: Any  #: what rounding took from their aim; None where it is not known
+    crossed: tuple[Any, ...]  #: what the medium finds of them once, such as where they enter and leave its parts
+
+    def at(self, x):
+        """Return the points at the distances x [m]."""
+        return dr.fma(self.direction, x, self.origin)
+
+
+class Medium:
+    """What fills space. Media are frozen dataclasses derived from it; see the page of this room."""
+
+    albedo: Any  #: single-scattering albedo, RGB [1]; its type is that of colours
+    phase: Any  #: the phase function
+    clear = False  #: whether nothing scatters or absorbs but bounded media
+    bounded_media: tuple[Any, ...] = ()  #: those in it
+    clouds: Any = None  #: in clear air: all bounded media, of any shape, for methods that render clouds
+
+    @property
+    def channels(self) -> int:
+        """1 for a grey medium, 3 for a coloured one."""
+        raise NotImplementedError
+
+    @property
+    def vacuum(self) -> bool:
+        """Whether a ray can be without extinction from some place on, in a channel."""
+        raise NotImplementedError
+
+    def extinction(self, rays: Rays, x) -> tuple[Any, ...]:
+        """Return the extinction at distances x of rays [1/m], by channel."""
+        raise NotImplementedError
+
+    def optical_depth(self, rays: Rays, x0, x1) -> tuple[Any, ...]:
+        """Return the optical depth of segments [m] of rays, by channel [1]; `x1` may be infinite."""
+        raise NotImplementedError
+
+    def length_of(self, depth: float) -> Any:
+        """Return a length in which the optical depth grows by `depth` in every channel, wherever it lies [m]."""
+        raise NotImplementedError
+
+    def rays(self, origin, direction, low=None) -> Rays:
+        """Return rays [m] of unit directions, with what the medium finds of them once."""
+        return Rays(origin, direction, low, ())
+
+    def depth_to_light(self, light: Any, point, r, active: Any = True) -> tuple[Any, ...]:
+        """Return the optical depth from points [m] to a light, by channel; `r` is its distance [m], if it has a place.
+
+        Parameters
+        ----------
+        light
+            A light, or what else has a `position` [m].
+        active
+            The lanes to compute.
+        """
+        if not getattr(light, "w", 1):
+            return self.optical_depth(self.rays(point, -light.axis), 0, dr.full(type(point.x), dr.inf))
+        return self.optical_depth(self.rays(point, (light.position - point) / r), 0, r)
+
+    def source(self, rays: Rays, x, angle: Angle) -> Any:
+        """Return albedo sigma_t p at distances x of rays, in parts of `unit`: a colour [1/m], or a number."""
+        return self.albedo * self.colour(self.extinction(rays, x)) * angle(self.phase)
+
+    def mean_source(self, rays: Rays, x0, x1, angle: Angle) -> Any:
+        """Return the mean of `source` over segments: froxels hold one value. By default it is that in the middle."""
+        return self.source(rays, 0.5 * (x0 + x1), angle)
+
+    @property
+    def unit(self) -> Any:
+        """What `source` and all integrals of it leave out because it is the same everywhere: by default nothing."""
+        return 1
+
+    def part(self, rays: Rays, x0, x1, *, uniform: bool) -> tuple[Any, Any]:
+        """Return the part of segments [m] in which steps are worth while, 0 and 0 where there is none.
+
+        `uniform` steps need an end; those in the angle at a light have it at infinity.
+        """
+        return x0, dr.minimum(x1, x0 + self.length_of(OPTICAL_REACH)) if uniform else x1
+
+    def ambient(self, rays: Rays, distance) -> Any:
+        """Return the light of a constant field of radiance 1 in the medium up to a distance [m], RGB: 1 - exp(-tau)."""
+        return self.albedo * (1 - self.transmittance(self.optical_depth(rays, 0, distance)))
+
+    def thicker(self, factor: float) -> "Medium":
+        """Return it with the extinction times a factor; the albedo stays."""
+        raise NotImplementedError
+
+    def lit(self, rays: Rays, light: Light, geometry, *, kernel: Any = None, form: str = "kernel") -> "LitRays":
+        """Return rays with one light.
+
+        Parameters
+        ----------
+        rays, light
+            From `rays`, and any light.
+        geometry
+            Where they pass the light, a `realtime.rays.ray_light.RayGeometry`.
+        kernel, form
+            What else decides on the integral, in media that ask: `realtime.kernels`, and the form of
+            `realtime.scene.media.bounded_rays`.
+        """
+        return LitRays(self, light, rays, geometry, kernel)
+
+    def colour(self, channels: Sequence[Any]) -> Any:
+        """Return values by channel as one: the number itself of a grey medium, otherwise a colour."""
+        return channels[0] if len(channels) == 1 else type(self.albedo)(*channels)
+
+    def transmittance(self, depths: Sequence[Any]) -> Any:
+        """Return exp(-tau) of optical depths by channel, see `colour`."""
+        return self.colour([exp_bounded(-depth) for depth in depths])
+
+    def both_ways(self, rays: Rays, x, light: Any, r) -> Any:
+        """Return the transmittance from a light to the points at x and on to the camera; `r` is their distance [m]."""
+        depths = self.optical_depth(rays, 0, x), self.depth_to_light(light, rays.at(x), r)
+        return self.transmittance([camera + own for camera, own in zip(*depths, strict=True)])
+
+    def radiance(self, light: Light, integral) -> Any:
+        """Return the radiance of an integral of `source` exp(-tau)/r^2 dx [W/(m^2 sr)] (DESIGN section 2)."""
+        return light.intensity * (self.unit * (integral * (0.25 * dr.inv_pi)))
+
+
+@dataclass(frozen=True)
+class LitRays:
+    """Rays with one light: what methods ask of the medium. Integrals are in parts of `Medium.unit`."""
+
+    medium: Any
+    light: Light
+    rays: Any  #: `Rays`; of methods the `realtime.methods.interface.view.View`
+    geometry: Any  #: foot, height and cone, `realtime.rays.ray_light.RayGeometry`
+    kernel: Any = None  #: an airlight kernel, for media that ask it
+
+    def nothing(self, width: int) -> Any:
+        """Return the integral of nothing for some rays."""
+        return dr.zeros(type(self.medium.albedo), width)
+
+    def segment(self, distance) -> tuple[Any, Any]:
+        """Return the part of the rays that the light could reach, up to a distance, in the cone of a spot [m]."""
+        return self.geometry.lit_segment(type(distance)(0), distance)
+
+    def airlight(self, x0, x1):
+        """Return the integral over lit segments [x0, x1] [m], any that a light could reach; `x1` may be infinite."""
+        x0, x1 = self.geometry.lit_segment(x0, x1)
+        x1 = dr.minimum(x1, x0 + 2 * self.medium.length_of(OPTICAL_REACH))
+        total = self.nothing(dr.width(x0, x1))
+        for begin, end in self.geometry.smooth_subsegments(self.light, x0, x1):
+            foot = dr.clip(self.geometry.foot, begin, end) if self.light.w else begin
+            total += self._nodes(begin, foot) + self._nodes(foot, end)
+        return total
+
+    def _nodes(self, x0, x1):
+        """Integrate by nodes in w = asinh((x - foot)/height), in which the integrand has no peak at the light."""
+        foot, height = self.geometry.foot, dr.maximum(self.geometry.height, 1e-12)
+        w0, w1 = (dr.asinh((x - foot) / height) for x in (x0, x1))
+        total = self.nothing(dr.width(x0, x1))
+        for fraction, weight in unit_nodes(_NODES):
+            if self.light.w:
+                w = dr.lerp(w0, w1, fraction)
+                total += self.source(dr.fma(height, dr.sinh(w), foot)) * (weight * (w1 - w0) * height * dr.cosh(w))
+            else:
+                total += self.source(dr.lerp(x0, x1, fraction)) * (weight * (x1 - x0))
+        return dr.select(x1 > x0, total, 0)
+
+    def gamma(self, x):
+        """Return Gamma(x), the airlight from the camera to a distance [m] (Biri 2006, section 4.2).
+
+        A difference of two Gammas carries the rounding of both: `airlight` of a segment is better where it can be had.
+        """
+        return self.airlight(type(x)(0), x)
+
+    def source(self, x):
+        """Return the integrand at distances x [m], exp(-tau) p/r^2 times what `Medium.source` does not leave out."""
+        light, medium = self.light, self.medium
+        s = x - self.geometry.foot
+        square = dr.fma(s, s, dr.square(self.geometry.height)) if light.w else type(x)(1)
+        r = dr.sqrt(square)
+        value = medium.source(self.rays, x, self.angle(s, r)) * medium.both_ways(self.rays, x, light, r)
+        strength = dr.rcp(square) if light.w else 1
+        return value * (strength * self.geometry.falloff(light, x) if light.varies else strength)
+
+    def angle(self, s, r) -> Angle:
+        """Return the angle by which light is scattered at s = x - foot and r from the light [m]."""
+        if self.light.w:
+            return lambda phase: phase.evaluate(-s / r)
+        # Narrow lobes need both halves of the angle between ray and light, which is one for a ray.
+        axis, direction = self.light.axis, self.rays.direction
+        down, up = (0.25 * dr.squared_norm(v) for v in (axis + direction, axis - direction))
+        return lambda phase: phase.evaluate_half(down, up)
+
+    def radiance(self, integral):
+        """Return the radiance of an integral [W/(m^2 sr)]."""
+        return self.medium.radiance(self.light, integral)
+
+
+def optical_reach(Float) -> float:
+    """Return the optical depths after which a number type has nothing left of light; float64 takes twice as many."""
+    return OPTICAL_REACH if is_single(Float) else 2 * OPTICAL_REACH
