@@ -12,7 +12,7 @@ ray receive, from samples of their own,
 
     L = exp(-tau_camera)  int Le V f cos_s exp(-s tau_shadow) domega,
 
-f cos_s by Mitsuba's `BSDF.eval`; V is whether the last lit interval of the ray reaches its end.
+f cos_s by Mitsuba's `BSDF.eval`. Of a flat light V is exact along sections, from which samples are drawn where it is 1.
 `reference.quadrature.light_samples` draws both kinds of samples, `reference.quadrature.replicates` says how many a ray
 gets: eight independent scramblings each give a mean, and their spread the standard error.
 """
@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from reference.quadrature.ahead import done_ahead
 from reference.quadrature.bounded import sum_media
 from reference.quadrature.light_airlight import worth_of_doubt
-from reference.quadrature.light_samples import samples_for_points, samples_for_rays
+from reference.quadrature.light_samples import Sections, samples_for_rays, sections_for_points
 from reference.quadrature.replicates import PILOT, REPLICATES, Keep, Kept, PointPlan, replicate_means, square_points
 from reference.quadrature.segments import camera_segments, optical_depth
 from reference.quadrature.surface import Reflection, SurfaceHits
@@ -39,7 +39,7 @@ from reference.scene.read import TruthScene
 from reference.visibility.before_light import IN_PLANE, before_light
 from reference.visibility.candidates import Ball
 from reference.visibility.certificate import LitIntervals, RandomChecks
-from reference.visibility.lit_intervals import Obstacles, lit_intervals, obstacles, reaches
+from reference.visibility.lit_intervals import Obstacles, lit_intervals, obstacles
 from reference.visibility.planes import Rays, before, rays_at
 
 Array = NDArray[np.float64]
@@ -49,7 +49,8 @@ Share = Callable[[float], None]
 _RTOL = 1e-6  # of the integral of one sample, whose estimate is many digits too large: far below the error of a mean
 _PAIRS = 1 << 16  # rays and samples at once
 _EVERY = 7  # of the pairs is checked by a shadow ray: odd, so that it steps through all samples
-_LAST = 1e-5  # of the way to a surface: the part of a ray whose end is asked for
+_BEFORE = 1e-6  # of the way to a surface: how far before it what lights it is looked at
+_OUTSIDE = 1e-5  # of the radius of a sphere: what is closer to it touches it
 
 
 @dataclass(frozen=True)
@@ -217,7 +218,8 @@ def area_surface(
         for number, beam in enumerate(beams):
             for replicate in range(REPLICATES):
                 square = square_points(chosen, number, replicate, beam.light.kind)[slice(*numbers)]
-                work = partial(_reflected, beam, rows[active], square, shadow_scale, reflection)
+                turn = _turn(chosen, number, replicate)
+                work = partial(_reflected, beam, rows[active], square, turn, shadow_scale, reflection)
                 total[..., replicate] += keep(f"surface-{part}{number}-{numbers[1]}-{replicate}", work)["radiance"]
                 done += 1
                 tell(done / rounds)
@@ -227,34 +229,66 @@ def area_surface(
     return result
 
 
-def _reflected(beam: Beam, active: Index, square: Array, shadow_scale: float, reflection: Reflection) -> Kept:
+def _turn(plan: PointPlan, number: int, replicate: int) -> float:
+    """Return by what angle a replicate's sections are turned: by a half or one and a half right angles, and around."""
+    along, across = divmod(replicate, 2)
+    shift = (along + np.random.default_rng((plan.seed, number)).random()) / (REPLICATES // 2)
+    return 0.25 * np.pi * (1 + 2 * across + shift - 0.5)
+
+
+def _reflected(
+    beam: Beam, active: Index, square: Array, turn: float, shadow_scale: float, reflection: Reflection
+) -> Kept:
     """Return sums over samples of what surface points reflect, before what is between them and the camera."""
     truth, light, each = beam.scene, beam.light, len(square)
     total = np.zeros((len(active), 3))
-    point = truth.origin + beam.distance[active, None] * truth.direction[active]
+    end = beam.distance[active]
+    point = truth.origin + end[:, None] * truth.direction[active]
     away = point - light.centre
     if light.kind == "sphere":
-        sees = np.linalg.norm(away, axis=1) > light.radius * (1 + _LAST)
+        sees = np.linalg.norm(away, axis=1) > light.radius * (1 + _OUTSIDE)
     else:
         sees = away @ light.normal > IN_PLANE * max(1.0, float(np.abs(light.centre).max()))
     seeing = np.flatnonzero(sees)
+    # For its section a surface point is the light.
+    middle = point.mean(axis=0) if len(point) else light.centre
+    around = replace(beam.known(), light=Ball(middle, float(np.linalg.norm(point - middle, axis=1).max(initial=0.0))))
     step = max(1, _PAIRS // each)
     for first in range(0, len(seeing), step):
         rows = seeing[first : first + step]
-        samples = samples_for_points(light, point[rows], square)
-        place, _, weight = samples.flat()
-        of = np.repeat(rows, each)
+        sections = sections_for_points(light, point[rows], square, turn)
+        # Looked at from a little before the surface, where the camera sees it: what hides there is not its own.
+        eye = truth.origin + (end - _BEFORE * (1 + end))[rows, None] * truth.direction[active[rows]]
+        eye, uniform = np.repeat(eye, each, axis=0), np.tile(square[:, 1], len(rows))
+        row, place, weight = seen_samples(sections, eye, around, np.repeat(active[rows], each), uniform)
+        of = rows[row // each]
         way = place - point[of]
         r = np.linalg.norm(way, axis=1)
         towards = way / np.maximum(r, np.finfo(float).tiny)[:, None]
         value = reflection(active[of], towards)
-        used = np.flatnonzero(value.max(axis=1) > 0)
-        of, towards, r, value, weight = of[used], towards[used], r[used], value[used], weight[used]
-        rays = rays_at(truth.origin, truth.direction[active[of]], place[used])
-        end = beam.distance[active[of]]
-        lit = lit_intervals(rays, (end * (1 - _LAST), end), beam.known(), of=active[of], checks=0)
-        seen = reaches(lit, end)
-        of, value, weight = of[seen], value[seen], weight[seen]
-        shadow = optical_depth(truth, point[of], towards[seen], np.zeros(len(of)), shadow_scale * r[seen])
+        shadow = optical_depth(truth, point[of], towards, np.zeros(len(of)), shadow_scale * r)
         total += sums_of(of, value * np.exp(-shadow) * weight[:, None] * light.radiance, len(total))
     return {"radiance": total}
+
+
+def seen_samples(
+    sections: Sections, eye: Array, known: Obstacles, of: Index, uniform: Array
+) -> tuple[Index, Array, Array]:
+    """Return which sections are seen, a sample of what is seen of each, and its solid angle; see `Sections.drawn`.
+
+    Parameters
+    ----------
+    sections
+        The sections.
+    eye
+        Where each is looked at from, in front of the surface point, (n, 3) [m].
+    known, of
+        What can stand between, and the number of the ray to the surface point in it, (n,).
+    uniform
+        Numbers from 0 to 1, (n,).
+    """
+    length = np.linalg.norm(sections.way, axis=1)
+    rays = rays_at(sections.start, sections.way / np.maximum(length, np.finfo(float).tiny)[:, None], eye)
+    lit = lit_intervals(rays, (0 * length, length), known, of=of, checks=0)
+    of_length = length[lit.ray]
+    return sections.drawn(replace(lit, low=lit.low / of_length, high=lit.high / of_length), uniform)

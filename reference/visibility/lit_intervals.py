@@ -102,7 +102,7 @@ def _inside(rays: Rays, ends: tuple[Array, Array], known: Obstacles) -> tuple[Ar
             continue
         within = np.linalg.norm(rays.position - centre, axis=1) < radius
         way = centre - rays.origin
-        middle = rays.direction @ way
+        middle = np.sum(rays.direction * way, axis=1)
         beside = np.linalg.norm(way - middle[:, None] * rays.direction, axis=1)
         half = np.sqrt(np.maximum(radius - beside, 0) * (radius + beside))
         low = np.where(within, np.maximum(low, middle - half), low)

@@ -43,7 +43,7 @@ _SMALLEST_SINE = 1e-12  # a ray this close to the direction of a light [rad] is 
 class Rays:
     """Camera rays, each in its plane with a light: arrays of shape (n, ...)."""
 
-    origin: Array  #: where all begin [m], (3,)
+    origin: Array  #: where all begin [m], (3,), or each, (n, 3)
     direction: Array  #: unit, (n, 3)
     position: Array  #: p: where the light of each ray is [m], or the unit direction towards it, (n, 3)
     normal: Array  #: unit vector across the ray, from the light to the foot point or along the light, (n, 3)
@@ -53,7 +53,8 @@ class Rays:
 
     def __getitem__(self, rows) -> "Rays":
         changed = {f.name: getattr(self, f.name) for f in fields(self)}
-        return Rays(**{name: part if name in ("origin", "w") else part[rows] for name, part in changed.items()})
+        same = ("origin", "w") if self.origin.ndim == 1 else ("w",)
+        return Rays(**{name: part if name in same else part[rows] for name, part in changed.items()})
 
     def point(self, ray: Index, x: Array) -> Array:
         """Return the points at distances along rays of these numbers, (k, 3) [m]."""
@@ -76,7 +77,7 @@ def rays_at(origin: Array, direction: Array, position: Array, w: int = 1) -> Ray
     Parameters
     ----------
     origin
-        Where all rays begin [m], (3,).
+        Where all rays begin [m], (3,), or each, (n, 3).
     direction
         Unit vectors, (n, 3).
     position

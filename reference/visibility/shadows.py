@@ -125,9 +125,9 @@ def _compiled(rays: Rays, ends: tuple, lists: tuple, sizes: tuple[int, int]) -> 
     shadows, slots = sizes
     count = len(rays.foot)
     low, high = mi.Float64(ends[0]), mi.Float64(np.maximum(*ends))
-    origin = mi.Vector3d(*(float(c) for c in rays.origin))
+    origin = mi.Vector3d(np.ascontiguousarray(np.broadcast_to(rays.origin, (count, 3)).T))
     w, most, stride = mi.Float64(float(rays.w)), mi.UInt32(slots), mi.UInt32(count)
-    dr.make_opaque(origin, w, most, stride)
+    dr.make_opaque(w, most, stride)
     direction, across = mi.Vector3d(rays.direction.T), mi.Vector3d(-rays.normal.T)
     lanes = _Lanes(
         origin, direction, across, dr.cross(direction, across), mi.Float64(rays.foot), mi.Float64(rays.height), w

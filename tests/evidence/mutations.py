@@ -220,6 +220,12 @@ def _for_points(function, *arguments):
     return replace(samples, weight=2 * samples.weight)
 
 
+def _through_everything(function, sections, eye, known, *others):
+    no_spheres, no_disks = np.empty((0, 3)), replace(known.shapes.disks, radius=np.empty(0))
+    shapes = replace(known.shapes, triangles=np.empty((0, 3, 3)), centre=no_spheres, radius=np.empty(0), disks=no_disks)
+    return function(sections, eye, replace(known, shapes=shapes), *others)
+
+
 def _one_too_few(function, *arguments, plan, **named):
     found = function(*arguments, plan=plan, **named)
     return replace(found, replicates=found.replicates * plan.most / (plan.most - 1))
@@ -412,13 +418,11 @@ _WIDE = _all(
         "area-shadows-itself": Wrap("reference.visibility.before_light:before_light", _own_shape),
         "area-null-is-opaque": _sorted(True),
         "area-black-is-clear": _sorted(False),
-        "area-surface-both-sides": Wrap(f"{_SAMPLES}:samples_for_points", _for_points),
+        "area-surface-both-sides": Wrap(f"{_SAMPLES}:sections_for_points", _for_points),
         "area-surface-bright-leg": Rewrite(
             _WEIGHTED, "value_ * np.exp(-shadow_) * weight_[:, None]", "value_ * weight_[:, None]"
         ),
-        "area-surface-without-shadows": Wrap(
-            "reference.visibility.lit_intervals:reaches", lambda function, lit, end: np.ones(len(end), bool)
-        ),
+        "area-surface-without-shadows": Wrap("reference.quadrature.area_lights:seen_samples", _through_everything),
     },
 )
 

@@ -294,5 +294,5 @@ def test_what_a_polygon_leaves_of_a_light(variant, kind, corners, samples):
     else:
         sides = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
         expected = [1 - polygon_overlap(shape, sides) / (4 * half[0] * half[1]) for shape in fallen]
-    # The error of samples that are seen or not falls as N^-3/4; three times the standard error of 8 x 64, 7e-3.
-    np.testing.assert_allclose(share, expected, atol=2e-2 * (64 / samples) ** 0.75, rtol=0)
+    # Three times the standard error of 8 x 64 sections, 1.6e-3; it falls as N^-3/2, and more slowly at corners.
+    np.testing.assert_allclose(share, expected, atol=5e-3 * (64 / samples), rtol=0)

@@ -7,15 +7,14 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from reference.quadrature.area_lights import AreaAirlight, area_airlight, beams_of
-from reference.quadrature.light_samples import samples_for_points
+from reference.quadrature.area_lights import AreaAirlight, area_airlight, beams_of, seen_samples
+from reference.quadrature.light_samples import sections_for_points
 from reference.quadrature.replicates import REPLICATES, PointPlan, square_points
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import TruthScene, read_truth
 from reference.visibility.before_light import before_light
 from reference.visibility.candidates import Ball
-from reference.visibility.lit_intervals import lit_intervals, obstacles, reaches
-from reference.visibility.planes import rays_at
+from reference.visibility.lit_intervals import obstacles
 
 BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0, 0.0, 0.0]}}
 NULL = {"type": "null"}
@@ -79,7 +78,7 @@ def lit_room(light, *, size=(5, 4), medium=None, empty=False, **shapes: Any) -> 
 
 
 def visible_share(truth: TruthScene, place, normal, samples: int):
-    """Return the share of the area of the first light that surface points see, (points, replicates) [1].
+    """Return the share of the area of the first light, a flat one, that surface points see, (points, replicates) [1].
 
     A camera looks down on each point along its normal.
     """
@@ -91,14 +90,12 @@ def visible_share(truth: TruthScene, place, normal, samples: int):
         known = obstacles(down, Ball(light.centre, light.radius), np.ones(1), shapes)
         for replicate in range(REPLICATES):
             square = square_points(PointPlan(most=samples), 0, replicate, light.kind)
-            seen_at, of_light, angle = samples_for_points(light, point[None], square).flat()
+            sections = sections_for_points(light, point[None], square)
+            eye, of = np.broadcast_to(point + 1e-6 * normal, (samples, 3)), np.zeros(samples, np.int64)
+            _, seen_at, angle = seen_samples(sections, eye, known, of, square[:, 1])
             way = point - seen_at
             r = np.linalg.norm(way, axis=1)
-            area = angle * r**3 / np.sum(way * of_light, axis=1)
-            rays = rays_at(down.origin, np.repeat(down.direction, samples, axis=0), seen_at)
-            end = np.ones(samples)
-            lit = lit_intervals(rays, (0.999 * end, end), known, of=np.zeros(samples, np.int64), checks=0)
-            result[number, replicate] = area[reaches(lit, end)].sum() / area.sum()
+            result[number, replicate] = (angle * r**3 / (way @ light.normal)).sum() / samples / light.area
     return result
 
 

@@ -4,6 +4,7 @@
 from dataclasses import replace
 from functools import partial
 
+import mitsuba as mi
 import numpy as np
 import pytest
 from scipy.special import roots_legendre
@@ -12,7 +13,7 @@ from reference.quadrature import area_lights
 from reference.quadrature.area_lights import area_surface, beams_of
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.light_points import light_points
-from reference.quadrature.light_samples import samples_for_points, samples_for_rays
+from reference.quadrature.light_samples import samples_for_rays, sections_for_points
 from reference.quadrature.replicates import PointPlan, square_points, standard_error
 from reference.quadrature.surface import Reflection, surface_hits
 from reference.scene.read import read_truth
@@ -21,6 +22,7 @@ from reference.visibility.certificate import segments_blocked
 from reference.visibility.exact_distance import exact_distance
 from tests.evidence.closed_forms import sphere_airlight
 from tests.helpers.area_lights import (
+    GREY,
     NULL,
     airlight_replicates,
     ball,
@@ -33,6 +35,7 @@ from tests.helpers.area_lights import (
     turned,
 )
 
+WHITE = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [1.0, 1.0, 1.0]}}
 LAMPS = {"rectangle": flat, "disk": partial(flat, "disk"), "sphere": ball}
 
 
@@ -59,7 +62,7 @@ def test_samples_stand_for_the_area_and_the_solid_angle(variant, kind):
     place = 2 * draw(size=(60, 3))
     away = place - light.centre
     place = place[(away @ light.normal > 0.05) if kind != "sphere" else np.linalg.norm(away, axis=1) > 0.45]
-    angle = samples_for_points(light, place, square).weight.mean(axis=1)
+    angle = sections_for_points(light, place, square).weight.reshape(len(place), -1).mean(axis=1)
     way = place[:, None] - samples.place[0]
     r = np.linalg.norm(way, axis=2)
     cosine = np.maximum(np.sum(way * samples.normal[0], axis=2) / r, 0.0)
@@ -110,6 +113,39 @@ def test_a_light_does_not_shadow_itself_and_black_is_null_for_what_it_sends(vari
     same = clear[0]
     assert images[0].airlight[same] == pytest.approx(images[1].airlight[same], rel=1e-9)
     assert images[0].surface[same] == pytest.approx(images[1].surface[same], rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.claim("area-light-closed-forms", tolerance="1.3 times the standard error of 1e-3 that is asked for")
+def test_half_a_plane_before_a_rectangle(variant):
+    """A white floor under a rectangle that half a plane covers, by the default plan, in closed form.
+
+    The floor receives Le times the form factor of what is left, a rectangle (Howell, A catalog of radiation heat
+    transfer configuration factors, B-4).
+    """
+    a, b, high, over, edge = 0.7, 0.4, 3.0, 1.1, 0.13
+    up = mi.ScalarTransform4f()
+    shapes = {
+        "lamp": lamp(radiance=(1, 1, 1), to_world=up.translate([0, 0, high]).rotate([1, 0, 0], 180).scale([a, b, 1])),
+        "floor": {"type": "rectangle", "to_world": up.scale(9.0), "bsdf": WHITE},
+        "cover": {"type": "rectangle", "to_world": up.translate([0, edge - 50, over]).scale([60, 50, 1]), "bsdf": GREY},
+    }
+    camera = up.look_at([0.3, 0.2, 0.9], [0.1, 0.15, 0.0], [0, 1, 0])
+    truth = read_truth(lit_scene(size=(16, 12), to_world=camera, medium=fog(0.0, 0.5), **shapes))
+    hits = surface_hits(truth)
+    hits = replace(hits, distance=exact_distance(truth, hits.interaction, hits.distance))
+    x, y, _ = (truth.origin + hits.distance[:, None] * truth.direction).T
+
+    def from_foot(across, along):
+        first, second = np.hypot(across, high), np.hypot(along, high)
+        return 0.5 * (across / first * np.arctan(along / first) + along / second * np.arctan(across / second))
+
+    left = np.clip(y + (edge - y) * high / over, -b, b)
+    sides = [(1, a, b), (-1, -a, b), (-1, a, left), (1, -a, left)]
+    expected = sum(sign * from_foot(end - x, side - y) for sign, end, side in sides) / np.pi
+    known = np.zeros((len(x), 3))
+    got = area_surface(truth, hits, beams_of(truth, hits.distance), known, plan=PointPlan())[:, 0].mean(axis=1)
+    assert 0.4 < np.mean((left > -b) & (left < b)) < 0.8
+    assert np.sqrt(np.mean((got - expected) ** 2)) < 1.3e-3 * expected.mean()
 
 
 @pytest.mark.parametrize("kind", ["rectangle", "sphere", pytest.param("disk", marks=pytest.mark.slow)])

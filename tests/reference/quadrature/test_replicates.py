@@ -15,7 +15,7 @@ from reference.quadrature.replicates import PILOT, REPLICATES, PointPlan, replic
 from reference.quadrature.surface import surface_hits
 from reference.visibility.exact_distance import exact_distance
 from tests.evidence.closed_forms import sphere_airlight
-from tests.helpers.area_lights import airlight_replicates, fixed, fog, lamp, lit_room, turned
+from tests.helpers.area_lights import GREY, airlight_replicates, fixed, fog, lamp, lit_room, turned
 
 STUDENT = 2.3646  #: standard errors to either side that hold 95 % with seven degrees of freedom
 
@@ -107,8 +107,18 @@ def test_intervals_beside_a_lamp_hold(variant):
 @pytest.mark.statistical
 @pytest.mark.claim("area-light-errors", tolerance="binomial: 4.5 standard errors of a share of 400 runs, 1 % of all")
 @pytest.mark.parametrize("layer", ["airlight", "surface"])
-def test_intervals_in_a_penumbra_hold(variant, layer):
-    truth = lit_room(lamp(to_world=turned((0.3, 0.4, 2.9), 163, (0.5, 0.3, 1.0))), size=(4, 3))
+@pytest.mark.parametrize("before", ["block", "blinds"])
+def test_intervals_in_a_penumbra_hold(variant, layer, before):
+    blinds: dict = {"block": None} | {
+        f"slat-{k}": {
+            "type": "cube",
+            "to_world": turned((0.1, 0.25 * k - 1.0, 1.7), 27, (1.2, 0.09, 0.01)),
+            "bsdf": GREY,
+        }
+        for k in range(9)
+    }
+    light = lamp(to_world=turned((0.3, 0.4, 2.9), 163, (0.5, 0.3, 1.0)))
+    truth = lit_room(light, size=(4, 3), **(blinds if before == "blinds" else {}))
     hits = surface_hits(truth)
     hits = replace(hits, distance=exact_distance(truth, hits.interaction, hits.distance))
     known = np.zeros((len(hits.distance), 3))
