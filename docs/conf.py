@@ -22,6 +22,7 @@ extensions = [
     "generated",
 ]
 exclude_patterns = ["_ext", "data", "tools"]
+source_suffix = {".md": "markdown", ".ipynb": "markdown"}
 highlight_language = "none"  # what is indented is a formula
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3

@@ -19,4 +19,4 @@ Read in this order:
 - `commands/`: the command line, made of these functions.
 """
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"

@@ -4,9 +4,11 @@
 A line `<!-- generated: NAME WORDS -->` of a page is replaced by Markdown that a function of `listed`, `measured`,
 `shown` or `tested` returns, before the page is read, so that nothing on the pages is copied by hand. In a plain viewer
 the marks are invisible: `.venv/bin/python -m sphinx -W --keep-going docs airlight-docs` builds the pages.
-Links to Python files of the project, which have no pages, become the names of the files.
+Links to Python files of the project, which have no pages, become the names of the files. A notebook is read as the
+Markdown of its cells and of what they printed and showed.
 """
 
+import json
 import re
 from pathlib import Path
 
@@ -46,7 +48,7 @@ PARTS = {
 _MARK = re.compile(r"<!-- generated: ([a-z-]+)((?: [\w-]+)*) -->")
 _SOURCE = re.compile(r"\[([^\]]+)\]\(\.\./((?:analytic|realtime|reference|validation|reports)/[\w/]+)\.py\)")
 #: Documents in the folder above, and the pages that show them.
-_PAGES = {"../CONTRIBUTING.md": "contributing.md", "../CHANGELOG.md": "changelog.md", "../DESIGN.md": "conventions.md"}
+_PAGES = {"../DESIGN.md": "conventions.md"}
 
 
 def fill(text: str) -> str:
@@ -70,7 +72,24 @@ def _code(link: re.Match[str]) -> str:
     return f"`{link[1].strip('`')}`"
 
 
+def _notebook(text: str) -> str:
+    """Return the cells of a notebook with their output as Markdown."""
+    parts = []
+    for cell in json.loads(text)["cells"]:
+        source = "".join(cell["source"])
+        parts.append(source if cell["cell_type"] == "markdown" else f"```python\n{source}\n```")
+        for output in cell.get("outputs", ()):
+            data = output.get("data", {})
+            if "text/html" in data:
+                parts.append("```{raw} html\n" + "".join(data["text/html"]) + "\n```")
+            else:
+                parts.append("```text\n" + "".join(output.get("text") or data["text/plain"]).rstrip() + "\n```")
+    return "\n\n".join(parts) + "\n"
+
+
 def _replace(app: Sphinx, docname: str, content: list[str]) -> None:
+    if app.env.doc2path(docname).suffix == ".ipynb":
+        content[0] = _notebook(content[0])
     text = _SOURCE.sub(_code, content[0])
     for path, page in _PAGES.items():
         text = text.replace(f"]({path}", f"]({page}")

@@ -1,14 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""For tests of `import airlight`: the functions that it has, a small image, a method and a kernel of one's own."""
-
-from pathlib import Path
+"""For tests of `import airlight`: a small image, a method and a kernel of one's own."""
 
 from realtime.kernels.exact import exact
 from realtime.methods.unshadowed import unshadowed
 
-ROOT = Path(__file__).resolve().parents[2]
 TINY = (16, 12)
-FUNCTIONS = ("load_scene", "render", "reference", "compare", "study", "report")
 
 
 def brighter(view, *, kernel=None, times=2.0):

@@ -1,16 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reports from Python, and the tutorial."""
-
-import os
-import re
-import subprocess
-import sys
-
-import numpy as np
-import pytest
+"""What a report from Python is given."""
 
 import airlight
-from tests.helpers.api import FUNCTIONS, ROOT, brighter
+from tests.helpers.api import brighter
 
 
 def test_report_hands_on_what_it_was_given(variant, tmp_path, monkeypatch):
@@ -30,38 +22,3 @@ def test_report_hands_on_what_it_was_given(variant, tmp_path, monkeypatch):
     assert not given["apart"]  # a function runs here
     names = [configuration.method.rpartition(":")[2] for configuration in given["study"].configurations]
     assert names == ["min-max", "brighter"]
-
-
-@pytest.mark.slow
-@pytest.mark.claim("python-tutorial")
-def test_the_tutorial_runs(tmp_path):
-    """Every snippet of docs/python.md, one after the other as in a notebook, prints what the page says."""
-    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8").partition("## In a notebook")[0]
-    blocks = re.findall(r"^```python\n(.*?)^```(?:\n\n```text\n(.*?)^```)?", page, flags=re.DOTALL | re.MULTILINE)
-    assert len(blocks) >= 8
-    assert {name for name in FUNCTIONS if any(f"airlight.{name}(" in code for code, _ in blocks)} == set(FUNCTIONS)
-    mark = "print('-- end of snippet --')\n"
-    program = "".join(code + mark for code, _ in blocks if "airlight.report(" not in code)  # which takes minutes
-    (tmp_path / "tutorial.py").write_text(program)
-    ran = subprocess.run(
-        [sys.executable, "tutorial.py"],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    assert ran.returncode == 0, ran.stderr
-    printed = ran.stdout.split("-- end of snippet --\n")
-    expected = [text for code, text in blocks if "airlight.report(" not in code]
-    for said, printed_now in zip(expected, printed):
-        words, numbers = _parts(said)
-        assert _parts(printed_now)[0] == words
-        # Nothing here depends on the machine but rounding, and what samples and kernels make of it.
-        np.testing.assert_allclose(_parts(printed_now)[1], numbers, rtol=0.5, atol=2e-3)
-
-
-def _parts(text):
-    """Return a text without its numbers, and these."""
-    pattern = r"[-+]?\d+(?:\.\d+)?(?:e[-+]\d+)?"
-    return re.sub(pattern, "#", text), [float(digits) for digits in re.findall(pattern, text)]
