@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from reference.quadrature.segments import optical_depth
 from reference.scene.area_light import TruthAreaLight
+from reference.scene.device import vectors
 from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthScene
 from reference.visibility.line_crossings import half_chord
@@ -45,7 +46,7 @@ def emitted_light(truth: TruthScene, distance: Array) -> Array:
         rows = np.flatnonzero(np.isinf(distance))
         depth = optical_depth(truth, truth.origin, truth.direction[rows], np.zeros(len(rows)), np.full(len(rows), _FAR))
         interaction = dr.zeros(mi.SurfaceInteraction3f, len(rows))
-        interaction.wi = mi.Vector3f(-truth.direction[rows].T)
+        interaction.wi = vectors(mi.Vector3f, -truth.direction[rows])
         total[rows] += np.array(truth.background.eval(interaction), dtype=np.float64).reshape(3, -1).T * np.exp(-depth)
     return total
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from reference.quadrature.segments import optical_depth
 from reference.scene.area_light import is_area
+from reference.scene.device import on_device, vectors
 from reference.scene.directional_light import DirectionalLight, is_directional
 from reference.scene.read import TruthLight, TruthScene
 
@@ -54,8 +55,8 @@ class Reflection:
 
     def __call__(self, ray: Index, towards: Array) -> Array:
         """Return f cos_s, (n, 3) [1/sr], where rays of these numbers hit, for light from unit directions, (n, 3)."""
-        at = dr.gather(mi.SurfaceInteraction3f, self.interaction, mi.UInt32(ray.astype(np.uint32)))
-        local = at.to_local(dr.normalize(mi.Vector3f(towards.T)))
+        at = dr.gather(mi.SurfaceInteraction3f, self.interaction, on_device(mi.UInt32, ray))
+        local = at.to_local(dr.normalize(vectors(mi.Vector3f, towards)))
         return np.array(at.bsdf().eval(mi.BSDFContext(), at, local), dtype=np.float64).reshape(3, -1).T
 
 

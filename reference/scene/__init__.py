@@ -5,6 +5,7 @@ These are facts that Mitsuba gives when it is asked. What follows from them alon
 
 Read in this order:
 
+- `device.py`: numbers of NumPy for compiled kernels;
 - `camera.py`: directions of rays through positions on the film;
 - `convex_bounds.py`: convex bounds of media, read and checked;
 - `directional_light.py`: directional lights: direction and irradiance;

@@ -35,7 +35,7 @@ _PARTS = 4  # in which rays are parted, again and again
 _FAN = np.arange(12) * np.pi / 6  # directions in the plane of a ray and the axis [rad]
 _LEVEL = 1e-12  # a rise of a vector along a ray below this is rounding
 _SLACK = 1e-9  # of the size of the scene: rounding
-_NUMBERS = 1 << 21  # looked at at once
+_MANY = 300  # shapes: fewer are held against all planes at once
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def _tiles(
         rays, numbers = waiting.pop()
         fan = _FAN if len(rays) <= width else _FAN[:0]
         hull = _Hull(light, axis, to_light, direction[rays], length[rays], fan, size)
-        numbers = numbers[hull.near(solids, numbers)]
+        numbers = hull.near(solids, numbers)
         if not len(numbers):
             continue
         if len(rays) <= (1 if wide else _TILE):
@@ -146,7 +146,7 @@ class _Hull:
         up = up if np.linalg.norm(up) > 1e-9 else helper
         up /= np.linalg.norm(up)
         side = _cross(mean, up)
-        vectors = [np.cos(turn) * mean + np.sin(turn) * up for turn in fan]
+        vectors = []
         # Both planes through the axis that hold the rays between them, and those that touch the ball as well.
         out = up - (up @ axis) * axis
         if np.linalg.norm(out) < 1e-9:
@@ -162,7 +162,7 @@ class _Hull:
                 beside = abs(to_light @ up)
                 lean = min(light.radius / beside, 1.0) if beside > 0 else 1.0
                 vectors.append(sign * np.sqrt(1 - lean**2) * side - lean * up)
-        m = np.stack(vectors)
+        m = np.stack([*vectors, *(np.cos(turn) * mean + np.sin(turn) * up for turn in fan)])
         if np.isinf(length).any():
             forward = direction @ mean
             rise = (m @ direction.T) / np.maximum(forward, 1e-3)
@@ -177,13 +177,14 @@ class _Hull:
         useful = np.isfinite(self.support) & (norm > 1e-6)
         self.m, self.support, self.norm = m[useful], self.support[useful], norm[useful]
 
-    def near(self, solids: tuple[Array, Array], numbers: Index) -> NDArray[np.bool_]:
+    def near(self, solids: tuple[Array, Array], numbers: Index) -> Index:
         """Return which balls of these numbers no half space leaves out."""
         centre, radius = solids
-        result = np.ones(len(numbers), bool)
-        step = max(1, _NUMBERS // max(1, len(self.m)))
-        for first in range(0, len(numbers), step):
-            some = numbers[first : first + step]
-            beyond = centre[some] @ self.m.T - radius[some, None] * self.norm > self.support
-            result[first : first + step] = ~beyond.any(axis=1)
-        return result
+        for first in range(len(self.m)):
+            # One after the other while they are many: the planes beside the rays, which come first, leave few.
+            m = slice(first, first + 1 if len(numbers) > _MANY else None)
+            beyond = centre[numbers] @ self.m[m].T - radius[numbers, None] * self.norm[m] > self.support[m]
+            numbers = numbers[~(beyond[:, 0] if m.stop else beyond.any(axis=1))]
+            if not m.stop:
+                break
+        return numbers

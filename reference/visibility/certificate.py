@@ -15,6 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.scene.device import on_device, vectors
 from reference.scene.shapes import Shapes
 from reference.visibility.planes import Rays
 
@@ -175,8 +176,9 @@ def _cast(occluders: Any, start: Array, target: Array) -> Bools:
         block = slice(first, first + _CHUNK)
         way = target[block] - start[block]
         length = np.maximum(np.linalg.norm(way, axis=1), np.finfo(float).tiny)
-        direction = mi.Vector3f((way / length[:, None]).T)
-        ray = mi.Ray3f(mi.Point3f(start[block].T), direction, mi.Float(length * (1 - _SHORT)), 0.0, [])
+        direction = vectors(mi.Vector3f, way / length[:, None])
+        reach = on_device(mi.Float, length * (1 - _SHORT))
+        ray = mi.Ray3f(vectors(mi.Point3f, start[block]), direction, reach, 0.0, [])
         parts.append(~np.array(occluders.ray_test(ray), dtype=bool))
     return np.concatenate(parts)
 

@@ -37,6 +37,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.scene.device import on_device, vectors
 from reference.scene.shapes import Shapes
 from reference.visibility.candidates import Near
 from reference.visibility.planes import Rays
@@ -92,14 +93,14 @@ def lit_parts(
         ray = np.flatnonzero(ends[1] > ends[0])
         return ray, ends[0][ray], ends[1][ray]
     data = [
-        mi.Float64(np.ascontiguousarray(part).ravel())
+        on_device(mi.Float64, np.ravel(part))
         for part in (
             shapes.triangles,
             np.column_stack([shapes.centre, shapes.radius]),
             np.column_stack([shapes.disks.centre, shapes.disks.normal, shapes.disks.radius]),
         )
     ]
-    lists = [mi.UInt32(each[2].astype(np.uint32)) for each in (near.triangles, near.spheres, near.disks)]
+    lists = [on_device(mi.UInt32, each[2]) for each in (near.triangles, near.spheres, near.disks)]
     ranges = [(begin[of], end[of]) for begin, end, _ in (near.triangles, near.spheres, near.disks)]
     shadows = max(1, int(np.sum([end - begin for begin, end in ranges], axis=0).max(initial=0)))
     parts, slots, first = [], _SLOTS, 0
@@ -124,14 +125,13 @@ def _compiled(rays: Rays, ends: tuple, lists: tuple, sizes: tuple[int, int]) -> 
     """Return how many lit parts each lane has, and where they begin and end."""
     shadows, slots = sizes
     count = len(rays.foot)
-    low, high = mi.Float64(ends[0]), mi.Float64(np.maximum(*ends))
-    origin = mi.Vector3d(np.ascontiguousarray(np.broadcast_to(rays.origin, (count, 3)).T))
+    low, high = on_device(mi.Float64, ends[0]), on_device(mi.Float64, np.maximum(*ends))
     w, most, stride = mi.Float64(float(rays.w)), mi.UInt32(slots), mi.UInt32(count)
     dr.make_opaque(w, most, stride)
-    direction, across = mi.Vector3d(rays.direction.T), mi.Vector3d(-rays.normal.T)
-    lanes = _Lanes(
-        origin, direction, across, dr.cross(direction, across), mi.Float64(rays.foot), mi.Float64(rays.height), w
-    )
+    origin = vectors(mi.Vector3d, np.broadcast_to(rays.origin, (count, 3)))
+    direction, across = vectors(mi.Vector3d, rays.direction), vectors(mi.Vector3d, -rays.normal)
+    foot, height = on_device(mi.Float64, rays.foot), on_device(mi.Float64, rays.height)
+    lanes = _Lanes(origin, direction, across, dr.cross(direction, across), foot, height, w)
     lane = dr.arange(mi.UInt32, count)
     lows, highs = dr.empty(mi.Float64, count * shadows), dr.empty(mi.Float64, count * shadows)
 
@@ -145,7 +145,7 @@ def _compiled(rays: Rays, ends: tuple, lists: tuple, sizes: tuple[int, int]) -> 
     for shadow, values, number, (begin, end) in zip((_triangle, _sphere, _disk), data, numbers, spans, strict=True):
         if not len(number):
             continue
-        last = mi.UInt32(end.astype(np.uint32))
+        last = on_device(mi.UInt32, end)
 
         def look(j, known, held0, held1, shadow=shadow, values=values, number=number):
             start, finish = shadow(lanes, values, dr.gather(mi.UInt32, number, j))
@@ -158,9 +158,7 @@ def _compiled(rays: Rays, ends: tuple, lists: tuple, sizes: tuple[int, int]) -> 
             held1 = dr.select(casts, dr.select(touches, dr.maximum(held1, finish), finish), held1)
             return j + 1, known, held0, held1
 
-        _, *state = dr.while_loop(
-            (mi.UInt32(begin.astype(np.uint32)), *state), lambda j, *others, last=last: j < last, look
-        )
+        _, *state = dr.while_loop((on_device(mi.UInt32, begin), *state), lambda j, *others, last=last: j < last, look)
     known, held0, held1 = state
     casts = held0 < held1
     store(known, held0, held1, casts)

@@ -23,7 +23,7 @@ Bools = NDArray[np.bool_]
 Layers = Callable[[Array, Array], tuple[Array, Array]]  #: of airlight and surfaces, (m, 3) each
 
 APART = 2  #: pixels between those whose errors are compared: a filter that is wider than a pixel joins neighbours
-_MOST_RAYS = 3200  # every pixel of an image of 64 x 48
+_FEW_RAYS = 800  # with which faults that move paths are told apart
 _SPHERE_SAMPLES = 32  # of a sphere in the place of a point light: its rays pass by close
 _BATCHES, _PATHS = 4, 16  # batches of paths a pixel for the light of multiple scattering
 _SMOOTH = 40  # of the width of an image: the width of the filter for that light
@@ -130,7 +130,7 @@ class SceneLight:
         """Return the rays of an image in a scenery, and what is known of them."""
         key = "view", scenery.offset, scenery.zoom, _sight(seen)
         return self._once(
-            key, lambda: seen.view(most=_MOST_RAYS, apart=APART, **scenery.where), lambda v: 40 * v.distance.size
+            key, lambda: seen.view(most=seen.rays, apart=APART, **scenery.where), lambda v: 40 * v.distance.size
         )
 
     def model(self, seen: Seen, scenery: Scenery, layer: int) -> FogModel:
@@ -161,7 +161,7 @@ class SceneLight:
 
 def _sight(seen: Seen) -> tuple[Any, ...]:
     """Return what of an image its pixels depend on, and their paths."""
-    return seen.area, seen.holds, seen.samples, seen.used.tobytes()
+    return seen.area, seen.holds, seen.samples, seen.rays, seen.used.tobytes()
 
 
 @dataclass
@@ -181,6 +181,11 @@ class Predictor:
     def fog(self) -> Fog:
         """The fog as the scene has it."""
         return scene_fog(self.seen.truth)
+
+    @cached_property
+    def coarse(self) -> "Predictor":
+        """One with fewer pixels."""
+        return Predictor(replace(self.seen, rays=_FEW_RAYS), self.shape, self.light)
 
     @cached_property
     def view(self) -> View:

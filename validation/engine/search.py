@@ -65,9 +65,12 @@ def explain(
     fine
         Whether the values are looked for to all digits, or to some per cent, which a fault that is wrong needs.
     """
-    search = _Search(predictor, tuple(faults))
+    # To tell apart what moves paths, which are found again for each value, few of them are enough.
+    few = not fine and any(parameter.step for fault in faults for parameter in fault.parameters)
+    sought = predictor.coarse if few else predictor
+    search = _Search(sought, tuple(faults))
     parameters = search.parameters
-    starts = [tuple(value for part in near for value in part)] if near else _starts(predictor, faults)
+    starts = [tuple(value for part in near for value in part)] if near else _starts(sought, faults)
     best = starts[0]
     if all(fault.solved or not fault.parameters for fault in faults):
         parameters = ()
@@ -81,6 +84,7 @@ def explain(
             improve = search.on_line if on_a_line else search.by_steps
             places = [improve(place, scale, fine) for place in places]
         best = min((search.outward(place) for place in places), key=lambda values: search.loss(values, scale))
+    search = _Search(predictor, tuple(faults)) if few else search
     errors, guess = search.errors(best), search.guess(best)
     error = float(np.abs(errors).mean())
     return Explanation(tuple(faults), _parted(faults, best), guess, errors, predictor.lit(guess), error)

@@ -28,6 +28,7 @@ Found = TypeVar("Found")  #: what an attempt at an image is
 
 PIXELS = ("centre", "area")  #: what a pixel may be: the radiance at its centre, or the mean over its area
 
+_MOST_RAYS = 3200  # every pixel of an image of 64 x 48
 _FEWEST = 64  # pixels, whatever rays they need
 _SIDE = 3  # rays along a side of a pixel, for means over its area
 _MOST_SAMPLES = 128  # of an area light
@@ -45,6 +46,7 @@ class Seen:
     used: Bools  #: which pixels may take part, (pixels,)
     area: bool = False  #: whether a pixel is a mean over its area, or the value at its centre
     samples: int = SAMPLES  #: that stand for an area light, see `needed_samples`
+    rays: int = _MOST_RAYS  #: that a diagnosis looks at, at most
 
     def view(
         self, *, most: int, apart: int = 0, offset: tuple[float, float] = (0.0, 0.0), zoom: float = 1.0, seed: int = 0

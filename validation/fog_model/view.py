@@ -19,6 +19,7 @@ from reference.quadrature.replicates import PointPlan, square_points
 from reference.quadrature.surface import surface_hits
 from reference.scene.area_light import TruthAreaLight, is_area
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
+from reference.scene.device import vectors
 from reference.scene.directional_light import DirectionalLight, is_directional
 from reference.scene.read import TruthLight, TruthMedium, TruthScene, homogeneous_around
 from reference.scene.shapes import read_shapes
@@ -81,14 +82,14 @@ class View:
             facing = self.interaction.is_valid()
             if isinstance(light, DirectionalLight):
                 towards = np.broadcast_to(-light.direction, point.shape)
-                shadow_ray = self.interaction.spawn_ray(mi.Vector3f(towards.T))
+                shadow_ray = self.interaction.spawn_ray(vectors(mi.Vector3f, towards))
             else:
                 way = light.position - point
                 towards = way / np.maximum(np.linalg.norm(way, axis=1), np.finfo(float).tiny)[:, None]
                 # An array, since a number would be a constant of a kernel, which each light would compile again.
                 place = np.broadcast_to(light.position, point.shape)
-                shadow_ray = self.interaction.spawn_ray_to(mi.Point3f(np.ascontiguousarray(place.T)))
-            local = self.interaction.to_local(mi.Vector3f(np.ascontiguousarray(towards.T)))
+                shadow_ray = self.interaction.spawn_ray_to(vectors(mi.Point3f, place))
+            local = self.interaction.to_local(vectors(mi.Vector3f, towards))
             value = self.interaction.bsdf().eval(mi.BSDFContext(), self.interaction, local, facing)
             reflected = np.array(value, dtype=np.float64).reshape(3, -1).T
             lit = visible & np.any(reflected > 0, axis=1)

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Numbers of NumPy for compiled kernels, which do not depend on how many there are or where their memory lies."""
+
+from typing import Any
+
+import drjit as dr
+import numpy as np
+from numpy.typing import ArrayLike
+
+_ALIGNMENT = 64  # bytes, of memory that Dr.Jit allocates
+
+
+def on_device(kind: Any, numbers: ArrayLike) -> Any:
+    """Return numbers, (n,), as an array of a kind such as `mi.Float64`.
+
+    Dr.Jit reads NumPy's memory as it stands, and compiles a kernel for the alignment of all arrays that it reads: where
+    NumPy puts them by chance, the same kernel is compiled again and again. So they are copied to where Dr.Jit's lie.
+    """
+    given = np.asarray(numbers)
+    dtype = np.dtype({"Float32": "f4", "Float64": "f8", "UInt32": "u4"}[dr.type_v(kind).name])
+    memory = np.empty(given.size * dtype.itemsize + _ALIGNMENT, np.uint8)
+    first = -memory.ctypes.data % _ALIGNMENT
+    aligned = memory[first : first + given.size * dtype.itemsize].view(dtype)
+    aligned[:] = given
+    return kind(aligned)
+
+
+def vectors(kind: Any, rows: ArrayLike) -> Any:
+    """Return rows, (n, 3), as vectors of a kind such as `mi.Vector3d`; of all at once their number is a constant."""
+    return kind(*(on_device(dr.value_t(kind), column) for column in np.asarray(rows).T))
