@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from reference.quadrature.segments import optical_depth
 from reference.scene.area_light import TruthAreaLight
-from reference.scene.device import vectors
+from reference.scene.device import as_rows, vectors
 from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthScene
 from reference.visibility.line_crossings import half_chord
@@ -47,7 +47,7 @@ def emitted_light(truth: TruthScene, distance: Array) -> Array:
         depth = optical_depth(truth, truth.origin, truth.direction[rows], np.zeros(len(rows)), np.full(len(rows), _FAR))
         interaction = dr.zeros(mi.SurfaceInteraction3f, len(rows))
         interaction.wi = vectors(mi.Vector3f, -truth.direction[rows])
-        total[rows] += np.array(truth.background.eval(interaction), dtype=np.float64).reshape(3, -1).T * np.exp(-depth)
+        total[rows] += as_rows(truth.background.eval(interaction)) * np.exp(-depth)
     return total
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from reference.quadrature.segments import optical_depth
 from reference.scene.area_light import is_area
-from reference.scene.device import on_device, vectors
+from reference.scene.device import as_rows, on_device, vectors
 from reference.scene.directional_light import DirectionalLight, is_directional
 from reference.scene.read import TruthLight, TruthScene
 
@@ -57,7 +57,7 @@ class Reflection:
         """Return f cos_s, (n, 3) [1/sr], where rays of these numbers hit, for light from unit directions, (n, 3)."""
         at = dr.gather(mi.SurfaceInteraction3f, self.interaction, on_device(mi.UInt32, ray))
         local = at.to_local(dr.normalize(vectors(mi.Vector3f, towards)))
-        return np.array(at.bsdf().eval(mi.BSDFContext(), at, local), dtype=np.float64).reshape(3, -1).T
+        return as_rows(at.bsdf().eval(mi.BSDFContext(), at, local))
 
 
 def lit_surface(
@@ -91,7 +91,7 @@ def lit_surface(
     for emitter, light, reaches in zip(emitters, lights, reached, strict=True):
         towards, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
         reflected = interaction.bsdf().eval(mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing)
-        radiance = np.array(reflected * arriving, dtype=np.float64).reshape(3, -1).T
+        radiance = as_rows(reflected * arriving)
         if isinstance(light, DirectionalLight):
             way, r = np.broadcast_to(-light.direction, point.shape), np.full(len(point), _ENDLESS)
         else:

@@ -5,7 +5,7 @@ from typing import Any
 
 import drjit as dr
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 _ALIGNMENT = 64  # bytes, of memory that Dr.Jit allocates
 
@@ -28,3 +28,10 @@ def on_device(kind: Any, numbers: ArrayLike) -> Any:
 def vectors(kind: Any, rows: ArrayLike) -> Any:
     """Return rows, (n, 3), as vectors of a kind such as `mi.Vector3d`; of all at once their number is a constant."""
     return kind(*(on_device(dr.value_t(kind), column) for column in np.asarray(rows).T))
+
+
+def as_rows(values: Any) -> NDArray[np.float64]:
+    """Return vectors or colours as rows, (n, 3), for the same reason one component after the other."""
+    dr.eval(values)
+    components = [np.array(component, dtype=np.float64) for component in values]
+    return np.stack(np.broadcast_arrays(*components), axis=1)

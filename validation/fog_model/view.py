@@ -19,7 +19,7 @@ from reference.quadrature.replicates import PointPlan, square_points
 from reference.quadrature.surface import surface_hits
 from reference.scene.area_light import TruthAreaLight, is_area
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
-from reference.scene.device import vectors
+from reference.scene.device import as_rows, vectors
 from reference.scene.directional_light import DirectionalLight, is_directional
 from reference.scene.read import TruthLight, TruthMedium, TruthScene, homogeneous_around
 from reference.scene.shapes import read_shapes
@@ -90,8 +90,7 @@ class View:
                 place = np.broadcast_to(light.position, point.shape)
                 shadow_ray = self.interaction.spawn_ray_to(vectors(mi.Point3f, place))
             local = self.interaction.to_local(vectors(mi.Vector3f, towards))
-            value = self.interaction.bsdf().eval(mi.BSDFContext(), self.interaction, local, facing)
-            reflected = np.array(value, dtype=np.float64).reshape(3, -1).T
+            reflected = as_rows(self.interaction.bsdf().eval(mi.BSDFContext(), self.interaction, local, facing))
             lit = visible & np.any(reflected > 0, axis=1)
             if shadows:
                 lit &= ~np.array(self.truth.occluders.ray_test(shadow_ray, facing), dtype=bool)
