@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 _FEW_PLANES = 12  # of which every three are met
 _ANGLES = 90  # that are tried, in a quarter of a turn
 _BITS = 14  # of the numbers of a sphere
+_BORDER = 0.05  # of the size of all shapes
 _MARGIN = 1.001  # so that rounding leaves nothing outside
 
 
@@ -46,6 +47,21 @@ def mesh_spheres(meshes: Sequence[ClosedMesh]) -> Array:
     vertices = np.concatenate([mesh.vertices for mesh in meshes])
     corners = vertices[ConvexHull(vertices).vertices]
     return _rounded(np.column_stack([corners, np.zeros(len(corners))]))
+
+
+def shape_spheres(shapes) -> Array:
+    """Return spheres about Mitsuba's shapes, as `media_spheres` does, for a medium without sides.
+
+    They are larger than the shapes by a twentieth of them all: at the border of a map nothing stands, so that what lies
+    beyond it is lit.
+    """
+    spheres = []
+    for shape in shapes:
+        low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (shape.bbox().min, shape.bbox().max))
+        spheres.append([*(0.5 * (low + high)), 0.5 * float(np.linalg.norm(high - low))])
+    found = np.array(spheres or [[0.0, 0.0, 0.0, 1.0]])
+    size = np.ptp(found[:, :3], axis=0).max() + found[:, 3].max()
+    return _rounded(found + np.array([0, 0, 0, _BORDER * size]))
 
 
 def _rounded(spheres: Array) -> Array:

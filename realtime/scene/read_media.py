@@ -30,6 +30,7 @@ from realtime.scene.convex_bounds import (
 )
 from realtime.scene.density import DensityGrid, density_on_device, read_density
 from realtime.scene.media.bounded import BoundedMedia, Clouds
+from realtime.scene.media.height_fog import HeightFog, Layer
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.media.light_paths import BoundedMedium
 from realtime.scene.media.medium import Medium
@@ -120,7 +121,16 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[Cl
                 "the camera references no medium: it would be in a vacuum; declare the medium with an id and put "
                 '<ref name="medium" id="..."/> inside the sensor'
             )
+        if _is_height_fog(sensor.get_medium()):
+            return _height_fog(sensor.get_medium(), types), ()
         return _homogeneous(sensor.get_medium(), types), ()
+    for shape in boundaries:
+        for own in (shape.interior_medium(), shape.exterior_medium()):
+            if _is_height_fog(own):
+                raise InputError(
+                    f"shape '{shape.id()}' bounds a medium in height fog, or height fog; wanted height fog alone, in "
+                    "the sensor: remove the medium of the shape"
+                )
     shapes = [read_bounds(shape) for shape in boundaries]
     bounds = [convex for convex, _ in shapes if convex is not None]
     uneven = [shape.id() for shape in boundaries if not shape.interior_medium().is_homogeneous()]
@@ -295,6 +305,34 @@ def _require_constant(medium, *coefficients: str) -> None:
 def _check_albedo(albedo) -> None:
     if np.any(albedo > 1 + 1e-6):
         raise InputError(f"the medium's albedo is {albedo.tolist()}; wanted values from 0 to 1")
+
+
+def _is_height_fog(medium) -> bool:
+    return medium is not None and "sigma_t.H_1" in mi.traverse(medium)
+
+
+def _height_fog(medium, types: ArrayTypes) -> HeightFog:
+    """Read a medium whose extinction is a volume of type `heightfog`, which answers for its numbers."""
+    _require_constant(medium, "albedo")
+    parameters = mi.traverse(medium)
+    scale = float(parameters["scale"])
+
+    def number(name: str, factor: float = 1.0):
+        return dr.opaque(types.scalar, factor * float(parameters[f"sigma_t.{name}"][0]))
+
+    layers = tuple(
+        Layer(number(f"sigma_{i}", scale), number(f"z_{i}"), number(f"H_{i}"))
+        for i in "12"
+        if float(parameters[f"sigma_t.sigma_{i}"][0]) > 0
+    )
+    albedo = np.broadcast_to(np.array(parameters["albedo.value.value"], dtype=np.float64).reshape(-1), 3)
+    _check_albedo(albedo)
+    up = types.vector(*(float(each) for each in np.array(parameters["sigma_t.up"]).ravel()))
+    color = types.color(*(float(value) for value in albedo))
+    dr.make_opaque(up, color)
+    clamped = bool(parameters["sigma_t.clamped"][0])
+    ends, phase = (number("floor"), number("cap")), _read_phase(medium.phase_function(), types)
+    return HeightFog(layers, number("sigma_0", scale), clamped, *ends, up, color, phase)
 
 
 def _homogeneous(medium, types: ArrayTypes) -> Homogeneous:

@@ -20,9 +20,16 @@ from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes, array_types, is_single, types_of
 from realtime.scene.camera import Camera, pixel_grid
 from realtime.scene.closed_mesh import ClosedMesh
-from realtime.scene.directional_extent import directional_fields, distance_before, media_spheres, mesh_spheres
+from realtime.scene.directional_extent import (
+    directional_fields,
+    distance_before,
+    media_spheres,
+    mesh_spheres,
+    shape_spheres,
+)
 from realtime.scene.features import SceneFeatures, backgrounds, scene_notes
 from realtime.scene.lights import Light, spot_fields
+from realtime.scene.media.height_fog import HeightFog
 from realtime.scene.media.medium import Medium
 from realtime.scene.read_media import opaque_scene, read_medium, sort_shapes
 from realtime.scene.triangle_table import Facets, read_facets
@@ -128,7 +135,10 @@ class _Bodies:
 
     def beam(self, axis, types: ArrayTypes) -> dict[str, Any]:
         """Return the fields of a `Light` from infinity, which travels along a unit vector."""
-        spheres = mesh_spheres(self.meshes) if self.meshes else media_spheres(self.medium.bounded_media)
+        if isinstance(self.medium, HeightFog):
+            spheres = shape_spheres(self.opaque)
+        else:
+            spheres = mesh_spheres(self.meshes) if self.meshes else media_spheres(self.medium.bounded_media)
         return directional_fields(axis, spheres, distance_before(spheres, self.opaque), types)
 
 
@@ -187,7 +197,15 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
 
 def _read_directional(emitter, bodies: _Bodies, types: ArrayTypes) -> Light:
     medium = bodies.medium
-    if not (medium.clear and medium.clouds):
+    matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
+    axis = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+    if isinstance(medium, HeightFog):
+        if not axis @ np.array(medium.up, dtype=np.float64).ravel() < 0:
+            raise InputError(
+                f"light '{emitter.id()}' is directional and shines from the horizon or below: each of its light paths "
+                "through height fog, which has no sides, is infinitely deep; wanted a light from above the horizon"
+            )
+    elif not (medium.clear and medium.clouds):
         raise InputError(
             "the scene has a directional light and a medium without bounds, which lets nothing of it through from "
             "infinity: wanted media with bounds in clear air; give the medium bounds, or use a 'point' or 'spot' light"
@@ -196,8 +214,6 @@ def _read_directional(emitter, bodies: _Bodies, types: ArrayTypes) -> Light:
     if "irradiance.value" not in parameters:
         raise InputError("the directional light has a textured or spectral irradiance; wanted a constant 'rgb' one")
     irradiance = _read_colour(parameters["irradiance.value"], "the directional light's irradiance", "W/m^2")
-    matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
-    axis = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
     arrays: dict[str, Any] = {"intensity": types.color(*(float(c) for c in irradiance))}
     arrays |= bodies.beam(axis, types)
     dr.make_opaque(*arrays.values())

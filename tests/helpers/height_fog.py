@@ -124,8 +124,8 @@ def drawn(seed: int, count: int = 40) -> list[Drawn]:
     return found
 
 
-def fog_xml(*parts: str, size: tuple[int, int] = (24, 18), fog: str = FOG) -> str:
-    """Return a scene file: height fog over ground, a ball and a post, and further parts."""
+def fog_xml(*parts: str, size: tuple[int, int] = (24, 18), fog: str = FOG, ball: str = "sphere") -> str:
+    """Return a scene file: height fog over ground, a ball or a cube, and a post, and further parts."""
     width, height = size
     return f"""<scene version="3.0.0">
     <medium type="heterogeneous" id="fog">{fog}
@@ -137,8 +137,8 @@ def fog_xml(*parts: str, size: tuple[int, int] = (24, 18), fog: str = FOG) -> st
         <film type="hdrfilm"><integer name="width" value="{width}"/><integer name="height" value="{height}"/></film>
     </sensor>
     <shape type="rectangle" id="ground"><transform name="to_world"><scale value="60"/></transform></shape>
-    <shape type="sphere" id="ball">
-        <point name="center" x="-1.3" y="-0.4" z="2.1"/><float name="radius" value="0.9"/></shape>
+    <shape type="{ball}" id="ball">
+        <transform name="to_world"><scale value="0.7"/><translate x="-1.3" y="-0.4" z="2.1"/></transform></shape>
     <shape type="cube" id="post"><transform name="to_world">
         <scale x="0.3" y="0.3" z="2.1"/><translate x="1.1" y="2.1" z="2.1"/></transform></shape>
     {"".join(parts)}</scene>"""

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Height fog on the device: the certified rays in both precisions, frames against the reference, and refusals."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import pytest
+
+from realtime.errors import InputError
+from realtime.frame.renderer import frame_renderer, render_frame
+from realtime.kernels.exact import exact
+from realtime.kernels.quadrature import quadrature
+from realtime.kernels.taylor import taylor
+from realtime.methods.registry import METHODS
+from realtime.numerics.array_types import array_types
+from realtime.rays.ray_light import ray_geometry
+from realtime.scene.lights import Light
+from realtime.scene.media.height_fog import HeightFog, Layer, phi
+from realtime.scene.phase import HenyeyGreenstein
+from realtime.scene.read_scene import read_scene
+from reference.quadrature.image import quadrature_image
+from reference.scene.read import read_truth
+from tests.helpers.frames import relative_rmse
+from tests.helpers.height_fog import LAMP, SPOT, SUN, fog_xml, rows
+from validation.scenes.loading import load_scene
+
+
+@dataclass(frozen=True)
+class Sun:
+    """What of a light at infinity the medium asks."""
+
+    axis: object
+    axis_low: object
+    w: int = 0
+    varies: bool = False
+    cone: object = None
+    facing: object = None
+    beam: object = None
+
+
+def ends_of(row):
+    """Return a floor and a cap beyond which a row finds nothing: scenes have them, and no infinite density."""
+    heights = [row.origin[2]]
+    heights += [] if row.sun else [row.origin[2] + row.direction[2] * row.x1, row.light[2]]
+    layers = [layer for layer in row.fog.layers if layer.sigma_t > 0]
+    floor = max(layer.base - 60 * layer.scale_height for layer in layers)
+    cap = max(layer.base + 60 * layer.scale_height for layer in layers)
+    return min(floor, *heights) - 1, max(cap, *heights) + 1
+
+
+def relative_errors(chosen, precision, kernel=exact):
+    """The relative errors of rows of one kind, in one call of the medium."""
+    types = array_types(precision)
+
+    def number(values):
+        return types.scalar(np.array(values, dtype=np.float64))
+
+    def vector(values):
+        return types.vector(*(number(column) for column in np.array(values).T))
+
+    def layer(i):
+        found = [row.fog.layers[i] for row in chosen]
+        return Layer(*(number([getattr(each, name) for each in found]) for name in Layer.__annotations__))
+
+    medium = HeightFog(
+        (layer(0), layer(1)),
+        number([row.fog.constant for row in chosen]),
+        chosen[0].fog.clamped,
+        number([ends_of(row)[0] for row in chosen]),
+        number([ends_of(row)[1] for row in chosen]),
+        types.vector(0, 0, 1),
+        types.color(1),
+        HenyeyGreenstein(number([row.phase.g for row in chosen])),
+    )
+    directions = np.array([row.direction for row in chosen])
+    rounded = directions.astype(np.float32 if precision == "single" else np.float64)
+    lights = vector([row.light for row in chosen])
+    zero = types.vector(0, 0, 0)
+    light = Sun(-lights, zero) if chosen[0].sun else Light(position=lights, intensity=types.color(1))
+    rays = medium.rays(vector([row.origin for row in chosen]), vector(rounded), vector(directions - rounded))
+    geometry = ray_geometry(rays.origin, rays.direction, light, low=rays.direction_low)
+    lit = medium.lit(rays, light, geometry, kernel=kernel)
+    found = lit.airlight(number([row.x0 for row in chosen]), number([row.x1 for row in chosen]))
+    expected = np.array([row.value for row in chosen])
+    return np.abs(np.array(found.x, dtype=np.float64) / expected - 1)
+
+
+def by_tag(*tags, clamped=False):
+    return [row for row in rows() if row.tag in tags and row.fog.clamped == clamped and 1e-30 < row.value < 1e30]
+
+
+SUNS = ("sun", "sun-infinite", "sun-resonant")
+GENERIC = ("generic", "large-H", "horizontal", "grazing", "above", "below")
+HARD = ("small-H", "near-light", "strong-g")
+
+
+@pytest.mark.claim("height-fog-kernels", tolerance="1e-5 in float32 to an exponent of 30, 1e-12 in float64")
+def test_suns_on_certified_rays(variant):
+    assert relative_errors(by_tag(*SUNS), "double").max() < 1e-12
+    # An exponent of 30 has as many roundings in float32.
+    chosen = [row for row in by_tag(*SUNS) if row.value > 1e-13]
+    assert relative_errors(chosen, "single").max() < 1e-5
+
+
+@pytest.mark.claim("height-fog-kernels", tolerance="1e-5 in float32, 1e-9 in float64; of hard rays the coordinates'")
+@pytest.mark.parametrize("clamped", [False, True])
+def test_panels_on_certified_rays(variant, clamped):
+    generic = by_tag("clamped", clamped=True) if clamped else by_tag(*GENERIC)
+    assert relative_errors(generic, "single").max() < 2e-5
+    assert relative_errors(generic, "double").max() < 1e-9
+    if not clamped:
+        assert relative_errors(by_tag(*HARD), "double").max() < 1e-8
+        # Beside a light the rounding of the row's own coordinates is a part of the distance.
+        assert relative_errors(by_tag("small-H"), "single").max() < 2e-5
+
+
+@pytest.mark.claim("height-fog-kernels", tolerance="1e-4 for nine of ten generic rays, as asked for")
+def test_sixteen_nodes_in_w(variant):
+    errors = relative_errors(by_tag(*GENERIC), "single", quadrature)
+    assert np.quantile(errors, 0.9) < 1e-5
+    assert np.quantile(relative_errors(by_tag(*GENERIC), "double", partial(quadrature, nodes=8)), 0.9) < 1e-5
+
+
+def test_phi_keeps_its_digits(variant):
+    for precision, error in (("single", 3e-7), ("double", 3e-15)):
+        Float = array_types(precision).scalar
+        u = np.concatenate([[0.0], np.geomspace(1e-12, 60, 400)]).astype(np.float32).astype(np.float64)
+        expected = np.where(u == 0, 1, -np.expm1(-u) / np.where(u == 0, 1, u))
+        np.testing.assert_allclose(np.array(phi(Float(u)), dtype=np.float64), expected, rtol=error)
+
+
+@pytest.fixture
+def scene(variant, tmp_path):
+    def load(*lights):
+        path = tmp_path / "fog.xml"
+        path.write_text(fog_xml(*lights, size=(32, 24), ball="cube"))
+        return load_scene(str(path)).scene
+
+    return load
+
+
+def frame(scene, method, kernel=exact):
+    return render_frame(frame_renderer(read_scene(scene), METHODS[method], kernel=kernel))
+
+
+@pytest.mark.claim("height-fog-methods", tolerance="1e-5 relative RMSE of shadow planes in float32")
+@pytest.mark.parametrize("lights", [(LAMP, SPOT), (SUN,)], ids=["local", "sun"])
+def test_frames_are_the_reference(scene, lights):
+    loaded = scene(*lights)
+    truth = quadrature_image(read_truth(loaded), checks=0)
+    planes = frame(loaded, "shadow-planes")
+    assert relative_rmse(planes.airlight, truth.airlight) < 1e-5
+    assert relative_rmse(planes.surface, truth.surface) < 1e-4
+    # Maps and steps: some percent at their defaults.
+    for method, error in (("light-volumes", 0.02), ("min-max", 0.05), ("ray-march", 0.1)):
+        assert relative_rmse(frame(loaded, method).airlight, truth.airlight) < error, method
+
+
+@pytest.mark.claim("height-fog-refused", tolerance="by name")
+def test_refusals(scene):
+    with pytest.raises(InputError, match="kernel: got taylor, which is of homogeneous fog"):
+        frame(scene(LAMP), "shadow-planes", taylor)
+    with pytest.raises(InputError, match="light 'sun' is directional and shines from the horizon or below"):
+        read_scene(scene(SUN.replace('z="-0.45"', 'z="0.1"')))
