@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from realtime.scene.features import scene_notes
 from realtime.scene.read_scene import read_scene
 from reference.scene.area_light import TruthAreaLight
 from reference.scene.camera import camera_matrix
@@ -65,10 +64,8 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
     InputError
         For a scene without a reference, with the name of what is in the way.
     """
+    notes = read_scene(loaded.scene).features.notes  # it refuses what `render` refuses, in its words
     truth = read_truth(loaded.scene)
-    fog = isinstance(truth.medium, HeightMedium)
-    # Reading refuses what `render` refuses, in its words.
-    notes = scene_notes(loaded.scene) if fog else read_scene(loaded.scene).features.notes
     camera = _camera(loaded.scene.sensors()[0], truth)
     described = {
         "scene": loaded.name,

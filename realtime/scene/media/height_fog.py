@@ -206,7 +206,7 @@ class HeightRays(LitRays):
         x0, x1 = dr.clip(x0, enter, leave), dr.clip(x1, enter, leave)
         if not self.light.w:
             return medium.albedo * dr.select(x1 > x0, self._sun(x0, x1), 0)
-        # Twice the usual reach: from thick fog upwards the way to the light may lose more depth than the camera's gains.
+        # Twice the usual reach: out of thick fog the way to the light may lose more depth than the camera's gains.
         x1 = dr.minimum(x1, x0 + medium.length_from(self.rays, x0, 2 * optical_reach(type(x0))))
         total = type(x0)(0)
         for begin, end in self._smooth(x0, x1):

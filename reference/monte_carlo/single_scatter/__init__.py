@@ -7,8 +7,9 @@ Read in this order:
 - `directional_sampling.py`: distances for directional lights: uniform and free-flight;
 - `boundary_walk.py`: optical depth and visibility through the boundaries of media;
 - `area_sampling.py`: lights with extent, and points on them;
-- `scene_data.py`: what the integrator must know of a scene, read on its own;
 - `stretches.py`: camera rays, their stretches in one medium, cells of samples;
+- `height_fog.py`: the estimate in height fog, with optical depths of its own;
+- `scene_data.py`: what the integrator must know of a scene, read on its own;
 - `area_estimate.py`: the estimate under lights with extent;
 - `estimator.py`: the estimate of one camera ray;
 - `integrator.py`: its batches.

@@ -39,6 +39,7 @@ from reference.monte_carlo.single_scatter.distance_sampling import (
     mixture_of,
     sample_distance,
 )
+from reference.monte_carlo.single_scatter.height_fog import height_fog_light
 from reference.monte_carlo.single_scatter.scene_data import Light, Task
 from reference.monte_carlo.single_scatter.stretches import Ray, Stretch, cell_of, point_on
 
@@ -63,6 +64,8 @@ def ray_light(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
         medium = dr.zeros(mi.MediumPtr)
     elif isinstance(medium, mi.Medium):
         medium = mi.MediumPtr(medium)
+    if task.fog is not None:
+        return height_fog_light(task, sampler, ray, medium, active)
     if task.around.bounded:
         return _through_media(task, sampler, ray, medium, active)
     nothing = dr.zeros(mi.Spectrum, dr.width(active))

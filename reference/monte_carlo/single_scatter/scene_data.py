@@ -21,6 +21,7 @@ from reference.monte_carlo.single_scatter.boundary_walk import (
     read_surroundings,
     require_homogeneous,
 )
+from reference.monte_carlo.single_scatter.height_fog import HeightDensity, read_height_density
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ class Task:
     samples: int  #: distances for each ray, light and medium
     grey: bool  #: no medium's extinction depends on the channel
     area: tuple[AreaLight, ...] = ()  #: lights with extent
+    fog: HeightDensity | None = None  #: what camera rays start in, where that is height fog
 
 
 def read_task(scene, medium, samples: int) -> Task:
@@ -68,6 +70,14 @@ def read_task(scene, medium, samples: int) -> Task:
         _read_light(emitter) for emitter in scene.emitters() if not (_is_directional(emitter) or is_area(emitter))
     )
     around, media = read_surroundings(scene)
+    fog = read_height_density(medium) if isinstance(medium, mi.Medium) else None
+    if fog is not None:
+        if area:
+            raise InputError(
+                "single-scatter: the scene has area lights in height fog; wanted point, spot and directional lights: "
+                "take the estimator volpath"
+            )
+        return Task(around, lights, directional, samples, grey=True, fog=fog)
     if directional:
         _refuse_endless(scene, medium, directional[0])
     if isinstance(medium, mi.Medium):
