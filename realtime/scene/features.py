@@ -25,6 +25,7 @@ class SceneFeatures:
     concave: tuple[str, ...] = ()  #: shapes that bound media and are not all convex: clouds
     uneven: int = 0  #: clouds whose density differs from place to place
     sky: str = ""  #: the axis from which a uniform sky shines, '' where there is none; it is seen behind the scene
+    height_fog: bool = False  #: the density of the medium depends on height
     notes: tuple[str, ...] = ()  #: what the user should know of this scene
 
 
@@ -74,6 +75,8 @@ def describe(features: SceneFeatures) -> dict[str, str]:
         if features.concave
         else f"bounded, in {'clear air' if features.clear else 'another medium'}: rays clipped, no kernel"
         if features.bounded
+        else "height fog: depths and suns in closed form, panels of nodes for lights at places"
+        if features.height_fog
         else "unbounded: every ray lies in it whole",
         "lights": " and ".join(lights),
         "spot falloff": "inside the cone: integrand weighted"

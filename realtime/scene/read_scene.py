@@ -298,6 +298,7 @@ def _scene_features(
         isotropic=all(phase.constant for phase in phases),
         bounded=bool(medium.bounded_media),
         clear=medium.clear,
+        height_fog=isinstance(medium, HeightFog),
         vacuum=medium.vacuum,
         point_lights=sum(light.kind == "point" for light in lights),
         spot_lights=sum(light.kind == "spot" for light in lights),

@@ -295,21 +295,48 @@ class HeightRays(LitRays):
 
     def _integrand(self, s, r):
         """Return sigma_t exp(-tau) p at s = x - foot and r from the light [1/m]."""
-        medium, (start, rise) = self.medium, self.rays.crossed[1]
+        medium, ((enter, _), (start, rise)) = self.medium, self.rays.crossed
         x = self.geometry.foot + s
         z = dr.fma(rise, x, start)
-        exponent = medium.optical_depth(self.rays, 0, x)[0]
-        exponent += medium._between(z, dr.dot(self.light.position, medium.up), r)
-        value = medium.density(z) * exp_bounded(-exponent) * medium.phase.evaluate(-s / r)
+        at_light = dr.dot(self.light.position, medium.up)
+        if medium.clamped:
+            density, exponent = medium.density(z), medium.optical_depth(self.rays, 0, x)[0]
+            exponent += medium._between(z, at_light, r)
+        else:
+            # One exponential a layer: those where the ray enters and at the light are the same for all nodes.
+            length, end = dr.maximum(x - enter, 0), dr.clip(at_light, medium.floor, medium.cap)
+            away = dr.abs(at_light - z)
+            within = dr.select(end == at_light, r, r * (dr.abs(end - z) / dr.maximum(away, 1e-12)))
+            density, exponent = medium.constant, medium.constant * (length + within)
+            for layer in medium.layers:
+                here, there = medium._fall(layer, z), medium._fall(layer, end)
+                before = medium._fall(layer, dr.fma(rise, enter, start))
+                rises = dr.abs(rise) * length / layer.scale_height, dr.abs(end - z) / layer.scale_height
+                depth = length * mean_fall(before, here, rises[0]) + within * mean_fall(here, there, rises[1])
+                density = dr.fma(layer.sigma_t, here, density)
+                exponent = dr.fma(layer.sigma_t, depth, exponent)
+        value = density * exp_bounded(-exponent) * medium.phase.evaluate(-s / r)
         return value * self.geometry.falloff_beside(self.light, s) if self.light.varies else value
+
+
+def mean_fall(a, b, u):
+    """Return the mean of an exponential between two places where it is a and b, u >= 0 scale heights apart."""
+    if is_single(type(u)):
+        return dr.select(u < 0.5, dr.maximum(a, b) * _series(u), dr.abs(a - b) / u)
+    return dr.maximum(a, b) * phi(u)
+
+
+def _series(u):
+    """Return (1 - e^-u)/u to u^6, in float32 right to rounding below 1/2."""
+    series = type(u)(1 / 5040)
+    for divisor in (720, 120, 24, 6, 2, 1):
+        series = dr.fma(-u, series, 1 / divisor)
+    return series
 
 
 def phi(u):
     """Return (1 - e^-u)/u, 1 at u = 0, for u >= 0 (see the module)."""
     if is_single(type(u)):
-        series = type(u)(1 / 5040)
-        for divisor in (720, 120, 24, 6, 2, 1):
-            series = dr.fma(-u, series, 1 / divisor)
-        return dr.select(u < 0.5, series, (1 - exp_bounded(-u)) / u)
+        return dr.select(u < 0.5, _series(u), (1 - exp_bounded(-u)) / u)
     e = dr.exp(-u)
     return dr.select(e == 1, 1, (1 - e) / dr.select(u < 1, -dr.log(e), u))
