@@ -243,12 +243,12 @@ def _sampled(
         loaded, estimator, budget=budget, seed=seed, orders=chosen, progress=tell, elsewhere=elsewhere
     )
     counted = {"cached": found.cached, "damaged": found.damaged, "masked": found.masked}
-    errors = {"pooled_error": found.errors.pooled, "worst_error": found.errors.worst, "reached": found.reached}
+    errors = {"pooled_error": found.errors["pooled"], "worst_error": found.errors["worst"], "reached": found.reached}
     return Reference(
         scene=loaded.name,
         image=sealed(found.image),
         estimator=estimator,
-        relative_error=getattr(found.errors, budget.target),
+        relative_error=found.errors[budget.target],
         details=_batches(found.image.attributes) | counted | errors,
     )
 

@@ -52,14 +52,14 @@ def kernels(*, kernel: Kernels = (), phase: str | None = None, progress: Progres
     from reports.machine.environment import activate
 
     activate()
-    from validation.kernels.benchmark import PHASES, bench_kernels
+    from validation.kernels.benchmark import PHASES, bench_kernels, speed_against_error
     from validation.metrics.errors import plain
 
     phases = PHASES if phase is None else ((phase, phase_from_words(phase).g),)
     named = [kernel_name(each) or "" for each in several(kernel)] or None
     with telling(progress, "kernels") as tell:
         found = bench_kernels(named, phases=phases, rays=_TIMED_RAYS, progress=counted(tell))
-    data = plain(found)
+    data = {"costs": plain(found), "levels": plain(speed_against_error(found))}
     drawn = kernel_tables(data["costs"], data["levels"])
     said = ("ns/ray: the kernel alone by Dr.Jit's history, median.",)
     shown = [cost for cost in data["costs"] if cost["phase"] == phases[0][0] and not cost["refused"]]
@@ -241,14 +241,14 @@ def stability(*, kernel: Kernels = (), progress: Progress = None) -> Study:
     from reports.machine.environment import activate
 
     activate()
-    from validation.kernels.stability import CERTIFIED, Bar
+    from validation.kernels.stability import BAR, CERTIFIED
     from validation.kernels.stability import stability as run
     from validation.metrics.errors import plain
 
     named = [kernel_name(each) or "" for each in several(kernel)] or None
     with telling(progress, "stability") as tell:
         found = run(named, count=_TRIED_RAYS, progress=counted(tell))
-    data = plain({"certified": CERTIFIED, "bar": Bar(), "kernels": found})
+    data = plain({"certified": CERTIFIED, "bar": BAR, "kernels": found})
     drawn = [each for one in data["kernels"] for each in _stability_tables(one)]
     return Study(
         name="stability",

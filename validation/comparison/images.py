@@ -140,9 +140,10 @@ def compare_images(
         If a layer is not there, the sizes differ, a standard error is negative or not finite, or an exposure is given
         for nothing.
     """
-    extras = _Extras(all_metrics, flip, exposure)
-    names = ("the reference", reference), ("the test image", test)
-    return _compare(*names, name=layer, mask=mask, margin=margin, extras=extras)
+    extras: dict[str, Any] = {"all_metrics": all_metrics, "flip": flip, "exposure": exposure}
+    return _compare(
+        ("the reference", reference), ("the test image", test), name=layer, mask=mask, margin=margin, **extras
+    )
 
 
 def compare_files(
@@ -181,17 +182,15 @@ def compare_files(
     chosen = test_image.with_data(reference_image.with_data(None if mask is None else read_mask(mask)))
     names = (str(reference), reference_image), (str(test), test_image)
     layer = common_layer(*names) if layer is None else layer
-    whole = _compare(*names, name=layer, mask=chosen, margin=margin, extras=_Extras(all_metrics, flip, exposure))
+    extras: dict[str, Any] = {"all_metrics": all_metrics, "flip": flip, "exposure": exposure}
+    whole = _compare(*names, name=layer, mask=chosen, margin=margin, **extras)
     whole = replace(
         whole, notes=tuple(f"{path}: {image.attributes[NOTE]}" for path, image in names if NOTE in image.attributes)
     )
     if not by_order:
         return whole
-    plain = _Extras(all_metrics=False, flip=False, exposure=None)
-    orders = tuple(
-        _compare(*names, name=name, mask=chosen, margin=margin, extras=plain) for name in _layers_by_order(*names)
-    )
-    return replace(whole, orders=orders)
+    by_name = [_compare(*names, name=name, mask=chosen, margin=margin) for name in _layers_by_order(*names)]
+    return replace(whole, orders=tuple(by_name))
 
 
 def common_layer(reference: tuple[str, Image], test: tuple[str, Image]) -> str:
@@ -216,15 +215,6 @@ def _layers_by_order(reference: tuple[str, Image], test: tuple[str, Image]) -> l
     return sorted(of_both, key=lambda name: int(name.split("_")[1]))
 
 
-@dataclass(frozen=True)
-class _Extras:
-    """What is computed beside the metrics and the statistics."""
-
-    all_metrics: bool
-    flip: bool
-    exposure: float | None
-
-
 def _compare(
     reference_image: tuple[str, Image],
     test_image: tuple[str, Image],
@@ -232,13 +222,15 @@ def _compare(
     name: str,
     mask: ArrayLike | None,
     margin: float | None,
-    extras: _Extras,
+    all_metrics: bool = False,
+    flip: bool = False,
+    exposure: float | None = None,
 ) -> Comparison:
     """Compare a layer of two images that have names."""
-    if extras.exposure is not None and not (extras.all_metrics or extras.flip):
+    if exposure is not None and not (all_metrics or flip):
         raise InputError("an exposure is for the colour differences and FLIP; ask for all metrics or for FLIP too")
-    if extras.exposure is not None and not abs(extras.exposure) <= STOPS:
-        raise InputError(f"exposure: got {extras.exposure:g} stops, wanted -{STOPS:g} to {STOPS:g}")
+    if exposure is not None and not abs(exposure) <= STOPS:
+        raise InputError(f"exposure: got {exposure:g} stops, wanted -{STOPS:g} to {STOPS:g}")
     reference, test = (_estimate(path, image, name) for path, image in (reference_image, test_image))
     metrics = error_metrics(reference.mean, test.mean, mask=mask)
     statistics = None
@@ -250,16 +242,15 @@ def _compare(
             f"'{name}_se'; leave the margin out, or make the reference by Monte Carlo"
         )
     images: tuple[ArrayLike, ArrayLike] = (reference.mean, test.mean)
-    wanted = extras.all_metrics
     return Comparison(
         name,
         metrics,
         statistics,
         masked=0 if mask is None else int((~np.asarray(mask)).sum()),
-        errors=published_errors(*images, mask=mask) if wanted else None,
-        errors_normalised=published_errors(*images, mask=mask, unit=None) if wanted else None,
-        colour=colour_difference(*images, mask=mask, exposure=extras.exposure) if wanted else None,
-        flip=flip_hdr(*images, mask=mask, exposure=extras.exposure) if extras.flip else None,
+        errors=published_errors(*images, mask=mask) if all_metrics else None,
+        errors_normalised=published_errors(*images, mask=mask, unit=None) if all_metrics else None,
+        colour=colour_difference(*images, mask=mask, exposure=exposure) if all_metrics else None,
+        flip=flip_hdr(*images, mask=mask, exposure=exposure) if flip else None,
     )
 
 

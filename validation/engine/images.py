@@ -13,13 +13,13 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, read_exr
+from validation.clock import Timing
 from validation.engine.judge import EngineComparison, TruthOf, judge_image
 from validation.engine.judged_layer import AIRLIGHT, SURFACE, judged_layer
 from validation.metrics.errors import Metrics, error_metrics
@@ -38,21 +38,6 @@ class EngineImage:
 
 
 @dataclass(frozen=True)
-class ImageTimes:
-    """What an engine says of the time that an image took."""
-
-    median_ms: float  #: of a frame
-    low_ms: float  #: first quartile, or the median where there is none
-    high_ms: float  #: third quartile
-    device: str  #: what it ran on
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the times of a frame, as methods have them."""
-        frame = {"median_ms": self.median_ms, "low_ms": self.low_ms, "high_ms": self.high_ms, "repetitions": 0}
-        return {"frame": frame}
-
-
-@dataclass(frozen=True)
 class ImageMeasurement:
     """How wrong an image from elsewhere is."""
 
@@ -60,7 +45,7 @@ class ImageMeasurement:
     image: Image  #: only the layers that were judged, named by what they hold
     judged: EngineComparison
     surface_error: Metrics | None  #: where the image has both layers
-    times: ImageTimes | None = None  #: that its engine took, as `times.json` says
+    times: tuple[Timing, str] | None = None  #: that its engine took for a frame, and on what, as `times.json` says
 
     @property
     def light(self) -> NDArray[np.float64]:
@@ -74,7 +59,7 @@ class ImageMeasurement:
         notes = [judged.note] if judged.note else []
         notes += ["judged by the means over the areas of pixels, which fit"] if judged.pixel == "area" else []
         notes += [judged.verdict.words]
-        notes += [f"timed on {self.times.device}"] if self.times is not None and self.times.device else []
+        notes += [f"timed on {self.times[1]}"] if self.times is not None and self.times[1] else []
         return "; ".join(notes)
 
 
@@ -136,8 +121,8 @@ def measure_image(shown: EngineImage, loaded: LoadedScene, truth_of: TruthOf, *,
     return ImageMeasurement(shown, Image(layers), judged, surface, image_times(shown.path))
 
 
-def image_times(path: Path) -> ImageTimes | None:
-    """Return what `times.json` in the folder of an image says of it; None where it says nothing.
+def image_times(path: Path) -> tuple[Timing, str] | None:
+    """Return the time of a frame that `times.json` in the folder of an image says, and the device; None for nothing.
 
     The file holds, by the name of the image, `{"ms": 3.1, "quartiles": [2.9, 3.4], "device": "RTX 4090"}`, of which
     the last two may be missing.
@@ -151,7 +136,7 @@ def image_times(path: Path) -> ImageTimes | None:
         if entry is None:
             return None
         low, high = entry.get("quartiles", (entry["ms"], entry["ms"]))
-        times = ImageTimes(float(entry["ms"]), float(low), float(high), str(entry.get("device", "")))
+        times = Timing(float(entry["ms"]), float(low), float(high), repetitions=0)
         if not 0 < times.low_ms <= times.median_ms <= times.high_ms < math.inf:
             raise ValueError("ms")
     except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
@@ -159,7 +144,7 @@ def image_times(path: Path) -> ImageTimes | None:
             f'{file}: wanted {{"{path.name}": {{"ms": 3.1, "quartiles": [2.9, 3.4], "device": "RTX 4090"}}}}, '
             "milliseconds of a frame above 0, the median between its quartiles"
         ) from error
-    return times
+    return times, str(entry.get("device", ""))
 
 
 def _scene_of(path: Path, scenes: Mapping[str, str]) -> str:

@@ -78,30 +78,26 @@ def _power_of_two(number: int) -> int:
     return 1 << (max(1, number).bit_length() - 1)
 
 
-@dataclass(frozen=True)
-class RelativeErrors:
-    """Relative standard errors of an image [1], see the module; 0 in the dark, infinite for what is not finite."""
+def relative_errors(batches: Batches, near: NDArray[np.bool_]) -> dict[Target, float]:
+    """Return the relative standard errors [1] of some batches, less the airlight of pixels `near` a light, (pixels,).
 
-    pooled: float  #: of the sum of all pixels' errors, the largest of all layers and channels
-    worst: float  #: of a single pixel
-
-
-def relative_errors(batches: Batches, near: NDArray[np.bool_]) -> RelativeErrors:
-    """Return the relative errors [1] of some batches, without the airlight of pixels `near` a light, (pixels,)."""
+    See the module: 'pooled' is that of the sum of all pixels' errors, the largest of all layers and channels, 'worst'
+    that of a single pixel; 0 in the dark, infinite for what is not finite.
+    """
     pooled = worst = 0.0
     for number, layer in enumerate(LAYERS):
         keep = ~near if layer == "airlight" else np.ones_like(near)
         mean, error = batches.mean[number][keep], batches.standard_error[number][keep]
         total = mean.sum(axis=0)
         if not (np.isfinite(total).all() and np.isfinite(error).all()):
-            return RelativeErrors(np.inf, np.inf)  # no target is met by what is no number
+            return {"pooled": np.inf, "worst": np.inf}  # no target is met by what is no number
         lit = total > 0
         if not lit.any():
             continue
         mean, error, total = mean[:, lit], error[:, lit], total[lit]
         pooled = max(pooled, float((np.sqrt((error**2).sum(axis=0)) / total).max()))
         worst = max(worst, float((error / np.maximum(mean, _FLOOR * total / len(mean))).max()))
-    return RelativeErrors(pooled, worst)
+    return {"pooled": pooled, "worst": worst}
 
 
 def near_light(truth: TruthScene, distance: NDArray[np.float64]) -> NDArray[np.bool_]:

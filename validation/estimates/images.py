@@ -20,7 +20,7 @@ from reference.scene.clouds import read_clouds
 from reference.scene.read import read_truth
 from reference.storage.exr import Image
 from reference.storage.scene_digest import scene_digest
-from validation.estimates.budget import LEAST_BATCHES, Budget, RelativeErrors, batch_plan, near_light, relative_errors
+from validation.estimates.budget import LEAST_BATCHES, Budget, Target, batch_plan, near_light, relative_errors
 from validation.estimates.monte_carlo import Elsewhere, monte_carlo_batches
 from validation.estimates.quadrature import truth_image
 from validation.scenes.loading import LoadedScene
@@ -72,7 +72,7 @@ class MonteCarloReference:
     """A reference by random samples, and how it came about."""
 
     image: Image  #: layers with their standard errors
-    errors: RelativeErrors
+    errors: dict[Target, float]
     reached: bool | None  #: whether the target error was reached; None if none was set
     masked: int  #: pixels beside a light, whose airlight is left out of `errors`
     cached: int  #: batches that were in the cache
@@ -136,7 +136,7 @@ def monte_carlo_reference(
         elsewhere=elsewhere,
     )
     errors = relative_errors(run.batches, near)
-    reached = None if budget.error is None else getattr(errors, budget.target) <= budget.error
+    reached = None if budget.error is None else errors[budget.target] <= budget.error
     image = _layered_batches(loaded, estimator, run.batches, distance=distance.reshape(shape))
     if seen is not None:
         transmittance = seen.transmittance.reshape(*shape, 3)
@@ -176,7 +176,7 @@ class _Watch:
     def enough(self, batches: Batches) -> bool:
         """Say whether the target is reached; expect the error to fall with the square root of the batches."""
         assert self._budget.error is not None
-        error = getattr(relative_errors(batches, self._near), self._budget.target)
+        error = relative_errors(batches, self._near)[self._budget.target]
         done = len(batches.seeds)
         self._expected = max(LEAST_BATCHES, math.ceil(done * min(1e6, error / self._budget.error) ** 2))
         self._words = f", {self._budget.target} error {error:.3g} of {self._budget.error:.3g}"

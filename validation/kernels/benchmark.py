@@ -85,25 +85,6 @@ class KernelCost:
         return None if spread is None else spread.median
 
 
-@dataclass(frozen=True)
-class Level:
-    """The cheapest kernel whose error stays at or below a level."""
-
-    phase: str
-    statistic: str  #: 'max' or 'p99'
-    level: float
-    cheapest: str | None
-    ns: float | None  #: its cost [ns a ray]
-
-
-@dataclass(frozen=True)
-class KernelBench:
-    """All that was measured in one run."""
-
-    costs: tuple[KernelCost, ...]
-    levels: tuple[Level, ...]
-
-
 def bench_kernels(
     names: Sequence[str] | None = None,
     *,
@@ -111,7 +92,7 @@ def bench_kernels(
     rays: int = RAYS,
     seconds: float = 0.3,
     progress: Progress | None = None,
-) -> KernelBench:
+) -> list[KernelCost]:
     """Measure kernels, all of the registry by default: 'name' stands for all its sizes, 'name-N' for one.
 
     Of the phase functions, with their g, the first is measured with all sizes, the others with the default sizes. So
@@ -129,7 +110,7 @@ def bench_kernels(
                 cost = measure(family, size, truth=truth, timed=timed, seconds=seconds)
                 if cost.refused is None or size == default:  # a size that the kernel does not have is left out
                     costs.append(cost)
-    return KernelBench(tuple(costs), speed_against_error(costs))
+    return costs
 
 
 def measure(family: str, size: int | None, *, truth: Cases, timed: Cases, seconds: float = 0.3) -> KernelCost:
@@ -151,17 +132,18 @@ def measure(family: str, size: int | None, *, truth: Cases, timed: Cases, second
     return KernelCost(name, family, size, phase, g, rays, device, wall, median, p99, largest, nonfinite)
 
 
-def speed_against_error(costs: Sequence[KernelCost]) -> tuple[Level, ...]:
-    """Return the cheapest kernel for each phase function, statistic and error level.
+def speed_against_error(costs: Sequence[KernelCost]) -> list[dict[str, Any]]:
+    """Return the cheapest kernel, and its cost [ns a ray], for each phase function, statistic and error level.
 
-    Kernels that gave values that are not finite reach no level.
+    A kernel reaches a level if its error stays at or below it; one that gave values that are not finite reaches none.
     """
     levels = []
     for phase, statistic, level in product(dict.fromkeys(cost.phase for cost in costs), ("max", "p99"), LEVELS):
         good = [cost for cost in costs if cost.phase == phase and _reaches(cost, statistic, level)]
         best = min(good, key=lambda cost: cost.ns or 0.0, default=None)
-        levels.append(Level(phase, statistic, level, best.kernel if best else None, best.ns if best else None))
-    return tuple(levels)
+        of_best = {"cheapest": best.kernel if best else None, "ns": best.ns if best else None}
+        levels.append({"phase": phase, "statistic": statistic, "level": level, **of_best})
+    return levels
 
 
 def _reaches(cost: KernelCost, statistic: str, level: float) -> bool:

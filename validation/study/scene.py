@@ -358,7 +358,7 @@ def _image_measured(study: SceneStudy, shown: EngineImage) -> Computed:
         arrays["whole"] = measured.judged.truth
     elif "surface" in measured.image.layers or not np.any(truth.surface > 0):
         arrays["whole"] = truth.airlight + truth.surface
-    times = {} if measured.times is None else {"times": measured.times.to_json()}
+    times = {} if measured.times is None else {"times": {"frame": plain(measured.times[0])}}
     return plain(row) | times, arrays
 
 

@@ -53,11 +53,11 @@ def test_errors_by_hand():
     surface_error = [[0.5, 0.0, 0.0], [0.0, 0.0, 0.5]]  # 0.5 of 5 and of 10
     traced = batches([airlight, surface], [airlight_error, surface_error])
     errors = relative_errors(traced, np.zeros(2, dtype=bool))
-    assert errors.pooled == pytest.approx(0.125, rel=1e-12)
-    assert errors.worst == pytest.approx(0.3, rel=1e-12)
+    assert errors["pooled"] == pytest.approx(0.125, rel=1e-12)
+    assert errors["worst"] == pytest.approx(0.3, rel=1e-12)
     # Without the first pixel of the airlight: 0.4/3 pooled and worst.
     errors = relative_errors(traced, np.array([True, False]))
-    assert (errors.pooled, errors.worst) == pytest.approx((0.4 / 3, 0.4 / 3), rel=1e-12)
+    assert (errors["pooled"], errors["worst"]) == pytest.approx((0.4 / 3, 0.4 / 3), rel=1e-12)
 
 
 @pytest.mark.claim("pixels-beside-a-light")
@@ -80,4 +80,4 @@ def test_no_target_is_met_by_what_is_no_number(odd, layer):
     mean[layer, 2] = odd
     batches = Batches(tuple(range(32)), 1, mean, np.zeros_like(mean), np.ones((32, 2, 3)))
     errors = relative_errors(batches, np.zeros(4, dtype=bool))
-    assert (errors.pooled, errors.worst) == (np.inf, np.inf)
+    assert (errors["pooled"], errors["worst"]) == (np.inf, np.inf)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from validation.kernels.rays import table
-from validation.kernels.stability import GENERATED, Bar, _broken
+from validation.kernels.stability import GENERATED, _broken
 from validation.kernels.values import Values
 
 # Rays of which single terms are below 2^-126 though their sums are far above, with the J of each. A processor that
@@ -30,7 +30,7 @@ def faults(cases, J, precision="single"):
     """Return what values break of the bar, if the other precision is right."""
     values = {precision: Values(cases.value, {}, np.ones(len(J), dtype=bool)) for precision in ("single", "double")}
     values[precision] = replace(values[precision], J=np.asarray(J, dtype=np.float64))
-    return _broken(Bar(), GENERATED, cases, values)
+    return _broken(GENERATED, cases, values)
 
 
 @pytest.mark.claim("underflow-breaks-no-bar")
