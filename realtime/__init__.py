@@ -10,7 +10,7 @@ Rooms:
 - `errors.py`: the exception for mistakes of the user;
 - `memory.py`: refuses work that needs more memory than the machine, its container or the GPU has;
 - `parameters.py`: typed parameters of methods, with defaults, ranges and help;
-- `numerics/`: array types, error-free arithmetic, fast functions, Gauss-Legendre nodes;
+- `numerics/`: array types, fast functions, Gauss-Legendre nodes;
 - `droplets/`: phase functions of the droplets of fog and clouds;
 - `area_lights/`: area lights, and the samples that stand for them;
 - `scene/`: camera, lights, phase functions and meshes, read from Mitsuba; the features of a scene; what moves;
@@ -34,8 +34,8 @@ Rooms:
    `methods/shadow_planes/silhouettes.py` finds the edges that bound shadows, and
    `methods/shadow_planes/plane_table.py` makes planes of them, in wedges of azimuth about the light.
 5. `frame/surface.py` casts the camera rays and shades what they meet, without shadows.
-6. `methods/interface/view.py` makes the view of these rays, and `methods/shadow_planes/pixel_rays.py` says where each
-   passes the light, in terms of `rays/ray_light.py` and, for a spot, `rays/spot_cone.py`.
+6. `methods/interface/view.py` makes the view of these rays; `rays/ray_light.py` and, for a spot, `rays/spot_cone.py`
+   say where each passes the light.
 7. `methods/shadow_planes/sweep.py` walks along the planes of each ray and finds its lit intervals
    (`intervals/lit_intervals.py`).
 8. The medium (`scene/media/homogeneous.py` of the protocol in `scene/media/medium.py`) is asked for the integral over

@@ -218,7 +218,7 @@ def surface_stages(
         direction, _ = ray_directions(camera, pixel)
         seen = visible_surface(cast, facets, camera.origin, direction, color=type(medium.albedo))
         medium = medium if through_media else replace(medium, bounded_media=())
-        rays = Rays(camera.origin, direction, None, cast.crossed)
+        rays = Rays(camera.origin, direction, direction, cast.crossed)
         depths = medium.optical_depth(rays, 0, dr.select(seen.seen, cast.distance, 0))
         shown = {"medium": medium, "depths": depths}
 

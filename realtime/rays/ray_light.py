@@ -5,14 +5,13 @@ With v = l - w origin, the homogeneous vector from the camera to the light (`rea
 direction d, ``foot = v . d`` and ``height = |v x d|``. For a light at infinity, w = 0, v has unit length, and they are
 the cosine and the sine of the angle between ray and light. The textbook form
 sqrt(|v|^2 - foot^2) cancels where the ray passes close to the light: at height 1e-3 |v| it has no correct digit left in
-float32. Each component of the cross product is a difference of two products, a b - c d, and Kahan's form with fused
-multiply-add gives it to 1.5 units in the last place:
+float32, and so has a difference of products of rounded numbers. Foot, height and the ends of what a light reaches are
+found once for a ray and light: all of that is computed in float64, from the aim of the ray as the camera has it
+(`realtime.scene.camera`), and rounded at the end. Each component of the cross product is a difference of two products,
+a b - c d, and Kahan's form with fused multiply-add gives it to 1.5 units in the last place, so that v x d is at right
+angles to d however close to the light the ray passes:
 
     w = c d;   e = fma(-c, d, w)   (the exact rounding error of w);   a b - c d = fma(a, b, -w) + e
-
-That is as good as v and d are. The rounding errors of both are known, v's from the subtraction and d's from
-`realtime.scene.camera`, and enter to first order: (v + v') x (d + d') = v x d + v' x d + v x d'. A spot's cone needs
-the cross product to twice the digits (`realtime.rays.spot_cone`); a point light does not pay for them.
 
 A light point with the normal n lights what lies before its plane, with the cosine of the angle to n for a profile. From
 the light to the point of the ray at x, s = x - foot from the foot, leads (v x d) x d + s d, hence
@@ -23,12 +22,12 @@ Where that is 0 the ray meets the plane. The vector in brackets has the length o
 right to rounding as close to the light as v x d is.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
+import mitsuba as mi
 
-from realtime.numerics.error_free import difference_of_products, two_sum
 from realtime.rays.spot_cone import axis_distance, axis_geometry, cone_interval
 from realtime.scene.lights import Light
 
@@ -102,68 +101,55 @@ class RayGeometry:
         away = dr.sqrt(dr.fma(t, t, dr.square(self.gap)))
         along = dr.fma(self.axial, s, self.offset)
         # Compute one angle: at the dim edge the difference of two angles would cancel.
-        cos, sin = light.cone.cos, dr.sqrt(light.cone.square_sin)
+        cos, sin = (type(x)(value) for value in (light.cone.cos, dr.sqrt(light.cone.square_sin)))
         within = dr.atan2(sin * along - cos * away, dr.fma(cos, along, sin * away))
         return dr.clip(within * light.inverse_transition, 0, 1)
 
 
-def ray_geometry(origin, direction, light: Light, *, low=None) -> RayGeometry:
+def ray_geometry(origin, direction, light: Light) -> RayGeometry:
     """Return foot and height of rays with respect to one light, and where they are in what it lights.
 
     Parameters
     ----------
     origin, direction
-        Camera rays, three-vectors of Dr.Jit arrays [m]; `direction` has unit length.
+        Camera rays [m] in any precision; `direction` may have any length, and its errors are those of the height.
     light
-        Any light.
-    low
-        What rounding took from `direction`, if that is known (see `realtime.scene.camera.ray_directions`).
+        Any light; the result has its precision.
 
     Notes
     -----
     Valid for any ray. A ray through the light, or parallel to the light, has height 0.
     """
-    v, v_low = two_sum(light.position, -origin) if light.w else (-light.axis, -light.axis_low)
-    d = direction
-    if light.cone is not None:
-        return _spot_geometry((v, v_low), d, low, light)
-    cross = type(v)(
-        difference_of_products(v.y, d.z, v.z, d.y),
-        difference_of_products(v.z, d.x, v.x, d.z),
-        difference_of_products(v.x, d.y, v.y, d.x),
-    )
-    cross += dr.cross(v_low, d)
-    if low is not None:
-        cross += dr.cross(v, low)
-    geometry = RayGeometry(dr.dot(v, d), dr.norm(cross))
-    if light.facing is None:
-        return geometry
-    normal, normal_low = light.facing.normal, light.facing.normal_low
-    away = dr.cross(cross, d)
-    axial = dr.dot(normal, d) + (dr.dot(normal_low, d) if low is None else dr.dot(normal_low, d) + dr.dot(normal, low))
-    return before_plane(geometry, axial, dr.dot(normal, away) + dr.dot(normal_low, away))
+    aim = mi.Vector3d(direction)
+    v = mi.Vector3d(light.position) - mi.Vector3d(origin) if light.w else -light.exact_axis
+    inverse = dr.rcp(dr.norm(aim))
+    d, w = aim * inverse, _cross(v, aim) * inverse
+    fields = {"foot": dr.dot(v, d), "height": dr.norm(w)}
+    if light.facing is not None:
+        axial, offset = dr.dot(light.facing.exact_normal, d), dr.dot(light.facing.exact_normal, dr.cross(w, d))
+        meets = fields["foot"] - offset / axial
+        # A ray along the plane is before it as a whole, or nowhere.
+        along = axial == 0
+        enter = dr.select(axial > 0, meets, -dr.inf)
+        leave = dr.select(axial < 0, meets, dr.select(along & (offset <= 0), -dr.inf, dr.inf))
+        fields |= {"axial": axial, "offset": offset, "enter": enter, "leave": leave}
+    elif light.cone is not None:
+        ray = axis_geometry(w, d, light.exact_axis)
+        enter, leave = (fields["foot"] + s for s in cone_interval(ray, light.cone))
+        fields |= {"axial": ray.axial, "offset": ray.offset, "enter": enter, "leave": leave}
+        if light.beam is not None:
+            begin, end = (fields["foot"] + s for s in cone_interval(ray, light.beam))
+            fields |= {"beam_enter": begin, "beam_leave": end, **axis_distance(ray)}
+    Float = type(light.position.x)
+    return RayGeometry(**{name: Float(value) for name, value in fields.items()})
 
 
-def before_plane(geometry: RayGeometry, axial, offset) -> RayGeometry:
-    """Return the geometry of rays and a light point; `axial` [1] and `offset` [m] see `RayGeometry`."""
-    meets = geometry.foot - offset / axial
-    # A ray along the plane is before it as a whole, or nowhere.
-    along = axial == 0
-    enter = dr.select(axial > 0, meets, -dr.inf)
-    leave = dr.select(axial < 0, meets, dr.select(along & (offset <= 0), -dr.inf, dr.inf))
-    return replace(geometry, axial=axial, offset=offset, enter=enter, leave=leave)
+def _cross(a, b):
+    def difference(i, j):
+        w = a[j] * b[i]
+        return dr.fma(a[i], b[j], -w) + dr.fma(-a[j], b[i], w)
 
-
-def _spot_geometry(away, direction, direction_low, light: Light) -> RayGeometry:
-    """Return the geometry of rays and a spot; `away` is the vector to the light with its low part."""
-    ray = axis_geometry(away, direction, direction_low, light)
-    foot = dr.dot(away[0], direction)
-    enter, leave = (foot + s for s in cone_interval(ray, light.cone))
-    geometry = RayGeometry(foot, ray.height, ray.axial, ray.offset, enter, leave)
-    if light.beam is None:
-        return geometry
-    begin, end = (foot + s for s in cone_interval(ray, light.beam))
-    return replace(geometry, beam_enter=begin, beam_leave=end, **axis_distance(ray))
+    return type(a)(difference(1, 2), difference(2, 0), difference(0, 1))
 
 
 def _clip(enter, leave, x0, x1):

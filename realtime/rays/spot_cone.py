@@ -16,14 +16,9 @@ w/h are three unit vectors at right angles, so with across = a . w
 
     axial^2 + (offset/h)^2 + (across/h)^2 = 1,     hence     D = h^2 sin^2 - across^2.
 
-One difference is left, zero where the ray is tangent to the cone. A share e of h^2 that rounding adds to it changes a
-chord that is sqrt(e) of the distance from nothing to that, so float32 loses half of its digits there, for the rounding
-errors of v, d, a, sin and w enter alike. All of these are known (`realtime.numerics.error_free`), and with
-
-    h^2 sin^2 - across^2 + 2 (sin^2 w - across a) . w' - 2 across a' . w
-
-their effect to first order, where a prime marks what rounding took: D is right to rounding unless it is below 1e-13
-h^2. A common factor of d, which its low part leaves open, is one of h and across both.
+One difference is left, zero where the ray is tangent. A share e of h^2 that rounding adds to it changes a chord that is
+sqrt(e) of the distance from nothing to that: half of float64's digits are lost there, and float32 has its own. A common
+factor of d is one of h and across both.
 
 **The roots.** The end where A s + B > 0 is where the ray enters the cone, the other where it leaves it,
 
@@ -46,8 +41,7 @@ from typing import Any
 
 import drjit as dr
 
-from realtime.numerics.error_free import settled, two_cross, two_dot, two_product
-from realtime.scene.lights import Cone, Light
+from realtime.scene.lights import Cone
 
 _TINY = 2.0**-100
 
@@ -60,58 +54,23 @@ class AxisGeometry:
     offset: Any  # [m]
     height: Any  # [m]
     square: Any  # its square [m^2]
-    square_low: Any  # what rounding took from it
     across: Any  # [m]
-    shift: Any  # across times what rounding took from across [m^2]
 
 
-def axis_geometry(away, direction, direction_low, light: Light) -> AxisGeometry:
-    """Return rays as a spot's axis sees them.
-
-    `away` is the vector to the light with its low part [m]; `direction` are unit vectors, `direction_low` what rounding
-    took from them.
-    """
-    v, v_low = away
-    w, w_low = two_cross(v, direction)
-    w_low += dr.cross(v_low, direction)
-    if direction_low is not None:
-        w_low += dr.cross(v, direction_low)
-    w, w_low = settled(w, w_low)
-    square, square_low = two_dot(w, w)
-    across, across_low = two_dot(light.axis, w)
-    across_low += dr.dot(light.axis, w_low) + dr.dot(light.axis_low, w)
+def axis_geometry(w, direction, axis) -> AxisGeometry:
+    """Return rays as a spot's axis sees them; `w` is v x d [m], all in float64."""
     # The triple product keeps its digits where the light is close to the ray.
-    offset = dr.dot(light.axis, dr.cross(w, direction))
-    square_low = dr.fma(2, dr.dot(w, w_low), square_low)
-    axial, height = dr.dot(light.axis, direction), dr.sqrt(square)
-    return AxisGeometry(axial, offset, height, square, square_low, across, 2 * across * across_low)
+    offset, square = dr.dot(axis, dr.cross(w, direction)), dr.squared_norm(w)
+    return AxisGeometry(dr.dot(axis, direction), offset, dr.sqrt(square), square, dr.dot(axis, w))
 
 
 def cone_interval(ray: AxisGeometry, cone: Cone):
-    """Return the signed distances from the foot at which rays enter and leave a cone [m], see `cone_roots`."""
-    limit, limit_low = two_product(ray.square, cone.square_sin)
-    across, across_low = two_product(ray.across, ray.across)
-    low = dr.fma(ray.square_low, cone.square_sin, dr.fma(ray.square, cone.square_sin_low, limit_low))
-    return cone_roots(ray, (limit - across) + (low - (across_low + ray.shift)), cone)
-
-
-def cone_roots(ray: AxisGeometry, discriminant, cone: Cone):
     """Return the signed distances from the foot at which rays enter and leave a cone [m]; both -inf if they miss it.
 
-    Parameters
-    ----------
-    ray
-        The rays; neither `across` nor what rounding took is read.
-    discriminant
-        D [m^2].
-    cone
-        The cone.
-
-    Notes
-    -----
     Valid for half angles below 90 degrees. Half lines end at infinity. A ray through the light is in the cone on one
     side of it, or nowhere.
     """
+    discriminant = ray.square * cone.square_sin - dr.square(ray.across)
     # For a ray through the light only the signs remain, times `_TINY`.
     b = ray.axial * ray.offset
     c = (ray.offset - cone.cos * ray.height) * (ray.offset + cone.cos * ray.height)

@@ -50,18 +50,16 @@ def turned_light(light: Light, about: Array, turn: Array) -> Light:
         return replace(light, **_turned_directional(light, light.extent, turn))
     position = np.array(light.position, dtype=np.float64).ravel()
     arrays = {"position": _like(light.position, about + turn @ (position - about))}
-    if light.axis is not None:
-        high, low = (np.array(part, dtype=np.float64).ravel() for part in (light.axis, light.axis_low))
-        axis = turn @ (high + low)
-        arrays["axis"] = _like(light.axis, axis)
-        arrays["axis_low"] = _like(light.axis_low, axis - np.array(arrays["axis"], dtype=np.float64).ravel())
+    if light.exact_axis is not None:
+        arrays["exact_axis"] = _like(light.exact_axis, turn @ np.array(light.exact_axis).ravel())
     return replace(light, **arrays)
 
 
 def _turned_directional(light: Light, extent: DirectionalExtent, turn: Array) -> dict[str, Any]:
-    high, low = (np.array(part, dtype=np.float64).ravel() for part in (light.axis, light.axis_low))
     types = types_of(type(extent.back))
-    return directional_fields(turn @ (high + low), extent_spheres(extent), float(extent.back[0]), types)
+    return directional_fields(
+        turn @ np.array(light.exact_axis).ravel(), extent_spheres(extent), float(extent.back[0]), types
+    )
 
 
 def coloured_light(light: Light, share: float) -> Light:

@@ -11,10 +11,9 @@ of size 1,
 Rays start at the pinhole; the near clip plane does not cut the medium away (DESIGN section 6.3).
 
 A direction that is rounded to float32 misses its aim by 6e-8 of the distance: 3e-7 m at a light 5 m away, which is 1e-4
-of the height of a ray that passes it at half a pixel, and of the airlight there. So a direction is a sum of two
-numbers, `direction + low`, and likewise the camera's vectors. Sums and products keep their rounding errors by the
-error-free transformations of `realtime.numerics.error_free`. Only the *aim* needs this: a relative error of the length
-scales nothing but rounding.
+of the height of a ray that passes it at half a pixel, and of the airlight there. So the camera's vectors and the aim of
+a ray have float64, in which `realtime.rays.ray_light` computes once where it passes a light; all else has the precision
+of the scene.
 """
 
 from dataclasses import dataclass, replace
@@ -24,7 +23,6 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.numerics.error_free import two_product, two_sum
 from realtime.numerics.host_numbers import host_numbers
 
 TILE = 16  #: rays in a tile of neighbouring pixels
@@ -49,18 +47,28 @@ class Camera:
     width: int  #: [pixels]
     height: int  #: [pixels]
     origin: Any  #: the pinhole [m]
-    forward: Any  #: unit vector to the centre of the image
-    left: Any  #: one pixel to the left, at distance 1
-    up: Any  #: one pixel up, at distance 1
-    forward_low: Any  #: what rounding took from `forward`
-    left_low: Any
-    up_low: Any
+    axes: tuple[Any, Any, Any]  #: `forward`, `left` and `up` in float64
     grid: PixelGrid
+
+    @property
+    def forward(self) -> Any:
+        """The unit vector to the centre of the image."""
+        return type(self.origin)(self.axes[0])
+
+    @property
+    def left(self) -> Any:
+        """One pixel to the left, at distance 1."""
+        return type(self.origin)(self.axes[1])
+
+    @property
+    def up(self) -> Any:
+        """One pixel up, at distance 1."""
+        return type(self.origin)(self.axes[2])
 
 
 @dataclass(frozen=True)
 class HostCamera:
-    """A camera on the host, vectors as in `Camera` with what rounding took from them, in float64."""
+    """A camera on the host, in float64."""
 
     width: int  #: [pixels]
     height: int  #: [pixels]
@@ -70,11 +78,11 @@ class HostCamera:
     up: Any
 
 
-def pixel_grid(width: int, height: int, Float: Any) -> PixelGrid:
-    """Return the pixels of an image for a `Camera` whose numbers have the type `Float`."""
+def pixel_grid(width: int, height: int) -> PixelGrid:
+    """Return the pixels of an image for a `Camera`."""
     shift = (width - 1).bit_length()
     columns, reciprocal, bits = map(mi.UInt32, (width, -(-(1 << (31 + shift)) // width), shift))
-    grid = PixelGrid(columns, reciprocal, bits, Float(0.5 * (width - 1)), Float(0.5 * (height - 1)))
+    grid = PixelGrid(columns, reciprocal, bits, mi.Float64(0.5 * (width - 1)), mi.Float64(0.5 * (height - 1)))
     dr.make_opaque(grid)
     return grid
 
@@ -92,9 +100,7 @@ def row_and_column(camera: Camera, pixel):
 
 def read_camera(camera: Camera) -> HostCamera:
     """Bring a camera to the host, which waits for the device."""
-    high, low = (camera.forward, camera.left, camera.up), (camera.forward_low, camera.left_low, camera.up_low)
-    origin, *axes = host_numbers(camera.origin, *high, *low)
-    return HostCamera(camera.width, camera.height, origin, *(axes[i] + axes[i + 3] for i in range(3)))
+    return HostCamera(camera.width, camera.height, *host_numbers(camera.origin), *host_numbers(*camera.axes))
 
 
 def shifted_camera(camera: Camera, right: float, down: float) -> Camera:
@@ -111,13 +117,9 @@ def shifted_camera(camera: Camera, right: float, down: float) -> Camera:
         How far beside [pixels].
     """
     host = read_camera(camera)
-    forward = host.forward - right * host.left - down * host.up
-    Vector = type(camera.forward)
-    real = np.float32 if dr.itemsize_v(camera.forward) == 4 else np.float64
-    high = forward.astype(real)
-    vectors = [Vector(*(float(c) for c in part)) for part in (high, forward - high)]
-    dr.make_opaque(*vectors)
-    return replace(camera, forward=vectors[0], forward_low=vectors[1])
+    forward = mi.Vector3d(*(float(c) for c in host.forward - right * host.left - down * host.up))
+    dr.make_opaque(forward)
+    return replace(camera, axes=(forward, *camera.axes[1:]))
 
 
 def resized_camera(camera: Camera, width: int, height: int) -> Camera:
@@ -130,12 +132,10 @@ def resized_camera(camera: Camera, width: int, height: int) -> Camera:
     width, height
         Of its image [pixels].
     """
-    across, upwards = camera.width / width, camera.height / height
-    vectors = [camera.left * across, camera.up * upwards, camera.left_low * across, camera.up_low * upwards]
-    dr.make_opaque(*vectors)
-    left, up, left_low, up_low = vectors
-    grid = pixel_grid(width, height, type(camera.origin.x))
-    return replace(camera, width=width, height=height, left=left, up=up, left_low=left_low, up_low=up_low, grid=grid)
+    forward, left, up = camera.axes
+    left, up = left * (camera.width / width), up * (camera.height / height)
+    dr.make_opaque(left, up)
+    return replace(camera, width=width, height=height, axes=(forward, left, up), grid=pixel_grid(width, height))
 
 
 def tiled_pixels(width: int, height: int, tile: int = SIDE):
@@ -152,32 +152,12 @@ def tiled_pixels(width: int, height: int, tile: int = SIDE):
 
 
 def ray_directions(camera: Camera, pixel):
-    """Return the unit directions through the centres of pixels.
+    """Return the unit directions through the centres of pixels, and the same of about unit length in float64.
 
-    Parameters
-    ----------
-    camera
-        The camera; its arrays fix the precision of the result.
-    pixel
-        Pixel numbers, row times width plus column, an unsigned Dr.Jit array.
-
-    Returns
-    -------
-    direction
-        Unit vectors.
-    low
-        What rounding took from their aim: `direction + low` is right to twice the digits, but for a common factor.
+    `pixel` are numbers, row times width plus column, an unsigned Dr.Jit array.
     """
-    Float = type(camera.origin.x)
     row, column = row_and_column(camera, pixel)
-    # Whole and half numbers: exact.
-    i, j = camera.grid.half_width - Float(column), camera.grid.half_height - Float(row)
-    across, across_error = two_product(camera.left, i)
-    upward, upward_error = two_product(camera.up, j)
-    plane, plane_error = two_sum(across, upward)
-    aim, aim_error = two_sum(plane, camera.forward)
-    low = aim_error + plane_error + across_error + upward_error
-    low += camera.forward_low + camera.left_low * i + camera.up_low * j
-    scale = dr.rsqrt(dr.squared_norm(aim))
-    direction = aim * scale
-    return direction, dr.fma(aim, scale, -direction) + low * scale
+    i, j = camera.grid.half_width - mi.Float64(column), camera.grid.half_height - mi.Float64(row)
+    forward, left, up = camera.axes
+    aim = dr.fma(left, i, dr.fma(up, j, forward))
+    return type(camera.origin)(aim * dr.rcp(dr.norm(aim))), aim

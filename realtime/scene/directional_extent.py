@@ -14,6 +14,7 @@ from itertools import combinations
 from typing import Any
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
@@ -21,7 +22,7 @@ from scipy.spatial import ConvexHull
 from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import ArrayTypes
 from realtime.scene.closed_mesh import ClosedMesh
-from realtime.scene.lights import DirectionalExtent, with_low
+from realtime.scene.lights import DirectionalExtent
 from realtime.scene.media.light_paths import BoundedMedium
 
 Array = NDArray[np.float64]
@@ -100,7 +101,6 @@ def directional_fields(axis: Array, spheres: Array, back: float, types: ArrayTyp
     -----
     Valid for any axis. All but the axis is rounded to float32 in any precision, so that its map is the same in all.
     """
-    high, low = with_low(axis, types)
     middle = _middle(spheres)
     across, up, corner = _least_rectangle(axis, spheres[:, :3] - middle, spheres[:, 3])
     behind = _MARGIN * float(((spheres[:, :3] - middle) @ axis + spheres[:, 3]).max())
@@ -110,7 +110,7 @@ def directional_fields(axis: Array, spheres: Array, back: float, types: ArrayTyp
     media = types.vector(*(aligned_array(types.scalar, column) for column in spheres[:, :3].T))
     numbers = {"depth": types.scalar(float(np.float32(back + behind))), "back": types.scalar(back)}
     extent = DirectionalExtent(**made, **numbers, media=media, radii=aligned_array(types.scalar, spheres[:, 3]))
-    fields = {"position": position, "axis": _vector(high, types), "axis_low": _vector(low, types), "extent": extent}
+    fields = {"position": position, "exact_axis": mi.Vector3d(*(float(c) for c in axis)), "extent": extent}
     dr.make_opaque(*fields.values())
     return fields
 

@@ -4,6 +4,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +12,7 @@ from realtime.area_lights.points import PlacedPoints, place_points
 from realtime.numerics.aligned import aligned_numbers
 from realtime.numerics.array_types import ArrayTypes, types_of
 from realtime.numerics.host_numbers import host_numbers
-from realtime.scene.lights import Facing, Light, with_low
+from realtime.scene.lights import Facing, Light
 from realtime.scene.read_scene import Scene
 
 Array = NDArray[np.float64]
@@ -74,10 +75,9 @@ class HostLightPoints:
 def read_light_points(points: Sequence[Light]) -> HostLightPoints:
     """Bring light points to the host together, which waits for the device once."""
     facing = [point.facing for point in points if point.facing is not None]
-    numbers = host_numbers(
-        *(point.position for point in points), *(own.normal for own in facing), *(own.lift for own in facing)
-    )
-    position, normal, lift = (np.stack(numbers[i * len(points) : (i + 1) * len(points)]) for i in range(3))
+    normal = np.stack(host_numbers(*(own.exact_normal for own in facing)))
+    numbers = host_numbers(*(point.position for point in points), *(own.lift for own in facing))
+    position, lift = np.stack(numbers[: len(points)]), np.stack(numbers[len(points) :])
     helper = np.where(np.abs(normal[:, :1]) < 0.5, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     across = np.cross(helper, normal)
     return HostLightPoints(position, normal, across / np.linalg.norm(across, axis=1, keepdims=True), lift)
@@ -89,10 +89,7 @@ def _points_of(placed: PlacedPoints, source: int, types: ArrayTypes) -> list[Lig
     lift, chord = aligned_numbers(types.scalar, np.array([placed.lift, placed.chord]))
     alike = len(placed.normals) > 1 and bool(np.all(placed.normals == placed.normals[0]))
     normals = placed.normals[:1] if alike else placed.normals
-    facings = [
-        Facing(_vector(high, types), _vector(low, types), lift, chord)
-        for high, low in (with_low(normal, types) for normal in normals)
-    ]
+    facings = [Facing(mi.Vector3d(*aligned_numbers(mi.Float64, normal)), lift, chord) for normal in normals]
     return [
         Light(_vector(position, types), intensity, facing=facings[0 if alike else number], source=source)
         for number, position in enumerate(placed.positions)

@@ -22,7 +22,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.numerics.array_types import ArrayTypes, is_single
+from realtime.numerics.array_types import ArrayTypes
 from realtime.numerics.host_numbers import host_numbers
 
 Array = NDArray[np.float64]
@@ -32,9 +32,8 @@ Array = NDArray[np.float64]
 class Cone:
     """A cone about the axis of a spot, by its half angle."""
 
-    cos: Any
-    square_sin: Any
-    square_sin_low: Any  #: what rounding took from `square_sin`
+    cos: Any  #: in float64
+    square_sin: Any  #: in float64
 
 
 @dataclass(frozen=True)
@@ -53,8 +52,7 @@ class DirectionalExtent:
 class Facing:
     """What only a light point has: how the part of a shape that it stands for faces."""
 
-    normal: Any  #: unit normal of the shape, on the side that shines
-    normal_low: Any  #: what rounding took from it
+    exact_normal: Any  #: unit normal of the shape, on the side that shines, in float64
     lift: Any  #: how far before the shape rays start, so that they do not meet it [m]
     chord: Any  #: how long a ray is in the shape that goes along the normal, from behind: twice a sphere's radius [m]
 
@@ -69,8 +67,7 @@ class Light:
 
     position: Any  #: three-vector; directional: the middle of `extent` [m]
     intensity: Any  #: radiant intensity on the axis [W/sr], RGB; directional: irradiance of a plane across it [W/m^2]
-    axis: Any = None  #: spot: unit vector from the light along its axis; directional: in which the light travels
-    axis_low: Any = None  #: spot, directional: what rounding took from `axis`
+    exact_axis: Any = None  #: `axis` in float64
     cutoff: Any = None  #: spot: half angle beyond which there is no light [rad]
     cone: Any = None  #: spot: the `Cone` of the cut-off
     beam: Any = None  #: soft spot: the `Cone` in which the intensity is full
@@ -93,9 +90,14 @@ class Light:
         return "spot" if self.cone is not None else "point" if self.w else "directional"
 
     @property
+    def axis(self) -> Any:
+        """Spot: unit vector from the light along its axis; directional: in which the light travels; others: None."""
+        return None if self.exact_axis is None else type(self.position)(self.exact_axis)
+
+    @property
     def normal(self) -> Any:
         """The normal of a light point, a unit vector; None for other lights."""
-        return self.facing.normal if self.facing is not None else None
+        return None if self.facing is None else type(self.position)(self.facing.exact_normal)
 
     @property
     def varies(self) -> bool:
@@ -105,7 +107,7 @@ class Light:
     @property
     def cos_cutoff(self) -> Any:
         """Cosine of the half angle beyond which there is no light; None without a cone."""
-        return self.cone.cos if self.cone is not None else None
+        return None if self.cone is None else type(self.position.x)(self.cone.cos)
 
     def toward(self, point) -> Any:
         """Return l - w P: the vector from points to the light [m], or the unit direction to a light at infinity."""
@@ -125,7 +127,7 @@ class Light:
             return mi.Ray3f(mi.Point3f(point - self.axis * away), mi.Vector3f(-self.axis))
         start = mi.Point3f(self.position)
         if self.facing is not None:
-            start += mi.Vector3f(self.facing.normal * self.facing.lift)
+            start += mi.Vector3f(self.normal * self.facing.lift)
         direction = mi.Vector3f(point) - mi.Vector3f(start)
         length = dr.norm(direction)
         # Twenty units in the last place before the point: on a surface the point itself must not block the light.
@@ -149,9 +151,9 @@ class Light:
         """
         if self.facing is None:
             return self.position, 0
-        cosine = dr.dot(unit, self.facing.normal)
+        cosine = dr.dot(unit, self.normal)
         skipped = dr.maximum(-self.facing.chord * cosine, 0)
-        return self.position + self.facing.normal * dr.mulsign(self.facing.lift, cosine) + unit * skipped, skipped
+        return self.position + self.normal * dr.mulsign(self.facing.lift, cosine) + unit * skipped, skipped
 
     def without_cone(self) -> "Light":
         """Return the light all around of which a spot shows a cone."""
@@ -171,8 +173,7 @@ def host_position(light: Light) -> Array:
     """Return the homogeneous position of a light on the host: l [m for w = 1] and w, (4,), in float64."""
     if light.w:
         return np.append(host_numbers(light.position)[0], 1.0)
-    axis, low = host_numbers(light.axis, light.axis_low)
-    return np.append(-(axis + low), 0.0)
+    return np.append(-host_numbers(light.exact_axis)[0], 0.0)
 
 
 def place_and_weight(position: Array) -> tuple[Array, int]:
@@ -192,26 +193,15 @@ def spot_fields(axis, cutoff: float, beam: float, types: ArrayTypes) -> dict[str
     types
         Of the arrays.
     """
-    axis = np.asarray(axis, dtype=np.float64)
-    high, low = with_low(axis, types)
     fields = {
-        "axis": types.vector(*(float(component) for component in high)),
-        "axis_low": types.vector(*(float(component) for component in low)),
+        "exact_axis": mi.Vector3d(*(float(component) for component in axis)),
         "cutoff": types.scalar(cutoff),
-        "cone": _cone(cutoff, types),
+        "cone": _cone(cutoff),
     }
     if beam < cutoff:
-        fields |= {"beam": _cone(beam, types), "inverse_transition": types.scalar(1 / (cutoff - beam))}
+        fields |= {"beam": _cone(beam), "inverse_transition": types.scalar(1 / (cutoff - beam))}
     return fields
 
 
-def with_low(values, types: ArrayTypes):
-    """Return float64 values as they are in a precision, and what rounding takes from them, in float64."""
-    values = np.asarray(values, dtype=np.float64)
-    high = values.astype(np.float32 if is_single(types.scalar) else np.float64).astype(np.float64)
-    return high, values - high
-
-
-def _cone(angle: float, types: ArrayTypes) -> Cone:
-    square, low = with_low(math.sin(angle) ** 2, types)
-    return Cone(types.scalar(math.cos(angle)), types.scalar(float(square)), types.scalar(float(low)))
+def _cone(angle: float) -> Cone:
+    return Cone(mi.Float64(math.cos(angle)), mi.Float64(math.sin(angle) ** 2))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from realtime.area_lights.read import is_area_light, read_area_light
 from realtime.area_lights.shape import AreaLight
 from realtime.errors import InputError
-from realtime.numerics.array_types import ArrayTypes, array_types, is_single, types_of
+from realtime.numerics.array_types import ArrayTypes, array_types, types_of
 from realtime.scene.camera import Camera, pixel_grid
 from realtime.scene.closed_mesh import ClosedMesh
 from realtime.scene.directional_extent import (
@@ -159,13 +159,10 @@ def _read_camera(scene, types: ArrayTypes):
     tangent = math.tan(0.5 * math.radians(float(parameters["x_fov"][0])))
     pixel = 2 * tangent / width
     basis = matrix[:3, 2], matrix[:3, 0] * pixel, matrix[:3, 1] * pixel
-    real = np.float32 if is_single(types.scalar) else np.float64
-    low = [column - column.astype(real) for column in basis]
-    vectors = [types.vector(*(float(c) for c in column)) for column in (matrix[:3, 3], *basis, *low)]
-    dr.make_opaque(*vectors)
-    names = ("origin", "forward", "left", "up", "forward_low", "left_low", "up_low")
-    grid = pixel_grid(width, height, types.scalar)
-    return Camera(width, height, **dict(zip(names, vectors, strict=True)), grid=grid), sensor
+    forward, left, up = (mi.Vector3d(*(float(c) for c in column)) for column in basis)
+    origin = types.vector(*(float(c) for c in matrix[:3, 3]))
+    dr.make_opaque(origin, forward, left, up)
+    return Camera(width, height, origin, (forward, left, up), pixel_grid(width, height)), sensor
 
 
 def _read_light(emitter, types: ArrayTypes) -> Light:
@@ -321,6 +318,6 @@ def _uneven(medium: Medium) -> int:
 
 def _axis_name(light: Light) -> str:
     """Return the axis of coordinates from which a beam comes: 'x', '-x', 'y', '-y', 'z' or '-z'."""
-    from_there = -np.array(light.axis, dtype=np.float64).ravel()
+    from_there = -np.array(light.exact_axis).ravel()
     number = int(np.argmax(np.abs(from_there)))
     return ("-" if from_there[number] < 0 else "") + "xyz"[number]

@@ -117,13 +117,13 @@ def light_basis(light: Light) -> tuple[Any, Any, Any] | None:
     """Return two vectors across a light's axis and the axis, in float64; None for a light without one."""
     if light.axis is None:
         return None
-    axis = mi.Vector3d(light.axis) + mi.Vector3d(light.axis_low)
+    axis = light.exact_axis
     if not light.w:
         return mi.Vector3d(light.extent.across), mi.Vector3d(light.extent.up), axis
     # Any vector that is not parallel to the axis will do to start from.
     helper = dr.select(dr.abs(axis.x) < 0.5, type(axis)(1, 0, 0), type(axis)(0, 1, 0))
     across = dr.normalize(dr.cross(helper, axis))
-    square = mi.Float64(light.cone.square_sin) + mi.Float64(light.cone.square_sin_low)
+    square = light.cone.square_sin
     scale = dr.sqrt(square / (1 - square))
     return across * scale, dr.cross(axis, across) * scale, axis
 

@@ -19,20 +19,20 @@ def make_camera(origin, target=(0.0, 0.0, 0.0), *, fov=50.0, size=(WIDTH, HEIGHT
     left = np.cross((0.137, 0.211, 1.0), forward)
     pixel = 2 * np.tan(0.5 * np.deg2rad(fov)) / size[0]
     left *= pixel / np.linalg.norm(left)
-    vectors = (origin, forward, left, np.cross(forward, left), *np.zeros((3, 3)))
+    vectors = (origin, forward, left, np.cross(forward, left))
     return opaque_camera(size, vectors)
 
 
 def simple_camera():
     """Return a camera at the origin that looks along z and has the pixel (i, j) in the direction (5 - i, 4 - j, 1)."""
-    return opaque_camera((11, 9), ((0, 0, 0), (0, 0, 1), (1, 0, 0), (0, 1, 0), *[(0, 0, 0)] * 3))
+    return opaque_camera((11, 9), ((0, 0, 0), (0, 0, 1), (1, 0, 0), (0, 1, 0)))
 
 
 def opaque_camera(size, vectors):
     """Return a camera of these vectors, in float64; all such cameras share their kernels, as the product's do."""
     arrays = [mi.Vector3d(*map(float, vector)) for vector in vectors]
     dr.make_opaque(arrays)
-    return Camera(*size, *arrays, grid=pixel_grid(*size, mi.Float64))
+    return Camera(*size, arrays[0], tuple(arrays[1:]), grid=pixel_grid(*size))
 
 
 def tetrahedron(points) -> VolumeMesh:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -86,12 +86,8 @@ def evaluate_rows(
         geometry = RayGeometry(column(cases.foot[rows]), column(cases.height[rows]), None, None)
     else:
         light = Light(types.vector(cases.light[rows].T), types.color(intensity))
-        # A file's directions have unit length to the digits they are written with.
-        given = types.vector(cases.direction[rows].T)
-        scale = dr.rsqrt(dr.squared_norm(given))
-        direction = given * scale
-        low = dr.fma(given, scale, -direction)
-        geometry = ray_geometry(types.vector(cases.origin[rows].T), direction, light, low=low)
+        direction = mi.Vector3d(cases.direction[rows].T)
+        geometry = ray_geometry(types.vector(cases.origin[rows].T), direction, light)
     x0, x1 = column(cases.x0[rows]), column(cases.x1[rows])
     return np.array(function(geometry, x0, x1, medium, light), dtype=np.float64)
 

@@ -156,8 +156,7 @@ def _truth_light(known: TruthLight, light: Light) -> TruthLight:
 
 
 def _axis(light: Light) -> Array:
-    high, low = (np.array(part, dtype=np.float64).reshape(3) for part in (light.axis, light.axis_low))
-    axis = high + low
+    axis = np.array(light.exact_axis).reshape(3)
     return axis / np.linalg.norm(axis)
 
 

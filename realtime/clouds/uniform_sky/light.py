@@ -119,10 +119,10 @@ def _slab_width(shape: Any) -> float:
 
 def _seen_share(light: Light, point: Any, visible: Visible) -> Any:
     """Return the share of the sky that opaque shapes leave to points [1]."""
-    Float, Vector = type(point.x), type(point)
+    Float = type(point.x)
     corners = itertools.product((-1, 1), repeat=3)
-    axes = [Vector(*(sign * (1 / 3) ** 0.5 for sign in corner)) for corner in corners]
-    seen = [dr.select(visible(point, replace(light, axis=axis)), Float(1), 0) for axis in axes]
+    axes = [mi.Vector3d(*(sign * (1 / 3) ** 0.5 for sign in corner)) for corner in corners]
+    seen = [dr.select(visible(point, replace(light, exact_axis=axis)), Float(1), 0) for axis in axes]
     return sum(seen) / len(seen)
 
 

@@ -198,7 +198,7 @@ def _sampled_shares(view: View, light: Light, kernel, samples: Samples, heights:
         sample = dr.gather(mi.UInt32, marked, lane)
         (i, j), slice_number, depth = sample_ray(samples, sample)
         direction = dr.normalize(camera.forward + camera.left * i + camera.up * j)
-        rays = view.medium.rays(view.origin, direction, type(direction)(0))
+        rays = view.medium.rays(view.origin, direction)
         seen = replace(view, **vars(rays), distance=depth)
         airlight = seen.lit_by(light, kernel)
         share = _lit_integral(airlight, heights, slice_number) / airlight.gamma(airlight.rays.distance)

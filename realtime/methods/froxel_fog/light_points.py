@@ -31,25 +31,24 @@ class LightPointTable:
         """Return the light point of a number; what all have in common is that of `like`, one of them."""
         Float, Vector = type(self.places), type(like.position)
         place, way = (dr.gather(four_numbers(Float), rows, number) for rows in (self.places, self.normals))
-        facing = Facing(Vector(way.xyz), Vector(0), place.w, Float(0))
+        facing = Facing(mi.Vector3d(way.xyz), place.w, Float(0))
         return replace(like, position=Vector(place.xyz), facing=facing)
 
     def lit(self, number: Any, light: Light, point: Any) -> Any:
         """Return whether a light point reaches points in the air [m], by its map."""
         assert self.maps is not None
-        assert light.facing is not None
-        frame = self._frame(number, light.position, light.facing)
+        frame = self._frame(number, light)
         return self.maps.lit(number, frame.local(point - light.position))
 
     def frame(self, number: Any, like: Light) -> LightFrame:
         """Return the light point of a number with its frame; `like` is one of them."""
-        light = self.point(number, like)
-        assert light.facing is not None
-        return self._frame(number, light.position, light.facing)
+        return self._frame(number, self.point(number, like))
 
-    def _frame(self, number: Any, position: Any, facing: Facing) -> LightFrame:
-        across = type(position)(dr.gather(four_numbers(type(self.across)), self.across, number).xyz)
-        return LightFrame(position, across, dr.cross(facing.normal, across), facing.normal, facing.lift)
+    def _frame(self, number: Any, light: Light) -> LightFrame:
+        assert light.facing is not None
+        normal = light.normal
+        across = type(normal)(dr.gather(four_numbers(type(self.across)), self.across, number).xyz)
+        return LightFrame(light.position, across, dr.cross(normal, across), normal, light.facing.lift)
 
     def with_maps(self, geometry: Any, like: Light, size: int) -> "LightPointTable":
         """Return the table with maps, of `size` texels on a side, of the shapes of a Mitsuba scene."""

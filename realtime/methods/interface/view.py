@@ -43,7 +43,7 @@ class View(Rays):
 
     def geometry(self, light: Light) -> RayGeometry:
         """Return where the rays pass a light: foot, height, and what of them it could reach."""
-        return ray_geometry(self.origin, self.direction, light, low=self.direction_low)
+        return ray_geometry(self.origin, self.aim, light)
 
     def lit_by(self, light: Light, kernel: Any = None, *, form: str = "kernel", geometry: Any = None) -> LitRays:
         """Return the rays with one light, which the medium integrates.

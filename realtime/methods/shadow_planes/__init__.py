@@ -10,7 +10,6 @@ Read in this order:
 - `method.py`: the method, its parameters and what the paper does otherwise.
 - `silhouettes.py`: the edges of occluders that bound their shadows, and which occluders a view needs.
 - `plane_table.py`: planes as four numbers, by wedges of azimuth.
-- `pixel_rays.py`: camera rays in the frame of the light.
 - `sweep.py`: the lit intervals of a ray, along the planes of its list.
 - `published_crossings.py`: the sum of the paper, plane by plane with a stencil.
 - `published_mesh.py`: its Gamma at the vertices of meshes.

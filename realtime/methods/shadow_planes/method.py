@@ -31,7 +31,6 @@ import mitsuba as mi
 from realtime.errors import InputError
 from realtime.methods.interface.method import Layers, Method, no_state, tolerance
 from realtime.methods.interface.view import View
-from realtime.methods.shadow_planes.pixel_rays import aim_at, read_spot, seen_rays
 from realtime.methods.shadow_planes.plane_table import PlaneIndex, index_planes
 from realtime.methods.shadow_planes.published_crossings import Buffer, reaches, sum_crossings
 from realtime.methods.shadow_planes.published_media import check_vertices, sum_in_media
@@ -202,9 +201,11 @@ class ShadowPlanes(Method):
         """Return the airlight of a light, the rays among its planes, and whether planes bound its cone."""
         cone = bool(self.cone and light.cone is not None and not light.varies)
         light = light.without_cone() if cone else light
-        seen = seen_rays(index.aim, view.camera, view.pixel, index.distance, light)
-        rays = ray_planes(index, seen.x, seen.y, seen.z, ray_end=index.distance / view.distance)
-        return view.lit_by(light, kernel, form=self.media, geometry=seen.geometry), rays, cone
+        # In float64: next to the image of the light x and y vanish.
+        aim = view.aim * dr.rcp(dr.norm(view.aim))
+        x, y, z = (type(view.distance)(dr.dot(axis, aim)) for axis in index.axes)
+        rays = ray_planes(index, x, y, z, ray_end=index.distance / view.distance)
+        return view.lit_by(light, kernel, form=self.media), rays, cone
 
     def _ambient_fog(self, view: View):
         """Return the radiance of a constant light field in the media [W/(m^2 sr)]."""
@@ -310,14 +311,12 @@ def plane_finder(
     if cone and light.cone is not None:
         axis, cosine = host_numbers(light.axis, light.cos_cutoff)
         ring = cone_ring(axis, float(cosine[0]), cone)
-    seen = None if ring is not None else read_spot(light)
 
     def find() -> PlaneIndex:
         used = components_in_view(casters, camera, position)
         if own is not None:
             used &= ~casters.of_shape(own)
-        aim = partial(aim_at, camera, spot=seen, types=types)
-        return index_planes(casters, position, camera.origin, used=used, types=types, order=order, ring=ring, aim=aim)
+        return index_planes(casters, position, camera.origin, used=used, types=types, order=order, ring=ring)
 
     return find
 

@@ -55,7 +55,6 @@ share its azimuth bit by bit, and an edge holds phi if first <= phi < last: no r
 and none is counted twice.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -86,9 +85,7 @@ _SLACK = 1e-5  # of the terms of a sum: float32 rounding, with room to spare
 class PlaneIndex:
     """The shadow planes of one light as a frame needs them; Dr.Jit arrays, padded so that their sizes seldom change."""
 
-    x_axis: Any  #: axes of the frame of `LightBasis`
-    y_axis: Any
-    z_axis: Any
+    axes: tuple[Any, Any, Any]  #: of the frame of `LightBasis`, in float64
     distance: Any  #: D, from the light to the camera [m]; w = 0: 1
     start: Any  #: first place in `entries` of every wedge, and the end of the last
     entries: Any  #: the planes of wedge after wedge
@@ -98,7 +95,6 @@ class PlaneIndex:
     spans: Any  #: first and last azimuth, layers gained when psi grows past it, Biri's cosine of every plane; flat
     ends: Any  #: ends of the edge of every plane in the frame [m], six numbers each, flat
     layers: Any  #: layers between the light and the camera
-    aim: Any = None  #: where the pixels of the camera aim in the frame, see `realtime.methods.shadow_planes.pixel_rays`
     w: int = 1  #: last coordinate of the light's homogeneous position
 
 
@@ -335,7 +331,6 @@ def index_planes(
     types,
     order: str = "exact",
     ring: Array | None = None,
-    aim: Callable[[Array], Any] | None = None,
 ) -> PlaneIndex:
     """Find the shadow planes of a light and put them into wedges for a camera.
 
@@ -355,8 +350,6 @@ def index_planes(
         In which rays go over planes, see `wedge_lists`.
     ring
         Of a spot whose cone is a caster, see `realtime.methods.shadow_planes.silhouettes.cone_ring`.
-    aim
-        Axes of the frame -> where the pixels of the camera aim in it.
     """
     basis = light_basis(light, camera)
     axes = basis.axes
@@ -371,11 +364,8 @@ def index_planes(
     Float = types.scalar
     real = np.float32 if is_single(Float) else np.float64
     spans = np.stack([planes.first, planes.last, planes.gain, planes.centre], axis=1)
-    x_axis, y_axis, z_axis = (types.vector(*(float(c) for c in axis)) for axis in axes)
     index = PlaneIndex(
-        x_axis,
-        y_axis,
-        z_axis,
+        tuple(mi.Vector3d(*(float(c) for c in axis)) for axis in axes),
         Float(basis.distance),
         mi.UInt32(_padded(start)),
         mi.UInt32(_padded(entries, 3)),
@@ -385,7 +375,6 @@ def index_planes(
         Float(_padded(spans.astype(real).ravel(), 5)),
         Float(_padded(planes.ends.astype(real).ravel(), 6)),
         Float(layers),
-        aim(axes) if aim else None,
         basis.w,
     )
     dr.make_opaque(index)

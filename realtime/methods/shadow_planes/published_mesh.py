@@ -67,7 +67,8 @@ def mesh_gamma(index: PlaneIndex, light: Light, gamma: Gamma, *, rows: int, cone
     if further:
         row = dr.minimum(row, _last_row(index, end // 2, casters_rows, rows))
     corner = Vector(*(dr.gather(Float, index.ends, end * 3 + k) for k in range(3))) * RATIO ** Float(row)
-    point = light.position + index.x_axis * corner.x + index.y_axis * corner.y + index.z_axis * corner.z
+    x_axis, y_axis, z_axis = (Vector(axis) for axis in index.axes)
+    point = light.position + x_axis * corner.x + y_axis * corner.y + z_axis * corner.z
     values = gamma(point)
     dr.eval(values)
     Color = type(values)

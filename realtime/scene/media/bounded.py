@@ -17,7 +17,6 @@ from realtime.scene.density import Density
 from realtime.scene.media.bounded_rays import BoundedRays, camera_pieces, check_form
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.media.light_paths import BoundedMedium, chord, paths_from
-from realtime.scene.media.medium import Rays
 from realtime.scene.media.published_form import bounded_form
 from realtime.scene.phase import Phase
 
@@ -41,9 +40,10 @@ class BoundedMedia(Homogeneous):
     clear: bool = False
     clouds: Clouds | None = None
 
-    def rays(self, origin, direction, low=None):
+    def rays(self, origin, direction, aim=None):
         """Return rays with the distances at which they enter and leave each medium [m]."""
-        return Rays(origin, direction, low, tuple(chord(own, origin, direction) for own in self.bounded_media))
+        crossed = tuple(chord(own, origin, direction) for own in self.bounded_media)
+        return replace(super().rays(origin, direction, aim), crossed=crossed)
 
     def extinction(self, rays, x):
         """Return that of the medium in which a point lies [1/m]."""

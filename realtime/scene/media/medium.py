@@ -25,7 +25,7 @@ class Rays:
 
     origin: Any  #: one for all rays, or one each [m]
     direction: Any  #: unit directions
-    direction_low: Any  #: what rounding took from their aim; None where it is not known
+    aim: Any  #: the same in float64, of about unit length, for what lies near a light
     crossed: tuple[Any, ...]  #: what the medium finds of them once, such as where they enter and leave its parts
 
     def at(self, x):
@@ -64,9 +64,9 @@ class Medium:
         """Return a length in which the optical depth grows by `depth` in every channel, wherever it lies [m]."""
         raise NotImplementedError
 
-    def rays(self, origin, direction, low=None) -> Rays:
-        """Return rays [m] of unit directions, with what the medium finds of them once."""
-        return Rays(origin, direction, low, ())
+    def rays(self, origin, direction, aim=None) -> Rays:
+        """Return rays [m] of unit directions, with what the medium finds of them once; `aim` has twice their digits."""
+        return Rays(origin, direction, direction if aim is None else aim, ())
 
     def depth_to_light(self, light: Any, point, r, active: Any = True) -> tuple[Any, ...]:
         """Return the optical depth from points [m] to a light, by channel; `r` is its distance [m], if it has a place.

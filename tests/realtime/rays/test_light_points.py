@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The airlight of a light point, with the cosine at its normal, against adaptive quadrature that shares nothing."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -8,7 +9,7 @@ from scipy.integrate import quad
 from realtime.kernels.registry import KERNELS
 from realtime.numerics.array_types import array_types
 from realtime.rays.ray_light import ray_geometry
-from realtime.scene.lights import Facing, Light, with_low
+from realtime.scene.lights import Facing, Light
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import HenyeyGreenstein, Isotropic
 
@@ -70,10 +71,9 @@ def integrals(rays, kernel, precision, isotropic):
     def number(name):
         return types.scalar(rays[name].astype(real))
 
-    high, low = with_low(rays["normal"], types)
-    light = Light(vector(rays["light"]), types.color(1), facing=Facing(vector(high), vector(low), None, None), source=0)
-    direction, direction_low = with_low(rays["direction"], types)
-    geometry = ray_geometry(vector(rays["origin"]), vector(direction), light, low=vector(direction_low))
+    normal, direction = (mi.Vector3d(*(mi.Float64(c) for c in rays[name].T)) for name in ("normal", "direction"))
+    light = Light(vector(rays["light"]), types.color(1), facing=Facing(normal, None, None), source=0)
+    geometry = ray_geometry(vector(rays["origin"]), direction, light)
     phase = Isotropic() if isotropic else HenyeyGreenstein(number("g"))
     medium = Homogeneous((number("sigma_t"),), types.color(1), phase)
     x0, x1 = number("x0"), number("x1")

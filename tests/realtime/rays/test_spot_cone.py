@@ -8,7 +8,7 @@ from mpmath import mp
 
 from realtime.numerics.array_types import array_types
 from realtime.rays.ray_light import ray_geometry
-from realtime.scene.lights import Light, spot_fields, with_low
+from realtime.scene.lights import Light, spot_fields
 from tests.helpers.kernel_values import opaque, vectors
 
 # Rounded to float32; their difference is not.
@@ -65,9 +65,8 @@ def ends_of(direction, degrees, precision):
     angle = float(np.deg2rad(degrees))
     fields = spot_fields(AXIS, angle, angle, types)
     light = opaque(Light(types.vector(*(float(x) for x in LIGHT)), types.color(1), **fields))
-    high, low = with_low(direction, types)
     origin = opaque(types.vector(*(float(x) for x in CAMERA)))
-    geometry = ray_geometry(origin, vectors(types, high), light, low=vectors(types, low))
+    geometry = ray_geometry(origin, vectors(array_types("double"), direction), light)
     ends = np.array([np.array(geometry.enter, dtype=np.float64), np.array(geometry.leave, dtype=np.float64)])
     enter, leave, foot, height = np.array([exact_interval(ray, angle) for ray in direction]).T
     return ends, np.array([enter, leave]), foot, height

@@ -40,17 +40,18 @@ def test_rays_are_those_of_mitsuba(variant, size, axis, pixels):
 
 
 def test_aim_is_kept_to_twice_the_digits(variant):
-    """Single precision with its low part against double precision: the angle between the two."""
+    """The aim that a camera of single precision has besides its direction, by NumPy: the angle between them."""
     matrix = mi.ScalarTransform4f().look_at([1.3, -2.1, 0.7], [0.2, 0.4, 0.9], [0.1, 0.2, 1.0])
     film = {"type": "hdrfilm", "width": 801, "height": 601}
     scene = mi.load_dict({"type": "scene", "s": {"type": "perspective", "fov": 63.7, "to_world": matrix, "film": film}})
     pixel = mi.UInt32(np.arange(0, 801 * 601, 7, dtype=np.uint32))
-    high, low = (
-        np.array(part, dtype=np.float64) for part in ray_directions(_read_camera(scene, array_types())[0], pixel)
-    )
-    exact = np.array(ray_directions(_read_camera(scene, array_types("double"))[0], pixel)[0])
-    plain = np.linalg.norm(np.cross(high.T, exact.T), axis=1)
-    kept = np.linalg.norm(np.cross((high + low).T, exact.T), axis=1)
+    camera = _read_camera(scene, array_types())[0]
+    direction, aim = (np.array(part, dtype=np.float64).T for part in ray_directions(camera, pixel))
+    forward, left, up = (np.array(axis).ravel() for axis in camera.axes)
+    number = np.arange(0, 801 * 601, 7)
+    exact = forward + (400 - number % 801)[:, None] * left + (300 - number // 801)[:, None] * up
+    exact /= np.linalg.norm(exact, axis=1, keepdims=True)
+    plain, kept = (np.linalg.norm(np.cross(part, exact), axis=1) for part in (direction, aim))
     assert plain.max() > 2e-8  # what float32 alone leaves
     assert kept.max() < 1e-13
 
@@ -67,7 +68,7 @@ def test_rows_and_columns_are_those_of_a_division(variant, width):
     rows = np.append(generator.integers(0, most // width + 1, 2000), [0, 1, most // width])
     pixels = np.clip(np.concatenate([rows * width + step for step in (-1, 0, 1)]), 0, most)
     pixels = np.concatenate([pixels, generator.integers(0, most, 2000), [most]])
-    camera = SimpleNamespace(grid=pixel_grid(width, 3, mi.Float))
+    camera = SimpleNamespace(grid=pixel_grid(width, 3))
     row, column = row_and_column(camera, mi.UInt32(pixels.astype(np.uint32)))
     assert np.array_equal(np.array(row), pixels // width)
     assert np.array_equal(np.array(column), pixels % width)

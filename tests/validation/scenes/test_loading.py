@@ -92,8 +92,8 @@ def test_resized_scene_has_the_rays_of_one_built_at_that_size(variant, small_fil
     np.testing.assert_array_equal(read_truth(resized).direction, read_truth(expected).direction)
     resized_camera, expected_camera = read_scene(resized).camera, read_scene(expected).camera
     assert (resized_camera.width, resized_camera.height) == size
-    for name in ("origin", "forward", "left", "up", "forward_low", "left_low", "up_low"):
-        np.testing.assert_array_equal(np.array(getattr(resized_camera, name)), np.array(getattr(expected_camera, name)))
+    np.testing.assert_array_equal(np.array(resized_camera.origin), np.array(expected_camera.origin))
+    np.testing.assert_array_equal(np.array(resized_camera.axes), np.array(expected_camera.axes))
     for place in [(0.13, 0.29), (0.71, 0.93)]:
         rays = [
             s.sensors()[0].sample_ray(0.0, 0.5, mi.Point2f(*place), mi.Point2f(0.5))[0] for s in (resized, expected)

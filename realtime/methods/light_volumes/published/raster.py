@@ -100,9 +100,7 @@ def _camera_basis(camera: Camera):
     def read(vector):
         return np.array(vector, dtype=np.float64).ravel()
 
-    low = (camera.forward_low, camera.left_low, camera.up_low)
-    basis = [read(high) + read(rest) for high, rest in zip((camera.forward, camera.left, camera.up), low)]
-    return read(camera.origin), np.stack(basis, axis=1)
+    return read(camera.origin), np.stack([read(axis) for axis in camera.axes], axis=1)
 
 
 def _opaque(values):
