@@ -57,19 +57,11 @@ class Cases:
 def read_cases(path: str | Path, *, phase: str | None = None) -> Cases:
     """Read a table of cases.
 
-    Parameters
-    ----------
-    path
-        A CSV file with a header line; see the module's docstring for the columns.
-    phase
-        Words of a phase function for all rows, in place of the column, which may then be missing; the values of the
-        file, which are of others, are left out.
-
-    Raises
-    ------
-    InputError
-        For a file that cannot be read, a missing column, a word where a number belongs, a number out of its range or an
-        unknown phase function: the message names file, line (from 1, the header) and column.
+    `path`: a CSV file with a header line; see the module's docstring for the columns; `phase`: words of a phase
+    function for all rows, in place of the column, which may then be missing; the values of the file, which are of
+    others, are left out. Raises InputError for a file that cannot be read, a missing column, a word where a number
+    belongs, a number out of its range or an unknown phase function: the message names file, line (from 1, the header)
+    and column.
     """
     header, lines = _read_text(Path(path))
     columns = dict(zip(header, zip(*(cells for _, cells in lines), strict=True), strict=True))
@@ -84,18 +76,10 @@ def read_cases(path: str | Path, *, phase: str | None = None) -> Cases:
 def cases_from_columns(columns: Mapping[str, Any], *, name: str = "cases") -> tuple[Cases, tuple[int, ...]]:
     """Return cases from columns in memory, and the shape that their values have together.
 
-    Parameters
-    ----------
-    columns
-        By name the columns of `analytic.cases`, of any shapes that broadcast together. `foot` and `height` may stand
-        for `t` and `h`, and `origin`, `direction` and `light`, (..., 3), for the coordinates of rays.
-    name
-        What messages call them; they count rows from 0.
-
-    Raises
-    ------
-    InputError
-        As `read_cases`, and for columns whose shapes do not go together.
+    `columns`: by name the columns of `analytic.cases`, of any shapes that broadcast together. `foot` and `height` may
+    stand for `t` and `h`, and `origin`, `direction` and `light`, (..., 3), for the coordinates of rays. `name`: what
+    messages call them; they count rows from 0. Raises InputError as `read_cases`, and for columns whose shapes do not
+    go together.
     """
     given: dict[str, Any] = {}
     for key, values in columns.items():
@@ -225,10 +209,7 @@ class _Table:
     def numbers(self, name: str, *, infinite: bool = False) -> Array:
         """Return the column `name` as numbers, (rows,), finite but for `x1` and where `infinite` allows it.
 
-        Raises
-        ------
-        InputError
-            For a cell that is no number, or not finite, with its place.
+        Raises InputError for a cell that is no number, or not finite, with its place.
         """
         try:
             values = np.array(self.columns[name], dtype=np.float64)
@@ -242,10 +223,7 @@ class _Table:
     def check(self, name: str, fine: NDArray[np.bool_], wanted: str) -> None:
         """Refuse the column `name` where a row is not `fine`, (rows,); `wanted` says what it should be.
 
-        Raises
-        ------
-        InputError
-            With the first such cell.
+        Raises InputError with the first such cell.
         """
         if not fine.all():
             row = int(np.argmin(fine))

@@ -201,24 +201,11 @@ def optics(
 ) -> Optics:
     """Return how droplets extinguish and scatter light.
 
-    Parameters
-    ----------
-    droplets
-        Their sizes; those of Bouthors 2008 by default.
-    wavelength
-        Of the light in air [um], 0.2 to 2.
-    index
-        Of refraction of the droplets [1]; that of water for the three `WAVELENGTHS`, to be given for others.
-    sizes
-        How many sizes are averaged; `Droplets.sizes` by default.
+    `droplets`: their sizes; those of Bouthors 2008 by default; `wavelength`: of the light in air [um], 0.2 to 2;
+    `index`: of refraction of the droplets [1]; that of water for the three `WAVELENGTHS`, to be given for others;
+    `sizes`: how many sizes are averaged; `Droplets.sizes` by default. Raises InputError for a wavelength without an
+    index, or out of range.
 
-    Raises
-    ------
-    InputError
-        For a wavelength without an index, or out of range.
-
-    Notes
-    -----
     Valid for all `Droplets`. Takes some seconds at r_e = 6 um, and a minute at 50 um; the results are kept.
     """
     kinds = droplets or Droplets()
@@ -316,16 +303,8 @@ class Modified:
 def moments(phase: Callable[[Array], Array], count: int, *, breaks: tuple[float, ...] = (), degree: int = 400) -> Array:
     """Return the first Legendre moments chi_l = (1/2) int p P_l dcos of a phase function [1], (count,).
 
-    Parameters
-    ----------
-    phase
-        Takes cosines of the scattering angle.
-    count
-        How many.
-    breaks
-        Angles at which it jumps or has a kink [degrees].
-    degree
-        Of a polynomial of the cosine that is as good as the function between the breaks.
+    `phase`: takes cosines of the scattering angle; `count`: how many; `breaks`: angles at which it jumps or has a kink
+    [degrees]; `degree`: of a polynomial of the cosine that is as good as the function between the breaks.
     """
     edges = np.cos(np.deg2rad([180.0, *sorted(breaks, reverse=True), 0.0]))
     nodes, weights = np.polynomial.legendre.leggauss((degree + count) // 2 + 1)

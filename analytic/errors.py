@@ -28,21 +28,9 @@ def nearest(word: str, known: Iterable[str]) -> str:
 def named_values(option: str, words: Iterable[str], read: Callable[[str], Value], wanted: str) -> dict[str, Value]:
     """Return values by name from words of the form 'NAME=VALUE'.
 
-    Parameters
-    ----------
-    option
-        Where the words stand, for messages.
-    words
-        What the user wrote.
-    read
-        Returns the value of a text that is not empty, or raises ValueError.
-    wanted
-        What a word should look like, for messages.
-
-    Raises
-    ------
-    InputError
-        If a word has another form, or two words give one name different values.
+    `option`: where the words stand, for messages; `words`: what the user wrote; `read`: returns the value of a text
+    that is not empty, or raises ValueError; `wanted`: what a word should look like, for messages. Raises InputError if
+    a word has another form, or two words give one name different values.
     """
     values: dict[str, Value] = {}
     for word in words:

@@ -33,23 +33,11 @@ Values = Array | float  # arrays of shapes that broadcast, or numbers
 def foot_and_height(origin: ArrayLike, direction: ArrayLike, light: ArrayLike) -> tuple[Array, Array]:
     """Return the foot and height of rays over a light.
 
-    Parameters
-    ----------
-    origin, light
-        Points [m], of shape (n, 3), or (3,) for one that all share.
-    direction
-        Directions of the rays, of shape (n, 3) or (3,), of length 1 to float32 rounding. What is left of a length other
-        than 1 is divided out, so that distances are along the unit vector.
-
-    Returns
-    -------
-    foot, height
-        Signed distance of the foot point from the origin [m] and distance from the light to the ray [m], of shape (n,).
-
-    Raises
-    ------
-    InputError
-        For arrays of other shapes, numbers that are not finite, or directions that are not of length 1 (to 1e-5).
+    `origin`, `light`: points [m], of shape (n, 3), or (3,) for one that all share. `direction`: directions of the rays,
+    of shape (n, 3) or (3,), of length 1 to float32 rounding. What is left of a length other than 1 is divided out, so
+    that distances are along the unit vector. Returns `foot`, `height`: signed distance of the foot point from the
+    origin [m] and distance from the light to the ray [m], of shape (n,). Raises InputError for arrays of other shapes,
+    numbers that are not finite, or directions that are not of length 1 (to 1e-5).
     """
     o, d, p = (_points(name, value) for name, value in (("origin", origin), ("direction", direction), ("light", light)))
     length = np.sqrt(np.sum(d * d, axis=-1))
@@ -72,8 +60,6 @@ def foot_and_height(origin: ArrayLike, direction: ArrayLike, light: ArrayLike) -
 def path_length(x: Values, foot: Values, height: Values) -> Array:
     """Return q = (x - foot) + r [m], without cancellation, by the two branches in the module's docstring.
 
-    Notes
-    -----
     Valid for finite x and foot and height >= 0; it is 0 on a ray through the light, before the light.
     """
     s = np.asarray(x, dtype=np.float64) - foot

@@ -202,23 +202,11 @@ def height_fog_sun(
 ) -> Array:
     """Return K of intervals of rays that the sun lights, in closed form [1].
 
-    Parameters
-    ----------
-    fog
-        The medium.
-    origin, rise
-        Height of the origin of each ray [m], and vertical component of its unit direction, (n,).
-    x0, x1
-        Ends of the intervals along the rays [m], x0 <= x1; x1 may be infinite.
-    sun
-        Vertical component of the unit direction towards the sun, above 0.
-    phase
-        Value of the phase function along each ray, (n,).
-
-    Raises
-    ------
-    InputError
-        For a sun at or below the horizon, and a constant part without a cap: every light path is infinitely deep.
+    `fog`: the medium; `origin`, `rise`: height of the origin of each ray [m], and vertical component of its unit
+    direction, (n,); `x0`, `x1`: ends of the intervals along the rays [m], x0 <= x1; x1 may be infinite; `sun`: vertical
+    component of the unit direction towards the sun, above 0; `phase`: value of the phase function along each ray, (n,).
+    Raises InputError for a sun at or below the horizon, and a constant part without a cap: every light path is
+    infinitely deep.
     """
     if not 0 < sun <= 1:
         raise InputError(
@@ -278,19 +266,10 @@ def height_fog_segments(
 ) -> tuple[Array, Array]:
     """Integrate the airlight of lights at places over N intervals of rays.
 
-    Parameters
-    ----------
-    fog, rays
-        The medium and the rays, each over a light.
-    x0, x1
-        Ends of the intervals along the rays [m], x0 <= x1; x1 may be infinite.
-    phase, shadow_scale, weight, rtol
-        As in `analytic.panels.airlight_segments`; `shadow_scale` shortens the light path at the light.
-
-    Returns
-    -------
-    value, error
-        K [1/m^2] and an estimate of its absolute error, of shape (N,); both infinite where the light is on an interval.
+    `fog`, `rays`: the medium and the rays, each over a light; `x0`, `x1`: ends of the intervals along the rays [m], x0
+    <= x1; x1 may be infinite; `phase`, `shadow_scale`, `weight`, `rtol`: as in `analytic.panels.airlight_segments`;
+    `shadow_scale` shortens the light path at the light. Returns `value`, `error`: K [1/m^2] and an estimate of its
+    absolute error, of shape (N,); both infinite where the light is on an interval.
     """
     columns = np.broadcast_arrays(
         *(np.asarray(v, dtype=np.float64) for v in (rays.origin, rays.rise, rays.foot, rays.height, rays.light, x0, x1))

@@ -71,20 +71,10 @@ def terms(size: float) -> int:
 def coefficients(size: ArrayLike, index: complex) -> tuple[Complex, Complex]:
     """Return the coefficients a_n and b_n of spheres [1], (terms, sizes) each; row n - 1 holds n.
 
-    Parameters
-    ----------
-    size
-        x = 2 pi r / wavelength of each sphere [1], (sizes,).
-    index
-        m = n + i k, the refractive index relative to the surroundings [1], k >= 0.
+    `size`: x = 2 pi r / wavelength of each sphere [1], (sizes,); `index`: m = n + i k, the refractive index relative to
+    the surroundings [1], k >= 0. Raises InputError for a size outside 1e-6 to 2e4 or an index that is no refractive
+    index.
 
-    Raises
-    ------
-    InputError
-        For a size outside 1e-6 to 2e4 or an index that is no refractive index.
-
-    Notes
-    -----
     Valid for what `InputError` does not name. Beyond a sphere's own number of terms its coefficients are 0.
     """
     x, m = checked(size, index)
@@ -146,12 +136,8 @@ def angular_functions(cos_scatter: Array, count: int) -> tuple[Array, Array]:
 def intensities(a: Complex, b: Complex, pi: Array, tau: Array) -> Array:
     """Return |S_1|^2 + |S_2|^2 [1] of spheres, (sizes, cosines).
 
-    Parameters
-    ----------
-    a, b
-        Of `coefficients`, (terms, sizes) each.
-    pi, tau
-        Of `angular_functions`, at least as many terms, (terms or more, cosines) each.
+    `a`, `b`: of `coefficients`, (terms, sizes) each; `pi`, `tau`: of `angular_functions`, at least as many terms,
+    (terms or more, cosines) each.
     """
     n = np.arange(1, len(a) + 1)[:, None]
     weight = (2 * n + 1) / (n * (n + 1))
@@ -168,10 +154,7 @@ def intensities(a: Complex, b: Complex, pi: Array, tau: Array) -> Array:
 def checked(size: ArrayLike, index: complex) -> tuple[Array, complex]:
     """Return sizes [1] and a refractive index [1] that can be computed with.
 
-    Raises
-    ------
-    InputError
-        As `coefficients` does.
+    Raises InputError as `coefficients` does.
     """
     x = np.atleast_1d(np.asarray(size, dtype=np.float64))
     if not x.size or not np.all((x >= 1e-6) & (x <= _LARGEST)):

@@ -85,38 +85,17 @@ def airlight_segments(
 ) -> tuple[Array, Array]:
     """Integrate the airlight of N segments of rays.
 
-    Parameters
-    ----------
-    foot, height
-        Signed distance of the foot point and distance between light and ray [m]; numbers or shape (N,).
-    x0, x1
-        Ends of the segments along the ray [m], x0 <= x1; x1 may be infinite.
-    sigma_t
-        Extinction coefficient [1/m], >= 0.
-    phase
-        Phase function, the same for all segments.
-    shadow_scale
-        s in [0, 1]: the light's leg counts s times in the exponent, exp(-sigma_t (x + s r)), as in a renderer that
-        attenuates over shortened shadow rays (DESIGN section 6.1).
-    weight
-        Relative intensity of the light: called as weight(x, index) with distances x of shape (m, 7) or (m, 21) [m] and
-        the row numbers of their segments, shape (m,); returns an array of the shape of x. Where it has kinks, cut the
-        segments there, otherwise the panels around them are halved many times.
-    rtol
-        Relative tolerance, in [1e-13, 0.1].
+    `foot`, `height`: signed distance of the foot point and distance between light and ray [m]; numbers or shape (N,).
+    `x0`, `x1`: ends of the segments along the ray [m], x0 <= x1; x1 may be infinite. `sigma_t`: extinction coefficient
+    [1/m], >= 0. `phase`: phase function, the same for all segments. `shadow_scale`: s in [0, 1]: the light's leg counts
+    s times in the exponent, exp(-sigma_t (x + s r)), as in a renderer that attenuates over shortened shadow rays
+    (DESIGN section 6.1). `weight`: relative intensity of the light: called as weight(x, index) with distances x of
+    shape (m, 7) or (m, 21) [m] and the row numbers of their segments, shape (m,); returns an array of the shape of x.
+    Where it has kinks, cut the segments there, otherwise the panels around them are halved many times. `rtol`: relative
+    tolerance, in [1e-13, 0.1]. Returns `value`, `error`: J [1/m] and an estimate of its absolute error, mostly many
+    digits too large, of shape (N,). Raises InputError for numbers out of their ranges, NaN, or arrays that do not
+    broadcast.
 
-    Returns
-    -------
-    value, error
-        J [1/m] and an estimate of its absolute error, mostly many digits too large, of shape (N,).
-
-    Raises
-    ------
-    InputError
-        For numbers out of their ranges, NaN, or arrays that do not broadcast.
-
-    Notes
-    -----
     Valid for all finite inputs: x0 = x1 gives 0, the light on the segment +inf (error inf), the light on the ray beside
     the segment the finite limit. A segment that cannot meet `rtol` comes back with an error estimate that says so.
     """
@@ -163,15 +142,8 @@ def log_distance(foot: Array, height: Array, x0: Array, x1: Array) -> tuple[Arra
 
     all sums being of one sign. Of a segment that holds the foot it is the sum of two positive terms.
 
-    Parameters
-    ----------
-    foot, height, x0, x1
-        As in `airlight_segments`, arrays of one shape [m].
-
-    Returns
-    -------
-    start, scale, width, height
-        w0, E at w0, w1 - w0, which may be infinite [1], and the height, above 0 [m].
+    `foot`, `height`, `x0`, `x1`: as in `airlight_segments`, arrays of one shape [m]. Returns `start`, `scale`, `width`,
+    `height`: w0, E at w0, w1 - w0, which may be infinite [1], and the height, above 0 [m].
     """
     s0, s1 = x0 - foot, x1 - foot
     beside = np.where(s0 > 0, s0, np.where(s1 < 0, -s1, 0.0))
@@ -231,23 +203,9 @@ def adapted(
 ) -> tuple[Array, Array]:
     """Halve the panels of all sums that miss the tolerance until none does, or only rounding is left.
 
-    Parameters
-    ----------
-    first
-        Segment, start and width of the first panels.
-    evaluate
-        Integrates such panels.
-    row
-        To which of `count` sums each segment belongs.
-    count
-        Number of sums.
-    rtol
-        Relative tolerance of each [1].
-
-    Returns
-    -------
-    value, error
-        The sums and estimates of their errors, (count,).
+    `first`: segment, start and width of the first panels; `evaluate`: integrates such panels; `row`: to which of
+    `count` sums each segment belongs; `count`: number of sums; `rtol`: relative tolerance of each [1]. Returns `value`,
+    `error`: the sums and estimates of their errors, (count,).
     """
     panels = evaluate(*first)
     for _ in range(_HALVINGS):
@@ -302,12 +260,7 @@ def _evaluate(segments: _Segments, integrand: _Integrand, owner: Index, start: A
 def blocks_by_rule(width: Array, most: int) -> Iterator[tuple[Pair, Index]]:
     """Yield pairs of rules with the numbers of panels that each is to integrate at once.
 
-    Parameters
-    ----------
-    width
-        Of the panels, in w, (panels,) [1].
-    most
-        How many panels at once.
+    `width`: of the panels, in w, (panels,) [1]; `most`: how many panels at once.
     """
     narrow = width <= _NARROW
     for pair, chosen in ((NARROW, narrow), (WIDE, ~narrow)):

@@ -297,18 +297,10 @@ def hg_draine_moments(diameter: float, count: int) -> Array:
 def phase_from_words(words: str, *, g: float = 0.0) -> PhaseFunction:
     """Return a phase function by words such as 'hg', 'hg-draine:12' and 'mie:6:2:0.55'.
 
-    Parameters
-    ----------
-    words
-        A name of `PHASE_NAMES` or `DROPLET_NAMES`, then by colons for 'hg' g, for 'hg-draine' the diameter [um], for
-        'mie' and 'mie-modified' r_e [um], gamma and the wavelength [um]; what is left out has its default.
-    g
-        Of 'hg' where the words do not say it.
-
-    Raises
-    ------
-    InputError
-        For an unknown name, numbers that are none or too many of them, and those out of range.
+    `words`: a name of `PHASE_NAMES` or `DROPLET_NAMES`, then by colons for 'hg' g, for 'hg-draine' the diameter [um],
+    for 'mie' and 'mie-modified' r_e [um], gamma and the wavelength [um]; what is left out has its default; `g`: of 'hg'
+    where the words do not say it. Raises InputError for an unknown name, numbers that are none or too many of them, and
+    those out of range.
     """
     name, *cells = words.strip().lower().split(":")
     most = {"hg": 1, "hg-draine": 1} | dict.fromkeys(_DROPLETS, 3)

@@ -26,27 +26,11 @@ Array = NDArray[np.float64]
 def taylor_coefficients(a: ArrayLike, phase: PhaseFunction, degree: int = 4) -> Array:
     """Return the coefficients of exp(a - a tan(theta/2 + pi/4)) p(-sin theta) in powers of theta.
 
-    Parameters
-    ----------
-    a
-        Optical thickness sigma_t h between the light and the foot point [1], >= 0, of any shape.
-    phase
-        Any phase function but 'tabulated', whose slope jumps.
-    degree
-        Highest power, >= 0; 4 in Biri 2006, annex.
+    `a`: optical thickness sigma_t h between the light and the foot point [1], >= 0, of any shape; `phase`: any phase
+    function but 'tabulated', whose slope jumps; `degree`: highest power, >= 0; 4 in Biri 2006, annex. Returns
+    coefficients of theta^0 to theta^degree [1], of shape a.shape + (degree + 1,), **without** the factor exp(-a).
+    Raises InputError for a tabulated phase function, a negative degree, or an `a` that is negative or not finite.
 
-    Returns
-    -------
-    numpy.ndarray
-        Coefficients of theta^0 to theta^degree [1], of shape a.shape + (degree + 1,), **without** the factor exp(-a).
-
-    Raises
-    ------
-    InputError
-        For a tabulated phase function, a negative degree, or an `a` that is negative or not finite.
-
-    Notes
-    -----
     Valid for every a; the series itself converges for |theta| < pi/2 (Henyey-Greenstein: nearer, where
     1 + g^2 + 2 g sin theta has its zeros), and a few terms are only useful where a theta is small.
     """

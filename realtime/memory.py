@@ -44,19 +44,8 @@ def usable_memory() -> Memory | None:
 def check_memory(what: str, needed: int, advice: str) -> None:
     """Raise an error if work needs more memory than there is.
 
-    Parameters
-    ----------
-    what
-        What the user asked for, as the message begins.
-    needed
-        Memory that the work needs [bytes].
-    advice
-        What the user can do, as the message ends.
-
-    Raises
-    ------
-    InputError
-        If there is less memory.
+    `what`: what the user asked for, as the message begins; `needed`: memory that the work needs [bytes]; `advice`: what
+    the user can do, as the message ends. Raises InputError if there is less memory.
     """
     memory = usable_memory()
     if memory is not None and needed > memory.size:

@@ -46,22 +46,9 @@ class PlacedPoints:
 def place_points(light: AreaLight, points: int, pattern: str) -> PlacedPoints:
     """Return the light points of a light.
 
-    Parameters
-    ----------
-    light
-        The light with extent.
-    points
-        How many, 1 to 4096.
-    pattern
-        One of `realtime.area_lights.patterns.PATTERNS`.
+    `light`: the light with extent; `points`: how many, 1 to 4096; `pattern`: one of
+    `realtime.area_lights.patterns.PATTERNS`. Raises InputError for a number or a pattern that there is not.
 
-    Raises
-    ------
-    InputError
-        For a number or a pattern that there is not.
-
-    Notes
-    -----
     Valid for all lights. One point of a sphere lights a half space alone; a few points are needed there.
     """
     LightPoints(points, pattern)

@@ -29,17 +29,8 @@ def is_area_light(emitter) -> bool:
 def read_area_light(shape: Any, camera: Array) -> AreaLight:
     """Read the light of a Mitsuba shape.
 
-    Parameters
-    ----------
-    shape
-        A shape with an `area` emitter.
-    camera
-        Where the camera is, (3,) [m].
-
-    Raises
-    ------
-    InputError
-        For a light that no method can render, with the name of its shape.
+    `shape`: a shape with an `area` emitter; `camera`: where the camera is, (3,) [m]. Raises InputError for a light that
+    no method can render, with the name of its shape.
     """
     name = shape.id()
     kind = _KINDS.get(shape.class_name())

@@ -63,22 +63,9 @@ class DropletSeries:
 def droplet_series(radius: float = 6.0, gamma: float = 2.0, wavelength: float = 0.55) -> DropletSeries:
     """Return the phase function of water droplets.
 
-    Parameters
-    ----------
-    radius
-        Effective radius r_e [um], 2 to 50.
-    gamma
-        How narrow the sizes are distributed [1], above 0.
-    wavelength
-        One of 0.65, 0.55, 0.45 [um].
+    `radius`: effective radius r_e [um], 2 to 50; `gamma`: how narrow the sizes are distributed [1], above 0;
+    `wavelength`: one of 0.65, 0.55, 0.45 [um]. Raises InputError for numbers out of these ranges.
 
-    Raises
-    ------
-    InputError
-        For numbers out of these ranges.
-
-    Notes
-    -----
     Takes some seconds at 6 um, a minute at 50 um; the results are kept.
     """
     _check(radius, gamma, wavelength)

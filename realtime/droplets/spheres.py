@@ -37,15 +37,8 @@ def term_counts(size: Array) -> NDArray[np.int64]:
 def phase_shift_coefficients(size: Array, index: float) -> tuple[Complex, Complex]:
     """Return a_n and b_n [1], (sizes, terms) each; column n - 1 holds n.
 
-    Parameters
-    ----------
-    size
-        x of each sphere [1], (sizes,).
-    index
-        m, the real refractive index relative to the surroundings [1].
+    `size`: x of each sphere [1], (sizes,); `index`: m, the real refractive index relative to the surroundings [1].
 
-    Notes
-    -----
     Valid for sizes from 0.01 to 5000. Beyond a sphere's own number of terms its coefficients are 0.
     """
     counts = term_counts(size)
@@ -89,12 +82,7 @@ def angular_factors(cosine: Array, count: int) -> tuple[Array, Array]:
     Both obey recurrences of Legendre's derivatives: pi_n = P_n'(cos), and tau_n = cos pi_n - sin^2 P_n'' with sin^2
     P_n'' = 2 cos P_n' - n (n + 1) P_n.
 
-    Parameters
-    ----------
-    cosine
-        Of the scattering angle, (angles,).
-    count
-        Largest n.
+    `cosine`: of the scattering angle, (angles,); `count`: largest n.
     """
     plus, minus = np.empty((count, len(cosine))), np.empty((count, len(cosine)))
     legendre_before, legendre = np.ones_like(cosine), cosine.copy()

@@ -64,11 +64,8 @@ class Corners:
 def tile_corners(pixel, camera: Camera, *, by_rays: bool, lights: int) -> Corners:
     """Return how the tiles of an image lie; `pixel` are its pixel numbers in square tiles.
 
-    Raises
-    ------
-    InputError
-        For a method that draws all pixels together and not `by_rays`, more `lights` than a number has bits, and an
-        image whose sides are no multiples of four or less than three tiles.
+    Raises InputError for a method that draws all pixels together and not `by_rays`, more `lights` than a number has
+    bits, and an image whose sides are no multiples of four or less than three tiles.
     """
     if not by_rays:
         raise InputError(
@@ -108,18 +105,9 @@ def adaptive_layers(
 ) -> Layers:
     """Return what a method renders of every pixel, interpolated between the corners of tiles where that is enough.
 
-    Parameters
-    ----------
-    render
-        Renders some pixels.
-    corners, pixel, width
-        Of the image: its pixel numbers in square tiles, and how many pixels a row has.
-    distance
-        To the visible surfaces [m].
-    tolerance
-        Largest second difference between corners, as a share of the value.
-    last
-        What the last frame handed on, by tile; None for the first.
+    `render`: renders some pixels; `corners`, `pixel`, `width`: of the image: its pixel numbers in square tiles, and how
+    many pixels a row has; `distance`: to the visible surfaces [m]; `tolerance`: largest second difference between
+    corners, as a share of the value; `last`: what the last frame handed on, by tile; None for the first.
     """
     Float, lanes = type(distance), dr.width(pixel)
     tiles = lanes // TILE

@@ -50,25 +50,13 @@ def next_frame(
 ) -> tuple[tuple[Any, Any, Any], FrameCache]:
     """Render a scene, and reuse what the last frame left.
 
-    Parameters
-    ----------
-    renderer
-        The stages of the frame.
-    scene
-        The scene as it is now: that of the renderer but for camera, positions, lights, colours and medium.
-    cache
-        What the last frame left; None for the first, for which everything is made. If nothing is said to move in it,
-        it is shaded by the function that the next ones will use: then these record nothing.
-    camera_moved, geometry_moved, light_moved
-        What is elsewhere than in the last frame, or turned: the camera, shapes or the bounds of media, a light. The
-        medium and the colours of lights may have changed in any case.
-
-    Returns
-    -------
-    stages
-        As from `realtime.frame.renderer.run_stages`: bit by bit what it returns for this scene.
-    cache
-        For the next frame.
+    `renderer`: the stages of the frame. `scene`: the scene as it is now: that of the renderer but for camera,
+    positions, lights, colours and medium. `cache`: what the last frame left; None for the first, for which everything
+    is made. If nothing is said to move in it, it is shaded by the function that the next ones will use: then these
+    record nothing. `camera_moved`, `geometry_moved`, `light_moved`: what is elsewhere than in the last frame, or
+    turned: the camera, shapes or the bounds of media, a light. The medium and the colours of lights may have changed in
+    any case. Returns `stages`: as from `realtime.frame.renderer.run_stages`: bit by bit what it returns for this scene;
+    `cache`: for the next frame.
     """
     moved = {"camera_moved": camera_moved, "geometry_moved": geometry_moved, "light_moved": light_moved}
     return _next_of(replace(renderer, scene=scene), cache, None, **moved)
@@ -79,19 +67,9 @@ def next_parts(
 ) -> Iterator[tuple[FrameRenderer, tuple[Any, Any, Any], FrameCache]]:
     """Render a scene as `next_frame` does, in parts where a large image can be.
 
-    Parameters
-    ----------
-    renderer, scene, moved
-        See `next_frame`.
-    caches
-        What the parts of the last frame left; None for the first.
-
-    Yields
-    ------
-    part
-        The stages of one part, with the scene: for `realtime.frame.renderer.frame_with_part`.
-    stages, cache
-        As of `next_frame`.
+    `renderer`, `scene`, `moved`: see `next_frame`; `caches`: what the parts of the last frame left; None for the first.
+    Yields `part`: the stages of one part, with the scene: for `realtime.frame.renderer.frame_with_part`; `stages`,
+    `cache`: as of `next_frame`.
     """
     renderer, state = replace(renderer, scene=scene), None
     for number, part in enumerate(parts(renderer)):

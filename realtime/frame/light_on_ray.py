@@ -34,21 +34,9 @@ _ROUNDING = 2.0**-24
 def check_radiance(scene: Scene, name: str, airlight: Any, surface: Any, distance: Any) -> None:
     """Refuse the frame of a method that is not finite everywhere, or whose airlight is not.
 
-    Parameters
-    ----------
-    scene
-        As it was rendered.
-    name
-        The method's.
-    airlight, surface
-        Radiances, (height, width, 3) [W/(m^2 sr)].
-    distance
-        To the visible surface, (height, width) [m].
-
-    Raises
-    ------
-    InputError
-        With the first pixel that is wrong, and why.
+    `scene`: as it was rendered; `name`: the method's; `airlight`, `surface`: radiances, (height, width, 3) [W/(m^2
+    sr)]; `distance`: to the visible surface, (height, width) [m]. Raises InputError with the first pixel that is wrong,
+    and why.
     """
     # A medium with bounds may end before the light, and a cone look away: there the number says more than the ray.
     points = [] if scene.medium.clear else [pair for pair in enumerate(scene.lights, 1) if pair[1].kind == "point"]

@@ -24,10 +24,7 @@ def pixel_offsets(samples: int) -> Iterator[tuple[float, float]]:
 
     Both are between -1/2 and 1/2, and 0 in the mean.
 
-    Raises
-    ------
-    InputError
-        For no sample at all.
+    Raises InputError for no sample at all.
     """
     if samples < 1:
         raise InputError(f"samples: got {samples}, wanted 1 or more")
@@ -40,19 +37,9 @@ def pixel_offsets(samples: int) -> Iterator[tuple[float, float]]:
 def render_samples(renderer: FrameRenderer, samples: int, progress: Callable[[float], None] | None = None) -> Frame:
     """Render the mean over some rays of each pixel.
 
-    Parameters
-    ----------
-    renderer
-        From `realtime.frame.renderer.frame_renderer`. What a method makes of the scene is made anew for each ray.
-    samples
-        Rays of each pixel; 1 is `render_frame`.
-    progress
-        Called with the share done.
-
-    Returns
-    -------
-    Frame
-        Mean radiances; the distance is that of the first ray.
+    `renderer`: from `realtime.frame.renderer.frame_renderer`. What a method makes of the scene is made anew for each
+    ray. `samples`: rays of each pixel; 1 is `render_frame`. `progress`: called with the share done. Returns `Frame`:
+    mean radiances; the distance is that of the first ray.
     """
     camera, frame = renderer.scene.camera, None
     for number, (right, down) in enumerate(pixel_offsets(samples), 1):

@@ -59,14 +59,8 @@ class VisibleSurface:
 def cast_rays(scene, facets: Facets | None, origin, direction) -> Cast:
     """Cast the camera rays.
 
-    Parameters
-    ----------
-    scene
-        The Mitsuba scene.
-    facets
-        Its triangles, or None: then Mitsuba will be asked for the surfaces.
-    origin, direction
-        Rays in any precision [m] and their unit directions; they are cast in float32.
+    `scene`: the Mitsuba scene; `facets`: its triangles, or None: then Mitsuba will be asked for the surfaces; `origin`,
+    `direction`: rays in any precision [m] and their unit directions; they are cast in float32.
     """
     Float = type(origin.x)
     hit = scene.ray_intersect_preliminary(_ray(origin, direction), coherent=True)
@@ -109,18 +103,9 @@ def _ray(origin, direction):
 def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light, depths, shadows: bool = True):
     """Return the radiance that the visible surface sends to the eye through the medium, from one light [W/(m^2 sr)].
 
-    Parameters
-    ----------
-    scene
-        The Mitsuba scene, for shadow rays.
-    surface
-        From `visible_surface`.
-    medium, light
-        What the light crosses and where it comes from.
-    depths
-        The optical depths of the camera rays, by channel.
-    shadows
-        Whether to cast shadow rays; a method that finds out otherwise what is lit leaves them to that.
+    `scene`: the Mitsuba scene, for shadow rays; `surface`: from `visible_surface`; `medium`, `light`: what the light
+    crosses and where it comes from; `depths`: the optical depths of the camera rays, by channel; `shadows`: whether to
+    cast shadow rays; a method that finds out otherwise what is lit leaves them to that.
     """
     cosine, r, arriving = _arriving(light, surface)
     lit = surface.seen & (cosine > 0)
@@ -137,14 +122,8 @@ def lit_by_points(scene, surface: VisibleSurface, *, medium: Medium, lights: Seq
 
     What they have in common is taken out of the sum: their intensity, the albedo and the leg to the eye.
 
-    Parameters
-    ----------
-    scene, surface, depths, shadows
-        As for `lit_surface`.
-    medium
-        Without bounded media in it.
-    lights
-        The points of one light.
+    `scene`, `surface`, `depths`, `shadows`: as for `lit_surface`; `medium`: without bounded media in it; `lights`: the
+    points of one light.
     """
 
     def weight(light: Light):
@@ -183,25 +162,12 @@ def surface_stages(
 ) -> tuple[Callable[..., Any], Callable[..., Any], bool]:
     """Return the stages for a scene.
 
-    Parameters
-    ----------
-    scene
-        The scene; what matters is what cannot move.
-    provides_visibility
-        Whether the method finds out which surfaces are lit.
-    by_source
-        Whether it does so for all points of a light with extent together.
-    through_media
-        Whether the bounded media dim the surfaces; if not, the method says how much they do.
-
-    Returns
-    -------
-    surface
-        (geometry, facets, pixel, camera, medium, lights) -> what camera rays meet, and what `shade` returns.
-    shade
-        (geometry, facets, pixel, camera, medium, lights, cast) -> surface radiance by light, or a tuple of their sum.
-    casts_rays
-        Whether `shade` needs the geometry.
+    `scene`: the scene; what matters is what cannot move; `provides_visibility`: whether the method finds out which
+    surfaces are lit; `by_source`: whether it does so for all points of a light with extent together; `through_media`:
+    whether the bounded media dim the surfaces; if not, the method says how much they do. Returns `surface`: (geometry,
+    facets, pixel, camera, medium, lights) -> what camera rays meet, and what `shade` returns; `shade`: (geometry,
+    facets, pixel, camera, medium, lights, cast) -> surface radiance by light, or a tuple of their sum; `casts_rays`:
+    whether `shade` needs the geometry.
     """
     if not scene.features.surfaces:
         return _nothing_met, no_surface, False

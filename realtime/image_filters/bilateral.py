@@ -24,21 +24,10 @@ def reach(hd: float, support: float) -> int:
 def bilateral(image: PerRay, raster: Raster, *, hd: float, guides: tuple[Guide, ...], support: float = 3.0) -> PerRay:
     """Return an image filtered, see `realtime.image_filters`.
 
-    Parameters
-    ----------
-    image
-        A number or a colour per pixel, row by row.
-    raster
-        Its size.
-    hd
-        Standard deviation of the weights in the image [pixels], above 0.
-    guides
-        What says that pixels are alike; with none it is the Gaussian.
-    support
-        Half side of the square of taps [`hd`].
+    `image`: a number or a colour per pixel, row by row; `raster`: its size; `hd`: standard deviation of the weights in
+    the image [pixels], above 0; `guides`: what says that pixels are alike; with none it is the Gaussian; `support`:
+    half side of the square of taps [`hd`].
 
-    Notes
-    -----
     Valid for finite images. Reconstructed from captions of Ali 2016 where the guide is the image itself (his SBFS) or a
     depth (his SoftBiF-VS).
     """

@@ -28,20 +28,10 @@ def bilateral_of_levels(
 ) -> PerRay:
     """Return `realtime.image_filters.bilateral.bilateral` of an image of numbers with itself as its guide.
 
-    Parameters
-    ----------
-    image
-        Numbers l / `levels` with l from 0 to `levels`, row by row.
-    raster
-        Its size.
-    levels
-        N, the number of light points.
-    hd, hr
-        Standard deviations [pixels], [1]; `hr` may be infinite.
-    support
-        Half side of the square of taps [`hd`].
-    there
-        Which pixels take part; the others, for instance the sky, change nothing and stay what they are.
+    `image`: numbers l / `levels` with l from 0 to `levels`, row by row; `raster`: its size; `levels`: N, the number of
+    light points; `hd`, `hr`: standard deviations [pixels], [1]; `hr` may be infinite; `support`: half side of the
+    square of taps [`hd`]; `there`: which pixels take part; the others, for instance the sky, change nothing and stay
+    what they are.
     """
     r = reach(hd, support)
     shares = [math.exp(-0.5 * (offset / hd) ** 2) for offset in range(r + 1)]

@@ -73,14 +73,8 @@ class Taps:
     def add(self, exponent: Any, place: Any, total: Any, sums: list[Any]) -> tuple[Any, list[Any]]:
         """Return the sums of weights and of weighted differences with one more tap.
 
-        Parameters
-        ----------
-        exponent
-            To base 2 of the weight by distance, at most 0.
-        place
-            Where the tap of every pixel is.
-        total, sums
-            So far, of the weights and by channel.
+        `exponent`: to base 2 of the weight by distance, at most 0; `place`: where the tap of every pixel is; `total`,
+        `sums`: so far, of the weights and by channel.
         """
         Float = type(self.here[0])
         for (channel, width), middle in zip(self.wide.guides, self.guide_here, strict=True):

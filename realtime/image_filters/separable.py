@@ -24,14 +24,9 @@ def separable(
 ) -> PerRay:
     """Return an image filtered along rows and then along columns.
 
-    Parameters
-    ----------
-    image, raster, guides, support
-        As for `realtime.image_filters.bilateral.bilateral`.
-    hd
-        Standard deviation [pixels], above 0: one number, or an array with an entry per pixel.
-    most
-        With an array, its upper bound [pixels].
+    `image`, `raster`, `guides`, `support`: as for `realtime.image_filters.bilateral.bilateral`; `hd`: standard
+    deviation [pixels], above 0: one number, or an array with an entry per pixel; `most`: with an array, its upper bound
+    [pixels].
     """
     for right in (True, False):
         r = reach(hd if isinstance(hd, float | int) else most, support)

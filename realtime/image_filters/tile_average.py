@@ -19,14 +19,8 @@ _EXPONENTS = (-1, 0, 0, 0, -1)  # of the weights along a row, to base 2
 def tile_average(image: PerRay, raster: Raster, *, guides: tuple[Guide, ...] = ()) -> PerRay:
     """Return the mean over the window about every pixel, weighted by guides.
 
-    Parameters
-    ----------
-    image
-        A number, a colour or a vector per pixel, row by row.
-    raster
-        Its size.
-    guides
-        What says that pixels are alike.
+    `image`: a number, a colour or a vector per pixel, row by row; `raster`: its size; `guides`: what says that pixels
+    are alike.
     """
     taps = taps_of(with_margin(image, guides, raster, right=2, down=2))
     wide = taps.wide

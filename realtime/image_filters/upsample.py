@@ -26,20 +26,10 @@ def upsample(
 ) -> PerRay:
     """Return the values of pixels of a large image.
 
-    Parameters
-    ----------
-    small
-        A number or a colour per pixel of the small image, row by row, evaluated.
-    small_guide
-        Its guide of numbers, for instance `realtime.image_filters.guides.depth_guide`, evaluated.
-    guide
-        The values of that guide at the pixels that are asked for.
-    raster
-        The size of the small image.
-    scale
-        Pixels of the large image from one of the small image to the next.
-    column, row
-        Of the pixels that are asked for, in the large image, in any order.
+    `small`: a number or a colour per pixel of the small image, row by row, evaluated; `small_guide`: its guide of
+    numbers, for instance `realtime.image_filters.guides.depth_guide`, evaluated; `guide`: the values of that guide at
+    the pixels that are asked for; `raster`: the size of the small image; `scale`: pixels of the large image from one of
+    the small image to the next; `column`, `row`: of the pixels that are asked for, in the large image, in any order.
     """
     Float = type(guide)
     x, left, right = _between(Float, column, scale, raster.width)

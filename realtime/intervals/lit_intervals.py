@@ -52,12 +52,8 @@ class LitIntervals:
 def no_intervals(zero, start) -> LitIntervals:
     """Return what rays have at their start.
 
-    Parameters
-    ----------
-    zero
-        The sum of nothing, one for each ray.
-    start
-        Where rays start, one for each [m]: there an interval opens if they are lit.
+    `zero`: the sum of nothing, one for each ray; `start`: where rays start, one for each [m]: there an interval opens
+    if they are lit.
     """
     return LitIntervals(zero, start, +start, dr.full(mi.Bool, False, dr.width(zero)))
 
@@ -133,12 +129,8 @@ def filled(key: float, places: int, Float, width: int, *, gains: bool = True) ->
 def insert(queue: Crossings, key, gain=None, *, larger_is_nearer: bool):
     """Put a crossing in its place.
 
-    Returns
-    -------
-    queue
-        The nearest, as many as before.
-    key, gain
-        Of the crossing that is left without a place, the farthest of all.
+    Returns `queue`: the nearest, as many as before; `key`, `gain`: of the crossing that is left without a place, the
+    farthest of all.
     """
     nearer, farther = (dr.maximum, dr.minimum) if larger_is_nearer else (dr.minimum, dr.maximum)
     keys, gains, new = [], [], key

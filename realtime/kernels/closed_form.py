@@ -53,14 +53,9 @@ _REGIONS = {4: (1.0, 12, 42), 8: (2.0, 30, 90)}
 def closed_form(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light):
     """Return the airlight integral J by complex exponential integrals [1/m].
 
-    Raises
-    ------
-    InputError
-        For Henyey-Greenstein and tabulated phase functions, which are no polynomials, and for a spot that falls off
-        inside its cone.
+    Raises InputError for Henyey-Greenstein and tabulated phase functions, which are no polynomials, and for a spot that
+    falls off inside its cone.
 
-    Notes
-    -----
     Valid for any extinction, vacuum included, and x1 infinite; a segment of zero length gives 0. J is the difference of
     two tails, so its relative error is a few roundings times (tail0 + tail1)/J, in float32 6e-8 times that. This is
     harmless where the segment holds most of the light that comes from beyond its near end; it leaves nothing, and can
@@ -70,8 +65,6 @@ def closed_form(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light
     of the distances: harmless beyond the light, useless before it. A ray through the light gives a large number instead
     of +inf.
 
-    References
-    ----------
     Pegoraro, Parker 2009, *An analytical solution to single scattering in homogeneous participating media*, Computer
     Graphics Forum 28(2); Pegoraro, Schott, Parker 2009, *An analytical approach to single scattering for anisotropic
     media and light distributions*, Graphics Interface, for polynomials in the cosine.
@@ -123,13 +116,8 @@ def _tail(foot, h, x, sigma_t, polynomial):
 def scaled_e1(e, a):
     """Return real and imaginary part of exp(z) E1(z) for z = a (e - i).
 
-    Parameters
-    ----------
-    e, a
-        Dr.Jit arrays [1], e >= 0 and a >= 0. At a = 0 the imaginary part is atan(1/e), the real part large.
+    `e`, `a`: Dr.Jit arrays [1], e >= 0 and a >= 0. At a = 0 the imaginary part is atan(1/e), the real part large.
 
-    Notes
-    -----
     Valid for |z| up to 1e18 in float32. The imaginary part errs by at most 1e-5 of itself in float32 and 1e-13 in
     float64, just inside the circle at large e, and by about one rounding in the median; the real part by as little of
     |S|.

@@ -47,8 +47,6 @@ _ISOTROPIC_DOUBLE, _PANEL_NODES = 40, 24
 def exact(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light):
     """Return the airlight integral J to the accuracy of the arithmetic [1/m].
 
-    Notes
-    -----
     Valid for any extinction (vacuum included), any ray, the light beside the segment (height 0) included, any segment,
     endless ones and those of length 0 included, and |g| < 1. Where the ray meets the light (height 0) on the segment,
     its ends included, the integral is infinite, and so is the result.

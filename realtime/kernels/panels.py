@@ -55,23 +55,10 @@ _DEEPEST = 116.0  # e^-80
 def panels_mean(phase: Phase, start, scale, width, decays, weight: Callable[[Any], Any] | None):
     """Return I/(d (v1 - v0)), the mean over the range of v, for each extinction [1].
 
-    Parameters
-    ----------
-    phase
-        The phase function.
-    start
-        (F, C), sinh and cosh of v0, float32.
-    scale
-        d, see above.
-    width
-        v1 - v0; 0 where there is nothing to integrate.
-    decays
-        a = sigma_t h, one or more.
-    weight
-        Relative intensity of the light by E, or None where it is 1 everywhere.
+    `phase`: the phase function; `start`: (F, C), sinh and cosh of v0, float32; `scale`: d, see above; `width`: v1 - v0;
+    0 where there is nothing to integrate; `decays`: a = sigma_t h, one or more; `weight`: relative intensity of the
+    light by E, or None where it is 1 everywhere.
 
-    Notes
-    -----
     Valid for any decay. The values are 0 where e^-80 is.
     """
     Float = type(width)

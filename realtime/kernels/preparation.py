@@ -25,17 +25,8 @@ def prepared_by(prepare: Callable[..., Any]) -> Callable[[Any], Any]:
 def prepare_kernel(kernel: Any, Float: type) -> Any:
     """Return the tables of a kernel, evaluated, in the precision of `Float`; None for one that reads none.
 
-    Parameters
-    ----------
-    kernel
-        A kernel function, or a `functools.partial` of one that sets parameters.
-    Float
-        The type of a number per ray.
-
-    Raises
-    ------
-    InputError
-        For what the kernel's `prepare` refuses.
+    `kernel`: a kernel function, or a `functools.partial` of one that sets parameters; `Float`: the type of a number per
+    ray. Raises InputError for what the kernel's `prepare` refuses.
     """
     function, parameters = (kernel.func, kernel.keywords) if isinstance(kernel, partial) else (kernel, {})
     prepare = getattr(function, "prepare", None)

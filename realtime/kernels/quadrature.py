@@ -42,13 +42,8 @@ from realtime.scene.media.medium import optical_reach
 def quadrature(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, nodes: int = 16):
     """Return the airlight integral J by Gauss-Legendre quadrature in w [1/m].
 
-    Parameters
-    ----------
-    nodes
-        Nodes of each panel, a positive even number.
+    `nodes`: nodes of each panel, a positive even number.
 
-    Notes
-    -----
     Valid for any ray that does not pass through the light, any extinction, vacuum included, and `x1` infinite. With 16
     nodes and an isotropic phase function the relative error in float32 stays below about 1e-5 for optical depths up to
     100; sharp phase functions (g above 0.8) need more nodes.

@@ -74,19 +74,9 @@ def serves(rule: Rule, segment_extent: Extent, phase: Phase):
 def short_segment(geometry: RayGeometry, x0, x1, phase: Phase, extinctions, *, rule: Rule):
     """Return J of short segments for each extinction [1/m].
 
-    Parameters
-    ----------
-    geometry, x0, x1
-        See `realtime.kernels`.
-    phase
-        The phase function.
-    extinctions
-        One or more [1/m].
-    rule
-        How many nodes.
+    `geometry`, `x0`, `x1`: see `realtime.kernels`; `phase`: the phase function; `extinctions`: one or more [1/m];
+    `rule`: how many nodes.
 
-    Notes
-    -----
     Valid where the rule `serves`.
     """
     s0, length, height_squared = x0 - geometry.foot, x1 - x0, dr.square(geometry.height)

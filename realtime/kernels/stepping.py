@@ -47,8 +47,6 @@ def equiangular(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light
     Valid for any ray that does not meet the light (height above 0); thick media need many steps, since a few angles
     hold all the light.
 
-    References
-    ----------
     Kulla, Fajardo 2012, *Importance sampling techniques for path tracing in participating media*, section 4.
     """
     _check("steps", steps)

@@ -80,23 +80,11 @@ def table(
 ):
     """Return the airlight integral J as the difference of two reads of a table [1/m].
 
-    Parameters
-    ----------
-    form
-        'sun', the published table, or 'tail', scaled tails and heads.
-    size
-        Entries along each side, 64 in the paper.
-    tables
-        What `upload_table` returned; None uploads the table for this call alone.
+    `form`: 'sun', the published table, or 'tail', scaled tails and heads; `size`: entries along each side, 64 in the
+    paper; `tables`: what `upload_table` returned; None uploads the table for this call alone. Raises InputError for a
+    phase function that is not isotropic, a spot that falls off inside its cone, an unknown form, a size outside [2,
+    2048], and where a frozen function records that was given no table.
 
-    Raises
-    ------
-    InputError
-        For a phase function that is not isotropic, a spot that falls off inside its cone, an unknown form, a size
-        outside [2, 2048], and where a frozen function records that was given no table.
-
-    Notes
-    -----
     Valid for x1 infinite, vacuum and segments of zero length (J = 0). Both forms are differences of reads, so where J
     is small against them (slivers, and with 'sun' all that is flat: rays that leave the light behind, thick media)
     errors grow as much, and small values can become negative.
@@ -109,8 +97,6 @@ def table(
     'tail': any extinction, h = 0 beside the light; a segment that holds the light gives +inf. With 64 entries the
     largest relative error is about 3e-4, 1e-5 with 512; of slivers 1e-3, and 0.1 in float32.
 
-    References
-    ----------
     Sun, Ramamoorthi, Narasimhan, Nayar 2005, *A practical analytic single scattering model for real time rendering*,
     ACM Transactions on Graphics 24(3).
     """

@@ -92,20 +92,11 @@ def taylor_bounded(
 def taylor(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, degree: int = 4, printed: bool = False):
     """Return the airlight integral J by the Taylor polynomial about the foot [1/m].
 
-    Parameters
-    ----------
-    degree
-        Degree of the polynomial, 4 in the paper; at most 4 as printed, where with 2 every coefficient is a printed one.
-    printed
-        Whether the coefficients are those of the paper's annex, misprints included: the kernel `taylor-printed`.
+    `degree`: degree of the polynomial, 4 in the paper; at most 4 as printed, where with 2 every coefficient is a
+    printed one; `printed`: whether the coefficients are those of the paper's annex, misprints included: the kernel
+    `taylor-printed`. Raises InputError for a phase function that has no series, or that the annex does not have, and
+    for a degree that there is not.
 
-    Raises
-    ------
-    InputError
-        For a phase function that has no series, or that the annex does not have, and for a degree that there is not.
-
-    Notes
-    -----
     Valid near theta = 0 only: the error is large where the segment ends more than about 1 rad from the foot or where
     sigma_t h is large; far behind the camera exp(-sigma_t foot) overflows. That is the published method's own limit.
     As printed it is valid nowhere in particular: even near the foot the error is of first order in theta (hazy, murky)
@@ -144,12 +135,8 @@ def _coefficients(a, phase: Phase, degree: int, *, printed: bool) -> list:
 def printed_coefficients(a, name: str) -> list:
     """Return the printed coefficients of theta^0, theta^1, ..., without e^-a, over the phase function's mean [1].
 
-    Parameters
-    ----------
-    a
-        sigma_t h [1], a number or an array of any kind.
-    name
-        'isotropic' (five coefficients), 'rayleigh', 'hazy' or 'murky' (three).
+    `a`: sigma_t h [1], a number or an array of any kind; `name`: 'isotropic' (five coefficients), 'rayleigh', 'hazy' or
+    'murky' (three).
     """
     unit = 0 * a + 1
     if name == "isotropic":

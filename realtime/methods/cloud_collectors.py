@@ -178,10 +178,7 @@ class CloudCollectors(Method):
     def preparation(self, scene):
         """Return what makes the light maps of a frame; tables and boundaries are made here, once.
 
-        Raises
-        ------
-        InputError
-            If the maps need more memory than the machine has.
+        Raises InputError if the maps need more memory than the machine has.
         """
         return _preparation(scene, self)
 

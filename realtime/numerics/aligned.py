@@ -16,12 +16,7 @@ def aligned_array(scalar: Any, numbers: NDArray[Any]) -> Any:
     A Dr.Jit array of NumPy's memory uses it as it stands, and a kernel is compiled, a frozen function recorded, for the
     alignment of each of its arrays: where NumPy puts them by chance, the same kernel is compiled again and again.
 
-    Parameters
-    ----------
-    scalar
-        The type of the array, such as `mi.Float`.
-    numbers
-        (n,), in any unit.
+    `scalar`: the type of the array, such as `mi.Float`; `numbers`: (n,), in any unit.
     """
     dtype = _dtype(scalar, numbers)
     aligned = _memory(numbers.size * dtype.itemsize)[: numbers.size * dtype.itemsize].view(dtype)
@@ -32,10 +27,7 @@ def aligned_array(scalar: Any, numbers: NDArray[Any]) -> Any:
 def aligned_numbers(scalar: Any, numbers: NDArray[Any]) -> list[Any]:
     """Return numbers as Dr.Jit arrays of one entry each, as `aligned_array` makes them.
 
-    Parameters
-    ----------
-    scalar, numbers
-        As of `aligned_array`.
+    `scalar`, `numbers`: as of `aligned_array`.
     """
     dtype = _dtype(scalar, numbers)
     step = _ALIGNMENT // dtype.itemsize

@@ -30,16 +30,8 @@ class ArrayTypes:
 def array_types(precision: str = "single") -> ArrayTypes:
     """Return the array types of a precision.
 
-    Parameters
-    ----------
-    precision
-        'single' (float32) or 'double' (float64). Rays are always cast in float32, the only precision of Mitsuba's
-        wheels.
-
-    Raises
-    ------
-    InputError
-        If the precision has another name.
+    `precision`: 'single' (float32) or 'double' (float64). Rays are always cast in float32, the only precision of
+    Mitsuba's wheels. Raises InputError if the precision has another name.
     """
     if precision == "single":
         return ArrayTypes(mi.Float, mi.Vector3f, mi.Color3f)

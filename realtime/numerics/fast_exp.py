@@ -32,8 +32,6 @@ _LOG2_E_LOW = 1.9259629911266175e-8  # the rest
 def exp_bounded(x):
     """Return exp(x) for float32 lanes on a processor, `drjit.exp` elsewhere.
 
-    Notes
-    -----
     Valid for x <= 88; below -87 the result stays at 1.2e-38 instead of falling to zero. Relative error below 2e-7.
     NaN stays NaN. What is put together from bits has no derivative: where one is asked for, it is `drjit.exp` too.
     """
@@ -50,8 +48,6 @@ def exp_bounded(x):
 def exp2_bounded(x):
     """Return 2^x for float32 lanes on a processor, `drjit.exp2` elsewhere.
 
-    Notes
-    -----
     Valid for |x| <= 125, unchecked: beyond, the result means nothing. Relative error below 2e-7. Where a derivative is
     asked for, it is `drjit.exp2` too.
     """
@@ -65,8 +61,6 @@ def exp2_bounded(x):
 def sinh_bounded(y):
     """Return sinh y in float32 without the cancellation of two exponentials.
 
-    Notes
-    -----
     Valid for |y| <= 1.65. Relative error below 2e-7.
     """
     square = dr.square(y)

@@ -14,15 +14,8 @@ from numpy.typing import NDArray
 def host_numbers(*values: Any) -> tuple[NDArray[np.float64], ...]:
     """Bring values to the host together.
 
-    Parameters
-    ----------
-    values
-        Dr.Jit numbers and vectors of one type and one entry each, in any unit.
-
-    Returns
-    -------
-    numbers
-        By value its components, (n,), in float64.
+    `values`: Dr.Jit numbers and vectors of one type and one entry each, in any unit. Returns `numbers`: by value its
+    components, (n,), in float64.
     """
     components = [tuple(value) if dr.depth_v(value) > 1 else (value,) for value in values]
     every = [component for of_value in components for component in of_value]

@@ -109,15 +109,9 @@ class RayGeometry:
 def ray_geometry(origin, direction, light: Light) -> RayGeometry:
     """Return foot and height of rays with respect to one light, and where they are in what it lights.
 
-    Parameters
-    ----------
-    origin, direction
-        Camera rays [m] in any precision; `direction` may have any length, and its errors are those of the height.
-    light
-        Any light; the result has its precision.
+    `origin`, `direction`: camera rays [m] in any precision; `direction` may have any length, and its errors are those
+    of the height; `light`: any light; the result has its precision.
 
-    Notes
-    -----
     Valid for any ray. A ray through the light, or parallel to the light, has height 0.
     """
     aim = mi.Vector3d(direction)

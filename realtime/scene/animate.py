@@ -35,14 +35,7 @@ def turned_light(light: Light, about: Array, turn: Array) -> Light:
 
     A uniform sky is the same whichever way it turns, and the beam that stands for it stays.
 
-    Parameters
-    ----------
-    light
-        The light.
-    about
-        A point that stays [m].
-    turn
-        Rotation matrix, (3, 3).
+    `light`: the light; `about`: a point that stays [m]; `turn`: rotation matrix, (3, 3).
     """
     if light.sky is not None:
         return light
@@ -101,10 +94,7 @@ def with_area_lights(scene: Scene, area_lights: Sequence[AreaLight]) -> Scene:
 def thicker_medium(medium: Medium, factor: float) -> Medium:
     """Return a medium, and the bounded media in it, with the extinction times a factor; the albedo stays.
 
-    Raises
-    ------
-    InputError
-        For a factor that is negative or not finite.
+    Raises InputError for a factor that is negative or not finite.
     """
     if not 0 <= factor < np.inf:
         raise InputError(f"factor of the extinction: got {factor!r}, wanted a finite value of 0 or more")
@@ -125,10 +115,7 @@ class Objects:
 def read_objects(scene: Scene, names: Sequence[str]) -> Objects:
     """Read the shapes that are to move; `names` are those of meshes.
 
-    Raises
-    ------
-    InputError
-        For a shape that is not there, or whose vertices Mitsuba does not let move.
+    Raises InputError for a shape that is not there, or whose vertices Mitsuba does not let move.
     """
     parameters = mi.traverse(scene.geometry)
     vertices = {}

@@ -109,12 +109,7 @@ def shifted_camera(camera: Camera, right: float, down: float) -> Camera:
     Only `forward` changes, by (W - 1)/2 - (i + right) and likewise for rows, so it is of unit length and upright on the
     image to first order in the size of a pixel only: for pictures.
 
-    Parameters
-    ----------
-    camera
-        The camera.
-    right, down
-        How far beside [pixels].
+    `camera`: the camera; `right`, `down`: how far beside [pixels].
     """
     host = read_camera(camera)
     forward = mi.Vector3d(*(float(c) for c in host.forward - right * host.left - down * host.up))
@@ -125,12 +120,7 @@ def shifted_camera(camera: Camera, right: float, down: float) -> Camera:
 def resized_camera(camera: Camera, width: int, height: int) -> Camera:
     """Return the camera of the same picture with other pixels, which need not be squares.
 
-    Parameters
-    ----------
-    camera
-        The camera.
-    width, height
-        Of its image [pixels].
+    `camera`: the camera; `width`, `height`: of its image [pixels].
     """
     forward, left, up = camera.axes
     left, up = left * (camera.width / width), up * (camera.height / height)

@@ -53,19 +53,8 @@ class ClosedMesh:
 def closed_mesh(name: str, vertices: Array, faces: NDArray[Any]) -> ClosedMesh:
     """Return a mesh with its doubled vertices joined.
 
-    Parameters
-    ----------
-    name
-        For messages.
-    vertices
-        Positions [m], (vertices, 3).
-    faces
-        Vertex numbers, counter-clockwise seen from outside, (faces, 3).
-
-    Raises
-    ------
-    InputError
-        Where an edge is not met once each way, with its name.
+    `name`: for messages; `vertices`: positions [m], (vertices, 3); `faces`: vertex numbers, counter-clockwise seen from
+    outside, (faces, 3). Raises InputError where an edge is not met once each way, with its name.
     """
     joined, own, number = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
     mesh = ClosedMesh(name, joined, number.reshape(-1)[np.asarray(faces, dtype=np.int64)], own)
@@ -113,17 +102,8 @@ def encloses(mesh: ClosedMesh, point: Array) -> bool:
 def check_bodies(meshes: Sequence[ClosedMesh], shapes: Sequence[Any]) -> None:
     """Refuse meshes that are no disjoint bodies, with the name of an edge.
 
-    Parameters
-    ----------
-    meshes
-        The bounds of all media.
-    shapes
-        Mitsuba's shapes of them, in the same order.
-
-    Raises
-    ------
-    InputError
-        For meshes that cross themselves or one another, are inside out, or lie within one another.
+    `meshes`: the bounds of all media; `shapes`: Mitsuba's shapes of them, in the same order. Raises InputError for
+    meshes that cross themselves or one another, are inside out, or lie within one another.
     """
     _check_crossings(meshes, shapes)
     parts = [part for number, mesh in enumerate(meshes) for part in _parts(number, mesh)]

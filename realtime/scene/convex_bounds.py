@@ -46,22 +46,9 @@ class Bounds:
 def read_bounds(shape) -> tuple[Bounds | None, ClosedMesh | None]:
     """Read the bounds of a medium from a shape.
 
-    Parameters
-    ----------
-    shape
-        A Mitsuba shape.
-
-    Returns
-    -------
-    bounds
-        Its convex bounds; None where it is not convex.
-    mesh
-        Its triangles; None for a sphere.
-
-    Raises
-    ------
-    InputError
-        For a shape that is neither a sphere nor a closed mesh with its normals outwards, with its name.
+    `shape`: a Mitsuba shape. Returns `bounds`: its convex bounds; None where it is not convex; `mesh`: its triangles;
+    None for a sphere. Raises InputError for a shape that is neither a sphere nor a closed mesh with its normals
+    outwards, with its name.
     """
     name = shape.id()
     if shape.class_name() == "Sphere":
@@ -90,21 +77,9 @@ def _read_sphere(shape) -> Bounds:
 def mesh_bounds(name: str, vertices: Array, faces: NDArray[Any], mesh: ClosedMesh | None = None) -> Bounds | None:
     """Return the bounds that the mesh `name` describes, None where it is not convex.
 
-    Parameters
-    ----------
-    name
-        For messages.
-    vertices
-        Positions [m], (vertices, 3).
-    faces
-        Vertex numbers, counter-clockwise seen from outside, (faces, 3).
-    mesh
-        The same as `closed_mesh` returns it, if it is known.
-
-    Raises
-    ------
-    InputError
-        For a mesh that is not closed, inside out or flat.
+    `name`: for messages; `vertices`: positions [m], (vertices, 3); `faces`: vertex numbers, counter-clockwise seen from
+    outside, (faces, 3); `mesh`: the same as `closed_mesh` returns it, if it is known. Raises InputError for a mesh that
+    is not closed, inside out or flat.
     """
     mesh = mesh or closed_mesh(name, vertices, faces)
     corners = vertices[faces]
@@ -234,8 +209,6 @@ def mean_distance(bounds: Bounds) -> float:
     point at the distance d from the centre, so R = 6 a/5. In a mesh it is the mean over 65 536 pairs drawn once for all
     from a fixed seed, with a standard error of about 0.2 %.
 
-    References
-    ----------
     Biri, Arques, Michelin 2006, section 4.2.
     """
     if bounds.is_sphere:

@@ -106,11 +106,8 @@ def _cell(place, count) -> tuple[Any, Any]:
 def read_density(medium: Any, mesh: ClosedMesh) -> DensityGrid:
     """Return the grid of a Mitsuba medium within a mesh.
 
-    Raises
-    ------
-    InputError
-        For a `heterogeneous` medium whose extinction is no grid of one channel, linear between voxels, that covers the
-        mesh, or whose albedo is not the same everywhere.
+    Raises InputError for a `heterogeneous` medium whose extinction is no grid of one channel, linear between voxels,
+    that covers the mesh, or whose albedo is not the same everywhere.
     """
     name, parameters = f"the {medium.class_name()} of shape '{mesh.name}'", mi.traverse(medium)
     if "sigma_t.data" not in parameters:

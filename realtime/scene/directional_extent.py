@@ -88,17 +88,9 @@ def distance_before(spheres: Array, shapes) -> float:
 def directional_fields(axis: Array, spheres: Array, back: float, types: ArrayTypes) -> dict[str, Any]:
     """Return the fields of a directional `Light` that follow from where it comes from and what it lights.
 
-    Parameters
-    ----------
-    axis
-        Unit vector in which the light travels.
-    spheres, back
-        From `media_spheres` and `distance_before` [m].
-    types
-        Of the arrays.
+    `axis`: unit vector in which the light travels; `spheres`, `back`: from `media_spheres` and `distance_before` [m];
+    `types`: of the arrays.
 
-    Notes
-    -----
     Valid for any axis. All but the axis is rounded to float32 in any precision, so that its map is the same in all.
     """
     middle = _middle(spheres)

@@ -21,17 +21,8 @@ Array = NDArray[np.float64]
 def with_light_points(scene: Scene, points: int, pattern: str) -> Scene:
     """Return a scene whose lights are the ordinary ones, followed by the points of each light with extent in turn.
 
-    Parameters
-    ----------
-    scene
-        From `realtime.scene.read_scene.read_scene`.
-    points, pattern
-        See `realtime.area_lights.points.LightPoints`.
-
-    Raises
-    ------
-    InputError
-        For a number or a pattern that there is not.
+    `scene`: from `realtime.scene.read_scene.read_scene`; `points`, `pattern`: see
+    `realtime.area_lights.points.LightPoints`. Raises InputError for a number or a pattern that there is not.
     """
     ordinary = tuple(light for light in scene.lights if light.source is None)
     return replace(scene, lights=ordinary + light_points(scene, points, pattern))
@@ -40,17 +31,8 @@ def with_light_points(scene: Scene, points: int, pattern: str) -> Scene:
 def light_points(scene: Scene, points: int, pattern: str) -> tuple[Light, ...]:
     """Return the points of the lights with extent of a scene, light after light.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-    points, pattern
-        See `realtime.area_lights.points.LightPoints`.
-
-    Raises
-    ------
-    InputError
-        For a number or a pattern that there is not.
+    `scene`: the scene; `points`, `pattern`: see `realtime.area_lights.points.LightPoints`. Raises InputError for a
+    number or a pattern that there is not.
     """
     types = types_of(type(scene.camera.origin.x))
     placed = [place_points(light, points, pattern) for light in scene.area_lights]

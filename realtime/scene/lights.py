@@ -116,10 +116,7 @@ class Light:
     def shadow_ray(self, point) -> Any:
         """Return the Mitsuba ray that is blocked where the light does not reach a point; a surface there blocks none.
 
-        Parameters
-        ----------
-        point
-            Points [m].
+        `point`: points [m].
         """
         if not self.w:
             # From the point on, where a ray is exact, though not from the surface that it may lie on.
@@ -144,10 +141,7 @@ class Light:
 
         Those of a light point start beyond the shape that it lies on, so that they do not meet it.
 
-        Parameters
-        ----------
-        unit
-            Unit directions, in any precision.
+        `unit`: unit directions, in any precision.
         """
         if self.facing is None:
             return self.position, 0
@@ -184,14 +178,8 @@ def place_and_weight(position: Array) -> tuple[Array, int]:
 def spot_fields(axis, cutoff: float, beam: float, types: ArrayTypes) -> dict[str, Any]:
     """Return the fields of a `Light` that only a spot has.
 
-    Parameters
-    ----------
-    axis
-        Unit vector from the light along its axis, in float64.
-    cutoff, beam
-        Half angles beyond which there is no light, and up to which the intensity is full [rad].
-    types
-        Of the arrays.
+    `axis`: unit vector from the light along its axis, in float64; `cutoff`, `beam`: half angles beyond which there is
+    no light, and up to which the intensity is full [rad]; `types`: of the arrays.
     """
     fields = {
         "exact_axis": mi.Vector3d(*(float(component) for component in axis)),

@@ -62,17 +62,9 @@ class Casters:
 def read_casters(scene, area_lights: Sequence[AreaLight] = ()) -> Casters:
     """Read the triangles of a Mitsuba scene.
 
-    Parameters
-    ----------
-    scene
-        An `mi.Scene`; shapes whose surface lets light pass (`null`) cast no shadow.
-    area_lights
-        Its lights with extent: those that are opaque have triangles even where their shapes have none.
-
-    Raises
-    ------
-    InputError
-        For a shape that has no triangles, with its name.
+    `scene`: an `mi.Scene`; shapes whose surface lets light pass (`null`) cast no shadow; `area_lights`: its lights with
+    extent: those that are opaque have triangles even where their shapes have none. Raises InputError for a shape that
+    has no triangles, with its name.
     """
     known = {light.name: light for light in area_lights}
     meshes = []
@@ -90,11 +82,8 @@ def read_casters(scene, area_lights: Sequence[AreaLight] = ()) -> Casters:
 def make_casters(meshes) -> Casters:
     """Return the casters of meshes.
 
-    Parameters
-    ----------
-    meshes
-        (name, vertices (n, 3) [m], triangles (m, 3)) each. Triangles with a vertex twice and repeated ones are left
-        out, the latter with a warning.
+    `meshes`: (name, vertices (n, 3) [m], triangles (m, 3)) each. Triangles with a vertex twice and repeated ones are
+    left out, the latter with a warning.
     """
     parts, warnings, shapes, first_vertex, first_component = [], [], [], 0, 0
     for name, vertices, triangles in meshes:

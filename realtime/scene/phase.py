@@ -410,22 +410,11 @@ _NARROW = 0.1
 def named_phase(words: str, *, g=None, values=None, Float: Any = None) -> Phase:
     """Return a phase function of the toolkit.
 
-    Parameters
-    ----------
-    words
-        The name of one of `PHASES`, then by colons for 'hg' g, for 'hg-draine' the diameter [um], for 'mie' and
-        'mie-modified' the effective radius [um], gamma and the wavelength [um].
-    g
-        'hg': mean cosine, in (-1, 1), where the words do not say it.
-    values
-        'tabulated': values of mean 1 at regularly spaced cosines from -1 to 1.
-    Float
-        Array type of the tables of droplets, that of the variant by default.
-
-    Raises
-    ------
-    InputError
-        For words that name no phase function, a cell that is no number, or droplets out of range.
+    `words`: the name of one of `PHASES`, then by colons for 'hg' g, for 'hg-draine' the diameter [um], for 'mie' and
+    'mie-modified' the effective radius [um], gamma and the wavelength [um]; `g`: 'hg': mean cosine, in (-1, 1), where
+    the words do not say it; `values`: 'tabulated': values of mean 1 at regularly spaced cosines from -1 to 1; `Float`:
+    array type of the tables of droplets, that of the variant by default. Raises InputError for words that name no phase
+    function, a cell that is no number, or droplets out of range.
     """
     name, *cells = words.split(":")
     by_name = {phase.name: phase for phase in PHASES}

@@ -48,10 +48,8 @@ _PHASES = {
 def sort_shapes(scene):
     """Return the opaque shapes of a scene and those that bound a medium.
 
-    Raises
-    ------
-    InputError
-        For a shape that is transparent or bounds a medium in a way that no method can render, with its name.
+    Raises InputError for a shape that is transparent or bounds a medium in a way that no method can render, with its
+    name.
     """
     opaque, boundaries = [], []
     for shape in scene.shapes():
@@ -94,26 +92,10 @@ def opaque_scene(scene, opaque):
 def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[ClosedMesh, ...]]:
     """Return the medium of a scene with the bounded media in it.
 
-    Parameters
-    ----------
-    sensor
-        Mitsuba's sensor.
-    boundaries
-        The shapes that bound media.
-    types
-        Array types to compute with.
-
-    Returns
-    -------
-    medium
-        In clear air with `clouds`, whatever the bounds; with `bounded_media` only where all bounds are convex.
-    meshes
-        The bounds where not all of them are convex, or a medium is not homogeneous; then all are meshes.
-
-    Raises
-    ------
-    InputError
-        For media that no method can render, with the name of what is in the way.
+    `sensor`: Mitsuba's sensor; `boundaries`: the shapes that bound media; `types`: array types to compute with. Returns
+    `medium`: in clear air with `clouds`, whatever the bounds; with `bounded_media` only where all bounds are convex;
+    `meshes`: the bounds where not all of them are convex, or a medium is not homogeneous; then all are meshes. Raises
+    InputError for media that no method can render, with the name of what is in the way.
     """
     if not boundaries:
         if sensor.get_medium() is None:

@@ -97,23 +97,9 @@ def cast_hemisphere_maps(
 ) -> HemisphereMaps:
     """Cast the maps of all points of a light.
 
-    Parameters
-    ----------
-    scene
-        The Mitsuba scene that holds the occluders.
-    frames
-        The light points, one a lane.
-    points
-        How many there are.
-    size
-        Texels on a side of each map, a power of two.
-    for_surfaces
-        Whether points on surfaces will be asked for, not only those in the air.
-
-    Raises
-    ------
-    InputError
-        If `size` is not a power of two from 4 to 8192.
+    `scene`: the Mitsuba scene that holds the occluders; `frames`: the light points, one a lane; `points`: how many
+    there are; `size`: texels on a side of each map, a power of two; `for_surfaces`: whether points on surfaces will be
+    asked for, not only those in the air. Raises InputError if `size` is not a power of two from 4 to 8192.
     """
     check_size(size)
     Float, side = type(frames.lift), size + 1

@@ -63,19 +63,9 @@ class Projection:
     def homogeneous(self, face, vector, weight: int) -> tuple[Any, Any, Any, Any]:
         """Return what is proportional to (u, v, s, 1) on a face.
 
-        Parameters
-        ----------
-        face
-            Number of the face.
-        vector
-            Of points, less the position of the light [m]; or directions.
-        weight
-            1 for points, 0 for directions: their last homogeneous coordinate.
-
-        Returns
-        -------
-        a, b, s, c
-            Linear in (vector, weight).
+        `face`: number of the face; `vector`: of points, less the position of the light [m]; or directions; `weight`: 1
+        for points, 0 for directions: their last homogeneous coordinate. Returns `a`, `b`, `s`, `c`: linear in (vector,
+        weight).
         """
         a, b, c = self.products(face, vector)
         if self.basis:
@@ -87,12 +77,7 @@ class Projection:
     def inverse_depth(self, place, distance):
         """Return the s of points that rays of the map meet: inverse planar depth [1/m], or height for w = 0 [m].
 
-        Parameters
-        ----------
-        place
-            (u, v) on a face.
-        distance
-            Along the rays, infinite where nothing is met [m].
+        `place`: (u, v) on a face; `distance`: along the rays, infinite where nothing is met [m].
         """
         if not self.w:
             return dr.maximum(self.depth - distance, 0)

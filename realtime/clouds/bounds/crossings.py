@@ -35,21 +35,9 @@ class Crossing:
 def next_crossing(surfaces: CloudSurfaces, origin, direction, x, active=True) -> Crossing:
     """Return the first crossing beyond a distance.
 
-    Parameters
-    ----------
-    surfaces
-        The boundaries of clouds.
-    origin, direction
-        Rays in any precision [m] and their unit directions.
-    x
-        Distance of the last crossing, or 0 [m].
-    active
-        Lanes to compute.
-
-    Returns
-    -------
-    crossing
-        Its distance is larger than `x`.
+    `surfaces`: the boundaries of clouds; `origin`, `direction`: rays in any precision [m] and their unit directions;
+    `x`: distance of the last crossing, or 0 [m]; `active`: lanes to compute. Returns `crossing`: its distance is larger
+    than `x`.
     """
     Float = type(x)
     size = dr.maximum(dr.maximum(dr.abs(origin.x), dr.abs(origin.y)), dr.abs(origin.z))
@@ -75,21 +63,10 @@ def next_crossing(surfaces: CloudSurfaces, origin, direction, x, active=True) ->
 def sum_over_stretches(surfaces: CloudSurfaces, origin, direction, end, total, add, active=True) -> Any:
     """Add up what the stretches of rays within clouds have, from the nearest to the farthest.
 
-    Parameters
-    ----------
-    surfaces
-        The boundaries of clouds.
-    origin, direction
-        Rays in any precision [m] and their unit directions.
-    end
-        Where they end, may be infinite [m].
-    total
-        The sum of no stretch, an array or a tuple of arrays of the rays' width.
-    add
-        (total, begin, end, cloud, inside) -> total, with the stretch [m] in the cloud of a number; only lanes that are
-        `inside` count.
-    active
-        Lanes to compute.
+    `surfaces`: the boundaries of clouds; `origin`, `direction`: rays in any precision [m] and their unit directions;
+    `end`: where they end, may be infinite [m]; `total`: the sum of no stretch, an array or a tuple of arrays of the
+    rays' width; `add`: (total, begin, end, cloud, inside) -> total, with the stretch [m] in the cloud of a number; only
+    lanes that are `inside` count; `active`: lanes to compute.
     """
     Float = type(direction.x)
     lanes = max(dr.width(direction), dr.width(origin))
@@ -113,14 +90,8 @@ def sum_over_stretches(surfaces: CloudSurfaces, origin, direction, end, total, a
 def optical_depths(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end, active=True) -> tuple[Any, ...]:
     """Return the optical depth of rays up to a distance in all clouds, by channel [1].
 
-    Parameters
-    ----------
-    surfaces, clouds
-        The boundaries, and what fills them.
-    origin, direction, end
-        As for `sum_over_stretches`.
-    active
-        Lanes to compute; the others have a depth of 0.
+    `surfaces`, `clouds`: the boundaries, and what fills them; `origin`, `direction`, `end`: as for
+    `sum_over_stretches`; `active`: lanes to compute; the others have a depth of 0.
     """
     Float = type(direction.x)
 

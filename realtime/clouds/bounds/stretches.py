@@ -47,21 +47,9 @@ def first_stretches(
 ) -> tuple[Crossing, Stretches, tuple[PerRay, ...]]:
     """Follow rays to their ends.
 
-    Parameters
-    ----------
-    surfaces, clouds
-        The boundaries, and what fills them.
-    origin, direction, end
-        As for `realtime.clouds.bounds.crossings.sum_over_stretches`.
-
-    Returns
-    -------
-    first
-        The first crossing.
-    stretches
-        The first ones.
-    depths
-        Optical, of all stretches, by channel [1].
+    `surfaces`, `clouds`: the boundaries, and what fills them; `origin`, `direction`, `end`: as for
+    `realtime.clouds.bounds.crossings.sum_over_stretches`. Returns `first`: the first crossing; the first ones;
+    `depths`: optical, of all stretches, by channel [1].
     """
     Float = type(direction.x)
     lanes = max(dr.width(direction), dr.width(origin))

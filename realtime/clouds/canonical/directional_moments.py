@@ -111,19 +111,9 @@ class DirectionalMoments:
     def __call__(self, tau: float, suns: ArrayLike, depths: Sequence[float]) -> Array:
         """Return the modes of a slab's light.
 
-        Parameters
-        ----------
-        tau
-            Thickness [mean free paths].
-        suns
-            (L,), cosines of the zenith angles of suns, each of which shines alone.
-        depths
-            (D,), in [0, tau] [mean free paths].
-
-        Returns
-        -------
-        ndarray
-            (sets, modes + 1, 4, L, D, V): B_m [1/sr], A_m, A_{-m}, C_m for unit flux across the beam.
+        `tau`: thickness [mean free paths]; `suns`: (L,), cosines of the zenith angles of suns, each of which shines
+        alone; `depths`: (D,), in [0, tau] [mean free paths]. Returns `ndarray`: (sets, modes + 1, 4, L, D, V): B_m
+        [1/sr], A_m, A_{-m}, C_m for unit flux across the beam.
         """
         cosines = np.atleast_1d(np.asarray(suns, dtype=np.float64))
         run = _Run(self, tau, depths, lowest=float(cosines.min()))
@@ -270,10 +260,7 @@ class _Run:
     ) -> tuple[list[Array], list[Array]]:
         """Return the light of scattered sources by mode, with the displacement that it gains on the way.
 
-        Returns
-        -------
-        fields, edges
-            By mode: at the nodes where they are wanted, and (4, L, D, J) at the wanted depths.
+        Returns `fields`, `edges`: by mode: at the nodes where they are wanted, and (4, L, D, J) at the wanted depths.
         """
         suns, count = len(self.suns), len(sources)
         b, b_edges = self._carried(lines, [source[..., self._fields(_B)] for source in sources], inside=True)

@@ -104,18 +104,9 @@ def fitted_functions(
 ) -> tuple[FittedSet, ...]:
     """Return the functions fitted to the tables of a medium, from the disk where they are kept there.
 
-    Parameters
-    ----------
-    phase, albedo
-        Of the medium.
-    tables
-        From `realtime.clouds.canonical.tables.canonical_tables`.
-    look_up
-        Of these.
-    types
-        Of its numbers.
-    progress
-        Called with (share done, what) while functions are fitted; without it the log says how far they are.
+    `phase`, `albedo`: of the medium; `tables`: from `realtime.clouds.canonical.tables.canonical_tables`; `look_up`: of
+    these; `types`: of its numbers; `progress`: called with (share done, what) while functions are fitted; without it
+    the log says how far they are.
     """
     made = VERSION, tables_digest(tables.grid), types.scalar.__name__
     digest = hashlib.blake2b(repr(made).encode(), digest_size=8).hexdigest()
@@ -132,14 +123,8 @@ def fitted_functions(
 def fit_tables(look_up: LookUp, types: ArrayTypes, *, progress: Progress | None = None) -> tuple[FittedSet, ...]:
     """Fit the functions to tables.
 
-    Parameters
-    ----------
-    look_up
-        Of the tables, `realtime.clouds.canonical.look_up.on_device`.
-    types
-        Of its numbers.
-    progress
-        Called with (share done, what).
+    `look_up`: of the tables, `realtime.clouds.canonical.look_up.on_device`; `types`: of its numbers; `progress`: called
+    with (share done, what).
     """
     tell = progress or (lambda share, what: None)
     samples = _samples(look_up, types)

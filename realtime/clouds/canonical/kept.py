@@ -48,12 +48,7 @@ def medium_numbers(phase: SlabPhase, albedo: float) -> Array:
 def load_kept(digest: str, medium: Array) -> dict[str, Any] | None:
     """Return the arrays under a digest of a medium, None where there are none or the file is damaged.
 
-    Parameters
-    ----------
-    digest
-        Of how tables were made.
-    medium
-        From `medium_numbers`.
+    `digest`: of how tables were made; `medium`: from `medium_numbers`.
     """
     for path in sorted(_folder().glob(f"canonical-{digest}-*.npz")):
         arrays = _read(path, medium)

@@ -22,19 +22,9 @@ Array = NDArray[Any]
 def direction_shapes(fields: Array, places: Array, directions: Array, rank: int) -> Array:
     """Return the shapes that fields at some places have most of.
 
-    Parameters
-    ----------
-    fields
-        (P, V), at P places in V directions.
-    places, directions
-        (P,) and (V,), weights, not negative; those of directions positive.
-    rank
-        K, how many shapes.
-
-    Returns
-    -------
-    ndarray
-        (K, V), with sum_v directions_v g_k g_l = delta_kl.
+    `fields`: (P, V), at P places in V directions; `places`, `directions`: (P,) and (V,), weights, not negative; those
+    of directions positive; `rank`: K, how many shapes. Returns `ndarray`: (K, V), with sum_v directions_v g_k g_l =
+    delta_kl.
     """
     roots = np.sqrt(directions)
     weighted = fields * roots * np.sqrt(places / places.max())[:, None]

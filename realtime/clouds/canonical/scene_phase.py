@@ -15,15 +15,8 @@ Array = NDArray[np.float64]
 def slab_phase(phase: Phase, types: ArrayTypes, *, modified: bool = False) -> AnglePhase:
     """Return the phase function of a scene by its values.
 
-    Parameters
-    ----------
-    phase
-        Of a medium of the scene.
-    types
-        Of its numbers.
-    modified
-        Whether the peak below `CUT` is cut to zero: then lengths are those of the medium whose density is lowered by
-        `share_of_peak`.
+    `phase`: of a medium of the scene; `types`: of its numbers; `modified`: whether the peak below `CUT` is cut to zero:
+    then lengths are those of the medium whose density is lowered by `share_of_peak`.
     """
     edge = np.deg2rad(CUT)
 

@@ -26,14 +26,8 @@ _NETWORKS = {
 def around(places: tuple[Any, ...], sides: tuple[int, ...], first: Any = 0) -> list[tuple[Any, Any]]:
     """Return indices and weights of the entries around places.
 
-    Parameters
-    ----------
-    places
-        Coordinates from 0 to 1; two, three or five.
-    sides
-        Entries along each, the last of which lie side by side.
-    first
-        Index of the first entry.
+    `places`: coordinates from 0 to 1; two, three or five; `sides`: entries along each, the last of which lie side by
+    side; `first`: index of the first entry.
     """
     base: Any = mi.UInt32(first)
     pairs: list[tuple[Any, Any]] = []

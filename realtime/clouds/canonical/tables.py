@@ -100,21 +100,9 @@ def canonical_tables(
 ) -> CanonicalTables:
     """Return the tables of a medium, from the disk where they are kept there.
 
-    Parameters
-    ----------
-    phase
-        Phase function of the medium.
-    albedo
-        In (0, 1].
-    grid
-        Numbers of entries.
-    progress
-        Called with (share done, what) while tables are made; without it the log says how far they are.
-
-    Raises
-    ------
-    InputError
-        For an albedo out of range.
+    `phase`: phase function of the medium; `albedo`: in (0, 1]; `grid`: numbers of entries; `progress`: called with
+    (share done, what) while tables are made; without it the log says how far they are. Raises InputError for an albedo
+    out of range.
     """
     if not 0 < albedo <= 1:
         raise InputError(

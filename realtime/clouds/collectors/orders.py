@@ -38,14 +38,9 @@ def light_of_orders(
 ) -> OrdersLight:
     """Search the collectors of all sets of orders, and return their light.
 
-    Parameters
-    ----------
-    light_map, transport, point, toward, extinction, behind, search, active
-        See `realtime.clouds.collectors.search.collector_light`.
-    sets
-        How many sets there are, numbers from 0 on.
-    last
-        The `OrdersLight.collectors` of the last frame; None where a search starts with nothing.
+    `light_map`, `transport`, `point`, `toward`, `extinction`, `behind`, `search`, `active`: see
+    `realtime.clouds.collectors.search.collector_light`; `sets`: how many sets there are, numbers from 0 on; `last`: the
+    `OrdersLight.collectors` of the last frame; None where a search starts with nothing.
     """
     cold = cold_start(light_map, point)
     lights = []

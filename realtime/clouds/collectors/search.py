@@ -101,28 +101,11 @@ def collector_light(
 ) -> CollectorLight:
     """Find the collectors of one set of orders, and the light that comes from them.
 
-    Parameters
-    ----------
-    light_map
-        Of the cloud under one sun.
-    transport
-        See `Transport`.
-    set_number
-        What the transport is asked for.
-    point
-        Points in the cloud or on it [m].
-    toward
-        Unit directions in which light leaves them.
-    extinction
-        Of the cloud [1/m].
-    behind
-        Optical depth of the clouds on the ray behind each point.
-    start
-        With which the search starts.
-    search
-        How it goes on.
-    active
-        Lanes to compute; in the others the collector stays and no light comes.
+    `light_map`: of the cloud under one sun; `transport`: see `Transport`; `set_number`: what the transport is asked
+    for; `point`: points in the cloud or on it [m]; `toward`: unit directions in which light leaves them; `extinction`:
+    of the cloud [1/m]; `behind`: optical depth of the clouds on the ray behind each point; `start`: with which the
+    search starts; `search`: how it goes on; `active`: lanes to compute; in the others the collector stays and no light
+    comes.
     """
     Float = type(start.width)
     lanes = max(dr.width(point), dr.width(toward))

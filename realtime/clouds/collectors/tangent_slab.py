@@ -60,20 +60,10 @@ def tangent_slab(
 ) -> TangentSlab:
     """Return the slab that touches a filtered surface, with a point and a direction in it.
 
-    Parameters
-    ----------
-    surface
-        What `realtime.clouds.light_maps.pyramid.filtered_surface` found.
-    axis
-        Unit direction in which the light travels.
-    point
-        Points in the cloud or on it [m].
-    toward
-        Unit directions in which light leaves the points.
-    extinction
-        Of the cloud [1/m].
-    along_light
-        Whether thickness and depth are those along the light, as printed.
+    `surface`: what `realtime.clouds.light_maps.pyramid.filtered_surface` found; `axis`: unit direction in which the
+    light travels; `point`: points in the cloud or on it [m]; `toward`: unit directions in which light leaves the
+    points; `extinction`: of the cloud [1/m]; `along_light`: whether thickness and depth are those along the light, as
+    printed.
     """
     Float = type(surface.cover)
     normal, mu_l = _facing(surface.normal, axis)

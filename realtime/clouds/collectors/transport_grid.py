@@ -74,14 +74,8 @@ class TransportGrid:
 def transport_grid(look_up: Any, angular: Any, sets: int) -> TransportGrid:
     """Return the grid of a look-up.
 
-    Parameters
-    ----------
-    look_up
-        `realtime.clouds.canonical.look_up.DeviceTables`.
-    angular
-        P_s by set, as the tables have it.
-    sets
-        How many.
+    `look_up`: `realtime.clouds.canonical.look_up.DeviceTables`; `angular`: p_s by set, as the tables have it; `sets`:
+    how many.
     """
     Float = type(look_up.angular[0])
     Four, Vector = four_numbers(Float), dr.uint32_array_t(Float)

@@ -81,18 +81,9 @@ def light_depths(
 ) -> LightDepths:
     """Return what lies between a sun and all points of a cloud.
 
-    Parameters
-    ----------
-    surfaces, clouds
-        The boundaries, and what fills them, with a density.
-    light
-        A directional light, with an extent that holds the clouds.
-    cloud
-        The number of the cloud.
-    stride
-        How long the steps are at most [voxels].
-    size, layers
-        Texels on a side; layers of each.
+    `surfaces`, `clouds`: the boundaries, and what fills them, with a density; `light`: a directional light, with an
+    extent that holds the clouds; `cloud`: the number of the cloud; how long the steps are at most [voxels]; `size`,
+    `layers`: texels on a side; layers of each.
     """
     Float = type(light.position.x)
     start, axis, texel = texel_rays(light, size)

@@ -55,15 +55,9 @@ def dense_surface(
 ) -> DenseSurface:
     """Return where rays first meet more than a density.
 
-    Parameters
-    ----------
-    surfaces, clouds, origin, direction, end, stride
-        As for `realtime.clouds.hypertexture.march.marched_depths`.
-    threshold
-        rho_0 [1].
-    only
-        The number of a cloud that is seen alone, with what the rays meet behind its surface; None for all, where rays
-        end at the surface.
+    `surfaces`, `clouds`, `origin`, `direction`, `end`, `stride`: as for
+    `realtime.clouds.hypertexture.march.marched_depths`; `threshold`: rho_0 [1]; `only`: the number of a cloud that is
+    seen alone, with what the rays meet behind its surface; None for all, where rays end at the surface.
     """
     Float, lanes = type(direction.x), max(dr.width(direction), dr.width(origin))
     density = clouds.density
@@ -119,16 +113,8 @@ def lit_dense_surface(
 ) -> LitSurfaces:
     """Return what rays along a light meet of one cloud, as `realtime.clouds.light_maps.surfaces.cast_surfaces` does.
 
-    Parameters
-    ----------
-    surfaces, clouds, threshold, stride
-        As for `dense_surface`.
-    light, size
-        As for `cast_surfaces`.
-    cloud
-        Its number.
-    body
-        By cloud, mean(rho where rho > rho_0) [1].
+    `surfaces`, `clouds`, `threshold`, `stride`: as for `dense_surface`; `light`, `size`: as for `cast_surfaces`;
+    `cloud`: its number; `body`: by cloud, mean(rho where rho > rho_0) [1].
     """
     check_size(size)
     Float, Vector = type(light.position.x), type(light.position)

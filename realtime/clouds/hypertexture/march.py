@@ -29,20 +29,10 @@ def march(
 ) -> Any:
     """Add up what small steps of rays within clouds have, from the nearest to the farthest.
 
-    Parameters
-    ----------
-    surfaces
-        The boundaries of clouds.
-    origin, direction, end
-        Rays [m], their unit directions, and where they end, may be infinite [m].
-    total
-        The sum of no step, a tuple of arrays of the rays' width.
-    step
-        (total, distance [m], cloud, active) -> how long a step may be [m].
-    add
-        (total, begin, end, cloud, inside) -> total, and whether to go on, for steps [m] in the cloud of a number.
-    active
-        Lanes to compute.
+    `surfaces`: the boundaries of clouds; `origin`, `direction`, `end`: rays [m], their unit directions, and where they
+    end, may be infinite [m]; `total`: the sum of no step, a tuple of arrays of the rays' width; `step`: (total,
+    distance [m], cloud, active) -> how long a step may be [m]; `add`: (total, begin, end, cloud, inside) -> total, and
+    whether to go on, for steps [m] in the cloud of a number; `active`: lanes to compute.
     """
     Float, lanes = type(direction.x), max(dr.width(direction), dr.width(origin))
 
@@ -82,14 +72,9 @@ def marched_depths(
 ) -> tuple[Any, ...]:
     """Return the optical depth of rays up to a distance in all clouds, by channel [1].
 
-    Parameters
-    ----------
-    surfaces, clouds, origin, direction, end, active
-        As for `realtime.clouds.bounds.crossings.optical_depths`.
-    stride
-        How long the first steps are [voxels].
-    seen
-        Whether the depths are those of what the eye sees: steps grow, and end behind `OPAQUE`.
+    `surfaces`, `clouds`, `origin`, `direction`, `end`, `active`: as for
+    `realtime.clouds.bounds.crossings.optical_depths`; how long the first steps are [voxels]; `seen`: whether the depths
+    are those of what the eye sees: steps grow, and end behind `OPAQUE`.
     """
     Float, lanes = type(direction.x), max(dr.width(direction), dr.width(origin))
 

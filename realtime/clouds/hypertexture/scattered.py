@@ -60,15 +60,9 @@ def marched_light(
 ) -> tuple[tuple[Any, ...], ...]:
     """Return the radiance that clouds scatter once into rays, by beam and octave, RGB [W/(m^2 sr)].
 
-    Parameters
-    ----------
-    rays, beams, steps, printed
-        As for `realtime.clouds.single_scattering.march.scattered`.
-    stride
-        The longest step where a ray enters [voxels].
+    `rays`, `beams`, `steps`, `printed`: as for `realtime.clouds.single_scattering.march.scattered`; the longest step
+    where a ray enters [voxels].
 
-    References
-    ----------
     Bouthors, Neyret, Max, Bruneton, Crassin 2008, sections 6.2 and 8.
     """
     clouds, Float, Color = rays.clouds, type(rays.direction.x), type(rays.clouds.albedo)

@@ -85,14 +85,8 @@ class FilteredSurface:
 def light_map(clouds: Sequence[Any], light: Light, size: int, *, slopes: bool = True) -> LightMap:
     """Return the map of clouds under one directional light.
 
-    Parameters
-    ----------
-    clouds
-        By cloud a Mitsuba scene of its boundary alone.
-    light, size
-        See `cast_surfaces`, which says what is refused, too.
-    slopes
-        Whether normals are those of mean slopes, or means of unit normals, as printed.
+    `clouds`: by cloud a Mitsuba scene of its boundary alone; `light`, `size`: see `cast_surfaces`, which says what is
+    refused, too; `slopes`: whether normals are those of mean slopes, or means of unit normals, as printed.
     """
     return filtered_map([cast_surfaces(cloud, light, size) for cloud in clouds], light, slopes=slopes)
 
@@ -215,17 +209,8 @@ def map_place(light_map: LightMap, point) -> tuple[Any, Any]:
 def filtered_surface(light_map: LightMap, point, width: Metres) -> FilteredSurface:
     """Return the lit surface that points lie under, or over, along the light.
 
-    Parameters
-    ----------
-    light_map
-        Of a cloud and a light.
-    point
-        Points [m].
-    width
-        Standard deviation of the filter [m].
+    `light_map`: of a cloud and a light; `point`: points [m]; `width`: standard deviation of the filter [m].
 
-    Notes
-    -----
     Valid for any point and any width of 0 or more; what lies beside the map has the values of its edge.
     """
     Float = type(width)

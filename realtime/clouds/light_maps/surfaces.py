@@ -32,19 +32,8 @@ class LitSurfaces:
 def cast_surfaces(cloud, light: Light, size: int) -> LitSurfaces:
     """Cast both rays of every texel; nothing is evaluated, so that what reads it is computed with it.
 
-    Parameters
-    ----------
-    cloud
-        A Mitsuba scene of the cloud's boundary alone.
-    light
-        A directional light, with an extent that holds the cloud.
-    size
-        Texels on a side, a power of two.
-
-    Raises
-    ------
-    InputError
-        If `size` is not a power of two from 4 to 8192.
+    `cloud`: a Mitsuba scene of the cloud's boundary alone; `light`: a directional light, with an extent that holds the
+    cloud; `size`: texels on a side, a power of two. Raises InputError if `size` is not a power of two from 4 to 8192.
     """
     check_size(size)
     Float, Vector = type(light.position.x), type(light.position)

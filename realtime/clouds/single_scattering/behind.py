@@ -14,12 +14,7 @@ from realtime.scene.lights import Light
 def light_on_surfaces(rays: CloudRays, leg: Callable[[Any, Any], tuple[Any, ...]]) -> PerRay:
     """Return the share of a light that clouds let through to the visible surfaces, a colour [1]; 1 where there is none.
 
-    Parameters
-    ----------
-    rays
-        Rays up to the surfaces.
-    leg
-        (point [m], active) -> the depth of the leg to a point, by channel [1].
+    `rays`: rays up to the surfaces; `leg`: (point [m], active) -> the depth of the leg to a point, by channel [1].
     """
     Color = type(rays.clouds.albedo)
     seen = dr.isfinite(rays.end)
@@ -30,12 +25,8 @@ def light_on_surfaces(rays: CloudRays, leg: Callable[[Any, Any], tuple[Any, ...]
 def sky_behind(lights: Sequence[Light], distance, Color) -> PerRay | None:
     """Return the radiance of the sky where there is no surface, a `Color` [W/(m^2 sr)]; None without a sky.
 
-    Parameters
-    ----------
-    lights
-        Of the scene, the beam of the sky among them.
-    distance
-        To the visible surface, infinite where there is none [m].
+    `lights`: of the scene, the beam of the sky among them; `distance`: to the visible surface, infinite where there is
+    none [m].
     """
     for light in lights:
         if light.sky is not None:

@@ -84,23 +84,11 @@ def scattered(
 ) -> tuple[tuple[Any, ...], ...]:
     """Return the radiance that clouds scatter once into rays, by beam and octave, RGB [W/(m^2 sr)].
 
-    Parameters
-    ----------
-    rays
-        Rays through clouds.
-    beams
-        The lights.
-    steps
-        N of `realtime.clouds.single_scattering.spacing`, in a ray; a stretch in a cloud has one more.
-    printed
-        Whether to sum what the paper prints.
+    `rays`: rays through clouds; `beams`: the lights; `steps`: N of `realtime.clouds.single_scattering.spacing`, in a
+    ray; a stretch in a cloud has one more; `printed`: whether to sum what the paper prints.
 
-    Notes
-    -----
     Valid for any extinction and thickness; `steps` is at least 1.
 
-    References
-    ----------
     Bouthors, Neyret, Max, Bruneton, Crassin 2008, section 6.2.
     """
     clouds, Float, Color = rays.clouds, type(rays.direction.x), type(rays.clouds.albedo)
@@ -197,16 +185,8 @@ def scattered(
 def step_light(beam: Beam, own, depths, legs, *, printed: bool) -> list[Any]:
     """Return the integrals of exp(-tau - a l) dtau over a step by octave, colours [1].
 
-    Parameters
-    ----------
-    beam
-        The light.
-    own
-        The depth of the step, by channel [1].
-    depths, legs
-        tau and l at its two ends, by channel [1].
-    printed
-        Whether to return what the paper prints.
+    `beam`: the light; `own`: the depth of the step, by channel [1]; `depths`, `legs`: tau and l at its two ends, by
+    channel [1]; `printed`: whether to return what the paper prints.
     """
     Color = type(beam.irradiance)
     by_octave = []

@@ -44,8 +44,6 @@ def opacity_of(depths: tuple[Any, ...], Color) -> Any:
 def printed_opacity(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end) -> Any:
     """Return what is printed for the opacity, a colour [m]; arguments as of `opacity`.
 
-    References
-    ----------
     Bouthors, Neyret, Max, Bruneton, Crassin 2008, eq. 2.
     """
     Float, Color = type(direction.x), type(clouds.albedo)

@@ -58,18 +58,9 @@ def depth_panels(
 ) -> DepthPanels:
     """Return panels for a slab.
 
-    Parameters
-    ----------
-    tau
-        Thickness [mean free paths].
-    narrowest
-        Width of the panels at both boundaries, where the slab is thicker than that.
-    depths
-        Depths in [0, tau] that become edges, so that results are known there.
-    count
-        Nodes of each panel.
-    widest
-        Width of a panel at most, where the distance from the boundaries is not over 50 [mean free paths].
+    `tau`: thickness [mean free paths]; `narrowest`: width of the panels at both boundaries, where the slab is thicker
+    than that; `depths`: depths in [0, tau] that become edges, so that results are known there; `count`: nodes of each
+    panel; `widest`: width of a panel at most, where the distance from the boundaries is not over 50 [mean free paths].
     """
     half = [0.0]
     while half[-1] < tau / 2:
@@ -119,15 +110,7 @@ class Transport:
     def __call__(self, source: Array) -> tuple[Array, Array]:
         """Return the radiance of a source, at nodes and edges; no light enters from outside.
 
-        Parameters
-        ----------
-        source
-            (F, Z, J): F fields at the Z = P K nodes.
-
-        Returns
-        -------
-        nodes, edges
-            (F, Z, J) and (F, P + 1, J).
+        `source`: (F, Z, J): F fields at the Z = P K nodes. Returns `nodes`, `edges`: (F, Z, J) and (F, P + 1, J).
         """
         fields, _, streams = source.shape
         panels, count = self.panels.nodes.shape

@@ -199,12 +199,7 @@ class _AllOrders:
 def order_sets(slab: SlabOrders, sets: Sequence[tuple[int, float]]) -> tuple[list[Edges], Edges]:
     """Return the moments of sets of orders, and of all orders from 1 on.
 
-    Parameters
-    ----------
-    slab
-        The slab.
-    sets
-        First and last order of each set, the last one `math.inf` for a set without end.
+    `slab`: the slab; `sets`: first and last order of each set, the last one `math.inf` for a set without end.
     """
     finite = [int(last) for _, last in sets if math.isfinite(last)]
     finite += [first - 1 for first, last in sets if not math.isfinite(last)]

@@ -43,22 +43,9 @@ def slab_radiance(
 ) -> Array:
     """Return the diffuse radiance of a slab [1/sr], (depths, directions), for unit flux across the beam.
 
-    Parameters
-    ----------
-    tau
-        Thickness [mean free paths].
-    mu0
-        Cosine of the zenith angle of the beam, in (0, 1].
-    phase, albedo
-        Of the medium.
-    depths
-        In [0, tau] [mean free paths].
-    directions
-        mu, positive upwards and not 0, and phi [rad], 0 along the beam's horizontal direction.
-    streams
-        N, in each hemisphere.
-    nodes
-        Of each panel of depth.
+    `tau`: thickness [mean free paths]; `mu0`: cosine of the zenith angle of the beam, in (0, 1]; `phase`, `albedo`: of
+    the medium; `depths`: in [0, tau] [mean free paths]; `directions`: mu, positive upwards and not 0, and phi [rad], 0
+    along the beam's horizontal direction; N, in each hemisphere; `nodes`: of each panel of depth.
     """
     rule = double_gauss(streams)
     moments = phase.moments(2 * streams + 1)

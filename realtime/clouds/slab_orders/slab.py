@@ -91,20 +91,10 @@ def slab_light(
 ) -> tuple[SlabLight, SlabLight]:
     """Return the light of a slab, and the same with less effort: the difference is an estimate of the error.
 
-    Parameters
-    ----------
-    tau
-        Thickness [mean free paths], positive.
-    mu0
-        Cosine of the zenith angle of the sun, in (0, 1].
-    phase, albedo
-        Of the medium; the albedo in [0, 1].
-    sets
-        First and last order of each set, the last `math.inf` for a set without end.
-    depths
-        In [0, tau], where fluence, flux and radiance are wanted.
-    directions
-        mu, positive upwards, not 0, and phi [rad], 0 along the horizontal direction of the sun's light.
+    `tau`: thickness [mean free paths], positive; `mu0`: cosine of the zenith angle of the sun, in (0, 1]; `phase`,
+    `albedo`: of the medium; the albedo in [0, 1]; `sets`: first and last order of each set, the last `math.inf` for a
+    set without end; `depths`: in [0, tau], where fluence, flux and radiance are wanted; `directions`: mu, positive
+    upwards, not 0, and phi [rad], 0 along the horizontal direction of the sun's light.
     """
     streams = needed_streams(phase)
 

@@ -46,10 +46,7 @@ def escapes(phase: SlabPhase, albedo: float) -> Array:
 
     They are made in some seconds and kept on disk.
 
-    Parameters
-    ----------
-    phase, albedo
-        Of the medium, the albedo in [0, 1].
+    `phase`, `albedo`: of the medium, the albedo in [0, 1].
     """
     made = "escapes", _VERSION, _STREAMS, THINNEST, THICKEST, THICKNESSES, COSINES
     digest = hashlib.blake2b(repr(made).encode(), digest_size=8).hexdigest()

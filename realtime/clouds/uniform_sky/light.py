@@ -79,16 +79,8 @@ def sky_escapes(scene: Scene) -> SkyEscapes:
 def sky_light(known: SkyEscapes, light: Light, rays: CloudRays, visible: Visible | None) -> tuple[Any, ...]:
     """Return the light of a sky by set of orders, colours, in the order of `ORDER_LAYERS` [W/(m^2 sr)].
 
-    Parameters
-    ----------
-    known
-        From `sky_escapes`.
-    light
-        That of the sky.
-    rays
-        Through the clouds as they are.
-    visible
-        (point [m], light) -> whether no opaque shape is between them; None where nothing casts a shadow.
+    `known`: from `sky_escapes`; `light`: that of the sky; `rays`: through the clouds as they are; `visible`: (point
+    [m], light) -> whether no opaque shape is between them; None where nothing casts a shadow.
     """
     Float, Color = type(rays.direction.x), type(light.sky)
     first = next_crossing(rays.surfaces, rays.origin, rays.direction, dr.zeros(Float, dr.width(rays.direction)))

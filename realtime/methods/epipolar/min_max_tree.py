@@ -56,20 +56,9 @@ class SliceHeights:
 def slice_heights(shadow_map: ShadowMap, heights, slices: Slices, light: Light) -> SliceHeights:
     """Return the height maps of slices.
 
-    Parameters
-    ----------
-    shadow_map
-        Of the light.
-    heights
-        Its inverse planar depths at the corners of the texels
-        (`realtime.shadow_maps.shadow_map.inverse_depth`) [1/m].
-    slices
-        The slices of the image.
-    light
-        The light.
+    `shadow_map`: of the light; `heights`: its inverse planar depths at the corners of the texels
+    (`realtime.shadow_maps.shadow_map.inverse_depth`) [1/m]; `slices`: the slices of the image; `light`: the light.
 
-    References
-    ----------
     Chen, Baran, Durand, Jarosz 2011, *Real-time volumetric shadows using 1D min-max mipmaps*.
     """
     edges = 1 if light_faces(light) == 1 else 2

@@ -40,16 +40,8 @@ class Samples:
 def mark_samples(slices: Slices, depth, *, count: int, step: int) -> Samples:
     """Return samples, with those to be computed marked.
 
-    Parameters
-    ----------
-    slices
-        The slices.
-    depth
-        Distances of the visible surface, pixel by pixel, row by row; may be infinite [m].
-    count
-        Samples of a slice, a multiple of 32.
-    step
-        One in so many is computed: a power of two up to 32.
+    `slices`: the slices; `depth`: distances of the visible surface, pixel by pixel, row by row; may be infinite [m];
+    `count`: samples of a slice, a multiple of 32; `step`: one in so many is computed: a power of two up to 32.
     """
     words = count // WORD
     index = dr.arange(mi.UInt32, slices.count * words)
@@ -130,21 +122,9 @@ def no_value(like):
 def between_samples(samples: Samples, values, point, depth):
     """Return the values of pixels from those of samples.
 
-    Parameters
-    ----------
-    samples, values
-        The samples; by sample the values of those that are marked.
-    point
-        Image points (i, j) of the pixels.
-    depth
-        Their distances [m].
-
-    Returns
-    -------
-    value
-        The weighted mean.
-    fits
-        Whether enough of the samples agree in their depth.
+    `samples`, `values`: the samples; by sample the values of those that are marked; `point`: image points (i, j) of the
+    pixels; `depth`: their distances [m]. Returns `value`: the weighted mean; `fits`: whether enough of the samples
+    agree in their depth.
     """
     place = slice_coordinate(samples.slices, *point)
     low = dr.floor(place)

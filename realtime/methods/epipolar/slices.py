@@ -52,17 +52,9 @@ class Slices:
 def image_slices(camera: Camera, light: Light, count: int) -> Slices:
     """Return the slices of an image.
 
-    Parameters
-    ----------
-    camera
-        The camera.
-    light
-        Any light, anywhere. Where it is in the pinhole, all half planes hold it; E is then the centre of the image.
-    count
-        How many slices.
+    `camera`: the camera. `light`: any light, anywhere. Where it is in the pinhole, all half planes hold it; E is then
+    the centre of the image. `count`: how many slices.
 
-    References
-    ----------
     Engelhardt, Dachsbacher 2010, *Epipolar sampling for shadows and crepuscular rays in participating media with
     single scattering*. Yusov 2013, *Practical implementation of light scattering effects using epipolar sampling and
     1D min/max binary trees*.

@@ -50,20 +50,10 @@ def sum_lit_intervals(
 ):
     """Add up an integral over the lit intervals of rays.
 
-    Parameters
-    ----------
-    heights
-        The maps.
-    number
-        The slice that stands for each ray: the ray is turned into it about the line of camera and light.
-    geometry
-        The rays and the light.
-    segment
-        Distances (x0, x1) between which to look; `x1` may be infinite, and x1 <= x0 for rays to leave out [m].
-    integral
-        Function (x0, x1) -> value of one interval.
-    zero
-        The value of no interval, one for each ray.
+    `heights`: the maps; `number`: the slice that stands for each ray: the ray is turned into it about the line of
+    camera and light; `geometry`: the rays and the light; `segment`: distances (x0, x1) between which to look; `x1` may
+    be infinite, and x1 <= x0 for rays to leave out [m]; function (x0, x1) -> value of one interval; `zero`: the value
+    of no interval, one for each ray.
     """
     x0, x1 = segment
     width = dr.width(zero)

@@ -41,12 +41,7 @@ _TERMS = 8  # of it: 0.1^8/9! = 3e-14 is left out
 def accumulated(view: View, grid: Grid, scattered: PerRay) -> Any:
     """Return the airlight up to the begin and the end of each slice, (slices + 1) values a column, four numbers each.
 
-    Parameters
-    ----------
-    view, grid
-        The frame and its froxels.
-    scattered
-        By froxel, a colour [W/(m^3 sr)], evaluated.
+    `view`, `grid`: the frame and its froxels; `scattered`: by froxel, a colour [W/(m^3 sr)], evaluated.
     """
     Float, Color, medium = type(view.distance), type(scattered), view.medium
     column = dr.arange(mi.UInt32, grid.columns)

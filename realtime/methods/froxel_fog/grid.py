@@ -80,16 +80,8 @@ class Grid:
 def view_grid(view: View, *, size: tuple[int, int, int], near: float, far: float, distribution: str) -> Grid:
     """Return the grid of a view.
 
-    Parameters
-    ----------
-    view
-        The frame.
-    size
-        Froxels across, down and in depth.
-    near, far
-        Depths [m]; 0: chosen for the frame.
-    distribution
-        'exponential' or 'linear'.
+    `view`: the frame; `size`: froxels across, down and in depth; `near`, `far`: depths [m]; 0: chosen for the frame;
+    `distribution`: 'exponential' or 'linear'.
     """
     Float = type(view.distance)
     end = dr.opaque(Float, far) if far else _frame_depth(view)
@@ -125,14 +117,9 @@ def _reach(view: View, light: Light, medium: Medium) -> Metres:
 def trilinear(volume: Any, size: tuple[int, int, int], place: tuple[Any, Any, Any]) -> Any:
     """Return values between the eight neighbours of a place, a colour.
 
-    Parameters
-    ----------
-    volume
-        Four numbers a value, across first, then down, then in depth.
-    size
-        How many values there are across, down and in depth.
-    place
-        Where, in steps of the grid from the first value on; beside the grid it is the value at its border.
+    `volume`: four numbers a value, across first, then down, then in depth; `size`: how many values there are across,
+    down and in depth; `place`: where, in steps of the grid from the first value on; beside the grid it is the value at
+    its border.
     """
     Float = type(volume)
     corners, weights = [], []

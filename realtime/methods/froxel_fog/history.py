@@ -53,16 +53,8 @@ def averaged(
 ) -> tuple[PerRay, FroxelHistory]:
     """Return the mean of what froxels scatter in this frame and in those before, and what to hand on.
 
-    Parameters
-    ----------
-    scattered
-        Of this frame, a colour [W/(m^3 sr)].
-    grid
-        Of this frame.
-    last
-        What the last frame handed on; None for the first.
-    weight
-        h, of the history.
+    `scattered`: of this frame, a colour [W/(m^3 sr)]; `grid`: of this frame; `last`: what the last frame handed on;
+    None for the first; `weight`: h, of the history.
     """
     Float, Color = type(grid.far), type(scattered)
     if last is None:

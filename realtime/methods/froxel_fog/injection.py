@@ -58,16 +58,9 @@ def scattered_light(
 ) -> PerRay:
     """Return the light that each froxel scatters to the camera, a colour [W/(m^3 sr)].
 
-    Parameters
-    ----------
-    view, grid
-        The frame and its froxels.
-    shift
-        Of the points from the middles of the froxels, in parts of a froxel across, down and in depth.
-    tables
-        Of the points of lights with extent.
-    visible
-        Which light reaches which point.
+    `view`, `grid`: the frame and its froxels; `shift`: of the points from the middles of the froxels, in parts of a
+    froxel across, down and in depth; `tables`: of the points of lights with extent; `visible`: which light reaches
+    which point.
     """
     points = _froxel_points(view, grid, shift)
     total = dr.zeros(type(view.medium.albedo), grid.columns * grid.slices)

@@ -74,18 +74,8 @@ def in_face(heights: InverseDepthField, face, away, direction, segment):
 def face_ray(heights: InverseDepthField, face, away, direction, segment) -> FaceRay:
     """Return rays in a face.
 
-    Parameters
-    ----------
-    heights
-        The height field.
-    face
-        Number of the face.
-    away
-        The camera less the light [m].
-    direction
-        Unit directions.
-    segment
-        The distances (x0, x1) of the part in the face; `x1` may be infinite.
+    `heights`: the height field; `face`: number of the face; `away`: the camera less the light [m]; `direction`: unit
+    directions; `segment`: the distances (x0, x1) of the part in the face; `x1` may be infinite.
     """
     a0, b0, s0, c0 = heights.projection.homogeneous(face, away, 1)
     da, db, ds, dc = heights.projection.homogeneous(face, direction, 0)

@@ -34,14 +34,8 @@ _SIDES = 2 * LEAF * (LEAF + 1)  # of the texels of a leaf
 def with_walls(heights: InverseDepthField, scene, light: Light) -> InverseDepthField:
     """Return a height field with upright walls where the map of a light jumps.
 
-    Parameters
-    ----------
-    heights
-        The height field of the light's map.
-    scene
-        The Mitsuba scene that the map was cast in.
-    light
-        The light.
+    `heights`: the height field of the light's map; `scene`: the Mitsuba scene that the map was cast in; `light`: the
+    light.
     """
     walls = dr.zeros(mi.UInt32, heights.faces * heights.size**2)
     leaf, side = _jumping_sides(heights)

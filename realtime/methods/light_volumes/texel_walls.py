@@ -132,14 +132,8 @@ def height_in(parts: Parts, x, y):
 def walled_heights(heights: InverseDepthField, walls, texels) -> InverseDepthField:
     """Return a height field with walls in its texels, and the bounds of its nodes as these need them.
 
-    Parameters
-    ----------
-    heights
-        The height field.
-    walls
-        The number of each texel.
-    texels
-        Those that may have walls; some may be there more than once.
+    `heights`: the height field; `walls`: the number of each texel; `texels`: those that may have walls; some may be
+    there more than once.
     """
     bounds = heights.bounds + 0
     if dr.width(texels):

@@ -53,28 +53,11 @@ def sum_lit_intervals(
 ):
     """Add up an integral over the lit intervals of every ray.
 
-    Parameters
-    ----------
-    heights
-        The height field.
-    away
-        The camera less the light [m].
-    direction
-        Unit directions of the rays.
-    segment
-        Distances (x0, x1) between which to look; `x1` may be infinite [m].
-    integral
-        Function (x0, x1) -> value of one interval.
-    zero
-        The value of no interval, one for each ray.
-
-    Returns
-    -------
-    total
-        Sum over the lit intervals.
-    lit
-        Whether the light reaches what is at the end of the segment: a hard shadow by the shadow map, with the range of
-        the heights over a texel as its bias.
+    `heights`: the height field; `away`: the camera less the light [m]; `direction`: unit directions of the rays;
+    `segment`: distances (x0, x1) between which to look; `x1` may be infinite [m]; function (x0, x1) -> value of one
+    interval; `zero`: the value of no interval, one for each ray. Returns `total`: sum over the lit intervals; `lit`:
+    whether the light reaches what is at the end of the segment: a hard shadow by the shadow map, with the range of the
+    heights over a texel as its bias.
     """
     x0, x1 = segment
     width = dr.width(direction, zero)

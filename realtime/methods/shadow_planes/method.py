@@ -154,10 +154,7 @@ class ShadowPlanes(Method):
     def preparation(self, scene):
         """Read the casters of a scene and return what finds the shadow planes of a frame.
 
-        Raises
-        ------
-        InputError
-            For casters without triangles.
+        Raises InputError for casters without triangles.
         """
         casters = read_casters(scene.geometry, scene.area_lights)
         return PlanePreparation(casters, self.cone, self.order) if scene.features.shadows else no_state

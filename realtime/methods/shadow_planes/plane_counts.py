@@ -36,10 +36,7 @@ class CasterPlan:
 def caster_plan(scene: Scene) -> CasterPlan:
     """Count the casters of a scene and what its camera needs of them.
 
-    Raises
-    ------
-    InputError
-        For a caster without triangles.
+    Raises InputError for a caster without triangles.
     """
     casters = with_positions(read_casters(scene.geometry, scene.area_lights), scene.positions)
     camera = read_camera(scene.camera)

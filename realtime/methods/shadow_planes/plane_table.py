@@ -179,12 +179,8 @@ def edge_planes(vertices: Array, coefficient: NDArray[np.int8], *, w: int = 1) -
 def wedge_lists(planes: Planes, *, order: str) -> tuple[NDArray[np.uint32], NDArray[np.uint32], Array, np.float32]:
     """Return first places, entries, bounds and scale of the wedges of planes, as of `PlaneIndex`, in NumPy.
 
-    Parameters
-    ----------
-    planes
-        None across azimuth 0.
-    order
-        'paper': towards the camera by the cosine of the middle of the edge; 'exact' and 'none': as rays cross them.
+    `planes`: none across azimuth 0; `order`: 'paper': towards the camera by the cosine of the middle of the edge;
+    'exact' and 'none': as rays cross them.
     """
     span = np.minimum(planes.last, TURN) - np.maximum(planes.first, 0)
     count = int(np.clip(2 ** np.ceil(np.log2(_FINE * TURN / np.mean(span))), _LEAST, _MOST)) if len(span) else _LEAST
@@ -334,22 +330,10 @@ def index_planes(
 ) -> PlaneIndex:
     """Find the shadow planes of a light and put them into wedges for a camera.
 
-    Parameters
-    ----------
-    casters
-        Triangles with their adjacency.
-    light
-        Homogeneous position of the light, (4,), or its place, (3,) [m].
-    camera
-        Position of the camera [m].
-    used
-        By component, whether its shadow can be seen.
-    types
-        The array types to use, see `realtime.numerics.array_types`.
-    order
-        In which rays go over planes, see `wedge_lists`.
-    ring
-        Of a spot whose cone is a caster, see `realtime.methods.shadow_planes.silhouettes.cone_ring`.
+    `casters`: triangles with their adjacency; `light`: homogeneous position of the light, (4,), or its place, (3,) [m];
+    `camera`: position of the camera [m]; `used`: by component, whether its shadow can be seen; `types`: the array types
+    to use, see `realtime.numerics.array_types`; `order`: in which rays go over planes, see `wedge_lists`; `ring`: of a
+    spot whose cone is a caster, see `realtime.methods.shadow_planes.silhouettes.cone_ring`.
     """
     basis = light_basis(light, camera)
     axes = basis.axes
@@ -384,14 +368,8 @@ def index_planes(
 def planes_of_rays(index: PlaneIndex, azimuth, way, ray_end):
     """Return the place of the first plane of the wedges of rays, and how many of them they may cross.
 
-    Parameters
-    ----------
-    index
-        The planes.
-    azimuth, way
-        Of the rays: diamond angle, and unit direction in the frame, three arrays.
-    ray_end
-        D/x at the end of each; w = 0: 1/x.
+    `index`: the planes; `azimuth`, `way`: of the rays: diamond angle, and unit direction in the frame, three arrays;
+    `ray_end`: d/x at the end of each; w = 0: 1/x.
     """
     x, y, z = way
     # About a light at the camera an azimuth is no number: whole numbers have the upper bound.
@@ -412,16 +390,8 @@ def planes_of_rays(index: PlaneIndex, azimuth, way, ray_end):
 def plane_crossing(index: PlaneIndex, number, way, active):
     """Return where rays cross planes, as D/x (w = 0: 1/x), and whether that is beyond the edge.
 
-    Parameters
-    ----------
-    index
-        The planes.
-    number
-        Which of them.
-    way
-        Unit directions of rays in the frame, three arrays.
-    active
-        Lanes to read for.
+    `index`: the planes; `number`: which of them; `way`: unit directions of rays in the frame, three arrays; `active`:
+    lanes to read for.
     """
     x, y, z = way
     a, b, p, q = dr.gather(four_numbers(type(x)), index.lines, number, active)

@@ -71,29 +71,11 @@ def sum_crossings(
 ):
     """Add up Gamma over the crossings of every ray.
 
-    Parameters
-    ----------
-    index, ray
-        The planes and the rays.
-    distance
-        To the visible surface, or to the end in a bounded medium [m].
-    gammas
-        Functions (plane, ray, x) and (x) that give the radiance of Gamma at a crossing and at the surface.
-    order
-        'exact', 'paper' or 'none'.
-    buffer
-        What keeps the sum; None for float.
-    start
-        What is in the buffer before, or None.
-    entry
-        Where rays enter a bounded medium, or None.
-
-    Returns
-    -------
-    total
-        The radiance.
-    lit
-        Whether the light reaches the end.
+    `index`, `ray`: the planes and the rays; `distance`: to the visible surface, or to the end in a bounded medium [m];
+    `gammas`: functions (plane, ray, x) and (x) that give the radiance of Gamma at a crossing and at the surface;
+    `order`: 'exact', 'paper' or 'none'; `buffer`: what keeps the sum; None for float; `start`: what is in the buffer
+    before, or None; `entry`: where rays enter a bounded medium, or None. Returns `total`: the radiance; `lit`: whether
+    the light reaches the end.
     """
     at_plane, at_surface = gammas
     ray_end = index.distance / distance

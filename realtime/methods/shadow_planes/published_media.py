@@ -46,10 +46,7 @@ from realtime.scene.media.medium import Medium
 def check_vertices(medium: Medium, lights: Sequence[Light]) -> None:
     """Refuse bounded media whose Gamma no vertices can have.
 
-    Raises
-    ------
-    InputError
-        For a medium around them, and for a directional light.
+    Raises InputError for a medium around them, and for a directional light.
     """
     if not medium.clear or not all(light.w for light in lights):
         raise InputError(
@@ -71,18 +68,9 @@ def sum_in_media(
 ):
     """Return the radiance of one light in all bounded media, with Gamma at vertices [W/(m^2 sr)].
 
-    Parameters
-    ----------
-    view, media
-        The frame, and its rays in the media, with the light.
-    index, rays
-        The planes and the rays.
-    rows, cone
-        See `realtime.methods.shadow_planes.published_mesh.mesh_gamma`.
-    order, buffer
-        See `realtime.methods.shadow_planes.published_crossings.sum_crossings`.
-    start
-        What is in the buffer before, or 0.
+    `view`, `media`: the frame, and its rays in the media, with the light; `index`, `rays`: the planes and the rays;
+    `rows`, `cone`: see `realtime.methods.shadow_planes.published_mesh.mesh_gamma`; `order`, `buffer`: see
+    `realtime.methods.shadow_planes.published_crossings.sum_crossings`; `start`: what is in the buffer before, or 0.
     """
     triangle = visible_triangle(view)
     Color, total = type(view.medium.albedo), start

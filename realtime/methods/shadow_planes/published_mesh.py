@@ -49,14 +49,8 @@ def gamma_at(view: View, light: Light, point, *, kernel):
 def mesh_gamma(index: PlaneIndex, light: Light, gamma: Gamma, *, rows: int, cone: bool = False):
     """Return the function (plane, ray, x) that interpolates Gamma on the meshes of the planes.
 
-    Parameters
-    ----------
-    index, light, gamma
-        The planes of a light, and Gamma.
-    rows
-        Of the planes of casters.
-    cone
-        Whether planes of a cone are among them.
+    `index`, `light`, `gamma`: the planes of a light, and Gamma; `rows`: of the planes of casters; `cone`: whether
+    planes of a cone are among them.
     """
     further = math.ceil(-math.log(NEARNESS) / math.log(RATIO)) if cone else 0
     casters_rows, rows = rows, rows + further
@@ -119,14 +113,8 @@ def surface_gamma(triangle, gamma: Gamma, otherwise):
 def visible_triangle(view: View):
     """Return the triangles that the rays of a view hit first.
 
-    Returns
-    -------
-    corners
-        Three positions [m].
-    weights
-        Barycentric coordinates of the hit in them.
-    seen
-        Whether a triangle is hit.
+    Returns `corners`: three positions [m]; `weights`: barycentric coordinates of the hit in them; `seen`: whether a
+    triangle is hit.
     """
     ray = mi.Ray3f(mi.Point3f(view.origin), mi.Vector3f(view.direction))
     hit = view.scene.ray_intersect_preliminary(ray, coherent=True)

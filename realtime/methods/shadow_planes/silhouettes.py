@@ -81,17 +81,9 @@ def layers(casters: Casters, light: Array) -> NDArray[np.int8]:
 def silhouette(casters: Casters, light: Array, *, used: NDArray[np.bool_] | None = None) -> Silhouette:
     """Find the silhouette edges.
 
-    Parameters
-    ----------
-    casters
-        Triangles with their adjacency.
-    light
-        Homogeneous position of the light, (4,), or its place, (3,) [m].
-    used
-        By component, which ones to look at; all by default.
+    `casters`: triangles with their adjacency; `light`: homogeneous position of the light, (4,), or its place, (3,) [m];
+    `used`: by component, which ones to look at; all by default.
 
-    Notes
-    -----
     Valid for closed, open and non-manifold meshes, either winding, and a light inside a caster (which has then no
     silhouette: all outside is dark, see `realtime.methods.shadow_planes.plane_table.layers_between`).
     """
@@ -109,14 +101,8 @@ def silhouette(casters: Casters, light: Array, *, used: NDArray[np.bool_] | None
 def cone_ring(axis: Array, cos_cutoff: float, sides: int) -> Array:
     """Return unit vectors from a light through the corners of a ring on its cone, (sides, 3).
 
-    Parameters
-    ----------
-    axis
-        Of the spot, a unit vector.
-    cos_cutoff
-        Cosine of the half angle of the cone, in (0, 1).
-    sides
-        Edges of the ring, 3 or more.
+    `axis`: of the spot, a unit vector; `cos_cutoff`: cosine of the half angle of the cone, in (0, 1); `sides`: edges of
+    the ring, 3 or more.
     """
     across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     across /= np.linalg.norm(across)

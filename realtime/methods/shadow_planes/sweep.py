@@ -97,23 +97,9 @@ def read_plane(index: PlaneIndex, ray: RayPlanes, k, active):
 def sum_lit_intervals(index: PlaneIndex, ray: RayPlanes, segment, integral, zero):
     """Add up an integral over the lit intervals of every ray.
 
-    Parameters
-    ----------
-    index, ray
-        The planes and the rays.
-    segment
-        Distances (x0, x1) between which to look; `x1` may be infinite [m].
-    integral
-        Function (x0, x1) -> value of one interval.
-    zero
-        The value of no interval, one for each ray.
-
-    Returns
-    -------
-    total
-        Sum over the lit intervals.
-    lit
-        Whether the light reaches the end of the segment.
+    `index`, `ray`: the planes and the rays; `segment`: distances (x0, x1) between which to look; `x1` may be infinite
+    [m]; function (x0, x1) -> value of one interval; `zero`: the value of no interval, one for each ray. Returns
+    `total`: sum over the lit intervals; `lit`: whether the light reaches the end of the segment.
     """
     x0, x1 = segment
 
@@ -200,12 +186,8 @@ def _read(sweep: _Sweep, place, reads):
 def _walk(sweep: _Sweep, active, *, places: int):
     """Go over the planes in the order of the list.
 
-    Returns
-    -------
-    passed
-        What the ray has passed, right where it is not lost.
-    lost
-        Whether the order was wrong, or wrong by more than the queue could mend.
+    Returns `passed`: what the ray has passed, right where it is not lost; `lost`: whether the order was wrong, or wrong
+    by more than the queue could mend.
     """
     Float, width = type(sweep.ray_end), dr.width(sweep.ray.x)
     count = sweep.ray.count

@@ -38,18 +38,8 @@ def integral_of_points(
 ) -> Any:
     """Return the sum of the airlight integrals of the points of a light with extent [1/m].
 
-    Parameters
-    ----------
-    view
-        The rays, in one medium without bounds.
-    state
-        The light, with its maps if `shadow=map`.
-    points
-        How many points it has.
-    share
-        One point for each ray, counted `points` times; None for all.
-    p
-        The parameters.
+    `view`: the rays, in one medium without bounds; `state`: the light, with its maps if `shadow=map`; `points`: how
+    many points it has; `share`: one point for each ray, counted `points` times; None for all; `p`: the parameters.
     """
     Float = type(view.distance)
     nothing = view.lit_by(view.lights[0]).nothing(dr.width(view.distance))

@@ -18,10 +18,7 @@ MOST_HD = 64.0  #: [pixels]
 def check_width(value: Any) -> None:
     """Refuse a width that no filter can have.
 
-    Raises
-    ------
-    InputError
-        If `value` is neither 'auto' nor a number above 0 up to 64 [pixels].
+    Raises InputError if `value` is neither 'auto' nor a number above 0 up to 64 [pixels].
     """
     if value == AUTO:
         return
@@ -36,10 +33,7 @@ def check_width(value: Any) -> None:
 def check_range(value: Any) -> None:
     """Refuse a range that no filter can have.
 
-    Raises
-    ------
-    InputError
-        If `value` is not above 0; it may be infinite.
+    Raises InputError if `value` is not above 0; it may be infinite.
     """
     if not value > 0:
         raise InputError(f"hr: got {value!r}, wanted a number above 0, or inf for a Gaussian")

@@ -19,20 +19,9 @@ def smooth_share(
 ) -> Any:
     """Return the share of a light that reaches the surfaces, filtered.
 
-    Parameters
-    ----------
-    share
-        From 0 to 1, row by row.
-    raster
-        The image.
-    there
-        Where there are surfaces: the sky takes no part.
-    depth
-        The guide of their depth.
-    points, levels
-        N, and whether the share has N + 1 levels.
-    p
-        The parameters, with a filter whose `hd` is a number.
+    `share`: from 0 to 1, row by row; `raster`: the image; `there`: where there are surfaces: the sky takes no part;
+    `depth`: the guide of their depth; `points`, `levels`: N, and whether the share has N + 1 levels; `p`: the
+    parameters, with a filter whose `hd` is a number.
     """
     if p.filter == "gauss" or p.guide == "self":
         hr = math.inf if p.filter == "gauss" else p.hr

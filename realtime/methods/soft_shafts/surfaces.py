@@ -64,16 +64,8 @@ def reached_surfaces(
 ) -> Reached:
     """Return what of a light with extent reaches the surfaces of a view, where they are `asked` for; others return 0.
 
-    Parameters
-    ----------
-    view
-        The rays, row by row.
-    state
-        The light.
-    number_of, count
-        Which light point each ray asks first, second and so on, counted from 0, and how many.
-    p
-        The parameters.
+    `view`: the rays, row by row; `state`: the light; `number_of`, `count`: which light point each ray asks first,
+    second and so on, counted from 0, and how many; `p`: the parameters.
     """
     Float = type(view.distance)
     there = dr.isfinite(view.distance) & asked
@@ -127,18 +119,9 @@ def few_pixels(raster: Raster) -> tuple[Raster, int]:
 def penumbra_width(blockers: Any, distance: Any, camera: Camera, width: Any, raster: Raster, *, guide: Guide) -> Any:
     """Return how wide the penumbra of a light is about every pixel [pixels], 0 where nothing blocks it.
 
-    Parameters
-    ----------
-    blockers
-        From `blockers_of`, in the pixels of `few_pixels`.
-    distance
-        How far all surfaces of the image are, row by row [m].
-    camera, width
-        Of the image, and how wide the light is [m].
-    raster
-        The image.
-    guide
-        Of the depth.
+    `blockers`: from `blockers_of`, in the pixels of `few_pixels`; `distance`: how far all surfaces of the image are,
+    row by row [m]; `camera`, `width`: of the image, and how wide the light is [m]; `raster`: the image; `guide`: of the
+    depth.
     """
     few, step = few_pixels(raster)
     dr.eval(guide.values)
@@ -159,12 +142,7 @@ def penumbra_width(blockers: Any, distance: Any, camera: Camera, width: Any, ras
 def blockers_of(view: View, state: SourceState, count: int) -> Any:
     """Return the sum of log((d_r - d_b) / d_b) over the light points that something blocks, and how many these are.
 
-    Parameters
-    ----------
-    view
-        Rays to surfaces.
-    state, count
-        The light, with its maps, and how many points it has.
+    `view`: rays to surfaces; `state`, `count`: the light, with its maps, and how many points it has.
     """
     Float = type(view.distance)
     there = dr.isfinite(view.distance)

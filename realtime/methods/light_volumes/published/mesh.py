@@ -43,22 +43,11 @@ def volume_mesh(
 ) -> VolumeMesh:
     """Return the mesh around what a light reaches.
 
-    Parameters
-    ----------
-    shadow_map
-        Shadow map of the light.
-    light
-        A point or spot light.
-    tessellation
-        ``static``: two triangles a texel; ``adaptive``: larger ones where the map is flat (see
-        `realtime.methods.light_volumes.published.tessellation`).
-    threshold
-        For ``adaptive``: departure from the map that is allowed, relative to the depth.
-
-    Raises
-    ------
-    InputError
-        If `tessellation` or `threshold` is none, or a surface touches the light.
+    `shadow_map`: shadow map of the light; `light`: a point or spot light; `tessellation`: ``static``: two triangles a
+    texel; ``adaptive``: larger ones where the map is flat (see
+    `realtime.methods.light_volumes.published.tessellation`); `threshold`: for ``adaptive``: departure from the map that
+    is allowed, relative to the depth. Raises InputError if `tessellation` or `threshold` is none, or a surface touches
+    the light.
     """
     if tessellation not in ("static", "adaptive"):
         raise InputError(f"tessellation: got {tessellation!r}, wanted static or adaptive")
@@ -85,10 +74,7 @@ def tessellation_stages(
     The passes are those of the paper's Table 1, ``laplacian``, ``edge map`` and ``tessellate``, and ``vertices``, which
     a graphics card does while it draws.
 
-    Raises
-    ------
-    InputError
-        If `threshold` is not a positive number.
+    Raises InputError if `threshold` is not a positive number.
     """
     passed: list[Any] = [_heights(shadow_map)]
     times = {}

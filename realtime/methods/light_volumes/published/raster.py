@@ -69,17 +69,9 @@ class _Spans:
 def signed_crossings(mesh: VolumeMesh, camera: Camera, *, batch: int = BATCH) -> Iterator[Crossings]:
     """Yield the crossings of the rays through all pixels with the triangles of a mesh.
 
-    Parameters
-    ----------
-    mesh
-        The mesh; vertices at infinity are as good as any.
-    camera
-        The camera; pixels are points at the centres of squares.
-    batch
-        Triangles, rows of triangles, and crossings that are held at a time.
+    `mesh`: the mesh; vertices at infinity are as good as any; `camera`: the camera; pixels are points at the centres of
+    squares; `batch`: triangles, rows of triangles, and crossings that are held at a time.
 
-    Notes
-    -----
     Valid for any mesh. For a closed one the signs of the crossings of each pixel add up to 0, or to 1 where the camera
     is inside and normals point out; all that can go wrong is which, with a camera on the mesh. The yielded arrays are
     not evaluated: what the caller does with them becomes one kernel with the expansion of the spans.

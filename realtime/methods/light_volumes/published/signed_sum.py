@@ -24,17 +24,10 @@ from realtime.scene.media.medium import LitRays
 def crossing_sum(batches: Iterable[Crossings], airlight: LitRays, distance, *, lane: Any = None) -> Any:
     """Return J along the lit parts of rays, the signed sum over their crossings [1/m].
 
-    Parameters
-    ----------
-    batches
-        From `realtime.methods.light_volumes.published.raster.signed_crossings`.
-    airlight, distance
-        The rays with the light, whose cone clips every crossing, and the distances to the visible surface [m].
-    lane
-        By pixel number its entry among the rays; None where they are in the order of the image.
+    `batches`: from `realtime.methods.light_volumes.published.raster.signed_crossings`; `airlight`, `distance`: the rays
+    with the light, whose cone clips every crossing, and the distances to the visible surface [m]; `lane`: by pixel
+    number its entry among the rays; None where they are in the order of the image.
 
-    Notes
-    -----
     Valid for a closed mesh. With eq. 3 as it stands, every crossing beyond the light has the large airlight about the
     light, and what rounding leaves of it where they cancel is visible. As J(0, x) = J(0, D) - J(x, D), the sum is also
 
@@ -81,26 +74,13 @@ def crossing_sum(batches: Iterable[Crossings], airlight: LitRays, distance, *, l
 def mesh_airlight(view: View, light: Light, mesh: VolumeMesh, *, kernel, batch: int = BATCH):
     """Return the airlight of one light by the triangles of its light volume [W/(m^2 sr)].
 
-    Parameters
-    ----------
-    view
-        The frame; its rays are those of all pixels of its camera.
-    light
-        The light.
-    mesh
-        Its light volume, closed.
-    kernel
-        An airlight kernel function.
-    batch
-        See `realtime.methods.light_volumes.published.raster.signed_crossings`.
+    `view`: the frame; its rays are those of all pixels of its camera; `light`: the light; `mesh`: its light volume,
+    closed; `kernel`: an airlight kernel function; `batch`: see
+    `realtime.methods.light_volumes.published.raster.signed_crossings`.
 
-    Notes
-    -----
     Valid for homogeneous media that fill all space. The number of crossings is counted on the way: not for a frozen
     function.
 
-    References
-    ----------
     Billeter, Sintorn, Assarsson 2010, eq. 3.
     """
     airlight = view.lit_by(light, kernel)

@@ -48,10 +48,7 @@ def configuration(sides: int) -> list[tuple[int, int, int]]:
     A fan from the first middle there is, which lies on no line with the rest of the ring, or without one from the
     corner (0, 0): 2 triangles, and one more for each divided side.
 
-    Parameters
-    ----------
-    sides
-        Which sides are divided, one bit each: 1 lower, 2 right, 4 upper, 8 left.
+    `sides`: which sides are divided, one bit each: 1 lower, 2 right, 4 upper, 8 left.
     """
     middles = [2 * side + 1 for side in range(4) if sides >> side & 1]
     start = middles[0] if middles else 0
@@ -62,17 +59,9 @@ def configuration(sides: int) -> list[tuple[int, int, int]]:
 def edges(height, threshold: float) -> list[Any]:
     """Return the nodes of each level that hold an edge at the spacing of that level.
 
-    Parameters
-    ----------
-    height
-        Array (faces, N + 1, N + 1), N a power of two, of inverse depths [1/m], none negative.
-    threshold
-        Largest departure that is no edge, relative to the height [1].
-
-    Raises
-    ------
-    InputError
-        If `threshold` is not a positive number.
+    `height`: array (faces, N + 1, N + 1), N a power of two, of inverse depths [1/m], none negative; `threshold`:
+    largest departure that is no edge, relative to the height [1]. Raises InputError if `threshold` is not a positive
+    number.
     """
     if not 0 < threshold < np.inf:
         raise InputError(f"threshold: got {threshold!r}, wanted a positive number, for instance 0.001")
