@@ -15,6 +15,7 @@ from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthLight, TruthMedium, TruthScene, read_truth
 from reports.interchange.cycles import cycles_properties
 from reports.interchange.recipes import recipes
+from validation.scenes.engine_fog import ENGINES, parameters_of
 from validation.scenes.loading import LoadedScene, scene_stem
 from validation.scenes.random.scene import drawn_values, is_random
 
@@ -165,6 +166,7 @@ def _medium(medium: TruthMedium | HeightMedium) -> dict[str, Any] | None:
             "floor": _number(medium.floor),
             "cap": _number(medium.cap),
             "up": up_axis(medium.up),
+            "engines": {name: _in_engine(name, medium) for name in ENGINES},
             "albedo": _numbers(medium.albedo),
             "phase": phase | {"formula": _PHASES[medium.phase.name]},
         }
@@ -177,6 +179,16 @@ def _medium(medium: TruthMedium | HeightMedium) -> dict[str, Any] | None:
         "mean_free_path": [_number(1 / value) if value > 0 else None for value in sigma_t],
         "phase": phase | {"formula": _PHASES[medium.phase.name]},
     }
+
+
+def _in_engine(name: str, medium: HeightMedium) -> dict[str, Any]:
+    """Return the parameters of height fog in an engine, lengths in metres, or why it has none."""
+    found = parameters_of(name, medium.layers, clamped=medium.clamped, constant=medium.constant)
+    if isinstance(found, str):
+        return {"cannot": found}
+    numbers = {key: _number(value) for key, value in found.items()}
+    engine = ENGINES[name]
+    return {"parameters": numbers, "not_physical": engine.unphysical, "not_checked": engine.unchecked}
 
 
 _PHASES = {

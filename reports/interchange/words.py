@@ -105,6 +105,13 @@ def _height_fog(medium: Mapping[str, Any]) -> Iterator[Cells]:
         numbers = f"sigma_t {layer['sigma_t']:.7g} 1/m at {layer['base']:.7g} m{below}"
         yield "", f"layer {number}", f"{numbers}; falls to 1/e in {layer['scale_height']:.7g} m"
     yield "", "everywhere", f"sigma_t {medium['constant']:.7g} 1/m"
+    for name, engine in medium["engines"].items():
+        numbers = engine.get("parameters", {})
+        line = ", ".join(f"{key} {value:.7g}" for key, value in numbers.items()) or f"cannot: {engine['cannot']}"
+        yield "", f"as in {name}", line
+        if numbers:
+            yield "", "not physical", engine["not_physical"]
+            yield "", "not checked", engine["not_checked"]
     yield "", "albedo", _colour(medium["albedo"])
 
 

@@ -9,6 +9,7 @@ Read in this order:
 - `meshes.py`: meshes by their parameters;
 - `cloud_meshes.py`: surfaces of clouds by formulas;
 - `hypertexture.py`: density by the distance into a mesh and gradient noise;
+- `engine_fog.py`: the height fog of engines as layers;
 - `height_fog.py`: the volume `heightfog` of Mitsuba: density by height;
 - `random`: scenes drawn from a seed;
 - `numbers.py`: refuses numbers of which no finite image can come;

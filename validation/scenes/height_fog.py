@@ -17,6 +17,9 @@ with max(z - z_i, 0) for z - z_i if `clamped` is true. What is not given is 0. `
 its third axis is up, its lower and upper end are the floor and the cap of the fog, beyond which there is nothing. The
 fog has no sides: Mitsuba gets a box that is a thousand times as wide as it is high at least.
 
+In place of these numbers it takes an engine's parameters, with `<string name="engine" value="unreal"/>`
+(`validation.scenes.engine_fog`).
+
 Mitsuba knows the volume once a scene was loaded, or `register_height_fog` was called for its variant.
 """
 
@@ -27,6 +30,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+
+from validation.scenes.engine_fog import ENGINES, layers_of
 
 NUMBERS = ("sigma_0", "sigma_1", "z_1", "H_1", "sigma_2", "z_2", "H_2")
 _WIDE = 1000.0  # half of the least width over the height
@@ -44,8 +49,7 @@ def _register(variant: str) -> None:
         """Exponential layers over a floor and under a cap."""
 
         def __init__(self, props):
-            given = {name: float(props.get(name, 0.0)) for name in NUMBERS}
-            self._clamped = bool(props.get("clamped", False))
+            given, self._clamped = _given(props)
             floor, cap, up, box = _box(props)
             props["to_world"] = mi.ScalarAffineTransform4d(box)
             mi.Volume.__init__(self, props)
@@ -87,6 +91,20 @@ def _register(variant: str) -> None:
             return f"HeightFog[{numbers}, clamped = {self._clamped}, up = {up}]"
 
     mi.register_texture("heightfog", HeightFog)
+
+
+def _given(props: Any) -> tuple[dict[str, float], bool]:
+    """Return the numbers of the layers, and whether they are clamped, from numbers or from an engine's parameters."""
+    if "engine" not in props:
+        given = {name: float(props.get(name, 0.0)) for name in NUMBERS}
+        return given, bool(props.get("clamped", False))
+    engine = str(props["engine"])
+    names = ENGINES[engine].parameters if engine in ENGINES else ()
+    layers, clamped = layers_of(engine, {name: float(props[name]) for name in names if name in props})
+    given = dict.fromkeys(NUMBERS, 0.0)
+    for i, layer in enumerate(layers, 1):
+        given |= dict(zip((f"sigma_{i}", f"z_{i}", f"H_{i}"), layer, strict=True))
+    return given, clamped
 
 
 def _box(props: Any) -> tuple[float, float, list[float], Any]:

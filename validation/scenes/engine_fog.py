@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The height fog of engines as layers: what their parameters mean in metres, and what of it is not physical.
+
+**Unreal.** With k = FogHeightFalloff/1000 and D = FogDensity/1000 per cm the density is D 2^(-k (z - z_0)). Its line
+integral, D (1 - 2^-F)/F with F = k times the rise, lacks 1/ln 2, and the transmittance is 2^-integral, which puts in
+one ln 2 more: the extinction is (ln 2)^2 D, that is 0.048045 FogDensity per metre, and H = 1/(k ln 2), 14.427 m over
+FogHeightFalloff. The volumetric fog (and the path tracer) has 1/2 for (ln 2)^2: 0.05 FogDensity ExtinctionScale per
+metre, 4.07 % denser.
+
+**Unity HDRP.** The extinction is 1/meanFreePath up to baseHeight and falls to a thousandth at maximumHeight:
+H = (maximumHeight - baseHeight)/ln 1000, the difference being 0.01 m at least.
+
+**PlayCanvas.** By its pages: `density` at `heightBase`, falling by exp(-heightFalloff (z - heightBase)).
+
+Read in shader text of Unreal as copied in public repositories (4.22 and later), in HDRP's Fog.cs and
+VolumeRendering.hlsl, and in PlayCanvas' pages.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+LN2 = math.log(2.0)
+_UNREAL = 0.1  # of a density by 1000 per cm, per metre
+_LEAST_DIFFERENCE = 0.01  # between HDRP's heights [m]
+
+Layer = tuple[float, float, float]  # extinction [1/m], base [m], scale height [m]
+
+
+@dataclass(frozen=True)
+class Engine:
+    """An engine's height fog."""
+
+    parameters: Mapping[str, float | None]  #: names with defaults; None: must be given. Heights are in metres
+    unphysical: str  #: what of its fog no medium does
+    unchecked: str  #: what is assumed of it
+
+
+_UNREAL_FOG = {
+    "FogDensity": None,
+    "FogHeightFalloff": None,
+    "FogHeight": 0.0,
+    "SecondFogDensity": 0.0,
+    "SecondFogHeightFalloff": 0.2,
+    "SecondFogHeightOffset": 0.0,
+}
+_RELEASES = "releases newer than the copies of 4.22 and later that were read"
+ENGINES = {
+    "unreal": Engine(
+        _UNREAL_FOG,
+        "its fog has a constant in-scattered colour without light paths and shadows, a directional term that is a "
+        "power of a cosine, FogMaxOpacity, StartDistance and a cut-off distance",
+        _RELEASES,
+    ),
+    "unreal-volumetric": Engine(
+        _UNREAL_FOG | {"ExtinctionScale": 1.0},
+        "its extinction is 4.07 % denser than that of its own analytic fog, since 1/2 stands for (ln 2)^2",
+        _RELEASES + "; whether local lights are attenuated by the fog before a point",
+    ),
+    "hdrp": Engine(
+        {"meanFreePath": None, "baseHeight": 0.0, "maximumHeight": None},
+        "it cuts the cosine of the zenith angle at a small number, and without volumetrics its scattering equals its "
+        "extinction",
+        "whether local lights are attenuated by the fog before a point",
+    ),
+    "playcanvas": Engine(
+        {"density": None, "heightBase": 0.0, "heightFalloff": None},
+        "its `extinction` scales absorption apart from scattering, and its ambient term has no source",
+        "whether it is constant below heightBase (taken not to be), and whether `extinction` scales both ways",
+    ),
+}
+
+
+def layers_of(engine: str, given: Mapping[str, float]) -> tuple[tuple[Layer, ...], bool]:
+    """Return the layers that an engine's parameters stand for, and whether they are constant below their bases.
+
+    Raises
+    ------
+    ValueError
+        For another engine, a parameter that is missing, or one that makes no fog.
+    """
+    if engine not in ENGINES:
+        raise ValueError(f"heightfog has engine = {engine}; wanted one of {', '.join(ENGINES)}")
+    values = {name: given.get(name, default) for name, default in ENGINES[engine].parameters.items()}
+    missing = [name for name, value in values.items() if value is None]
+    if missing:
+        raise ValueError(f"heightfog of engine {engine} has no {missing[0]}; wanted {', '.join(values)}")
+    number = {name: float(value) for name, value in values.items() if value is not None}
+    if engine == "hdrp":
+        if not number["meanFreePath"] > 0:
+            raise ValueError(f"heightfog has meanFreePath = {number['meanFreePath']:g}; wanted a length above 0 m")
+        rise = max(number["maximumHeight"] - number["baseHeight"], _LEAST_DIFFERENCE)
+        return ((1 / number["meanFreePath"], number["baseHeight"], rise / math.log(1000.0)),), True
+    if engine == "playcanvas":
+        return ((number["density"], number["heightBase"], 1 / _above_zero(number, "heightFalloff")),), False
+    factor = _UNREAL * (0.5 * number["ExtinctionScale"] if engine == "unreal-volumetric" else LN2**2)
+    base, layers = number["FogHeight"], []
+    for prefix, offset in (("", 0.0), ("Second", number["SecondFogHeightOffset"])):
+        if number[f"{prefix}FogDensity"]:
+            scale = 10 / (_above_zero(number, f"{prefix}FogHeightFalloff") * LN2)
+            layers.append((factor * number[f"{prefix}FogDensity"], base + offset, scale))
+    return tuple(layers), False
+
+
+def parameters_of(engine: str, layers: Sequence[Layer], *, clamped: bool, constant: float) -> dict[str, float] | str:
+    """Return an engine's parameters for layers, or in words why it has none."""
+    if not layers:
+        return "it has no fog without a layer"
+    if constant:
+        return "it has no constant part"
+    if clamped != (engine == "hdrp"):
+        return "its layers are constant below their bases" if engine == "hdrp" else "its layers go on below their bases"
+    if len(layers) > (2 if engine.startswith("unreal") else 1):
+        return "it has one layer"
+    sigma_t, base, scale = layers[0]
+    if engine == "hdrp":
+        return {"meanFreePath": 1 / sigma_t, "baseHeight": base, "maximumHeight": base + scale * math.log(1000.0)}
+    if engine == "playcanvas":
+        return {"density": sigma_t, "heightBase": base, "heightFalloff": 1 / scale}
+    factor = _UNREAL * (0.5 if engine == "unreal-volumetric" else LN2**2)
+    found = {"FogDensity": sigma_t / factor, "FogHeightFalloff": 10 / (scale * LN2), "FogHeight": base}
+    if len(layers) == 2:
+        sigma_t, other, scale = layers[1]
+        found["SecondFogDensity"] = sigma_t / factor
+        found |= {"SecondFogHeightFalloff": 10 / (scale * LN2), "SecondFogHeightOffset": other - base}
+    return found
+
+
+def _above_zero(number: Mapping[str, float], name: str) -> float:
+    if not number[name] > 0:
+        raise ValueError(f"heightfog has {name} = {number[name]:g}; wanted a number above 0")
+    return number[name]
