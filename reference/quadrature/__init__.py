@@ -3,12 +3,13 @@
 
 Read in this order:
 
-- `height_fog.py`: sums over lit stretches in height fog;
+- `height_fog.py`: the same in height fog;
 - `unbounded.py`: sums over lit stretches in one medium without bounds;
 - `segments.py`: media in convex bounds along rays and shadow segments;
 - `pieces.py`: smooth pieces of lit stretches in bounded media;
 - `adaptive_panels.py`: panels that are halved until a sum meets its tolerance;
 - `bounded.py`: sums over lit stretches in bounded media, for all lights;
+- `fields.py`: what every medium answers, the door for new ones;
 - `light_airlight.py`: the airlight of one point, spot or directional light;
 - `surface.py`: the lit surface behind the medium;
 - `ahead.py`: work that threads do ahead of what needs it;

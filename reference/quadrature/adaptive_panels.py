@@ -1,19 +1,34 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Panels of the smooth pieces of rays, halved until the sum of each ray meets a tolerance (see `analytic.panels`)."""
+"""The sum of smooth pieces of rays for any medium: panels are halved until each ray meets a tolerance.
+
+The pairs of rules are those of `analytic.panels`, and so is the variable near a place; under a direction it is the
+distance. A medium states its integrand (`Integrand`); lights, tolerances and uncertain edges are known here.
+"""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.unbounded import sums_of
+from analytic.kronrod import Pair
+from analytic.panels import blocks_by_rule
+from reference.quadrature.pieces import Pieces
+from reference.quadrature.unbounded import Profile, sums_of
+from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 RTOL = 1e-9  #: relative tolerance of the sum of a ray and a light
+AT_LIGHT = 1e-290  #: height [m] below which a ray meets the light
 _HALVINGS = 40
+_PANEL = 2.4  # width in v of the first panels, as in `analytic.panels`
+_THICK = 0.2  # optical depth over which a panel in x is as wide as one of this width in v times ten
+_NEAR_ZERO = 1e-15  # height over distance below which a light beside a piece may as well be at this height
+_PANELS = 8192  # panels at once
+_EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
@@ -58,7 +73,146 @@ def first_panels(start: Array, width: Array, widest: float) -> tuple[Index, Arra
     return piece, start[piece] + number * part, part
 
 
-def sum_panels(
+class Integrand(Protocol):
+    """What a medium scatters along pieces: exp(-tau) p, to be multiplied by albedo sigma_t."""
+
+    #: (pieces, 3): what multiplies the values, such as albedo sigma_t where that is constant [1/m]
+    factor: Array
+    extinction: Array  #: (pieces,): the largest, by which pieces under directions are parted [1/m]
+    same: Index  #: (3,): which column of the values each channel has
+
+    def __call__(self, rows: Index, x: Array, inside: Array, r: Array, scatter: Array) -> tuple[Array, Array]:
+        """Return values and optical depths of nodes, (m, nodes, columns) each.
+
+        Parameters
+        ----------
+        rows
+            The pieces, (m,).
+        x, inside
+            Distances from the camera, and from where the pieces begin, (m, nodes) [m].
+        r
+            Distances to the lights, infinite for directions, (m, nodes) [m].
+        scatter
+            Cosines of the scattering angle, (m, nodes).
+        """
+
+
+def sum_pieces(
+    rays: Rays,
+    pieces: Pieces,
+    integrand: Integrand,
+    block: slice,
+    *,
+    profile: Profile | None,
+    edge: Array,
+    rounding: Array,
+    rtol: float = RTOL,
+) -> tuple[Array, Array]:
+    """Integrate smooth pieces of a block of rays and add up those of each ray, for lights of strength 1.
+
+    Parameters
+    ----------
+    rays, pieces
+        All rays, in their planes with the lights, and the pieces of those of the block.
+    integrand
+        What the medium scatters along the pieces.
+    block
+        Of rays.
+    profile, edge, rounding, rtol
+        See `reference.quadrature.fields.Field`; the uncertainties are by ray.
+
+    Returns
+    -------
+    value, error
+        And a bound of it, (rays of the block, 3) each; infinite where a ray meets a light in a medium that scatters.
+    """
+    work = _Sum(rays, pieces, integrand, profile)
+    owner, count = pieces.ray - block.start, len(rays.foot[block])
+    value, error = _sum_panels(work.first_panels(), work.evaluate, owner, count, rtol)
+    error = error + sums_of(owner, work.edge_error(edge, rounding), count)
+    meets = sums_of(owner, work.meets_light()[:, None] * integrand.factor, count) > 0
+    return np.where(meets, np.inf, value), np.where(meets, np.inf, error)
+
+
+@dataclass
+class _Sum:
+    """The sums of one block of rays, in v = asinh((x - foot)/height) for places and in x for directions."""
+
+    rays: Rays
+    pieces: Pieces
+    integrand: Integrand
+    profile: Profile | None
+    own: Rays = field(init=False)  # the ray of each piece
+    height: Array = field(init=False)
+    start: Array = field(init=False)  # where each piece begins, in v or x
+    width: Array = field(init=False)
+
+    def __post_init__(self):
+        pieces = self.pieces
+        self.own = self.rays[pieces.ray]
+        if self.rays.w:
+            s0, s1 = pieces.x0 - self.own.foot, pieces.x1 - self.own.foot
+            beside = np.where(s0 > 0, s0, np.where(s1 < 0, -s1, 0.0))
+            self.height = np.maximum(self.own.height, np.maximum(_NEAR_ZERO * beside, AT_LIGHT))
+            self.start = np.arcsinh(s0 / self.height)
+            self.width = np.arcsinh(s1 / self.height) - self.start
+        else:
+            self.height, self.start, self.width = self.own.height, pieces.x0, pieces.x1 - pieces.x0
+
+    def first_panels(self) -> tuple[Index, Array, Array]:
+        return first_panels(self.start, self.width, _PANEL if self.rays.w else np.inf)
+
+    def meets_light(self) -> NDArray[np.bool_]:
+        near = (self.own.height < AT_LIGHT) & bool(self.rays.w)
+        return near & (self.pieces.x0 <= self.own.foot) & (self.own.foot <= self.pieces.x1)
+
+    def evaluate(self, piece: Index, start: Array, width: Array) -> Panels:
+        """Integrate panels by both rules, a block at a time so that the arrays stay in the cache."""
+        both, noise = np.empty((2, len(piece), 3)), np.empty((len(piece), 3))
+        size = width if self.rays.w else width * self.integrand.extinction[piece] / (10 * _THICK)
+        for pair, block in blocks_by_rule(size, _PANELS):
+            both[:, block], noise[block] = self.evaluate_block(pair, piece[block], start[block], width[block])
+        return Panels(piece, start, width, both[0], np.abs(both[0] - both[1]), noise)
+
+    def evaluate_block(self, pair: Pair, rows: Index, start: Array, width: Array) -> tuple[Array, Array]:
+        """Return the integrals of panels by both rules, (2, m, 3), and the rounding errors of the first, (m, 3)."""
+        half, same = 0.5 * width, self.integrand.same
+        f, depth = self.at(rows, start[:, None] + half[:, None] * (1 + pair.nodes))
+        scale = half[:, None] * self.integrand.factor[rows]
+        both = np.einsum("mnc,nk->kmc", f, pair.weights)[..., same] * scale
+        return both, _EPS * (16 + depth[:, len(pair.nodes) // 2, same]) * np.abs(both[0])
+
+    def at(self, rows: Index, v: Array) -> tuple[Array, Array]:
+        """Return the integrand, times dx/r^2 or dx by dv and the profile, and tau, at v, (m, nodes)."""
+        own, begin = self.own, self.pieces.x0[rows, None]
+        if self.rays.w:
+            height, foot = self.height[rows, None], own.foot[rows, None]
+            cosine = 1 / np.cosh(v)
+            s, r, scatter, rate = height * np.sinh(v), height / cosine, -np.tanh(v), cosine / height
+            x, inside = foot + s, np.maximum(s + (foot - begin), 0.0)
+        else:
+            x, inside, r = v, v - begin, np.full_like(v, np.inf)
+            scatter, rate = np.broadcast_to(np.clip(own.foot[rows, None], -1, 1), v.shape), np.ones_like(v)
+        f, depth = self.integrand(rows, x, inside, r, scatter)
+        if self.profile is not None:
+            rate = rate * self.profile(x, self.pieces.ray[rows])
+        return f * rate[:, :, None], depth
+
+    def edge_error(self, edge: Array, rounding: Array) -> Array:
+        """Return what the uncertain places of edges of shadows and of kinks are worth: integrand times uncertainty."""
+        pieces, every = self.pieces, np.arange(len(self.width))
+        ends = np.stack([self.start, self.start + self.width], axis=1)
+        f = self.at(every, ends)[0][..., self.integrand.same] * self.integrand.factor[:, None]
+        total = np.zeros((len(every), 3))
+        for end, chosen in enumerate((pieces.first, pieces.last)):
+            total += (chosen * edge[pieces.ray])[:, None] * f[:, end]
+        same = (pieces.ray[1:] == pieces.ray[:-1]) & (pieces.x0[1:] == pieces.x1[:-1])
+        same &= pieces.medium[1:] == pieces.medium[:-1]
+        total[1:] += (16 * same * rounding[pieces.ray[1:]])[:, None] * np.abs(f[1:, 0] - f[:-1, 1])
+        return total
+
+
+def _sum_panels(
     first: tuple[Index, Array, Array],
     evaluate: Callable[[Index, Array, Array], Panels],
     owner: Index,

@@ -27,13 +27,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.quadrature.ahead import done_ahead
-from reference.quadrature.bounded import sum_media
+from reference.quadrature.fields import field_of, optical_depth
 from reference.quadrature.light_airlight import worth_of_doubt
 from reference.quadrature.light_samples import Sections, samples_for_rays, sections_for_points
 from reference.quadrature.replicates import PILOT, REPLICATES, Keep, Kept, PointPlan, replicate_means, square_points
-from reference.quadrature.segments import camera_segments, optical_depth
 from reference.quadrature.surface import Reflection, SurfaceHits
-from reference.quadrature.unbounded import cosine_profile, stretch_sums, sums_of
+from reference.quadrature.unbounded import cosine_profile, sums_of
 from reference.scene.area_light import TruthAreaLight
 from reference.scene.read import TruthScene
 from reference.visibility.before_light import IN_PLANE, before_light
@@ -162,14 +161,8 @@ def _scattered(beam: Beam, active: Index, square: Array, shadow_scale: float) ->
             "rtol": _RTOL,
             "edge": lit.edge,
         }
-        stretches = lit.ray, lit.low, lit.high
-        if truth.media:
-            along = replace(truth, direction=rays.direction)
-            segments = camera_segments(along, np.repeat(beam.distance[active[rows]], each))
-            parts = sum_media(truth, rays, stretches, segments, **how)
-        else:
-            sums = stretch_sums(truth.medium, rays, stretches, **how)
-            parts = sums_of(lit.ray, sums[0], len(weight)), sums_of(lit.ray, sums[1], len(weight))
+        distance = np.repeat(beam.distance[active[rows]], each)
+        parts = field_of(truth).sums(rays, (lit.ray, lit.low, lit.high), distance, **how)
         parts = parts[0], parts[1] + worth_of_doubt(truth, rays, lit)
         value, error = ((part * weight[:, None]).reshape(-1, each, 3).sum(axis=1) * light.radiance for part in parts)
         return rows, lit.random_checks, value, error

@@ -24,32 +24,65 @@ The pieces are integrated by Gauss and Kronrod's pairs on panels that are halved
 `analytic.panels`), once for channels whose extinction is the same in all media.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.kronrod import Pair
-from analytic.panels import blocks_by_rule
-from reference.quadrature.adaptive_panels import RTOL, Panels, first_panels, sum_panels
+from reference.quadrature.adaptive_panels import AT_LIGHT, RTOL, sum_pieces
 from reference.quadrature.pieces import Kinks, Pieces, by_medium, cut_pieces, medium_of
-from reference.quadrature.segments import Segments, shadow_kinks
-from reference.quadrature.unbounded import Profile, Stretches, sums_of
+from reference.quadrature.segments import Segments, camera_segments, depth_through_media, shadow_kinks
+from reference.quadrature.unbounded import Profile, Stretches, strongest
 from reference.scene.convex_bounds import Bounds, Sphere
-from reference.scene.read import TruthScene
-from reference.visibility.line_crossings import crossed_facets, sphere_crossings
+from reference.scene.read import TruthScene, homogeneous_around
+from reference.visibility.line_crossings import crossed_facets, crossings, sphere_crossings
 from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_PANEL = 2.4  # width in v of the first panels, as in `analytic.panels`
-_THICK = 0.2  # optical depth over which a panel in x is as wide as one of this width in v times ten
-_AT_LIGHT = 1e-290  # height [m] below which a ray meets the light
-_NEAR_ZERO = 1e-15  # height over distance below which a light beside a piece may as well be at this height
 _RAYS = 4096  # rays at once
-_PANELS = 8192  # panels at once
-_EPS = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True)
+class Bounded:
+    """Homogeneous media in disjoint convex bounds, and what surrounds them; a field (`reference.quadrature.fields`)."""
+
+    truth: TruthScene
+
+    @property
+    def strongest(self) -> Array:
+        """The most that a metre of a ray scatters, (3,) [1/m]."""
+        return np.max([strongest(medium) for medium in (homogeneous_around(self.truth), *self.truth.media)], axis=0)
+
+    def optical_depth(self, origin: Array, direction: Array, low: Array, high: Array) -> Array:
+        """Return the optical depth of parts of straight lines, (n, 3) [1]."""
+        return depth_through_media(self.truth, origin, direction, low, high)
+
+    def leave(self, origin: Array, direction: Array) -> Array:
+        """Return the distance behind which rays meet nothing that scatters, (n,) [m]."""
+        if strongest(homogeneous_around(self.truth)).any():
+            return np.full(len(direction), np.inf)
+        spans = [crossings(medium.bounds, origin, direction) for medium in self.truth.media]
+        return np.max([np.where(enter < leave, np.maximum(leave, 0.0), 0.0) for enter, leave in spans], axis=0)
+
+    def sums(
+        self,
+        rays: Rays,
+        stretches: Stretches,
+        distance: Array,
+        *,
+        profile: Profile | None = None,
+        shadow_scale: float = 1.0,
+        edge: float | Array = 0.0,
+        rounding: Array | None = None,
+        rtol: float | None = None,
+    ) -> tuple[Array, Array]:
+        """Return the airlight of each ray from its lit stretches, and a bound of its error, (rays, 3) each."""
+        segments = camera_segments(replace(self.truth, direction=rays.direction), distance)
+        how: dict[str, Any] = {"profile": profile, "shadow_scale": shadow_scale, "edge": edge, "rounding": rounding}
+        return sum_media(self.truth, rays, stretches, segments, rtol=rtol or RTOL, **how)
 
 
 def sum_media(
@@ -98,8 +131,9 @@ def sum_media(
         pieces, kinks = smooth_pieces(truth, rays, segments, (ray[chosen], x0[chosen], x1[chosen]))
         if len(pieces.ray):
             block = slice(first, first + _RAYS)
-            part = _Sum(truth, rays, pieces, kinks, profile, shadow_scale, first, len(rays.foot[block]))
-            total[block], bound[block] = part.adapt(rtol, edge, rounding)
+            integrand = _Integrand(truth, pieces, rays[pieces.ray], kinks, shadow_scale)
+            how: dict[str, Any] = {"edge": edge, "rounding": rounding, "rtol": rtol}
+            total[block], bound[block] = sum_pieces(rays, pieces, integrand, block, profile=profile, **how)
     return total / (4 * np.pi), bound / (4 * np.pi)
 
 
@@ -133,22 +167,16 @@ def _kinks_of_phases(truth: TruthScene, rays: Rays, used: Index) -> list[Kinks]:
 
 
 @dataclass
-class _Sum:
-    """The sums of one block of rays."""
+class _Integrand:
+    """exp(-tau) p on the pieces of one block of rays (`reference.quadrature.adaptive_panels.Integrand`)."""
 
     truth: TruthScene
-    rays: Rays
     pieces: Pieces
+    own: Rays  # the ray of each piece
     kinks: list[Kinks]  # of each bounded medium, see `smooth_pieces`
-    profile: Profile | None
     scale: float
-    first: int  # number of the first ray
-    count: int
-    own: Rays = field(init=False)  # the ray of each piece
-    height: Array = field(init=False)
-    start: Array = field(init=False)  # where each piece begins, in v or x
-    width: Array = field(init=False)
-    factor: Array = field(init=False)  # albedo sigma_t of the medium of each piece
+    factor: Array = field(init=False)  # albedo sigma_t of the medium of each piece, (pieces, 3)
+    extinction: Array = field(init=False)  # the largest of the channels, (pieces,)
     different: Index = field(init=False)  # a channel of each set of extinctions, (sets,)
     same: Index = field(init=False)  # number of the set of each channel, (3,)
     sigma_t: Array = field(init=False)  # of these sets, (pieces, sets)
@@ -156,17 +184,8 @@ class _Sum:
 
     def __post_init__(self):
         truth, pieces = self.truth, self.pieces
-        self.own = self.rays[pieces.ray]
-        if self.rays.w:
-            s0, s1 = pieces.x0 - self.own.foot, pieces.x1 - self.own.foot
-            beside = np.where(s0 > 0, s0, np.where(s1 < 0, -s1, 0.0))
-            self.height = np.maximum(self.own.height, np.maximum(_NEAR_ZERO * beside, _AT_LIGHT))
-            self.start = np.arcsinh(s0 / self.height)
-            self.width = np.arcsinh(s1 / self.height) - self.start
-        else:
-            self.height, self.start, self.width = self.own.height, pieces.x0, pieces.x1 - pieces.x0
         sigma_t = by_medium(truth, "sigma_t", pieces.medium)
-        self.factor = sigma_t * by_medium(truth, "albedo", pieces.medium)
+        self.factor, self.extinction = sigma_t * by_medium(truth, "albedo", pieces.medium), sigma_t.max(axis=1)
         every = np.stack([medium.sigma_t for medium in (truth.medium, *truth.media)])
         _, self.different, self.same = np.unique(every, axis=1, return_index=True, return_inverse=True)
         self.sigma_t = sigma_t[:, self.different]
@@ -175,80 +194,27 @@ class _Sum:
             for medium, kinks in zip(truth.media, self.kinks, strict=True)
         ]
 
-    def adapt(self, rtol: float, edge: Array, rounding: Array) -> tuple[Array, Array]:
-        """Halve panels until all rays meet the tolerance, or only rounding is left."""
-        owner = self.pieces.ray - self.first
-        widest = _PANEL if self.rays.w else np.inf
-        value, error = sum_panels(first_panels(self.start, self.width, widest), self.evaluate, owner, self.count, rtol)
-        error = error + sums_of(owner, self.edge_error(edge, rounding), self.count)
-        meets = sums_of(owner, self.meets_light()[:, None] * self.factor, self.count) > 0
-        return np.where(meets, np.inf, value), np.where(meets, np.inf, error)
-
-    def meets_light(self) -> NDArray[np.bool_]:
-        near = (self.own.height < _AT_LIGHT) & bool(self.rays.w)
-        return near & (self.pieces.x0 <= self.own.foot) & (self.own.foot <= self.pieces.x1)
-
-    def evaluate(self, piece: Index, start: Array, width: Array) -> Panels:
-        """Integrate panels by both rules, a block at a time so that the arrays stay in the cache."""
-        both, noise = np.empty((2, len(piece), 3)), np.empty((len(piece), 3))
-        size = width if self.rays.w else width * self.sigma_t[piece].max(axis=1) / (10 * _THICK)
-        for pair, block in blocks_by_rule(size, _PANELS):
-            both[:, block], noise[block] = self.evaluate_block(pair, piece[block], start[block], width[block])
-        return Panels(piece, start, width, both[0], np.abs(both[0] - both[1]), noise)
-
-    def evaluate_block(self, pair: Pair, rows: Index, start: Array, width: Array) -> tuple[Array, Array]:
-        """Return the integrals of panels by both rules, (2, m, 3), and the rounding errors of the first, (m, 3)."""
-        half = 0.5 * width
-        f, depth = self.integrand(rows, start[:, None] + half[:, None] * (1 + pair.nodes))
-        scale = half[:, None] * self.factor[rows]
-        both = np.einsum("mnc,nk->kmc", f, pair.weights)[..., self.same] * scale
-        return both, _EPS * (16 + depth[:, len(pair.nodes) // 2, self.same]) * np.abs(both[0])
-
-    def integrand(self, rows: Index, v: Array) -> tuple[Array, Array]:
-        """Return exp(-tau) p dx/r^2 or dx, by dv, times the profile, and tau, at v, (m, nodes): (m, nodes, sets)."""
-        truth, own = self.truth, self.own
-        begin = self.pieces.x0[rows, None]
-        if self.rays.w:
-            height, foot = self.height[rows, None], own.foot[rows, None]
-            cosine = 1 / np.cosh(v)
-            s, r, scatter, rate = height * np.sinh(v), height / cosine, -np.tanh(v), cosine / height
-            x, inside = foot + s, np.maximum(s + (foot - begin), 0.0)
-        else:
-            x, inside, r = v, v - begin, np.full_like(v, np.inf)
-            scatter, rate = np.broadcast_to(np.clip(own.foot[rows, None], -1, 1), v.shape), np.ones_like(v)
+    def __call__(self, rows: Index, x: Array, inside: Array, r: Array, scatter: Array) -> tuple[Array, Array]:
+        truth = self.truth
         depth = self.pieces.depth[rows][:, None, self.different] + inside[:, :, None] * self.sigma_t[rows, None]
         around = truth.medium.sigma_t[self.different]
-        limit = self.scale * r if self.rays.w else r
+        limit = self.scale * r if self.own.w else r
         if np.any(around > 0):
             depth += limit[:, :, None] * around
         for medium, body in zip(truth.media, self.bodies, strict=True):
             depth += body.length(rows, x, r, limit)[:, :, None] * (medium.sigma_t[self.different] - around)
-        f = np.exp(-depth) * (rate * self.directional(rows, x, scatter))[:, :, None]
-        return f, depth
+        return np.exp(-depth) * self.phase(rows, scatter)[:, :, None], depth
 
-    def directional(self, rows: Index, x: Array, scatter: Array) -> Array:
-        """Return the phase function of each piece's medium times the profile of the light."""
-        result = np.ones(x.shape)
+    def phase(self, rows: Index, scatter: Array) -> Array:
+        """Return the phase function of each piece's medium."""
+        result = np.ones(scatter.shape)
         numbers = self.pieces.medium[rows]
         for number in np.unique(numbers):
             phase = medium_of(self.truth, int(number)).phase
             if not phase.is_constant:
                 chosen = numbers == number
                 result[chosen] = phase(scatter[chosen])
-        return result if self.profile is None else result * self.profile(x, self.pieces.ray[rows])
-
-    def edge_error(self, edge: Array, rounding: Array) -> Array:
-        """Return what the uncertain places of edges of shadows and of kinks are worth: integrand times uncertainty."""
-        pieces, every = self.pieces, np.arange(len(self.width))
-        ends = np.stack([self.start, self.start + self.width], axis=1)
-        f = self.integrand(every, ends)[0][..., self.same] * self.factor[:, None]
-        total = np.zeros((len(every), 3))
-        for end, chosen in enumerate((pieces.first, pieces.last)):
-            total += (chosen * edge[pieces.ray])[:, None] * f[:, end]
-        same = (pieces.ray[1:] == pieces.ray[:-1]) & (pieces.x0[1:] == pieces.x1[:-1])
-        same &= pieces.medium[1:] == pieces.medium[:-1]
-        total[1:] += (16 * same * rounding[pieces.ray[1:]])[:, None] * np.abs(f[1:, 0] - f[:-1, 1])
-        return total
+        return result
 
 
 @dataclass(frozen=True)
@@ -315,7 +281,7 @@ class _Body:
         place = np.sum((own.position - own.w * own.origin) * own.direction, axis=1)[rows, None]
         product = towards - x * place - own.w * x * (along - x)
         power = (x - along) ** 2 + (centre @ centre - self.bounds.radius**2 - along**2)
-        return sphere_crossings(product / (np.maximum(r, _AT_LIGHT) if own.w else 1.0), power)
+        return sphere_crossings(product / (np.maximum(r, AT_LIGHT) if own.w else 1.0), power)
 
 
 def _runs(pieces: Pieces, kinks: Kinks) -> tuple[Index, Index, Index]:

@@ -6,10 +6,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.segments import optical_depth
+from reference.quadrature.fields import optical_depth
 from reference.scene.area_light import TruthAreaLight
 from reference.scene.device import as_rows, vectors
-from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthScene
 from reference.visibility.line_crossings import half_chord
 
@@ -41,8 +40,7 @@ def emitted_light(truth: TruthScene, distance: Array) -> Array:
         rows = np.flatnonzero(at <= distance * (1 + _OWN))
         depth = optical_depth(truth, truth.origin, truth.direction[rows], np.zeros(len(rows)), at[rows])
         total[rows] += light.radiance * np.exp(-depth)
-    finite = isinstance(truth.medium, HeightMedium) or not np.any(truth.medium.sigma_t > 0)
-    if truth.background is not None and finite:  # else nothing of it arrives
+    if truth.background is not None:
         rows = np.flatnonzero(np.isinf(distance))
         depth = optical_depth(truth, truth.origin, truth.direction[rows], np.zeros(len(rows)), np.full(len(rows), _FAR))
         interaction = dr.zeros(mi.SurfaceInteraction3f, len(rows))

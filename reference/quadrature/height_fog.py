@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The airlight of lit stretches in height fog, with a bound of its error: `analytic.height_fog` in the rays' planes."""
 
-from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analytic.height_fog import HeightFog, HeightRays, Layer, height_fog_segments, height_fog_sun
+from reference.quadrature.unbounded import Profile, Stretches, strongest, sums_of
 from reference.scene.height_fog import HeightMedium
 from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+
+_RTOL = 1e-10  # of the integral of each stretch
 
 _ROUNDING = 64 * np.finfo(np.float64).eps  # of a sum of optical depths, for one of 1
 
@@ -22,33 +24,66 @@ def fog_of(medium: HeightMedium) -> HeightFog:
     return HeightFog(layers, medium.constant, medium.clamped, medium.floor, medium.cap)
 
 
-def height_fog_depth(medium: HeightMedium, origin: Array, direction: Array, low: Array, high: Array) -> Array:
-    """Return the optical depth of parts of rays from distances `low` to `high`, (n,) [m]."""
-    start, rise = origin @ medium.up, direction @ medium.up
-    length = np.maximum(high - low, 0.0)
-    return fog_of(medium).optical_depth(start + low * rise, start + low * rise + length * rise, length)
+@dataclass(frozen=True)
+class HeightField:
+    """Height fog without sides; a field (`reference.quadrature.fields`)."""
+
+    medium: HeightMedium
+
+    @property
+    def strongest(self) -> Array:
+        """The most that a metre of a ray scatters, (3,) [1/m]."""
+        return strongest(self.medium)
+
+    def optical_depth(self, origin: Array, direction: Array, low: Array, high: Array) -> Array:
+        """Return the optical depth of parts of straight lines, (n, 3) [1]."""
+        start, rise = np.asarray(origin) @ self.medium.up, direction @ self.medium.up
+        length = np.maximum(high - low, 0.0)
+        depth = fog_of(self.medium).optical_depth(start + low * rise, start + low * rise + length * rise, length)
+        return np.repeat(depth[:, None], 3, axis=1)
+
+    def leave(self, origin: Array, direction: Array) -> Array:
+        """Return the distance at which rays leave the fog for good, (n,) [m]: infinite on a level in it."""
+        start, rise = origin @ self.medium.up, direction @ self.medium.up
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends = np.stack([(z - start) / rise for z in (self.medium.floor, self.medium.cap)])
+        level = np.where((start >= self.medium.floor) & (start <= self.medium.cap), np.inf, 0.0)
+        return np.where(rise == 0, level, np.maximum(ends.max(axis=0), 0.0))
+
+    def sums(
+        self,
+        rays: Rays,
+        stretches: Stretches,
+        distance: Array,
+        *,
+        profile: Profile | None = None,
+        shadow_scale: float = 1.0,
+        edge: float | Array = 0.0,
+        rounding: Array | None = None,
+        rtol: float | None = None,
+    ) -> tuple[Array, Array]:
+        """Return the airlight of each ray from its lit stretches, and a bound of its error, (rays, 3) each."""
+        if rays.w:
+            scale, rtol = shadow_scale, rtol or _RTOL
+            value, error = _of_places(self.medium, rays, stretches, profile=profile, scale=scale, rtol=rtol, edge=edge)
+        else:
+            value, error = _of_suns(self.medium, rays, stretches, np.broadcast_to(edge, len(rays.foot)))
+        factor, ray = self.medium.albedo / (4 * np.pi), stretches[0]
+        value, error = (sums_of(ray, part[:, None] * factor, len(rays.foot)) for part in (value, error))
+        return value, error
 
 
-def height_fog_exit(medium: HeightMedium, origin: Array, direction: Array) -> Array:
-    """Return the distance at which rays leave height fog for good, (n,) [m]: infinite on a level in it."""
-    start, rise = origin @ medium.up, direction @ medium.up
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ends = np.stack([(z - start) / rise for z in (medium.floor, medium.cap)])
-    level = np.where((start >= medium.floor) & (start <= medium.cap), np.inf, 0.0)
-    return np.where(rise == 0, level, np.maximum(ends.max(axis=0), 0.0))
-
-
-def height_stretch_sums(
+def _of_places(
     medium: HeightMedium,
     rays: Rays,
-    stretches: tuple[Index, Array, Array],
+    stretches: Stretches,
     *,
-    profile: Callable[[Array, Index], Array] | None,
-    shadow_scale: float,
+    profile: Profile | None,
+    scale: float,
     rtol: float,
-    edge: float,
+    edge: float | Array,
 ) -> tuple[Array, Array]:
-    """Return the airlight of lit stretches from lights at places, as `reference.quadrature.unbounded.stretch_sums`."""
+    """Return sigma_t J of lit stretches and its error, (stretches,) [1/m^2]."""
     ray, x0, x1 = stretches
     fog = fog_of(medium)
     of_light = np.broadcast_to(rays.position, rays.direction.shape)[ray] @ medium.up
@@ -61,7 +96,7 @@ def height_stretch_sums(
     )
     weight = None if profile is None else lambda x, row: profile(x, ray[row])
     value, error = height_fog_segments(
-        fog, heights, x0, np.maximum(x0, x1), medium.phase, shadow_scale=shadow_scale, weight=weight, rtol=rtol
+        fog, heights, x0, np.maximum(x0, x1), medium.phase, shadow_scale=scale, weight=weight, rtol=rtol
     )
     for x in (x0, x1):  # a relative uncertainty of the distance from the light is worth r times the integrand
         s = np.where(np.isfinite(x), x, rays.foot[ray]) - rays.foot[ray]
@@ -72,24 +107,11 @@ def height_stretch_sums(
         with np.errstate(over="ignore"):
             strip = np.exp(fog.log_density(z) - depth) * medium.phase(-s / r) / r
         error = error + edge * np.where(np.isfinite(x), strip, 0.0)
-    factor = medium.albedo / (4 * np.pi)
-    return value[:, None] * factor, error[:, None] * factor
+    return value, error
 
 
-def sun_stretch_sums(
-    medium: HeightMedium, rays: Rays, stretches: tuple[Index, Array, Array], edge: Array
-) -> tuple[Array, Array]:
-    """Return the airlight of lit stretches for a sun of irradiance 1, in closed form, and its bound [1/sr].
-
-    Parameters
-    ----------
-    medium, rays
-        The fog, and the rays in their planes with the direction towards the sun.
-    stretches
-        Rays, and distances of both ends, of which the second may be infinite [m].
-    edge
-        Uncertainty of the ends of the stretches of each ray [m].
-    """
+def _of_suns(medium: HeightMedium, rays: Rays, stretches: Stretches, edge: Array) -> tuple[Array, Array]:
+    """Return what lit stretches scatter of suns of irradiance 1, in closed form, and its error, (stretches,) [1]."""
     ray, x0, x1 = stretches
     fog = fog_of(medium)
     origin, rise = float(rays.origin @ medium.up), rays.direction[ray] @ medium.up
@@ -106,5 +128,4 @@ def sun_stretch_sums(
         error += edge[ray] * np.where(np.isfinite(x), f, 0.0)
         # The exponent carries the rounding of its own size and of heights in scale heights.
         error += _ROUNDING * value * (1 + np.where(np.isfinite(depth), np.minimum(depth, 745.0), 0.0))
-    factor = medium.albedo / (4 * np.pi)
-    return value[:, None] * factor, error[:, None] * factor
+    return value, error

@@ -7,12 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.bounded import sum_media
-from reference.quadrature.height_fog import height_fog_exit, sun_stretch_sums
-from reference.quadrature.segments import Segments, camera_segments, scattering_range
-from reference.quadrature.unbounded import lit_stretches, profile_of, sum_intervals, sums_of
+from reference.quadrature.fields import field_of
+from reference.quadrature.unbounded import lit_stretches, profile_of
 from reference.scene.directional_light import DirectionalLight
-from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthLight, TruthScene
 from reference.scene.shapes import Shapes, read_shapes
 from reference.visibility.candidates import Ball
@@ -22,7 +19,8 @@ from reference.visibility.planes import Rays, cone_interval, rays_at
 
 Array = NDArray[np.float64]
 
-_LEAST_SINE = 1e-4  # between a ray and a sun in height fog: closer ones are looked at no further
+_LEAST_SINE = 1e-4  # between a ray and a sun: along closer ones it is looked no further for shadows
+_END = 1e-6  # relative: an interval that ends this close to where a ray was looked at goes on to there
 
 
 @dataclass(frozen=True)
@@ -42,7 +40,7 @@ class LitRays:
 
     rays: Rays
     lit: LitIntervals  #: up to the surface, in the cone of a spot
-    segments: Segments | None  #: the media along the rays, where these have bounds
+    distance: Array  #: to the visible surface, (rays,) [m]
     shapes: Shapes  #: what can stand in the light
     end: Array  #: up to where the rays were looked at, (rays,) [m]
 
@@ -64,17 +62,22 @@ def light_airlight(
         See `lit_rays`.
     """
     found = lit_rays(truth, light, distance, **how)
-    rays, lit, segments = found.rays, found.lit, found.segments
-    if segments is None:
-        radiance, bound = sum_intervals(truth.medium, light, rays, lit, shadow_scale)
-    else:
-        stretches = lit_stretches(light, rays, lit)
-        named: dict[str, Any] = {"profile": profile_of(light, rays), "shadow_scale": shadow_scale, "edge": lit.edge}
-        radiance, bound = (part * light.intensity for part in sum_media(truth, rays, stretches, segments, **named))
+    rays, lit = found.rays, found.lit
+    radiance, bound = lit_sums(truth, light, rays, lit, distance, shadow_scale)
     in_front = (rays.foot > 0) & (rays.foot < distance)
     angle = np.where(in_front, np.arctan2(rays.height, rays.foot), np.pi)
     bound = bound + worth_of_doubt(truth, rays, lit) * light.intensity
     return LightAirlight(radiance, bound, angle, lit, reaches(lit, distance))
+
+
+def lit_sums(
+    truth: TruthScene, light: TruthLight, rays: Rays, lit: LitIntervals, distance: Array, shadow_scale: float = 1.0
+) -> tuple[Array, Array]:
+    """Return the airlight of a point or spot light from the lit intervals of rays, and its bound, (rays, 3) each."""
+    stretches = lit_stretches(light, rays, lit)
+    how: dict[str, Any] = {"profile": profile_of(light, rays), "shadow_scale": shadow_scale, "edge": lit.edge}
+    value, bound = field_of(truth).sums(rays, stretches, distance, **how)
+    return value * light.intensity, bound * light.intensity
 
 
 def lit_rays(
@@ -101,33 +104,24 @@ def lit_rays(
         normal = np.broadcast_to(light.axis, truth.direction.shape)
     known = obstacles(truth, Ball(light.position), distance, shapes)
     lit = lit_intervals(rays, ends, known, checks=checks, normal=normal)
-    return LitRays(rays, lit, camera_segments(truth, distance) if truth.media else None, known.shapes, ends[1])
+    return LitRays(rays, lit, distance, known.shapes, ends[1])
 
 
 def directional_airlight(truth: TruthScene, light: DirectionalLight, distance: Array, **how: Any) -> LightAirlight:
     """Compute the airlight of one directional light along every ray; see `light_airlight`."""
     found = lit_parallel_rays(truth, light, distance, **how)
     rays, lit = found.rays, found.lit
-    none = np.zeros((len(distance), 3))
-    angle = np.full(len(distance), np.pi)
-    if isinstance(truth.medium, HeightMedium):
-        # Behind all that could stand in the light, a ray is lit or not as at the end of what was looked at.
-        goes_on = reaches(lit, found.end) & np.isinf(distance)
-        last = lit.high * (1 + 1e-6) >= found.end[lit.ray]
-        leaves = height_fog_exit(truth.medium, truth.origin, truth.direction)
-        high = np.where(goes_on[lit.ray] & last, leaves[lit.ray], lit.high)
-        edge = lit.edge * coordinates(rays, found.shapes)
-        parts = sun_stretch_sums(truth.medium, rays, (lit.ray, lit.low, high), edge)
-        radiance, bound = (sums_of(lit.ray, part, len(distance)) * light.irradiance for part in parts)
-        bound = bound + worth_of_doubt(truth, rays, lit) * light.irradiance
-        return LightAirlight(radiance, bound, angle, lit, reaches(lit, distance))
-    if found.segments is None:
-        return LightAirlight(none, none, angle, lit, reaches(lit, distance))
+    field, angle = field_of(truth), np.full(len(distance), np.pi)
+    # Behind all that could stand in the light, a ray is lit or not as at the end of what was looked at.
+    goes_on = (reaches(lit, found.end) & np.isinf(distance))[lit.ray]
+    last = lit.high * (1 + _END) >= found.end[lit.ray]
+    leaves = np.where(goes_on & last, field.leave(truth.origin, truth.direction)[lit.ray], lit.high)
+    high = np.maximum(lit.high, leaves)
     # What the uncertainty of coordinates is worth on a ray, through an edge or a kink; at most all of the ray.
     scale = np.maximum(coordinates(rays, found.shapes), lit.high.max(initial=0.0) / rays.height)
-    edge = np.minimum(lit.edge * scale, np.bincount(lit.ray, lit.high - lit.low, len(distance)))
-    stretches = lit.ray, lit.low, lit.high
-    sums = sum_media(truth, rays, stretches, found.segments, edge=edge, rounding=np.finfo(float).eps * scale)
+    edge = np.minimum(lit.edge * scale, np.bincount(lit.ray, high - lit.low, len(distance)))
+    how = {"edge": edge, "rounding": np.finfo(float).eps * scale}
+    sums = field.sums(rays, (lit.ray, lit.low, high), distance, **how)
     radiance, bound = (part * light.irradiance for part in sums)
     bound = bound + worth_of_doubt(truth, rays, lit) * light.irradiance
     return LightAirlight(radiance, bound, angle, lit, reaches(lit, distance))
@@ -137,19 +131,15 @@ def lit_parallel_rays(
     truth: TruthScene, light: DirectionalLight, distance: Array, *, shapes: Shapes | None = None, checks: int = 32
 ) -> LitRays:
     """Return which parts of the rays a directional light reaches; see `lit_rays`."""
-    segments = camera_segments(truth, distance) if truth.media else None
     rays = rays_at(truth.origin, truth.direction, -light.direction, w=0)
-    if isinstance(truth.medium, HeightMedium):
-        shapes = read_shapes(truth.occluders) if shapes is None else shapes
-        # No shadow falls on a ray where it has left the light's cylinder about all shapes.
-        clear = coordinates(rays, shapes) * np.minimum(1.0, rays.height / _LEAST_SINE)
-        last = np.minimum(height_fog_exit(truth.medium, truth.origin, truth.direction), clear)
-    else:
-        last = scattering_range(segments)[1] if segments is not None else np.full(len(distance), -np.inf)
-    end = np.where(np.isfinite(distance), distance, np.maximum(last, 0.0))
+    shapes = read_shapes(truth.occluders) if shapes is None else shapes
+    # No shadow falls on a ray where it has left the light's cylinder about all shapes.
+    clear = coordinates(rays, shapes) * np.minimum(1.0, rays.height / _LEAST_SINE)
+    last = np.minimum(field_of(truth).leave(truth.origin, truth.direction), clear)
+    end = np.where(np.isfinite(distance), distance, last)
     known = obstacles(truth, Ball(-light.direction, w=0), end, shapes)
     lit = lit_intervals(rays, (np.zeros_like(end), end), known, checks=checks)
-    return LitRays(rays, lit, segments, known.shapes, end)
+    return LitRays(rays, lit, distance, known.shapes, end)
 
 
 def worth_of_doubt(truth: TruthScene, rays: Rays, lit: LitIntervals) -> Array:
@@ -161,7 +151,5 @@ def worth_of_doubt(truth: TruthScene, rays: Rays, lit: LitIntervals) -> Array:
     worth = np.zeros((len(rays.foot), 3))
     ray, part = lit.doubt
     part = part / rays.height[ray] if rays.w else part
-    for medium in (truth.medium, *truth.media):
-        strongest = medium.phase(np.linspace(-1, 1, 1001)).max()
-        np.add.at(worth, ray, part[:, None] * medium.albedo * medium.largest * strongest / (4 * np.pi))
+    np.add.at(worth, ray, part[:, None] * field_of(truth).strongest / (4 * np.pi))
     return worth

@@ -5,12 +5,12 @@ A piece lies inside of one medium, and the leg from the light passes no corner o
 (`reference.quadrature.segments`); nor does the scattering angle pass a kink of a tabulated phase function.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.segments import AMBIENT, Segments, optical_depth
+from reference.quadrature.segments import AMBIENT, Segments, depth_through_media
 from reference.quadrature.unbounded import Stretches
 from reference.scene.read import TruthMedium, TruthScene, homogeneous_around
 from reference.visibility.planes import Rays
@@ -62,7 +62,21 @@ def cut_pieces(truth: TruthScene, rays: Rays, segments: Segments, lit: Stretches
     kinks
         Rays and distances of the kinks, (kinks,) each [m], in any order.
     """
-    return _cut(truth, rays, _parts(truth, rays, segments, *lit), *kinks)
+    parts = _parts(truth, rays, segments, *lit)
+    if not len(parts.ray):  # of a batch of rays none is lit within the media
+        return parts
+    before = depth_through_media(truth, rays.origin, rays.direction[parts.ray], np.zeros(len(parts.ray)), parts.x0)
+    pieces = cut(parts, kinks)
+    into = (pieces.x0 - parts.x0[pieces.part])[:, None]
+    return replace(pieces, depth=before[pieces.part] + into * by_medium(truth, "sigma_t", pieces.medium))
+
+
+def whole(lit: Stretches) -> Pieces:
+    """Return lit stretches as pieces of one medium, by ray and distance, for `cut`."""
+    order = np.lexsort((lit[1], lit[0]))
+    ray, x0, x1 = lit[0][order], lit[1][order], lit[2][order]
+    medium, every = np.full(len(ray), AMBIENT), np.ones(len(ray), bool)
+    return Pieces(ray, medium, x0, x1, every, np.isfinite(x1), np.zeros((len(ray), 3)), np.arange(len(ray)))
 
 
 def _parts(truth: TruthScene, rays: Rays, segments: Segments, ray: Index, x0: Array, x1: Array) -> Pieces:
@@ -83,10 +97,9 @@ def _parts(truth: TruthScene, rays: Rays, segments: Segments, ray: Index, x0: Ar
     return Pieces(ray, number, low, high, first, last, np.zeros((len(ray), 3)), np.arange(len(ray)))[order]
 
 
-def _cut(truth: TruthScene, rays: Rays, parts: Pieces, ray: Index, x: Array) -> Pieces:
-    """Cut parts of rays, given by ray and distance, at kinks."""
-    if not len(parts.ray):  # of a batch of rays none is lit within the media
-        return parts
+def cut(parts: Pieces, kinks: Kinks) -> Pieces:
+    """Cut parts of rays, given by ray and distance, at kinks; the depths of the pieces are those of their parts."""
+    ray, x = kinks
     # The part in which each kink lies is the last one that begins before it.
     everything = np.lexsort((np.concatenate([parts.x0, x]), np.concatenate([parts.ray, ray])))
     begins = everything < len(parts.ray)
@@ -101,17 +114,6 @@ def _cut(truth: TruthScene, rays: Rays, parts: Pieces, ray: Index, x: Array) -> 
     ends = np.append(owner[1:] != owner[:-1], True)[: len(owner)]
     end = np.where(ends, parts.x1[owner], np.append(start[1:], 0.0)[: len(owner)])
     begin = np.append(True, ends[:-1])[: len(owner)]
-    before = optical_depth(truth, rays.origin, rays.direction[parts.ray], np.zeros(len(parts.ray)), parts.x0)
-    sigma_t = by_medium(truth, "sigma_t", parts.medium[owner])
-    depth = before[owner] + (start - parts.x0[owner])[:, None] * sigma_t
-    pieces = Pieces(
-        parts.ray[owner],
-        parts.medium[owner],
-        start,
-        end,
-        parts.first[owner] & begin,
-        parts.last[owner] & ends,
-        depth,
-        owner,
-    )
+    first, last = parts.first[owner] & begin, parts.last[owner] & ends
+    pieces = Pieces(parts.ray[owner], parts.medium[owner], start, end, first, last, parts.depth[owner], owner)
     return pieces[end > start]

@@ -20,9 +20,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.height_fog import height_fog_depth
 from reference.scene.convex_bounds import Bounds, Polyhedron, Sphere
-from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthScene
 from reference.visibility.line_crossings import crossings, half_chord
 from reference.visibility.planes import Rays
@@ -43,8 +41,8 @@ class Segments:
     medium: Index  #: number in `TruthScene.media`, or `AMBIENT`
 
 
-def optical_depth(truth: TruthScene, origin: Array, direction: Array, low: Array, high: Array) -> Array:
-    """Return the optical depth of parts of rays.
+def depth_through_media(truth: TruthScene, origin: Array, direction: Array, low: Array, high: Array) -> Array:
+    """Return the optical depth of parts of rays where all media are homogeneous.
 
     Parameters
     ----------
@@ -66,9 +64,6 @@ def optical_depth(truth: TruthScene, origin: Array, direction: Array, low: Array
     -----
     Valid for any points, inside or outside of the media.
     """
-    if isinstance(truth.medium, HeightMedium):
-        depth = height_fog_depth(truth.medium, np.asarray(origin), direction, low, high)
-        return np.repeat(depth[:, None], 3, axis=1)
     total = np.maximum(high - low, 0.0)[:, None] * truth.medium.sigma_t
     for medium in truth.media:
         enter, leave = crossings(medium.bounds, origin, direction)

@@ -17,7 +17,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.segments import optical_depth
+from reference.quadrature.fields import optical_depth
 from reference.scene.area_light import is_area
 from reference.scene.device import as_rows, on_device, vectors
 from reference.scene.directional_light import DirectionalLight, is_directional

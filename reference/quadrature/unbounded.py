@@ -2,13 +2,13 @@
 """The airlight of lit intervals in one unbounded medium, added up for every ray, with an error bound."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analytic.panels import airlight_segments
-from reference.quadrature.height_fog import height_stretch_sums
 from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthLight, TruthMedium
 from reference.visibility.certificate import LitIntervals
@@ -20,91 +20,59 @@ Stretches = tuple[Index, Array, Array]  # rays, and distances of both ends [m]
 Profile = Callable[[Array, Index], Array]  # distances, (m, k) [m], and rays, (m,) -> intensity over that on the axis
 
 
-def sum_intervals(
-    medium: TruthMedium | HeightMedium,
-    light: TruthLight,
-    rays: Rays,
-    lit: LitIntervals,
-    shadow_scale: float,
-    rtol: float = 1e-10,
-) -> tuple[Array, Array]:
-    """Integrate every lit interval and add up the intervals of each ray.
-
-    Parameters
-    ----------
-    medium
-        The medium without bounds, or height fog.
-    light
-        A point or spot light.
-    rays, lit
-        The camera rays in their planes with the light, and their lit intervals.
-    shadow_scale
-        The share of the shadow segment that is attenuated over.
-    rtol
-        Relative tolerance of each integral [1].
-
-    Returns
-    -------
-    radiance, bound
-        And the bound of its error, (rays, 3) each [W/(m^2 sr)].
-    """
-    stretches = lit_stretches(light, rays, lit)
-    how: dict[str, Any] = {
-        "profile": profile_of(light, rays),
-        "shadow_scale": shadow_scale,
-        "rtol": rtol,
-        "edge": lit.edge,
-    }
-    values, errors = stretch_sums(medium, rays, stretches, **how)
-    count = len(rays.foot)
-    return sums_of(stretches[0], values, count) * light.intensity, sums_of(
-        stretches[0], errors, count
-    ) * light.intensity
+_RTOL = 1e-10  # of the integral of each stretch
 
 
-def stretch_sums(
-    medium: TruthMedium | HeightMedium,
-    rays: Rays,
-    stretches: Stretches,
-    *,
-    profile: Profile | None,
-    shadow_scale: float,
-    rtol: float,
-    edge: float = 0.0,
-) -> tuple[Array, Array]:
-    """Return the airlight of each lit stretch for a light of intensity 1, and the bound of its error, (stretches, 3).
+@dataclass(frozen=True)
+class Unbounded:
+    """One homogeneous medium everywhere, or a vacuum; a field (`reference.quadrature.fields`)."""
 
-    In 1/(m^2 sr).
+    medium: TruthMedium
 
-    Parameters
-    ----------
-    medium, rays
-        The medium without bounds, and the rays in their planes with lights at places.
-    stretches
-        Of the rays.
-    profile
-        Of the lights; None: they are isotropic.
-    shadow_scale, rtol
-        See `sum_intervals`.
-    edge
-        Relative uncertainty of the distance of both ends from the light.
-    """
-    if isinstance(medium, HeightMedium):
-        how: dict[str, Any] = {"profile": profile, "shadow_scale": shadow_scale, "rtol": rtol, "edge": edge}
-        return height_stretch_sums(medium, rays, stretches, **how)
-    ray, x0, x1 = stretches
-    foot, height = rays.foot[ray], rays.height[ray]
-    weight = None if profile is None else lambda x, row: profile(x, ray[row])
-    values, errors = np.zeros((len(ray), 3)), np.zeros((len(ray), 3))
-    known: dict[float, tuple[Array, Array]] = {}
-    for channel, sigma_t in enumerate(medium.sigma_t.tolist()):
-        if sigma_t not in known:
-            how = {"shadow_scale": shadow_scale, "weight": weight, "rtol": rtol}
-            value, error = airlight_segments(foot, height, x0, np.maximum(x0, x1), sigma_t, medium.phase, **how)
-            known[sigma_t] = value, error + edge * _edge_worth((foot, height), (x0, x1), sigma_t, medium)
-        factor = medium.albedo[channel] * sigma_t / (4 * np.pi)
-        values[:, channel], errors[:, channel] = (factor * column for column in known[sigma_t])
-    return values, errors
+    @property
+    def strongest(self) -> Array:
+        """The most that a metre of a ray scatters, (3,) [1/m]."""
+        return strongest(self.medium)
+
+    def optical_depth(self, origin: Array, direction: Array, low: Array, high: Array) -> Array:
+        """Return the optical depth of parts of straight lines, (n, 3) [1]."""
+        return np.maximum(high - low, 0.0)[:, None] * self.medium.sigma_t
+
+    def leave(self, origin: Array, direction: Array) -> Array:
+        """Return the distance behind which rays meet nothing that scatters, (n,) [m]."""
+        return np.full(len(direction), np.inf if self.strongest.any() else 0.0)
+
+    def sums(
+        self,
+        rays: Rays,
+        stretches: Stretches,
+        distance: Array,
+        *,
+        profile: Profile | None = None,
+        shadow_scale: float = 1.0,
+        edge: float | Array = 0.0,
+        rounding: Array | None = None,
+        rtol: float | None = None,
+    ) -> tuple[Array, Array]:
+        """Return the airlight of each ray and its bound; of a direction nothing: it reaches no fog without end."""
+        ray, x0, x1 = stretches
+        values, errors = np.zeros((len(ray), 3)), np.zeros((len(ray), 3))
+        foot, height, medium = rays.foot[ray], rays.height[ray], self.medium
+        weight = None if profile is None else lambda x, row: profile(x, ray[row])
+        known: dict[float, tuple[Array, Array]] = {}
+        for channel, sigma_t in enumerate(medium.sigma_t.tolist() if rays.w else []):
+            if sigma_t not in known:
+                how: dict[str, Any] = {"shadow_scale": shadow_scale, "weight": weight, "rtol": rtol or _RTOL}
+                value, error = airlight_segments(foot, height, x0, np.maximum(x0, x1), sigma_t, medium.phase, **how)
+                known[sigma_t] = value, error + edge * _edge_worth((foot, height), (x0, x1), sigma_t, medium)
+            factor = medium.albedo[channel] * sigma_t / (4 * np.pi)
+            values[:, channel], errors[:, channel] = (factor * column for column in known[sigma_t])
+        return sums_of(ray, values, len(rays.foot)), sums_of(ray, errors, len(rays.foot))
+
+
+def strongest(medium: TruthMedium | HeightMedium) -> Array:
+    """Return the most that a metre of a ray scatters in a medium, albedo sigma_t p, (3,) [1/m]."""
+    return medium.albedo * medium.largest * float(medium.phase(np.linspace(-1, 1, 1001)).max())
 
 
 def _edge_worth(plane: tuple[Array, Array], ends: tuple[Array, Array], sigma_t: float, medium: TruthMedium) -> Array:
@@ -165,7 +133,7 @@ def lit_stretches(light: TruthLight, rays: Rays, lit: LitIntervals) -> Stretches
     Parameters
     ----------
     light, rays, lit
-        See `sum_intervals`.
+        A point or spot light, the rays in their planes with it, and their lit intervals.
     """
     ray, low, high = lit.ray, np.maximum(lit.low, 0.0), lit.high
     if not light.is_soft or light.cosine:

@@ -43,19 +43,20 @@ class Mutation:
 def _sums(change: Callable[..., Any]) -> Wrap:
     """Change the airlight of one light: change(medium, radiance)."""
 
-    def around(function, medium, *others, **named):
-        radiance, bound = function(medium, *others, **named)
-        return change(medium, radiance), bound
+    def around(function, truth, *others, **named):
+        radiance, bound = function(truth, *others, **named)
+        return change(truth.medium, radiance), bound
 
-    return Wrap("reference.quadrature.unbounded:sum_intervals", around)
+    return Wrap("reference.quadrature.light_airlight:lit_sums", around)
 
 
 def _brighter(factor: float) -> Wrap:
     return _sums(lambda medium, radiance: radiance * factor)
 
 
-def _first_extinction(function, medium, *others, **named):
-    first = replace(medium, sigma_t=np.full(3, medium.sigma_t[0]))
+def _first_extinction(function, truth, *others, **named):
+    medium = truth.medium
+    first = replace(truth, medium=replace(medium, sigma_t=np.full(3, medium.sigma_t[0])))
     return tuple(values * medium.sigma_t / medium.sigma_t[0] for values in function(first, *others, **named))
 
 
@@ -159,9 +160,9 @@ def _shifted(lit, low, high):
     return [(a + 0.01 * (a > low), min(high, b + 0.01 * (b < high))) for a, b in lit]
 
 
-def _behind(function, medium, light, rays, lit, *others, **named):
+def _behind(function, truth, light, rays, lit, *others, **named):
     high = np.where(rays.foot[lit.ray] > 0, lit.high, lit.low)
-    return function(medium, light, rays, replace(lit, high=high), *others, **named)
+    return function(truth, light, rays, replace(lit, high=high), *others, **named)
 
 
 def _surface(change: Callable[..., Any]) -> Wrap:
@@ -306,7 +307,7 @@ _FOG = _all(
         "four-pi-twice": _brighter(1 / _FOUR_PI),
         "extinction-for-scattering": _sums(lambda medium, radiance: radiance / medium.albedo),
         "albedo-squared": _sums(lambda medium, radiance: radiance * medium.albedo),
-        "one-extinction": Wrap("reference.quadrature.unbounded:sum_intervals", _first_extinction),
+        "one-extinction": Wrap("reference.quadrature.light_airlight:lit_sums", _first_extinction),
         "one-per-cent": _brighter(1.01),
         "three-per-mille": _brighter(1.003),
         "one-per-mille": _brighter(1.001),
@@ -328,7 +329,7 @@ _FOG = _all(
         "falloff-in-the-cosine": Wrap("reference.visibility.planes:falloff", _linear_in_cosine),
         "hard-spot": Wrap("reference.visibility.planes:falloff", lambda function, theta, *others: np.ones_like(theta)),
         "first-light-only": Wrap("reference.quadrature.light_airlight:light_airlight", _one_light),
-        "no-light-behind": Wrap("reference.quadrature.unbounded:sum_intervals", _behind),
+        "no-light-behind": Wrap("reference.quadrature.light_airlight:lit_sums", _behind),
         "shadow-for-light": _lit(_complement),
         "no-shadows": _lit(lambda lit, low, high: [(low, high)]),
         "no-sphere-shadows": Wrap(

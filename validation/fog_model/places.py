@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from reference.quadrature.bounded import smooth_pieces
 from reference.quadrature.light_airlight import LitRays
 from reference.quadrature.pieces import by_medium
+from reference.quadrature.segments import camera_segments
 from reference.quadrature.unbounded import lit_stretches, profile_of
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import TruthLight, TruthScene
@@ -97,11 +98,11 @@ def point_nodes(
         x0, x1 = np.maximum(x0, ends[0][ray]), np.minimum(x1, ends[1][ray])
     used = x1 > x0
     ray, x0, x1 = ray[used], x0[used], x1[used]
-    if reach.segments is None:
+    if not truth.media:
         medium = np.full(len(ray), AROUND)
         x1 = np.where(np.isinf(x1), np.maximum(x0, rays.foot[ray]) + _long_enough(truth), x1)
     else:
-        pieces, _ = smooth_pieces(truth, rays, reach.segments, (ray, x0, x1))
+        pieces, _ = smooth_pieces(truth, rays, camera_segments(truth, reach.distance), (ray, x0, x1))
         # The reference counts media with bounds from 0 and calls what surrounds them -1.
         ray, x0, x1, medium = pieces.ray, pieces.x0, pieces.x1, pieces.medium + 1
     foot, s0, s1 = rays.foot[ray], x0 - rays.foot[ray], x1 - rays.foot[ray]
@@ -126,13 +127,12 @@ def parallel_nodes(
 ) -> Places:
     """Return the nodes of a directional light on the lit parts of all rays, see `point_nodes`."""
     rays, lit = reach.rays, reach.lit
-    assert reach.segments is not None
     x0, x1 = lit.low, lit.high
     if ends is not None:
         x0, x1 = np.maximum(x0, ends[0][lit.ray]), np.minimum(x1, ends[1][lit.ray])
     used = x1 > x0
     stretches = lit.ray[used], x0[used], x1[used]
-    pieces, _ = smooth_pieces(truth, rays, reach.segments, stretches)
+    pieces, _ = smooth_pieces(truth, rays, camera_segments(truth, reach.distance), stretches)
     width = pieces.x1 - pieces.x0
     depth = np.maximum(width * by_medium(truth, "sigma_t", pieces.medium).max(axis=1), 1e-300)
     owner, place, weight = panel_nodes(np.zeros(len(width)), depth, most=_DEEP, short=_SHALLOW)

@@ -31,7 +31,8 @@ from realtime.methods.registry import METHODS
 from realtime.parameters import defaults
 from realtime.scene.phase import Tabulated
 from realtime.scene.read_scene import Scene
-from reference.quadrature.segments import AMBIENT, camera_segments, optical_depth, scattering_range
+from reference.quadrature.fields import optical_depth
+from reference.quadrature.segments import AMBIENT, camera_segments, scattering_range
 from reference.quadrature.surface import surface_hits
 from reference.scene.convex_bounds import normals_at
 from reference.scene.directional_light import DirectionalLight

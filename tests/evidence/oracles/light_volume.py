@@ -46,8 +46,8 @@ from realtime.methods.light_volumes.jump_search import with_walls
 from realtime.scene.read_scene import Scene
 from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
 from realtime.shadow_maps.shadow_map import ShadowMap
+from reference.quadrature.light_airlight import lit_sums
 from reference.quadrature.surface import surface_hits
-from reference.quadrature.unbounded import sum_intervals
 from reference.scene.read import TruthLight, TruthScene
 from reference.visibility.certificate import LitIntervals
 from reference.visibility.exact_distance import exact_distance
@@ -89,7 +89,7 @@ def oracle_airlight(
     for number, (light, shadow_map) in enumerate(zip(truth.lights, shadow_maps, strict=True)):
         rays, ends = _rays_of(truth, light, np.reshape(distance, -1))
         lit = volume_intervals(height_field(shadow_map, walls[number] if walls else None), rays, ends)
-        total += sum_intervals(truth.medium, light, rays, lit, 1.0)[0]
+        total += lit_sums(truth, light, rays, lit, np.reshape(distance, -1))[0]
     return total.reshape(truth.height, truth.width, 3)
 
 

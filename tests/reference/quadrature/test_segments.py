@@ -3,7 +3,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.quadrature.segments import AMBIENT, camera_segments, optical_depth, scattering_range
+from reference.quadrature.fields import optical_depth
+from reference.quadrature.segments import AMBIENT, camera_segments, scattering_range
 from reference.scene.read import read_truth
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 

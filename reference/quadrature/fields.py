@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What fills a scene: the one door for media in the quadrature.
+
+Everything else asks a field: the sums over lit intervals, surfaces, what the camera sees of lights, and bounds. A new
+medium is a class with the four members of `Field` in a file of its own, and a line in `field_of`. Where its integrals
+have no closed form, `sums` cuts the stretches into smooth pieces (`whole` and `cut` of `reference.quadrature.pieces`),
+states its integrand, and gives both to `sum_pieces` of `reference.quadrature.adaptive_panels`: that knows lights,
+tolerances and edges. `tests/reference/quadrature/test_fields.py` does so for a density that grows with height.
+"""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.quadrature.bounded import Bounded
+from reference.quadrature.height_fog import HeightField
+from reference.quadrature.unbounded import Profile, Stretches, Unbounded
+from reference.scene.height_fog import HeightMedium
+from reference.scene.read import TruthScene
+from reference.visibility.planes import Rays
+
+Array = NDArray[np.float64]
+
+
+class Field(Protocol):
+    """What a medium, or all media of a scene together, answer."""
+
+    @property
+    def strongest(self) -> Array:
+        """The most that a metre of a ray scatters, albedo sigma_t p, (3,) [1/m]."""
+
+    def optical_depth(self, origin: Array, direction: Array, low: Array, high: Array) -> Array:
+        """Return the optical depth of parts of straight lines, (n, 3) [1], 0 where high <= low.
+
+        `origin` is (n, 3), or (3,) for all; `direction` has unit vectors, (n, 3); distances are (n,) [m], and may be
+        as large as floats are.
+        """
+
+    def leave(self, origin: Array, direction: Array) -> Array:
+        """Return the distance behind which rays meet nothing that scatters, (n,) [m]; may be infinite."""
+
+    def sums(
+        self,
+        rays: Rays,
+        stretches: Stretches,
+        distance: Array,
+        *,
+        profile: Profile | None = None,
+        shadow_scale: float = 1.0,
+        edge: float | Array = 0.0,
+        rounding: Array | None = None,
+        rtol: float | None = None,
+    ) -> tuple[Array, Array]:
+        """Return the airlight of each ray from its lit stretches, and a bound of its error, (rays, 3) each.
+
+        Parameters
+        ----------
+        rays
+            In their planes with lights of strength 1: places if `rays.w` is 1 [1/m^2], else directions [1/sr].
+        stretches
+            Rays, and distances of both ends; the second may be infinite [m].
+        distance
+            Of each ray to the visible surface [m].
+        profile
+            Of lights at places; None: they are isotropic.
+        shadow_scale
+            Fraction of the shadow segment to a place that is attenuated over, from the scattering point on.
+        edge
+            Uncertainty of the ends of stretches: relative to their distance from a place, or by ray a length [m].
+        rounding
+            Of the places of kinks, by ray [m].
+        rtol
+            Relative tolerance of a sum; the field's own by default.
+        """
+
+
+def field_of(truth: TruthScene) -> Field:
+    """Return what fills a scene."""
+    if isinstance(truth.medium, HeightMedium):
+        return HeightField(truth.medium)
+    return Bounded(truth) if truth.media else Unbounded(truth.medium)
+
+
+def optical_depth(truth: TruthScene, origin: Array, direction: Array, low: Array, high: Array) -> Array:
+    """Return the optical depth of parts of straight lines in a scene; see `Field.optical_depth`."""
+    return field_of(truth).optical_depth(origin, direction, low, high)
