@@ -35,7 +35,7 @@ from realtime.errors import InputError
 from realtime.numerics.array_types import is_single
 from realtime.numerics.fast_exp import exp_bounded
 from realtime.numerics.gauss_legendre import unit_nodes
-from realtime.scene.media.medium import LitRays, Medium, Rays, optical_reach
+from realtime.scene.media.medium import LitRays, Medium, optical_reach
 from realtime.scene.phase import Phase
 
 _NODES, _NODES_DOUBLE = 8, 12
@@ -76,14 +76,15 @@ class HeightFog(Medium):
         """Whether rays leave the fog."""
         return True
 
-    def rays(self, origin, direction, low=None):
+    def rays(self, origin, direction, aim=None):
         """Return rays with the distances between which they are in the fog [m], and their heights and rise."""
         start, rise = dr.dot(origin, self.up), dr.dot(direction, self.up)
         ends = [(z - start) / rise for z in (self.floor, self.cap)]
         level, inside = rise == 0, (start >= self.floor) & (start <= self.cap)
         enter = dr.select(level, 0, dr.maximum(dr.minimum(*ends), 0))
         leave = dr.select(level, dr.select(inside, _ENDLESS, 0), dr.clip(dr.maximum(*ends), 0, _ENDLESS))
-        return Rays(origin, direction, low, ((dr.minimum(enter, leave), leave), (start, rise)))
+        crossed = (dr.minimum(enter, leave), leave), (start, rise)
+        return replace(super().rays(origin, direction, aim), crossed=crossed)
 
     def density(self, z):
         """Return the extinction at heights between floor and cap [1/m]."""

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Height fog on the device: the certified rays in both precisions, frames against the reference, and refusals."""
 
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import partial
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -24,19 +25,6 @@ from reference.scene.read import read_truth
 from tests.helpers.frames import relative_rmse
 from tests.helpers.height_fog import LAMP, SPOT, SUN, fog_xml, rows
 from validation.scenes.loading import load_scene
-
-
-@dataclass(frozen=True)
-class Sun:
-    """What of a light at infinity the medium asks."""
-
-    axis: object
-    axis_low: object
-    w: int = 0
-    varies: bool = False
-    cone: object = None
-    facing: object = None
-    beam: object = None
 
 
 def ends_of(row):
@@ -73,13 +61,15 @@ def relative_errors(chosen, precision, kernel=exact):
         types.color(1),
         HenyeyGreenstein(number([row.phase.g for row in chosen])),
     )
-    directions = np.array([row.direction for row in chosen])
-    rounded = directions.astype(np.float32 if precision == "single" else np.float64)
-    lights = vector([row.light for row in chosen])
-    zero = types.vector(0, 0, 0)
-    light = Sun(-lights, zero) if chosen[0].sun else Light(position=lights, intensity=types.color(1))
-    rays = medium.rays(vector([row.origin for row in chosen]), vector(rounded), vector(directions - rounded))
-    geometry = ray_geometry(rays.origin, rays.direction, light, low=rays.direction_low)
+    directions, places = (np.array([getattr(row, name) for row in chosen]).T for name in ("direction", "light"))
+    light = Light(position=vector(places.T), intensity=types.color(1))
+    if chosen[0].sun:  # a light at infinity is one that has an extent
+        light = replace(
+            light, exact_axis=mi.Vector3d(*(mi.Float64(-column) for column in places)), extent=types.scalar(1)
+        )
+    aim = mi.Vector3d(*(mi.Float64(column) for column in directions))
+    rays = medium.rays(vector([row.origin for row in chosen]), vector(directions.T), aim)
+    geometry = ray_geometry(rays.origin, rays.aim, light)
     lit = medium.lit(rays, light, geometry, kernel=kernel)
     found = lit.airlight(number([row.x0 for row in chosen]), number([row.x1 for row in chosen]))
     expected = np.array([row.value for row in chosen])
