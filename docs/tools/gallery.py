@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from analytic.errors import InputError, nearest
 from realtime.frame.samples import render_samples
@@ -26,13 +26,15 @@ from realtime.scene.read_scene import read_scene
 from reference.storage.files import temporary_folder, write_bytes, write_text
 from reports.data.reader import read_report
 from reports.machine.environment import MissingError, activate, versions
-from reports.plotting.pictures import error_map, preview, tone_curve
+from reports.plotting.pictures import error_map, error_scale, preview, tone_curve
+from reports.tables.table import number
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import error_metrics
 from validation.scenes.changes import parse_changes
 from validation.scenes.loading import LoadedScene, load_scene
 from validation.scenes.registry import SCENES
 from validation.study.configuration import configuration, parse_settings, prepared
+from validation.study.frame_times import time_frame
 
 DOCS = Path(__file__).resolve().parents[1]
 FOLDER = DOCS / "gallery"
@@ -44,7 +46,7 @@ COARSER = 3  #: by which error maps of lights with extent are coarser
 Pixels = np.ndarray[Any, np.dtype[np.uint8]]
 SIZE, SMALL = (640, 480), (480, 360)
 SAMPLES = 16
-_SOFT = ("ray-march", ("shadow=map", "steps=64", "points=16"), 4)  # each light point takes as long as a light
+_SOFT = ("ray-march", ("shadow=map", "steps=64", "points=64"), 4)  # fewer light samples show as bands
 _CLOUDS = ("cloud-octaves", (), 1)  # seconds a frame
 #: How a scene is shown where `shadow-planes` would be slow or refused: method, settings, rays a pixel.
 _OTHERWISE = {
@@ -54,6 +56,8 @@ _OTHERWISE = {
         ("cloud-slab", "stratocumulus", "cumulus", "cumulus-detail", "step-cloud", "ring", "two-lobes"), _CLOUDS
     ),
 }
+#: Scenes that are seen from elsewhere, as `--change` takes it.
+_SEEN_FROM = {"two-lobes": ("camera.origin=-931.0,-713.0,1213.0", "camera.target=23.0,31.0,889.0")}
 #: The scene in which a method is shown, and its settings, where that is not `hall` and its defaults.
 _METHOD_SCENES = {
     "soft-shafts": ("penumbra-plane", ()),
@@ -103,7 +107,7 @@ class Picture:
 def scene_picture(scene: str) -> Picture:
     """Return the picture of a built-in scene."""
     method, settings, samples = _OTHERWISE.get(scene, ("shadow-planes", (), SAMPLES))
-    return Picture(f"scene-{scene}", "scene", scene, method, settings, samples)
+    return Picture(f"scene-{scene}", "scene", scene, method, settings, samples, _SEEN_FROM.get(scene, ()))
 
 
 def method_pictures(method: str) -> tuple[Picture, ...]:
@@ -177,7 +181,26 @@ def _pixels(picture: Picture) -> tuple[Pixels, dict[str, Any]]:
     truth = truth_image(loaded.scene).airlight
     error = error_metrics(truth, frame.airlight).relative_rmse
     colours = error_map(truth, np.asarray(frame.airlight, dtype=np.float64))
-    return colours.repeat(coarser, axis=0).repeat(coarser, axis=1), {"relative_rmse": error}
+    chosen = configuration(picture.method, None, parse_settings(picture.settings))
+    whole = read_scene(load_scene(picture.scene, SMALL).scene)
+    milliseconds = time_frame(prepared(whole, chosen)).frame.median_ms
+    picture_of = _with_scale(colours.repeat(coarser, axis=0).repeat(coarser, axis=1), error, milliseconds)
+    return picture_of, {"relative_rmse": error, "frame_ms": milliseconds}
+
+
+def _with_scale(colours: Pixels, error: float, milliseconds: float) -> Pixels:
+    """Return an error map above the scale of its colours, its number and the time of a frame."""
+    width = colours.shape[1]
+    below = Image.new("RGB", (width, 46), "white")
+    below.paste(Image.fromarray(error_scale()).resize((width // 2, 12)), (10, 6))
+    write = ImageDraw.Draw(below)
+    for place, words in ((0.0, "-100 %"), (0.25, "-1 %"), (0.5, "0.01 %"), (0.75, "+1 %"), (1.0, "+100 %")):
+        write.text(
+            (10 + place * width / 2, 22), words, fill="black", anchor="ma" if 0 < place < 1 else "la", font_size=11
+        )
+    said = f"rel. RMSE {number(100 * error, 2)} %, {milliseconds:.0f} ms"
+    write.text((width - 10, 12), said, fill="black", anchor="ra", font_size=14)
+    return np.concatenate([colours, np.asarray(below)])
 
 
 def _page() -> Pixels:
@@ -195,6 +218,8 @@ def _page() -> Pixels:
         window = browser.new_page(viewport={"width": 1300, "height": 1000}, color_scheme="light")
         window.goto((REPORT / "report.html").resolve().as_uri())
         window.wait_for_selector("html[data-drawn]", timeout=120_000, state="attached")
+        window.locator("#viewer-0 input[type=range]").fill("2")  # so that shafts are seen in a small picture
+        window.wait_for_selector("#viewer-0[data-drawn$=' 2']")
         shot = window.screenshot()
         browser.close()
     return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB").resize((1040, 800), Image.Resampling.LANCZOS))

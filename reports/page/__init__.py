@@ -10,6 +10,5 @@ Read in this order:
 - `chart.py`: speed against error, as SVG
 - `image_codec.py`: images as integers that compress well
 - `image_index.py`: what the script of the page reads
-- `image_cache.py`: packed images kept between runs
 - `render.py`: the page of all these
 """

@@ -3,7 +3,7 @@
 
 Each scene becomes one string of base64 that holds all of its packed planes, and an entry of the index that says where
 each lies and how it was coded (`reports.page.image_codec`). A page has a limit of bytes; the largest scenes go down
-`LADDER` until all fit (`reports.page.image_cache`): first the differences are coded more coarsely, then every second,
+`LADDER` until all fit: first the differences are coded more coarsely, then every second,
 third ... pixel is kept. What was done is in the index, and the page says so.
 """
 
@@ -67,6 +67,40 @@ class StoredImages:
 
     reference: Mapping[str, Array]
     methods: Sequence[Mapping[str, Array]]
+
+
+def page_images(scenes: Sequence[Mapping[str, Any]], folder: Path, limit: int) -> list[SceneImages]:
+    """Return the images of scenes, all together in no more than so many characters.
+
+    Every scene begins with the finest rung of `LADDER`; while the page is too large the largest goes a rung down.
+
+    Parameters
+    ----------
+    scenes
+        Scenes of report.json.
+    folder
+        Where the files that they name lie.
+    limit
+        Of the sum of the lengths of `data`.
+
+    Raises
+    ------
+    InputError
+        If a file is missing or cannot be read, its size is not that of the reference, or nothing of `LADDER` fits.
+    """
+    rungs = [0] * len(scenes)
+    packed = [packed_scene(scene, read_images(scene, folder), *LADDER[0]) for scene in scenes]
+    while (total := sum(len(images.data) for images in packed)) > limit:
+        coarser = [place for place, rung in enumerate(rungs) if rung + 1 < len(LADDER)]
+        if not coarser:
+            raise InputError(
+                f"report: the images take {total / 1e6:.1f} MB of the page even with one pixel in {LADDER[-1][1]} "
+                f"along both axes, wanted at most {limit / 1e6:.1f} MB; report fewer scenes or methods at once"
+            )
+        largest = max(coarser, key=lambda place: len(packed[place].data))
+        rungs[largest] += 1
+        packed[largest] = packed_scene(scenes[largest], read_images(scenes[largest], folder), *LADDER[rungs[largest]])
+    return packed
 
 
 def read_images(scene: Mapping[str, Any], folder: Path) -> StoredImages:

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 from analytic.errors import InputError
 from reports.page.chart import scene_chart, speed_error_chart
 from reports.page.filters import FILTERS, KEYS, KINDS, MARKS, kept_words, precision_words, viewer_words
-from reports.page.image_cache import page_images
-from reports.page.image_index import SceneImages
+from reports.page.image_index import SceneImages, page_images
 from reports.page.tables import TABLES, trust_words
 from reports.plotting.colour_maps import signed_colours, unsigned_colours
 
@@ -55,7 +54,13 @@ def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) 
     lead = _lead(data["scenes"], [place for place, scene in enumerate(data["scenes"]) if id(scene) in number_of])
     chart = "" if lead is None else Markup(scene_chart(data["scenes"], lead))
     viewers = [
-        _viewer(scene, number_of[id(scene)], images[number_of[id(scene)]], chart if place == lead else "")
+        _viewer(
+            scene,
+            number_of[id(scene)],
+            images[number_of[id(scene)]],
+            chart=chart if place == lead else "",
+            folder=Path(folder) if place == lead else None,
+        )
         if id(scene) in number_of
         else None
         for place, scene in enumerate(data["scenes"])
@@ -107,16 +112,39 @@ def template_text(name: str) -> "Markup":
     return Markup((TEMPLATES / name).read_text(encoding="utf-8"))
 
 
-def _viewer(scene: Mapping[str, Any], number: int, images: SceneImages, chart: str) -> dict[str, Any]:
+def _viewer(
+    scene: Mapping[str, Any], number: int, images: SceneImages, *, chart: str, folder: Path | None
+) -> dict[str, Any]:
+    """Return what the viewer of a scene shows; with a folder also its first pictures, which need no script."""
     shown = [entry for entry in scene["methods"] if entry["files"]]
+    first = _first_shown(shown)
+    files = {"reference": scene["files"], "method": shown[first]["files"], "error": {}}
+    named = {name: of.get("picture") for name, of in files.items()} | {"error": shown[first]["files"].get("error")}
     return {
         "number": number,
         "shown": shown,
-        "first": _first_shown(shown),
+        "first": first,
+        "pictures": {
+            name: _inline(folder / file)
+            for name, file in named.items()
+            if folder and file and (folder / file).is_file()
+        },
         "size": images.index["size"],
         "words": viewer_words(images.index),
         "chart": chart,
     }
+
+
+def _inline(path: Path) -> str:
+    """Return a PNG file as the address of a smaller picture that stands in the page."""
+    import io
+
+    from PIL import Image
+
+    buffer = io.BytesIO()
+    with Image.open(path) as picture:
+        picture.convert("RGB").save(buffer, "WEBP", quality=80)
+    return f"data:image/webp;base64,{base64.b64encode(buffer.getvalue()).decode()}"
 
 
 def _lead(scenes: Sequence[Mapping[str, Any]], shown: Sequence[int]) -> int | None:

@@ -190,8 +190,6 @@ def test_code_is_the_same_wherever_it_lies_and_in_every_process(folder, tmp_path
 
 def functions():
     """What computes each kind of what is kept, and a module of which it takes numbers."""
-    from reports.page.image_index import packed_scene
-
     quadrature = "reference.quadrature.segments"
     return {
         "quadrature": (quadrature_image, quadrature),
@@ -201,7 +199,6 @@ def functions():
         "kernel-rays": (_truth, "analytic.panels"),
         "sweep-reference": (sampled_reference, quadrature),
         "row": (run, "realtime.methods.ray_march"),
-        "page": (packed_scene, "reports.page.image_codec"),
         "scene-checks": (check_reference, "validation.statistics.comparison"),
         "scene-multiple": (multiple_scattering_fraction, "reference.monte_carlo.volpath.integrator"),
         "cell": (_measured, "realtime.methods.ray_march"),
@@ -237,7 +234,7 @@ def test_every_kind_that_is_kept_is_in_the_table():
     text = "".join(path.read_text(encoding="utf-8") for path in module._modules().values())
     kinds = set(re.findall(r'key_of\(\s*"([a-z-]+)"', text)) | set(re.findall(r'_key\(\s*"([a-z-]+)"', text))
     assert kinds - {"report-paper"} <= functions().keys()
-    assert {"quadrature", "kernel-rays", "sweep-reference", "row", "page", "report-scaling"} <= kinds
+    assert {"quadrature", "kernel-rays", "sweep-reference", "row", "report-scaling"} <= kinds
 
 
 @pytest.mark.claim("report-kept")

@@ -19,6 +19,8 @@ def test_the_page_shows_what_the_files_hold(browser, tmp_path):
     page, told = watched(browser)
     page.goto(path.as_uri())
     page.wait_for_selector("html[data-drawn]")
+    page.keyboard.press("1")  # the page opens on the method of median error
+    page.wait_for_selector("#viewer-0[data-drawn^='0 ']")
     for name, which in (("reference", "reference"), ("good", "method")):
         wanted = tone_mapped(layer(folder, name), 2.5).astype(int)
         # The table of sRGB has 16385 steps and the reference 16 digits: one level at most.

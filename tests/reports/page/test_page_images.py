@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
-from reports.page.image_cache import page_images
 from reports.page.image_codec import (
     DIFFERENCE_BITS,
     GRADIENT,
@@ -28,7 +27,8 @@ from reports.page.image_codec import (
     reference_codes,
     reference_values,
 )
-from tests.helpers.page import images, report_data, write_files
+from reports.page.image_index import page_images
+from tests.helpers.page import report_data, write_files
 
 
 def difference_values(codes: Codes, k: float, s: float) -> Array:
@@ -126,21 +126,6 @@ def test_limits_are_kept_by_coarser_differences_then_fewer_pixels(scene, folder)
     fitted = page_images([small, scene], folder, sum(len(packed.data) for packed in both) - 1)
     assert fitted[0] == both[0]  # the largest scene gives way first
     assert fitted[1].index["of_difference"] > both[1].index["of_difference"]
-
-
-def test_packed_images_are_kept_until_a_file_changes_or_the_entry_is_damaged(scene, own_cache, tmp_path, monkeypatch):
-    write_files(tmp_path)
-    first = scene_images(scene, tmp_path, 10**8)
-    with monkeypatch.context() as patched:
-        patched.setattr("reports.page.image_cache.store", None)
-        assert scene_images(scene, tmp_path, 10**8) == first  # not packed again
-    (kept,) = own_cache.glob("page-*.npz")
-    kept.write_bytes(kept.read_bytes()[:-9])
-    assert scene_images(scene, tmp_path, 10**8) == first
-    changed = images()["flat"]
-    brighter = Image(changed | {"airlight": 1.01 * changed["airlight"]})
-    write_exr(tmp_path / "s" / "flat.exr", brighter, finite=False)  # the fake report has a pixel of NaN
-    assert scene_images(scene, tmp_path, 10**8).data != first.data
 
 
 def test_a_file_that_is_missing_or_of_another_size_is_refused(scene, tmp_path):
