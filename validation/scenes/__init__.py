@@ -3,7 +3,7 @@
 
 Read in this order:
 
-- `fog.toml`, `clouds.toml`: the built-in scenes as data;
+- `fog.toml`, `height_fog.toml`, `clouds.toml`: the built-in scenes as data;
 - `registry.py`: their records by name, and the Mitsuba dictionaries that the data stand for;
 - `parts.py`: shapes of meshes, media, lights and cameras for such dictionaries;
 - `meshes.py`: meshes by their parameters;

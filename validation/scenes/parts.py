@@ -66,6 +66,27 @@ def fog(
     }
 
 
+def height_fog(
+    layers: Sequence[Sequence[float]], floor: float, cap: float, *, albedo: Sequence[float], phase: dict[str, Any]
+) -> dict[str, Any]:
+    """Return height fog with the id 'fog': one or two layers of extinction [1/m], base and scale height [m].
+
+    `floor` and `cap` are the heights where it ends [m].
+    """
+    numbers = {
+        f"{name}_{i}": value for i, layer in enumerate(layers, 1) for name, value in zip(("sigma", "z", "H"), layer)
+    }
+    box = mi.ScalarTransform4f().translate([0, 0, floor]).scale([1, 1, cap - floor])
+    return {
+        "type": "heterogeneous",
+        "id": "fog",
+        "sigma_t": {"type": "heightfog", "to_world": box} | numbers,
+        "has_spectral_extinction": False,  # see `validation.scenes.files.media.grey_height_fog`
+        "albedo": {"type": "rgb", "value": list(albedo)},
+        "phase": phase,
+    }
+
+
 def phase_function(words: str, values: int) -> dict[str, Any]:
     """Return a phase function from words such as 'hg:0.37', a table of `values` where Mitsuba has no other plugin."""
     name, _, number = words.partition(":")

@@ -38,12 +38,13 @@ import mitsuba as mi
 import numpy as np
 
 from validation.scenes import cloud_meshes, meshes
+from validation.scenes.height_fog import register_height_fog
 from validation.scenes.hypertexture import hypertexture
 from validation.scenes.meshes import Mesh, bent, joined, placed, rotation, scaled
-from validation.scenes.parts import camera, fog, light, medium_boundary, mitsuba_mesh, phase_function
+from validation.scenes.parts import camera, fog, height_fog, light, medium_boundary, mitsuba_mesh, phase_function
 
 MOVES = ("light", "objects", "medium", "colour")
-FILES = tuple(Path(__file__).with_name(name) for name in ("fog.toml", "clouds.toml"))
+FILES = tuple(Path(__file__).with_name(name) for name in ("fog.toml", "height_fog.toml", "clouds.toml"))
 
 Table = dict[str, Any]
 
@@ -92,6 +93,7 @@ class SceneRecord:
     purpose: str  #: one sentence: what the scene is for
     published: str  #: the published figure that the scene stands for
     animation: Animation = field(default_factory=Animation)  #: what moves in it
+    layered: bool = False  #: whether its fog is height fog, which has no one extinction
     clouds: bool = False  #: whether light is scattered many times: then `cloud-paths` is its truth, and few methods fit
     digest: str = ""  #: of its description
 
@@ -106,7 +108,8 @@ def _record(name: str, table: Table) -> SceneRecord:
     animation = Animation(**{key: tuple(value) for key, value in table.get("animation", {}).items()})
     digest = hashlib.sha256(json.dumps(table).encode()).hexdigest()
     words = table["purpose"], table["published"]
-    return SceneRecord(name, partial(_build, table), *words, animation, table.get("clouds", False), digest)
+    layered = "layers" in table.get("fog", {})
+    return SceneRecord(name, partial(_build, table), *words, animation, layered, table.get("clouds", False), digest)
 
 
 def _build(table: Table) -> dict[str, Any]:
@@ -176,7 +179,11 @@ def mesh_of(entry: Table, kinds: Mapping[str, Table]) -> Mesh:
 
 
 def _medium(table: Table, shape: str = "") -> dict[str, Any]:
-    medium = fog(table["sigma_t"], table["albedo"], phase_function(table.get("phase", "isotropic"), _DROPLETS))
+    phase = phase_function(table.get("phase", "isotropic"), _DROPLETS)
+    if "layers" in table:
+        register_height_fog()
+        return height_fog(table["layers"], table["floor"], table["cap"], albedo=table["albedo"], phase=phase)
+    medium = fog(table["sigma_t"], table["albedo"], phase)
     if "density" not in table:
         return medium
     density, low, high = _density(shape, json.dumps(table["density"]))
@@ -190,6 +197,6 @@ def _density(mesh: str, given: str) -> Any:
     return hypertexture(MESHES[mesh](), **json.loads(given))
 
 
-#: The built-in scenes by name, and those without clouds.
+#: The built-in scenes by name, and those of homogeneous fog.
 SCENES = {name: record for path in FILES for name, record in read_scenes(path).items()}
-FOG_SCENES = {name: record for name, record in SCENES.items() if not record.clouds}
+FOG_SCENES = {name: record for name, record in SCENES.items() if not (record.clouds or record.layered)}

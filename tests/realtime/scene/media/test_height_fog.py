@@ -25,6 +25,7 @@ from reference.scene.read import read_truth
 from tests.helpers.frames import relative_rmse
 from tests.helpers.height_fog import LAMP, SPOT, SUN, fog_xml, rows
 from validation.scenes.loading import load_scene
+from validation.scenes.registry import SCENES
 
 
 def ends_of(row):
@@ -145,6 +146,15 @@ def test_frames_are_the_reference(scene, lights):
     # Maps and steps: some percent at their defaults.
     for method, error in (("light-volumes", 0.02), ("min-max", 0.05), ("ray-march", 0.1)):
         assert relative_rmse(frame(loaded, method).airlight, truth.airlight) < error, method
+
+
+@pytest.mark.claim("height-fog-methods", tolerance="1e-5 relative RMSE of shadow planes in float32")
+@pytest.mark.parametrize("name", [name for name, record in SCENES.items() if record.layered])
+def test_built_in_scenes(variant, name):
+    loaded = load_scene(name, (24, 18)).scene
+    truth = quadrature_image(read_truth(loaded))
+    assert truth.airlight_bound.max() < 1e-6 * truth.airlight.mean()
+    assert relative_rmse(frame(loaded, "shadow-planes").airlight, truth.airlight) < 1e-5
 
 
 @pytest.mark.claim("height-fog-refused", tolerance="by name")
