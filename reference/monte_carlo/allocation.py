@@ -27,21 +27,10 @@ def allocated(
 ) -> NDArray[np.uint32]:
     """Return how many samples each pixel gets.
 
-    Parameters
-    ----------
-    pilot
-        Batches of the same estimator with other seeds, two at least.
-    samples
-        Samples a pixel, on the average.
-    shape
-        Height and width of the image.
-    masks
-        By layer the pixels that are compared, (height, width); the others get the equal share alone.
-
-    Returns
-    -------
-    array
-        Samples of every pixel [1], (layers, pixels), at least 1; their mean is `samples` up to rounding.
+    `pilot`: batches of the same estimator with other seeds, two at least; `samples`: samples a pixel, on the average;
+    `shape`: height and width of the image; `masks`: by layer the pixels that are compared, (height, width); the others
+    get the equal share alone. Returns samples of every pixel [1], (layers, pixels), at least 1; their mean is `samples`
+    up to rounding.
     """
     counts = []
     for number, layer in enumerate(LAYERS):

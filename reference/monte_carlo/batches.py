@@ -41,10 +41,7 @@ class Batches:
 def check_samples(samples: int) -> None:
     """Check the number of samples a pixel of a batch.
 
-    Raises
-    ------
-    ValueError
-        For none, or for more than a batch can add up, `LARGEST_BATCH`.
+    Raises ValueError for none, or for more than a batch can add up, `LARGEST_BATCH`.
     """
     if not 1 <= samples <= LARGEST_BATCH:
         raise ValueError(f"samples: got {samples}, wanted 1 to {LARGEST_BATCH}")
@@ -53,21 +50,9 @@ def check_samples(samples: int) -> None:
 def single_batch(seed: int, samples: int, mean: Array, *, layers: tuple[str, ...] = LAYERS) -> Batches:
     """Return one batch, given its radiance of every pixel, (layers, pixels, 3).
 
-    Parameters
-    ----------
-    seed
-        Of the batch.
-    samples
-        Samples a pixel in it.
-    mean
-        Its radiance of every pixel, (layers, pixels, 3) [W/(m^2 sr)].
-    layers
-        Their names.
-
-    Raises
-    ------
-    InputError
-        For radiance that is not finite: no mean and no standard error would follow from it.
+    `seed`: of the batch; `samples`: samples a pixel in it; `mean`: its radiance of every pixel, (layers, pixels, 3)
+    [W/(m^2 sr)]; `layers`: their names. Raises InputError for radiance that is not finite: no mean and no standard
+    error would follow from it.
     """
     wrong = ~np.isfinite(mean).all(axis=(0, 2))
     if wrong.any():
@@ -82,10 +67,7 @@ def single_batch(seed: int, samples: int, mean: Array, *, layers: tuple[str, ...
 def merged(first: Batches, second: Batches) -> Batches:
     """Add up two sets of batches of the same pixels.
 
-    Raises
-    ------
-    ValueError
-        For batches with other samples a pixel, or with a seed that both hold.
+    Raises ValueError for batches with other samples a pixel, or with a seed that both hold.
     """
     if first.samples != second.samples or set(first.seeds) & set(second.seeds):
         raise ValueError("batches to merge need the same samples a pixel and different seeds")
@@ -107,16 +89,9 @@ def combined_moments(first: tuple[int, Array, Array], second: tuple[int, Array, 
 
     The squares are those within each set and those between their means (Chan, Golub and LeVeque 1983, eq. 2.1).
 
-    Parameters
-    ----------
-    first, second
-        Of each set: how many numbers there are, their mean, and the sum of their squared deviations from it. The
-        arrays have one shape; the mean is in any unit, here [W/(m^2 sr)], the squares in its square.
-
-    Returns
-    -------
-    mean, squares
-        Of all numbers, in the same shape and units.
+    `first`, `second`: of each set: how many numbers there are, their mean, and the sum of their squared deviations from
+    it. The arrays have one shape; the mean is in any unit, here [W/(m^2 sr)], the squares in its square. Returns
+    `mean`, `squares`: of all numbers, in the same shape and units.
     """
     (n, mean, squares), (m, other_mean, other_squares) = first, second
     difference = other_mean - mean
@@ -137,10 +112,7 @@ def seed_ranges(seeds: Iterable[int]) -> str:
 def parse_seed_ranges(words: str) -> tuple[int, ...]:
     """Return the seeds that `seed_ranges` named, ascending.
 
-    Raises
-    ------
-    ValueError
-        If the words name no seeds, the same one twice, or one that no batch has.
+    Raises ValueError if the words name no seeds, the same one twice, or one that no batch has.
     """
     seeds: list[int] = []
     for part in words.split(","):

@@ -53,18 +53,9 @@ class Panels:
 def first_panels(start: Array, width: Array, widest: float) -> tuple[Index, Array, Array]:
     """Cut pieces into equal panels no wider than `widest`.
 
-    Parameters
-    ----------
-    start, width
-        Where the pieces begin and how wide they are, (pieces,), in the variable of the integral: w [1] or x [m], see
-        `Panels`.
-    widest
-        In the same unit, above 0.
-
-    Returns
-    -------
-    piece, start, width
-        Of every panel: the number of its piece, where it begins, and how wide it is, (panels,) each.
+    `start`, `width`: where the pieces begin and how wide they are, (pieces,), in the variable of the integral: w [1] or
+    x [m], see `Panels`; `widest`: in the same unit, above 0. Returns `piece`, `start`, `width`: of every panel: the
+    number of its piece, where it begins, and how wide it is, (panels,) each.
     """
     count = np.maximum(np.ceil(width / widest), 1).astype(np.int64)
     piece = np.repeat(np.arange(len(count)), count)
@@ -84,16 +75,9 @@ class Integrand(Protocol):
     def __call__(self, rows: Index, x: Array, inside: Array, r: Array, scatter: Array) -> tuple[Array, Array]:
         """Return values and optical depths of nodes, (m, nodes, columns) each.
 
-        Parameters
-        ----------
-        rows
-            The pieces, (m,).
-        x, inside
-            Distances from the camera, and from where the pieces begin, (m, nodes) [m].
-        r
-            Distances to the lights, infinite for directions, (m, nodes) [m].
-        scatter
-            Cosines of the scattering angle, (m, nodes).
+        `rows`: the pieces, (m,); `x`, `inside`: distances from the camera, and from where the pieces begin, (m, nodes)
+        [m]; `r`: distances to the lights, infinite for directions, (m, nodes) [m]; `scatter`: cosines of the scattering
+        angle, (m, nodes).
         """
 
 
@@ -110,21 +94,10 @@ def sum_pieces(
 ) -> tuple[Array, Array]:
     """Integrate smooth pieces of a block of rays and add up those of each ray, for lights of strength 1.
 
-    Parameters
-    ----------
-    rays, pieces
-        All rays, in their planes with the lights, and the pieces of those of the block.
-    integrand
-        What the medium scatters along the pieces.
-    block
-        Of rays.
-    profile, edge, rounding, rtol
-        See `reference.quadrature.fields.Field`; the uncertainties are by ray.
-
-    Returns
-    -------
-    value, error
-        And a bound of it, (rays of the block, 3) each; infinite where a ray meets a light in a medium that scatters.
+    `rays`, `pieces`: all rays, in their planes with the lights, and the pieces of those of the block; `integrand`: what
+    the medium scatters along the pieces; `block`: of rays; `profile`, `edge`, `rounding`, `rtol`: see
+    `reference.quadrature.fields.Field`; the uncertainties are by ray. Returns the value and a bound of
+    its error, (rays of the block, 3) each; infinite where a ray meets a light in a medium that scatters.
     """
     work = _Sum(rays, pieces, integrand, profile)
     owner, count = pieces.ray - block.start, len(rays.foot[block])
@@ -221,24 +194,9 @@ def _sum_panels(
 ) -> tuple[Array, Array]:
     """Halve panels until all rays meet the tolerance, or only rounding is left, and add up those of each ray.
 
-    Parameters
-    ----------
-    first
-        From `first_panels`.
-    evaluate
-        (pieces, starts, widths) -> panels.
-    owner
-        The ray of each piece, from 0 on.
-    count
-        Number of rays.
-    rtol
-        Relative tolerance of the sum of each ray [1].
-
-    Returns
-    -------
-    value, error
-        The integral of each ray and a bound of its error, (count, 3) each, in the unit of the panels' values, [1/m^2]
-        or [1].
+    `first`: from `first_panels`; `evaluate`: (pieces, starts, widths) -> panels; `owner`: the ray of each piece, from 0
+    on; `count`: number of rays; `rtol`: relative tolerance of the sum of each ray [1]. Returns `value`, `error`: the
+    integral of each ray and a bound of its error, (count, 3) each, in the unit of the panels' values, [1/m^2] or [1].
     """
     panels = evaluate(*first)
     for _ in range(_HALVINGS):

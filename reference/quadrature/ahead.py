@@ -18,19 +18,9 @@ Result = TypeVar("Result")
 def done_ahead(work: Callable[[Task], Result], tasks: Iterable[Task], *, workers: int) -> Iterator[Result]:
     """Yield the results of some work in the order of its tasks, while threads do those that follow.
 
-    Parameters
-    ----------
-    work
-        A function of one task that calls NumPy alone.
-    tasks
-        In order; they are made by the caller's thread.
-    workers
-        Threads; as many results and one more are kept at once.
-
-    Raises
-    ------
-    Exception
-        What the work raises, when its result is due; the tasks behind it are not begun.
+    `work`: a function of one task that calls NumPy alone; `tasks`: in order; they are made by the caller's thread;
+    `workers`: threads; as many results and one more are kept at once. Raises what the work raises, when its
+    result is due; the tasks behind it are not begun.
     """
     remaining = iter(tasks)
     with ThreadPoolExecutor(max(1, workers)) as pool:

@@ -93,20 +93,10 @@ def area_airlight(
 ) -> AreaAirlight:
     """Compute the airlight of all area lights along every ray.
 
-    Parameters
-    ----------
-    truth, beams
-        The scene, and its lights from `beams_of`.
-    known
-        The airlight of all other lights, to which errors are relative too, (rays, 3) [W/(m^2 sr)].
-    plan
-        How many samples.
-    shadow_scale
-        See `reference.quadrature.image.quadrature_image`.
-    tell
-        Called with the share of the work that is done.
-    keep
-        Called with the name of each part of the work and a function that does it; may return what it did before.
+    `truth`, `beams`: the scene, and its lights from `beams_of`; `known`: the airlight of all other lights, to which
+    errors are relative too, (rays, 3) [W/(m^2 sr)]; `plan`: how many samples; `shadow_scale`: see
+    `reference.quadrature.image.quadrature_image`; `tell`: called with the share of the work that is done; `keep`:
+    called with the name of each part of the work and a function that does it; may return what it did before.
     """
     count = len(truth.direction)
     bound, checks = np.zeros((count, 3)), list[RandomChecks]()
@@ -188,14 +178,9 @@ def area_surface(
 ) -> Array:
     """Return the radiance of surfaces lit by area lights, by replicate, (rays, 3, replicates) [W/(m^2 sr)].
 
-    Parameters
-    ----------
-    truth, hits, beams
-        The scene, what its rays hit, and its lights from `beams_of`.
-    known
-        The radiance that all other lights give, to which errors are relative too, (rays, 3) [W/(m^2 sr)].
-    plan, shadow_scale, tell, keep
-        As in `area_airlight`.
+    `truth`, `hits`, `beams`: the scene, what its rays hit, and its lights from `beams_of`; `known`: the radiance that
+    all other lights give, to which errors are relative too, (rays, 3) [W/(m^2 sr)]; `plan`, `shadow_scale`, `tell`,
+    `keep`: as in `area_airlight`.
     """
     result = np.zeros((len(hits.distance), 3, REPLICATES))
     rows = np.flatnonzero(np.isfinite(hits.distance))
@@ -269,16 +254,9 @@ def seen_samples(
 ) -> tuple[Index, Array, Array]:
     """Return which sections are seen, a sample of what is seen of each, and its solid angle; see `Sections.drawn`.
 
-    Parameters
-    ----------
-    sections
-        The sections.
-    eye
-        Where each is looked at from, in front of the surface point, (n, 3) [m].
-    known, of
-        What can stand between, and the number of the ray to the surface point in it, (n,).
-    uniform
-        Numbers from 0 to 1, (n,).
+    `sections`: the sections; `eye`: where each is looked at from, in front of the surface point, (n, 3) [m]; `known`,
+    `of`: what can stand between, and the number of the ray to the surface point in it, (n,); `uniform`: numbers from 0
+    to 1, (n,).
     """
     length = np.linalg.norm(sections.way, axis=1)
     rays = rays_at(sections.start, sections.way / np.maximum(length, np.finfo(float).tiny)[:, None], eye)

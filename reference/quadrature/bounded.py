@@ -99,27 +99,13 @@ def sum_media(
 ) -> tuple[Array, Array]:
     """Integrate lit stretches through the media that they pass and add up those of each ray, for a light of strength 1.
 
-    Parameters
-    ----------
-    truth, rays, stretches
-        The scene, the rays in their planes with lights, and lit stretches of them.
-    segments
-        From `reference.quadrature.segments.camera_segments`.
-    profile
-        Of the lights; None: they are isotropic.
-    shadow_scale
-        Share of the shadow segment that is attenuated over, from the scattering point on.
-    edge
-        Uncertainty of the ends of stretches: relative to their distance from the light, or a length by ray [m].
-    rounding
-        Of the places of kinks, by ray [m]; it matters where a facet lies along a directional light.
-    rtol
-        Relative tolerance of the sum of each ray [1].
-
-    Returns
-    -------
-    airlight, bound
-        And a bound of its error, (rays, 3) each; infinite where a ray meets the light inside a medium that scatters.
+    `truth`, `rays`, `stretches`: the scene, the rays in their planes with lights, and lit stretches of them;
+    `segments`: from `reference.quadrature.segments.camera_segments`; `profile`: of the lights; None: they are
+    isotropic; `shadow_scale`: share of the shadow segment that is attenuated over, from the scattering point on;
+    `edge`: uncertainty of the ends of stretches: relative to their distance from the light, or a length by ray [m];
+    `rounding`: of the places of kinks, by ray [m]; it matters where a facet lies along a directional light; `rtol`:
+    relative tolerance of the sum of each ray [1]. Returns the airlight and a bound of its error, (rays, 3)
+    each; infinite where a ray meets the light inside a medium that scatters.
     """
     count = len(rays.foot)
     total, bound = np.zeros((count, 3)), np.zeros((count, 3))
@@ -142,10 +128,8 @@ def smooth_pieces(
 ) -> tuple[Pieces, list[Kinks]]:
     """Cut lit stretches at the bounds of media and at the kinks of shadow segments and of phase functions.
 
-    Returns
-    -------
-    pieces, kinks
-        And the rays and distances of the kinks of the shadow segments through each of the bounded media.
+    Returns the pieces, and rays and distances of the kinks of the shadow segments through each of the
+    bounded media.
     """
     used = np.unique(stretches[0])
     found = []

@@ -23,15 +23,8 @@ def emitted_light(truth: TruthScene, distance: Array) -> Array:
 
     In W/(m^2 sr), (rays, 3).
 
-    Parameters
-    ----------
-    truth
-        The scene.
-    distance
-        To the visible surface, (rays,), infinite where there is none [m].
+    `truth`: the scene; `distance`: to the visible surface, (rays,), infinite where there is none [m].
 
-    Notes
-    -----
     Valid for the side that emits; a light of material `null` is seen with what is behind it, a black one ends the ray.
     """
     total = np.zeros((len(distance), 3))

@@ -54,24 +54,12 @@ class Field(Protocol):
     ) -> tuple[Array, Array]:
         """Return the airlight of each ray from its lit stretches, and a bound of its error, (rays, 3) each.
 
-        Parameters
-        ----------
-        rays
-            In their planes with lights of strength 1: places if `rays.w` is 1 [1/m^2], else directions [1/sr].
-        stretches
-            Rays, and distances of both ends; the second may be infinite [m].
-        distance
-            Of each ray to the visible surface [m].
-        profile
-            Of lights at places; None: they are isotropic.
-        shadow_scale
-            Fraction of the shadow segment to a place that is attenuated over, from the scattering point on.
-        edge
-            Uncertainty of the ends of stretches: relative to their distance from a place, or by ray a length [m].
-        rounding
-            Of the places of kinks, by ray [m].
-        rtol
-            Relative tolerance of a sum; the field's own by default.
+        `rays`: in their planes with lights of strength 1: places if `rays.w` is 1 [1/m^2], else directions [1/sr];
+        `stretches`: rays, and distances of both ends; the second may be infinite [m]; `distance`: of each ray to the
+        visible surface [m]; `profile`: of lights at places; None: they are isotropic; `shadow_scale`: fraction of the
+        shadow segment to a place that is attenuated over, from the scattering point on; `edge`: uncertainty of the ends
+        of stretches: relative to their distance from a place, or by ray a length [m]; `rounding`: of the places of
+        kinks, by ray [m]; `rtol`: relative tolerance of a sum; the field's own by default.
         """
 
 

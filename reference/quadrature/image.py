@@ -52,41 +52,18 @@ def quadrature_image(
 ) -> TruthImage:
     """Compute the truth of an image.
 
-    Parameters
-    ----------
-    truth
-        The scene.
-    checks
-        Random shadow rays to each ray and light, which check the lit intervals.
-    shadow_scale
-        Attenuate over this share [1] of each shadow segment: 1 is the truth, 1 - epsilon what a renderer with a
-        shadow-ray epsilon converges to (DESIGN section 6.1). Such a renderer also starts its shadow rays off the
-        surface, and so do those for `surface` then (`reference.visibility.certificate.reached_by_shadow_rays`).
-    pixel
-        "centre": the radiance along the ray through the centre. "area": the mean over the pixel.
-    tolerance
-        Of a mean over a pixel: the standard error over value [1] for which positions are chosen, up to 128 in each
-        replicate. `airlight_se` and `surface_se` say what was reached.
-    progress
-        Called with (done, total, what) as the work goes on.
-    plan
-        How many samples stand for area lights, along rays through pixel centres.
-    keep
-        Called with the name of each part of that work and a function that does it: it may keep what it returns, and
-        give it back when the same image is computed again. Not for means over pixels.
+    `truth`: the scene; `checks`: random shadow rays to each ray and light, which check the lit intervals;
+    `shadow_scale`: attenuate over this share [1] of each shadow segment: 1 is the truth, 1 - epsilon what a renderer
+    with a shadow-ray epsilon converges to (DESIGN section 6.1). Such a renderer also starts its shadow rays off the
+    surface, and so do those for `surface` then (`reference.visibility.certificate.reached_by_shadow_rays`). `pixel`:
+    "centre": the radiance along the ray through the centre. "area": the mean over the pixel. `tolerance`: of a mean
+    over a pixel: the standard error over value [1] for which positions are chosen, up to 128 in each replicate.
+    `airlight_se` and `surface_se` say what was reached. `progress`: called with (done, total, what) as the work goes
+    on; `plan`: how many samples stand for area lights, along rays through pixel centres; `keep`: called with the name
+    of each part of that work and a function that does it: it may keep what it returns, and give it back when the same
+    image is computed again. Not for means over pixels. Returns TruthImage: radiances, (height, width, 3) [W/(m^2 sr)],
+    and what is known of their errors. Raises InputError for another word in `pixel`.
 
-    Returns
-    -------
-    TruthImage
-        Radiances, (height, width, 3) [W/(m^2 sr)], and what is known of their errors.
-
-    Raises
-    ------
-    InputError
-        For another word in `pixel`.
-
-    Notes
-    -----
     Valid for homogeneous media, point and spot lights, area lights, opaque surfaces; for directional lights where all
     media have bounds. Their shadow segments have no end, so `shadow_scale` leaves them as they are. A pixel whose
     centre ray meets a point light has an infinite airlight; the mean over its area is finite.

@@ -50,16 +50,8 @@ def light_airlight(
 ) -> LightAirlight:
     """Compute the airlight of one point or spot light along every ray.
 
-    Parameters
-    ----------
-    truth, light
-        The scene and one of its lights.
-    distance
-        To the visible surface, (rays,), infinite where there is none [m].
-    shadow_scale
-        See `reference.quadrature.image.quadrature_image`.
-    how
-        See `lit_rays`.
+    `truth`, `light`: the scene and one of its lights; `distance`: to the visible surface, (rays,), infinite where there
+    is none [m]; `shadow_scale`: see `reference.quadrature.image.quadrature_image`; `how`: see `lit_rays`.
     """
     found = lit_rays(truth, light, distance, **how)
     rays, lit = found.rays, found.lit
@@ -85,14 +77,8 @@ def lit_rays(
 ) -> LitRays:
     """Return which parts of the rays a point or spot light reaches.
 
-    Parameters
-    ----------
-    truth, light, distance
-        See `light_airlight`.
-    shapes
-        What `reference.scene.shapes.read_shapes` returned, if known.
-    checks
-        Random shadow rays to each ray.
+    `truth`, `light`, `distance`: see `light_airlight`; `shapes`: what `reference.scene.shapes.read_shapes` returned, if
+    known; `checks`: random shadow rays to each ray.
     """
     rays = rays_at(truth.origin, truth.direction, light.position)
     cone = cone_interval(rays, light, light.cutoff)

@@ -21,17 +21,8 @@ Array = NDArray[np.float64]
 def light_points(light: TruthAreaLight, square: Array) -> Sequence[TruthLight]:
     """Return the points of a light as lights whose mean is the light.
 
-    Parameters
-    ----------
-    light
-        The light.
-    square
-        Points of the unit square, (n, 2) [1].
-
-    Returns
-    -------
-    sequence of TruthLight
-        Each with the intensity radiance times the whole area [W/sr].
+    `light`: the light; `square`: points of the unit square, (n, 2) [1]. Returns each with the intensity radiance times
+    the whole area [W/sr].
     """
     if light.kind == "sphere":
         height, azimuth = 1 - 2 * square[:, 0], 2 * np.pi * square[:, 1]

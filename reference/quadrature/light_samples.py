@@ -85,12 +85,8 @@ class Sections:
     def drawn(self, lit: LitIntervals, uniform: Array) -> tuple[Index, Array, Array]:
         """Return which sections are seen at all, a point of what is seen of each, and the solid angle of that [sr].
 
-        Parameters
-        ----------
-        lit
-            What is seen of each section, in shares of its length.
-        uniform
-            Numbers from 0 to 1, (n,), by which points are drawn.
+        `lit`: what is seen of each section, in shares of its length; `uniform`: numbers from 0 to 1, (n,), by which
+        points are drawn.
         """
         every, count = np.arange(len(self.weight)), len(self.weight)
         first, last = (self._cosine(every, np.full(count, end)) for end in (0.0, 1.0))
@@ -159,14 +155,8 @@ def samples_for_rays(
 ) -> LightSamples:
     """Return samples of a light for the airlight of rays.
 
-    Parameters
-    ----------
-    light
-        The light.
-    origin, direction, distance
-        Of the rays: where they start, (3,) [m], unit vectors, (rays, 3), and how far they go, (rays,) [m].
-    square
-        Points of the unit square, (samples, 2) [1], the same for all rays.
+    `light`: the light; `origin`, `direction`, `distance`: of the rays: where they start, (3,) [m], unit vectors, (rays,
+    3), and how far they go, (rays,) [m]; `square`: points of the unit square, (samples, 2) [1], the same for all rays.
     """
     axes = _axes(origin, direction, light.centre)
     if light.kind == "sphere":
@@ -187,18 +177,10 @@ def samples_for_rays(
 def sections_for_points(light: TruthAreaLight, place: Array, square: Array, turn: float = 0.0) -> Sections:
     """Return sections of a light for surface points that lie before it, point by point, even in the solid angle.
 
-    Parameters
-    ----------
-    light
-        The light.
-    place
-        The points, (points, 3) [m].
-    square
-        Points of the unit square, (samples, 2) [1], the same for all surface points. Of flat lights the second number
-        is left for the place in what is seen of a section.
-    turn
-        By what angle the axis is turned about the way to the light [rad]. An edge of a shadow along the sections takes
-        or leaves each of them whole, so replicates have angles of their own.
+    `light`: the light; `place`: the points, (points, 3) [m]; `square`: points of the unit square, (samples, 2) [1], the
+    same for all surface points. Of flat lights the second number is left for the place in what is seen of a section.
+    `turn`: by what angle the axis is turned about the way to the light [rad]. An edge of a shadow along the sections
+    takes or leaves each of them whole, so replicates have angles of their own.
     """
     way = light.centre - place
     if light.kind == "sphere":
@@ -292,12 +274,7 @@ class _Fan:
     def drawn(self, uniform: Array, length) -> tuple[Array, Array]:
         """Return azimuths, of a polygon by the length of the sections, (rows, k), and one over their density.
 
-        Parameters
-        ----------
-        uniform
-            Numbers from 0 to 1, (k,), or (rows, k).
-        length
-            (z0, h0, z1, h1) -> what the density is to follow.
+        `uniform`: numbers from 0 to 1, (k,), or (rows, k); `length`: (z0, h0, z1, h1) -> what the density is to follow.
         """
         if self.corners is None:
             spread = _spread(self.axes.height, self.radius, self.normal[:, 1:])

@@ -53,14 +53,8 @@ class Pieces:
 def cut_pieces(truth: TruthScene, rays: Rays, segments: Segments, lit: Stretches, kinks: Kinks) -> Pieces:
     """Cut lit stretches at the bounds of media and at every kink of the integrand.
 
-    Parameters
-    ----------
-    truth, rays, segments
-        The scene, the rays, and the media along them.
-    lit
-        Rays, (stretches,), and distances of both ends, (stretches,) each [m].
-    kinks
-        Rays and distances of the kinks, (kinks,) each [m], in any order.
+    `truth`, `rays`, `segments`: the scene, the rays, and the media along them; `lit`: rays, (stretches,), and distances
+    of both ends, (stretches,) each [m]; `kinks`: rays and distances of the kinks, (kinks,) each [m], in any order.
     """
     parts = _parts(truth, rays, segments, *lit)
     if not len(parts.ray):  # of a batch of rays none is lit within the media

@@ -94,19 +94,10 @@ def ray_values(
 ) -> RayValues:
     """Compute airlight, lit surface, distances and lit intervals of every ray of `truth.direction`.
 
-    Parameters
-    ----------
-    truth
-        The scene, with any rays.
-    checks, shadow_scale, progress, plan, keep
-        See `reference.quadrature.image.quadrature_image`.
-    shapes
-        What `reference.scene.shapes.read_shapes` returned for the occluders, if that is known.
-
-    Returns
-    -------
-    RayValues
-        Radiances, (rays, 3) [W/(m^2 sr)], distances, (rays,) [m], and how the lit intervals were checked.
+    `truth`: the scene, with any rays; `checks`, `shadow_scale`, `progress`, `plan`, `keep`: see
+    `reference.quadrature.image.quadrature_image`; `shapes`: what `reference.scene.shapes.read_shapes` returned for the
+    occluders, if that is known. Returns RayValues: radiances, (rays, 3) [W/(m^2 sr)], distances, (rays,) [m], and how
+    the lit intervals were checked.
     """
     shapes = read_shapes(truth.occluders) if shapes is None else shapes
     hits = surface_hits(truth)

@@ -74,14 +74,7 @@ class PointPlan:
 def square_points(plan: PointPlan, number: int, replicate: int, kind: str) -> Array:
     """Return the points of the unit square of a replicate of a light, (plan.most, 2) [1].
 
-    Parameters
-    ----------
-    plan
-        How many, and the seed.
-    number, kind
-        Of the light.
-    replicate
-        Number of the replicate.
+    `plan`: how many, and the seed; `number`, `kind`: of the light; `replicate`: number of the replicate.
     """
     generator = np.random.default_rng((plan.seed, number, replicate))
     if kind == "sphere":
@@ -114,18 +107,10 @@ Sums = Callable[[str, PointPlan, Index, Range], Array]
 def replicate_means(rays: int, known: Array, plan: PointPlan, sums: Sums) -> tuple[Array, Index]:
     """Return the means of every ray and replicate, (rays, columns, replicates), and of how many points, (rays,).
 
-    Parameters
-    ----------
-    rays
-        How many.
-    known
-        What else they receive, to which errors are relative too, (rays, columns).
-    plan
-        The error to reach, and how many points a ray has.
-    sums
-        Called with `PILOT`, or an empty name for what counts, the plan with its seed, the numbers of some rays, and the
-        range of the numbers of points; returns what these give in each replicate, added up, (rays, columns,
-        replicates).
+    `rays`: how many; `known`: what else they receive, to which errors are relative too, (rays, columns); `plan`: the
+    error to reach, and how many points a ray has; `sums`: called with `PILOT`, or an empty name for what counts, the
+    plan with its seed, the numbers of some rays, and the range of the numbers of points; returns what these give in
+    each replicate, added up, (rays, columns, replicates).
     """
     counts = np.full(rays, plan.most)
     if plan.error > 0 and plan.first < plan.most:

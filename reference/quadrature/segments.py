@@ -44,24 +44,10 @@ class Segments:
 def depth_through_media(truth: TruthScene, origin: Array, direction: Array, low: Array, high: Array) -> Array:
     """Return the optical depth of parts of rays where all media are homogeneous.
 
-    Parameters
-    ----------
-    truth
-        The scene.
-    origin
-        (n, 3), or (3,) for one that all share [m].
-    direction
-        Unit vectors, (n, 3).
-    low, high
-        Distances of the ends from the origin, (n,), finite [m].
+    `truth`: the scene; `origin`: (n, 3), or (3,) for one that all share [m]; `direction`: unit vectors, (n, 3); `low`,
+    `high`: distances of the ends from the origin, (n,), finite [m]. Returns `tau`: optical depth of each channel, (n,
+    3), 0 where high <= low.
 
-    Returns
-    -------
-    tau
-        Optical depth of each channel, (n, 3), 0 where high <= low.
-
-    Notes
-    -----
     Valid for any points, inside or outside of the media.
     """
     total = np.maximum(high - low, 0.0)[:, None] * truth.medium.sigma_t
@@ -103,17 +89,8 @@ def scattering_range(segments: Segments) -> tuple[Array, Array]:
 def shadow_kinks(bounds: Bounds, rays: Rays) -> tuple[Index, Array]:
     """Return where on rays the shadow segment has kinks: where it passes a corner of a body or touches it.
 
-    Parameters
-    ----------
-    bounds
-        The body.
-    rays
-        The rays in their planes with lights.
-
-    Returns
-    -------
-    ray, x
-        Number of the ray and distance of each kink [m], in no particular order.
+    `bounds`: the body; `rays`: the rays in their planes with lights. Returns `ray`, `x`: number of the ray and distance
+    of each kink [m], in no particular order.
     """
     if isinstance(bounds, Sphere):
         find, step = partial(_tangents, bounds), _BLOCK

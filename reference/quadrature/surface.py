@@ -67,15 +67,8 @@ def lit_surface(
 
     In W/(m^2 sr), (pixels, 3).
 
-    Parameters
-    ----------
-    truth, hits
-        The scene and what its rays hit.
-    reached
-        By light, the directional ones last, whether it reaches the surface at the end of each ray, as its lit intervals
-        say.
-    shadow_scale
-        See `reference.quadrature.ray_values`.
+    `truth`, `hits`: the scene and what its rays hit; `reached`: by light, the directional ones last, whether it reaches
+    the surface at the end of each ray, as its lit intervals say; `shadow_scale`: see `reference.quadrature.ray_values`.
     """
     interaction = hits.interaction
     total = np.zeros((len(hits.distance), 3))

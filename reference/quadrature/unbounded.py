@@ -91,19 +91,8 @@ def _edge_worth(plane: tuple[Array, Array], ends: tuple[Array, Array], sigma_t: 
 def sums_of(owner: Index, values: Array, count: int) -> Array:
     """Add up the rows that belong to each owner.
 
-    Parameters
-    ----------
-    owner
-        Of each row, from 0 on, (n,).
-    values
-        (n, columns), in any unit, such as [1/m].
-    count
-        Number of owners.
-
-    Returns
-    -------
-    numpy.ndarray
-        (count, columns), in the unit of the values.
+    `owner`: of each row, from 0 on, (n,); `values`: (n, columns), in any unit, such as [1/m]; `count`: number of
+    owners. Returns (count, columns), in the unit of the values.
     """
     return np.stack([np.bincount(owner, column, count) for column in values.T], axis=1)
 
@@ -130,10 +119,7 @@ def cosine_profile(rays: Rays, normal: Array) -> Profile:
 def lit_stretches(light: TruthLight, rays: Rays, lit: LitIntervals) -> Stretches:
     """Return lit intervals, cut at the cone of full intensity, where the profile of a soft spot has its kinks.
 
-    Parameters
-    ----------
-    light, rays, lit
-        A point or spot light, the rays in their planes with it, and their lit intervals.
+    `light`, `rays`, `lit`: a point or spot light, the rays in their planes with it, and their lit intervals.
     """
     ray, low, high = lit.ray, np.maximum(lit.low, 0.0), lit.high
     if not light.is_soft or light.cosine:

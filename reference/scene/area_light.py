@@ -74,18 +74,9 @@ def is_area(emitter: Any) -> bool:
 def read_area_light(emitter: Any, camera: Array) -> TruthAreaLight:
     """Read an area light.
 
-    Parameters
-    ----------
-    emitter
-        Mitsuba's.
-    camera
-        Position of the camera [m], (3,).
-
-    Raises
-    ------
-    InputError
-        By the name of the shape: for other shapes, textures, shapes without area or with different scales, a sphere
-        that is inside out or holds the camera, and a light that bounds a medium.
+    `emitter`: Mitsuba's; `camera`: position of the camera [m], (3,). Raises InputError by the name of the shape: for
+    other shapes, textures, shapes without area or with different scales, a sphere that is inside out or holds the
+    camera, and a light that bounds a medium.
     """
     shape = emitter.get_shape()
     kind = _KINDS.get(shape.class_name())

@@ -16,17 +16,9 @@ Array = NDArray[np.float64]
 def film_directions(sensor, positions: Array, size: tuple[int, int]) -> Array:
     """Return the unit directions through positions on the film, (n, 3) [1].
 
-    Parameters
-    ----------
-    sensor
-        A perspective sensor of Mitsuba.
-    positions
-        Columns and rows from the upper left corner, (n, 2) [pixels]: pixel centres end in one half.
-    size
-        Width and height of the film [pixels].
+    `sensor`: a perspective sensor of Mitsuba; `positions`: columns and rows from the upper left corner, (n, 2)
+    [pixels]: pixel centres end in one half; `size`: width and height of the film [pixels].
 
-    Notes
-    -----
     Valid for positions outside of the film too.
     """
     width, height = size

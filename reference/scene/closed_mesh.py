@@ -23,10 +23,7 @@ Index = NDArray[np.int64]
 def check_closed(shape: Any) -> None:
     """Check that the surface of a shape is closed and faces outwards.
 
-    Raises
-    ------
-    InputError
-        By the name of the shape, with an edge that is in the way.
+    Raises InputError by the name of the shape, with an edge that is in the way.
     """
     if shape.class_name() == "Sphere":
         if shape.has_flipped_normals():
@@ -56,10 +53,7 @@ def check_closed(shape: Any) -> None:
 def check_apart(shapes: list[Any]) -> None:
     """Check that closed surfaces cross neither themselves nor one another, and that none lies within another.
 
-    Raises
-    ------
-    InputError
-        By the names of the shapes, with an edge that goes through a face.
+    Raises InputError by the names of the shapes, with an edge that goes through a face.
     """
     scene = scene_from(shapes)
     for number, shape in enumerate(shapes):

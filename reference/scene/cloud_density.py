@@ -35,17 +35,9 @@ class CloudDensity:
     def along(self, origin: Array, way: Array, begin: Array, length: Array) -> Array:
         """Return the integral of the density over stretches of rays [m].
 
-        Parameters
-        ----------
-        origin
-            Where all rays start, (3,) [m].
-        way
-            Unit directions, (n, 3).
-        begin, length
-            Where stretches begin, and how long they are, (n,) [m].
+        `origin`: where all rays start, (3,) [m]; `way`: unit directions, (n, 3); `begin`, `length`: where stretches
+        begin, and how long they are, (n,) [m].
 
-        Notes
-        -----
         The midpoint rule with steps of an eighth of a voxel; Mitsuba's values are in float32.
         """
         if not len(way):
@@ -66,10 +58,8 @@ class CloudDensity:
 def read_cloud_density(shape: Any, name: str) -> CloudDensity:
     """Return the density within a shape; messages call its medium by `name`.
 
-    Raises
-    ------
-    InputError
-        For an extinction that is no grid of one channel with finite values of 0 or more, not all 0, around the shape.
+    Raises InputError for an extinction that is no grid of one channel with finite values of 0 or more, not all 0,
+    around the shape.
     """
     medium = shape.interior_medium()
     parameters = mi.traverse(medium)

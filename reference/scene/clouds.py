@@ -59,10 +59,7 @@ class CloudScene:
 def read_clouds(scene) -> CloudScene:
     """Read a scene of clouds of the current RGB variant.
 
-    Raises
-    ------
-    InputError
-        For a scene without clouds, sun or sky, or with what has no place among them, by its name.
+    Raises InputError for a scene without clouds, sun or sky, or with what has no place among them, by its name.
     """
     if not scene.sensors():
         raise InputError("the scene has no camera; wanted a sensor of type 'perspective'")

@@ -50,10 +50,8 @@ Bounds = Polyhedron | Sphere
 def read_bounds(shape: Any) -> Bounds:
     """Read the bounds of a medium from a shape.
 
-    Raises
-    ------
-    InputError
-        For a shape that is neither a sphere nor a closed convex mesh whose normals point outwards, by its name.
+    Raises InputError for a shape that is neither a sphere nor a closed convex mesh whose normals point outwards, by its
+    name.
     """
     parameters = mi.traverse(shape)
     if shape.class_name() == "Sphere":

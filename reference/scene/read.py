@@ -97,10 +97,7 @@ class TruthScene:
 def read_truth(scene) -> TruthScene:
     """Read a Mitsuba scene of the current RGB variant.
 
-    Raises
-    ------
-    InputError
-        For a scene whose truth cannot be computed, with the name of what is in the way.
+    Raises InputError for a scene whose truth cannot be computed, with the name of what is in the way.
     """
     if not scene.sensors():
         raise InputError("the scene has no camera; wanted a sensor of type 'perspective'")
@@ -147,10 +144,7 @@ def read_truth(scene) -> TruthScene:
 def homogeneous_around(truth: TruthScene) -> TruthMedium:
     """Return the medium without bounds, where it has one extinction.
 
-    Raises
-    ------
-    InputError
-        For height fog.
+    Raises InputError for height fog.
     """
     if isinstance(truth.medium, HeightMedium):
         raise InputError(NO_EXTINCTION)

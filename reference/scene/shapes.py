@@ -49,10 +49,7 @@ class Shapes:
 def read_shapes(scene) -> Shapes:
     """Read the shapes of a Mitsuba scene, all of them opaque.
 
-    Raises
-    ------
-    InputError
-        For a shape that is neither a mesh nor a rectangle, a sphere or a disk, with its name.
+    Raises InputError for a shape that is neither a mesh nor a rectangle, a sphere or a disk, with its name.
     """
     single = tuple((shape, _read(shape)) for shape in scene.shapes())
     triangles = [part for _, part in single if isinstance(part, np.ndarray)]

@@ -56,10 +56,7 @@ def cache_folder() -> Path:
 def cache_limit() -> int:
     """Return how large the cache may become [bytes]: `AIRLIGHT_CACHE_SIZE`, or `DEFAULT_LIMIT`.
 
-    Raises
-    ------
-    InputError
-        If the variable holds no size.
+    Raises InputError if the variable holds no size.
     """
     text = os.environ.get("AIRLIGHT_CACHE_SIZE", "").strip()
     if not text:

@@ -34,20 +34,8 @@ def ensure_folder(path: str | os.PathLike[str]) -> Path:
     Call this before any work is done: it costs one empty temporary file. Permission bits are not asked, because they
     say nothing about a read-only or full disk, nor about what the superuser may do.
 
-    Parameters
-    ----------
-    path
-        The folder; it may exist already.
-
-    Returns
-    -------
-    Path
-        The folder.
-
-    Raises
-    ------
-    InputError
-        If the path is not a folder, or the folder cannot be made or written.
+    `path`: the folder; it may exist already. Returns Path: the folder. Raises InputError if the path is not a folder,
+    or the folder cannot be made or written.
     """
     folder = Path(path)
     try:
@@ -69,10 +57,7 @@ def ensure_folder(path: str | os.PathLike[str]) -> Path:
 def ensure_writable(path: str | os.PathLike[str]) -> Path:
     """Prove before any work is done that a file can be written there; make its folder.
 
-    Raises
-    ------
-    InputError
-        If `path` is a folder or a device, or its folder cannot be written.
+    Raises InputError if `path` is a folder or a device, or its folder cannot be written.
     """
     target = Path(path)
     try:

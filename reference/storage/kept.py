@@ -59,15 +59,9 @@ class Kept:
 def key_of(kind: str, /, *functions: Any, **arguments: Any) -> str:
     """Return the key under which a result is kept.
 
-    Parameters
-    ----------
-    kind
-        One or more words with dashes: a file name begins with it.
-    functions
-        The functions that compute it, or names of modules of ours.
-    arguments
-        What the result depends on besides: numbers, words, arrays, paths, and tuples, dictionaries and data classes of
-        these.
+    `kind`: one or more words with dashes: a file name begins with it; `functions`: the functions that compute it, or
+    names of modules of ours; `arguments`: what the result depends on besides: numbers, words, arrays, paths, and
+    tuples, dictionaries and data classes of these.
     """
     content = {"arguments": arguments, "code": source_digest(*functions)}
     return f"{kind}-{hashlib.sha256(json.dumps(content, sort_keys=True, default=_plain).encode()).hexdigest()[:32]}"

@@ -20,10 +20,7 @@ IN_PLANE = 1e-7  #: of the largest coordinate: what is closer to the plane of a 
 def before_light(truth: TruthScene, light: TruthAreaLight) -> tuple[TruthScene, Shapes]:
     """Return the scene and the shapes that can shadow a light.
 
-    Parameters
-    ----------
-    truth, light
-        The scene and one of its lights with extent.
+    `truth`, `light`: the scene and one of its lights with extent.
     """
     shapes = truth.occluders.shapes()
     others = [shape for shape in shapes if shape != light.shape]

@@ -59,14 +59,8 @@ class Near:
 def near_shapes(light: Ball, origin: Array, direction: Array, length: Array, shapes: Shapes) -> Near:
     """Return the shapes that can stand between a light and rays.
 
-    Parameters
-    ----------
-    light
-        What holds it.
-    origin, direction, length
-        Of the rays: where all begin, (3,) [m], unit vectors, (rays, 3), and how far they go, (rays,) [m].
-    shapes
-        The shapes.
+    `light`: what holds it; `origin`, `direction`, `length`: of the rays: where all begin, (3,) [m], unit vectors,
+    (rays, 3), and how far they go, (rays,) [m]; `shapes`: the shapes.
     """
     none = np.zeros(len(direction), np.int64), np.zeros(len(direction), np.int64), np.empty(0, np.int64)
     if not shapes.count or not len(direction):

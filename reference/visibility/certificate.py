@@ -81,18 +81,10 @@ def certified(
 ) -> LitIntervals:
     """Check lit intervals at random places.
 
-    Parameters
-    ----------
-    lit, rays
-        The intervals, and the rays in their planes with the light.
-    ends
-        Between which distances the rays were looked at, (rays,) each [m].
-    occluders, shapes
-        What stands in the light: as an `mi.Scene`, and as numbers.
-    checks, every
-        Shadow rays to each of every so many rays: an odd number steps through all samples of a light.
-    normal
-        Of the surface of the light at each position, unit, (rays, 3); None for lights that are points.
+    `lit`, `rays`: the intervals, and the rays in their planes with the light; `ends`: between which distances the rays
+    were looked at, (rays,) each [m]; `occluders`, `shapes`: what stands in the light: as an `mi.Scene`, and as numbers;
+    `checks`, `every`: shadow rays to each of every so many rays: an odd number steps through all samples of a light;
+    `normal`: of the surface of the light at each position, unit, (rays, 3); None for lights that are points.
     """
     ray = np.arange(0, len(rays.foot), every)
     ray = ray[ends[1][ray] > ends[0][ray]]
@@ -197,12 +189,7 @@ def _generator(*drawn_for: Array) -> np.random.Generator:
 def segments_blocked(start: Array, end: Array, shapes: Shapes) -> Bools:
     """Return which segments meet a triangle, the surface of a sphere, or a disk, in float64.
 
-    Parameters
-    ----------
-    start, end
-        The ends of the segments, (segments, 3) [m].
-    shapes
-        The shapes.
+    `start`, `end`: the ends of the segments, (segments, 3) [m]; `shapes`: the shapes.
     """
     way = end - start
     blocked = np.zeros(len(start), dtype=bool)
@@ -264,16 +251,9 @@ def reached_by_shadow_rays(interaction: Any, light: Array, reached: Bools, *, sc
     Mitsuba's ray and the exact lit intervals differ, what the judge says of the ray from Mitsuba's start holds: so a
     fault of the lit intervals is still found by the comparison.
 
-    Parameters
-    ----------
-    interaction
-        Mitsuba's surface interactions, one for each ray.
-    light
-        Position of the light (3,) [m].
-    reached
-        Whether it reaches the surface points themselves, by exact geometry, (rays,).
-    scene, shapes
-        The `mi.Scene` of the occluders, and the same as numbers.
+    `interaction`: Mitsuba's surface interactions, one for each ray; `light`: position of the light (3,) [m]; `reached`:
+    whether it reaches the surface points themselves, by exact geometry, (rays,); `scene`, `shapes`: the `mi.Scene` of
+    the occluders, and the same as numbers.
     """
     ray = interaction.spawn_ray_to(mi.Point3f(*(float(c) for c in light)))
     valid = np.array(interaction.is_valid(), dtype=bool)

@@ -19,19 +19,10 @@ Array = NDArray[np.float64]
 def exact_distance(truth: TruthScene, interaction: Any, distance: Array, shapes: Shapes | None = None) -> Array:
     """Return the distances to the visible surface again in float64, where that is flat or a sphere.
 
-    Parameters
-    ----------
-    truth
-        The scene; its rays are those that were cast.
-    interaction
-        Mitsuba's surface interactions: which triangle each ray met.
-    distance
-        The distances that were found, (rays,), infinite where nothing is hit [m].
-    shapes
-        What `read_shapes` returned, if known.
+    `truth`: the scene; its rays are those that were cast; `interaction`: Mitsuba's surface interactions: which triangle
+    each ray met; `distance`: the distances that were found, (rays,), infinite where nothing is hit [m]; `shapes`: what
+    `read_shapes` returned, if known.
 
-    Notes
-    -----
     Valid where the plane of the triangle is met within 1e-4 of the distance; elsewhere, on triangles seen edge-on, the
     distance stays what it was. So it does on spheres that a ray misses in float64, which happens where it touches them.
     """

@@ -15,19 +15,8 @@ _BLOCK = 1 << 21  # numbers in one block of rays and facets
 def crossings(bounds: Bounds, origin: Array, direction: Array) -> tuple[Array, Array]:
     """Return where rays enter and leave a body.
 
-    Parameters
-    ----------
-    bounds
-        The body.
-    origin
-        (n, 3), or (3,) for one that all share [m].
-    direction
-        Unit vectors, (n, 3).
-
-    Returns
-    -------
-    enter, leave
-        Distances along the whole straight line, (n,) [m]; leave <= enter where it misses the body.
+    `bounds`: the body; `origin`: (n, 3), or (3,) for one that all share [m]; `direction`: unit vectors, (n, 3). Returns
+    `enter`, `leave`: distances along the whole straight line, (n,) [m]; leave <= enter where it misses the body.
     """
     if isinstance(bounds, Sphere):
         return sphere_crossings(np.sum((bounds.centre - origin) * direction, axis=-1), _power(bounds, origin))
@@ -37,19 +26,9 @@ def crossings(bounds: Bounds, origin: Array, direction: Array) -> tuple[Array, A
 def crossed_facets(bounds: Polyhedron, origin: Array, direction: Array) -> tuple[Index, Index, Array, Array]:
     """Return the facets at which rays enter and leave a polyhedron, and the distances, as `crossings` does.
 
-    Parameters
-    ----------
-    bounds
-        The polyhedron.
-    origin, direction
-        As in `crossings`.
-
-    Returns
-    -------
-    entered, left
-        Numbers of the facets, (n,) each.
-    enter, leave
-        Distances along the whole straight line, (n,) each [m]; leave <= enter where it misses the polyhedron.
+    `bounds`: the polyhedron; `origin`, `direction`: as in `crossings`. Returns `entered`, `left`: numbers of the
+    facets, (n,) each. Returns `enter`, `leave`: distances along the whole straight line, (n,) each [m]; leave <= enter
+    where it misses the polyhedron.
     """
     origin = np.atleast_2d(origin)
     enter, leave = np.empty(len(direction), np.int64), np.empty(len(direction), np.int64)
@@ -74,17 +53,8 @@ def sphere_crossings(along: Array, power: Array | float) -> tuple[Array, Array]:
 
     The smaller root in size is taken from the product of both, which is the power, so that nothing cancels.
 
-    Parameters
-    ----------
-    along
-        direction . (centre - origin), (n,) [m], for a unit direction.
-    power
-        |centre - origin|^2 - radius^2, the power of the origin, (n,) or a scalar [m^2].
-
-    Returns
-    -------
-    low, high
-        (n,) each [m].
+    `along`: direction . (centre - origin), (n,) [m], for a unit direction. `power`: |centre - origin|^2 - radius^2, the
+    power of the origin, (n,) or a scalar [m^2]. Returns `low`, `high`: (n,) each [m].
     """
     inner = along * along - power
     root = np.sqrt(np.maximum(inner, 0.0))
@@ -102,16 +72,7 @@ def _power(sphere: Sphere, origin: Array) -> Array:
 def half_chord(radius: Array | float, distance: Array) -> Array:
     """Return half of the chord at a distance from a disk's centre, sqrt(radius^2 - distance^2); 0 beyond the radius.
 
-    Parameters
-    ----------
-    radius
-        Of the disk, (n,) or a scalar [m].
-    distance
-        Of the chord from the centre, (n,) [m], at least 0.
-
-    Returns
-    -------
-    array
-        (n,) [m], without cancellation where both are alike.
+    `radius`: of the disk, (n,) or a scalar [m]; `distance`: of the chord from the centre, (n,) [m], at least 0. Returns
+    (n,) [m], without cancellation where both are alike.
     """
     return np.sqrt(np.maximum(radius - distance, 0) * (radius + distance))

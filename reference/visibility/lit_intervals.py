@@ -33,16 +33,8 @@ class Obstacles:
 def obstacles(truth: TruthScene, light: Ball, distance: Array, shapes: Shapes | None = None) -> Obstacles:
     """Return what can stand between a light and the rays of a scene.
 
-    Parameters
-    ----------
-    truth
-        The scene.
-    light
-        What holds the light.
-    distance
-        How far its rays go, (rays,), may be infinite [m].
-    shapes
-        What `reference.scene.shapes.read_shapes` returned for its occluders, if known.
+    `truth`: the scene; `light`: what holds the light; `distance`: how far its rays go, (rays,), may be infinite [m];
+    `shapes`: what `reference.scene.shapes.read_shapes` returned for its occluders, if known.
     """
     shapes = read_shapes(truth.occluders) if shapes is None else shapes
     near = near_shapes(light, truth.origin, truth.direction, distance, shapes)
@@ -61,21 +53,11 @@ def lit_intervals(
 ) -> LitIntervals:
     """Find the lit intervals of rays between two distances, and have them checked.
 
-    Parameters
-    ----------
-    rays
-        The rays in their planes with the light, or with samples of it.
-    ends
-        Distances between which a ray is looked at, (rays,) each [m]; the second may be infinite.
-    known
-        What can stand in the light.
-    of
-        By ray its number in `known`, (rays,); by default its own.
-    checks, every, normal
-        See `reference.visibility.certificate.certified`; no checks if 0.
+    `rays`: the rays in their planes with the light, or with samples of it; `ends`: distances between which a ray is
+    looked at, (rays,) each [m]; the second may be infinite; `known`: what can stand in the light; `of`: by ray its
+    number in `known`, (rays,); by default its own; `checks`, `every`, `normal`: see
+    `reference.visibility.certificate.certified`; no checks if 0.
 
-    Notes
-    -----
     Valid for opaque meshes, rectangles, spheres and disks, wherever they are.
     """
     of = np.arange(len(rays.foot)) if of is None else of

@@ -74,19 +74,10 @@ class Rays:
 def rays_at(origin: Array, direction: Array, position: Array, w: int = 1) -> Rays:
     """Return rays in their planes with a light.
 
-    Parameters
-    ----------
-    origin
-        Where all rays begin [m], (3,), or each, (n, 3).
-    direction
-        Unit vectors, (n, 3).
-    position
-        Of the light, (3,), or of the light of each ray, (n, 3): places [m] or unit directions.
-    w
-        1 for places, 0 for directions.
+    `origin`: where all rays begin [m], (3,), or each, (n, 3); `direction`: unit vectors, (n, 3); `position`: of the
+    light, (3,), or of the light of each ray, (n, 3): places [m] or unit directions; `w`: 1 for places, 0 for
+    directions.
 
-    Notes
-    -----
     Valid for all rays. One that meets the light lies in many planes: any is as good.
     """
     position = np.broadcast_to(position, direction.shape)
@@ -106,17 +97,9 @@ def rays_at(origin: Array, direction: Array, position: Array, w: int = 1) -> Ray
 def cone_interval(rays: Rays, light: TruthLight, angle: float) -> tuple[Array, Array]:
     """Return the interval of theta inside a cone about the light's axis.
 
-    Parameters
-    ----------
-    rays, light
-        The rays in their planes with the light; for a point light the interval is that of the whole line.
-    angle
-        Half angle of the cone [rad].
-
-    Returns
-    -------
-    low, high
-        (rays,) each [rad]; low > high where the ray misses the cone.
+    `rays`, `light`: the rays in their planes with the light; for a point light the interval is that of the whole line;
+    `angle`: half angle of the cone [rad]. Returns `low`, `high`: (rays,) each [rad]; low > high where the ray misses
+    the cone.
     """
     if light.axis is None:
         half_pi = np.full(len(rays.foot), 0.5 * np.pi)
@@ -132,12 +115,7 @@ def cone_interval(rays: Rays, light: TruthLight, angle: float) -> tuple[Array, A
 def falloff(theta: Array, rays: Rays, light: TruthLight) -> Array:
     """Return intensity over that on the axis [1]: Mitsuba's spot profile, linear behind the beam, or a cosine.
 
-    Parameters
-    ----------
-    theta
-        Angles at the light, (rays, angles) [rad].
-    rays, light
-        The rays in their planes with the light.
+    `theta`: angles at the light, (rays, angles) [rad]; `rays`, `light`: the rays in their planes with the light.
     """
     if not light.is_soft or light.axis is None:
         return np.ones_like(theta)

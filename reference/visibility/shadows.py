@@ -71,23 +71,10 @@ def lit_parts(
 ) -> tuple[Index, Array, Array]:
     """Return the lit parts of rays between two distances.
 
-    Parameters
-    ----------
-    rays
-        The rays.
-    ends
-        Between which distances they are looked at, (rays,) each [m]; nowhere if the first is not below the second.
-    near
-        Lists of the shapes that can stand in the light.
-    shapes
-        All shapes.
-    of
-        By ray, the number of its lists in `near`, (rays,).
-
-    Returns
-    -------
-    ray, low, high
-        Of every lit part, ascending, (parts,) each; distances [m].
+    `rays`: the rays; `ends`: between which distances they are looked at, (rays,) each [m]; nowhere if the first is not
+    below the second; `near`: lists of the shapes that can stand in the light; `shapes`: all shapes; `of`: by ray, the
+    number of its lists in `near`, (rays,). Returns `ray`, `low`, `high`: of every lit part, ascending, (parts,) each;
+    distances [m].
     """
     if not shapes.count:
         ray = np.flatnonzero(ends[1] > ends[0])

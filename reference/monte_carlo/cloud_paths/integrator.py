@@ -50,18 +50,9 @@ def cloud_paths_batch(
 ) -> Batches:
     """Trace one batch.
 
-    Parameters
-    ----------
-    clouds
-        The scene.
-    seed
-        Seed of the batch; different seeds are independent.
-    samples
-        Samples a pixel, at most 256.
-    sets
-        Names of disjoint sets of orders with their first and last order, the last `math.inf` for one without end.
-    seen
-        Pixels whose rays meet a cloud or a surface, (pixels,).
+    `clouds`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`: samples a pixel, at most
+    256; `sets`: names of disjoint sets of orders with their first and last order, the last `math.inf` for one without
+    end; `seen`: pixels whose rays meet a cloud or a surface, (pixels,).
     """
     check_samples(samples)
     targets = _targets([orders for _, orders in sets])

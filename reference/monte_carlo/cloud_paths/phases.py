@@ -70,10 +70,7 @@ class Tabulated:
 
     A cell is drawn by the alias method (Walker 1977; Vose 1991), a place in it by the inverse of the linear density.
 
-    Parameters
-    ----------
-    values
-        (A,), from backward to forward, of mean 1.
+    `values`: (A,), from backward to forward, of mean 1.
     """
 
     def __init__(self, values: Array):
@@ -121,10 +118,7 @@ def _aliases(weights: Array) -> tuple[Array, NDArray[np.uint32]]:
 def walk_phase(phase: PhaseFunction) -> WalkPhase:
     """Return a phase function of the scene for the walk.
 
-    Raises
-    ------
-    InputError
-        For one that no scene has.
+    Raises InputError for one that no scene has.
     """
     if phase.name in ("isotropic", "hg"):
         return HenyeyGreenstein(phase.g)

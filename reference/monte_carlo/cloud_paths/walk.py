@@ -97,20 +97,9 @@ class Paths:
 def walk(scene: WalkScene, targets: Targets, sampler, rays, *, samples: int, side: float):
     """Return the sums over samples, (layers x lanes) for each channel, and how many rays each lane cast.
 
-    Parameters
-    ----------
-    scene
-        What the walk reads.
-    targets
-        Where light goes.
-    sampler
-        Seeded, as wide as there are lanes.
-    rays
-        Where paths start from the eye's side and their unit directions, one a lane, as Mitsuba's rays.
-    samples
-        How many paths each lane follows.
-    side
-        Probability of a side flight, 0 to 1.
+    `scene`: what the walk reads; `targets`: where light goes; `sampler`: seeded, as wide as there are lanes; `rays`:
+    where paths start from the eye's side and their unit directions, one a lane, as Mitsuba's rays; `samples`: how many
+    paths each lane follows; `side`: probability of a side flight, 0 to 1.
     """
     lanes = dr.width(rays.d)
     sums = [dr.zeros(mi.Float, targets.count * lanes) for _ in range(3)]

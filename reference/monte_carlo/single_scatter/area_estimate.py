@@ -32,18 +32,8 @@ _LEAST_SLOPE = 1e-12  # of a ray against the plane of a light's point
 def area_airlight(task: Task, light: AreaLight, sampler, ray: Ray, stretch: Stretch, active):
     """Estimate what a light with extent sends from a stretch of the ray.
 
-    Parameters
-    ----------
-    task
-        What is fixed while the scene is traced.
-    light
-        Of `task`.
-    sampler
-        Mitsuba's sampler.
-    ray, stretch
-        Camera rays, and their part in one medium.
-    active
-        Mask.
+    `task`: what is fixed while the scene is traced; `light`: of `task`; `sampler`: Mitsuba's sampler; `ray`, `stretch`:
+    camera rays, and their part in one medium; `active`: mask.
     """
     shift, start = sampler.next_1d(active), sampler.next_2d(active)
 

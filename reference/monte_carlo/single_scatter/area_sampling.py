@@ -79,10 +79,8 @@ def is_area(emitter) -> bool:
 def read_area(emitter) -> AreaLight:
     """Read a light with extent from Mitsuba: its shape from the transform, which side shines by asking for a normal.
 
-    Raises
-    ------
-    InputError
-        For a shape other than a rectangle, a disk or a sphere, for a sheared one, and for a radiance that varies.
+    Raises InputError for a shape other than a rectangle, a disk or a sphere, for a sheared one, and for a radiance that
+    varies.
     """
     shape = emitter.get_shape()
     name, kind = f"single-scatter: light '{shape.id()}'", shape.class_name()
@@ -121,17 +119,8 @@ def read_area(emitter) -> AreaLight:
 def sample_point(u, v, light: AreaLight, *, origin, direction) -> LightPoint:
     """Sample points on a light for camera rays.
 
-    Parameters
-    ----------
-    u, v
-        Uniform in [0, 1).
-    light
-        The light.
-    origin, direction
-        The rays, of double precision.
+    `u`, `v`: uniform in [0, 1); `light`: the light; `origin`, `direction`: the rays, of double precision.
 
-    Notes
-    -----
     Valid for any ray.
     """
     u, v = mi.Float64(u), mi.Float64(v)

@@ -45,10 +45,8 @@ class Leg:
 def read_surroundings(scene) -> tuple[Surroundings, list[Any]]:
     """Read what rays can meet in a Mitsuba scene, and the media behind its boundaries.
 
-    Raises
-    ------
-    InputError
-        For a heterogeneous medium, a material that is transparent in part, or a medium behind an opaque material.
+    Raises InputError for a heterogeneous medium, a material that is transparent in part, or a medium behind an opaque
+    material.
     """
     bounded = False
     everywhere: list[Any] = []
@@ -81,10 +79,7 @@ def _is_null(shape) -> bool:
 def require_homogeneous(medium) -> None:
     """Refuse a medium that is not homogeneous.
 
-    Raises
-    ------
-    InputError
-        For such a medium.
+    Raises InputError for such a medium.
     """
     if not medium.is_homogeneous():
         raise InputError(f"single-scatter: got a {medium.class_name()}; wanted media of type 'homogeneous'")
@@ -138,16 +133,8 @@ def medium_at(around: Surroundings, position, known_position, known_medium, acti
 def transmittance(around: Surroundings, start, direction, distance, *, media: Leg, active):
     """Return the transmittance from a light to points at a distance; 0 where something is in between.
 
-    Parameters
-    ----------
-    around
-        What rays can meet.
-    start, direction, distance
-        The light, the unit vector to the point, and how far it is [m].
-    media
-        The media at both ends.
-    active
-        Mask.
+    `around`: what rays can meet; `start`, `direction`, `distance`: the light, the unit vector to the point, and how far
+    it is [m]; `media`: the media at both ends; `active`: mask.
     """
     reach = distance * (1 - _SHORT_OF_POINT)
     if not around.bounded:

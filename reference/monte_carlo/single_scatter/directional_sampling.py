@@ -20,19 +20,9 @@ from reference.monte_carlo.single_scatter.distance_sampling import free_flight, 
 def sample_stretch(u, length, sigma_t: Sequence[Any]) -> tuple[Any, Any]:
     """Sample a distance from the start of a stretch.
 
-    Parameters
-    ----------
-    u
-        Uniform in [0, 1).
-    length
-        Of the stretch, finite and above 0 [m].
-    sigma_t
-        One extinction for all channels, or one for each [1/m].
-
-    Returns
-    -------
-    y, density
-        Distance [m] and density of the mixture there [1/m], in single precision.
+    `u`: uniform in [0, 1); `length`: of the stretch, finite and above 0 [m]; `sigma_t`: one extinction for all
+    channels, or one for each [1/m]. Returns `y`, `density`: distance [m] and density of the mixture there [1/m], in
+    single precision.
     """
     length = mi.Float64(length)
     flights = [free_flights(length, mi.Float64(rate)) for rate in sigma_t]

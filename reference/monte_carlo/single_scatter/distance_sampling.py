@@ -72,15 +72,9 @@ class Span:
 def closest_approach(origin, direction, position) -> Approach:
     """Return foot, height and normal of rays in double precision.
 
-    Parameters
-    ----------
-    origin, direction
-        Rays, arrays of double precision; `direction` has unit length.
-    position
-        The light's position, of double precision.
+    `origin`, `direction`: rays, arrays of double precision; `direction` has unit length; `position`: the light's
+    position, of double precision.
 
-    Notes
-    -----
     Valid for any ray; one that meets the light gets a height of 1e-30 and a normal near zero.
     """
     offset = origin - position
@@ -97,19 +91,9 @@ def cone_ends(approach: Approach, direction, *, axis, cutoff: float) -> tuple[An
     tan(theta) = s/h, so that axis . w = m cos(theta - middle), with (m, middle) the polar form of
     (axis . normal, axis . direction). It is above cos(cutoff) for |theta - middle| < acos(cos(cutoff)/m).
 
-    Parameters
-    ----------
-    approach
-        How the rays pass the light.
-    direction
-        The rays' directions, of double precision.
-    axis
-        The cone's axis, a unit vector of double precision.
-    cutoff
-        The cone's half angle [rad].
+    `approach`: how the rays pass the light; `direction`: the rays' directions, of double precision; `axis`: the cone's
+    axis, a unit vector of double precision; `cutoff`: the cone's half angle [rad].
 
-    Notes
-    -----
     Valid for cones up to a half space; wider ones are answered by the whole line. The ends lie outside the cone by a
     hair: they bound where samples are drawn, and what the light sends there is the emitter's own answer.
     """
@@ -167,8 +151,6 @@ class FreeFlight:
 def free_flights(length, sigma_t) -> FreeFlight:
     """Return the free flights in a span of some length [m] and extinction [1/m].
 
-    Notes
-    -----
     Valid for sigma_t > 0, and for sigma_t = 0 where the length is finite.
     """
     cut = dr.minimum(length, _MEAN_FREE_PATHS / sigma_t)
@@ -227,20 +209,9 @@ def _terms(y, mixture: Mixture) -> list[tuple[Any, Any]]:
 def sample_distance(u, mixture: Mixture) -> tuple[Any, Any, Any]:
     """Sample a distance from the mixture of both techniques by inverting its cumulative distribution.
 
-    Parameters
-    ----------
-    u
-        Uniform in [0, 1).
-    mixture
-        See `mixture_of`.
+    `u`: uniform in [0, 1); `mixture`: see `mixture_of`. Returns the distances from the start of the span and from the
+    foot [m], and the density [1/m].
 
-    Returns
-    -------
-    tuple
-        The distances from the start of the span and from the foot [m], and the density [1/m].
-
-    Notes
-    -----
     The distance grows with u, so that a regular grid of u, jittered, stratifies the distance. (Were u to choose the
     technique, a lamp's peak would fall into few cells of the free flights: 50 times the variance at 64 samples.)
 

@@ -47,18 +47,9 @@ from reference.monte_carlo.single_scatter.stretches import Ray, Stretch, cell_of
 def ray_light(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
     """Return airlight and lit surface along camera rays [W/(m^2 sr)].
 
-    Parameters
-    ----------
-    task
-        See `reference.monte_carlo.single_scatter.scene_data`.
-    sampler
-        Mitsuba's sampler, with one stream for each ray.
-    ray
-        The rays.
-    medium
-        What the rays start in: a Mitsuba medium, a pointer to one, or None for a vacuum.
-    active
-        Mask.
+    `task`: see `reference.monte_carlo.single_scatter.scene_data`; `sampler`: Mitsuba's sampler, with one stream for
+    each ray; `ray`: the rays; `medium`: what the rays start in: a Mitsuba medium, a pointer to one, or None for a
+    vacuum; `active`: mask.
     """
     if medium is None:
         medium = dr.zeros(mi.MediumPtr)

@@ -30,21 +30,10 @@ _RAYS = 1 << 20  # camera rays in one kernel
 def single_scatter_batch(truth: TruthScene, seed: int, samples: int) -> Batches:
     """Trace one batch along the pixel-centre rays, from the pinhole.
 
-    Parameters
-    ----------
-    truth
-        The scene.
-    seed
-        Seed of the batch; different seeds are independent.
-    samples
-        Distances sampled for each ray, light and medium, each from a point of its own of a light with extent, at most
-        256.
-
-    Returns
-    -------
-    Batches
-        Airlight and surface of every pixel [W/(m^2 sr)]. The surface needs no sampling but under lights with extent:
-        without these all batches agree on it.
+    `truth`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`: distances sampled for
+    each ray, light and medium, each from a point of its own of a light with extent, at most 256. Returns Batches:
+    airlight and surface of every pixel [W/(m^2 sr)]. The surface needs no sampling but under lights with extent:
+    without these all batches agree on it.
     """
     check_samples(samples)
     medium = truth.scene.sensors()[0].get_medium()

@@ -50,19 +50,9 @@ class Task:
 def read_task(scene, medium, samples: int) -> Task:
     """Read what the estimator needs from a Mitsuba scene.
 
-    Parameters
-    ----------
-    scene
-        The `mi.Scene`.
-    medium
-        What camera rays start in: a Mitsuba medium, a pointer to one, or None for a vacuum.
-    samples
-        Distances for each ray, light and medium.
-
-    Raises
-    ------
-    InputError
-        For an emitter, a medium or a material that it has no answer for.
+    `scene`: the `mi.Scene`; `medium`: what camera rays start in: a Mitsuba medium, a pointer to one, or None for a
+    vacuum; `samples`: distances for each ray, light and medium. Raises InputError for an emitter, a medium or a
+    material that it has no answer for.
     """
     directional = tuple(emitter for emitter in scene.emitters() if _is_directional(emitter))
     area = tuple(read_area(emitter) for emitter in scene.emitters() if is_area(emitter))

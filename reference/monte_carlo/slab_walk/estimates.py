@@ -49,16 +49,8 @@ class SetEstimate:
 class SlabEstimate:
     """Light of a slab by photons.
 
-    Parameters
-    ----------
-    photons
-        How many.
-    sets
-        One for each set of orders.
-    reflectance, transmittance
-        Of all orders, the light that was never scattered among them.
-    up, down
-        Diffuse flux at each depth for a flux of pi across the beam.
+    `photons`: how many; `sets`: one for each set of orders; `reflectance`, `transmittance`: of all orders, the light
+    that was never scattered among them; `up`, `down`: diffuse flux at each depth for a flux of pi across the beam.
     """
 
     photons: int
@@ -80,20 +72,10 @@ def slab_estimate(
 ) -> SlabEstimate:
     """Estimate the light of a slab by a walk of photons.
 
-    Parameters
-    ----------
-    slab
-        The slab.
-    sets
-        First and last order of each set, the last `math.inf` for a set without end; order 0 is the beam.
-    photons
-        At least two; they are walked in batches of at most `BATCH`, at least 64 if there are as many photons.
-    seed
-        The same seed gives the same numbers, whatever the number of workers.
-    workers
-        Threads.
-    progress
-        Called with (share done, what).
+    `slab`: the slab; `sets`: first and last order of each set, the last `math.inf` for a set without end; order 0 is
+    the beam; `photons`: at least two; they are walked in batches of at most `BATCH`, at least 64 if there are as many
+    photons; `seed`: the same seed gives the same numbers, whatever the number of workers; `workers`: threads;
+    `progress`: called with (share done, what).
     """
     batches = max(math.ceil(photons / BATCH), min(photons, _MOST_COARSE))
     sizes = [photons // batches + (number < photons % batches) for number in range(batches)]

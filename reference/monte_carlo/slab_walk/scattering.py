@@ -15,10 +15,7 @@ _CELLS = 1 << 17  #: of the table of a tabulated phase function
 class HenyeyGreenstein:
     """Henyey and Greenstein's phase function; isotropic for g = 0.
 
-    Parameters
-    ----------
-    g
-        Mean cosine, in (-1, 1).
+    `g`: mean cosine, in (-1, 1).
     """
 
     g: float
@@ -39,12 +36,7 @@ class Tabulated:
     The distribution of the angle is summed exactly over cells that are finer than the table; within a cell, the cosine
     is uniform.
 
-    Parameters
-    ----------
-    angles
-        (A,), increasing from 0 to pi [rad].
-    heights
-        (A,), not negative, in any unit.
+    `angles`: (A,), increasing from 0 to pi [rad]; `heights`: (A,), not negative, in any unit.
     """
 
     def __init__(self, angles: Array, heights: Array):

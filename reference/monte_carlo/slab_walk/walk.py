@@ -41,18 +41,8 @@ class Scattering(Protocol):
 class Slab:
     """A homogeneous slab in the light of the sun.
 
-    Parameters
-    ----------
-    tau
-        Thickness [mean free paths].
-    mu0
-        Cosine of the zenith angle of the sun; its light travels downwards and along +x.
-    albedo
-        In [0, 1].
-    scattering
-        The phase function.
-    depths
-        In [0, tau], where passages are counted.
+    `tau`: thickness [mean free paths]; `mu0`: cosine of the zenith angle of the sun; its light travels downwards and
+    along +x; `albedo`: in [0, 1]; `scattering`: the phase function; `depths`: in [0, tau], where passages are counted.
     """
 
     tau: float
@@ -66,12 +56,8 @@ class Slab:
 class Counts:
     """Sums over the photons of a batch, by order: moments 1, x, x^2 + y^2, each weighted, over the number of photons.
 
-    Parameters
-    ----------
-    reflected, transmitted
-        (3, orders), from order 0 on.
-    up, down, fluence
-        (depths, 3, orders): passages through each depth, and passages over |mu|.
+    `reflected`, `transmitted`: (3, orders), from order 0 on; `up`, `down`, `fluence`: (depths, 3, orders): passages
+    through each depth, and passages over |mu|.
     """
 
     reflected: Array
@@ -84,14 +70,7 @@ class Counts:
 def walk(slab: Slab, photons: int, random: np.random.Generator) -> Counts:
     """Follow a batch of photons until all have left.
 
-    Parameters
-    ----------
-    slab
-        The slab.
-    photons
-        Number of photons.
-    random
-        Where numbers come from.
+    `slab`: the slab; `photons`: number of photons; `random`: where numbers come from.
     """
     rows: list[Array] = []
     for weight, (x, y, z), direction in flights(slab, photons, random):

@@ -49,29 +49,13 @@ def volpath_batch(
 ) -> Batches:
     """Trace one batch.
 
-    Parameters
-    ----------
-    truth
-        The scene.
-    seed
-        Seed of the batch; different seeds are independent.
-    samples
-        Samples a pixel, at most 256.
-    max_depth
-        Most edges of a path: 2 is one scattering. With more, `airlight` is the light that was scattered by the medium
-        alone, any number of times up to max_depth - 1, and `surface` all other light: what met a surface at least once.
-    counts
-        Samples of each pixel, (layers, pixels), for `max_depth` 2; all have `samples` by default.
+    `truth`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`: samples a pixel, at most
+    256; `max_depth`: most edges of a path: 2 is one scattering. With more, `airlight` is the light that was scattered
+    by the medium alone, any number of times up to max_depth - 1, and `surface` all other light: what met a surface at
+    least once. `counts`: samples of each pixel, (layers, pixels), for `max_depth` 2; all have `samples` by default.
+    Raises InputError for a scene of which Mitsuba does not know how large it is, under a directional light. Raises
+    ValueError if `samples` or `max_depth` is out of range, or `counts` come with another `max_depth` than 2.
 
-    Raises
-    ------
-    InputError
-        For a scene of which Mitsuba does not know how large it is, under a directional light.
-    ValueError
-        If `samples` or `max_depth` is out of range, or `counts` come with another `max_depth` than 2.
-
-    Notes
-    -----
     Batches of one seed but another `max_depth` are not independent: their airlight paths begin alike, so that the
     difference of the two has less spread than either.
     """
@@ -128,18 +112,8 @@ def black_surfaces(scene) -> Iterator[None]:
 def trace(truth: TruthScene, integrator, seed: int, counts: Counts, *, scattering: bool = True) -> Array:
     """Return the mean radiance of every pixel, (pixels, 3) [W/(m^2 sr)].
 
-    Parameters
-    ----------
-    truth
-        The scene.
-    integrator
-        Of Mitsuba.
-    seed
-        Of the whole image.
-    counts
-        Paths of each pixel, (pixels,).
-    scattering
-        Whether media scatter.
+    `truth`: the scene; `integrator`: of Mitsuba; `seed`: of the whole image; `counts`: paths of each pixel, (pixels,);
+    `scattering`: whether media scatter.
     """
     image = np.zeros((len(counts), 3))
     parts = _parts(counts)

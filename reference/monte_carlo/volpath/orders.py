@@ -24,16 +24,8 @@ def volpath_orders_batch(
 ) -> Batches:
     """Trace one batch of the layers `airlight`, `surface` and those of sets of orders.
 
-    Parameters
-    ----------
-    clouds
-        The scene.
-    seed
-        Seed of the batch; different seeds are independent.
-    samples
-        Samples a pixel, at most 256.
-    sets
-        Names of sets of orders with their first and last order, the last `math.inf` for one without end.
+    `clouds`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`: samples a pixel, at most
+    256; `sets`: names of sets of orders with their first and last order, the last `math.inf` for one without end.
     """
     check_samples(samples)
     truth = TruthScene(
