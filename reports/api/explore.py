@@ -33,6 +33,7 @@ class Description(Result):
 
     described: Mapping[str, Any]
     written: Mapping[str, Any] | None = None  #: the glTF file
+    grid: str = ""  #: the medium that reads the volume file, as XML
 
     @property
     def title(self) -> str:
@@ -41,7 +42,8 @@ class Description(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `airlight describe --json` prints."""
-        return {**self.described, **({} if self.written is None else {"gltf": self.written})}
+        grid = {"grid": self.grid} if self.grid else {}
+        return {**self.described, **({} if self.written is None else {"gltf": self.written}), **grid}
 
     @property
     def tables(self) -> Sequence[Table]:
@@ -61,7 +63,7 @@ class Description(Result):
             cut = ", ".join(self.written["tessellated"])
             more = f"; cut into triangles: {cut}" if cut else ""
             lines.append(f"{self.written['path']}: {self.written['triangles']} triangles{more}")
-        return lines
+        return [*lines, f"the height fog as a grid: {self.grid}"] if self.grid else lines
 
 
 @dataclass(frozen=True, repr=False)
@@ -102,7 +104,7 @@ def describe(
     size
         Width and height [pixels], or WxH; the scene's own by default.
     output
-        Write the scene as binary glTF 2.0, a .glb file.
+        Write the scene as binary glTF 2.0, a .glb file, or its height fog as a grid of Mitsuba, a .vol file.
     progress
         True says notes on the scene on the error stream.
 
@@ -115,8 +117,8 @@ def describe(
 
     files = [Path(path) for path in several(output)]
     for path in files:
-        if path.suffix.lower() != ".glb":
-            raise InputError(f"output: got {path}, wanted a name that ends in .glb, for example {path.stem}.glb")
+        if path.suffix.lower() not in (".glb", ".vol"):
+            raise InputError(f"output: got {path}, wanted a name that ends in .glb or .vol, such as {path.stem}.glb")
         ensure_writable(path)
     from reports.machine.environment import activate
 
@@ -133,9 +135,22 @@ def describe(
 
     loaded = opened(scene, size)
     described = describe_scene(loaded)
-    written = [write_gltf(path, loaded) for path in files]
+    volumes = [path for path in files if path.suffix.lower() == ".vol"]
+    written = [write_gltf(path, loaded) for path in files if path not in volumes]
+    grids = [_write_grid(path, loaded.scene) for path in volumes]
     note(progress, described["notes"])
-    return Description(described, written[-1] if written else None)
+    return Description(described, written[-1] if written else None, grids[-1] if grids else "")
+
+
+def _write_grid(path: Path, scene: Any) -> str:
+    from reference.scene.height_fog import HeightMedium
+    from reference.scene.read import read_truth
+    from reports.interchange.fog_grid import write_fog_grid
+
+    medium = read_truth(scene).medium
+    if not isinstance(medium, HeightMedium):
+        raise InputError(f"output: got {path}, and the medium is no height fog; wanted a name that ends in .glb")
+    return write_fog_grid(path, medium)
 
 
 @one_error

@@ -8,5 +8,6 @@ Read in this order:
 - `cycles.py`: these numbers as properties of Blender's module `bpy`
 - `meshes.py`: its shapes as triangles
 - `gltf.py`: the scene as glTF
+- `fog_grid.py`: height fog as a grid of densities
 - `words.py`: the scene as a table
 """

@@ -48,7 +48,7 @@ MISTAKES = (
     ("compare open-fog image.exr --fit sigmat", "did you mean"),
     ("compare open-fog image.exr --fit sigma_t=", "wanted NAME or NAME=VALUE"),
     ("describe open-frog", "did you mean 'open-fog'"),
-    ("describe open-fog -o fog.gltf", "wanted a name that ends in .glb"),
+    ("describe open-fog -o fog.gltf", "wanted a name that ends in .glb or .vol"),
     ("study integrals rays.csv --phase mie:51", "2 to 50 um"),
     ("study integrals rays.csv --phase tabulated", "without a table"),
     ("study slab --tau 2", "--tau"),
