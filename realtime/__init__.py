@@ -11,15 +11,15 @@ Rooms:
 - `memory.py`: refuses work that needs more memory than the machine, its container or the GPU has;
 - `parameters.py`: typed parameters of methods, with defaults, ranges and help;
 - `numerics/`: array types, fast functions, Gauss-Legendre nodes;
-- `droplets/`: phase functions of the droplets of fog and clouds;
+- `droplets.py`: phase functions of the droplets of fog and clouds;
 - `area_lights/`: area lights, and the samples that stand for them;
 - `scene/`: camera, lights, phase functions and meshes, read from Mitsuba; the features of a scene; what moves;
 - `scene/media/`: media; a new one, such as height fog, goes there, and its page says what it must write;
 - `rays/`: the geometry of rays and lights, and the cone of a spot;
 - `shadow_maps/`: shadow maps and the field of inverse depth over them;
-- `image_filters/`: Gaussian, bilateral and joint bilateral filters of whole images, and up-sampling;
+- `image_filters.py`: Gaussian, bilateral and joint bilateral filters of whole images, and up-sampling;
 - `kernels/`: the airlight integral between two distances along a ray in a homogeneous medium;
-- `intervals/`: the lit intervals of rays and their sum;
+- `intervals.py`: the lit intervals of rays and their sum;
 - `clouds/`: light scattered more than once;
 - `methods/`: the methods, and in `methods/interface/` what all of them share with frames;
 - `frame/`: camera rays, the lit surface, and whole frames, one or the next.
@@ -37,10 +37,9 @@ Rooms:
 6. `methods/interface/view.py` makes the view of these rays; `rays/ray_light.py` and, for a spot, `rays/spot_cone.py`
    say where each passes the light.
 7. `methods/shadow_planes/sweep.py` walks along the planes of each ray and finds its lit intervals
-   (`intervals/lit_intervals.py`).
+   (`intervals.py`).
 8. The medium (`scene/media/homogeneous.py` of the protocol in `scene/media/medium.py`) is asked for the integral over
-   each interval and calls the kernel that `kernels/registry.py` has under a name: `kernels/exact.py`, for which
-   `kernels/preparation.py` made tables ready if it has any.
+   each interval and calls the kernel that `kernels/registry.py` has under a name: `kernels/exact.py`.
 9. Behind the stages the renderer adds up what is lit of the surfaces and the airlight and brings both to the host;
    `frame/light_on_ray.py` checks that all of it is finite.
 """

@@ -1,20 +1,119 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Light points: a light with extent as N point lights of equal power.
+"""Light points, and the patterns in which they lie.
+
+Patterns of points, each for an equal part of the area.
+
+* `ring`: the few points of Ali 2016, whose layout the source does not print; reconstructed from captions. On a disk of
+  the radius R they lie on a circle of R/sqrt(2), on a rectangle on the ellipse that is sqrt(2/3) as large as it: there
+  their mean square distances from the middle are those of the whole light,
+
+      int r^2 dA / A = R^2/2,      int x^2 dx / (2 a) = a^2/3 = (1/2) (2/3) a^2,
+
+  so that they are right to second order for whatever is smooth. One point is the middle. A sphere has no ring: there
+  they lie on a spiral, at equal steps of height and golden angles.
+* `grid`: the middles of cells of equal area, in rows of nearly equal numbers.
+* `sobol`: the first points of Sobol's sequence, scrambled as Owen proposed, with one fixed seed (Laine and Karras 2011;
+  Burley 2020 has the hash).
+* `interleaved`: the cells of `grid` in an order in which points that follow one another lie far apart: for a method in
+  which neighbouring pixels take different ones. For all others it is `grid`.
+
+Light points: a light with extent as N point lights of equal power.
 
 Each stands for the part A/N of the area: a point light with the intensity I(w) = I0 max(0, n . w), I0 = Le A/N [W/sr],
 n the normal of the shape there. Its power, pi I0, is an N-th of that of the light.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.area_lights.patterns import PATTERNS, ring, spiral, square
 from realtime.area_lights.shape import AreaLight
 from realtime.parameters import Parameters, parameter
 
 Array = NDArray[np.float64]
+
+PATTERNS = ("ring", "grid", "sobol", "interleaved")
+_TURN = 0.37  #: where a ring begins [rad]: not on an axis of the light, along which occluders often run
+_GOLDEN = math.pi * (3 - math.sqrt(5))  #: [rad]
+_SEEDS = (0x1A2B3C4D, 0x9D5F37E1)
+
+
+def ring(points: int) -> Array:
+    """Return directions from the middle of a ring, (points, 2) of length 1; one point is the middle, (0, 0)."""
+    if points == 1:
+        return np.zeros((1, 2))
+    angle = _TURN + 2 * math.pi * np.arange(points) / points
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def spiral(points: int) -> Array:
+    """Return unit vectors along a spiral over the sphere, (points, 3)."""
+    z = 1 - (2 * np.arange(points) + 1) / points
+    angle = _TURN + _GOLDEN * np.arange(points)
+    across = np.sqrt(1 - z * z)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
+
+
+def square(pattern: str, points: int) -> Array:
+    """Return points of a pattern other than `ring` in the unit square, (points, 2) in [0, 1]."""
+    if pattern == "sobol":
+        return _sobol(points)
+    cells = _cells(points)
+    return cells if pattern == "grid" else cells[_far_apart(points)]
+
+
+def _cells(points: int) -> Array:
+    """Return the middles of cells of equal area: rows as high as they have cells."""
+    rows = max(1, round(math.sqrt(points)))
+    counts = np.full(rows, points // rows)
+    counts[: points % rows] += 1
+    top = np.cumsum(counts) / points
+    middles = top - 0.5 * counts / points
+    return np.concatenate(
+        [
+            np.stack([(np.arange(count) + 0.5) / count, np.full(count, middle)], axis=1)
+            for count, middle in zip(counts, middles)
+        ]
+    )
+
+
+def _far_apart(points: int) -> NDArray[np.int64]:
+    """Return 0 to points - 1 in the order of van der Corput's sequence."""
+    bits = max(1, (points - 1).bit_length())
+    number = np.arange(2**bits, dtype=np.uint32)
+    order = (_reversed(number) >> np.uint32(32 - bits)).astype(np.int64)
+    return order[order < points]
+
+
+def _sobol(points: int) -> Array:
+    index = np.arange(points, dtype=np.uint32)
+    first = _reversed(index)
+    second, direction = np.zeros_like(index), 1 << 31
+    for bit in range(32):
+        second ^= np.where(index >> np.uint32(bit) & np.uint32(1), np.uint32(direction), np.uint32(0))
+        direction ^= direction >> 1
+    columns = [_scrambled(column, seed) for column, seed in zip((first, second), _SEEDS)]
+    return (np.stack(columns, axis=1).astype(np.float64) + 0.5) / 2.0**32
+
+
+def _scrambled(number, seed: int):
+    """Return numbers after a nested uniform scrambling: each bit is flipped by a hash of the bits above it."""
+    with np.errstate(over="ignore"):
+        x = _reversed(number) + np.uint32(seed)
+        for factor in (0x6C50B47C, 0xB82F1E52, 0xC7AFE638, 0x8D22F6E6):
+            x ^= x * np.uint32(factor)
+    return _reversed(x)
+
+
+def _reversed(number):
+    """Return 32-bit numbers with their bits in reverse order."""
+    x = number
+    for shift, mask in ((16, 0x0000FFFF), (8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
+        x = (x >> np.uint32(shift)) & np.uint32(mask) | (x & np.uint32(mask)) << np.uint32(shift)
+    return x
+
 
 _NEAR = 4e-6  #: of the largest coordinate: how far off the shape rays start, some dozen units in the last place
 
@@ -47,7 +146,7 @@ def place_points(light: AreaLight, points: int, pattern: str) -> PlacedPoints:
     """Return the light points of a light.
 
     `light`: the light with extent; `points`: how many, 1 to 4096; `pattern`: one of
-    `realtime.area_lights.patterns.PATTERNS`. Raises InputError for a number or a pattern that there is not.
+    `realtime.area_lights.points.PATTERNS`. Raises InputError for a number or a pattern that there is not.
 
     Valid for all lights. One point of a sphere lights a half space alone; a few points are needed there.
     """

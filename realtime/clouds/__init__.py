@@ -4,11 +4,11 @@
 Read in this order:
 
 - `slab_orders/`: the light of a slab by order of scattering, in float64, from which tables are made;
-- `bounds/`: where rays cross the boundaries of clouds of any shape;
-- `single_scattering/`: opacity and the light of one scattering, which all methods for clouds share;
+- `bounds.py`: where rays cross the boundaries of clouds of any shape;
+- `single_scattering.py`: opacity and the light of one scattering, which all methods for clouds share;
 - `canonical/`: radiance, collector centre and spread at any point of a slab, by set of orders, as frames look it up;
-- `light_maps/`: a cloud as its sun sees it, filtered to any width;
-- `uniform_sky/`: the light of a sky that is the same everywhere;
+- `light_maps.py`: a cloud as its sun sees it, filtered to any width;
+- `uniform_sky.py`: the light of a sky that is the same everywhere;
 - `hypertexture/`: clouds whose density differs from place to place;
 - `collectors/`: where the light of a set of orders enters a cloud, and how much of it comes;
 - `order_layers.py`: the names of the layers of an image by order.

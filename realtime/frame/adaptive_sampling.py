@@ -38,8 +38,7 @@ import numpy as np
 
 from realtime.errors import InputError
 from realtime.methods.interface.method import Layers
-from realtime.numerics.aligned import aligned_array
-from realtime.numerics.array_types import Metres, PerRay, PerTile
+from realtime.numerics.array_types import Metres, PerRay, PerTile, aligned_array
 from realtime.scene.camera import SIDE, TILE, Camera
 
 _DEPTHS = 1.1  # largest to least distance in a tile

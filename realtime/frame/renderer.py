@@ -34,11 +34,10 @@ from realtime.errors import InputError, refusals
 from realtime.frame.adaptive_sampling import Corners, adaptive_layers, tile_corners
 from realtime.frame.light_on_ray import check_radiance
 from realtime.frame.surface import Cast, surface_stages
-from realtime.kernels.preparation import prepare_kernel, with_tables
+from realtime.kernels.table import prepare_kernel, with_tables
 from realtime.methods.interface.method import Layers, Method, Preparation, method_parameters
 from realtime.methods.interface.view import camera_view
-from realtime.numerics.aligned import aligned_array
-from realtime.numerics.array_types import PerRay
+from realtime.numerics.array_types import PerRay, aligned_array
 from realtime.numerics.recorded import Frozen
 from realtime.scene.camera import TILE, tiled_pixels
 from realtime.scene.light_points import with_light_points

@@ -34,14 +34,12 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.clouds.bounds.surfaces import CloudSurfaces, cloud_surfaces
+from realtime.clouds.bounds import CloudSurfaces, cloud_surfaces
+from realtime.clouds.canonical.coordinates import SETS, share_of_peak, slab_phase
 from realtime.clouds.canonical.fit import fit_on_device, fitted_functions
 from realtime.clouds.canonical.look_up import on_device
-from realtime.clouds.canonical.scene_phase import share_of_peak, slab_phase
-from realtime.clouds.canonical.sets import SETS
 from realtime.clouds.canonical.tables import canonical_tables
-from realtime.clouds.collectors.orders import OrdersLight, light_of_orders
-from realtime.clouds.collectors.search import Collector, Search
+from realtime.clouds.collectors.search import Collector, OrdersLight, Search, light_of_orders
 from realtime.clouds.collectors.transport_grid import transport_grid
 from realtime.clouds.hypertexture.light_depths import (
     LightDepths,
@@ -52,7 +50,7 @@ from realtime.clouds.hypertexture.light_depths import (
 )
 from realtime.clouds.hypertexture.lit_surface import dense_surface, lit_dense_surface
 from realtime.clouds.hypertexture.scattered import light_once, opacity_as_printed, with_densities
-from realtime.clouds.light_maps.pyramid import (
+from realtime.clouds.light_maps import (
     LightMap,
     filtered_map,
     length_along_light,
@@ -61,10 +59,8 @@ from realtime.clouds.light_maps.pyramid import (
     shade,
 )
 from realtime.clouds.order_layers import OPACITY, ORDER_LAYERS, order_layer
-from realtime.clouds.single_scattering.behind import light_on_surfaces, sky_behind
-from realtime.clouds.single_scattering.march import Beam, CloudRays, cloud_rays
-from realtime.clouds.single_scattering.opacity import opacity_of
-from realtime.clouds.uniform_sky.light import SkyEscapes, beams_of, sky_escapes, sky_light
+from realtime.clouds.single_scattering import Beam, CloudRays, cloud_rays, light_on_surfaces, opacity_of, sky_behind
+from realtime.clouds.uniform_sky import SkyEscapes, beams_of, sky_escapes, sky_light
 from realtime.memory import check_memory
 from realtime.methods.interface.method import Layers, Method, tolerance
 from realtime.methods.interface.view import View

@@ -21,15 +21,12 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.clouds.bounds.crossings import sum_over_stretches
-from realtime.clouds.bounds.surfaces import CloudSurfaces, cloud_surfaces
+from realtime.clouds.bounds import CloudSurfaces, cloud_surfaces, sum_over_stretches
 from realtime.clouds.hypertexture.light_depths import LightDepths, leg_by_depths, leg_through, sun_depths
 from realtime.clouds.hypertexture.scattered import light_once, opacity_as_printed, with_densities
 from realtime.clouds.order_layers import OPACITY, ORDER_LAYERS, order_layer
-from realtime.clouds.single_scattering.behind import light_on_surfaces, sky_behind
-from realtime.clouds.single_scattering.march import Beam, cloud_rays, exact_leg
-from realtime.clouds.single_scattering.opacity import opacity_of
-from realtime.clouds.uniform_sky.light import SkyEscapes, beams_of, sky_escapes, sky_light
+from realtime.clouds.single_scattering import Beam, cloud_rays, exact_leg, light_on_surfaces, opacity_of, sky_behind
+from realtime.clouds.uniform_sky import SkyEscapes, beams_of, sky_escapes, sky_light
 from realtime.errors import InputError
 from realtime.methods.interface.method import Layers, Method
 from realtime.methods.interface.view import View

@@ -31,7 +31,7 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.errors import InputError
-from realtime.intervals.lit_intervals import add_waiting, close_interval, no_intervals, sum_at_end
+from realtime.intervals import add_waiting, close_interval, no_intervals, sum_at_end
 from realtime.methods.interface.marching import marched_integral, marched_steps
 from realtime.methods.interface.method import Method, tolerance
 from realtime.parameters import parameter

@@ -3,9 +3,7 @@
 
 Read in this order:
 
-- `array_types.py`: the Dr.Jit types of one precision, so that one source runs in float32 and float64;
-- `aligned.py`: arrays from NumPy, aligned as Dr.Jit's own;
-- `host_numbers.py`: the way back, for a few numbers of a scene;
+- `array_types.py`: the Dr.Jit types of one precision, arrays from NumPy, and the way back;
 - `diamond_angle.py`: an azimuth without trigonometry;
 - `fast_exp.py`: exponentials for bounded arguments;
 - `gauss_legendre.py`: nodes and weights as constants of recorded kernels;

@@ -1,11 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Dr.Jit array types of one precision, so that every method runs in float32 and float64 from the same source."""
+"""Arrays of Dr.Jit: types of one precision, arrays from NumPy, and the way back to the host.
+
+Dr.Jit array types of one precision, so that every method runs in float32 and float64 from the same source.
+
+Arrays from NumPy in memory that is aligned as Dr.Jit's own is.
+
+Numbers of a scene brought from the device to the host, the one way in which a frame may do so.
+
+What a frame reads so is a few numbers of lights and cameras; each such read waits until the device has come to rest.
+"""
 
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
 from realtime.errors import InputError
 
@@ -89,3 +100,70 @@ def chosen_value(values, number):
     for place, value in enumerate(others, 1):
         chosen = dr.select(number == place, value, chosen)
     return chosen
+
+
+_ALIGNMENT = 64  # bytes, of memory that Dr.Jit allocates
+
+
+def aligned_array(scalar: Any, numbers: NDArray[Any]) -> Any:
+    """Return numbers as a Dr.Jit array in memory that is aligned as Dr.Jit's own is.
+
+    A Dr.Jit array of NumPy's memory uses it as it stands, and a kernel is compiled, a frozen function recorded, for the
+    alignment of each of its arrays: where NumPy puts them by chance, the same kernel is compiled again and again.
+
+    `scalar`: the type of the array, such as `mi.Float`; `numbers`: (n,), in any unit.
+    """
+    dtype = _dtype(scalar, numbers)
+    aligned = _memory(numbers.size * dtype.itemsize)[: numbers.size * dtype.itemsize].view(dtype)
+    aligned[:] = numbers
+    return scalar(aligned)
+
+
+def aligned_numbers(scalar: Any, numbers: NDArray[Any]) -> list[Any]:
+    """Return numbers as Dr.Jit arrays of one entry each, as `aligned_array` makes them.
+
+    `scalar`, `numbers`: as of `aligned_array`.
+    """
+    dtype = _dtype(scalar, numbers)
+    step = _ALIGNMENT // dtype.itemsize
+    aligned = _memory(numbers.size * _ALIGNMENT)[: numbers.size * _ALIGNMENT].view(dtype)
+    aligned[::step] = numbers
+    return [scalar(aligned[place : place + 1]) for place in range(0, numbers.size * step, step)]
+
+
+def _dtype(scalar: Any, numbers: NDArray[Any]) -> np.dtype[Any]:
+    floats: dict[Any, np.dtype[Any]] = {dr.VarType.Float32: np.dtype("f4"), dr.VarType.Float64: np.dtype("f8")}
+    return floats.get(dr.type_v(scalar), numbers.dtype)  # truth values and whole numbers come in their own type
+
+
+def _memory(size: int) -> NDArray[np.uint8]:
+    """Return at least so many bytes of aligned memory, and as many again as Embree may read beyond the last number."""
+    memory = np.empty(size + 2 * _ALIGNMENT, dtype=np.uint8)
+    return memory[-memory.ctypes.data % _ALIGNMENT :]
+
+
+def host_numbers(*values: Any) -> tuple[NDArray[np.float64], ...]:
+    """Bring values to the host together.
+
+    `values`: Dr.Jit numbers and vectors of one type and one entry each, in any unit. Returns `numbers`: by value its
+    components, (n,), in float64.
+    """
+    components = [tuple(value) if dr.depth_v(value) > 1 else (value,) for value in values]
+    every = [component for of_value in components for component in of_value]
+    numbers = _element_by_element(every) if _on_processor(every[0]) else _in_one_transfer(every)
+    ends = np.cumsum([len(of_value) for of_value in components])
+    return tuple(np.split(numbers, ends[:-1]))
+
+
+def _on_processor(number: Any) -> bool:
+    return bool(dr.backend_v(number) != dr.JitBackend.CUDA)
+
+
+def _element_by_element(numbers: list[Any]) -> NDArray[np.float64]:
+    """Read where they lie: on a processor a read takes less than a microsecond, and a copy of all a kernel."""
+    return np.array([number[0] for number in numbers], dtype=np.float64)
+
+
+def _in_one_transfer(numbers: list[Any]) -> NDArray[np.float64]:
+    """Gather on the device, then transfer once: every transfer from a GPU waits for all that runs there."""
+    return np.array(dr.concat(numbers), dtype=np.float64)

@@ -15,11 +15,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.area_lights.caster import caster_vertices
-from realtime.area_lights.shape import AreaLight
+from realtime.area_lights.shape import AreaLight, caster_vertices
 from realtime.errors import InputError
-from realtime.numerics.aligned import aligned_array
-from realtime.numerics.array_types import types_of
+from realtime.numerics.array_types import aligned_array, types_of
 from realtime.scene.directional_extent import directional_fields, extent_spheres
 from realtime.scene.lights import DirectionalExtent, Light
 from realtime.scene.media.medium import Medium

@@ -23,7 +23,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.numerics.host_numbers import host_numbers
+from realtime.numerics.array_types import host_numbers
 
 TILE = 16  #: rays in a tile of neighbouring pixels
 SIDE = 4  #: of a tile [pixels]

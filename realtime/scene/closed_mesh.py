@@ -21,7 +21,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from realtime.errors import InputError
-from realtime.numerics.aligned import aligned_array
+from realtime.numerics.array_types import aligned_array
 from realtime.scene.named_shapes import scene_of
 
 Array = NDArray[np.float64]

@@ -25,8 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.errors import InputError
-from realtime.numerics.aligned import aligned_array
-from realtime.numerics.array_types import ArrayTypes, PerRay, four_numbers
+from realtime.numerics.array_types import ArrayTypes, PerRay, aligned_array, four_numbers
 from realtime.scene.closed_mesh import ClosedMesh
 
 Array = NDArray[np.float64]

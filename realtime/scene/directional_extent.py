@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from realtime.numerics.aligned import aligned_array
-from realtime.numerics.array_types import ArrayTypes
+from realtime.numerics.array_types import ArrayTypes, aligned_array
 from realtime.scene.closed_mesh import ClosedMesh
 from realtime.scene.lights import DirectionalExtent
 from realtime.scene.media.light_paths import BoundedMedium

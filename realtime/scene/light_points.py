@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.area_lights.points import PlacedPoints, place_points
-from realtime.numerics.aligned import aligned_numbers
-from realtime.numerics.array_types import ArrayTypes, types_of
-from realtime.numerics.host_numbers import host_numbers
+from realtime.numerics.array_types import ArrayTypes, aligned_numbers, host_numbers, types_of
 from realtime.scene.lights import Facing, Light
 from realtime.scene.read_scene import Scene
 

@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from realtime.area_lights.caster import caster_triangles, caster_vertices
-from realtime.area_lights.shape import AreaLight
+from realtime.area_lights.shape import AreaLight, caster_triangles, caster_vertices
 from realtime.errors import InputError
 
 Array = NDArray[np.float64]

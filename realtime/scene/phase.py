@@ -18,7 +18,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.droplets.table import CUT, droplet_table, share_cut
+from realtime.droplets import CUT, droplet_table, share_cut
 from realtime.errors import InputError
 
 
@@ -26,8 +26,8 @@ from realtime.errors import InputError
 class Reach:
     """How far rules of fixed sizes serve a phase function, each found by trial."""
 
-    panel: float = 0.4  #: widest panel of `realtime.kernels.panels`, in v
-    few: float = 0.1  #: longest segment for four nodes of `realtime.kernels.short_segments`, over its distance
+    panel: float = 0.4  #: widest panel of `realtime.kernels.exact`, in v
+    few: float = 0.1  #: longest segment for four nodes of `realtime.kernels.exact`, over its distance
     more: float = 0.2  #: and for eight nodes
     turn: float = 0.25  #: of the largest angle of a panel at the light, `realtime.scene.media.bounded_rays`
 
@@ -56,7 +56,7 @@ class Phase:
         return self.evaluate_half(1 - up, up)
 
     def density(self, f, c, scale) -> Any:
-        """Return p/(1 + E^2) cosh v at E = scale f, c = cosh v = sqrt(1 + f^2), as `realtime.kernels.panels` wants."""
+        """Return p/(1 + E^2) cosh v at E = scale f, c = cosh v = sqrt(1 + f^2), as `realtime.kernels.exact` wants."""
         square = dr.square(scale * f)
         up = dr.rcp(square + 1)
         return c * up * self.evaluate_half(square * up, up)
@@ -341,11 +341,11 @@ class HgDraine(Phase):
 
 @dataclass(frozen=True)
 class Mie(Phase):
-    """Water droplets, from the table of `realtime.droplets.table`."""
+    """Water droplets, from the table of `realtime.droplets`."""
 
     entries: Any  #: values and slopes in turn
     lobe: float  #: E = tan(angle/2) at which the peak has fallen to half
-    width: float  #: widest panel of `realtime.kernels.panels`: the finer the function ripples, the narrower
+    width: float  #: widest panel of `realtime.kernels.exact`: the finer the function ripples, the narrower
 
     name = "mie"
     reach = Reach(few=0.01, more=0.04, turn=0.03)

@@ -15,8 +15,7 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.errors import InputError
-from realtime.numerics.aligned import aligned_array
-from realtime.numerics.array_types import ArrayTypes
+from realtime.numerics.array_types import ArrayTypes, aligned_array
 from realtime.scene.closed_mesh import ClosedMesh, check_bodies, encloses
 from realtime.scene.convex_bounds import (
     Bounds,
@@ -55,7 +54,7 @@ def sort_shapes(scene):
     for shape in scene.shapes():
         bsdf, name = shape.bsdf(), shape.id()
         if shape.is_emitter() and bsdf.class_name() == "Null":
-            continue  # light and nothing else: `realtime.area_lights.read` says what it must be
+            continue  # light and nothing else: `realtime.area_lights.shape` says what it must be
         bounds = shape.interior_medium() is not None or shape.exterior_medium() is not None
         if bsdf.class_name() != "Null":
             if bounds:

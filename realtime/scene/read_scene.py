@@ -14,8 +14,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.area_lights.read import is_area_light, read_area_light
-from realtime.area_lights.shape import AreaLight
+from realtime.area_lights.shape import AreaLight, is_area_light, read_area_light
 from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes, array_types, types_of
 from realtime.scene.camera import Camera, pixel_grid

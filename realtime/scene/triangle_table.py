@@ -16,8 +16,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.numerics.aligned import aligned_array
-from realtime.numerics.array_types import ArrayTypes, four_numbers
+from realtime.numerics.array_types import ArrayTypes, aligned_array, four_numbers
 
 _CORNERS = (0, 0), (1, 0), (0, 1)  # barycentric coordinates u, v
 _FLAT = 1e-5  # length of the difference between the normals of a corner and of the triangle: float32, with room

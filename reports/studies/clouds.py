@@ -227,7 +227,7 @@ def transport(phase: str = "mie-modified", *, albedo: float = 1.0, progress: Pro
     from reports.machine.environment import activate
 
     activate()
-    from realtime.clouds.canonical.sets import set_name
+    from realtime.clouds.canonical.coordinates import set_name
     from realtime.clouds.canonical.tables import RANKS, canonical_tables
     from validation.slab.phases import phase_pair
 

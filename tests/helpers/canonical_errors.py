@@ -16,10 +16,9 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.clouds.canonical.coordinates import LOWEST_SUN, THICKEST, THINNEST
+from realtime.clouds.canonical.coordinates import LOWEST_SUN, SETS, THICKEST, THINNEST, set_name
 from realtime.clouds.canonical.directional_moments import DirectionalMoments
 from realtime.clouds.canonical.look_up import LookUp
-from realtime.clouds.canonical.sets import SETS, set_name
 from realtime.clouds.slab_orders.phases import SlabPhase
 from realtime.numerics.array_types import ArrayTypes
 

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction
-from realtime.numerics.aligned import aligned_array
-from realtime.numerics.array_types import ArrayTypes, array_types
+from realtime.numerics.array_types import ArrayTypes, aligned_array, array_types
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous

@@ -11,7 +11,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-import realtime.numerics.host_numbers as host_numbers
+import realtime.numerics.array_types as array_types
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("realtime", "validation", "reports")
@@ -22,7 +22,7 @@ def round_trips() -> Iterator[Counter[str]]:
     """Count, by file and function of ours, what waits for the device: reads of arrays, and sizes that arrays decide.
 
     Dr.Jit forbids what waits in any other way (`dr.JitFlag.ForbidSynchronization`): that raises. The processor takes
-    the way of a GPU where the two differ, `realtime.numerics.host_numbers`.
+    the way of a GPU where the two differ, `realtime.numerics.array_types`.
     """
     import pytest
 
@@ -52,7 +52,7 @@ def round_trips() -> Iterator[Counter[str]]:
                 patch.setattr(kind, name, counted(getattr(kind, name), _on_device))
         for name in ("compress", "sync_thread", "flush_malloc_cache", "slice"):
             patch.setattr(dr, name, counted(getattr(dr, name), lambda given: True))
-        patch.setattr(host_numbers, "_on_processor", lambda number: False)
+        patch.setattr(array_types, "_on_processor", lambda number: False)
         with dr.scoped_set_flag(dr.JitFlag.ForbidSynchronization):
             yield trips
 

@@ -18,9 +18,9 @@ import numpy as np
 from analytic.cases import Cases
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
-from realtime.kernels.preparation import prepare_kernel, with_tables
 from realtime.kernels.registry import KERNELS
-from realtime.numerics.aligned import aligned_array
+from realtime.kernels.table import prepare_kernel, with_tables
+from realtime.numerics.array_types import aligned_array
 from realtime.numerics.recorded import Frozen
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light

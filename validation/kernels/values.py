@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from analytic.cases import Cases
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
-from realtime.numerics.aligned import aligned_array
-from realtime.numerics.array_types import array_types
+from realtime.numerics.array_types import aligned_array, array_types
 from realtime.rays.ray_light import RayGeometry, ray_geometry
 from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.droplets import Modified, optics
+from realtime.clouds.canonical.coordinates import SETS, set_name
 from realtime.clouds.canonical.directional_moments import DirectionalMoments
 from realtime.clouds.canonical.fit import fit_on_device, fitted_functions
 from realtime.clouds.canonical.look_up import LookUp, on_device
-from realtime.clouds.canonical.sets import SETS, set_name
 from realtime.clouds.canonical.tables import canonical_tables
 from realtime.clouds.slab_orders.moments import SlabOrders, order_sets
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SlabPhase, droplet_phase

@@ -9,7 +9,7 @@ import numpy as np
 
 from analytic.errors import InputError
 from analytic.phase import phase_from_words
-from realtime.numerics.aligned import aligned_array
+from realtime.numerics.array_types import aligned_array
 from validation.scenes.meshes import Mesh
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from realtime.area_lights.read import is_area_light
+from realtime.area_lights.shape import is_area_light
 from realtime.scene.mesh_adjacency import mesh_triangles
 from realtime.scene.named_shapes import scene_of
 from validation.scenes.meshes import divided

@@ -1,5 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The coordinates of the tables, and the steep factors that they leave out, so that few entries serve.
+"""The coordinates of the canonical tables, and which factors of the light of a slab they leave out.
+
+The eight sets of orders of Bouthors 2008, section 5.1; order 1 stands apart.
+
+The phase function scattered n times, P_s of the coordinates of the tables.
+
+Fields over places and directions as sums of products.
+
+A field q of the place p = (t, d, mu_L) and of the direction v = (mu, phi) is close to a sum of few products,
+
+    q(p, v) = sum_k a_k(p) g_k(v),
+
+coefficients of the place times shapes of the direction: places have little to tell each other apart by, and each tells
+it in all directions at once. Tables of three and of two coordinates take the place of one of five, so that both can be
+fine. The best g_k are the first eigenvectors of the mean of q(v) q(v') over places (Eckart and Young 1936): that of the
+weighted square error, for weights of places and of directions. They are orthonormal, which makes a_k = <q, g_k>.
+
+The coordinates of the tables, and the steep factors that they leave out, so that few entries serve.
 
     thickness    log(t + 0.02), for t from 0.01 to 200
     depth        a(d)/(a(d) + a(t - d)), a(z) = log(1 + z/0.1): 0 at the lit face, 1 at the other, fine at both
@@ -33,17 +50,105 @@ direction and log s_b(t, d, mu_L) a mean over directions,
     D = w <s> + s_b (X, Y),     sigma^2 = s_b^2 exp(2 Z) + |w|^2 (<s^2> - <s>^2)/2.
 
 F, X, Y and Z are sums of products, see `low_rank.py`.
+
+Interpolation on simplices: the entries around a place of a regular grid, and what each counts.
+
+With the shares f of the place in its cell sorted so that f_1 >= f_2 >= .., and the strides s_i in that order,
+
+    v = v_0 (1 - f_1) + v_1 (f_1 - f_2) + .. + v_n f_n,     v_i the entry at base + s_1 + .. + s_i,
+
+linear within each of the simplices of a cell, and continuous: n + 1 entries, where products of pairs of weights take
+2^n. A function without mixed second derivatives has the same error in both.
+
+The phase function of a scene as the computation of slabs needs it.
 """
 
 import math
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.clouds.canonical.sets import SETS
+from realtime.clouds.slab_orders.phases import AnglePhase, SlabPhase
+from realtime.droplets import CUT
+from realtime.numerics.array_types import ArrayTypes
+from realtime.scene.phase import Phase
+
+#: First and last order of each set.
+SETS: tuple[tuple[int, float], ...] = (
+    (2, 2),
+    (3, 4),
+    (5, 6),
+    (7, 8),
+    (9, 12),
+    (13, 18),
+    (19, 30),
+    (31, math.inf),
+)
+
+
+def set_name(number: int) -> str:
+    """Return '2', '3-4', .. '31-inf'."""
+    first, last = SETS[number]
+    if first == last:
+        return str(first)
+    return f"{first}-{int(last)}" if math.isfinite(last) else f"{first}-inf"
+
 
 Array = NDArray[Any]
+
+ENTRIES = 1025  #: at even angles from 0 to pi
+_DEGREES = 800
+_LEAST = 1e-3  #: of the mean, below which nothing is divided by it
+
+
+def repeated_scattering(phase: SlabPhase) -> Array:
+    """Return P_s at even angles, (sets, ENTRIES).
+
+    n scatterings of a beam without a boundary multiply Legendre moments: the mean over the orders of a set of
+    sum (2 l + 1) chi_l^n P_l. The set without end counts as isotropic.
+    """
+    cosines = np.cos(np.linspace(0.0, np.pi, ENTRIES))
+    moments = phase.moments(_DEGREES)
+    series = []
+    for first, last in SETS:
+        if math.isfinite(last):
+            powers = np.mean([moments**order for order in range(first, int(last) + 1)], axis=0)
+        else:
+            powers = np.eye(1, _DEGREES)[0]
+        series.append((2 * np.arange(_DEGREES) + 1) * powers)
+    before, now = np.zeros_like(cosines), np.ones_like(cosines)
+    total = np.zeros((len(SETS), ENTRIES))
+    for degree, strengths in enumerate(np.array(series).T):
+        total += strengths[:, None] * now
+        before, now = now, ((2 * degree + 1) * cosines * now - degree * before) / (degree + 1)
+    return np.maximum(total, _LEAST)
+
+
+def at_angle(table: Array, cosines: Array) -> Array:
+    """Return values of one set at cosines, linear in the angle between entries."""
+    return np.interp(np.arccos(np.clip(cosines, -1.0, 1.0)), np.linspace(0.0, np.pi, ENTRIES), table)
+
+
+def direction_shapes(fields: Array, places: Array, directions: Array, rank: int) -> Array:
+    """Return the shapes that fields at some places have most of.
+
+    `fields`: (P, V), at P places in V directions; `places`, `directions`: (P,) and (V,), weights, not negative; those
+    of directions positive; `rank`: K, how many shapes. Returns `ndarray`: (K, V), with sum_v directions_v g_k g_l =
+    delta_kl.
+    """
+    roots = np.sqrt(directions)
+    weighted = fields * roots * np.sqrt(places / places.max())[:, None]
+    _, vectors = np.linalg.eigh(weighted.T @ weighted)
+    return np.ascontiguousarray((vectors[:, ::-1][:, :rank] / roots[:, None]).T)
+
+
+def coefficients(fields: Array, directions: Array, shapes: Array) -> Array:
+    """Return a_k of fields, (P, K); parameters as above."""
+    return (fields * directions) @ shapes.T
+
 
 THINNEST, THICKEST = 0.01, 200.0
 LOWEST_SUN = 0.02
@@ -127,3 +232,65 @@ def last_way(way: Array) -> tuple[Array, Array]:
     variance = 2 - (way + 2) * way * lost - mean**2
     series = short / 2 - short**2 / 12, short**2 / 12 - short**4 / 240
     return np.where(way < SHORT, series[0], mean), np.where(way < SHORT, series[1], np.maximum(variance, 0.0))
+
+
+#: Networks that sort so many numbers by comparisons of pairs.
+_NETWORKS = {
+    2: ((0, 1),),
+    3: ((0, 2), (0, 1), (1, 2)),
+    5: ((0, 3), (1, 4), (0, 2), (1, 3), (0, 1), (2, 4), (1, 2), (3, 4), (2, 3)),
+}
+
+
+def around(places: tuple[Any, ...], sides: tuple[int, ...], first: Any = 0) -> list[tuple[Any, Any]]:
+    """Return indices and weights of the entries around places.
+
+    `places`: coordinates from 0 to 1; two, three or five; `sides`: entries along each, the last of which lie side by
+    side; `first`: index of the first entry.
+    """
+    base: Any = mi.UInt32(first)
+    pairs: list[tuple[Any, Any]] = []
+    for axis, (place, side) in enumerate(zip(places, sides, strict=True)):
+        position = dr.clip(place, 0, 1) * (side - 1)
+        cell = dr.minimum(mi.UInt32(position), side - 2)
+        stride = math.prod(sides[axis + 1 :])
+        base += cell * stride
+        pairs.append((position - type(position)(cell), mi.UInt32(stride)))
+    for first, second in _NETWORKS[len(pairs)]:
+        (a, p), (b, q) = pairs[first], pairs[second]
+        less = a < b
+        pairs[first] = dr.select(less, b, a), dr.select(less, q, p)
+        pairs[second] = dr.select(less, a, b), dr.select(less, p, q)
+    entries, before = [], type(pairs[0][0])(1)
+    for share, stride in pairs:
+        entries.append((base, before - share))
+        base, before = base + stride, share
+    return [*entries, (base, before)]
+
+
+def slab_phase(phase: Phase, types: ArrayTypes, *, modified: bool = False) -> AnglePhase:
+    """Return the phase function of a scene by its values.
+
+    `phase`: of a medium of the scene; `types`: of its numbers; `modified`: whether the peak below `CUT` is cut to zero:
+    then lengths are those of the medium whose density is lowered by `share_of_peak`.
+    """
+    edge = np.deg2rad(CUT)
+
+    def heights(angles: Array) -> Array:
+        values = _values(phase, types, angles)
+        return np.where(angles < edge, 0.0, values) if modified else values
+
+    return AnglePhase(heights, np.array([0.0, edge, np.pi]))
+
+
+def share_of_peak(phase: Phase, types: ArrayTypes) -> float:
+    """Return the share of the light [1] that a phase function scatters by less than `CUT`."""
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    edge = np.deg2rad(CUT)
+    angles = edge * (nodes + 1) / 2
+    return float(weights @ (_values(phase, types, angles) * np.sin(angles)) * edge / 4)
+
+
+def _values(phase: Phase, types: ArrayTypes, angles: Array) -> Array:
+    down, up = (types.scalar(function(angles / 2) ** 2) for function in (np.sin, np.cos))
+    return np.array(phase.evaluate_half(down, up), dtype=np.float64)

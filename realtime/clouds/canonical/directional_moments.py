@@ -35,7 +35,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from realtime.clouds.canonical.sets import SETS
+from realtime.clouds.canonical.coordinates import SETS
 from realtime.clouds.slab_orders.depth_panels import DepthPanels, Transport, depth_panels, panel_weights
 from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes
 from realtime.clouds.slab_orders.phases import SlabPhase

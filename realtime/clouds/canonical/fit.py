@@ -27,9 +27,9 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from realtime.clouds.canonical import coordinates
+from realtime.clouds.canonical.coordinates import SETS
 from realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
 from realtime.clouds.canonical.look_up import LookUp, direction_share
-from realtime.clouds.canonical.sets import SETS
 from realtime.clouds.canonical.tables import CanonicalTables, logged, tables_digest
 from realtime.clouds.slab_orders.phases import SlabPhase
 from realtime.numerics.array_types import ArrayTypes

@@ -28,8 +28,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from realtime.clouds.canonical import coordinates
-from realtime.clouds.canonical.angular import ENTRIES
-from realtime.clouds.canonical.simplex import around
+from realtime.clouds.canonical.coordinates import ENTRIES, around
 from realtime.clouds.canonical.tables import RANKS, CanonicalTables
 from realtime.numerics.array_types import ArrayTypes
 

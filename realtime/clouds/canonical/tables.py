@@ -13,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.clouds.canonical import coordinates
-from realtime.clouds.canonical.angular import at_angle, repeated_scattering
+from realtime.clouds.canonical.coordinates import SETS, at_angle, coefficients, direction_shapes, repeated_scattering
 from realtime.clouds.canonical.directional_moments import DirectionalMoments
 from realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
-from realtime.clouds.canonical.low_rank import coefficients, direction_shapes
-from realtime.clouds.canonical.sets import SETS
 from realtime.clouds.slab_orders.phases import SlabPhase
 from realtime.errors import InputError
 

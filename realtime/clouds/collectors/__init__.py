@@ -3,8 +3,6 @@
 
 Read in this order:
 
-- `tangent_slab.py`: the slab that touches the filtered surface, and a point and a view in it;
 - `search.py`: the fixed point of the collector, and the light that comes from there;
-- `orders.py`: one search for each set of orders;
 - `transport_grid.py`: the canonical transport on a grid that frames read fast.
 """

@@ -1,5 +1,35 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""The collector of a set of orders: a fixed point on the lit surface of a cloud (Bouthors 2008, section 6.1).
+"""The collector search: the tangent slab of a collector, the fixed point, and the light that comes from there.
+
+The slab that touches a cloud where light enters it, and a point and a direction in it.
+
+A collector is a place c and a width sigma. The lit surface filtered by sigma (`realtime.clouds.light_maps`) gives a
+point q of the filtered surface, its outward normal n and the thickness Z of the cloud along the light w_L there. The
+slab is the one that touches it: its lit face goes through q across n. With mu_L = -n . w_L,
+
+    t = sigma_t mu_L Z                      its thickness; Z lies along the light,
+    d = sigma_t (q - p) . n                 the depth of the point p below the face,
+    f = p + n d / sigma_t                   the foot of p on the face,
+    mu = v . n                              of the direction v in which light leaves p,
+    x = (w_L + mu_L n)/|..|,  y = n x x     the horizontal direction of the light, and the one beside it,
+    cos phi = v . x / sin, sin phi = v . y / sin,   sin = sqrt(1 - mu^2).
+
+The canonical transport of (t, d, mu, phi, mu_L) gives the radiance of a set of orders at p in the direction v, and
+where its light enters the slab: c = f + (c_x x + c_y y)/sigma_t.
+
+Where a cloud is no slab:
+
+* p above the filtered face: d = 0. A cloud has bumps that the filter has not.
+* p deeper than the slab is thick: t = d. There is cloud down to p at least.
+* The sun below the tangent plane, or in it: mu_L is `LEAST_COSINE` at least, and n is turned towards the sun until it
+  is. Normals of a map face the light, so means of them are never below the plane; at silhouettes they come close to it.
+* Opposed normals whose mean is 0 (both sides of a ridge): n is the direction towards the sun.
+* The sun in the zenith: x is any horizontal direction; the transport depends on none.
+
+`thickness=light` has both lengths along the light, as printed: t = sigma_t Z and d/mu_L, what a depth map holds.
+A slab in which the sun stands at 75 degrees is then 3.9 times too thick.
+
+The collector of a set of orders: a fixed point on the lit surface of a cloud (Bouthors 2008, section 6.1).
 
 Let P(c, sigma) be the slab that touches the surface filtered by sigma where c lies along the light, and F the canonical
 transport: it tells of a slab and of p and v in it the place and the width (c, sigma) of the entry of light. Wanted is
@@ -30,6 +60,12 @@ to p: where both are large it is no contraction, and steps overshoot.
   light is that of the last slab: F gives it with the place and the width.
 
 The distance |F - c'| / sigma of the last step says how far the search is from its end: `CollectorLight.missed`.
+
+The light of all sets of orders at points of a cloud under one sun: one search for each set.
+
+What a frame leaves to the next are the collectors of each set: the vectors from the points to the centres, and the
+widths, which are 0 where there is none. Where the camera moved, a point of the next frame lies beside the one whose
+collector it takes, and its collector lies beside that too.
 """
 
 from collections.abc import Callable
@@ -39,8 +75,81 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.collectors.tangent_slab import TangentSlab, tangent_slab
-from realtime.clouds.light_maps.pyramid import LightMap, filtered_surface
+from realtime.clouds.light_maps import FilteredSurface, LightMap, filtered_surface
+
+LEAST_COSINE = 0.02  #: of the sun over a tangent plane
+_LEAST_LENGTH = 1e-4  #: of a mean of unit normals that has a direction
+
+
+@dataclass(frozen=True)
+class TangentSlab:
+    """A slab, a point and a direction in it; lengths in mean free paths unless they say otherwise."""
+
+    thickness: Any  #: t
+    depth: Any  #: d of the point, from 0 to t
+    mu: Any  #: cosine of the direction with the normal
+    cos_phi: Any
+    sin_phi: Any
+    mu_l: Any  #: cosine of the sun's zenith angle
+    foot: Any  #: of the point on the lit face [m]
+    normal: Any
+    along: Any  #: the horizontal direction of the light
+    beside: Any  #: across it and the normal
+
+
+def tangent_slab(
+    surface: FilteredSurface, *, axis: Any, point: Any, toward: Any, extinction: Any, along_light: bool = False
+) -> TangentSlab:
+    """Return the slab that touches a filtered surface, with a point and a direction in it.
+
+    `surface`: what `realtime.clouds.light_maps.filtered_surface` found; `axis`: unit direction in which the
+    light travels; `point`: points in the cloud or on it [m]; `toward`: unit directions in which light leaves the
+    points; `extinction`: of the cloud [1/m]; `along_light`: whether thickness and depth are those along the light, as
+    printed.
+    """
+    Float = type(surface.cover)
+    normal, mu_l = _facing(surface.normal, axis)
+    below = dr.maximum(dr.dot(surface.middle - point, normal), 0)
+    depth, thickness = extinction * below, extinction * surface.thickness
+    if along_light:
+        depth /= mu_l
+    else:
+        thickness *= mu_l
+    along = axis + normal * mu_l
+    length = dr.norm(along)
+    helper = dr.select(dr.abs(normal.x) < 0.5, type(normal)(1, 0, 0), type(normal)(0, 1, 0))
+    along = dr.select(length > _LEAST_LENGTH, along / length, dr.normalize(dr.cross(helper, normal)))
+    beside = dr.cross(normal, along)
+    mu = dr.clip(dr.dot(toward, normal), -1, 1)
+    x, y = dr.dot(toward, along), dr.dot(toward, beside)
+    sine = dr.sqrt(dr.square(x) + dr.square(y))
+    flat = sine > 0
+    return TangentSlab(
+        thickness=dr.maximum(thickness, depth),
+        depth=depth,
+        mu=mu,
+        cos_phi=dr.select(flat, x / sine, Float(1)),
+        sin_phi=dr.select(flat, y / sine, Float(0)),
+        mu_l=mu_l,
+        foot=dr.fma(normal, below, point),
+        normal=normal,
+        along=along,
+        beside=beside,
+    )
+
+
+def _facing(normal: Any, axis: Any) -> tuple[Any, Any]:
+    """Return a unit normal that faces the light by `LEAST_COSINE` at least, and its cosine."""
+    length = dr.norm(normal)
+    normal = dr.select(length > _LEAST_LENGTH, normal / length, -axis)
+    cosine = -dr.dot(normal, axis)
+    # n + s (-w_L), whose cosine is c: s = c sqrt((1 - a^2)/(1 - c^2)) - a, with a that of n.
+    sine = dr.sqrt(dr.maximum(1 - dr.square(cosine), 0))
+    turn = LEAST_COSINE / (1 - LEAST_COSINE**2) ** 0.5 * sine - cosine
+    low = cosine < LEAST_COSINE
+    normal = dr.select(low, dr.normalize(dr.fma(axis, -turn, normal)), normal)
+    return normal, dr.select(low, type(cosine)(LEAST_COSINE), dr.minimum(cosine, 1))
+
 
 #: ``transport(set_number, t, d, mu, cos_phi, sin_phi, mu_l)`` -> T [1/sr], c_x, c_y, sigma [mean free paths].
 Transport = Callable[..., tuple[Any, Any, Any, Any]]
@@ -174,3 +283,58 @@ def _way(slab: TangentSlab) -> Any:
     """Return the optical length of the slab behind the point."""
     across = dr.select(slab.mu < 0, slab.depth, slab.thickness - slab.depth)
     return dr.maximum(across / dr.maximum(dr.abs(slab.mu), _LEVEL), 1e-4)
+
+
+@dataclass(frozen=True)
+class OrdersLight:
+    """The light of sets of orders at points."""
+
+    by_set: tuple[Any, ...]  #: for unit irradiance across the beam [1/sr]
+    collectors: tuple[Collector, ...]  #: for the next frame, by set; centres count from the points [m]
+
+
+def light_of_orders(
+    light_map: LightMap,
+    transport: Transport,
+    *,
+    sets: int,
+    point,
+    toward,
+    extinction,
+    behind,
+    search: Search,
+    last: tuple[Collector, ...] | None = None,
+    active: Any = True,
+) -> OrdersLight:
+    """Search the collectors of all sets of orders, and return their light.
+
+    `light_map`, `transport`, `point`, `toward`, `extinction`, `behind`, `search`, `active`: see
+    `realtime.clouds.collectors.search.collector_light`; `sets`: how many sets there are, numbers from 0 on; `last`: the
+    `OrdersLight.collectors` of the last frame; None where a search starts with nothing.
+    """
+    cold = cold_start(light_map, point)
+    lights = []
+    for number in range(sets):
+        start = cold if last is None else _warm(cold, last[number], point)
+        light = collector_light(
+            light_map,
+            transport,
+            number,
+            point=point,
+            toward=toward,
+            extinction=extinction,
+            behind=behind,
+            start=start,
+            search=search,
+            active=active,
+        )
+        lights.append(light)
+    kept = (Collector(light.collector.centre - point, dr.select(active, light.collector.width, 0)) for light in lights)
+    return OrdersLight(tuple(light.radiance for light in lights), tuple(kept))
+
+
+def _warm(cold: Collector, last: Collector, point) -> Collector:
+    """Return the collector with which a search starts: the last frame's where there is one."""
+    way, width = last.centre, last.width
+    there = width > 0
+    return Collector(dr.select(there, point + way, cold.centre), dr.select(there, width, cold.width))

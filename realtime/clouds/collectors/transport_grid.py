@@ -9,7 +9,7 @@ fifth, with one packet an entry,
 
 where P_s and 1 - exp(-L) are the steep factors that the tables leave out, too, and Q_0(t, d, mu_L) is Q of one level
 direction: deep in thick slabs it falls by many powers of e, so that it has a grid of its own, of three dimensions and
-finer. Between entries it is linear on simplices (`realtime.clouds.canonical.simplex`): 6 entries, where products of
+finer. Between entries it is linear on simplices (`realtime.clouds.canonical.coordinates`): 6 entries, where products of
 five pairs of weights would read 32. The entries are looked up in the tables when a scene is prepared. All sets have one
 code: the number of the set is an offset.
 """
@@ -22,9 +22,8 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.clouds.canonical import coordinates
-from realtime.clouds.canonical.angular import ENTRIES
+from realtime.clouds.canonical.coordinates import ENTRIES, around
 from realtime.clouds.canonical.look_up import place_shares, scattered_at
-from realtime.clouds.canonical.simplex import around
 from realtime.numerics.array_types import four_numbers
 
 #: Entries along thickness, depth, sun, direction and azimuth.

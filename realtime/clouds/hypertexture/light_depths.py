@@ -20,9 +20,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.bounds.surfaces import CloudSurfaces
+from realtime.clouds.bounds import CloudSurfaces
 from realtime.clouds.hypertexture.march import march, marched_depths, middle_density, voxel
-from realtime.clouds.single_scattering.march import exact_leg
+from realtime.clouds.single_scattering import exact_leg
 from realtime.numerics.array_types import Metres, bytes_of
 from realtime.scene.lights import Light
 from realtime.scene.media.bounded import Clouds

@@ -23,10 +23,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.bounds.crossings import next_crossing
-from realtime.clouds.bounds.surfaces import CloudSurfaces
+from realtime.clouds.bounds import CloudSurfaces, next_crossing
 from realtime.clouds.hypertexture.march import march, middle_density, voxel
-from realtime.clouds.light_maps.surfaces import LitSurfaces
+from realtime.clouds.light_maps import LitSurfaces
 from realtime.scene.lights import Light
 from realtime.scene.media.bounded import Clouds
 from realtime.shadow_maps.shadow_map import check_size, texel_rays
@@ -111,7 +110,7 @@ def lit_dense_surface(
     threshold: float,
     stride: Any,
 ) -> LitSurfaces:
-    """Return what rays along a light meet of one cloud, as `realtime.clouds.light_maps.surfaces.cast_surfaces` does.
+    """Return what rays along a light meet of one cloud, as `realtime.clouds.light_maps.cast_surfaces` does.
 
     `surfaces`, `clouds`, `threshold`, `stride`: as for `dense_surface`; `light`, `size`: as for `cast_surfaces`;
     `cloud`: its number; `body`: by cloud, mean(rho where rho > rho_0) [1].

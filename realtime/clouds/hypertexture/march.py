@@ -3,7 +3,7 @@ r"""Small steps of rays through clouds with densities, and optical depths.
 
 A step of the length dx has the density in its middle, rho, and the depth kappa rho dx: the midpoint rule, whose error
 falls with dx^2. Steps start as long as a voxel, and grow with the depth tau to the eye like exp(tau/s), s =
-`realtime.clouds.single_scattering.spacing.SPREAD`: what lies behind tau shows with exp(-tau), so all steps have about
+`realtime.clouds.single_scattering.SPREAD`: what lies behind tau shows with exp(-tau), so all steps have about
 the same share in what is wrong of it.
 """
 
@@ -13,9 +13,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.bounds.crossings import next_crossing
-from realtime.clouds.bounds.surfaces import CloudSurfaces
-from realtime.clouds.single_scattering.spacing import SPREAD
+from realtime.clouds.bounds import CloudSurfaces, next_crossing
+from realtime.clouds.single_scattering import SPREAD
 from realtime.numerics.array_types import Metres
 from realtime.scene.media.bounded import Clouds
 
@@ -73,7 +72,7 @@ def marched_depths(
     """Return the optical depth of rays up to a distance in all clouds, by channel [1].
 
     `surfaces`, `clouds`, `origin`, `direction`, `end`, `active`: as for
-    `realtime.clouds.bounds.crossings.optical_depths`; how long the first steps are [voxels]; `seen`: whether the depths
+    `realtime.clouds.bounds.optical_depths`; how long the first steps are [voxels]; `seen`: whether the depths
     are those of what the eye sees: steps grow, and end behind `OPAQUE`.
     """
     Float, lanes = type(direction.x), max(dr.width(direction), dr.width(origin))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Light that was scattered once in clouds with densities, and their opacity as printed.
 
-The sum of `realtime.clouds.single_scattering.march` with the extinction kappa rho of each step, and the legs of the
+The sum of `realtime.clouds.single_scattering` with the extinction kappa rho of each step, and the legs of the
 light linear on it. Nodes lie at
 
     tau_k = -s log(1 - (k/N) (1 - exp(-T/s)))
@@ -21,12 +21,18 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.bounds.crossings import optical_depths
-from realtime.clouds.bounds.surfaces import CloudSurfaces
+from realtime.clouds.bounds import CloudSurfaces, optical_depths
 from realtime.clouds.hypertexture.march import OPAQUE, least, march, marched_depths, middle_density, voxel
-from realtime.clouds.single_scattering.march import Beam, CloudRays, scattered, step_light
-from realtime.clouds.single_scattering.opacity import add_printed, nothing_printed, printed_opacity
-from realtime.clouds.single_scattering.spacing import SPREAD
+from realtime.clouds.single_scattering import (
+    SPREAD,
+    Beam,
+    CloudRays,
+    add_printed,
+    nothing_printed,
+    printed_opacity,
+    scattered,
+    step_light,
+)
 from realtime.numerics.array_types import chosen_value
 from realtime.scene.media.bounded import Clouds
 
@@ -60,7 +66,7 @@ def marched_light(
 ) -> tuple[tuple[Any, ...], ...]:
     """Return the radiance that clouds scatter once into rays, by beam and octave, RGB [W/(m^2 sr)].
 
-    `rays`, `beams`, `steps`, `printed`: as for `realtime.clouds.single_scattering.march.scattered`; the longest step
+    `rays`, `beams`, `steps`, `printed`: as for `realtime.clouds.single_scattering.scattered`; the longest step
     where a ray enters [voxels].
 
     Bouthors, Neyret, Max, Bruneton, Crassin 2008, sections 6.2 and 8.

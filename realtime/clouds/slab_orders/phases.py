@@ -15,8 +15,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import ArrayLike, NDArray
 
-from realtime.droplets.series import droplet_series
-from realtime.droplets.table import CUT
+from realtime.droplets import CUT, droplet_series
 from realtime.scene.phase import HgDraine
 
 Array = NDArray[np.float64]
@@ -109,7 +108,7 @@ def tabulated_phase(angles: Array, heights: Array) -> AnglePhase:
 
 
 def droplet_phase(radius: float, gamma: float, wavelength: float, *, modified: bool) -> AnglePhase:
-    """Return the phase function of droplets; the numbers are those of `realtime.droplets.series.droplet_series`.
+    """Return the phase function of droplets; the numbers are those of `realtime.droplets.droplet_series`.
 
     If it is `modified`, the peak below `CUT` is cut to zero: lengths are then those of the medium whose density is
     lowered by the share of the peak.

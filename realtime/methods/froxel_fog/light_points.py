@@ -9,8 +9,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.numerics.aligned import aligned_array
-from realtime.numerics.array_types import four_numbers
+from realtime.numerics.array_types import aligned_array, four_numbers
 from realtime.scene.light_points import read_light_points
 from realtime.scene.lights import Facing, Light
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps, LightFrame, cast_hemisphere_maps

@@ -7,7 +7,7 @@ over which the ray is above the largest height is lit as a whole, one over which
 steps to its neighbour, one level up where the border is that of the parent too. Into any other node it descends, down
 to the texels. In a texel it crosses the height field not at all, once, or twice
 (`realtime.methods.light_volumes.texel_crossings`), and between crossings it is lit or dark as a whole
-(`realtime.intervals.lit_intervals`). So crossings come in the order of the ray.
+(`realtime.intervals`). So crossings come in the order of the ray.
 
 The borders of a node are crossed at t = (column - u0) dt/du and t = (row - v0) dt/dv, computed from its own four
 borders alone. So two neighbours see the same number t between them and, if they are texels, the same two heights: D,
@@ -24,7 +24,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.intervals.lit_intervals import LitIntervals, add_waiting, close_interval, no_intervals, sum_at_end
+from realtime.intervals import LitIntervals, add_waiting, close_interval, no_intervals, sum_at_end
 from realtime.methods.light_volumes.face_lines import Line, at_line, distance_at, face_ray, in_face, line_of
 from realtime.methods.light_volumes.texel_crossings import passage, texel_crossings
 from realtime.shadow_maps.inverse_depth_field import InverseDepthField, node_bounds

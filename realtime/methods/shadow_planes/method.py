@@ -37,8 +37,7 @@ from realtime.methods.shadow_planes.published_media import check_vertices, sum_i
 from realtime.methods.shadow_planes.published_mesh import gamma_at, mesh_gamma, surface_gamma, visible_triangle
 from realtime.methods.shadow_planes.silhouettes import components_in_view, cone_ring
 from realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_intervals
-from realtime.numerics.array_types import ArrayTypes, types_of
-from realtime.numerics.host_numbers import host_numbers
+from realtime.numerics.array_types import ArrayTypes, host_numbers, types_of
 from realtime.parameters import parameter
 from realtime.scene.camera import HostCamera, read_camera
 from realtime.scene.light_points import source_shape

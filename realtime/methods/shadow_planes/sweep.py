@@ -14,7 +14,7 @@ eight; after that it collects the eight nearest crossings from the whole list, g
 and so on. That is right for any order.
 
 A walk is one loop that reads a plane or goes over a crossing. An interval that has ended waits until every fourth plane
-(`realtime.intervals.lit_intervals` says why): neighbours whose intervals end at two edges of one silhouette are then
+(`realtime.intervals` says why): neighbours whose intervals end at two edges of one silhouette are then
 served at once. What is lit to the end of the ray is added behind the loop, which rays that cross nothing do not enter.
 """
 
@@ -25,7 +25,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.intervals.lit_intervals import (
+from realtime.intervals import (
     LitIntervals,
     add_waiting,
     close_interval,

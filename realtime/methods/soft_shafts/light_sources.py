@@ -10,8 +10,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from realtime.numerics.aligned import aligned_array
-from realtime.numerics.array_types import types_of
+from realtime.numerics.array_types import aligned_array, types_of
 from realtime.scene.light_points import read_light_points
 from realtime.scene.lights import Light
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps, LightFrame, cast_hemisphere_maps

@@ -30,11 +30,7 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.errors import InputError
-from realtime.image_filters.guides import depth_guide
-from realtime.image_filters.raster import Raster
-from realtime.image_filters.separable import separable
-from realtime.image_filters.tile_average import tile_average
-from realtime.image_filters.upsample import small_pixels, upsample
+from realtime.image_filters import Raster, depth_guide, separable, small_pixels, tile_average, upsample
 from realtime.methods.interface.marching import marched_integral
 from realtime.methods.interface.method import Layers
 from realtime.methods.interface.view import View

@@ -6,11 +6,7 @@ from typing import Any
 
 import drjit as dr
 
-from realtime.image_filters.bilateral import bilateral
-from realtime.image_filters.guides import Guide, airlight_guide
-from realtime.image_filters.levels import bilateral_of_levels
-from realtime.image_filters.raster import Raster
-from realtime.image_filters.separable import separable
+from realtime.image_filters import Guide, Raster, airlight_guide, bilateral, bilateral_of_levels, separable
 from realtime.methods.soft_shafts.parameters import AUTO, SoftShaftsParameters
 
 

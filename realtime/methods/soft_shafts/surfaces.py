@@ -21,10 +21,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.image_filters.guides import Guide
-from realtime.image_filters.raster import Raster
-from realtime.image_filters.separable import separable
-from realtime.image_filters.upsample import small_pixels, upsample
+from realtime.image_filters import Guide, Raster, separable, small_pixels, upsample
 from realtime.methods.interface.view import View
 from realtime.methods.soft_shafts.light_sources import SourceState, frame_at
 from realtime.methods.soft_shafts.parameters import SoftShaftsParameters

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from realtime.area_lights.caster import caster_triangles, caster_vertices
+from realtime.area_lights.shape import caster_triangles, caster_vertices
 from tests.helpers.meshes import directed_edges, volume
 from tests.realtime.area_lights.test_points import AXES, MIDDLE, lamp
 

@@ -4,8 +4,7 @@
 import numpy as np
 import pytest
 
-from realtime.area_lights.patterns import PATTERNS
-from realtime.area_lights.points import place_points
+from realtime.area_lights.points import PATTERNS, place_points
 from realtime.area_lights.shape import AreaLight, turned_area_light
 from realtime.errors import InputError
 from validation.scenes.meshes import rotation

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from realtime.clouds.collectors.search import Search, cold_start, collector_light
-from realtime.clouds.light_maps.pyramid import light_map
-from realtime.numerics.aligned import aligned_array
+from realtime.clouds.light_maps import light_map
+from realtime.numerics.array_types import aligned_array
 from tests.helpers.frames import read
 from tests.helpers.scenes import clear_scene
 from tests.helpers.sunlit import cube, sun, unit

@@ -7,9 +7,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.clouds.light_maps.pyramid import filtered_map, filtered_surface, slope_normals
-from realtime.clouds.light_maps.surfaces import LitSurfaces, cast_surfaces
-from realtime.numerics.aligned import aligned_array
+from realtime.clouds.light_maps import LitSurfaces, cast_surfaces, filtered_map, filtered_surface, slope_normals
+from realtime.numerics.array_types import aligned_array
 from tests.helpers.frames import read
 from tests.helpers.scenes import clear_scene
 from tests.helpers.sunlit import ALONG, SIDES, cube, sun, unit

@@ -7,9 +7,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.clouds.canonical.angular import ENTRIES
+from realtime.clouds.canonical.coordinates import ENTRIES
 from realtime.clouds.collectors.transport_grid import transport_grid
-from realtime.numerics.aligned import aligned_array
+from realtime.numerics.array_types import aligned_array
 
 SETS = 2
 

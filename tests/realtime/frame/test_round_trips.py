@@ -31,7 +31,7 @@ LAMP = {"type": "point", "position": [0.9, 0.7, 1.9], "intensity": {"type": "rgb
 
 MOVES = {"look": "", "camera": "camera_moved", "light": "light_moved", "objects": "geometry_moved"}
 
-READ = "realtime/numerics/host_numbers.py: _in_one_transfer"
+READ = "realtime/numerics/array_types.py: _in_one_transfer"
 SIDES = "realtime/methods/light_volumes/jump_search.py: _jumping_sides"
 
 #: By method the moves after which a frame waits for the host, where, and how often in each of the scenes below. There

@@ -10,8 +10,7 @@ import pytest
 from analytic.phase import PhaseFunction
 from realtime.errors import InputError
 from realtime.kernels.registry import KERNELS
-from realtime.numerics.aligned import aligned_array
-from realtime.numerics.array_types import array_types
+from realtime.numerics.array_types import aligned_array, array_types
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous

@@ -10,8 +10,7 @@ from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction
 from realtime.kernels.exact import exact
 from realtime.kernels.registry import KERNELS
-from realtime.numerics.aligned import aligned_array
-from realtime.numerics.array_types import array_types
+from realtime.numerics.array_types import aligned_array, array_types
 from realtime.rays.ray_light import RayGeometry, ray_geometry
 from realtime.scene.lights import Light, spot_fields
 from realtime.scene.media.homogeneous import Homogeneous

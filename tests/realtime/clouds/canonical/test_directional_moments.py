@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from PythonicDISORT.pydisort import pydisort
 
+from realtime.clouds.canonical.coordinates import SETS
 from realtime.clouds.canonical.directional_moments import DirectionalMoments
-from realtime.clouds.canonical.sets import SETS
 from realtime.clouds.slab_orders.moments import SlabOrders, order_sets
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
 from realtime.clouds.slab_orders.streams import double_gauss

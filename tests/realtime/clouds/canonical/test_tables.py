@@ -9,9 +9,9 @@ import realtime.clouds.canonical.fit as fit_module
 import realtime.clouds.canonical.tables as tables_module
 import tests.helpers.canonical_errors as errors_module
 from realtime.clouds.canonical import coordinates
+from realtime.clouds.canonical.coordinates import SETS
 from realtime.clouds.canonical.fit import fit_on_device, fit_tables
 from realtime.clouds.canonical.look_up import on_device
-from realtime.clouds.canonical.sets import SETS
 from realtime.clouds.canonical.tables import Grid, canonical_tables
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
 from realtime.numerics.array_types import array_types

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 import realtime.methods.cloud_collectors as method
-from realtime.clouds.bounds.surfaces import cloud_surfaces
+from realtime.clouds.bounds import cloud_surfaces
 from realtime.clouds.hypertexture.light_depths import light_depths, marched_leg
 from realtime.clouds.hypertexture.lit_surface import dense_surface
 from realtime.clouds.hypertexture.march import marched_depths
-from realtime.numerics.aligned import aligned_array
+from realtime.numerics.array_types import aligned_array
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import SUN, TURN, cloud, cloud_scene, crossings, dense, linear_between, ring

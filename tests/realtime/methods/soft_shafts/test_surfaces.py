@@ -6,8 +6,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.image_filters.guides import depth_guide
-from realtime.image_filters.raster import Raster
+from realtime.image_filters import Raster, depth_guide
 from realtime.methods.soft_shafts.surfaces import AUTO_WIDTH, few_pixels, penumbra_width
 from realtime.numerics.array_types import two_numbers
 from realtime.scene.read_scene import read_scene

@@ -5,8 +5,7 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from realtime.numerics.aligned import aligned_array
-from realtime.numerics.array_types import array_types
+from realtime.numerics.array_types import aligned_array, array_types
 from realtime.rays.ray_light import ray_geometry
 from realtime.scene.convex_bounds import mesh_bounds
 from realtime.scene.lights import Light

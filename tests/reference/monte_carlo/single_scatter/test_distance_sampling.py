@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from realtime.numerics.aligned import aligned_array
+from realtime.numerics.array_types import aligned_array
 from reference.monte_carlo.single_scatter import distance_sampling as ds
 from reference.monte_carlo.single_scatter.distance_sampling import (
     Span,

@@ -1,5 +1,30 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Single scattering in clouds, by steps on which the legs of the light are linear.
+"""Opacity and the light of one scattering along rays through clouds.
+
+Nodes along a ray, exponentially spaced in optical depth.
+
+N steps of a ray of the depth T in clouds end at
+
+    tau_k = -s log(1 - (k/N) (1 - exp(-T/s))),        k = 1 .. N,        tau_N = T:
+
+equal shares of the integral of exp(-tau/s). With s = 1 each step takes as much of the ray's own extinction; light that
+is extinguished less on its way in than on the way out needs nodes further in, so that s is larger.
+
+The opacity of clouds along a ray.
+
+With the extinctions kappa_i and the lengths of the stretches in clouds, light from behind passes with the transmittance
+
+    T = prod exp(-kappa_i (x_{i+1} - x_i)),        opacity = 1 - T.
+
+Printed is (Bouthors 2008, eq. 2)
+
+    opacity = sum (exp(-kappa_i x_{i+1}) - exp(-kappa_i x_i)) / kappa_i.
+
+Its sign is wrong: it integrates exp(-kappa x), which falls. It is a length, since the factor kappa is missing, and each
+exponent has the local kappa times the whole distance instead of the depth cumulated up to there. As printed the opacity
+is negative, and more light comes out than went in; x is counted from where the ray enters the first cloud.
+
+Single scattering in clouds, by steps on which the legs of the light are linear.
 
 Light of the irradiance E that comes from a direction reaches the point at x after the depth l(x), and the eye after
 tau(x) more; of phase function P/4 pi and albedo w,
@@ -16,6 +41,8 @@ with one of these in them.
 
 Octaves of a light (`realtime.methods.cloud_octaves`) have the leg a l with a factor a each, and a phase function each:
 the same sum with u = tau + a l.
+
+What is seen behind clouds: surfaces that light reaches through clouds, and a sky.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,13 +52,83 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.bounds.crossings import Crossing, optical_depths
-from realtime.clouds.bounds.stretches import Stretches, first_stretches, next_stretches
-from realtime.clouds.bounds.surfaces import CloudSurfaces
-from realtime.clouds.single_scattering.spacing import node_depth, node_share
-from realtime.numerics.array_types import chosen_value
+from realtime.clouds.bounds import (
+    CloudSurfaces,
+    Crossing,
+    Stretches,
+    first_stretches,
+    next_stretches,
+    optical_depths,
+    sum_over_stretches,
+)
+from realtime.numerics.array_types import PerRay, chosen_value
 from realtime.scene.lights import Light
 from realtime.scene.media.bounded import Clouds
+
+SPREAD = 2.0  #: s
+_LEAST = 1e-30  # of the logarithm's argument: the last node is the end of the ray
+
+
+def node_share(total, steps: int):
+    """Return (1 - exp(-T/s))/N of rays of the depth `total` in so many `steps`."""
+    return (1 - dr.exp(-total / SPREAD)) / steps
+
+
+def node_depth(number, steps: int, share):
+    """Return tau_k of a `number` k [1], of `steps` N with their `share`; infinite from the last one on."""
+    depth = -SPREAD * dr.log(dr.maximum(1 - type(share)(number) * share, _LEAST))
+    return dr.select(number >= steps, dr.inf, depth)
+
+
+def opacity(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end) -> Any:
+    """Return the opacity of rays up to a distance, a colour [1]; arguments as of `optical_depths`.
+
+    `surfaces` and `clouds` are the boundaries and what fills them, `origin` [m] and unit `direction` the rays, `end`
+    may be infinite [m].
+    """
+    return opacity_of(optical_depths(surfaces, clouds, origin, direction, end), type(clouds.albedo))
+
+
+def opacity_of(depths: tuple[Any, ...], Color) -> Any:
+    """Return 1 - exp(-depth) as a colour, from optical `depths` by channel [1]; `Color` is its type."""
+    # 1 - exp(-d) = 2 exp(-d/2) sinh(d/2) loses nothing where d is small.
+    shares = [
+        dr.select(depth < 0.1, 2 * dr.exp(-0.5 * depth) * dr.sinh(0.5 * depth), 1 - dr.exp(-depth)) for depth in depths
+    ]
+    return Color(*shares)
+
+
+def printed_opacity(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end) -> Any:
+    """Return what is printed for the opacity, a colour [m]; arguments as of `opacity`.
+
+    Bouthors, Neyret, Max, Bruneton, Crassin 2008, eq. 2.
+    """
+    Float, Color = type(direction.x), type(clouds.albedo)
+
+    def add(total, begin, end, cloud, inside):
+        kappas = [dr.gather(Float, sigma_t, cloud, inside) for sigma_t in clouds.sigma_t]
+        return add_printed(total, begin, end, kappas, inside)
+
+    nothing = nothing_printed(clouds, Float, dr.width(direction))
+    _, sums = sum_over_stretches(surfaces, origin, direction, end, nothing, add)
+    return Color(*sums)
+
+
+def nothing_printed(clouds: Clouds, Float, lanes: int) -> tuple[Any, tuple[Any, ...]]:
+    """Return the sum of no stretch: where the first cloud begins, infinite, and 0 by channel."""
+    return dr.full(Float, dr.inf, lanes), tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
+
+
+def add_printed(total, begin, end, kappas, inside) -> tuple[Any, tuple[Any, ...]]:
+    """Return `total` and what is printed for a stretch [m] of the extinctions `kappas` [1/m], where it is `inside`."""
+    first, sums = total
+    first = dr.select(inside & ~dr.isfinite(first), begin, first)
+    near, far = (dr.select(inside, place - first, 0) for place in (begin, end))
+    terms = [
+        dr.select(inside & (kappa > 0), (dr.exp(-kappa * far) - dr.exp(-kappa * near)) / kappa, 0) for kappa in kappas
+    ]
+    return first, tuple(own + term for own, term in zip(sums, terms))
+
 
 _BETWEEN = -1.0  # in place of a distance, between two stretches
 _SERIES = 0.02  # below it (1 - exp(-d))/d is summed up: d^4/120 is left, 1e-9
@@ -65,7 +162,7 @@ class Beam:
 
 
 def cloud_rays(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end) -> CloudRays:
-    """Return rays with their depths; arguments as of `realtime.clouds.bounds.stretches.first_stretches`.
+    """Return rays with their depths; arguments as of `realtime.clouds.bounds.first_stretches`.
 
     `surfaces` and `clouds` are the boundaries and what fills them, `origin` [m] and unit `direction` the rays, `end`
     may be infinite [m].
@@ -84,7 +181,7 @@ def scattered(
 ) -> tuple[tuple[Any, ...], ...]:
     """Return the radiance that clouds scatter once into rays, by beam and octave, RGB [W/(m^2 sr)].
 
-    `rays`: rays through clouds; `beams`: the lights; `steps`: N of `realtime.clouds.single_scattering.spacing`, in a
+    `rays`: rays through clouds; `beams`: the lights; `steps`: N of `realtime.clouds.single_scattering`, in a
     ray; a stretch in a cloud has one more; `printed`: whether to sum what the paper prints.
 
     Valid for any extinction and thickness; `steps` is at least 1.
@@ -208,3 +305,26 @@ def _step(depth, eye, leg, *, printed: bool):
     series = dr.fma(change, dr.fma(change, dr.fma(change, -1 / 24, 1 / 6), -0.5), 1)
     share = dr.select(change < _SERIES, series, (1 - dr.exp(-change)) / dr.maximum(change, _SERIES))
     return depth * dr.exp(-dr.minimum(first, last)) * share
+
+
+def light_on_surfaces(rays: CloudRays, leg: Callable[[Any, Any], tuple[Any, ...]]) -> PerRay:
+    """Return the share of a light that clouds let through to the visible surfaces, a colour [1]; 1 where there is none.
+
+    `rays`: rays up to the surfaces; `leg`: (point [m], active) -> the depth of the leg to a point, by channel [1].
+    """
+    Color = type(rays.clouds.albedo)
+    seen = dr.isfinite(rays.end)
+    place = rays.origin + rays.direction * dr.select(seen, rays.end, 0)
+    return dr.select(seen, Color(*(dr.exp(-depth) for depth in leg(place, seen))), 1)
+
+
+def sky_behind(lights: Sequence[Light], distance, Color) -> PerRay | None:
+    """Return the radiance of the sky where there is no surface, a `Color` [W/(m^2 sr)]; None without a sky.
+
+    `lights`: of the scene, the beam of the sky among them; `distance`: to the visible surface, infinite where there is
+    none [m].
+    """
+    for light in lights:
+        if light.sky is not None:
+            return dr.select(dr.isfinite(distance), Color(0), light.sky)
+    return None

@@ -6,9 +6,7 @@ import pytest
 
 from analytic.droplets import Droplets, Modified, optics
 from analytic.mie import coefficients
-from realtime.droplets.series import droplet_series
-from realtime.droplets.spheres import phase_shift_coefficients
-from realtime.droplets.table import droplet_table, share_cut
+from realtime.droplets import droplet_series, droplet_table, phase_shift_coefficients, share_cut
 from realtime.errors import InputError
 
 

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from realtime.intervals.lit_intervals import add_waiting, close_interval, no_intervals, open_interval, sum_at_end
-from realtime.numerics.aligned import aligned_array
+from realtime.intervals import add_waiting, close_interval, no_intervals, open_interval, sum_at_end
+from realtime.numerics.array_types import aligned_array
 
 RAYS, STEPS = 24, 7
 GAINS = arrays(np.int64, (RAYS, STEPS), elements=st.integers(-2, 2))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
-from realtime.clouds.uniform_sky.escapes import slab_escapes
+from realtime.clouds.uniform_sky import slab_escapes
 
 PHASE = HenyeyGreensteinPhase(0.85)
 

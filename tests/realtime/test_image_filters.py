@@ -5,12 +5,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.image_filters.bilateral import bilateral
-from realtime.image_filters.guides import Guide, depth_guide
-from realtime.image_filters.levels import bilateral_of_levels
-from realtime.image_filters.raster import Raster
-from realtime.image_filters.separable import separable
-from realtime.image_filters.tile_average import tile_average
+from realtime.image_filters import Guide, Raster, bilateral, bilateral_of_levels, depth_guide, separable, tile_average
 
 
 def slow_bilateral(image, *, hd, guides=(), support=3.0):

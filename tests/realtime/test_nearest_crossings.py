@@ -9,8 +9,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from realtime.intervals.lit_intervals import exchange, filled, insert
-from realtime.numerics.aligned import aligned_array
+from realtime.intervals import exchange, filled, insert
+from realtime.numerics.array_types import aligned_array
 
 RAYS, COUNT, PLACES = 16, 9, 4
 # Few values, so that many are equal; 0 and infinity stand for no crossing.

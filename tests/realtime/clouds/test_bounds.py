@@ -6,9 +6,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.clouds.bounds.crossings import next_crossing, optical_depths
-from realtime.clouds.bounds.surfaces import cloud_surfaces
-from realtime.numerics.aligned import aligned_array
+from realtime.clouds.bounds import cloud_surfaces, next_crossing, optical_depths
+from realtime.numerics.array_types import aligned_array
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import length_inside, loaded, ring
 

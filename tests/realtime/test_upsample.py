@@ -5,9 +5,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.image_filters.guides import Guide, depth_guide
-from realtime.image_filters.raster import Raster
-from realtime.image_filters.upsample import small_pixels, upsample
+from realtime.image_filters import Guide, Raster, depth_guide, small_pixels, upsample
 
 WIDTH, HEIGHT = 24, 16
 

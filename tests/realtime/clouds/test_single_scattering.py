@@ -6,11 +6,10 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.clouds.bounds import stretches
-from realtime.clouds.bounds.surfaces import cloud_surfaces
-from realtime.clouds.single_scattering.march import Beam, cloud_rays, exact_leg, scattered
-from realtime.clouds.single_scattering.opacity import opacity, printed_opacity
-from realtime.numerics.aligned import aligned_array
+from realtime.clouds import bounds
+from realtime.clouds.bounds import cloud_surfaces
+from realtime.clouds.single_scattering import Beam, cloud_rays, exact_leg, opacity, printed_opacity, scattered
+from realtime.numerics.array_types import aligned_array
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import SUN, cloud, crossings, length_inside, loaded, ring
 
@@ -110,7 +109,7 @@ def test_stretches_that_are_not_kept_are_found_again(monkeypatch):
     scene = loaded(sun=SUN, ring=cloud("ring", ring(), COLOURED))
     images = []
     for kept in (1, 9):
-        monkeypatch.setattr(stretches, "KEPT", kept)
+        monkeypatch.setattr(bounds, "KEPT", kept)
         images += marched(scene, origin, direction, steps=8)
     np.testing.assert_array_equal(*images)
 
