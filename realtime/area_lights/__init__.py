@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lights with extent: rectangles, disks and spheres of constant radiance, and the points that stand for them.
+"""Lights with extent: rectangles, disks, spheres and meshes of constant radiance, and the points that stand for them.
 
 Read in this order:
 

@@ -10,7 +10,8 @@ Patterns of points, each for an equal part of the area.
       int r^2 dA / A = R^2/2,      int x^2 dx / (2 a) = a^2/3 = (1/2) (2/3) a^2,
 
   so that they are right to second order for whatever is smooth. One point is the middle. A sphere has no ring: there
-  they lie on a spiral, at equal steps of height and golden angles.
+  they lie on a spiral, at equal steps of height and golden angles. Nor has a mesh: there they follow its area in equal
+  steps.
 * `grid`: the middles of cells of equal area, in rows of nearly equal numbers.
 * `sobol`: the first points of Sobol's sequence, scrambled as Owen proposed, with one fixed seed (Laine and Karras 2011;
   Burley 2020 has the hash).
@@ -151,7 +152,9 @@ def place_points(light: AreaLight, points: int, pattern: str) -> PlacedPoints:
     Valid for all lights. One point of a sphere lights a half space alone; a few points are needed there.
     """
     LightPoints(points, pattern)
-    if light.kind == "sphere":
+    if light.kind == "mesh":
+        positions, normals = _on_mesh(light, points, pattern)
+    elif light.kind == "sphere":
         positions, normals = _on_sphere(light, points, pattern)
     else:
         u, v = _on_disk(points, pattern) if light.kind == "disk" else _on_rectangle(points, pattern)
@@ -159,7 +162,25 @@ def place_points(light: AreaLight, points: int, pattern: str) -> PlacedPoints:
         normals = np.broadcast_to(light.normal, (points, 3))
     lift = _NEAR * float(np.abs(light.middle).max() + np.linalg.norm(light.across) + np.linalg.norm(light.up))
     chord = 2 * light.radius if light.kind == "sphere" else 0.0
+    if light.folded:
+        positions = positions + lift * normals  # its shape stays in the light of its points
     return PlacedPoints(positions, normals, light.radiance * (light.area / points), lift, chord)
+
+
+def _on_mesh(light: AreaLight, points: int, pattern: str) -> tuple[Array, Array]:
+    """Return points, and normals: one coordinate of the pattern goes along the area, and within each triangle anew."""
+    if pattern == "ring":
+        number = np.arange(points)
+        u, v = (number + 0.5) / points, number * _GOLDEN / (2 * math.pi) % 1
+    else:
+        u, v = square(pattern, points).T
+    twice = np.linalg.norm(light.normals, axis=1)
+    last = np.cumsum(twice) / twice.sum()
+    chosen = np.minimum(np.searchsorted(last, u, side="right"), len(last) - 1)
+    root = np.sqrt(np.clip(1 - (last[chosen] - u) / (twice[chosen] / twice.sum()), 0, 1))
+    first, second, third = (light.vertices[light.triangles[chosen, corner]] for corner in range(3))
+    places = first + (root * (1 - v))[:, None] * (second - first) + (root * v)[:, None] * (third - first)
+    return places, light.normals[chosen] / twice[chosen, None]
 
 
 def _on_rectangle(points: int, pattern: str) -> tuple[Array, Array]:

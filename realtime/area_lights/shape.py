@@ -13,12 +13,12 @@ shadow; they matter where the shape shadows other lights, not its own.
 
 Reading a light with extent from a Mitsuba shape with an `area` emitter.
 
-The shape is a `rectangle`, `disk` or `sphere` of constant radiance. Its material is opaque (black as Mitsuba's is for
-an emitter that has none, else the shape is a surface like others too) or `null`.
+The shape is a `rectangle`, `disk`, `sphere` or mesh of constant radiance. Its material is opaque (black as Mitsuba's is
+for an emitter that has none, else the shape is a surface like others too) or `null`.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import mitsuba as mi
@@ -29,7 +29,7 @@ from realtime.errors import InputError
 
 Array = NDArray[np.float64]
 
-KINDS = ("rectangle", "disk", "sphere")
+KINDS = ("rectangle", "disk", "sphere", "mesh")
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,7 @@ class AreaLight:
     """A light with extent, on the host, in float64.
 
     A point of a rectangle or disk is middle + u across + v up, u and v from -1 to 1, for a disk with u^2 + v^2 <= 1.
+    Middle and axes of a mesh are those of a ball around it.
     """
 
     name: str  #: of its shape
@@ -47,6 +48,10 @@ class AreaLight:
     normal: Array  #: of a rectangle or disk, which shine on this side alone; a unit vector (3,)
     radiance: Array  #: Le, RGB (3,) [W/(m^2 sr)]
     opaque: bool  #: whether its shape is black, ends camera rays and shadows other lights; else it is nothing but light
+    vertices: Array = field(default_factory=lambda: np.empty((0, 3)))  #: of a mesh [m]
+    #: of a mesh: numbers of vertices, counter-clockwise from the side that shines, (triangles, 3)
+    triangles: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 3), dtype=np.int64))
+    folded: bool = False  #: whether parts of the shape can stand in the light of others
 
     @property
     def radius(self) -> float:
@@ -56,8 +61,16 @@ class AreaLight:
     @property
     def area(self) -> float:
         """What shines [m^2]."""
+        if self.kind == "mesh":
+            return float(0.5 * np.linalg.norm(self.normals, axis=1).sum())
         across, up = float(np.linalg.norm(self.across)), float(np.linalg.norm(self.up))
         return {"rectangle": 4.0, "disk": math.pi, "sphere": 4 * math.pi}[self.kind] * across * up
+
+    @property
+    def normals(self) -> Array:
+        """Vectors along the normals of the triangles of a mesh, twice as long as these are large [m^2]."""
+        first, second, third = (self.vertices[self.triangles[:, corner]] for corner in range(3))
+        return np.cross(second - first, third - first)
 
     @property
     def power(self) -> Array:
@@ -68,7 +81,8 @@ class AreaLight:
 def turned_area_light(light: AreaLight, about: Array, turn: Array) -> AreaLight:
     """Return a light turned about a point (3,) [m] by a rotation matrix (3, 3)."""
     middle = about + turn @ (light.middle - about)
-    return replace(light, middle=middle, across=turn @ light.across, up=turn @ light.up, normal=turn @ light.normal)
+    axes = {name: turn @ getattr(light, name) for name in ("across", "up", "normal")}
+    return replace(light, middle=middle, vertices=about + (light.vertices - about) @ turn.T, **axes)
 
 
 _SIDES, _RINGS = 64, 32
@@ -76,6 +90,8 @@ _SIDES, _RINGS = 64, 32
 
 def caster_vertices(light: AreaLight) -> Array:
     """Return the vertices of the triangles of a light, (vertices, 3) [m]."""
+    if light.kind == "mesh":
+        return light.vertices
     if light.kind == "rectangle":
         corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
         return np.array([light.middle + u * light.across + v * light.up for u, v in corners])
@@ -93,6 +109,8 @@ def caster_vertices(light: AreaLight) -> Array:
 
 def caster_triangles(light: AreaLight) -> NDArray[np.int64]:
     """Return the numbers of the vertices of its triangles, (triangles, 3)."""
+    if light.kind == "mesh":
+        return light.triangles
     if light.kind == "rectangle":
         return np.array([[0, 1, 2], [0, 2, 3]])
     i = np.arange(_SIDES)
@@ -113,6 +131,8 @@ def caster_triangles(light: AreaLight) -> NDArray[np.int64]:
 
 _KINDS = {"Rectangle": "rectangle", "Disk": "disk", "Sphere": "sphere"}
 _LEAST = 1e-12  #: half a side or a radius, of which float32 knows the square [m]
+_FLAT = 1e-6  #: of a mesh's size and place: how far before a triangle a vertex lies in its plane, after float32
+_MANY, _CHUNK = 1e9, 1 << 22  #: vertices times triangles that are looked at, in all and at once
 _SHEARED = 1e-4  #: of a length: how far from a right angle or from another length, after float32
 
 
@@ -129,15 +149,17 @@ def read_area_light(shape: Any, camera: Array) -> AreaLight:
     """
     name = shape.id()
     kind = _KINDS.get(shape.class_name())
-    if kind is None:
+    if kind is None and not shape.is_mesh():
         raise InputError(
-            f"light '{name}': its shape is a {shape.class_name()}; wanted a 'rectangle', 'disk' or 'sphere' with an "
-            "'area' emitter, or in a file a mesh whose triangles are halves of rectangles"
+            f"light '{name}': its shape is a {shape.class_name()}; wanted a 'rectangle', 'disk', 'sphere' or mesh with "
+            "an 'area' emitter"
         )
     radiance = _read_radiance(shape.emitter(), name)
     opaque = shape.bsdf().class_name() != "Null"
     if shape.interior_medium() is not None or shape.exterior_medium() is not None:
         raise InputError(f"light '{name}': its shape bounds a medium; wanted a light apart from the bounds of media")
+    if kind is None:
+        return _read_mesh(shape, radiance, opaque)
     matrix = np.array(mi.traverse(shape)["to_world"].matrix, dtype=np.float64).reshape(4, 4)
     if not np.isfinite(matrix).all():
         raise InputError(f"light '{name}': its to_world holds numbers that are not finite")
@@ -162,6 +184,54 @@ def read_area_light(shape: Any, camera: Array) -> AreaLight:
     elif np.array(shape.sample_position(0.0, mi.Point2f(0.31, 0.47)).n, dtype=np.float64).ravel() @ normal < 0:
         normal = -normal
     return AreaLight(name, kind, middle, across, up, normal / np.linalg.norm(normal), radiance, opaque)
+
+
+def _read_mesh(shape: Any, radiance: Array, opaque: bool) -> AreaLight:
+    """Read a mesh. The order of vertices says which side of a triangle shines, or their normals if there are any."""
+    vertices = _rows(shape.vertex_positions_buffer())
+    triangles = _rows(shape.faces_buffer()).astype(np.int64)
+    if not np.isfinite(vertices).all():
+        raise InputError(f"light '{shape.id()}': its vertices hold numbers that are not finite")
+    corners = vertices[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    twice = np.linalg.norm(normals, axis=1)
+    if not twice.any():
+        raise InputError(f"light '{shape.id()}': the mesh has no area; wanted triangles that have some")
+    inverted = shape.has_flipped_normals()
+    if shape.has_vertex_normals():
+        along = np.einsum("tcx,tx->t", _rows(shape.vertex_normals_buffer())[triangles], normals)
+        turned = (along < 0) != inverted
+    else:
+        turned = np.full(len(triangles), inverted)
+    triangles[turned] = triangles[turned][:, [0, 2, 1]]
+    normals[turned] *= -1
+    triangles, normals = triangles[twice > 0], normals[twice > 0]
+    corners = vertices[triangles].reshape(-1, 3)
+    middle = (corners.max(axis=0) + corners.min(axis=0)) / 2
+    radius = float(np.linalg.norm(corners - middle, axis=1).max())
+    x, y, z = np.eye(3)
+    light = AreaLight(shape.id(), "mesh", middle, radius * x, radius * y, z, radiance, opaque, vertices, triangles)
+    return replace(light, folded=opaque and _is_folded(light, normals))
+
+
+def _rows(buffer: Any) -> Array:
+    return np.array(buffer, dtype=np.float64).reshape(-1, 3)
+
+
+def _is_folded(light: AreaLight, normals: Array) -> bool:
+    """Return whether a vertex lies before the plane of a triangle; yes for a mesh too large to look."""
+    vertices = light.vertices[np.unique(light.triangles)]
+    count, most = len(vertices), _FLAT * (light.radius + float(np.abs(light.middle).max()))
+    if count * len(normals) > _MANY:
+        return True
+    unit = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    offset = (unit * light.vertices[light.triangles[:, 0]]).sum(axis=1)
+    rows = max(1, _CHUNK // count)
+    for start in range(0, len(unit), rows):
+        height = vertices @ unit[start : start + rows].T - offset[start : start + rows]
+        if height.max() > most:
+            return True
+    return False
 
 
 def _read_radiance(emitter, name: str) -> Array:

@@ -78,6 +78,9 @@ def with_area_lights(scene: Scene, area_lights: Sequence[AreaLight]) -> Scene:
         return replace(scene, area_lights=tuple(area_lights))
     parameters = mi.traverse(scene.geometry)
     for light in black:
+        if light.kind == "mesh":
+            replace_positions(parameters, {light.name: light.vertices.astype(np.float32)})
+            continue
         key = f"{light.name}.to_world"
         third = np.cross(light.across, light.up)
         third *= np.linalg.norm(light.across) / np.linalg.norm(third)

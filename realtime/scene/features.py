@@ -20,7 +20,7 @@ class SceneFeatures:
     spot_lights: int
     soft_spots: bool  #: a spot's intensity falls off inside its cone
     directional_lights: int = 0
-    area_lights: tuple[str, ...] = ()  #: the shapes of lights with extent: 'rectangle', 'disk' or 'sphere'
+    area_lights: tuple[str, ...] = ()  #: the shapes of lights with extent: 'rectangle', 'disk', 'sphere' or 'mesh'
     clear: bool = False  #: bounded: nothing fills the space between the media
     concave: tuple[str, ...] = ()  #: shapes that bound media and are not all convex: clouds
     uneven: int = 0  #: clouds whose density differs from place to place

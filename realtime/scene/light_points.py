@@ -38,8 +38,9 @@ def light_points(scene: Scene, points: int, pattern: str) -> tuple[Light, ...]:
 
 
 def source_shape(scene: Scene, light: Light) -> str | None:
-    """Return the name of the shape of a light point, which casts no shadow in it; None for other lights."""
-    return None if light.source is None else scene.area_lights[light.source].name
+    """Return the name of the shape of a light point that casts no shadow in it; None otherwise."""
+    area = None if light.source is None else scene.area_lights[light.source]
+    return None if area is None or area.folded else area.name
 
 
 @dataclass(frozen=True)

@@ -225,6 +225,8 @@ def _reflected(
     away = point - light.centre
     if light.kind == "sphere":
         sees = np.linalg.norm(away, axis=1) > light.radius * (1 + _OUTSIDE)
+    elif light.kind == "mesh":
+        sees = np.ones(len(away), bool)  # the samples say it, triangle by triangle
     else:
         sees = away @ light.normal > IN_PLANE * max(1.0, float(np.abs(light.centre).max()))
     seeing = np.flatnonzero(sees)

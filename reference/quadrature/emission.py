@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lights with extent, and the background, as the camera sees them: their own radiance through the medium, a layer."""
 
+from collections.abc import Iterator
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -9,12 +11,13 @@ from numpy.typing import NDArray
 from reference.quadrature.fields import optical_depth
 from reference.scene.area_light import TruthAreaLight
 from reference.scene.device import as_rows, vectors
-from reference.scene.read import TruthScene
+from reference.scene.read import TruthScene, scene_from
 from reference.visibility.line_crossings import half_chord
 
 Array = NDArray[np.float64]
 
 _OWN = 1e-4  # relative: a surface this close to a light is the light's own, or touches it
+_PAST = 1e-5  # of a distance, and [m]: how far beyond a crossing of a mesh the next is looked for
 _FAR = 1e30  # beyond all bounds of media [m]
 
 
@@ -29,10 +32,11 @@ def emitted_light(truth: TruthScene, distance: Array) -> Array:
     """
     total = np.zeros((len(distance), 3))
     for light in truth.area:
-        at = _distance(light, truth.origin, truth.direction)
-        rows = np.flatnonzero(at <= distance * (1 + _OWN))
-        depth = optical_depth(truth, truth.origin, truth.direction[rows], np.zeros(len(rows)), at[rows])
-        total[rows] += light.radiance * np.exp(-depth)
+        places = _mesh_distances(light, truth) if light.kind == "mesh" else [_distance(light, truth)]
+        for at in places:
+            rows = np.flatnonzero(at <= distance * (1 + _OWN))
+            depth = optical_depth(truth, truth.origin, truth.direction[rows], np.zeros(len(rows)), at[rows])
+            total[rows] += light.radiance * np.exp(-depth)
     if truth.background is not None:
         rows = np.flatnonzero(np.isinf(distance))
         depth = optical_depth(truth, truth.origin, truth.direction[rows], np.zeros(len(rows)), np.full(len(rows), _FAR))
@@ -42,8 +46,23 @@ def emitted_light(truth: TruthScene, distance: Array) -> Array:
     return total
 
 
-def _distance(light: TruthAreaLight, origin: Array, direction: Array) -> Array:
+def _mesh_distances(light: TruthAreaLight, truth: TruthScene) -> Iterator[Array]:
+    """Yield where rays meet a mesh from the side that emits, crossing after crossing, (rays,) [m]; else NaN."""
+    mesh = scene_from([light.shape])
+    start, walking = np.zeros(len(truth.direction)), np.ones(len(truth.direction), bool)
+    while walking.any():
+        place = truth.origin + start[:, None] * truth.direction
+        hit = mesh.ray_intersect(mi.Ray3f(vectors(mi.Point3f, place), vectors(mi.Vector3f, truth.direction)))
+        at = start + np.array(hit.t, dtype=np.float64)
+        walking &= np.isfinite(at)
+        yield np.where(walking & np.array(mi.Frame3f.cos_theta(hit.wi) > 0), at, np.nan)
+        walking &= not light.opaque
+        start = np.where(walking, at * (1 + _PAST) + _PAST, start)
+
+
+def _distance(light: TruthAreaLight, truth: TruthScene) -> Array:
     """Return where rays meet the side of a light that emits, (rays,) [m]; NaN where they do not."""
+    origin, direction = truth.origin, truth.direction
     away = light.centre - origin
     if light.kind == "sphere":
         middle = direction @ away

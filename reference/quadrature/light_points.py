@@ -4,7 +4,8 @@
 The radiance Le of an element dA of the surface, seen under the angle whose cosine to its normal is cos_l, is the
 intensity Le cos_l dA. The points are uniform on the surface, so one of N stands for the area A/N. They come from the
 unit square by maps that keep areas: a rectangle as it is; a disk by concentric squares (Shirley, Chiu 1997, A low
-distortion map between disk and square, J. Graphics Tools 2(3)); a sphere by its heights and azimuths (Archimedes).
+distortion map between disk and square, J. Graphics Tools 2(3)); a sphere by its heights and azimuths (Archimedes); a
+triangle of a mesh by the root of how far they are from a corner.
 """
 
 from collections.abc import Sequence
@@ -12,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.quadrature.mesh_choice import choose_by_area, places_in
 from reference.scene.area_light import TruthAreaLight
 from reference.scene.read import TruthLight
 
@@ -29,6 +31,9 @@ def light_points(light: TruthAreaLight, square: Array) -> Sequence[TruthLight]:
         across = np.sqrt(np.maximum(1 - height**2, 0.0))
         normals = np.stack([across * np.cos(azimuth), across * np.sin(azimuth), height], axis=1) @ light.frame
         places = light.centre + light.radius * normals
+    elif light.kind == "mesh":
+        chosen = choose_by_area(light, square)
+        places, normals = places_in(chosen.corners, chosen.square), chosen.normal
     else:
         sides = 2 * square - 1
         sides = _concentric(sides) if light.kind == "disk" else sides

@@ -33,6 +33,10 @@ the cosine from what is seen, and stands for that. So the sum is over a function
 that is continuous where the visibility of points is not: its error falls as N^-3/2, not as N^-3/4. Behind half a plane
 before a rectangle, 64 points in each of eight replicates leave 4e-3 of a penumbra, 64 sections 1e-3, and 256 sections
 2e-4. A sphere fills a cone of directions, where sections would be arcs: there each is so short that it is seen or not.
+
+**On a mesh** one coordinate of the square chooses a triangle (`reference.quadrature.mesh_choice`), and what is left of
+it serves within the triangle: along rays as above in one that is near, evenly over its area in others. For surface
+points each has a short section, evenly over the area.
 """
 
 from dataclasses import dataclass, fields
@@ -40,13 +44,16 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.quadrature.mesh_choice import Choice, choose_for_points, choose_for_rays, places_in
 from reference.scene.area_light import TruthAreaLight
+from reference.visibility.before_light import IN_PLANE
 from reference.visibility.certificate import LitIntervals
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _CELLS = 8  # of the table between two corners of a light
+_CELLS_OF_MANY = 2  # of one that a single sample of a mesh asks
 _ASIDE = 1e-6  # of a cell: how far from its ends its density is looked up
 _TINY = 1e-300
 _SHORT = 1e-6  # of the radius of a sphere: the length of its sections
@@ -158,19 +165,12 @@ def samples_for_rays(
     `light`: the light; `origin`, `direction`, `distance`: of the rays: where they start, (3,) [m], unit vectors, (rays,
     3), and how far they go, (rays,) [m]; `square`: points of the unit square, (samples, 2) [1], the same for all rays.
     """
+    if light.kind == "mesh":
+        return _on_triangles(choose_for_rays(light, origin, direction, distance, square), origin, direction)
     axes = _axes(origin, direction, light.centre)
     if light.kind == "sphere":
         return _on_sphere(light, axes, distance, square)
-    fan = _fan(light, axes)
-    phi, per_density = fan.drawn(square[:, 0], lambda z0, h0, z1, h1: np.hypot(z1 - z0, h1 - h0))
-    z0, h0, z1, h1 = fan.section(phi)
-    part = square[:, 1]
-    z, h = z0 + part * (z1 - z0), h0 + part * (h1 - h0)
-    n = axes.components(np.broadcast_to(light.normal, (len(direction), 1, 3)))[:, 0]
-    across = -n[:, 1:2] * np.sin(phi) + n[:, 2:] * np.cos(phi)
-    within = np.sqrt(np.maximum((1 - across) * (1 + across), 0.0))
-    weight = h * np.hypot(z1 - z0, h1 - h0) * per_density / np.maximum(within, _TINY)
-    place = axes.point(z, h, phi)
+    place, weight = _on_flat(_fan(light, axes), square)
     return LightSamples(place, np.broadcast_to(light.normal, place.shape), weight)
 
 
@@ -182,6 +182,9 @@ def sections_for_points(light: TruthAreaLight, place: Array, square: Array, turn
     `turn`: by what angle the axis is turned about the way to the light [rad]. An edge of a shadow along the sections
     takes or leaves each of them whole, so replicates have angles of their own.
     """
+    if light.kind == "mesh":
+        chosen = choose_for_points(light, place, square)
+        return _before_triangles(chosen, np.repeat(place, len(square), axis=0), _SHORT * light.radius)
     way = light.centre - place
     if light.kind == "sphere":
         return _in_cone(light, place, square)
@@ -226,6 +229,7 @@ class _Fan:
     corners: Array | None  # of a polygon, along axis, up and side, (rows, k, 3); None for a disk
     normal: Array  # of the light, along the same, (rows, 3)
     radius: float  # of a disk
+    cells: int = _CELLS  # of the table of sections between two corners
 
     def section(self, phi: Array) -> tuple[Array, Array, Array, Array]:
         """Return z and h of both ends of the sections at azimuths, (rows, k) each; without length where there is none.
@@ -291,7 +295,7 @@ class _Fan:
         azimuth = np.sort(np.arctan2(b, a), axis=1)
         last = np.where(around, azimuth[:, 0] + 2 * np.pi, azimuth[:, -1])
         breaks = np.concatenate([azimuth, last[:, None]], axis=1)
-        part = np.arange(_CELLS) / _CELLS
+        part = np.arange(self.cells) / self.cells
         nodes = breaks[:, :-1, None] + np.diff(breaks, axis=1)[..., None] * part
         return np.concatenate([nodes.reshape(len(a), -1), last[:, None]], axis=1)
 
@@ -303,6 +307,52 @@ def _fan(light: TruthAreaLight, axes: _Axes) -> _Fan:
         return _Fan(axes, None, normal, light.radius)
     corners = light.corners - axes.origin[:, None]
     return _Fan(axes, axes.components(corners), normal, 0.0)
+
+
+def _on_flat(fan: _Fan, square: Array) -> tuple[Array, Array]:
+    """Return samples by azimuth and by the place in the section, and the areas for which they stand."""
+    phi, per_density = fan.drawn(square[..., 0], lambda z0, h0, z1, h1: np.hypot(z1 - z0, h1 - h0))
+    z0, h0, z1, h1 = fan.section(phi)
+    part = square[..., 1]
+    z, h = z0 + part * (z1 - z0), h0 + part * (h1 - h0)
+    across = -fan.normal[:, 1:2] * np.sin(phi) + fan.normal[:, 2:] * np.cos(phi)
+    within = np.sqrt(np.maximum((1 - across) * (1 + across), 0.0))
+    weight = h * np.hypot(z1 - z0, h1 - h0) * per_density / np.maximum(within, _TINY)
+    return fan.axes.point(z, h, phi), weight
+
+
+# --- Meshes ---
+
+
+def _on_triangles(chosen: Choice, origin: Array, direction: Array) -> LightSamples:
+    """Return samples of a mesh for rays: of triangles that are near as of a flat light, of others evenly."""
+    rows = len(direction)
+    place, weight = places_in(chosen.corners, chosen.square), chosen.area.copy()
+    near = np.flatnonzero(chosen.near)
+    if len(near):
+        corners = chosen.corners[near]
+        axes = _axes(origin, np.repeat(direction, len(weight) // rows, axis=0)[near], corners.mean(axis=1))
+        normal = axes.components(chosen.normal[near, None])[:, 0]
+        fan = _Fan(axes, axes.components(corners - axes.origin[:, None]), normal, 0.0, _CELLS_OF_MANY)
+        found = _on_flat(fan, chosen.square[near, None])
+        place[near], weight[near] = (part[:, 0] for part in found)
+    shape = rows, -1, 3
+    return LightSamples(place.reshape(shape), chosen.normal.reshape(shape), (weight / chosen.chance).reshape(rows, -1))
+
+
+def _before_triangles(chosen: Choice, eye: Array, length: float) -> Sections:
+    """Return short sections of triangles, across the way to points; without weight for points behind them."""
+    start = places_in(chosen.corners, chosen.square)
+    way = eye - start
+    above = np.sum(way * chosen.normal, axis=1)
+    sees = above > IN_PLANE * np.maximum(1.0, np.abs(start).max(axis=1, initial=0.0))
+    weight = np.where(sees, chosen.area * above / np.linalg.norm(way, axis=1) ** 3 / chosen.chance, 0.0)
+    across = np.cross(chosen.normal, way)
+    size = np.linalg.norm(across, axis=1)[:, None]
+    side = chosen.corners[:, 1] - chosen.corners[:, 0]
+    along = size > _ASIDE * np.linalg.norm(way, axis=1)[:, None]
+    across = np.where(along, across / np.maximum(size, _TINY), side / np.linalg.norm(side, axis=1)[:, None])
+    return Sections(eye, across, start, length * across, weight)
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lights with extent: Mitsuba's `area` emitters of constant radiance on rectangles, disks and spheres.
+"""Lights with extent: Mitsuba's `area` emitters of constant radiance on rectangles, disks, spheres and meshes.
 
-A rectangle and a disk emit from the side of their normal, a sphere outwards. The material is opaque (the shape is a
-surface like others, most often a black one) or `null` (the shape is nothing but its emission).
+A rectangle, a disk and a triangle emit from the side of their normal, a sphere outwards. Normals at vertices, which
+only smooth the look of a mesh, say which side of its triangles that is, and nothing more. The material is opaque (the
+shape is a surface like others, most often a black one) or `null` (the shape is nothing but its emission).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import mitsuba as mi
@@ -17,20 +18,27 @@ from analytic.errors import InputError
 Array = NDArray[np.float64]
 
 _KINDS = {"Rectangle": "rectangle", "Disk": "disk", "Sphere": "sphere"}
+_LIFT = 1e-9  # of a mesh's size and place: how far before its triangles its light starts, so that they do not hide it
+_CONVEX = 1e-6  # of the same: corners this far before a triangle are in its plane; float32
+_PAIRS = 1e9  # triangles times corners that are looked at to see whether a mesh is convex
+_BITS = 16  # of a coordinate by which triangles are put in order
 _SQUARE = 1e-5  # scales and angles of a float32 transform that differ by less are meant to be equal
 
 
 @dataclass(frozen=True)
 class TruthAreaLight:
-    """A rectangle, disk or sphere of constant radiance."""
+    """A rectangle, disk, sphere or mesh of constant radiance."""
 
-    kind: str  #: "rectangle", "disk" or "sphere"
+    kind: str  #: "rectangle", "disk", "sphere" or "mesh"
     centre: Array  #: [m], (3,)
     frame: Array  #: unit vectors as rows, (3, 3): along both sides, and the normal of the side that emits
-    half: Array  #: half of both sides, (2,) [m]; of a disk and a sphere twice the radius
+    half: Array  #: half of both sides, (2,) [m]; of a disk and a sphere twice the radius, of a mesh of a ball around it
     radiance: Array  #: [W/(m^2 sr)], RGB
     opaque: bool  #: whether the shape is a surface too; else it is `null`, and neither shadows nor ends rays
     shape: Any  #: Mitsuba's shape
+    #: of a mesh, a hair before where they are, counter-clockwise from the side that emits, (triangles, 3, 3) [m]
+    triangles: Array = field(default_factory=lambda: np.empty((0, 3, 3)))
+    shadows_itself: bool = False  #: whether its shape is opaque, and parts of it can stand in the light of others
 
     @property
     def name(self) -> str:
@@ -50,6 +58,8 @@ class TruthAreaLight:
     @property
     def area(self) -> float:
         """Of the surface that emits [m^2]."""
+        if self.kind == "mesh":
+            return float(triangle_areas(self.triangles).sum())
         if self.kind == "rectangle":
             return float(4 * self.half[0] * self.half[1])
         return float((np.pi if self.kind == "disk" else 4 * np.pi) * self.radius**2)
@@ -66,6 +76,16 @@ class TruthAreaLight:
         return np.pi * self.area * self.radiance
 
 
+def triangle_normals(triangles: Array) -> Array:
+    """Return vectors along the normals of triangles, twice as long as these are large, (triangles, 3) [m^2]."""
+    return np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+
+
+def triangle_areas(triangles: Array) -> Array:
+    """Return the areas of triangles, (triangles,) [m^2]."""
+    return 0.5 * np.linalg.norm(triangle_normals(triangles), axis=1)
+
+
 def is_area(emitter: Any) -> bool:
     """Return whether an emitter of Mitsuba is an area light."""
     return bool(emitter.class_name() == "AreaLight")
@@ -80,26 +100,70 @@ def read_area_light(emitter: Any, camera: Array) -> TruthAreaLight:
     """
     shape = emitter.get_shape()
     kind = _KINDS.get(shape.class_name())
-    if kind is None:
-        what = "a mesh" if shape.is_mesh() else f"a {shape.class_name()}"
-        raise _refusal(
-            shape,
-            f"is {what}",
-            "a rectangle, a disk, a sphere, or in a file a mesh whose triangles are halves of rectangles",
-        )
+    if kind is None and not shape.is_mesh():
+        raise _refusal(shape, f"is a {shape.class_name()}", "a rectangle, a disk, a sphere, or a mesh")
     parameters = mi.traverse(emitter)
     if "radiance.value" not in parameters:
         raise _refusal(shape, "has a texture as radiance", "one radiance: give its mean as 'rgb'")
     if shape.interior_medium() is not None or shape.exterior_medium() is not None:
         raise _refusal(shape, "bounds a medium", "two shapes, one that emits and one of material 'null' for the medium")
-    flat = np.array(parameters["radiance.value"], dtype=np.float64).reshape(-1)
+    radiance = np.resize(np.array(parameters["radiance.value"], dtype=np.float64).reshape(-1), 3)
+    opaque = shape.bsdf().class_name() != "Null"
+    if kind is None:
+        return _mesh(shape, radiance, opaque)
     matrix = np.array(mi.traverse(shape)["to_world"].matrix, dtype=np.float64).reshape(4, 4)
     frame, half = _sides(shape, kind, matrix)
-    opaque = shape.bsdf().class_name() != "Null"
-    light = TruthAreaLight(kind, matrix[:3, 3], frame, half, np.resize(flat, 3), opaque, shape)
+    light = TruthAreaLight(kind, matrix[:3, 3], frame, half, radiance, opaque, shape)
     if kind == "sphere" and np.linalg.norm(camera - light.centre) <= light.radius * (1 + _SQUARE):
         raise _refusal(shape, "holds the camera", "a camera outside of lights: move it, or make the sphere smaller")
     return light
+
+
+def _mesh(shape: Any, radiance: Array, opaque: bool) -> TruthAreaLight:
+    parameters = mi.traverse(shape)
+    corners = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
+    faces = np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
+    normal = triangle_normals(corners[faces])
+    used = np.linalg.norm(normal, axis=1) > 0
+    if not np.isfinite(corners).all() or not used.any():
+        raise _refusal(shape, "has no area", "a mesh with triangles that have one")
+    faces, normal = faces[used], normal[used]
+    back = np.full(len(faces), shape.has_flipped_normals())
+    smooth = np.array(parameters.get("vertex_normals", ()), dtype=np.float64)
+    if smooth.size:
+        back ^= np.sum(smooth.reshape(-1, 3)[faces].sum(axis=1) * normal, axis=1) < 0
+    faces = np.where(back[:, None], faces[:, ::-1], faces)
+    normal = triangle_normals(corners[faces])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    known = corners[np.unique(faces)]
+    centre = 0.5 * (known.min(axis=0) + known.max(axis=0))
+    radius = float(np.linalg.norm(known - centre, axis=1).max())
+    size = radius + float(np.abs(centre).max())
+    triangles = corners[faces] + _LIFT * size * normal[:, None]
+    hides = opaque and not _is_convex(corners[faces][:, 0], normal, known, _CONVEX * size)
+    light = TruthAreaLight("mesh", centre, np.eye(3), np.full(2, radius), radiance, opaque, shape)
+    return replace(light, triangles=triangles[_neighbours(triangles.mean(axis=1))], shadows_itself=hides)
+
+
+def _neighbours(place: Array) -> NDArray[np.int64]:
+    """Return an order of points, (n, 3), where neighbours follow one another, that of their bits in turn (Morton)."""
+    low, high = place.min(axis=0), place.max(axis=0)
+    cell = ((place - low) / max(float((high - low).max()), np.finfo(float).tiny) * ((1 << _BITS) - 1)).astype(np.int64)
+    code = np.zeros(len(place), np.int64)
+    for bit in range(_BITS):
+        for axis in range(3):
+            code |= (cell[:, axis] >> bit & 1) << (3 * bit + axis)
+    return np.argsort(code, kind="stable")
+
+
+def _is_convex(corner: Array, normal: Array, known: Array, slack: float) -> bool:
+    """Return whether no point of a mesh is before one of its triangles; no for one too large to look."""
+    if float(len(corner)) * len(known) > _PAIRS:
+        return False
+    step = max(1, (1 << 22) // len(known))
+    blocks = (slice(first, first + step) for first in range(0, len(corner), step))
+    level = np.sum(corner * normal, axis=1)
+    return all(((normal[block] @ known.T).max(axis=1) <= level[block] + slack).all() for block in blocks)
 
 
 def _sides(shape: Any, kind: str, matrix: Array) -> tuple[Array, Array]:

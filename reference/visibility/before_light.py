@@ -3,7 +3,8 @@
 
 A rectangle and a disk emit to one side, and a convex body shines on nothing that it hides itself: so a light's own
 shape never shadows it, nor does what lies in or behind the plane of a rectangle or a disk. It is left out, for in
-float64 what lies in that plane would be in front of it or behind it by chance.
+float64 what lies in that plane would be in front of it or behind it by chance. Another mesh stays, a hair behind where
+its light starts.
 """
 
 from dataclasses import replace
@@ -23,11 +24,11 @@ def before_light(truth: TruthScene, light: TruthAreaLight) -> tuple[TruthScene, 
     `truth`, `light`: the scene and one of its lights with extent.
     """
     shapes = truth.occluders.shapes()
-    others = [shape for shape in shapes if shape != light.shape]
+    others = [shape for shape in shapes if shape != light.shape or light.shadows_itself]
     if len(others) < len(shapes):
         truth = replace(truth, occluders=scene_of(others, truth.scene))
     known = read_shapes(truth.occluders)
-    if light.kind != "sphere":
+    if light.kind in ("rectangle", "disk"):
         largest = max(1.0, float(np.abs(known.triangles).max(initial=0)), float(np.abs(light.centre).max()))
         before = (known.triangles - light.centre) @ light.normal > IN_PLANE * largest
         known = replace(known, triangles=known.triangles[before.any(axis=1)])

@@ -268,6 +268,8 @@ def _area(light: TruthAreaLight) -> dict[str, Any]:
         "luminous_flux": luminous_flux(power),
         "falloff": _FALLOFF["area"],
     }
+    if light.kind == "mesh":
+        return described | {"triangles": len(light.triangles)}
     if light.kind == "sphere":
         return described | {"radius": _number(light.radius)}
     described |= {"axis": _numbers(light.normal), "across": _numbers(light.frame[0])}

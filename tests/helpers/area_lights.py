@@ -15,6 +15,7 @@ from reference.scene.read import TruthScene, read_truth
 from reference.visibility.before_light import before_light
 from reference.visibility.candidates import Ball
 from reference.visibility.lit_intervals import obstacles
+from validation.scenes.meshes import Mesh, placed, rotation, scaled, torus
 
 BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0, 0.0, 0.0]}}
 NULL = {"type": "null"}
@@ -25,6 +26,26 @@ def lamp(kind: str = "rectangle", *, radiance=(3.0, 2.0, 1.0), bsdf=None, **shap
     """Return an area light of this kind; `bsdf` is black by default."""
     emitter = {"type": "area", "radiance": {"type": "rgb", "value": list(radiance)}}
     return {"type": kind, "emitter": emitter, "bsdf": BLACK if bsdf is None else bsdf, **shape}
+
+
+def mesh_lamp(mesh: Mesh, *, radiance=(3.0, 2.0, 1.0), bsdf=None, flipped: bool = False):
+    """Return an area light on a mesh; `bsdf` is black by default."""
+    properties = mi.Properties()
+    properties["bsdf"] = mi.load_dict(BLACK if bsdf is None else bsdf)
+    properties["emitter"] = mi.load_dict(lamp(radiance=radiance)["emitter"])
+    properties["flip_normals"] = flipped
+    vertices, faces = mesh
+    made = mi.Mesh("lamp", vertex_count=len(vertices), face_count=len(faces), props=properties)
+    parameters = mi.traverse(made)
+    parameters["vertex_positions"] = mi.Float(vertices.astype(np.float32).ravel())
+    parameters["faces"] = mi.UInt32(faces.astype(np.uint32).ravel())
+    parameters.update()
+    return made
+
+
+def ring(place=(0.3, 0.4, 2.9), *, size=1.0, **changes: Any):
+    """Return a torus that hides parts of itself."""
+    return mesh_lamp(placed(scaled(torus(0.4, 0.15, (18, 9)), size), place, rotation((1, 2, 3), 37.0)), **changes)
 
 
 def fog(sigma_t=0.21, albedo=0.83) -> dict[str, Any]:

@@ -97,7 +97,7 @@ def light_places(scene: Scene) -> tuple[LightPlace, ...]:
         else:
             places.append(LightPlace("point", _host(light.position)))
     for wide in scene.area_lights:
-        flat = None if wide.kind == "sphere" else wide.normal
+        flat = wide.normal if wide.kind in ("rectangle", "disk") else None
         radius = float(np.linalg.norm(wide.across + wide.up)) if wide.kind == "rectangle" else wide.radius
         places.append(LightPlace("area", wide.middle, radius, flat))
     return tuple(places)

@@ -17,8 +17,10 @@ With an area of rho d(rho) d(phi) (Archimedes: equal slices have equal areas, an
 
     pdf = 1 / (4 pi R rho).
 
-A ray may meet a sphere twice: each of both places has a quarter of the points. The density of a point is the mean over
-the techniques, each with its share (the balance heuristic with one sample, Veach 1997, section 9.2.4).
+A ray may meet a sphere twice: each of both places has a quarter of the points. On a mesh half of the points are spread
+so in the one triangle that the ray meets first, if any, and the others evenly over all triangles. The density of a
+point is the mean over the techniques, each with its share (the balance heuristic with one sample, Veach 1997, section
+9.2.4).
 
 References
 ----------
@@ -36,6 +38,7 @@ import numpy as np
 from analytic.errors import InputError
 
 SHAPES = ("Rectangle", "Disk", "Sphere")
+_MESH = "Mesh"
 _PARALLEL = 1e-9  # sine of the angle between ray and plane below which they count as parallel
 _FADE = 16.0  # how soon points about the ray become fewer as it passes further from the light
 _TOUCHING = 1e-12  # of a light's size: no direction is known over a shorter way
@@ -47,19 +50,52 @@ _SHEAR = 1e-5  # relative: a transform in float32 rounds to 1e-6
 class AreaLight:
     """A light with extent as sampling must know it; vectors of double precision."""
 
-    shape: str  #: of `SHAPES`
+    shape: str  #: of `SHAPES`, or 'Mesh'
     centre: Any  #: [m]
     across: Any  #: unit vector, in the plane of a rectangle or disk
     up: Any  #: another, at right angles
-    normal: Any  #: unit vector to the side that shines; for a sphere any
-    reach: tuple[float, float]  #: half of a rectangle's sides along `across` and `up`, or the radius twice [m]
+    normal: Any  #: unit vector to the side that shines; for a sphere and a mesh any
+    reach: tuple[float, float]  #: half of the sides along `across` and `up`, or the radius twice [m]
     radiance: Any  #: RGB [W/(m^2 sr)]
+    mesh: "_Mesh | None" = None  #: of a mesh its triangles
 
     @property
     def area(self) -> float:
         """The area of the side that shines [m^2]."""
+        if self.mesh is not None:
+            return self.mesh.area
         a, b = self.reach
         return {"Rectangle": 4 * a * b, "Disk": math.pi * a * b, "Sphere": 4 * math.pi * a * b}[self.shape]
+
+
+@dataclass(frozen=True)
+class _Mesh:
+    """The triangles of a light: nine, three and one number for each, of double precision."""
+
+    scene: Any  #: an `mi.Scene` of the shape alone
+    corners: Any  #: a corner, and the ways from it to both others [m]
+    normals: Any  #: unit vectors to the side that shines
+    below: Any  #: the share of the area of all triangles up to each, itself included
+    count: int  #: how many there are
+    area: float  #: of all [m^2]
+
+    def corner(self, number, which: int):
+        """Return a corner of triangles, for 0, or the way to another, for 1 and 2 [m]."""
+        return self._vector(self.corners, number * 9 + 3 * which)
+
+    def normal(self, number):
+        """Return the unit normals of triangles."""
+        return self._vector(self.normals, number * 3)
+
+    def choose(self, u):
+        """Return triangles chosen by area, and the numbers spread over 0 to 1 anew in each."""
+        number = dr.binary_search(0, self.count - 1, lambda i: dr.gather(mi.Float64, self.below, i) <= u)
+        before = dr.gather(mi.Float64, self.below, dr.maximum(number, 1) - 1)
+        before = dr.select(number == 0, 0, before)
+        return number, (u - before) / (dr.gather(mi.Float64, self.below, number) - before)
+
+    def _vector(self, numbers, base):
+        return mi.Vector3d(*(dr.gather(mi.Float64, numbers, base + axis) for axis in range(3)))
 
 
 @dataclass(frozen=True)
@@ -84,12 +120,21 @@ def read_area(emitter) -> AreaLight:
     """
     shape = emitter.get_shape()
     name, kind = f"single-scatter: light '{shape.id()}'", shape.class_name()
-    if kind not in SHAPES:
-        raise InputError(f"{name} is a {kind}; wanted an 'area' emitter on a rectangle, a disk or a sphere")
+    if kind not in SHAPES and not shape.is_mesh():
+        raise InputError(f"{name} is a {kind}; wanted an 'area' emitter on a rectangle, a disk, a sphere or a mesh")
     parameters = mi.traverse(emitter)
     if "radiance.value" not in parameters:
         raise InputError(f"{name} has a textured radiance; wanted a constant one")
-    radiance = np.array(parameters["radiance.value"], dtype=np.float64).reshape(-1)
+    given = np.broadcast_to(np.array(parameters["radiance.value"], dtype=np.float64).reshape(-1), 3)
+    radiance = mi.Color3f(*(float(c) for c in given))
+    if shape.is_mesh():
+        box = shape.bbox()
+        centre, half = (np.array(part, dtype=np.float64).ravel() for part in (box.center(), 0.5 * box.extents()))
+        x, y, z = (mi.Vector3d(*(float(c) for c in axis)) for axis in np.eye(3))
+        reach = float(half[0]), float(half[1])
+        return AreaLight(
+            _MESH, mi.Point3d(*(float(c) for c in centre)), x, y, z, reach, radiance, _read_mesh(shape, name)
+        )
     matrix = np.array(mi.traverse(shape)["to_world"].matrix, dtype=np.float64).reshape(4, 4)
     axes = matrix[:3, :3]
     lengths = np.linalg.norm(axes, axis=0)
@@ -112,8 +157,36 @@ def read_area(emitter) -> AreaLight:
         up=vectors[1],
         normal=vectors[2],
         reach=(float(lengths[0]), float(lengths[0 if kind == "Sphere" else 1])),
-        radiance=mi.Color3f(*(float(c) for c in np.broadcast_to(radiance, 3))),
+        radiance=radiance,
     )
+
+
+def _read_mesh(shape, name: str) -> _Mesh:
+    """Read the triangles of a mesh; a point that Mitsuba samples on each says which side shines."""
+    parameters = mi.traverse(shape)
+    vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
+    corners: np.ndarray = vertices[np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)]
+    corners[:, 1:] -= corners[:, :1]
+    normals = np.cross(corners[:, 1], corners[:, 2])
+    areas = 0.5 * np.linalg.norm(normals, axis=1)
+    if not areas.sum() > 0:
+        raise InputError(f"{name} has no area; wanted a mesh with triangles that have one")
+    normals /= np.maximum(2 * areas, _LEAST)[:, None]
+    middle = dr.zeros(mi.PreliminaryIntersection3f, len(areas))
+    middle.t, middle.prim_index, middle.prim_uv = 1, dr.arange(mi.UInt32, len(areas)), mi.Point2f(1 / 3)
+    middle.shape = mi.ShapePtr(shape)
+    found = middle.compute_surface_interaction(
+        dr.zeros(mi.Ray3f, len(areas)), mi.RayFlags.Minimal | mi.RayFlags.ShadingFrame
+    )
+    shining = np.array(found.sh_frame.n, dtype=np.float64).T
+    normals[np.sum(normals * shining, axis=1) < 0] *= -1
+    below = np.cumsum(areas) / areas.sum()
+    below[-1] = 1.0
+    own = shape.id()
+    scene = mi.load_dict({"type": "scene", "light": shape})
+    shape.set_id(own)  # the key became its name
+    one, two, three = (mi.Float64(np.ascontiguousarray(part).ravel()) for part in (corners, normals, below))
+    return _Mesh(scene, one, two, three, len(areas), float(areas.sum()))
 
 
 def sample_point(u, v, light: AreaLight, *, origin, direction) -> LightPoint:
@@ -124,6 +197,8 @@ def sample_point(u, v, light: AreaLight, *, origin, direction) -> LightPoint:
     Valid for any ray.
     """
     u, v = mi.Float64(u), mi.Float64(v)
+    if light.mesh is not None:
+        return _on_mesh(u, v, light.mesh, origin, direction)
     return (_on_sphere if light.shape == "Sphere" else _on_plane)(u, v, light, origin, direction)
 
 
@@ -131,6 +206,9 @@ def sample_evenly(u, v, light: AreaLight) -> LightPoint:
     """Sample points evenly over the area of a light, for u and v uniform in [0, 1)."""
     u, v = mi.Float64(u), mi.Float64(v)
     density = mi.Float64(1 / light.area)
+    if light.mesh is not None:
+        number, u = light.mesh.choose(u)
+        return LightPoint(_even_in_triangle(u, v, light.mesh, number), light.mesh.normal(number), density)
     if light.shape == "Sphere":
         normal = _towards(1 - 2 * v, 2 * math.pi * u, mi.Vector3d(0, 0, 1))
         return LightPoint(light.centre + light.reach[0] * normal, normal, density)
@@ -176,6 +254,57 @@ def _on_plane(u, v, light: AreaLight, origin, direction) -> LightPoint:
     density = (1 - share) / light.area + share / (2 * math.pi * dr.maximum(edge, rho) * rho)
     density = dr.select(counts, density, 0)
     return LightPoint(light.centre + light.across * x + light.up * y, light.normal, density)
+
+
+def _even_in_triangle(u, v, mesh: _Mesh, number):
+    root = dr.sqrt(u)
+    return mesh.corner(number, 0) + mesh.corner(number, 1) * (root * (1 - v)) + mesh.corner(number, 2) * (root * v)
+
+
+def _on_mesh(u, v, mesh: _Mesh, origin, direction) -> LightPoint:
+    """Sample points evenly, and half of those of a ray that meets the mesh about the place where it does."""
+    hit = mesh.scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction)))
+    meets = hit.is_valid()
+    met = dr.select(meets, hit.prim_index, 0)
+    share = mi.Float64(dr.select(meets, 0.5, 0))
+    number, within = mesh.choose(u)
+    even = _even_in_triangle(within, (v - share) / (1 - share), mesh, number)
+
+    # The place in the triangle that was met, in the axes of its first side and across it.
+    corner, first, second, normal = (*(mesh.corner(met, which) for which in range(3)), mesh.normal(met))
+    across = dr.normalize(first)
+    up = dr.cross(normal, across)
+    slope = dr.dot(direction, normal)
+    reach = dr.dot(corner - origin, normal) / dr.select(dr.abs(slope) < _PARALLEL, 1, slope)
+    place = origin + direction * reach
+    ends = [corner, corner + first, corner + second]
+    sine, cosine = dr.sincos(2 * math.pi * u)
+    edge = _edge_of_triangle(place, across * cosine + up * sine, ends, normal)
+    about = meets & (v < share)
+    position = dr.select(about, place + (across * cosine + up * sine) * (edge * v / dr.maximum(share, _LEAST)), even)
+    number = dr.select(about, met, number)
+
+    way = position - place
+    rho = dr.norm(way)
+    here = meets & (number == met)
+    counts = ~here | (rho > _TOUCHING * dr.norm(first))
+    rho = dr.select(here & counts, rho, 1)
+    edge = _edge_of_triangle(place, way / rho, ends, normal)
+    density = (1 - share) / mesh.area
+    density += dr.select(here, share / (2 * math.pi * dr.maximum(edge, rho) * rho), 0)
+    return LightPoint(position, mesh.normal(number), dr.select(counts, density, 0))
+
+
+def _edge_of_triangle(place, towards, ends, normal):
+    """Return how far a triangle reaches from a place in it in a unit direction of its plane [m]."""
+    reach = mi.Float64(dr.inf)
+    for one, other in zip(ends, (*ends[1:], ends[0])):
+        inward = dr.cross(normal, other - one)
+        inward = inward * dr.sign(dr.dot(inward, sum(ends) / 3 - one))
+        rate = -dr.dot(inward, towards)
+        gap = dr.maximum(dr.dot(inward, place - one), 0)
+        reach = dr.select(rate > 0, dr.minimum(reach, gap / dr.select(rate > 0, rate, 1)), reach)
+    return reach
 
 
 def _share(place, light: AreaLight, origin, direction):

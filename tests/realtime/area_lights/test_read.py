@@ -5,6 +5,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.area_lights.points import place_points
 from realtime.errors import InputError
 from realtime.scene.read_scene import read_scene
 from tests.helpers.lamps import area_lamp
@@ -43,6 +44,28 @@ def test_a_lamp_of_null_is_nothing_but_light(variant):
     assert "lamp" in [shape.id() for shape in read(lamp=area_lamp("disk", size=0.29)).geometry.shapes()]
 
 
+@pytest.mark.parametrize("flipped", [False, True])
+@pytest.mark.parametrize("pattern", ["ring", "sobol"])
+def test_points_of_a_mesh_lie_on_the_side_that_shines(variant, flipped, pattern):
+    """A box from outside is convex; from inside its walls stand in the light of one another."""
+    lamp = area_lamp("cube", flip_normals=flipped)
+    (light,) = read(lamp=lamp).area_lights
+    assert (light.kind, light.folded) == ("mesh", flipped)
+    half = np.array([0.31, 0.17, 0.17])
+    assert light.area == pytest.approx(8 * np.sum(half * np.roll(half, 1)), rel=1e-5)
+    placed = place_points(light, 600, pattern)
+    matrix = np.array(lamp["to_world"].matrix, dtype=np.float64)[:3]
+    local = np.linalg.solve(matrix[:, :3], (placed.positions - matrix[:, 3]).T).T
+    np.testing.assert_allclose(np.abs(local).max(axis=1), 1, atol=1e-4)
+    along = placed.normals @ (matrix[:, :3] / half)  # a unit vector along one of the axes
+    np.testing.assert_allclose(np.abs(along).max(axis=1), 1, atol=1e-5)
+    np.testing.assert_allclose(np.sum(along * local, axis=1), -1 if flipped else 1, atol=1e-4)
+    np.testing.assert_allclose(600 * np.pi * placed.intensity, light.power, rtol=1e-12)
+    walls = np.array([half[1] * half[2], half[2] * half[0], half[0] * half[1]])
+    expected = (walls + (walls.sum() - walls) / 3) / walls.sum()
+    np.testing.assert_allclose(np.mean(local**2, axis=0), expected, rtol=0.03)
+
+
 def _sheared():
     return mi.ScalarTransform4f(np.array([[1, 0.3, 0, 0.5], [0, 1, 0, 0.7], [0, 0, 1, 1.9], [0, 0, 0, 1]]))
 
@@ -51,7 +74,7 @@ def _sheared():
 @pytest.mark.parametrize(
     ("lamp", "message"),
     [
-        (lambda: area_lamp("cube"), "light 'lamp': its shape is a Cube"),
+        (lambda: area_lamp("cylinder"), "light 'lamp': its shape is a Cylinder"),
         (lambda: area_lamp("rectangle") | {"to_world": _sheared()}, "light 'lamp': the rectangle is sheared"),
         (lambda: area_lamp("disk", size=(0.3, 0.2)), "light 'lamp': the disk is scaled by 0.3 x 0.2"),
         (lambda: area_lamp("sphere", size=0.3, flip_normals=True), "light 'lamp': the sphere shines inwards"),

@@ -14,7 +14,7 @@ from reference.monte_carlo.single_scatter.scene_data import read_task
 from reference.monte_carlo.single_scatter.stretches import double_ray
 from reference.monte_carlo.volpath.integrator import volpath_batch
 from reference.scene.read import read_truth
-from tests.helpers.area_lights import BLACK, NULL, lamp, lit_scene
+from tests.helpers.area_lights import BLACK, NULL, lamp, lit_scene, ring
 from tests.helpers.scenes import tiny_scene
 
 _BATCHES = 24
@@ -36,6 +36,8 @@ def _at(place, target, scale):
 def _lamp(kind, bsdf, *, in_view=False):
     """Return a light above the ball, or one before the camera that faces it."""
     place, target = ((0.15, -0.9, 1.3), (0.1, -3.0, 0.9)) if in_view else ((0.9, 0.7, 1.9), (0.1, -0.5, 0.4))
+    if kind == "mesh":
+        return ring(place, size=0.8, radiance=(5.0, 4.0, 3.0), bsdf=bsdf)
     scale = {"rectangle": [0.5, 0.3, 1.0], "disk": [0.4, 0.4, 1.0], "sphere": [0.3, 0.3, 0.3]}[kind]
     return lamp(kind, radiance=(5.0, 4.0, 3.0), bsdf=bsdf, to_world=_at(place, target, scale))
 
@@ -96,11 +98,11 @@ _CASES = {
     f"{kind}, {'black' if bsdf is BLACK else 'null'}, {'in view' if in_view else 'above'}": {
         "lamp": (kind, bsdf, in_view)
     }
-    for kind in ("rectangle", "disk", "sphere")
+    for kind in ("rectangle", "disk", "sphere", "mesh")
     for bsdf in (BLACK, NULL)
     for in_view in (False, True)
 }
-_FAST = ("rectangle, black, in view",)
+_FAST = ("rectangle, black, in view", "mesh, black, above")
 
 
 @pytest.mark.claim("area-lights-by-samples", tolerance="four standard errors, which are below 1 %")
@@ -146,7 +148,9 @@ def test_surfaces_are_those_of_mitsubas_direct_integrator(variant, kind):
     assert np.all(np.abs(mean - expected) < 4 * together)
 
 
-@pytest.mark.parametrize("kind", ["sphere", *(pytest.param(k, marks=pytest.mark.slow) for k in ("rectangle", "disk"))])
+@pytest.mark.parametrize(
+    "kind", ["mesh", "sphere", *(pytest.param(k, marks=pytest.mark.slow) for k in ("rectangle", "disk"))]
+)
 def test_density_of_points_on_a_light(variant, kind):
     """Rationale: an importance density that is wrong anywhere is a bias.
 

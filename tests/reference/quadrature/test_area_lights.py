@@ -32,11 +32,15 @@ from tests.helpers.area_lights import (
     lamp,
     lit_room,
     lit_scene,
+    mesh_lamp,
+    ring,
     turned,
 )
+from validation.scenes.meshes import grid, icosphere, placed, scaled
 
 WHITE = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [1.0, 1.0, 1.0]}}
 LAMPS = {"rectangle": flat, "disk": partial(flat, "disk"), "sphere": ball}
+MESH = {"mesh": ring}
 
 
 def room(light, **changes):
@@ -68,6 +72,38 @@ def test_samples_stand_for_the_area_and_the_solid_angle(variant, kind):
     cosine = np.maximum(np.sum(way * samples.normal[0], axis=2) / r, 0.0)
     expected = np.mean(cosine / r**2 * samples.weight[0], axis=1)
     assert angle == pytest.approx(expected, rel=2e-2)
+
+
+def test_samples_of_a_mesh_stand_for_its_area(variant):
+    """Their errors are those of random choices among triangles, by what these send: a ray has 2048 samples."""
+    light = empty(ring()).area[0]
+    assert light.shadows_itself
+    towards = np.concatenate([light.centre + 0.5 * _draws(60, seed=1), _draws(60, seed=2)])
+    direction = towards / np.linalg.norm(towards, axis=1)[:, None]
+    square = square_points(fixed(2048), 0, 0, "mesh")
+    samples = samples_for_rays(light, np.zeros(3), direction, np.full(120, np.inf), square)
+    assert samples.weight.mean(axis=1) == pytest.approx(light.area, rel=4e-2)
+    assert samples.weight.mean() == pytest.approx(light.area, rel=2e-3)
+
+
+def _draws(count, seed):
+    return np.random.default_rng(seed).normal(size=(count, 3))
+
+
+def test_a_mesh_of_a_quad_is_the_rectangle_and_of_a_sphere_the_sphere(variant):
+    """What an icosphere of 1280 triangles sends is that of its area, 0.5 % below that of the sphere around it."""
+    quad = grid((-0.5, -0.3, 0.0), (1.0, 0.0, 0.0), (0.0, 0.6, 0.0), (1, 1))
+    turn = np.array(turned((0.0, 0.0, 0.0), 163, (1, 1, 1)).matrix, dtype=np.float64)[:3, :3]
+    fine = placed(scaled(icosphere(3), 0.4), (0.3, 0.4, 2.9))
+    for mesh, light in ((placed(quad, (0.3, 0.4, 2.9), turn), flat()), (fine, ball())):
+        one, other = room(mesh_lamp(mesh)), room(light)
+        images = [quadrature_image(truth, plan=fixed(64)) for truth in (one, other)]
+        share = one.area[0].area / other.area[0].area
+        for layer in ("airlight", "surface"):
+            found, wanted = (getattr(image, layer) for image in images)
+            error = np.hypot(*(getattr(image, f"{layer}_se") for image in images))
+            assert np.sqrt(np.mean(error**2)) < 4e-2 * wanted.mean()
+            assert np.all(np.abs(found - share * wanted) < 7 * error + 1e-3 * wanted + 1e-12)
 
 
 def test_one_sample_by_plain_quadrature(variant):
@@ -148,10 +184,10 @@ def test_half_a_plane_before_a_rectangle(variant):
     assert np.sqrt(np.mean((got - expected) ** 2)) < 1.3e-3 * expected.mean()
 
 
-@pytest.mark.parametrize("kind", ["rectangle", "sphere", pytest.param("disk", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", ["mesh", "rectangle", "sphere", pytest.param("disk", marks=pytest.mark.slow)])
 def test_surfaces_by_many_shadow_rays(variant, kind):
     """Samples in the solid angle against even points of the light, each seen or not along one float64 ray."""
-    truth = room(LAMPS[kind](), size=(8, 6))
+    truth = room((LAMPS | MESH)[kind](), size=(8, 6))
     hits = surface_hits(truth)
     hits = replace(hits, distance=exact_distance(truth, hits.interaction, hits.distance))
     known = np.zeros((len(hits.distance), 3))
@@ -181,7 +217,8 @@ def test_surfaces_by_many_shadow_rays(variant, kind):
     scale = expected.mean()
     # Student's value with seven degrees of freedom that one value in 100 000 exceeds; 1e-5: the rays' start.
     assert np.all(np.abs(difference) <= 9.1 * error + 1e-5 * scale)
-    assert np.sqrt(np.mean(error**2)) < 0.02 * scale
+    # Of a mesh half of the even points face away.
+    assert np.sqrt(np.mean(error**2)) < (0.07 if kind == "mesh" else 0.02) * scale
 
 
 def test_emission_is_seen_through_fog_and_not_from_behind(variant):
