@@ -123,7 +123,8 @@ def drop_arrays(key: str) -> None:
 def cache_entries() -> list[Entry]:
     """Return the files of the cache, the least recently used first."""
     root, entries = cache_folder(), []
-    for path in (*root.glob("[!.]*.npz"), *root.glob("*/[!.]*.npz")):
+    folders = [root, *(path for path in _listed(root) if path.is_dir())]
+    for path in (each for folder in folders for each in _listed(folder) if each.match("[!.]*.npz")):
         owner = path.parent if path.parent != root else path
         kind = _KIND.fullmatch(owner.name.removesuffix(".npz"))
         if kind is None or owner.is_symlink():
@@ -132,6 +133,14 @@ def cache_entries() -> list[Entry]:
             state = path.stat()
             entries.append(Entry(path, kind[1], state.st_size, state.st_mtime))
     return sorted(entries, key=lambda entry: (entry.used, entry.path))
+
+
+def _listed(folder: Path) -> list[Path]:
+    """Return what a folder holds: nothing, once another process has removed it (`Path.glob` of Python 3.11 raises)."""
+    try:
+        return list(folder.iterdir())
+    except OSError:
+        return []
 
 
 def remove_oldest(limit: int) -> tuple[int, int]:

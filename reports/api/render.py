@@ -381,16 +381,17 @@ def _plan(scene: Any, pixels: Any, changes: Any, precision: str, chosen: "Config
     if issubclass(method, ShadowPlanes):
         casters = caster_plan(read)
         words |= describe_casters(casters)
-        _warn(casters.warnings)
+        if dict(chosen.parameters).get("order", "exact") != "exact":
+            _warn(casters.warnings)
     return Plan(words, notes)
 
 
 def _warnings(renderer: Any) -> tuple[str, ...]:
-    """Return the warnings on the casters of shadow planes, said on the error stream too."""
+    """Return what planes in an order of a paper do not count right, said on the error stream too."""
     from realtime.methods.shadow_planes.method import PlanePreparation
 
     preparation = renderer.stages.prepare
-    if not isinstance(preparation, PlanePreparation):
+    if not isinstance(preparation, PlanePreparation) or preparation.order == "exact":
         return ()
     _warn(preparation.casters.warnings)
     return tuple(preparation.casters.warnings)

@@ -39,12 +39,12 @@ def test_certified_values():
     assert found[lobes] == pytest.approx(cases.value[lobes], rel=1e-10)
 
 
-@pytest.mark.claim("droplets-certified")
+@pytest.mark.claim("droplets-certified", tolerance="1e-13: processors round the moments of Mie's series differently")
 @pytest.mark.parametrize("number", [3, pytest.param(50, marks=pytest.mark.slow)])
 def test_a_certified_value_is_certified_again(number):
     header, *lines = FILE.read_text().splitlines()
     row = dict(zip(header.split(","), lines[number].split(",")))
-    assert value(row) == row["value"]
+    assert float(value(row)) == pytest.approx(float(row["value"]), rel=1e-13)
 
 
 @pytest.mark.claim("droplets-refused")
