@@ -49,10 +49,10 @@ def compare(
 ) -> "ImageComparison | SceneComparison | Diagnosed | Fitted":
     """Compare an image with another, or with the reference of a scene.
 
-    Returns bias and error quantiles, statistics if there are standard errors, and with a scene also the best-fitting
-    factor, what may be wrong with the image as a whole, where most of the error lies, and whether the image is right.
-    Exit status 1 if the image has values that are negative or not finite, or if the bias is not shown to be within
-    the margin.
+    The result has the bias and quantiles of the error, and statistics if there are standard errors. With a scene it
+    also has the best-fitting factor, what may be wrong with the image as a whole, where most of the error lies, and
+    whether the image is right. The exit status is 1 if the image has values that are negative or not finite, or if the
+    bias is not shown to be within the margin.
 
     `--diagnose` predicts the image that each of a hundred faults would make, of medium, lights, camera and encoding,
     and ranks them by evidence. `--fit` finds the parameters of the fog that explain the image, each with its 95 %
@@ -66,26 +66,26 @@ def compare(
     test
         The image to judge, an EXR file; from Python also a result or an array.
     layer
-        Layer to compare, 'airlight' by default; 'total' is R/G/B, the default where there is no airlight.
+        Layer to compare: 'airlight' by default, or 'total' (R/G/B) if there is no airlight.
     holds
-        With a scene: what the layer holds; what its name says by default.
+        With a scene: what the layer contains; by default what its name says.
     pixel
-        With a scene: whether pixels are values at their centre or means over their area; by default what fits, which
-        takes several times as long.
+        With a scene: whether pixels are values at their centre or means over their area. By default both are tried,
+        which takes several times as long.
     mask
         An EXR file that is 0 in pixels to leave out; from Python also truth values, (height, width).
     margin
         Largest relative bias that counts as agreement, such as 0.005; two images need standard errors for it.
     by_order
-        Of two images: compare the layers by order of scattering too, such as airlight_3_4.
+        With two images: also compare the layers by order of scattering, such as airlight_3_4.
     all_metrics
-        Also the errors by the formulas of other tools, the colour differences, and HDR-FLIP by flip-evaluator.
+        Also compute the errors of other tools, colour differences, and HDR-FLIP by flip-evaluator.
     diagnose
-        With a scene: say what is wrong with the image, in place of how far it is.
+        With a scene: say what is wrong with the image instead of how large its error is.
     fit
         With a scene: which parameters to fit, such as sigma_t,albedo (each also with .r, .g or .b), phase.g, intensity,
-        exposure, light.x, light.y, light.z; of one medium or light NAME as sigma_t:NAME. As sigma_t=0.1 it begins
-        with that value, else with the scene's.
+        exposure, light.x, light.y, light.z; sigma_t:NAME for one medium or light. sigma_t=0.1 starts the fit at
+        that value; without a value it starts at the scene's.
     output
         Write the difference: a .png file shows the signed relative error of each pixel in false colours, an .exr file
         has the values.

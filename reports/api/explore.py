@@ -93,20 +93,21 @@ def describe(
 ) -> "Description | FolderLog":
     """Describe all that another renderer needs to render a scene.
 
-    Its image can then be judged, by `airlight compare SCENE IMAGE.exr`. Camera, media, lights, surfaces, what the
-    pixels hold and what file to write. The glTF file has the same camera, lights and meshes; media are in its extras.
+    The description has the camera, media, lights and surfaces, what the pixels contain and which file to write.
+    `airlight compare SCENE IMAGE.exr` then judges the image. The glTF file has the same camera, lights and meshes, with
+    the media in its extras.
 
     Parameters
     ----------
     scene
-        A built-in scene, random:SEED or a Mitsuba XML file; from Python also what `load_scene` takes or returns. Of a
-        folder it says what becomes of each .xml file in it: taken with which notes, or refused with which words.
+        A built-in scene, random:SEED or a Mitsuba XML file; from Python also what `load_scene` takes or returns. For
+        a folder the result lists which of its .xml files are taken, with notes, and which are refused, and why.
     size
         Width and height [pixels], or WxH; the scene's own by default.
     output
         Write the scene as binary glTF 2.0, a .glb file, or its height fog as a grid of Mitsuba, a .vol file.
     progress
-        True says notes on the scene on the error stream.
+        True prints notes on the scene on the error stream.
 
     Raises
     ------
@@ -183,7 +184,7 @@ def view(
     kernel
         Airlight kernel, see `airlight list kernels`.
     change
-        A camera, light or medium unlike the scene's, such as medium.sigma_t=0.1; may be given several times.
+        Change the camera, a light or a medium of the scene, such as medium.sigma_t=0.1; may be given several times.
     size
         Width and height [pixels], or WxH.
     host

@@ -51,39 +51,39 @@ def reference(
 ) -> "Reference":
     """Compute the reference of a scene, with its error.
 
-    It is written as layered EXR. Finished batches are cached: a Monte Carlo run continues from them, after an
-    interruption or with more samples. `--cluster` spreads batches over workers; the file is the same, byte for byte.
-    Exit status 1 if the error that was asked for was not reached.
+    The file is a layered EXR. Finished batches are cached: a Monte Carlo run continues from them, after an interruption
+    or with more samples. `--cluster` spreads batches over workers; the file has the same bytes. The exit status is 1 if
+    the run did not reach the `--error` that it was given.
 
     Parameters
     ----------
     scene
         A built-in scene, random:SEED or a Mitsuba XML file; from Python also what `load_scene` takes or returns.
     estimator
-        quadrature, with a bound of the error in every pixel; or by random samples, with standard errors,
-        single-scatter and volpath; for clouds, whose light is scattered many times, cloud-paths.
+        quadrature has an error bound in every pixel. single-scatter and volpath use random samples and have standard
+        errors. cloud-paths is for clouds, in which light scatters many times.
     change
-        A camera, light or medium unlike the scene's, such as medium.sigma_t=0.1; may be given several times.
+        Change the camera, a light or a medium of the scene, such as medium.sigma_t=0.1; may be given several times.
     size
         Width and height [pixels], or WxH; the scene's own by default.
     pixel
-        Of the quadrature: the radiance at a pixel's centre, or the mean over its area.
+        For quadrature: the radiance at the centre of a pixel, or its mean over the area.
     samples
-        Of an estimator that samples: so many a pixel, at least 64; 2048 by default, 256 for clouds.
+        For an estimator that samples: samples per pixel, at least 64; 2048 by default, 256 for clouds.
     error
-        Of an estimator that samples: go on to this relative standard error, such as 0.001.
+        For an estimator that samples: stop at this relative standard error, such as 0.001.
     seconds
-        Of an estimator that samples: go on for so long [s].
+        For an estimator that samples: stop after this time [s].
     target
-        Whether `error` is that of the image, pooled, or of its worst pixel.
+        Whether `error` is the pooled error of the image or the error of its worst pixel.
     seed
-        Of the first batch of samples; the others count up.
+        Seed of the first batch of samples; the next batches count up from it.
     orders
-        For clouds, by cloud-paths and volpath: layers by order of scattering, such as 1,2,3-4,5-inf; 'sets', the
-        default of cloud-paths, are those of Bouthors 2008, 'all' is none.
+        For clouds, by cloud-paths or volpath: layers by order of scattering, such as 1,2,3-4,5-inf. 'sets', the default
+        of cloud-paths, are the orders of Bouthors 2008; 'all' writes no layers.
     merge
-        Merge the samples of these files with those of the scene, in place of tracing: Monte Carlo references of the
-        scene by one estimator with different seeds; may be given several times.
+        Trace nothing, and merge the samples of these files: Monte Carlo references of the scene by one estimator, with
+        different seeds; may be given several times.
     cluster
         Let workers compute: local[:N] processes, tcp://HOST:PORT or tls://HOST:PORT of a Dask scheduler, or its
         scheduler file. A tcp scheduler authenticates nobody and its workers run what they are sent: use it only on a

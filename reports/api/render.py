@@ -103,23 +103,23 @@ def render(
     kernel
         Airlight kernel, see `airlight list kernels`; 'exact' for a method that calls one.
     change
-        A camera, light or medium unlike the scene's, such as medium.sigma_t=0.1; may be given several times.
+        Change the camera, a light or a medium of the scene, such as medium.sigma_t=0.1; may be given several times.
     size
         Width and height [pixels], or WxH; the scene's own by default.
     precision
-        Of all that the method computes.
+        Whether the method computes in float32 (single) or float64 (double).
     samples
-        Camera rays a pixel, for pictures without aliasing; a method's error is measured at pixel centres.
+        Camera rays per pixel. More than one gives a picture without aliasing; errors are measured at pixel centres.
     frames
-        Render an animation of so many frames, as NAME-0001.exr and so on.
+        Render an animation with this many frames, as NAME-0001.exr and so on.
     animate
         What moves: light, objects, medium, colour, or several with commas; the scene's animation by default.
     output
-        A file to write, .exr for all layers or .png for a picture through a tone curve; may be given several times.
+        A file to write: .exr for all layers, .png for a tone-mapped picture; may be given several times.
     plan
-        Return what the scene needs of the method, and render nothing.
+        Say what the scene needs from the method, and render nothing.
     timed
-        Also measure what a frame costs, which takes some seconds.
+        Also measure the time of a frame, which takes some seconds.
     progress
         Called with (fraction done, what); True shows a bar.
     parameters

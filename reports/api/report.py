@@ -125,38 +125,38 @@ def report(
 ) -> Report:
     """Measure methods in scenes and write the report, one page.
 
-    The page is report.html; beside it lie report.json and each image as EXR and PNG.
+    The page is report.html, next to report.json and each image as EXR and PNG.
 
-    Results that this machine measured before, with the same code and scenes, come from the cache. Exit status 1 if
-    single-scatter or volpath does not confirm the reference within the margin, or a user method is at fault: the report
-    says what became of it.
+    Results that this machine measured before, with the same code and scenes, come from the cache. The exit status is 1
+    if single-scatter or volpath does not confirm the reference within the margin, or if a user method fails: the report
+    says how.
 
     Parameters
     ----------
     scenes
-        Built-in scenes, random:SEED and Mitsuba XML files, four with `--quick`, eleven by default; or a study, a TOML
-        file as of `airlight sweep`.
+        Built-in scenes, random:SEED and Mitsuba XML files; four with `--quick`, eleven by default. Or a study, a TOML
+        file as for `airlight sweep`.
     quick
-        Few scenes, small images: some minutes.
+        Few scenes and small images, for a first look in some minutes.
     full
-        Large images, many samples, all tables: an hour.
+        Large images, many samples and all tables, in about an hour.
     method
         A method of `airlight list methods`, a user method as MODULE:FUNCTION or FILE.py:FUNCTION, or 'all', the
         default; may be given several times. From Python also functions and `airlight.configuration(...)`.
     kernel
         Airlight kernel of the methods; may be given several times.
     settings
-        NAME=VALUE, a parameter of each method that `--method` names; may be given several times.
+        NAME=VALUE, a parameter for each method that `--method` names; may be given several times.
     images
-        Folder with your engine's images, SCENE.exr or SCENE.NAME.exr, judged against the reference.
+        Folder with images of your engine, SCENE.exr or SCENE.NAME.exr, to compare with the reference.
     output
-        Folder of the report; airlight-report by default.
+        Folder for the report; airlight-report by default.
     from_
-        Draw the page of this report.json again, without measuring; what `--method` names is shown in the strip.
+        Draw the page of this report.json again and measure nothing; `--method` names what the strip shows.
     figures
-        Also write figures and a LaTeX table for a paper, for a column of this width.
+        Also write figures and a LaTeX table for a paper, with the width of a single or a double column.
     fresh
-        Measure again what is cached by earlier runs.
+        Measure again what earlier runs have cached.
     cluster
         Let workers compute references and their checks: local[:N] processes, tcp://HOST:PORT or tls://HOST:PORT of a
         Dask scheduler, or its scheduler file. A tcp scheduler authenticates nobody and its workers run what they are
@@ -338,25 +338,25 @@ def diff(
 ) -> ReportDifference:
     """Compare two reports: what got slower or less accurate.
 
-    Also what got better, what is new and what is gone.
+    The result also has what got better, what is new and what is gone.
 
-    Errors have little noise: they may change by a relative band, or by float32 rounding. Times have much: the quartiles
-    of both reports tell how busy the machine was, and a change must show in all stages that share it. Between two
-    machines, times are compared relative to the median of all. Exit status 1 if anything is worse, gone, newly refused
-    or no longer finite, or if the reference is no longer confirmed.
+    Errors have little noise: they may change within a relative tolerance, or by float32 rounding. Times have much: the
+    quartiles of both reports say how busy the machine was, and a change must appear in all stages that share it. Times
+    of two machines are compared relative to the median of all. The exit status is 1 if anything is worse, gone, newly
+    refused or no longer finite, or if the reference is no longer confirmed.
 
     Parameters
     ----------
     old
-        report.json, or its folder, to compare with.
+        The earlier report.json, or its folder.
     new
-        report.json, or its folder, to judge.
+        The later report.json, or its folder.
     error_tolerance
-        Relative change of an error that is noise; that of a maximum is twice as wide.
+        Relative change of an error that counts as noise; for a maximum, twice as much.
     time_tolerance
-        Relative change of a time that is noise, on a quiet machine; inf compares no times.
+        Relative change of a time that counts as noise on a quiet machine; inf compares no times.
     common
-        Compare what both reports hold; what is missing from the new one is no loss.
+        Compare only what both reports have; what the new one lacks is no loss.
     """
     from reports.data.reader import read_report
     from reports.diff.compare import compare_reports
@@ -422,9 +422,9 @@ def paper(
 ) -> PaperClaims:
     """Give a verdict on every claim of the papers.
 
-    Equations, figures, tables and sentences: published beside measured. A verdict is reproduced, not reproduced,
-    differs (it depends on the machine or on a scene of ours) or impossible. Each is computed from what this command
-    measures, or from what is cached by an earlier run; all take an hour or so.
+    Equations, figures, tables and sentences stand next to what was measured. A verdict is reproduced, not reproduced,
+    differs (it depends on the machine or on a scene of ours) or impossible. This command measures what a verdict needs,
+    or takes it from the cache; all verdicts take about an hour.
 
     Parameters
     ----------
@@ -432,11 +432,11 @@ def paper(
         biri, billeter, ali or bouthors, with its numbers that have no verdict too, such as rates of graphics cards; the
         verdicts of all by default.
     figures
-        Also draw the pictures of the papers in our scenes, PDF and PNG with their data, into this folder.
+        Also draw the pictures of the papers in our scenes into this folder, as PDF and PNG with their data.
     quick
-        Only the claims that need no image; of figures small ones.
+        Only the claims that need no image, and small figures.
     fresh
-        Measure again what was cached by earlier runs.
+        Measure again what earlier runs have cached.
     progress
         Called with (fraction done, what); True shows a bar.
 

@@ -118,14 +118,14 @@ def sweep(
     `--from DIR` writes what the rows say: DIR/sweep.html, figures, and claims with their confidence as JSON; with -o
     into another folder.
 
-    Exit status 1 if a cell failed, hung or aborted, or was left undone.
+    The exit status is 1 if a cell failed, hung or aborted, or was left undone.
 
     Parameters
     ----------
     study
         A TOML file: what to sweep over, see docs/many-scenes.md.
     random
-        So many random scenes; 100 without a study.
+        Number of random scenes; 100 without a study.
     cluster
         Let workers compute: local[:N] processes, tcp://HOST:PORT or tls://HOST:PORT of a Dask scheduler, or its
         scheduler file. A tcp scheduler authenticates nobody and its workers run what they are sent: use it only on a
@@ -133,9 +133,9 @@ def sweep(
     output
         Folder of the rows; sweep-NAME by default.
     again
-        Compute cells again that failed, hung or aborted; the others stay.
+        Compute again the cells that failed, hung or aborted; the others stay.
     from_
-        Say what this sweep says: a page, figures and claims from its Parquet, without computing.
+        Write the page, figures and claims of this sweep from its Parquet file, without computing cells.
     progress
         Called with (fraction done, what); True shows a bar.
     """

@@ -81,13 +81,13 @@ def slab(
     albedo
         Single-scattering albedo, 0 to 1.
     orders
-        Orders, such as 1,2,3-4,31-inf; sets: those of Bouthors 2008; all: their sum.
+        Orders of scattering, such as 1,2,3-4,31-inf; 'sets' are the orders of Bouthors 2008, 'all' is the sum.
     depths
-        Where fluence, flux and radiance are wanted [mean free paths], with commas; top and bottom by default.
+        Depths of fluence, flux and radiance [mean free paths], with commas; top and bottom by default.
     directions
-        Of the radiance, as MU:PHI with commas: mu positive upwards, phi [degrees] 0 forward.
+        Directions of the radiance, MU:PHI with commas: mu is positive upwards, phi [degrees] is 0 forward.
     photons
-        How many photons check the numbers.
+        Number of photons of a random walk that checks the numbers.
     progress
         Called with (fraction done, what); True shows a bar.
 

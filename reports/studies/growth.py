@@ -48,21 +48,21 @@ def scaling(
 ) -> Study:
     """Time methods as their work grows.
 
-    Returns times, memory and exponents by pixels, triangles, lights, bounded media or texels of the map. Exit status 1
-    if a time jumps, or grows with a higher power of the work than before.
+    The result has times, memory and exponents by pixels, triangles, lights, bounded media or texels of the map. The
+    exit status is 1 if a time jumps, or grows with a higher power of the work than the baseline of the scene.
 
     Parameters
     ----------
     scenes
         Built-in scenes, random:SEED and Mitsuba XML files.
     kinds
-        Some of size,triangles,lights,media,map.
+        What grows: some of size,triangles,lights,media,map.
     method
-        As of `airlight study methods`; one configuration of each method with shadows by default.
+        A method, as in `airlight study methods`; by default one configuration of each method with shadows.
     kernel
         Airlight kernel of the methods; may be given several times.
     settings
-        NAME=VALUE, a parameter of each method that `--method` names; may be given several times.
+        NAME=VALUE, a parameter for each method that `--method` names; may be given several times.
     size
         Width and height [pixels], or WxH.
     progress
@@ -175,10 +175,10 @@ def map_size(
     kernel
         Airlight kernel of the method.
     settings
-        NAME=VALUE, a parameter of the method; may be given several times. Errors of other causes must be well below
-        that of the largest map.
+        NAME=VALUE, a parameter of the method; may be given several times. Choose them so that errors of other causes
+        are well below the error of the largest map.
     sizes
-        Of the shadow map [texels], with commas.
+        Sizes of the shadow map [texels], with commas.
     size
         Width and height of the image [pixels], or WxH.
     flicker

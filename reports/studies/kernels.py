@@ -44,7 +44,7 @@ def kernels(*, kernel: Kernels = (), phase: str | None = None, progress: Progres
     kernel
         A kernel of `airlight list kernels`; may be given several times, all by default.
     phase
-        The only phase function, such as hg-draine:12 or mie:6.
+        One phase function instead of the usual ones, such as hg-draine:12 or mie:6.
     progress
         Called with (fraction done, what); True shows a bar.
     """
@@ -228,8 +228,8 @@ def stability(*, kernel: Kernels = (), progress: Progress = None) -> Study:
     """Look for rays on which kernels break.
 
     Tries every kernel on certified values and on rays of every magnitude. Prints the ray of each largest error in the
-    format of `airlight study integrals`. Exit status 1 if a kernel that claims to be exact exceeds the error that it
-    claims.
+    format of `airlight study integrals`. The exit status is 1 if a kernel that claims to be exact exceeds
+    the error that it claims.
 
     Parameters
     ----------
@@ -448,7 +448,7 @@ def integrals(
     kernel
         Airlight kernel, see `airlight list kernels`.
     precision
-        Of all that the kernel computes.
+        Whether the kernel computes in float32 (single) or float64 (double).
     phase
         Phase function of all rows, in place of the file's: hg:G, hg-draine:DIAMETER, mie:RADIUS:GAMMA:WAVELENGTH,
         mie-modified, ...

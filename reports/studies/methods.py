@@ -88,7 +88,7 @@ def methods(
     kernel
         Airlight kernel of the methods; may be given several times.
     settings
-        NAME=VALUE, a parameter of each method that `--method` names; may be given several times.
+        NAME=VALUE, a parameter for each method that `--method` names; may be given several times.
     size
         Width and height [pixels], or WxH; the scene's own by default.
     seconds
@@ -235,11 +235,11 @@ def decomposition(
     scenes
         Built-in scenes, random:SEED and Mitsuba XML files.
     method
-        As of `airlight study methods`; a ray march by a map, min-max and froxel-fog by default.
+        A method, as in `airlight study methods`; by default a ray march by a map, min-max and froxel-fog.
     kernel
         Airlight kernel of the methods; may be given several times.
     settings
-        NAME=VALUE, a parameter of each method that `--method` names; may be given several times.
+        NAME=VALUE, a parameter for each method that `--method` names; may be given several times.
     size
         Width and height [pixels], or WxH.
     progress

@@ -52,18 +52,6 @@ def cliffs(records: Iterable[Record]) -> list[str]:
     ]
 
 
-def is_record(value: Any) -> bool:
-    """Return whether what a file holds is a `Record`, as far as comparisons read it."""
-    try:
-        named = [value[key] for key in ("scene", "kind", "label")]
-        powers = [value["growth"][name][key] for name in TIMES for key in ("exponent", "standard_error")]
-        sized = len(value["size"]) == 2
-    except (TypeError, KeyError):
-        return False
-    numbers_alone = all(power is None or isinstance(power, int | float) for power in powers)
-    return sized and numbers_alone and all(isinstance(word, str) for word in named)
-
-
 def same_records(old: Iterable[Record], new: Iterable[Record]) -> list[tuple[Record, Record]]:
     """Return the pairs of records of one method, scene, size and kind of work."""
 
