@@ -30,7 +30,16 @@ from reference.quadrature.ahead import done_ahead
 from reference.quadrature.fields import field_of, optical_depth
 from reference.quadrature.light_airlight import worth_of_doubt
 from reference.quadrature.light_samples import Sections, samples_for_rays, sections_for_points
-from reference.quadrature.replicates import PILOT, REPLICATES, Keep, Kept, PointPlan, replicate_means, square_points
+from reference.quadrature.replicates import (
+    PILOT,
+    REPLICATES,
+    Keep,
+    Kept,
+    PointPlan,
+    Sums,
+    replicate_means,
+    square_points,
+)
 from reference.quadrature.surface import Reflection, SurfaceHits
 from reference.quadrature.unbounded import cosine_profile, sums_of
 from reference.scene.area_light import TruthAreaLight
@@ -100,7 +109,32 @@ def area_airlight(
     """
     count = len(truth.direction)
     bound, checks = np.zeros((count, 3)), list[RandomChecks]()
-    rounds, done = 2 * plan.rounds * len(truth.area) * REPLICATES, 0
+
+    def add(active: Index, got: Kept) -> None:
+        bound[active] += got["bound"]
+        checked, disagreements, refined, left = (int(value) for value in got["checks"][:4])
+        checks.append(RandomChecks(checked, disagreements, refined, left, float(got["checks"][4])))
+
+    def work(beam: Beam, active: Index, square: Array, turn: float) -> Kept:
+        return _scattered(beam, active, square, shadow_scale)
+
+    sums = _by_replicate("airlight", beams, plan, work, tell=tell, keep=keep, add=add)
+    means, used = replicate_means(count, known, plan, sums)
+    return AreaAirlight(means, bound / (REPLICATES * used[:, None]), RandomChecks.of_all(checks))
+
+
+def _by_replicate(
+    layer: str,
+    beams: list[Beam],
+    plan: PointPlan,
+    work: Callable[[Beam, Index, Array, float], Kept],
+    *,
+    tell: Share,
+    keep: Keep,
+    add: Callable[[Index, Kept], None] = lambda active, got: None,
+) -> Sums:
+    """Return the sums of a layer for `replicate_means`: work(light, rays, points of the square, turn of sections)."""
+    rounds, done = 2 * plan.rounds * len(beams) * REPLICATES, 0
 
     def sums(part: str, chosen: PointPlan, active: Index, numbers: tuple[int, int]) -> Array:
         nonlocal done
@@ -108,19 +142,23 @@ def area_airlight(
         for number, beam in enumerate(beams):
             for replicate in range(REPLICATES):
                 square = square_points(chosen, number, replicate, beam.light.kind)[slice(*numbers)]
-                work = partial(_scattered, beam, active, square, shadow_scale)
-                got = keep(f"airlight-{part}{number}-{numbers[1]}-{replicate}", work)
+                one = partial(work, beam, active, square, _turn(chosen, number, replicate))
+                got = keep(f"{layer}-{part}{number}-{numbers[1]}-{replicate}", one)
                 total[..., replicate] += got["radiance"]
                 if part != PILOT:
-                    bound[active] += got["bound"]
-                    checked, disagreements, refined, left = (int(value) for value in got["checks"][:4])
-                    checks.append(RandomChecks(checked, disagreements, refined, left, float(got["checks"][4])))
+                    add(active, got)
                 done += 1
                 tell(done / rounds)
         return total
 
-    means, used = replicate_means(count, known, plan, sums)
-    return AreaAirlight(means, bound / (REPLICATES * used[:, None]), RandomChecks.of_all(checks))
+    return sums
+
+
+def _turn(plan: PointPlan, number: int, replicate: int) -> float:
+    """Return by what angle a replicate's sections are turned: by a half or one and a half right angles, and around."""
+    along, across = divmod(replicate, 2)
+    shift = (along + np.random.default_rng((plan.seed, number)).random()) / (REPLICATES // 2)
+    return 0.25 * np.pi * (1 + 2 * across + shift - 0.5)
 
 
 def _scattered(beam: Beam, active: Index, square: Array, shadow_scale: float) -> Kept:
@@ -188,30 +226,14 @@ def area_surface(
         return result
     reflection = Reflection(hits.interaction)
     depth = optical_depth(truth, truth.origin, truth.direction[rows], np.zeros(len(rows)), hits.distance[rows])
-    rounds, done = 2 * plan.rounds * len(truth.area) * REPLICATES, 0
 
-    def sums(part: str, chosen: PointPlan, active: Index, numbers: tuple[int, int]) -> Array:
-        nonlocal done
-        total = np.zeros((len(active), 3, REPLICATES))
-        for number, beam in enumerate(beams):
-            for replicate in range(REPLICATES):
-                square = square_points(chosen, number, replicate, beam.light.kind)[slice(*numbers)]
-                turn = _turn(chosen, number, replicate)
-                work = partial(_reflected, beam, rows[active], square, turn, shadow_scale, reflection)
-                total[..., replicate] += keep(f"surface-{part}{number}-{numbers[1]}-{replicate}", work)["radiance"]
-                done += 1
-                tell(done / rounds)
-        return total * np.exp(-depth[active, :, None])
+    def work(beam: Beam, active: Index, square: Array, turn: float) -> Kept:
+        light = _reflected(beam, rows[active], square, turn, shadow_scale, reflection)
+        return {"radiance": light["radiance"] * np.exp(-depth[active])}
 
+    sums = _by_replicate("surface", beams, plan, work, tell=tell, keep=keep)
     result[rows], _ = replicate_means(len(rows), known[rows], plan, sums)
     return result
-
-
-def _turn(plan: PointPlan, number: int, replicate: int) -> float:
-    """Return by what angle a replicate's sections are turned: by a half or one and a half right angles, and around."""
-    along, across = divmod(replicate, 2)
-    shift = (along + np.random.default_rng((plan.seed, number)).random()) / (REPLICATES // 2)
-    return 0.25 * np.pi * (1 + 2 * across + shift - 0.5)
 
 
 def _reflected(

@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.scene.convex_bounds import Sphere
 from reference.scene.read import TruthScene
 from reference.scene.shapes import Shapes, read_shapes
 from reference.visibility.candidates import Ball, Near, near_shapes
 from reference.visibility.certificate import LitIntervals, certified
+from reference.visibility.line_crossings import crossings
 from reference.visibility.planes import Rays
 from reference.visibility.shadows import lit_parts
 
@@ -83,12 +85,9 @@ def _inside(rays: Rays, ends: tuple[Array, Array], known: Obstacles) -> tuple[Ar
         if np.linalg.norm(centre - known.light.centre) >= radius + known.light.radius:
             continue
         within = np.linalg.norm(rays.position - centre, axis=1) < radius
-        way = centre - rays.origin
-        middle = np.sum(rays.direction * way, axis=1)
-        beside = np.linalg.norm(way - middle[:, None] * rays.direction, axis=1)
-        half = np.sqrt(np.maximum(radius - beside, 0) * (radius + beside))
-        low = np.where(within, np.maximum(low, middle - half), low)
-        high = np.where(within, np.minimum(high, middle + half), high)
+        enter, leave = crossings(Sphere(centre, float(radius)), rays.origin, rays.direction)
+        low = np.where(within, np.maximum(low, enter), low)
+        high = np.where(within, np.minimum(high, leave), high)
     return low, high
 
 
