@@ -48,7 +48,12 @@ def at_position(predictor: Predictor, guess: Guess, p: Values) -> Guess:
 
 
 def _position_held(predictor: Predictor, guess: Guess, p: Values, at: Values) -> Guess:
-    """Return a guess with the light at p, and shadows as they are where it is at another place."""
+    """Return a guess with the light at p, and shadows as they are where it is at another place.
+
+    The edge of a spot's cone moves more of the fog than all else: there nothing is held.
+    """
+    if predictor.truth.lights[0].axis is not None:
+        return at_position(predictor, guess, p)
     held = at_position(predictor, guess, at)
     x, y, z = (value - before for value, before in zip(p, held.scenery.moved, strict=True))
     return replace(held, fog=held.fog.with_entry("moved", 0, (x, y, z)))

@@ -26,6 +26,7 @@ _COARSE = 0.02  # on a line, of a logarithm or in units of the parameter: enough
 _BEGUN = 2  # of the best starts: the best one may lead to a lesser minimum
 _TURNS, _TURNS_COARSE = 8, 4  # steps of Gauss and Newton at most
 _LITTLE = 0.9  # fraction of the loss that a step leaves which gains little
+_SMALL = 0.02  # of the step of differences: a change that is none
 _STEP = 1e-4  # of differences, of a logarithm or in units of the parameter, where no paths move
 
 
@@ -77,8 +78,8 @@ def explain(
     if parameters:
         scale = min(search.scale(start, fine) for start in starts)
         starts = sorted(starts, key=lambda start: search.loss(start, scale))
-        on_a_line = len(parameters) == 1 and not parameters[0].step
-        places = [search.inward(start) for start in starts[: _BEGUN if on_a_line else 1]]
+        on_a_line = len(parameters) == 1
+        places = [search.inward(start) for start in starts[: _BEGUN if on_a_line and not parameters[0].step else 1]]
         for turn in range(2 if fine else 1):
             scale = scale if turn == 0 else search.scale(search.outward(places[0]), fine)
             improve = search.on_line if on_a_line else search.by_steps
@@ -151,7 +152,8 @@ class _Search:
 
         place = np.clip(place, low, high)  # an image that is nearly black may begin beyond an end
         ends = _between(parameter, float(place[0]), low, high)
-        solved = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": 1e-7 if fine else _COARSE})
+        enough = (_SMALL * parameter.step or 1e-7) if fine else _COARSE
+        solved = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": enough})
         return np.array([solved.x]) if solved.fun <= loss(float(place[0])) else place
 
     def by_steps(self, place: Array, scale: float, fine: bool) -> Array:
@@ -172,7 +174,7 @@ class _Search:
                 move = 0.5 * move
             else:
                 return place
-            small = np.all(np.abs(trial - place) < 0.02 * steps) or (not fine and reached > _LITTLE * least)
+            small = np.all(np.abs(trial - place) < _SMALL * steps) or (not fine and reached > _LITTLE * least)
             place, least = trial, reached
             if small:
                 break
