@@ -33,21 +33,21 @@ from realtime.methods.froxel_fog.grid import Grid, trilinear
 from realtime.methods.interface.view import View
 from realtime.numerics.array_types import PerRay, four_numbers
 from realtime.scene.camera import row_and_column
+from realtime.scene.media.medium import Rays
 
 _THIN = 0.1  # optical depth of a slice up to which the series serves
 _TERMS = 8  # of it: 0.1^8/9! = 3e-14 is left out
 
 
-def accumulated(view: View, grid: Grid, scattered: PerRay) -> Any:
+def accumulated(view: View, grid: Grid, rays: Rays, scattered: PerRay) -> Any:
     """Return the airlight up to the begin and the end of each slice, (slices + 1) values a column, four numbers each.
 
-    `view`, `grid`: the frame and its froxels; `scattered`: by froxel, a colour [W/(m^3 sr)], evaluated.
+    `view`, `grid`, `rays`: the frame, its froxels, and the middle rays of columns; `scattered`: by froxel, a colour
+    [W/(m^3 sr)], evaluated.
     """
     Float, Color, medium = type(view.distance), type(scattered), view.medium
     column = dr.arange(mi.UInt32, grid.columns)
-    middle = grid.column_ray(column)
-    stretch = dr.norm(middle)
-    rays = medium.rays(view.origin, middle / stretch)
+    stretch = dr.norm(grid.column_ray(column))
     volume = dr.zeros(Float, 4 * (grid.slices + 1) * grid.columns)
 
     def step(number, x, kept, total):

@@ -24,7 +24,7 @@ from realtime.methods.interface.view import View
 from realtime.numerics.array_types import Metres, PerRay, four_numbers
 from realtime.scene.camera import Camera
 from realtime.scene.lights import Light
-from realtime.scene.media.medium import Medium
+from realtime.scene.media.medium import Medium, Rays
 
 _NEAR = 1 / 8  # of `far`, where it is not given
 _OPTICAL_REACH = 3.0  # optical depth behind a light that is worth slices: e^-6 = 0.25 % of the light comes back from it
@@ -87,6 +87,14 @@ def view_grid(view: View, *, size: tuple[int, int, int], near: float, far: float
     end = dr.opaque(Float, far) if far else _frame_depth(view)
     begin = dr.opaque(Float, near) if near else end * _NEAR
     return Grid(*size, view.camera, end, begin if distribution == "exponential" else None)
+
+
+def column_rays(view: View, grid: Grid) -> Rays:
+    """Return the middle rays of columns; what the medium finds of them is evaluated once."""
+    middle = grid.column_ray(dr.arange(mi.UInt32, grid.columns))
+    rays = view.medium.rays(view.origin, middle / dr.norm(middle))
+    dr.eval(rays.crossed)
+    return rays
 
 
 def _frame_depth(view: View) -> Metres:

@@ -51,6 +51,7 @@ class FroxelPoints:
 def scattered_light(
     view: View,
     grid: Grid,
+    rays: Rays,
     *,
     shift: tuple[Any, Any, Any],
     tables: tuple[LightPointTable, ...],
@@ -58,11 +59,11 @@ def scattered_light(
 ) -> PerRay:
     """Return the light that each froxel scatters to the camera, a colour [W/(m^3 sr)].
 
-    `view`, `grid`: the frame and its froxels; `shift`: of the points from the middles of the froxels, in parts of a
-    froxel across, down and in depth; `tables`: of the points of lights with extent; `visible`: which light reaches
-    which point.
+    `view`, `grid`, `rays`: the frame, its froxels, and the middle rays of columns; `shift`: of the points from the
+    middles of the froxels, in parts of a froxel across, down and in depth; `tables`: of the points of lights with
+    extent; `visible`: which light reaches which point.
     """
-    points = _froxel_points(view, grid, shift)
+    points = _froxel_points(view, grid, rays, shift)
     total = dr.zeros(type(view.medium.albedo), grid.columns * grid.slices)
     loops = () if view.features.bounded else tables
     for number, light in enumerate(view.lights):
@@ -78,7 +79,7 @@ def scattered_light(
     return view.medium.unit * total * (0.25 * dr.inv_pi)
 
 
-def _froxel_points(view: View, grid: Grid, shift: tuple[Any, Any, Any]) -> FroxelPoints:
+def _froxel_points(view: View, grid: Grid, rays: Rays, shift: tuple[Any, Any, Any]) -> FroxelPoints:
     Float = type(view.distance)
     lane = dr.arange(mi.UInt32, grid.columns * grid.slices)
     number = lane // grid.columns
@@ -88,7 +89,8 @@ def _froxel_points(view: View, grid: Grid, shift: tuple[Any, Any, Any]) -> Froxe
     point = dr.fma(ray, dr.lerp(begin, end, 0.5 + shift[2]), view.origin)
     middle = grid.column_ray(column)
     length = dr.norm(middle)
-    rays = view.medium.rays(view.origin, middle / length)
+    direction = middle / length
+    rays = Rays(view.origin, direction, direction, dr.gather(tuple, rays.crossed, column))
     unit = ray * dr.rsqrt(dr.squared_norm(ray))
     return FroxelPoints(point, unit, _least_square(grid, begin, end), rays, (begin * length, end * length))
 

@@ -19,7 +19,7 @@ import mitsuba as mi
 from realtime.errors import InputError
 from realtime.memory import check_memory
 from realtime.methods.froxel_fog.accumulation import accumulated, airlight_at_pixels
-from realtime.methods.froxel_fog.grid import view_grid
+from realtime.methods.froxel_fog.grid import column_rays, view_grid
 from realtime.methods.froxel_fog.history import averaged, frame_shift
 from realtime.methods.froxel_fog.injection import Visibility, scattered_light
 from realtime.methods.froxel_fog.light_points import LightPointTable, tabulated
@@ -137,13 +137,13 @@ class FroxelFog(Method):
         grid = view_grid(view, size=self.grid_size, near=self.near, far=self.far, distribution=self.distribution)
         dr.eval(grid.far, grid.near)
         shift = frame_shift(last if self.jitter == "frames" else None, type(view.distance))
-        visible = _visibility(view, state, self.shadow)
-        scattered = scattered_light(view, grid, shift=shift, tables=state.tables, visible=visible)
+        visible, rays = _visibility(view, state, self.shadow), column_rays(view, grid)
+        scattered = scattered_light(view, grid, rays, shift=shift, tables=state.tables, visible=visible)
         carried = None
         if self.carries:
             scattered, carried = averaged(scattered, grid, last, weight=self.history)
         dr.eval(scattered, carried)
-        return Layers(airlight_at_pixels(view, grid, accumulated(view, grid, scattered)), carried=carried)
+        return Layers(airlight_at_pixels(view, grid, accumulated(view, grid, rays, scattered)), carried=carried)
 
     def error_causes(self, size):
         """Return the causes of its errors, see `Method.error_causes`.
