@@ -73,8 +73,8 @@ class HeightFog(Medium):
 
     @property
     def vacuum(self):
-        """Whether rays leave the fog."""
-        return True
+        """No: rays leave the fog, but `part` says where steps end."""
+        return False
 
     def rays(self, origin, direction, aim=None):
         """Return rays with the distances between which they are in the fog [m], and their heights and rise."""

@@ -131,8 +131,8 @@ def scene(variant, tmp_path):
     return load
 
 
-def frame(scene, method, kernel=exact):
-    return render_frame(frame_renderer(read_scene(scene), METHODS[method], kernel=kernel))
+def frame(scene, method, kernel=exact, **parameters):
+    return render_frame(frame_renderer(read_scene(scene), METHODS[method], kernel=kernel, **parameters))
 
 
 @pytest.mark.claim("height-fog-methods", tolerance="1e-5 relative RMSE of shadow planes in float32")
@@ -146,6 +146,8 @@ def test_frames_are_the_reference(scene, lights):
     # Maps and steps: some percent at their defaults.
     for method, error in (("light-volumes", 0.02), ("min-max", 0.05), ("ray-march", 0.1)):
         assert relative_rmse(frame(loaded, method).airlight, truth.airlight) < error, method
+    even = frame(loaded, "ray-march", spacing="uniform", steps=1000)
+    assert relative_rmse(even.airlight, truth.airlight) < 0.1
 
 
 @pytest.mark.claim("height-fog-methods", tolerance="1e-5 relative RMSE of shadow planes in float32")
