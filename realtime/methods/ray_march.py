@@ -69,6 +69,12 @@ class RayMarch(Method):
         "the integrand at every step, or an integral by the kernel for each run of lit steps, as Billeter 2010 marches",
         choices=("steps", "transitions"),
     )
+    depth: str = parameter(
+        "exact",
+        "optical depth up to a step, with `sum=steps`: that of the medium, or a running sum over the steps, as engines "
+        "have it",
+        choices=("exact", "running"),
+    )
     map: int = map_size(512, "texels on a side of a face of the map, with `shadow=map`")
     tolerance: float = tolerance()
 
@@ -104,8 +110,17 @@ class RayMarch(Method):
                 return True
             return lit_in_map(state, light, point) if self.shadow == "map" else view.visible(point, light)
 
-        integral = _lit_runs if self.sum == "transitions" else marched_integral
-        return airlight.radiance(integral(airlight, view.distance, steps=self.steps, spacing=self.spacing, lit=lit))
+        if self.sum == "transitions":
+            integral = _lit_runs(airlight, view.distance, steps=self.steps, spacing=self.spacing, lit=lit)
+        else:
+            how: dict[str, Any] = {
+                "steps": self.steps,
+                "spacing": self.spacing,
+                "lit": lit,
+                "running": self.depth == "running",
+            }
+            integral = marched_integral(airlight, view.distance, **how)
+        return airlight.radiance(integral)
 
     def error_causes(self, size):
         """Return the causes of its errors, see `Method.error_causes`."""

@@ -133,10 +133,13 @@ class Medium:
         """Return exp(-tau) of optical depths by channel, see `colour`."""
         return self.colour([exp_bounded(-depth) for depth in depths])
 
-    def both_ways(self, rays: Rays, x, light: Any, r) -> Any:
-        """Return the transmittance from a light to the points at x and on to the camera; `r` is their distance [m]."""
-        depths = self.optical_depth(rays, 0, x), self.depth_to_light(light, rays.at(x), r)
-        return self.transmittance([camera + own for camera, own in zip(*depths, strict=True)])
+    def both_ways(self, rays: Rays, x, light: Any, r, camera: Sequence[Any] | None = None) -> Any:
+        """Return the transmittance from a light to the points at x and on to the camera; `r` is their distance [m].
+
+        `camera`: the optical depths from the camera by channel, where they are known.
+        """
+        depths = self.optical_depth(rays, 0, x) if camera is None else camera, self.depth_to_light(light, rays.at(x), r)
+        return self.transmittance([before + own for before, own in zip(*depths, strict=True)])
 
     def radiance(self, light: Light, integral) -> Any:
         """Return the radiance of an integral of `source` exp(-tau)/r^2 dx [W/(m^2 sr)] (DESIGN section 2)."""
@@ -191,13 +194,16 @@ class LitRays:
         """
         return self.airlight(type(x)(0), x)
 
-    def source(self, x):
-        """Return the integrand at distances x [m], exp(-tau) p/r^2 times what `Medium.source` does not leave out."""
+    def source(self, x, camera: Sequence[Any] | None = None):
+        """Return the integrand at distances x [m], exp(-tau) p/r^2 times what `Medium.source` does not leave out.
+
+        `camera`: see `Medium.both_ways`.
+        """
         light, medium = self.light, self.medium
         s = x - self.geometry.foot
         square = dr.fma(s, s, dr.square(self.geometry.height)) if light.w else type(x)(1)
         r = dr.sqrt(square)
-        value = medium.source(self.rays, x, self.angle(s, r)) * medium.both_ways(self.rays, x, light, r)
+        value = medium.source(self.rays, x, self.angle(s, r)) * medium.both_ways(self.rays, x, light, r, camera)
         strength = dr.rcp(square) if light.w else 1
         return value * (strength * self.geometry.falloff(light, x) if light.varies else strength)
 

@@ -150,6 +150,22 @@ def test_frames_are_the_reference(scene, lights):
     assert relative_rmse(even.airlight, truth.airlight) < 0.1
 
 
+@pytest.mark.claim("height-fog-methods", tolerance="a running sum errs by the square of its step")
+def test_a_running_sum_of_the_depth(scene):
+    loaded = scene(LAMP)
+    how = {"spacing": "uniform", "shadow": "none"}
+
+    def differs(steps):
+        exact_depth, running = (
+            frame(loaded, "ray-march", steps=steps, depth=depth, **how).airlight for depth in ("exact", "running")
+        )
+        return relative_rmse(running, exact_depth)
+
+    few, many = differs(25), differs(100)
+    assert 1e-4 < few < 0.3
+    assert few > 8 * many
+
+
 @pytest.mark.claim("height-fog-methods", tolerance="1e-5 relative RMSE of shadow planes in float32")
 @pytest.mark.parametrize("name", [name for name, record in SCENES.items() if record.layered])
 def test_built_in_scenes(variant, name):
