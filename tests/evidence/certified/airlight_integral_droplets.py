@@ -4,7 +4,8 @@
     python -m tests.evidence.certified.airlight_integral_droplets --write
 
 Each value is one on which two quadratures in mpmath agree (`integral.py`). The moments of Mie's phase functions
-count as exact as float64 has them, whose last digits depend on the processor (1e-14 of a value); a spline through their series, which `analytic.panels` takes, is 1e-8 off.
+count as exact as float64 has them, whose last digits depend on the processor (1e-14 of a value); a spline through their
+series, which `analytic.panels` takes, is 1e-8 off.
 """
 
 import csv

@@ -116,9 +116,8 @@ def test_slices_of_constant_light_add_up_to_the_closed_form(variant, sigma_t, sl
     grid = Grid(2, 1, slices, scene.camera, mi.Float64(3.1), mi.Float64(0.7))
     medium = Homogeneous((mi.Float64(sigma_t),), mi.Color3d(1), Isotropic())
     view = SimpleNamespace(medium=medium, distance=mi.Float64(0), origin=scene.camera.origin)
-    sums = np.array(accumulated(view, grid, column_rays(view, grid), dr.full(mi.Color3d, 1.7, 2 * slices))).reshape(
-        slices + 1, 2, 4
-    )
+    light = dr.full(mi.Color3d, 1.7, 2 * slices)
+    sums = np.array(accumulated(view, grid, column_rays(view, grid), light)).reshape(slices + 1, 2, 4)
     x = np.array(grid.depth(dr.arange(mi.Float64, slices + 1) / slices))[:, None]
     x = x * np.array(dr.norm(grid.column_ray(dr.arange(mi.UInt32, 2))))
     closed = 1.7 * -np.expm1(-sigma_t * x) / sigma_t
