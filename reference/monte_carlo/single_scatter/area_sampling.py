@@ -127,7 +127,7 @@ def read_area(emitter) -> AreaLight:
         raise InputError(f"{name} has a textured radiance; wanted a constant one")
     given = np.broadcast_to(np.array(parameters["radiance.value"], dtype=np.float64).reshape(-1), 3)
     radiance = mi.Color3f(*(float(c) for c in given))
-    if shape.is_mesh():
+    if kind not in SHAPES:
         box = shape.bbox()
         centre, half = (np.array(part, dtype=np.float64).ravel() for part in (box.center(), 0.5 * box.extents()))
         x, y, z = (mi.Vector3d(*(float(c) for c in axis)) for axis in np.eye(3))

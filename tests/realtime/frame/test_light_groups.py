@@ -25,7 +25,7 @@ from validation.scenes.meshes import rotation
 SIZE = (32, 24)
 #: Methods with what brings them close to the truth, and the relative RMSE of airlight that remains.
 CLOSE = {
-    "ray-march": ({"steps": 300}, 1e-3),
+    "ray-march": ({"steps": 600}, 1e-3),
     "shadow-planes": ({}, 1e-3),
     "light-volumes": ({"map": 1024}, 3e-3),
     "min-max": ({"map": 1024, "sampling": "pixels", "slices": 400}, 2e-2),
@@ -46,7 +46,7 @@ def one_by_one(variant, request):
     lit = with_light_points(scene, 5, "sobol")
     for point in lit.lights:
         alone = replace(scene, lights=(replace(point, source=None),), area_lights=())
-        frame = frames.render(alone, "ray-march", steps=600)
+        frame = frames.render(alone, "ray-march", steps=1200)
         airlight, surface = airlight + frame.airlight, surface + frame.surface
     return scene, airlight, surface
 
