@@ -290,9 +290,9 @@ def _on_mesh(u, v, mesh: _Mesh, origin, direction) -> LightPoint:
     counts = ~here | (rho > _TOUCHING * dr.norm(first))
     rho = dr.select(here & counts, rho, 1)
     edge = _edge_of_triangle(place, way / rho, ends, normal)
-    density = (1 - share) / mesh.area
-    density += dr.select(here, share / (2 * math.pi * dr.maximum(edge, rho) * rho), 0)
-    return LightPoint(position, mesh.normal(number), dr.select(counts, density, 0))
+    pdf = (1 - share) / mesh.area
+    pdf += dr.select(here, share / (2 * math.pi * dr.maximum(edge, rho) * rho), 0)
+    return LightPoint(position, mesh.normal(number), dr.select(counts, pdf, 0))
 
 
 def _edge_of_triangle(place, towards, ends, normal):
