@@ -22,31 +22,10 @@ from reference.storage.exr import Image
 from reference.storage.scene_digest import scene_digest
 from validation.estimates.budget import LEAST_BATCHES, Budget, Target, batch_plan, near_light, relative_errors
 from validation.estimates.monte_carlo import Elsewhere, monte_carlo_batches
-from validation.estimates.quadrature import truth_image
 from validation.scenes.loading import LoadedScene
 from validation.slab.request import order_range, parse_orders
 
 Progress = Callable[[float, str], None]
-
-
-def quadrature_reference(loaded: LoadedScene, *, pixel: str = "centre", progress: Progress | None = None) -> Image:
-    """Return the quadrature truth of a scene; the layer `airlight_bound` bounds the error of `airlight`.
-
-    Parameters
-    ----------
-    loaded
-        The scene.
-    pixel
-        'centre' or 'area', see `reference.quadrature.image.quadrature_image`.
-    progress
-        Called with (share done, what) as the work goes on.
-    """
-
-    def tell(done: int, total: int, what: str) -> None:
-        if progress is not None:
-            progress(done / total, what)
-
-    return whole_truth(loaded, truth_image(loaded.scene, pixel=pixel, progress=tell), pixel=pixel)
 
 
 def whole_truth(loaded: LoadedScene, truth: TruthImage, *, pixel: str = "centre") -> Image:
@@ -218,8 +197,3 @@ def _layered_batches(loaded: LoadedScene, estimator: str, batches: Batches, *, d
         "airlight:seeds": seed_ranges(batches.seeds),
     }
     return Image(layers, distance, attributes)
-
-
-def volpath_reference(loaded: LoadedScene, *, samples: int, seed: int = 0, progress: Progress | None = None) -> Image:
-    """Return volpath's mean with its standard errors; see `monte_carlo_reference`."""
-    return monte_carlo_reference(loaded, "volpath", budget=Budget(samples=samples), seed=seed, progress=progress).image
