@@ -1,20 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lights with extent: their record, their triangles, and how they are read.
+"""Lights with extent: their record, their triangles, and how they are read from Mitsuba's `area` emitters.
 
-The record of a light with extent.
+Every point of the surface sends the same radiance Le into all directions of the half space before it. An element dA has
+the intensity Le cos dA in a direction at an angle whose cosine to the normal is cos, and the power pi Le dA. The shape
+is a rectangle, disk, sphere or mesh; its material is `null` or opaque, and without one it is black, as in Mitsuba.
 
-Every point of its surface sends the same radiance Le into all directions of the half space before it. An element dA
-has the intensity Le cos dA in a direction at an angle whose cosine to the normal is cos, and the power pi Le dA.
-
-The triangles of a black light, for methods that know casters by their triangles.
-
-A disk or sphere has no triangles. A polygon and a sphere of facets stand for it, as large as it in area and in mean
-shadow; they matter where the shape shadows other lights, not its own.
-
-Reading a light with extent from a Mitsuba shape with an `area` emitter.
-
-The shape is a `rectangle`, `disk`, `sphere` or mesh of constant radiance. Its material is opaque (black as Mitsuba's is
-for an emitter that has none, else the shape is a surface like others too) or `null`.
+Methods that know occluders by their triangles need those of black lights. A disk and a sphere have none: a polygon and
+a sphere of facets stand for them, as large in area and in mean shadow. They shadow other lights, not their own.
 """
 
 import math

@@ -142,8 +142,13 @@ def _inline(path: Path) -> str:
     from PIL import Image
 
     buffer = io.BytesIO()
-    with Image.open(path) as picture:
-        picture.convert("RGB").save(buffer, "WEBP", quality=80)
+    try:
+        with Image.open(path) as picture:
+            picture.convert("RGB").save(buffer, "WEBP", quality=80)
+    except OSError as error:
+        raise InputError(
+            f"{path} is no picture that can be read ({error}); wanted the PNG of a report: measure again"
+        ) from None
     return f"data:image/webp;base64,{base64.b64encode(buffer.getvalue()).decode()}"
 
 

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from PIL import Image as Picture
 
 from reference.storage.exr import Image, write_exr
 from reports.commands.main import run
@@ -167,12 +168,15 @@ def test_a_report_is_drawn_again_without_measuring(tmp_path, capsys):
     folder = write_files(tmp_path / "r")
     for name in named_files(report_data()):
         if not (folder / name).exists():
-            (folder / name).write_bytes(b"a picture")
+            Picture.new("RGB", (6, 4)).save(folder / name, "PNG")
     (folder / "report.json").write_text(json.dumps(report_data()), encoding="utf-8")
     assert run(["report", "--from", str(folder), "-o", str(tmp_path / "again"), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == report_data()
     assert "The truth is confirmed." in (tmp_path / "again" / "report.html").read_text(encoding="utf-8")
     assert json.loads((tmp_path / "again" / "report.json").read_text(encoding="utf-8")) == report_data()
+    (folder / next(name for name in named_files(report_data()) if name.endswith(".png"))).write_bytes(b"half a file")
+    assert run(["report", "--from", str(folder), "-o", str(tmp_path / "third")]) == 2
+    assert "is no picture that can be read" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image as Picture
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
@@ -44,7 +45,7 @@ def report(tmp_path_factory):
     write_exr(folder / "reference.exr", Image({"airlight": truth}))
     methods = []
     for name in ("reference.png", "reference-airlight.png"):
-        (folder / name).write_bytes(b"a picture")
+        Picture.new("RGB", (32, 24)).save(folder / name)
     for label, error in _WRONG.items():
         wrong = truth * (1 + error)
         wrong[2:6, 20:24] *= 1.5 if error > 1e-3 else 1.0
