@@ -66,8 +66,8 @@ def crossing_sum(batches: Iterable[Crossings], airlight: LitRays, distance, *, l
         add(index, dr.select(near, 0, x), end, dr.select(near, sign, -sign))
     whole = dr.compress(beyond != 0)
     if dr.width(whole):
-        zero = dr.opaque(Float, 0, dr.width(whole))
-        add(whole, zero, dr.gather(Float, distance, whole), dr.gather(mi.Float64, beyond, whole))
+        camera = dr.opaque(Float, 0, dr.width(whole))
+        add(whole, camera, dr.gather(Float, distance, whole), dr.gather(mi.Float64, beyond, whole))
     return type(zero)(total)
 
 
