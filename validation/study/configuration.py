@@ -167,8 +167,12 @@ def prepared(scene: Scene, chosen: Configuration, *, extra_layers: bool = False)
 
 
 def rendered_lights(scene: Scene, chosen: Configuration) -> int:
-    """Return how many lights a method renders in a scene, the points of those with extent among them."""
-    points = dict(chosen.parameters).get("points", find_method(chosen.method).light_points.points)
+    """Return how many lights a method renders in a scene, the points of area lights among them.
+
+    A user's module is not imported for it: its method counts as one that has the points of others.
+    """
+    method = find_method("unshadowed" if ":" in chosen.method else chosen.method)
+    points = dict(chosen.parameters).get("points", method.light_points.points)
     return len(scene.lights) + int(points) * len(scene.area_lights)
 
 
