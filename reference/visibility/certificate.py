@@ -95,6 +95,8 @@ def certified(
     ray, share = np.repeat(ray, checks), share.ravel()
     at = low[ray] + share * (high - low)[ray]
     x = at if rays.w == 0 else rays.distance(at, ray)
+    finite = np.isfinite(x)  # a light on the line of a ray sees all of it at one angle, which is endlessly far
+    ray, share, x = ray[finite], share[finite], x[finite]
     # Two a ray, and the share of it that comes before: one number orders all.
     width = np.where(high > low, high - low, 1.0)
     begin, end = (

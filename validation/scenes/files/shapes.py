@@ -244,6 +244,8 @@ def _room(window: Array, side: float, walls: list[Array]) -> Array | None:
     """Return the transform that makes Mitsuba's cube the room behind a window, None where walls are missing."""
     front = _corners(window)
     normal = np.cross(window[:3, 0], window[:3, 1])
+    if not np.any(normal):  # it has no area, which its reader refuses
+        return None
     inward = side * normal / np.linalg.norm(normal)
     size = float(np.linalg.norm(front[0] - front[2]))
 
