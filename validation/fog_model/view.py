@@ -284,7 +284,8 @@ def _edged(places: Places, light: Light, source: Source, blend: float) -> Places
     """Return places with the edge of a spot as Blender has it, and as a sphere lights them that samples stand for."""
     factor = _blended(places.towards, light) if blend else 1.0
     if source.centre is not None and isinstance(light, TruthLight):
-        factor = factor / _level(places, light, source, source.centre)
+        level = _level(places, light, source, source.centre)
+        factor = np.divide(factor, level, out=np.zeros_like(level), where=level > 0)  # no sample sends to the others
     return places if np.ndim(factor) == 0 else replace(places, value=places.value * np.asarray(factor)[:, None])
 
 
