@@ -43,7 +43,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analytic.errors import InputError
 from analytic.kronrod import WIDE
-from analytic.panels import Panels, Weight, adapted, log_distance
+from analytic.panels import Panels, Weight, adapted, cut_at_kinks, equal_panels, log_distance
 from analytic.phase import PhaseFunction
 
 Array = NDArray[np.float64]
@@ -329,28 +329,13 @@ def _smooth_parts(fog: HeightFog, origin: Array, rise: Array, x0: Array, x1: Arr
 
 def _first_panels(parts: _Parts, kinks: Array) -> tuple[Index, Array, Array]:
     """Cut parts at the kinks of the phase function, and into panels that are narrow enough in w and in height."""
-    part: Index = np.arange(len(parts.start))
-    start, width = np.zeros(len(part)), parts.width
-    if len(kinks):
-        at = np.clip(np.arctanh(-kinks[::-1]) - parts.start[:, None], 0.0, width[:, None])
-        ends = np.concatenate([np.zeros((len(part), 1)), at, width[:, None]], axis=1)
-        pieces = np.diff(ends, axis=1)
-        part, piece = np.nonzero(pieces > 0)
-        start, width = ends[part, piece], pieces[part, piece]
-    part, start, width = _cut(part, start, width, np.maximum(np.ceil(width / _WIDEST), 1))
+    part, start, width = cut_at_kinks(parts.start, parts.width, kinks)
+    part, start, width = equal_panels(part, start, width, np.maximum(np.ceil(width / _WIDEST), 1))
     span = np.stack([start, start + width], axis=1) + parts.start[part, None]
     _, z = parts.heights(part, span)
     least = min((layer.scale_height for layer in parts.fog.layers if layer.sigma_t > 0), default=np.inf)
     count = np.ceil(np.abs(z[:, 1] - z[:, 0]) / (_SCALE_HEIGHTS * least))
-    return _cut(part, start, width, np.clip(np.nan_to_num(count, posinf=_MOST), 1, _MOST))
-
-
-def _cut(part: Index, start: Array, width: Array, count: Array) -> tuple[Index, Array, Array]:
-    """Cut panels into equal ones, `count` of each."""
-    times = count.astype(np.int64)
-    number = np.arange(times.sum()) - np.repeat(np.cumsum(times) - times, times)
-    width = np.repeat(width / times, times)
-    return np.repeat(part, times), np.repeat(start, times) + number * width, width
+    return equal_panels(part, start, width, np.clip(np.nan_to_num(count, posinf=_MOST), 1, _MOST))
 
 
 def _evaluate(

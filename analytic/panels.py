@@ -232,19 +232,29 @@ def _summed(owner: Index, values: Array, n: int) -> Array:
 
 def _first_panels(segments: _Segments, kinks: Array) -> tuple[Index, Array, Array]:
     """Cut the segments at the kinks of the phase function and into panels no wider than `_PANEL`."""
-    owner: Index = np.arange(len(segments.foot), dtype=np.int64)
-    start, width = np.zeros(len(owner)), segments.width
-    if len(kinks):
-        # cos = -tanh w, so the kinks in increasing order of w are those in decreasing order of the cosine.
-        at = np.clip(np.arctanh(-kinks[::-1]) - segments.start[:, None], 0.0, width[:, None])
-        ends = np.concatenate([np.zeros((len(start), 1)), at, width[:, None]], axis=1)
-        pieces = np.diff(ends, axis=1)
-        owner, piece = np.nonzero(pieces > 0)
-        start, width = ends[owner, piece], pieces[owner, piece]
-    count = np.maximum(np.ceil(width / _PANEL), 1).astype(np.int64)
-    number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    width = np.repeat(width / count, count)
-    return np.repeat(owner, count), np.repeat(start, count) + number * width, width
+    owner, start, width = cut_at_kinks(segments.start, segments.width, kinks)
+    return equal_panels(owner, start, width, np.maximum(np.ceil(width / _PANEL), 1))
+
+
+def cut_at_kinks(begin: Array, width: Array, kinks: Array) -> tuple[Index, Array, Array]:
+    """Cut intervals of w at the kinks of a phase function; return their numbers, starts from `begin` on, and widths."""
+    owner: Index = np.arange(len(begin), dtype=np.int64)
+    if not len(kinks):
+        return owner, np.zeros(len(begin)), width
+    # cos = -tanh w, so the kinks in increasing order of w are those in decreasing order of the cosine.
+    at = np.clip(np.arctanh(-kinks[::-1]) - begin[:, None], 0.0, width[:, None])
+    ends = np.concatenate([np.zeros((len(begin), 1)), at, width[:, None]], axis=1)
+    pieces = np.diff(ends, axis=1)
+    owner, piece = np.nonzero(pieces > 0)
+    return owner, ends[owner, piece], pieces[owner, piece]
+
+
+def equal_panels(owner: Index, start: Array, width: Array, count: Array) -> tuple[Index, Array, Array]:
+    """Cut intervals into equal panels, `count` of each; return their owners, starts and widths."""
+    times = count.astype(np.int64)
+    number = np.arange(times.sum()) - np.repeat(np.cumsum(times) - times, times)
+    width = np.repeat(width / times, times)
+    return np.repeat(owner, times), np.repeat(start, times) + number * width, width
 
 
 def _evaluate(segments: _Segments, integrand: _Integrand, owner: Index, start: Array, width: Array) -> Panels:

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.kronrod import Pair
-from analytic.panels import blocks_by_rule
+from analytic.panels import blocks_by_rule, equal_panels
 from reference.quadrature.pieces import Pieces
-from reference.quadrature.unbounded import Profile, sums_of
+from reference.quadrature.unbounded import Profile, Terms, sums_of
 from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
@@ -50,20 +50,6 @@ class Panels:
         return Panels(*(getattr(self, f.name)[rows] for f in fields(self)))
 
 
-def first_panels(start: Array, width: Array, widest: float) -> tuple[Index, Array, Array]:
-    """Cut pieces into equal panels no wider than `widest`.
-
-    `start`, `width`: where the pieces begin and how wide they are, (pieces,), in the variable of the integral: w [1] or
-    x [m], see `Panels`; `widest`: in the same unit, above 0. Returns `piece`, `start`, `width`: of every panel: the
-    number of its piece, where it begins, and how wide it is, (panels,) each.
-    """
-    count = np.maximum(np.ceil(width / widest), 1).astype(np.int64)
-    piece = np.repeat(np.arange(len(count)), count)
-    number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    part = (width / count)[piece]
-    return piece, start[piece] + number * part, part
-
-
 class Integrand(Protocol):
     """What a medium scatters along pieces: exp(-tau) p, to be multiplied by albedo sigma_t."""
 
@@ -86,22 +72,19 @@ def sum_pieces(
     pieces: Pieces,
     integrand: Integrand,
     block: slice,
-    *,
-    profile: Profile | None,
-    edge: Array,
-    rounding: Array,
-    rtol: float = RTOL,
+    terms: Terms,
 ) -> tuple[Array, Array]:
     """Integrate smooth pieces of a block of rays and add up those of each ray, for lights of strength 1.
 
     `rays`, `pieces`: all rays, in their planes with the lights, and the pieces of those of the block; `integrand`: what
-    the medium scatters along the pieces; `block`: of rays; `profile`, `edge`, `rounding`, `rtol`: see
-    `reference.quadrature.fields.Field`; the uncertainties are by ray. Returns the value and a bound of
-    its error, (rays of the block, 3) each; infinite where a ray meets a light in a medium that scatters.
+    the medium scatters along the pieces; `block`: of rays; `terms`: with `RTOL` by default. Returns the value and a
+    bound of its error, (rays of the block, 3) each; infinite where a ray meets a light in a medium that scatters.
     """
-    work = _Sum(rays, pieces, integrand, profile)
+    work = _Sum(rays, pieces, integrand, terms.profile)
+    edge = np.broadcast_to(terms.edge, len(rays.foot))
+    rounding = np.zeros(len(rays.foot)) if terms.rounding is None else terms.rounding
     owner, count = pieces.ray - block.start, len(rays.foot[block])
-    value, error = _sum_panels(work.first_panels(), work.evaluate, owner, count, rtol)
+    value, error = _sum_panels(work.first_panels(), work.evaluate, owner, count, terms.rtol or RTOL)
     error = error + sums_of(owner, work.edge_error(edge, rounding), count)
     meets = sums_of(owner, work.meets_light()[:, None] * integrand.factor, count) > 0
     return np.where(meets, np.inf, value), np.where(meets, np.inf, error)
@@ -133,7 +116,8 @@ class _Sum:
             self.height, self.start, self.width = self.own.height, pieces.x0, pieces.x1 - pieces.x0
 
     def first_panels(self) -> tuple[Index, Array, Array]:
-        return first_panels(self.start, self.width, _PANEL if self.rays.w else np.inf)
+        count = np.maximum(np.ceil(self.width / (_PANEL if self.rays.w else np.inf)), 1)
+        return equal_panels(np.arange(len(count)), self.start, self.width, count)
 
     def meets_light(self) -> NDArray[np.bool_]:
         near = (self.own.height < AT_LIGHT) & bool(self.rays.w)

@@ -20,7 +20,6 @@ gets: eight independent scramblings each give a mean, and their spread the stand
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import Any
 
 import drjit as dr
 import numpy as np
@@ -41,7 +40,7 @@ from reference.quadrature.replicates import (
     square_points,
 )
 from reference.quadrature.surface import Reflection, SurfaceHits
-from reference.quadrature.unbounded import cosine_profile, sums_of
+from reference.quadrature.unbounded import Terms, cosine_profile, sums_of
 from reference.scene.area_light import TruthAreaLight
 from reference.scene.read import TruthScene
 from reference.visibility.before_light import IN_PLANE, before_light
@@ -183,14 +182,9 @@ def _scattered(beam: Beam, active: Index, square: Array, shadow_scale: float) ->
 
     def summed(work: tuple[slice, Rays, Array, Array, LitIntervals]) -> tuple[slice, RandomChecks, Array, Array]:
         rows, rays, normal, weight, lit = work
-        how: Any = {
-            "profile": cosine_profile(rays, normal),
-            "shadow_scale": shadow_scale,
-            "rtol": _RTOL,
-            "edge": lit.edge,
-        }
+        terms = Terms(cosine_profile(rays, normal), shadow_scale, lit.edge, rtol=_RTOL)
         distance = np.repeat(beam.distance[active[rows]], each)
-        parts = field_of(truth).sums(rays, (lit.ray, lit.low, lit.high), distance, **how)
+        parts = field_of(truth).sums(rays, (lit.ray, lit.low, lit.high), distance, terms)
         parts = parts[0], parts[1] + worth_of_doubt(truth, rays, lit)
         value, error = ((part * weight[:, None]).reshape(-1, each, 3).sum(axis=1) * light.radiance for part in parts)
         return rows, lit.random_checks, value, error

@@ -25,15 +25,14 @@ The pieces are integrated by Gauss and Kronrod's pairs on panels that are halved
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.adaptive_panels import AT_LIGHT, RTOL, sum_pieces
+from reference.quadrature.adaptive_panels import AT_LIGHT, sum_pieces
 from reference.quadrature.pieces import Kinks, Pieces, by_medium, cut_pieces, medium_of
 from reference.quadrature.segments import Segments, camera_segments, depth_through_media, shadow_kinks
-from reference.quadrature.unbounded import Profile, Stretches, strongest
+from reference.quadrature.unbounded import TERMS, Stretches, Terms, strongest
 from reference.scene.convex_bounds import Bounds, Sphere
 from reference.scene.read import TruthScene, homogeneous_around
 from reference.visibility.line_crossings import crossed_facets, crossings, sphere_crossings
@@ -67,60 +66,20 @@ class Bounded:
         spans = [crossings(medium.bounds, origin, direction) for medium in self.truth.media]
         return np.max([np.where(enter < leave, np.maximum(leave, 0.0), 0.0) for enter, leave in spans], axis=0)
 
-    def sums(
-        self,
-        rays: Rays,
-        stretches: Stretches,
-        distance: Array,
-        *,
-        profile: Profile | None = None,
-        shadow_scale: float = 1.0,
-        edge: float | Array = 0.0,
-        rounding: Array | None = None,
-        rtol: float | None = None,
-    ) -> tuple[Array, Array]:
+    def sums(self, rays: Rays, stretches: Stretches, distance: Array, terms: Terms = TERMS) -> tuple[Array, Array]:
         """Return the airlight of each ray from its lit stretches, and a bound of its error, (rays, 3) each."""
         segments = camera_segments(replace(self.truth, direction=rays.direction), distance)
-        how: dict[str, Any] = {"profile": profile, "shadow_scale": shadow_scale, "edge": edge, "rounding": rounding}
-        return sum_media(self.truth, rays, stretches, segments, rtol=rtol or RTOL, **how)
-
-
-def sum_media(
-    truth: TruthScene,
-    rays: Rays,
-    stretches: Stretches,
-    segments: Segments,
-    *,
-    profile: Profile | None = None,
-    shadow_scale: float = 1.0,
-    edge: float | Array = 0.0,
-    rounding: Array | None = None,
-    rtol: float = RTOL,
-) -> tuple[Array, Array]:
-    """Integrate lit stretches through the media that they pass and add up those of each ray, for a light of strength 1.
-
-    `truth`, `rays`, `stretches`: the scene, the rays in their planes with lights, and lit stretches of them;
-    `segments`: from `reference.quadrature.segments.camera_segments`; `profile`: of the lights; None: they are
-    isotropic; `shadow_scale`: share of the shadow segment that is attenuated over, from the scattering point on;
-    `edge`: uncertainty of the ends of stretches: relative to their distance from the light, or a length by ray [m];
-    `rounding`: of the places of kinks, by ray [m]; it matters where a facet lies along a directional light; `rtol`:
-    relative tolerance of the sum of each ray [1]. Returns the airlight and a bound of its error, (rays, 3)
-    each; infinite where a ray meets the light inside a medium that scatters.
-    """
-    count = len(rays.foot)
-    total, bound = np.zeros((count, 3)), np.zeros((count, 3))
-    ray, x0, x1 = stretches
-    edge = np.broadcast_to(edge, count)
-    rounding = np.zeros(count) if rounding is None else rounding
-    for first in range(0, count, _RAYS):
-        chosen = (ray >= first) & (ray < first + _RAYS) & (x1 > x0)
-        pieces, kinks = smooth_pieces(truth, rays, segments, (ray[chosen], x0[chosen], x1[chosen]))
-        if len(pieces.ray):
-            block = slice(first, first + _RAYS)
-            integrand = _Integrand(truth, pieces, rays[pieces.ray], kinks, shadow_scale)
-            how: dict[str, Any] = {"edge": edge, "rounding": rounding, "rtol": rtol}
-            total[block], bound[block] = sum_pieces(rays, pieces, integrand, block, profile=profile, **how)
-    return total / (4 * np.pi), bound / (4 * np.pi)
+        count = len(rays.foot)
+        total, bound = np.zeros((count, 3)), np.zeros((count, 3))
+        ray, x0, x1 = stretches
+        for first in range(0, count, _RAYS):
+            chosen = (ray >= first) & (ray < first + _RAYS) & (x1 > x0)
+            pieces, kinks = smooth_pieces(self.truth, rays, segments, (ray[chosen], x0[chosen], x1[chosen]))
+            if len(pieces.ray):
+                block = slice(first, first + _RAYS)
+                integrand = _Integrand(self.truth, pieces, rays[pieces.ray], kinks, terms.shadow_scale)
+                total[block], bound[block] = sum_pieces(rays, pieces, integrand, block, terms)
+        return total / (4 * np.pi), bound / (4 * np.pi)
 
 
 def smooth_pieces(

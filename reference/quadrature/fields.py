@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from reference.quadrature.bounded import Bounded
 from reference.quadrature.height_fog import HeightField
-from reference.quadrature.unbounded import Profile, Stretches, Unbounded
+from reference.quadrature.unbounded import TERMS, Stretches, Terms, Unbounded
 from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthScene
 from reference.visibility.planes import Rays
@@ -40,26 +40,12 @@ class Field(Protocol):
     def leave(self, origin: Array, direction: Array) -> Array:
         """Return the distance behind which rays meet nothing that scatters, (n,) [m]; may be infinite."""
 
-    def sums(
-        self,
-        rays: Rays,
-        stretches: Stretches,
-        distance: Array,
-        *,
-        profile: Profile | None = None,
-        shadow_scale: float = 1.0,
-        edge: float | Array = 0.0,
-        rounding: Array | None = None,
-        rtol: float | None = None,
-    ) -> tuple[Array, Array]:
+    def sums(self, rays: Rays, stretches: Stretches, distance: Array, terms: Terms = TERMS) -> tuple[Array, Array]:
         """Return the airlight of each ray from its lit stretches, and a bound of its error, (rays, 3) each.
 
         `rays`: in their planes with lights of strength 1: places if `rays.w` is 1 [1/m^2], else directions [1/sr];
         `stretches`: rays, and distances of both ends; the second may be infinite [m]; `distance`: of each ray to the
-        visible surface [m]; `profile`: of lights at places; None: they are isotropic; `shadow_scale`: fraction of the
-        shadow segment to a place that is attenuated over, from the scattering point on; `edge`: uncertainty of the ends
-        of stretches: relative to their distance from a place, or by ray a length [m]; `rounding`: of the places of
-        kinks, by ray [m]; `rtol`: relative tolerance of a sum; the field's own by default.
+        visible surface [m]; `terms`: how the lights shine, and what is uncertain.
         """
 
 

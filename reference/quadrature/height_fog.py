@@ -2,18 +2,17 @@
 """The airlight of lit stretches in height fog, with a bound of its error: `analytic.height_fog` in the rays' planes."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analytic.height_fog import HeightFog, HeightRays, Layer, height_fog_segments, height_fog_sun
-from reference.quadrature.unbounded import Profile, Stretches, strongest, sums_of
+from reference.quadrature.unbounded import RTOL, TERMS, Stretches, Terms, strongest, sums_of, weight_of
 from reference.scene.height_fog import HeightMedium
 from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
-
-_RTOL = 1e-10  # of the integral of each stretch
 
 _ROUNDING = 64 * np.finfo(np.float64).eps  # of a sum of optical depths, for one of 1
 
@@ -50,39 +49,18 @@ class HeightField:
         level = np.where((start >= self.medium.floor) & (start <= self.medium.cap), np.inf, 0.0)
         return np.where(rise == 0, level, np.maximum(ends.max(axis=0), 0.0))
 
-    def sums(
-        self,
-        rays: Rays,
-        stretches: Stretches,
-        distance: Array,
-        *,
-        profile: Profile | None = None,
-        shadow_scale: float = 1.0,
-        edge: float | Array = 0.0,
-        rounding: Array | None = None,
-        rtol: float | None = None,
-    ) -> tuple[Array, Array]:
+    def sums(self, rays: Rays, stretches: Stretches, distance: Array, terms: Terms = TERMS) -> tuple[Array, Array]:
         """Return the airlight of each ray from its lit stretches, and a bound of its error, (rays, 3) each."""
         if rays.w:
-            scale, rtol = shadow_scale, rtol or _RTOL
-            value, error = _of_places(self.medium, rays, stretches, profile=profile, scale=scale, rtol=rtol, edge=edge)
+            value, error = _of_places(self.medium, rays, stretches, terms)
         else:
-            value, error = _of_suns(self.medium, rays, stretches, np.broadcast_to(edge, len(rays.foot)))
+            value, error = _of_suns(self.medium, rays, stretches, np.broadcast_to(terms.edge, len(rays.foot)))
         factor, ray = self.medium.albedo / (4 * np.pi), stretches[0]
         value, error = (sums_of(ray, part[:, None] * factor, len(rays.foot)) for part in (value, error))
         return value, error
 
 
-def _of_places(
-    medium: HeightMedium,
-    rays: Rays,
-    stretches: Stretches,
-    *,
-    profile: Profile | None,
-    scale: float,
-    rtol: float,
-    edge: float | Array,
-) -> tuple[Array, Array]:
+def _of_places(medium: HeightMedium, rays: Rays, stretches: Stretches, terms: Terms) -> tuple[Array, Array]:
     """Return sigma_t J of lit stretches and its error, (stretches,) [1/m^2]."""
     ray, x0, x1 = stretches
     fog = fog_of(medium)
@@ -94,10 +72,9 @@ def _of_places(
         rays.height[ray],
         of_light,
     )
-    weight = None if profile is None else lambda x, row: profile(x, ray[row])
-    value, error = height_fog_segments(
-        fog, heights, x0, np.maximum(x0, x1), medium.phase, shadow_scale=scale, weight=weight, rtol=rtol
-    )
+    how: dict[str, Any] = {"weight": weight_of(terms.profile, ray), "rtol": terms.rtol or RTOL}
+    ends = x0, np.maximum(x0, x1)
+    value, error = height_fog_segments(fog, heights, *ends, medium.phase, shadow_scale=terms.shadow_scale, **how)
     for x in (x0, x1):  # a relative uncertainty of the distance from the light is worth r times the integrand
         s = np.where(np.isfinite(x), x, rays.foot[ray]) - rays.foot[ray]
         r = np.maximum(np.hypot(rays.height[ray], s), np.finfo(np.float64).tiny)
@@ -106,7 +83,7 @@ def _of_places(
         depth = depth + fog.optical_depth(z, of_light, r)
         with np.errstate(over="ignore"):
             strip = np.exp(fog.log_density(z) - depth) * medium.phase(-s / r) / r
-        error = error + edge * np.where(np.isfinite(x), strip, 0.0)
+        error = error + terms.edge * np.where(np.isfinite(x), strip, 0.0)
     return value, error
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.quadrature.fields import field_of
-from reference.quadrature.unbounded import lit_stretches, profile_of
+from reference.quadrature.unbounded import Terms, lit_stretches, profile_of
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import TruthLight, TruthScene
 from reference.scene.shapes import Shapes, read_shapes
@@ -67,8 +67,8 @@ def lit_sums(
 ) -> tuple[Array, Array]:
     """Return the airlight of a point or spot light from the lit intervals of rays, and its bound, (rays, 3) each."""
     stretches = lit_stretches(light, rays, lit)
-    how: dict[str, Any] = {"profile": profile_of(light, rays), "shadow_scale": shadow_scale, "edge": lit.edge}
-    value, bound = field_of(truth).sums(rays, stretches, distance, **how)
+    terms = Terms(profile_of(light, rays), shadow_scale, lit.edge)
+    value, bound = field_of(truth).sums(rays, stretches, distance, terms)
     return value * light.intensity, bound * light.intensity
 
 
@@ -106,8 +106,8 @@ def directional_airlight(truth: TruthScene, light: DirectionalLight, distance: A
     # What the uncertainty of coordinates is worth on a ray, through an edge or a kink; at most all of the ray.
     scale = np.maximum(coordinates(rays, found.shapes), lit.high.max(initial=0.0) / rays.height)
     edge = np.minimum(lit.edge * scale, np.bincount(lit.ray, high - lit.low, len(distance)))
-    how = {"edge": edge, "rounding": np.finfo(float).eps * scale}
-    sums = field.sums(rays, (lit.ray, lit.low, high), distance, **how)
+    terms = Terms(edge=edge, rounding=np.finfo(float).eps * scale)
+    sums = field.sums(rays, (lit.ray, lit.low, high), distance, terms)
     radiance, bound = (part * light.irradiance for part in sums)
     bound = bound + worth_of_doubt(truth, rays, lit) * light.irradiance
     return LightAirlight(radiance, bound, angle, lit, reaches(lit, distance))

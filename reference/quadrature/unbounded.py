@@ -20,7 +20,21 @@ Stretches = tuple[Index, Array, Array]  # rays, and distances of both ends [m]
 Profile = Callable[[Array, Index], Array]  # distances, (m, k) [m], and rays, (m,) -> intensity over that on the axis
 
 
-_RTOL = 1e-10  # of the integral of each stretch
+RTOL = 1e-10  #: of the integral of each stretch
+
+
+@dataclass(frozen=True)
+class Terms:
+    """How lights of strength 1 shine on the lit stretches that are summed, and how well these are known."""
+
+    profile: Profile | None = None  #: of lights at places; None: they are isotropic
+    shadow_scale: float = 1.0  #: fraction of the way to a place that attenuates, from the scattering point on
+    edge: float | Array = 0.0  #: uncertainty of ends: relative to their distance from a place, or by ray a length [m]
+    rounding: Array | None = None  #: uncertainty of the places of kinks, by ray [m]
+    rtol: float | None = None  #: relative tolerance of a sum; the field's own by default
+
+
+TERMS = Terms()
 
 
 @dataclass(frozen=True)
@@ -42,32 +56,30 @@ class Unbounded:
         """Return the distance behind which rays meet nothing that scatters, (n,) [m]."""
         return np.full(len(direction), np.inf if self.strongest.any() else 0.0)
 
-    def sums(
-        self,
-        rays: Rays,
-        stretches: Stretches,
-        distance: Array,
-        *,
-        profile: Profile | None = None,
-        shadow_scale: float = 1.0,
-        edge: float | Array = 0.0,
-        rounding: Array | None = None,
-        rtol: float | None = None,
-    ) -> tuple[Array, Array]:
+    def sums(self, rays: Rays, stretches: Stretches, distance: Array, terms: Terms = TERMS) -> tuple[Array, Array]:
         """Return the airlight of each ray and its bound; of a direction nothing: it reaches no fog without end."""
         ray, x0, x1 = stretches
         values, errors = np.zeros((len(ray), 3)), np.zeros((len(ray), 3))
         foot, height, medium = rays.foot[ray], rays.height[ray], self.medium
-        weight = None if profile is None else lambda x, row: profile(x, ray[row])
+        weight = weight_of(terms.profile, ray)
         known: dict[float, tuple[Array, Array]] = {}
         for channel, sigma_t in enumerate(medium.sigma_t.tolist() if rays.w else []):
             if sigma_t not in known:
-                how: dict[str, Any] = {"shadow_scale": shadow_scale, "weight": weight, "rtol": rtol or _RTOL}
+                how: dict[str, Any] = {
+                    "shadow_scale": terms.shadow_scale,
+                    "weight": weight,
+                    "rtol": terms.rtol or RTOL,
+                }
                 value, error = airlight_segments(foot, height, x0, np.maximum(x0, x1), sigma_t, medium.phase, **how)
-                known[sigma_t] = value, error + edge * _edge_worth((foot, height), (x0, x1), sigma_t, medium)
+                known[sigma_t] = value, error + terms.edge * _edge_worth((foot, height), (x0, x1), sigma_t, medium)
             factor = medium.albedo[channel] * sigma_t / (4 * np.pi)
             values[:, channel], errors[:, channel] = (factor * column for column in known[sigma_t])
         return sums_of(ray, values, len(rays.foot)), sums_of(ray, errors, len(rays.foot))
+
+
+def weight_of(profile: Profile | None, ray: Index) -> Callable[[Array, Index], Array] | None:
+    """Return a profile by the numbers of the stretches of these rays."""
+    return None if profile is None else lambda x, row: profile(x, ray[row])
 
 
 def strongest(medium: TruthMedium | HeightMedium) -> Array:

@@ -377,7 +377,7 @@ _SUN = _all(
     "sun",
     {
         "directional-without-four-pi": Wrap(
-            f"{_BOUNDED}:sum_media",
+            f"{_BOUNDED}:Bounded.sums",
             lambda function, *arguments, **named: tuple(_FOUR_PI * part for part in function(*arguments, **named)),
         ),
         "directional-bright-leg": Rewrite(

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The door for media: a density that grows with height says what it is, and the sums are right for lamps and suns."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ from scipy.integrate import quad
 from reference.quadrature.adaptive_panels import sum_pieces
 from reference.quadrature.fields import Field
 from reference.quadrature.pieces import Pieces, cut, whole
+from reference.quadrature.unbounded import TERMS
 from reference.visibility.planes import Rays, rays_at
 
 LEAST, RATE, TOP = 0.13, 0.21, 6.0  # extinction at height 0 [1/m], its growth [1/m^2], and where it ends [m]
@@ -52,11 +53,10 @@ class GrowingFog:
     def leave(self, origin, direction):
         return np.where(direction[:, 2] > 0, (TOP - origin[2]) / direction[:, 2], np.inf)
 
-    def sums(self, rays, stretches, distance, *, profile=None, shadow_scale=1.0, edge=0.0, rounding=None, rtol=None):
+    def sums(self, rays, stretches, distance, terms=TERMS):
         pieces = cut(whole(stretches), (np.array([0, 1]), np.array([1.3, 2.1])))  # anywhere: nothing may change
-        count = len(rays.foot)
-        how = {"edge": np.broadcast_to(edge, count), "rounding": np.zeros(count), "rtol": rtol or 1e-10}
-        value, error = sum_pieces(rays, pieces, _Growing(rays, pieces), slice(0, count), profile=profile, **how)
+        terms = replace(terms, rtol=terms.rtol or 1e-10)
+        value, error = sum_pieces(rays, pieces, _Growing(rays, pieces), slice(0, len(rays.foot)), terms)
         return value / (4 * np.pi), error / (4 * np.pi)
 
 
