@@ -213,8 +213,10 @@ def rooms_as_boxes(state: Any, shapes: Iterable[Any]) -> list[str]:
     notes = []
     for shape in known:
         inside = [medium for medium in (shape.interior_medium(), shape.exterior_medium()) if medium is not None]
+        if not _is_null(shape) or len(inside) != 1:
+            continue
         room = _room(_matrix(shape), -1.0 if shape.interior_medium() else 1.0, walls)
-        if not _is_null(shape) or len(inside) != 1 or room is None:
+        if room is None:
             continue
         box = mi.Properties("cube")
         box.set_id(shape.id())
