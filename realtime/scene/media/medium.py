@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What every medium answers: the protocol between media and all that renders in them (the page of this room)."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -33,7 +34,7 @@ class Rays:
         return dr.fma(self.direction, x, self.origin)
 
 
-class Medium:
+class Medium(ABC):
     """What fills space. Media are frozen dataclasses derived from it; see the page of this room."""
 
     albedo: Any  #: single-scattering albedo, RGB [1]; its type is that of colours
@@ -43,26 +44,26 @@ class Medium:
     clouds: Any = None  #: in clear air: all bounded media, of any shape, for methods that render clouds
 
     @property
+    @abstractmethod
     def channels(self) -> int:
         """1 for a grey medium, 3 for a coloured one."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def vacuum(self) -> bool:
         """Whether a ray can be without extinction from some place on, in a channel."""
-        raise NotImplementedError
 
+    @abstractmethod
     def extinction(self, rays: Rays, x) -> tuple[Any, ...]:
         """Return the extinction at distances x of rays [1/m], by channel."""
-        raise NotImplementedError
 
+    @abstractmethod
     def optical_depth(self, rays: Rays, x0, x1) -> tuple[Any, ...]:
         """Return the optical depth of segments [m] of rays, by channel [1]; `x1` may be infinite."""
-        raise NotImplementedError
 
+    @abstractmethod
     def length_of(self, depth: float) -> Any:
         """Return a length in which the optical depth grows by `depth` in every channel, wherever it lies [m]."""
-        raise NotImplementedError
 
     def rays(self, origin, direction, aim=None) -> Rays:
         """Return rays [m] of unit directions, with what the medium finds of them once; `aim` has twice their digits."""
@@ -106,9 +107,9 @@ class Medium:
         """Return the light of a constant field of radiance 1 in the medium up to a distance [m], RGB: 1 - exp(-tau)."""
         return self.albedo * (1 - self.transmittance(self.optical_depth(rays, 0, distance)))
 
+    @abstractmethod
     def thicker(self, factor: float) -> "Medium":
         """Return it with the extinction times a factor; the albedo stays."""
-        raise NotImplementedError
 
     def lit(self, rays: Rays, light: Light, geometry, *, kernel: Any = None, form: str = "kernel") -> "LitRays":
         """Return rays with one light.
