@@ -391,10 +391,10 @@ def _warnings(renderer: Any) -> tuple[str, ...]:
     from realtime.methods.shadow_planes.method import PlanePreparation
 
     preparation = renderer.stages.prepare
-    if not isinstance(preparation, PlanePreparation) or preparation.order == "exact":
+    if not isinstance(preparation, PlanePreparation):
         return ()
-    _warn(preparation.casters.warnings)
-    return tuple(preparation.casters.warnings)
+    _warn(preparation.warnings)
+    return preparation.warnings
 
 
 def _warn(warnings: Any) -> None:

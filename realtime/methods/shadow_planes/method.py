@@ -268,6 +268,11 @@ class PlanePreparation:
         """Return the planes of every light of a scene."""
         return self.start(scene)()
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What planes in the order of a paper do not count right; in the exact order all is right."""
+        return () if self.order == "exact" else tuple(self.casters.warnings)
+
     def start(self, scene: Scene) -> Callable[[], tuple[PlaneIndex, ...]]:
         """Read what the host needs of a scene, which waits for the device; return what then finds the planes."""
         here = self.standing(scene)
