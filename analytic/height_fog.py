@@ -29,8 +29,8 @@ and from the other end, exp(-E(b)) tau(a,b) phi(-q), for q < 0. This is the resu
     K = int sigma_t(z) exp(-tau(o,x) - tau(x,light)) p(-tanh w)/r dw    [1/m^2].
 
 Light and phase function keep their singularities at |Im w| = pi/2 (`analytic.panels`); the density adds none, but turns
-the exponent by Im z/H. So panels are 2.4 wide at most, and span a few scale heights at most. Integrands have kinks
-where a ray crosses the base of a clamped layer: intervals are cut there, and at floor and cap.
+the exponent by Im z/H. Panels are therefore 2.4 wide at most, and span a few scale heights at most. Integrands have
+kinks where a ray crosses the base of a clamped layer: intervals are cut there, and at floor and cap.
 
 The radiance is albedo I K/(4 pi) of a light of intensity I, and albedo E K/(4 pi) of a sun of irradiance E.
 """

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Phase functions of the droplets of fog and clouds: Mie series, means over sizes, tables.
 
-The phase function of droplets as a cosine series of the scattering angle.
+**The phase function of droplets as a cosine series of the scattering angle.**
 
 The sizes are those of Bouthors 2008, eq. 3: with u = r/r_n the weight of an average over the cross sections is
 u^(gamma + 1) exp(-u), r_n = r_e/(gamma + 2). The rule takes the same midpoints as `analytic.droplets`: spheres have
@@ -12,7 +12,7 @@ the angle the square is a sum of cos(k angle), k <= 2 N, and its values at 2 N +
 degrees give the coefficients exactly (a discrete cosine transform of type 1). The mean over the sphere of a cosine
 series is the sum over even k of a_k/(1 - k^2), which scales it to 1.
 
-The amplitudes of light that spheres without absorption scatter (Mie 1908), in real arithmetic.
+**The amplitudes of light that spheres without absorption scatter (Mie 1908), in real arithmetic.**
 
 `analytic.mie` has complex coefficients by Bohren and Huffman's recurrences. Here the coefficients are phase shifts (van
 de Hulst 1957, section 10.21): for a real refractive index m and the size x = 2 pi r/wavelength,
@@ -31,7 +31,7 @@ downwards for any start beyond the transition at n = x (Du 2004, Appl. Opt. 43, 
 
 in which nothing cancels beyond n = x and no error is carried from one n to the next.
 
-The phase function of droplets as a table that kernels look up, from forward to backward.
+**The phase function of droplets as a table that kernels look up, from forward to backward.**
 
 The peak is a degree wide, the glory two, and both ends need angles to more digits than a cosine has in float32. With
 a = sin(angle/2) and b = cos(angle/2), which callers know without cancellation, the table is over

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Filters of whole images: Gaussian, bilateral and joint bilateral, by passes or levels; means of tiles; up-sampling.
 
-Guides: images whose differences between two pixels say how alike these are, in units of a width.
+**Guides: images** whose differences between two pixels say how alike these are, in units of a width.
 
-How the pixels of an image lie, images with a margin, from which taps beside the image read, and sums over taps.
+**How the pixels of an image lie**, images with a margin, from which taps beside the image read, and sums over taps.
 
-The bilateral and the joint bilateral filter as they are defined: every pixel, every tap.
+**The bilateral and the joint bilateral filter as they are defined: every pixel, every tap.**
 
 Tomasi and Manduchi 1998; Petschnigg et al. 2004 and Eisemann and Durand 2004 for guides. A tap gathers each channel of
 image and guides and takes one exponential; there are (2 r + 1)^2 taps with r = ceil(support hd).
 
-Filters along rows and then along columns: 2 (2 r + 1) taps a pixel in place of (2 r + 1)^2.
+**Filters along rows and then along columns:** 2 (2 r + 1) taps a pixel in place of (2 r + 1)^2.
 
 The Gaussian is a product, so that this is the same filter, also at the borders, where the taps that are left are
 normalised. With guides it is an approximation (Pham and van Vliet 2005): a tap off the row and the column is weighed
@@ -18,7 +18,7 @@ through a pixel on the column, by its guide. The two passes do not commute, so n
 
 The width may differ from pixel to pixel. Then a pixel takes as many taps as its own width asks for.
 
-The bilateral filter of an image that takes few values, exactly, as a sum of Gaussians.
+**The bilateral filter of an image that takes few values**, exactly, as a sum of Gaussians.
 
 A visibility by N light points takes the N + 1 values l / N. With W_l(p) the Gaussian of the image that is 1 where f is
 l / N and 0 elsewhere,
@@ -30,13 +30,13 @@ so that it costs 2 (2 r + 1) (N + 1) sums and no exponential a tap in place of (
 N = 5 that is 372 in place of 961 taps of ten times the operations. (Porikli 2008 and Yang, Tan, Ahuja 2009 do the same
 with quantised images, where it is an approximation.)
 
-The mean over a tile of 4 x 4 pixels, each of which has another of sixteen samples.
+**The mean over a tile of 4 x 4 pixels**, each of which has another of sixteen samples.
 
 A window of 4 x 4 that is moved to every pixel holds each sample once, but it lies half a pixel to one side. So the
 window has 5 x 5 taps with weights 1/2, 1, 1, 1, 1/2 along rows and columns: the two taps at its ends have the same
 sample, and each sample has the weight 1. Where a guide leaves out some taps, those that are left are normalised.
 
-Joint bilateral up-sampling: an image of every `scale`-th pixel becomes one of all, with a depth test.
+**Joint bilateral up-sampling:** an image of every `scale`-th pixel becomes one of all, with a depth test.
 
 Kopf, Cohen, Lischinski, Uyttendaele 2007; the depth test of realTiSoftLS (Ali 2016) is reconstructed from captions. A
 pixel takes the four pixels of the small image about it with the weights of bilinear interpolation, each times the

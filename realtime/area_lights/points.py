@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Light points, and the patterns in which they lie.
 
-Patterns of points, each for an equal part of the area.
+**Patterns of points, each for an equal part of the area.**
 
 * `ring`: the few points of Ali 2016, whose layout the source does not print; reconstructed from captions. On a disk of
   the radius R they lie on a circle of R/sqrt(2), on a rectangle on the ellipse that is sqrt(2/3) as large as it: there
@@ -18,7 +18,7 @@ Patterns of points, each for an equal part of the area.
 * `interleaved`: the cells of `grid` in an order in which points that follow one another lie far apart: for a method in
   which neighbouring pixels take different ones. For all others it is `grid`.
 
-Light points: a light with extent as N point lights of equal power.
+**Light points:** a light with extent as N point lights of equal power.
 
 Each stands for the part A/N of the area: a point light with the intensity I(w) = I0 max(0, n . w), I0 = Le A/N [W/sr],
 n the normal of the shape there. Its power, pi I0, is an N-th of that of the light.
@@ -168,7 +168,7 @@ def place_points(light: AreaLight, points: int, pattern: str) -> PlacedPoints:
 
 
 def _on_mesh(light: AreaLight, points: int, pattern: str) -> tuple[Array, Array]:
-    """Return points, and normals: one coordinate of the pattern goes along the area, and within each triangle anew."""
+    """Return points and normals: the first coordinate of the pattern chooses the triangle and a place along it."""
     if pattern == "ring":
         number = np.arange(points)
         u, v = (number + 0.5) / points, number * _GOLDEN / (2 * math.pi) % 1

@@ -1,22 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Where rays cross the boundaries of clouds of any shape.
 
-The boundaries of all clouds of a scene: a Mitsuba scene to cast rays at, and a table of normals.
+**The boundaries of all clouds of a scene:** a Mitsuba scene to cast rays at, and a table of normals.
 
-Crossings of rays with the boundaries of clouds, one after the other, and what follows from them.
+**Crossings of rays with the boundaries of clouds, one after the other, and what follows from them.**
 
-A stretch of a ray between two crossings lies in a cloud if and only if the ray leaves one at its end. So nobody needs
-to know where the ray starts, and a crossing that rounding hides, or shows twice, costs a stretch of its own length:
-the sum over the stretches is right to the rounding of a distance.
+A stretch of a ray between two crossings lies in a cloud if and only if the ray leaves one at its end. The start of
+the ray need not be known, and a crossing that rounding hides, or shows twice, costs a stretch of its own length: the
+sum over the stretches is right to the rounding of a distance.
 
 Rays are cast in float32, from the last crossing on. A stretch that is shorter than the step beyond it, 4e-6 of the
 distance and of the coordinates, is not seen.
 
-The stretches of rays in clouds, found once and kept: what is marched, summed and entered first.
+**The stretches of rays in clouds, found once and kept:** what is marched, summed and entered first.
 
-Few rays lie in clouds more than a few times. So the first stretches of a ray are kept in as many pairs of numbers, and
-who needs more of a ray looks for them once more from the first that has no place. Whoever walks along stretches casts
-no ray at each of its steps.
+Few rays lie in clouds more than a few times. The first stretches of a ray are kept in as many pairs of numbers; a walk
+that needs more looks for them again from the first that has no place. Walks along stretches cast no ray at each step.
 """
 
 from dataclasses import dataclass

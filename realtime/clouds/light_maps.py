@@ -54,7 +54,7 @@ from realtime.shadow_maps.shadow_map import check_size, texel_rays
 
 @dataclass(frozen=True)
 class LitSurfaces:
-    """What rays along the light meet of a cloud, in squares of 4 x 4 texels."""
+    """The parts of a cloud that rays along the light meet, in squares of 4 x 4 texels."""
 
     size: int  #: texels on a side
     place: Any  #: number of the texel of each ray, row by row

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Opacity and the light of one scattering along rays through clouds.
 
-Nodes along a ray, exponentially spaced in optical depth.
+**Nodes along a ray, exponentially spaced in optical depth.**
 
 N steps of a ray of the depth T in clouds end at
 
@@ -10,7 +10,7 @@ N steps of a ray of the depth T in clouds end at
 equal shares of the integral of exp(-tau/s). With s = 1 each step takes as much of the ray's own extinction; light that
 is extinguished less on its way in than on the way out needs nodes further in, so that s is larger.
 
-The opacity of clouds along a ray.
+**The opacity of clouds along a ray.**
 
 With the extinctions kappa_i and the lengths of the stretches in clouds, light from behind passes with the transmittance
 
@@ -24,7 +24,7 @@ Its sign is wrong: it integrates exp(-kappa x), which falls. It is a length, sin
 exponent has the local kappa times the whole distance instead of the depth cumulated up to there. As printed the opacity
 is negative, and more light comes out than went in; x is counted from where the ray enters the first cloud.
 
-Single scattering in clouds, by steps on which the legs of the light are linear.
+**Single scattering in clouds, by steps on which the legs of the light are linear.**
 
 Light of the irradiance E that comes from a direction reaches the point at x after the depth l(x), and the eye after
 tau(x) more; of phase function P/4 pi and albedo w,
@@ -42,7 +42,7 @@ with one of these in them.
 Octaves of a light (`realtime.methods.cloud_octaves`) have the leg a l with a factor a each, and a phase function each:
 the same sum with u = tau + a l.
 
-What is seen behind clouds: surfaces that light reaches through clouds, and a sky.
+**The background of clouds:** surfaces that light reaches through clouds, and a sky.
 """
 
 from collections.abc import Callable, Sequence

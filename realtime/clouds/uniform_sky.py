@@ -1,29 +1,29 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The light that clouds scatter from a sky that is the same everywhere, by order of scattering.
 
-The share of light paths that leave a slab after a number of scatterings.
+**The share of light paths that leave a slab after a number of scatterings.**
 
 Light goes both ways along a path. Under a sky of the radiance L everywhere, below as above, the eye gets of order n
 
     L albedo^n Pr(a path that starts at the eye is scattered n times and then leaves),
 
 as whatever such a path meets behind the cloud is L. If nothing is absorbed, every path leaves: all orders together are
-L times the opacity of the ray, exactly, for a cloud of any shape. So the shape decides only how this light is shared
-among the orders.
+L times the opacity of the ray, exactly, for a cloud of any shape. The shape therefore decides only how this light
+is divided among the orders.
 
 For a slab of the thickness t and a ray of the cosine mu these shares follow from the equation of transfer with light
 entering at both faces, I_0 = exp(-s/|mu|), s the depth from the face where a direction enters, order after order as in
 `realtime.clouds.slab_orders`, in the mean over azimuths alone. What is kept is divided by 1 - exp(-t/mu), so that the
 shares of all sets add up to 1 at albedo 1.
 
-The light that clouds scatter from a uniform sky into rays, by set of orders.
+**The light that clouds scatter from a uniform sky into rays, by set of orders.**
 
 A ray of the depth T in clouds, under a sky of the radiance L, gets of all orders L (1 - exp(-T)) where nothing is
-absorbed: as much as the clouds take from the sky behind. `escapes.py` says why, and how a slab shares it among the
-orders. The slab that stands for the cloud has its face where the ray first meets the cloud, with the cosine mu between
-ray and normal there, and the thickness t = mu T, through which the ray has the same depth T, but at most 2 V/S, with
-which it has the mean chord 4 V/S of a cloud of the volume V and the surface S: light leaves a body to all sides. A
-camera in a cloud looks across its slab.
+absorbed: as much as the clouds take from the sky behind. The section above says why, and how a slab shares it
+among the orders. The slab that stands for the cloud has its face where the ray first meets the cloud, with the cosine
+mu between ray and normal there, and the thickness t = mu T, through which the ray has the same depth T, but at most
+2 V/S, with which it has the mean chord 4 V/S of a cloud of the volume V and the surface S: light leaves a body to all
+sides. A camera in a cloud looks across its slab.
 
 With absorption the sum is that of the slab. Opaque shapes hide the same share of the sky from all orders: of eight
 directions from the place of entry, those that they block.
@@ -132,7 +132,7 @@ _SETS = len(ORDER_LAYERS)
 
 @dataclass(frozen=True)
 class SkyEscapes:
-    """The shares of `escapes.py` on the device."""
+    """The fractions of light paths that leave a slab, on the device."""
 
     shares: Any  #: medium after medium, (thicknesses, cosines, sets)
     media: tuple[Any, ...]  #: by channel, the number of the medium that fills each cloud

@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Arrays of Dr.Jit: types of one precision, arrays from NumPy, and the way back to the host.
 
-Dr.Jit array types of one precision, so that every method runs in float32 and float64 from the same source.
+Types come in sets of one precision, so that every method runs in float32 and float64 from the same source.
 
-Arrays from NumPy in memory that is aligned as Dr.Jit's own is.
+NumPy's arrays are copied to memory that is aligned as Dr.Jit's own is.
 
-Numbers of a scene brought from the device to the host, the one way in which a frame may do so.
-
-What a frame reads so is a few numbers of lights and cameras; each such read waits until the device has come to rest.
+A frame has one way to bring numbers of a scene from the device to the host. It reads a few numbers of lights and
+cameras; each such read waits until the device has come to rest.
 """
 
 from dataclasses import dataclass

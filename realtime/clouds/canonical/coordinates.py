@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The coordinates of the canonical tables, and which factors of the light of a slab they leave out.
 
-The eight sets of orders of Bouthors 2008, section 5.1; order 1 stands apart.
+**The eight sets of orders of Bouthors 2008, section 5.1**; order 1 stands apart.
 
-The phase function scattered n times, P_s of the coordinates of the tables.
+**The phase function scattered n times**, P_s of the coordinates of the tables.
 
-Fields over places and directions as sums of products.
+**Fields over places and directions as sums of products.**
 
 A field q of the place p = (t, d, mu_L) and of the direction v = (mu, phi) is close to a sum of few products,
 
@@ -16,7 +16,7 @@ it in all directions at once. Tables of three and of two coordinates take the pl
 fine. The best g_k are the first eigenvectors of the mean of q(v) q(v') over places (Eckart and Young 1936): that of the
 weighted square error, for weights of places and of directions. They are orthonormal, which makes a_k = <q, g_k>.
 
-The coordinates of the tables, and the steep factors that they leave out, so that few entries serve.
+**The coordinates of the tables, and the steep factors** that they leave out, so that few entries serve.
 
     thickness    log(t + 0.02), for t from 0.01 to 200
     depth        a(d)/(a(d) + a(t - d)), a(z) = log(1 + z/0.1): 0 at the lit face, 1 at the other, fine at both
@@ -49,9 +49,9 @@ direction and log s_b(t, d, mu_L) a mean over directions,
 
     D = w <s> + s_b (X, Y),     sigma^2 = s_b^2 exp(2 Z) + |w|^2 (<s^2> - <s>^2)/2.
 
-F, X, Y and Z are sums of products, see `low_rank.py`.
+F, X, Y and Z are sums of products, as above.
 
-Interpolation on simplices: the entries around a place of a regular grid, and what each counts.
+**Interpolation on simplices:** the entries around a place of a regular grid, and what each counts.
 
 With the shares f of the place in its cell sorted so that f_1 >= f_2 >= .., and the strides s_i in that order,
 
@@ -60,7 +60,7 @@ With the shares f of the place in its cell sorted so that f_1 >= f_2 >= .., and 
 linear within each of the simplices of a cell, and continuous: n + 1 entries, where products of pairs of weights take
 2^n. A function without mixed second derivatives has the same error in both.
 
-The phase function of a scene as the computation of slabs needs it.
+**The phase function of a scene**, as the computation of slabs needs it.
 """
 
 import math

@@ -2,7 +2,7 @@
 """The canonical transport on the device: sums of products of what depends on the place and on the direction.
 
 Tables are kept with the fewest entries that cubics need. Here, once, splines put more of them along every coordinate,
-so that a frame reads no more than the corners of a simplex (`simplex.py`): of a place in the slab (t, d, mu_L) four
+so that a frame reads no more than the corners of a simplex (`coordinates.py`): of a place in the slab (t, d, mu_L) four
 entries of the means b and log s_b, and four of the coefficients, of a direction (mu, phi) three of the shapes, in
 packets of four products. Who does not use T does not pay for it. All arrays take about 250 MB.
 

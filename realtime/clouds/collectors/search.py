@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The collector search: the tangent slab of a collector, the fixed point, and the light that comes from there.
 
-The slab that touches a cloud where light enters it, and a point and a direction in it.
+**The slab that touches a cloud where light enters it, and a point and a direction in it.**
 
 A collector is a place c and a width sigma. The lit surface filtered by sigma (`realtime.clouds.light_maps`) gives a
 point q of the filtered surface, its outward normal n and the thickness Z of the cloud along the light w_L there. The
@@ -29,7 +29,7 @@ Where a cloud is no slab:
 `thickness=light` has both lengths along the light, as printed: t = sigma_t Z and d/mu_L, what a depth map holds.
 A slab in which the sun stands at 75 degrees is then 3.9 times too thick.
 
-The collector of a set of orders: a fixed point on the lit surface of a cloud (Bouthors 2008, section 6.1).
+**The collector of a set of orders:** a fixed point on the lit surface of a cloud (Bouthors 2008, section 6.1).
 
 Let P(c, sigma) be the slab that touches the surface filtered by sigma where c lies along the light, and F the canonical
 transport: it tells of a slab and of p and v in it the place and the width (c, sigma) of the entry of light. Wanted is
@@ -61,9 +61,9 @@ to p: where both are large it is no contraction, and steps overshoot.
 
 The distance |F - c'| / sigma of the last step says how far the search is from its end: `CollectorLight.missed`.
 
-The light of all sets of orders at points of a cloud under one sun: one search for each set.
+**The light of all sets of orders at points of a cloud under one sun:** one search for each set.
 
-What a frame leaves to the next are the collectors of each set: the vectors from the points to the centres, and the
+A frame leaves to the next the collectors of each set: the vectors from the points to the centres, and the
 widths, which are 0 where there is none. Where the camera moved, a point of the next frame lies beside the one whose
 collector it takes, and its collector lies beside that too.
 """
