@@ -5,9 +5,9 @@ Read in this order:
 
 - `result.py`: what a study returns
 - `methods.py`: methods timed and compared, errors by cause, growth with the work, sizes of shadow maps
-- `kernels.py`: kernels timed, their errors, where they break, integrals of a file
-- `series.py`: Biri's polynomials and phase functions, drawn
-- `estimators.py`: Monte Carlo estimators at equal error, their convergence, their standardised errors
+- `kernels.py`: kernels timed, where they break, integrals of a file
+- `series.py`: Biri's polynomials
+- `estimators.py`: the convergence and the standardised errors of Monte Carlo estimators
 - `clouds.py`: a slab by order of scattering, tables of canonical transport
 - `registry.py`: the studies by name, and `airlight.study`
 """

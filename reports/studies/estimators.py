@@ -1,56 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Studies of the Monte Carlo estimators: time at equal error, convergence, standardised errors."""
+"""Studies of the Monte Carlo estimators: convergence, standardised errors."""
 
 from functools import partial
 from typing import Any
 
-from reports.api.inputs import Progress, SceneLike, Scenes, Size, one_error, pixels_of, several, telling
+from reports.api.inputs import Progress, SceneLike, one_error, telling
 from reports.machine.progress import counted, part_of
 from reports.studies.result import Study, with_environment
 from reports.tables.table import numbers, table, words
-
-
-@one_error
-def estimators(scenes: Scenes = (), *, size: Size = (160, 120), progress: Progress = None) -> Study:
-    """Time single-scatter and volpath at equal error.
-
-    Parameters
-    ----------
-    scenes
-        Built-in scenes, random:SEED and Mitsuba XML files; a thin fog and all built-in scenes for fog by default.
-    size
-        Width and height [pixels], or WxH.
-    progress
-        Called with (fraction done, what); True shows a bar.
-    """
-    from reports.machine.environment import activate
-
-    activate()
-    from reports.api.scenes import opened
-    from validation.estimates.efficiency import efficiency_lines, scene_efficiency, thin_fog
-    from validation.metrics.errors import plain
-    from validation.scenes.registry import FOG_SCENES
-    from validation.study.cost import check_work, sampled_work
-
-    pixels = pixels_of(size)
-    assert pixels is not None
-    # What cannot be used is refused before any work.
-    loaded = {str(name): opened(name, pixels).scene for name in several(scenes) or FOG_SCENES}
-    if not several(scenes):
-        loaded = {"open-fog, optical depth 0.2": thin_fog(pixels)} | loaded
-    check_work("estimators", [sampled_work(pixels, 1024) for _ in loaded])
-    found = {}
-    with telling(progress, "estimators") as tell:
-        for at, (name, scene) in enumerate(loaded.items()):
-            tell(at / len(loaded), name)
-            found[name] = scene_efficiency(scene)
-    said = [
-        line
-        for name, each in found.items()
-        for line in (f"{name}, {pixels[0]} x {pixels[1]}", *(f"  {line}" for line in efficiency_lines(each)))
-    ]
-    return Study(name="estimators", data=with_environment(estimators=plain(found)), said=tuple(said))
-
 
 _SAMPLES = 16  # samples a pixel in each batch
 _SIZE, _BATCHES = (64, 48), 64

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Studies of kernels: costs, errors over depth and angle, where they break, integrals of a file."""
+"""Studies of kernels: costs, where they break, integrals of a file."""
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -97,122 +97,6 @@ def _draw_costs(costs: Sequence[Mapping[str, Any]], column: str) -> Any:
         panel.set_ylabel("relative error of J [1]")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=6 if double else 3)
-    return figure
-
-
-# Their errors over depth and angle
-
-_GRID = (48, 37)  # depths times angles
-_DEPTHS = (1e-3, 30.0)  # optical depth of the distance to the light
-_ANGLES = (0.5, 179.5)  # [degrees]
-_REACH = 2.0  # length of the segment over the distance to the light
-_FLOOR, _CEILING = 1e-7, 1.0  # ends of the colour scale: the rounding of float32, and no correct digit
-
-
-@one_error
-def kernel_errors(*, progress: Progress = None) -> Study:
-    """Measure the error of each kernel over the optical depth and the angle of a ray.
-
-    A ray is described by the distance d from the camera to the light, as optical depth sigma_t d, and by the angle
-    between the ray and the direction to the light. Its segment goes from the camera to 2 d. Kernels run in float32 with
-    their default sizes, in isotropic fog; they are compared with certified values.
-
-    Parameters
-    ----------
-    progress
-        Called with (fraction done, what); True shows a bar.
-    """
-    from reports.machine.environment import activate
-
-    activate()
-    import numpy as np
-
-    from realtime.kernels.registry import KERNELS
-    from validation.kernels.errors import relative_error
-    from validation.kernels.values import evaluate_cases
-    from validation.study.configuration import find_kernel
-
-    cases, depth, angle = _grid_rays(*_GRID)
-    rows: list[dict[str, Any]] = []
-    with telling(progress, "kernel-errors") as tell:
-        for at, name in enumerate(KERNELS):
-            tell(at / len(KERNELS), name)
-            evaluated = evaluate_cases(cases, find_kernel(name), "single")
-            if not evaluated.accepted.any():
-                continue
-            error = relative_error(evaluated.J, np.asarray(cases.value), "single")
-            keys = ("kernel", "optical_depth", "angle_degrees", "relative_error")
-            rows += [dict(zip(keys, (name, *row))) for row in zip(depth.tolist(), angle.tolist(), error.tolist())]
-    largest = [
-        (name, *np.nanquantile([row["relative_error"] for row in rows if row["kernel"] == name], (0.5, 0.99, 1)))
-        for name in dict.fromkeys(row["kernel"] for row in rows)
-    ]
-    columns = (*words("kernel"), *numbers("median", p99="99 %", max="", how={"digits": 2}))
-    from validation.metrics.errors import plain
-
-    return Study(
-        name="kernel-errors",
-        data=with_environment(rays=plain(rows)),
-        drawn=(table(f"Relative errors of J on {len(depth)} rays, isotropic, float32", columns, largest),),
-        rows=tuple(rows),
-        draw=partial(_draw_errors, rows),
-    )
-
-
-def _grid_rays(columns: int, lines: int) -> tuple[Any, Any, Any]:
-    """Return rays on a grid, with the certified J, and the optical depth and angle [degrees] of each."""
-    import numpy as np
-
-    from validation.kernels.rays import table as ray_table
-    from validation.kernels.rays import with_truth
-
-    grid = np.meshgrid(np.geomspace(*_DEPTHS, columns), np.linspace(*_ANGLES, lines), indexing="ij")
-    depth, angle = (values.ravel() for values in grid)
-    foot, height = (
-        (depth * part).astype(np.float32).astype(np.float64)
-        for part in (np.cos(np.radians(angle)), np.sin(np.radians(angle)))
-    )
-    end = (_REACH * depth).astype(np.float32).astype(np.float64)
-    zero, ones = np.zeros_like(depth), np.ones_like(depth)
-    names, tags = np.full(len(depth), "isotropic"), np.full(len(depth), "grid")
-    cases = ray_table(names, zero, foot=foot, height=height, x0=zero, x1=end, sigma_t=ones, tags=tags)
-    return with_truth(cases), depth, angle
-
-
-def _draw_errors(rows: Sequence[Mapping[str, Any]], column: str) -> Any:
-    import numpy as np
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import LogNorm
-
-    from reports.plotting.figure import new_figure
-    from reports.plotting.style import WIDTHS
-
-    names = list(dict.fromkeys(row["kernel"] for row in rows))
-    across = 4 if column == "double" else 3
-    down = -(-len(names) // across)
-    width = WIDTHS[column]
-    figure = new_figure(width, down * width / across * 0.85 + 0.35)
-    panels = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False)
-    norm = LogNorm(_FLOOR, _CEILING, clip=True)
-    for panel, name in zip(panels.flat, names):
-        own = [row for row in rows if row["kernel"] == name]
-        depth, angle, error = (
-            np.array([row[key] for row in own]) for key in ("optical_depth", "angle_degrees", "relative_error")
-        )
-        depths, angles = np.unique(depth), np.unique(angle)
-        grid = np.full((len(angles), len(depths)), np.nan)
-        grid[np.searchsorted(angles, angle), np.searchsorted(depths, depth)] = error
-        panel.set_facecolor("#ff00ff")  # shows where a kernel's value is not finite
-        shown = np.maximum(np.ma.masked_invalid(grid), _FLOOR)
-        panel.pcolormesh(depths, angles, shown, norm=norm, cmap="cividis", rasterized=True)
-        panel.set(xscale="log", yticks=[0, 45, 90, 135, 180], title=name)
-        panel.grid(False)
-    for panel in panels.flat[len(names) :]:
-        panel.set_axis_off()
-    figure.supxlabel("optical depth of the distance to the light [1]", fontsize="medium")
-    figure.supylabel("angle from the light [degrees]", fontsize="medium")
-    scale: dict[str, Any] = {"label": "relative error of J [1]", "aspect": 40, "extend": "both", "shrink": 0.8}
-    figure.colorbar(ScalarMappable(norm, "cividis"), ax=panels, **scale)
     return figure
 
 

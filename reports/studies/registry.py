@@ -15,12 +15,9 @@ STUDIES = {
     "scaling": "growth",
     "map-size": "growth",
     "kernels": "kernels",
-    "kernel-errors": "kernels",
     "stability": "kernels",
     "integrals": "kernels",
     "polynomials": "series",
-    "phase-functions": "series",
-    "estimators": "estimators",
     "convergence": "estimators",
     "z-distribution": "estimators",
     "slab": "clouds",
@@ -70,7 +67,7 @@ def study(name: str, *arguments: Any, **named: Any) -> Any:
     Examples
     --------
     >>> import airlight
-    >>> airlight.study("phase-functions").data["g"] > 0.8
+    >>> airlight.study("slab", 2.0, 30.0, orders=[1])["1"]["reflectance"] > 0
     True
     """
     return find_study(name)(*arguments, **named)

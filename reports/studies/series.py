@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Studies of formulas: Biri's polynomials beside the kernel that they approximate, phase functions over the angle."""
+"""The study of Biri's polynomials beside the kernel that they approximate."""
 
 from functools import partial
 from typing import Any
@@ -95,48 +95,4 @@ def _draw_polynomials(rows: list[dict[str, Any]], column: str) -> Any:
         line[0].set_ylabel("f(theta) [1]")
     handles, labels = panels[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3)
-    return figure
-
-
-#: Curves by their words, with how they are drawn; '=' is the mean cosine of Mie's function.
-_PHASES: dict[str, dict[str, Any]] = {
-    "mie": {"color": "0.0", "linestyle": "-"},
-    "mie-modified": {"color": "0.55", "linestyle": "--"},
-    "hg-draine": {"color": "#0072b2", "linestyle": "-"},
-    "hg:=": {"color": "#009e73", "linestyle": "-"},
-    "hg:0.99": {"color": "#009e73", "linestyle": ":"},
-    "rayleigh": {"color": "#d55e00", "linestyle": "-."},
-}
-
-
-@one_error
-def phase_functions() -> Study:
-    """Compare phase functions of droplets with what stands in for them: Fig. 2 of Bouthors 2008."""
-    import numpy as np
-
-    from analytic.droplets import optics
-    from analytic.phase import phase_from_words
-
-    angle = np.concatenate([np.linspace(0, 10, 201), np.linspace(10, 180, 681)[1:]])
-    g = optics().g
-    down, up = np.sin(np.deg2rad(0.5 * angle)) ** 2, np.cos(np.deg2rad(0.5 * angle)) ** 2
-    values = {name: phase_from_words(name.replace("=", f"{g!r}")).from_half(down, up).tolist() for name in _PHASES}
-    rows = [dict(zip(("angle", *values), row)) for row in zip(angle.tolist(), *values.values())]
-    said = (f"Mean cosine of mie: {g:.6g}",)
-    data = {"g": g, "rows": rows}
-    return Study(name="phase-functions", data=data, said=said, rows=tuple(rows), draw=partial(_draw_phases, rows))
-
-
-def _draw_phases(rows: list[dict[str, Any]], column: str) -> Any:
-    from reports.plotting.figure import new_figure
-    from reports.plotting.style import WIDTHS
-
-    figure = new_figure(WIDTHS[column], 0.62 * WIDTHS[column])
-    panel = figure.subplots()
-    for name, style in _PHASES.items():
-        shown = [(row["angle"], row[name]) for row in rows if row[name] > 0]
-        label = "hg, g of mie" if name == "hg:=" else name.replace(":", ", g = ")
-        panel.plot(*zip(*shown), label=label, **style)
-    panel.set(yscale="log", xlim=(0, 180), xlabel="scattering angle [degrees]", ylabel="phase function, mean 1 [1]")
-    panel.legend()
     return figure

@@ -11,7 +11,6 @@ Read in this order:
 - `images.py`: references as layered images;
 - `merge.py`: references of several machines as one;
 - `agreement.py`: Monte Carlo estimators against the quadrature image;
-- `efficiency.py`: what two estimators cost at equal error;
 - `multiple_scattering.py`: the share of light that single scattering leaves out;
 - `expected_airlight.py`: the airlight that an estimator with a shadow-ray epsilon converges to.
 """
