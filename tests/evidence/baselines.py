@@ -89,10 +89,10 @@ def _entry(scene: Scene, chosen: Configuration, truth: TruthImage) -> dict[str, 
     row, frame = run(Cell("", SIZE, (), chosen, Measure("none", every_metric=False)), scene, of_image(truth))
     if row.error is None or frame is None:
         return {"refused": row.reason}
-    numbers = row.error.to_json() | {"mean": float(np.mean(np.asarray(frame.airlight, dtype=np.float64)))}
+    numbers = plain(row.error) | {"mean": float(np.mean(np.asarray(frame.airlight, dtype=np.float64)))}
     entry: dict[str, Any] = {"airlight": _rounded({name: numbers[name] for name in ERRORS})}
     if row.surface_error is not None:
-        surface = row.surface_error.to_json()
+        surface = plain(row.surface_error)
         entry["surface"] = _rounded({name: surface[name] for name in _SURFACE})
     return entry
 

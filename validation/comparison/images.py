@@ -23,7 +23,7 @@ from validation.comparison.compare_text import (
     statistics_lines,
 )
 from validation.metrics.colour import ColourDifference, colour_difference
-from validation.metrics.errors import Metrics, error_metrics
+from validation.metrics.errors import Metrics, error_metrics, plain
 from validation.metrics.flip import Flip, flip_hdr
 from validation.metrics.other_tools import PublishedErrors, published_errors
 from validation.statistics.comparison import Estimate, Statistics, compare_statistics
@@ -67,13 +67,10 @@ class Comparison:
         The metrics of other tools, the colour differences and FLIP are in objects of their own, where asked for.
         `relative_bias` is the same in the metrics and in the statistics, sum(test - ref) / sum(ref).
         """
-        statistics = {} if self.statistics is None else self.statistics.to_json()
-        extras = {
-            name: getattr(self, name).to_json()
-            for name in ("errors", "errors_normalised", "colour", "flip")
-            if getattr(self, name) is not None
-        }
-        flat = {"layer": self.layer, **statistics, **self.metrics.to_json(), "masked": self.masked}
+        statistics = {} if self.statistics is None else plain(self.statistics)
+        names = ("errors", "errors_normalised", "colour", "flip")
+        extras = {name: plain(value) for name in names if (value := getattr(self, name)) is not None}
+        flat = {"layer": self.layer, **statistics, **plain(self.metrics), "masked": self.masked}
         by_order = {"orders": [each.to_json() for each in self.orders]} if self.orders else {}
         notes = {"notes": list(self.notes)} if self.notes else {}
         return {**flat, **extras, **by_order, **notes, "failures": list(self.failures)}
@@ -250,7 +247,7 @@ def _compare(
         errors=published_errors(*images, mask=mask) if all_metrics else None,
         errors_normalised=published_errors(*images, mask=mask, unit=None) if all_metrics else None,
         colour=colour_difference(*images, mask=mask, exposure=exposure) if all_metrics else None,
-        flip=flip_hdr(*images, mask=mask, exposure=exposure) if flip else None,
+        flip=flip_hdr(*images, mask=mask, exposure=exposure)[0] if flip else None,
     )
 
 

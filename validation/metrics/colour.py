@@ -19,8 +19,7 @@ CIEDE2000: CIE 142-2001; Sharma, Wu and Dalal 2005 for its branches. Delta E ITP
 IC_TC_P: ITU-R BT.2100-2. White at 203 cd/m^2: ITU-R BT.2408-7. Both through colour-science.
 """
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import colour
 import numpy as np
@@ -28,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analytic.columns import column
 from analytic.errors import InputError
-from validation.metrics.errors import colours, compared, plain
+from validation.metrics.errors import colours, compared
 
 Array = NDArray[np.float64]
 
@@ -55,18 +54,12 @@ class ColourDifference:
     itp_p99: float = column("Delta E ITP, p99", "1", "99 % quantile of Delta E ITP")
     itp_max: float = column("Delta E ITP, largest", "1", "largest Delta E ITP")
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the numbers by name; what is not finite becomes None."""
-        return {name: plain(value) for name, value in asdict(self).items()}
-
 
 def colour_difference(
     reference: ArrayLike,
     test: ArrayLike,
     *,
     exposure: float | None = None,
-    white_luminance: float = WHITE_LUMINANCE,
-    peak_luminance: float = PEAK_LUMINANCE,
     mask: ArrayLike | None = None,
 ) -> ColourDifference:
     """Return how different two images look (see the module).
@@ -77,8 +70,6 @@ def colour_difference(
         Radiance [W/(m^2 sr)], (height, width), (height, width, 1) for grey or (height, width, 3).
     exposure
         In stops; None for `auto_exposure` of the reference.
-    white_luminance, peak_luminance
-        Of the screen of Delta E ITP [cd/m^2].
     mask
         Pixels to compare, (height, width) of truth values; all by default.
 
@@ -90,24 +81,20 @@ def colour_difference(
     """
     if exposure is not None and not np.isfinite(exposure):
         raise InputError(f"exposure: got {exposure}, wanted a number of stops such as -2, or none to choose it")
-    if not 0 < white_luminance <= peak_luminance <= PQ_PEAK:
-        raise InputError(
-            f"white at {white_luminance} and peak at {peak_luminance} cd/m^2; wanted 0 < white <= peak <= {PQ_PEAK:g}"
-        )
     ref, tst, chosen = compared(reference, test, mask)
     ref, tst = colours(ref), colours(tst)
     finite = chosen & (np.isfinite(ref) & np.isfinite(tst)).all(axis=2)
     if exposure is None:
         exposure = auto_exposure(ref[finite])
     shown = np.stack([ref[finite], tst[finite]]) * 2.0**exposure
-    brightest = peak_luminance / white_luminance
+    brightest = PEAK_LUMINANCE / WHITE_LUMINANCE
     surface, light = np.clip(shown, 0, 1), np.clip(shown, 0, brightest)
     de = ciede2000(*_lab(surface))
-    itp = delta_e_itp(*_ictcp(light * white_luminance))
+    itp = delta_e_itp(*_ictcp(light * WHITE_LUMINANCE))
     return ColourDifference(
         exposure=float(exposure),
-        white_luminance=white_luminance,
-        peak_luminance=peak_luminance,
+        white_luminance=WHITE_LUMINANCE,
+        peak_luminance=PEAK_LUMINANCE,
         pixels=int(chosen.sum()),
         nonfinite=int(chosen.sum() - finite.sum()),
         clipped=int((surface != shown).any(axis=(0, 2)).sum()),

@@ -43,10 +43,6 @@ class Metrics:
     nonfinite: int = column("not finite", "pixels", "with NaN or infinity in either image; left out of every average")
     negative: int = column("negative", "pixels", "with a negative value in the test image; they stay in the averages")
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the numbers by name; what is not finite becomes None, which JSON can hold."""
-        return {name: plain(value) for name, value in asdict(self).items()}
-
 
 def error_metrics(reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike | None = None) -> Metrics:
     """Compare a test image with a reference (formulae: see the module).

@@ -24,7 +24,7 @@ The number depends a little on the operating system (the project's note on preci
 
 import subprocess
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,7 @@ from numpy.typing import ArrayLike, NDArray
 from analytic.columns import column
 from analytic.errors import InputError
 from reference.storage.files import temporary_folder
-from validation.metrics.errors import colours, compared, plain
+from validation.metrics.errors import colours, compared
 
 PIXELS_PER_DEGREE = 67.0  #: of visual angle: a screen of 3840 pixels, 0.7 m wide, seen from 0.7 m
 TIMEOUT = 300.0  #: seconds that the child may take; a megapixel takes a few
@@ -69,13 +69,6 @@ class Flip:
     stop_exposure: float | None = column("last exposure", "stops", "of the range", default=None)
     exposures: int | None = column("exposures", "1", "how many", default=None)
     pixels_per_degree: float | None = column("pixels per degree", "1/degree", "of visual angle", default=None)
-    #: error of every pixel, (height, width)
-    error_map: NDArray[np.float32] | None = field(default=None, compare=False, repr=False)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return all but the map, by name."""
-        names = ("value", "note", "start_exposure", "stop_exposure", "exposures", "pixels_per_degree")
-        return {name: plain(getattr(self, name)) for name in names}
 
 
 def flip_hdr(
@@ -84,10 +77,10 @@ def flip_hdr(
     *,
     mask: ArrayLike | None = None,
     exposure: float | None = None,
-    pixels_per_degree: float = PIXELS_PER_DEGREE,
-    timeout: float = TIMEOUT,
-) -> Flip:
-    """Return HDR-FLIP of two images, through `flip-evaluator` in a child process (see the module).
+) -> tuple[Flip, NDArray[np.float32] | None]:
+    """Return HDR-FLIP of two images, through `flip-evaluator` in a child process (see the module), and its map.
+
+    The map has the error of every pixel, (height, width); None where there is no answer.
 
     Parameters
     ----------
@@ -98,8 +91,6 @@ def flip_hdr(
         images, black where that cannot be shown, so that they add nothing to their neighbours either.
     exposure
         A single exposure [stops] instead of the range of `exposure_range`.
-    timeout
-        Seconds after which the child is ended.
 
     Raises
     ------
@@ -109,13 +100,11 @@ def flip_hdr(
     """
     if exposure is not None and not np.isfinite(exposure):
         raise InputError(f"exposure: got {exposure}, wanted a number of stops such as -2, or none to choose a range")
-    if not 0 < pixels_per_degree < np.inf or not 0 < timeout < np.inf:
-        raise InputError(f"pixels per degree {pixels_per_degree}, time-out {timeout} s; wanted both above 0")
     ref, tst, chosen = compared(reference, test, mask)
     ref, tst = colours(ref), colours(tst)
     note = _unanswerable(ref[chosen], tst[chosen])
     if note:
-        return Flip(None, note)
+        return Flip(None, note), None
     drawable = np.where(np.isfinite(ref) & (ref >= 0), ref, 0)
     ref, tst = (np.where(chosen[..., None], image, drawable) for image in (ref, tst))
     # A power of two brings any unit into the range of float32; exposures are then counted from there.
@@ -123,25 +112,18 @@ def flip_hdr(
     with np.errstate(over="ignore"):
         scaled_reference, scaled_test = (np.ldexp(image, -shift).astype(np.float32) for image in (ref, tst))
     if not np.isfinite(scaled_test).all():
-        return Flip(None, "the test image is brighter than the reference by more than float32 holds")
+        return Flip(None, "the test image is brighter than the reference by more than float32 holds"), None
     start, stop = exposure_range(scaled_reference[chosen]) if exposure is None else (exposure + shift,) * 2
     count = max(2, int(np.ceil(stop - start)))
-    inputs = {
-        "start": start,
-        "stop": stop,
-        "count": count,
-        "ppd": pixels_per_degree,
-        "reference": scaled_reference,
-        "test": scaled_test,
-    }
-    answer = _in_child(inputs, timeout)
+    inputs = {"start": start, "stop": stop, "count": count, "ppd": PIXELS_PER_DEGREE}
+    answer = _in_child(inputs | {"reference": scaled_reference, "test": scaled_test})
     if isinstance(answer, str):
-        return Flip(None, answer)
+        return Flip(None, answer), None
     if answer.shape[:2] != chosen.shape or not ((answer >= 0) & (answer <= 1)).all():
-        return Flip(None, "flip-evaluator returned no map of errors between 0 and 1")
+        return Flip(None, "flip-evaluator returned no map of errors between 0 and 1"), None
     error_map = answer.reshape(chosen.shape)
     mean = float(error_map[chosen].mean(dtype=np.float64))
-    return Flip(mean, "", start - shift, stop - shift, count, pixels_per_degree, error_map)
+    return Flip(mean, "", start - shift, stop - shift, count, PIXELS_PER_DEGREE), error_map
 
 
 def exposure_range(reference: ArrayLike) -> tuple[float, float]:
@@ -167,7 +149,7 @@ def _unanswerable(ref: NDArray[np.float64], tst: NDArray[np.float64]) -> str:
     return "" if ref.max() > 0 else "the reference is black: HDR-FLIP has no exposure for it"
 
 
-def _in_child(inputs: dict[str, Any], timeout: float) -> NDArray[np.float32] | str:
+def _in_child(inputs: dict[str, Any]) -> NDArray[np.float32] | str:
     """Run FLIP in a process of its own; return its map, or what went wrong."""
     with temporary_folder() as folder:
         input_file, map_file = folder / "inputs.npz", folder / "map.npy"
@@ -180,10 +162,10 @@ def _in_child(inputs: dict[str, Any], timeout: float) -> NDArray[np.float32] | s
                 text=True,
                 errors="replace",
                 stdin=subprocess.DEVNULL,
-                timeout=timeout,
+                timeout=TIMEOUT,
             )
         except subprocess.TimeoutExpired:
-            return f"flip-evaluator did not answer within {timeout:g} s and was ended"
+            return f"flip-evaluator did not answer within {TIMEOUT:g} s and was ended"
         except OSError as error:
             return f"no process for flip-evaluator could be started: {error}"
         said = (ran.stderr.strip() or ran.stdout.strip()).splitlines()

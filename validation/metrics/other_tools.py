@@ -35,7 +35,7 @@ src/shaders/frag.glsl. They work in float32 and differ in what they do with infi
 everything is float64, and pixels that are not finite are left out and counted.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -43,7 +43,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analytic.columns import column
 from analytic.errors import InputError
-from validation.metrics.errors import FLOOR, RADIANCE, compared, plain
+from validation.metrics.errors import FLOOR, RADIANCE, compared
 
 Array = NDArray[np.float64]
 
@@ -75,10 +75,6 @@ class PublishedErrors:
     relative: float = column("relative", "1", "mean of |error| over the reference where that is not dark")
     relative_max: float = column("relative, largest", "1", "largest of the same")
     dark_max: float = column("in the dark", "1", "largest |error| of dark values, over the mean of the reference")
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the numbers by name; what is not finite (PSNR of equal images) becomes None."""
-        return {name: plain(value) for name, value in asdict(self).items()}
 
 
 def published_errors(

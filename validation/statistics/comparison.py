@@ -58,14 +58,14 @@ probability P(B > q(0.975) se) = P((B - b)/se > q(0.975) - b/se), the other tail
 b = (q(0.975) + q(0.90)) se, q the quantiles of Student's law; 3.24 se for many degrees of freedom.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analytic.errors import InputError
-from validation.metrics.errors import compared, plain
+from validation.metrics.errors import compared
 from validation.statistics.p_values import (
     binomial_p,
     bonferroni,
@@ -83,24 +83,12 @@ BLOCK = 8  #: side of a block [pixels]
 
 @dataclass(frozen=True)
 class Estimate:
-    """One side of a comparison.
+    """One side of a comparison, (height, width) or (height, width, channels)."""
 
-    Attributes
-    ----------
-    mean
-        Radiance [W/(m^2 sr)], (height, width) or (height, width, channels).
-    standard_error
-        Standard error of `mean`, of the same shape; None for an image without random error.
-    batches
-        Number of independent batches from whose means the standard error comes; None for one as good as exact.
-    batch_means
-        Mean over the pixels compared of every batch, (batches,) or (batches, channels) [W/(m^2 sr)].
-    """
-
-    mean: ArrayLike
-    standard_error: ArrayLike | None = None
-    batches: int | None = None
-    batch_means: ArrayLike | None = None
+    mean: ArrayLike  #: radiance [W/(m^2 sr)]
+    standard_error: ArrayLike | None = None  #: of `mean`, of the same shape; None for an image without random error
+    batches: int | None = None  #: independent ones, whose means gave the standard error; None for one as good as exact
+    batch_means: ArrayLike | None = None  #: over the pixels compared, of every batch, (batches,) or (batches, channels)
 
 
 @dataclass(frozen=True)
@@ -121,76 +109,39 @@ class _Side:
 class Statistics:
     """Agreement of two images with standard errors; every number stays if both radiances are scaled.
 
-    Attributes
-    ----------
-    masked
-        Pixels that the mask leaves out.
-    tested
-        Values with a z.
-    zero_reference, zero_reference_error
-        Values where the reference is zero, and the largest |test| among them over the mean of the reference.
-    zero_variance, zero_variance_error
-        Values without variance, and the largest |test - ref| among them over the mean of the reference.
-    z_mean, z_std
-        Mean and standard deviation of z: 0 and, for K batches, sqrt((K - 1)/(K - 3)) if the images agree and the
-        standard errors are right.
-    rejected, expected_rejections
-        Pixels with a value rejected at Sidak's level, and the number expected if the images agree.
-    exceeding, expected_exceeding, exceeding_p
-        Values below `plain_level`, the number expected, and the p-value of that number, both tails.
-    blocks, rejected_blocks
-        Blocks of 8 x 8 pixels, one channel each, and how many are rejected at Sidak's level for that number.
-    uniformity_p
-        p-value of the test that the p-values are uniform.
-    relative_bias, relative_bias_ci, relative_bias_ci_batches
-        sum(test) / sum(ref) - 1 with its 95 % intervals, from the standard errors and from the batch means.
-    relative_bias_se, relative_bias_freedom, relative_bias_p
-        Its standard error, from those of the pixels, the degrees of freedom of that, and the two-sided p-value.
-    reference_variance_share
-        Share of the reference's errors in the variance of `relative_bias`; the rest is the test image's.
-    largest_share
-        Share of one pixel in the variance of `relative_bias`; above 1 % its interval is doubtful.
-    detectable_bias
-        Smallest relative bias found with 90 % power at the 5 % level, by the wider interval.
-    margin, equivalent
-        The margin given, and whether all intervals lie within it.
-    family_level, plain_level
-        Levels of the tests.
+    If the images agree and the standard errors are right, z has the mean 0 and, for K batches, the standard deviation
+    sqrt((K - 1)/(K - 3)). Numbers "expected" are those of images that agree.
     """
 
-    masked: int
-    tested: int
-    zero_reference: int
-    zero_reference_error: float
-    zero_variance: int
-    zero_variance_error: float
+    masked: int  #: pixels that the mask leaves out
+    tested: int  #: values with a z
+    zero_reference: int  #: values where the reference is zero
+    zero_reference_error: float  #: the largest |test| among them over the mean of the reference
+    zero_variance: int  #: values without variance
+    zero_variance_error: float  #: the largest |test - ref| among them over the mean of the reference
     z_mean: float
     z_std: float
-    rejected: int
+    rejected: int  #: pixels with a value rejected at Sidak's level
     expected_rejections: float
-    exceeding: int
+    exceeding: int  #: values below `plain_level`
     expected_exceeding: float
-    exceeding_p: float
-    blocks: int
-    rejected_blocks: int
-    uniformity_p: float
-    relative_bias: float
-    relative_bias_ci: tuple[float, float]
-    relative_bias_ci_batches: tuple[float, float] | None
-    relative_bias_se: float
-    relative_bias_freedom: float
-    relative_bias_p: float
-    reference_variance_share: float
-    largest_share: float
-    detectable_bias: float
+    exceeding_p: float  #: p-value of `exceeding`, both tails
+    blocks: int  #: of 8 x 8 pixels, one channel each
+    rejected_blocks: int  #: at Sidak's level for their number
+    uniformity_p: float  #: p-value of the test that the p-values are uniform
+    relative_bias: float  #: sum(test) / sum(ref) - 1
+    relative_bias_ci: tuple[float, float]  #: its 95 % interval from the standard errors
+    relative_bias_ci_batches: tuple[float, float] | None  #: that from the batch means
+    relative_bias_se: float  #: from the standard errors of the pixels
+    relative_bias_freedom: float  #: degrees of freedom of that
+    relative_bias_p: float  #: two-sided
+    reference_variance_share: float  #: of the reference in the variance of `relative_bias`; the rest is the test's
+    largest_share: float  #: of one pixel in that variance; above 1 % the interval is doubtful
+    detectable_bias: float  #: smallest that is found with 90 % power at the 5 % level, by the wider interval
     margin: float | None
-    equivalent: bool | None
+    equivalent: bool | None  #: whether all intervals lie within the margin
     family_level: float
     plain_level: float
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the numbers by name; what is not finite becomes None, which JSON can hold."""
-        return {name: plain(value) for name, value in asdict(self).items()}
 
 
 def compare_statistics(

@@ -239,7 +239,7 @@ def _errors(cell: Cell, frame: Frame, scene: Scene, reference: Reference, whole:
         errors["surface_error"] = error_metrics(reference.surface, surface)
     if cell.measure.flip:
         lit = (reference.airlight, test) if reference.surface is None else (reference.light, test + surface)
-        errors["flip"] = flip_hdr(*lit, mask=mask)
+        errors["flip"] = flip_hdr(*lit, mask=mask)[0]
     if not cell.measure.every_metric:
         return errors
     errors["published"] = published_errors(reference.airlight, test, mask=mask)

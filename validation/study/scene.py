@@ -303,8 +303,8 @@ def _with_flip(judged: Judged) -> Judged:
     shown = judged.whole, judged.light
 
     def compute() -> Computed:
-        flip = flip_hdr(*shown)
-        return flip.to_json(), {} if flip.error_map is None else {"map": flip.error_map}
+        flip, error_map = flip_hdr(*shown)
+        return plain(flip), {} if error_map is None else {"map": error_map}
 
     result = cached_result(key_of("flip", flip_hdr, images=shown, version=_flip_version()), compute)
     image = judged.image

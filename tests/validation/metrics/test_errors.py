@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from validation.metrics.errors import error_metrics
+from validation.metrics.errors import error_metrics, plain
 
 EXACT = 1e-14  # some roundings of double precision
 
@@ -74,7 +74,7 @@ def test_nonfinite_pixels_are_counted_and_left_out():
 def test_black_reference_has_absolute_errors_only():
     metrics = error_metrics(np.zeros((2, 2, 3)), np.full((2, 2, 3), 0.5))
     assert (metrics.bias, metrics.rmse) == (0.5, 0.5)
-    as_json = metrics.to_json()
+    as_json = plain(metrics)
     assert all(as_json[name] is None for name in ("relative_bias", "relative_rmse", "p50", "p99", "max"))
     assert as_json["rmse"] == 0.5
 
