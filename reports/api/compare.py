@@ -190,21 +190,9 @@ def _as_file(image: Any) -> Iterator[Path]:
 
 
 def as_image(image: Any, layer: str | None, name: str) -> "tuple[Image, str]":
-    """Return layers, among them the one of that name, and what to call the image.
+    """Return layers of an `ImageLike`, and what to call it: `name` where it has none of its own.
 
-    Parameters
-    ----------
-    image
-        See `ImageLike`; an array, (height, width[, 3]), becomes the layer.
-    layer
-        The layer that will be looked at; the airlight by default.
-    name
-        What to call an image that has no name of its own.
-
-    Raises
-    ------
-    InputError
-        If an array is not of numbers, or a file has no such layer.
+    An array, (height, width[, 3]), becomes the layer; a file without the layer is refused.
     """
     import numpy as np
 

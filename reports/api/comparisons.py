@@ -241,17 +241,10 @@ class Fitted(Result):
 def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None) -> str:
     """Write how a test image differs from a reference, whole or not at all; return in words what the file shows.
 
-    Parameters
-    ----------
-    path
-        Ends in .exr: test - reference [W/(m^2 sr)] in R, G, B, and (test - reference) / max(reference, 0.001
-        mean(reference)) in the layer `relative`. Ends in .png: the latter in the false colours of a report,
-        `reports.plotting.pictures.error_map`.
-    reference, test
-        Radiance [W/(m^2 sr)], (height, width, 3).
-    kept
-        Pixels to show, truth values (height, width); all by default. The others, and in EXR files also those that are
-        not finite, have no difference.
+    An .exr file has test - reference [W/(m^2 sr)] in R, G, B, and (test - reference) / max(reference, 0.001
+    mean(reference)) in the layer `relative`; a .png file has the latter in false colours, `error_map`. Images are
+    (height, width, 3). Pixels outside of `kept`, (height, width), and in EXR files those that are not finite, have no
+    difference.
     """
     reference, test = (np.asarray(values, dtype=np.float64) for values in (reference, test))
     if kept is not None:

@@ -91,13 +91,7 @@ def several(things: Any) -> list[Any]:
 
 
 def listed(name: str, words: Any) -> list[str]:
-    """Return the words of a list, or of a text with commas between them.
-
-    Raises
-    ------
-    InputError
-        If one of them is empty.
-    """
+    """Return the words of a list, or of a text with commas between them; none may be empty."""
     parts = words.split(",") if isinstance(words, str) else [str(word) for word in words]
     parts = [part.strip() for part in parts]
     if not all(parts):
@@ -106,13 +100,7 @@ def listed(name: str, words: Any) -> list[str]:
 
 
 def pixels_of(size: Any) -> tuple[int, int] | None:
-    """Return a size as width and height [pixels], None for None.
-
-    Raises
-    ------
-    InputError
-        For anything else than two whole numbers or 'WxH'.
-    """
+    """Return two whole numbers or 'WxH' as width and height [pixels], None for None."""
     if size is None or isinstance(size, str):
         from validation.scenes.loading import parse_size
 
@@ -140,13 +128,7 @@ def _numbers(value: Any) -> str:
 
 
 def kernel_name(kernel: Any) -> str | None:
-    """Return the name of a kernel: of a function 'module:function', by which it can be imported again.
-
-    Raises
-    ------
-    InputError
-        If it is neither a name nor a function at the top of a module.
-    """
+    """Return the name of a kernel; of a function at the top of a module 'module:function', which imports it again."""
     if kernel is None or isinstance(kernel, str):
         return kernel
     module, name = getattr(kernel, "__module__", ""), getattr(kernel, "__qualname__", "")

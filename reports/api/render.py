@@ -420,22 +420,9 @@ def asked_configurations(
 ) -> "tuple[list[Configuration], bool]":
     """Return what to measure, and whether all user code among it is named, so that it can run in other processes.
 
-    Parameters
-    ----------
-    methods
-        Names, functions and configurations; a name without kernel and settings stands for its standard configurations,
-        'all', the default, for those of every built-in method for fog.
-    kernels
-        For each of them, every method is measured.
-    settings
-        Parameters of every method, by name or as NAME=VALUE.
-    usual
-        Of 'all'; the standard configurations of every built-in method by default.
-
-    Raises
-    ------
-    InputError
-        For unknown names, and for a kernel or a parameter that no method is named for.
+    A method is a name, a function or a configuration. A name without kernel and settings stands for its standard
+    configurations; 'all', the default, for `usual`, or those of every built-in method for fog. Every method is measured
+    with each kernel and with all settings, given by name or as NAME=VALUE.
     """
     from collections.abc import Mapping
 

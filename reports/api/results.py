@@ -392,13 +392,7 @@ class Plan(Result):
 
 
 def write_image(path: Path, image: Image, curve: ToneCurve | None = None, *, total: Array | None = None) -> None:
-    """Write layers as EXR, or their total as PNG through a tone curve; by default one that suits it.
-
-    Raises
-    ------
-    InputError
-        For another ending.
-    """
+    """Write layers as .exr, or their total as .png through a tone curve; by default one that suits it."""
     from reference.storage.exr import write_exr
     from reports.machine.environment import stamped
 

@@ -44,13 +44,7 @@ class OpenScene(LoadedScene):
 
 
 def opened(scene: Any, size: Any = None, changes: Mapping[str, tuple[float, ...]] | None = None) -> OpenScene:
-    """Return a scene at a size, its own by default; a scene that was loaded before is left as it is.
-
-    Raises
-    ------
-    InputError
-        If `scene` is not a scene, or is already loaded at another size, or cannot be changed.
-    """
+    """Return a scene at a size, its own by default; a scene that was loaded before is left as it is."""
     from reports.machine.environment import activate
 
     activate()

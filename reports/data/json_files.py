@@ -9,20 +9,7 @@ from analytic.errors import InputError
 
 
 def read_json(path: Path, wanted: str) -> Any:
-    """Return what is in a JSON file.
-
-    Parameters
-    ----------
-    path
-        Of the file.
-    wanted
-        What it should be, in words.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read or is not valid JSON.
-    """
+    """Return what is in a JSON file; `wanted` says in words what it should be."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

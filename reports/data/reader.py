@@ -14,18 +14,7 @@ SCHEMA_FILE = Path(__file__).parent / "schema" / "report-2.json"
 
 
 def read_report(path: Path | str) -> dict[str, Any]:
-    """Read a report.json of the current schema; every key at its top is there.
-
-    Parameters
-    ----------
-    path
-        Of report.json, or of the folder that holds it.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or it is not a report of this schema.
-    """
+    """Read a report.json of the current schema, or that of a folder."""
     file = _report_file(path)
     data = read_json(file, f"what `airlight report -o {file.parent}` writes")
     given = data.get("schema") if isinstance(data, dict) else None
@@ -41,23 +30,7 @@ def read_report(path: Path | str) -> dict[str, Any]:
 
 
 def load_report(path: Path | str) -> tuple[dict[str, Any], Path]:
-    """Read a report and check that every key and every file is there.
-
-    Parameters
-    ----------
-    path
-        Of report.json, or of the folder that holds it.
-
-    Returns
-    -------
-    tuple
-        Its content and the folder in which the files that it names lie.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, it does not keep to the schema, or a file that it names is missing.
-    """
+    """Read a report, check that every file it names is there, and return it with the folder of the files."""
     data, file = read_report(path), _report_file(path)
     for name in named_files(data):
         # `C:name` is relative to the folder of another drive.
@@ -93,15 +66,7 @@ def report_text(data: Mapping[str, Any]) -> str:
 
 
 def redraw_report(data: Mapping[str, Any], folder: Path, target: Path) -> None:
-    """Draw the page of a report again, into its own folder or as a whole report into another.
-
-    Parameters
-    ----------
-    data, folder
-        From `load_report`.
-    target
-        Where to write.
-    """
+    """Draw the page of what `load_report` returned again, into its own folder or as a whole report into another."""
     from reference.storage.files import ensure_folder, write_bytes, write_text
     from reports.page.render import render_page
 

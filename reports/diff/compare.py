@@ -59,23 +59,9 @@ def compare_reports(
     time_tolerance: float | None = TIME_TOLERANCE,
     common: bool = False,
 ) -> Difference:
-    """Compare two reports.
+    """Compare two reports of `read_report`; tolerances are relative, None for times compares none.
 
-    Parameters
-    ----------
-    old, new
-        From `reports.data.reader.read_report`.
-    error_tolerance
-        Relative band of errors.
-    time_tolerance
-        Relative band of times; None compares no times.
-    common
-        What only one of the reports holds is a note, not a loss.
-
-    Raises
-    ------
-    InputError
-        If no number of one can be compared with one of the other, or a tolerance is not above zero.
+    With `common` what only one of the reports holds is a note, not a loss. Reports without a common number are refused.
     """
     for name, value in (("error", error_tolerance), ("time", time_tolerance)):
         if value is not None and not 0 < value < float("inf"):
@@ -270,15 +256,7 @@ def _fastest(scene: Report, target: float) -> str | None:
 
 
 def _papers(old: Report, new: Report, gone: str) -> Iterator[Finding]:
-    """Compare which claims are reproduced.
-
-    Parameters
-    ----------
-    old, new
-        The reports; one without rows, of an older version, is compared with nothing.
-    gone
-        What a row is that only the old report has: 'worse', or 'note'.
-    """
+    """Compare which claims are reproduced; a row that only the old report has is `gone`, 'worse' or 'note'."""
     before, after = ({(row["paper"], row["item"]): row for row in report.get("papers", ())} for report in (old, new))
     if not before or not after:
         return

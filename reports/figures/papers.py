@@ -38,18 +38,8 @@ def write_figures(
 ) -> tuple[str, ...]:
     """Draw the figures of a paper, or of all, into a folder; return the names of the files.
 
-    Parameters
-    ----------
-    folder
-        Where they go.
-    paper
-        Its name; None for all.
-    rows
-        Claims with their verdicts, see `validation.papers.claims.judged`.
-    quick
-        Smaller images of fewer samples.
-    progress
-        Called with (fraction done, what).
+    `rows` are claims with their verdicts (`validation.papers.claims.judged`); `quick` draws smaller images of fewer
+    samples.
     """
     target = ensure_folder(folder)
     chosen = {name: make for name, (of, make) in _FIGURES.items() if paper is None or paper in of}

@@ -35,21 +35,9 @@ _FRAMES = (COLOURS["orange"], COLOURS["sky"])
 def write_figures(
     folder: Path, column: str, *, scene: str | None = None, labels: Sequence[str] | None = None
 ) -> tuple[str, ...]:
-    """Write the figures of a report into its folder; return the names of the files.
+    """Write the figures of a report into its folder, for a 'single' or 'double' column; return the names of the files.
 
-    Parameters
-    ----------
-    folder
-        Of the report.
-    column
-        'single' or 'double'.
-    scene, labels
-        What the strip of images shows: by default the first scene with shadows and the most accurate of each method.
-
-    Raises
-    ------
-    InputError
-        If the report has no such scene or method, or lacks an image.
+    The strip shows `scene` and `labels`: by default the first scene with shadows and the most accurate of each method.
     """
     data, place = load_report(folder)
     _add_times(data["scenes"], place / "times.json")

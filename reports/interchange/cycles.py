@@ -45,21 +45,13 @@ _KINDS = {"point": "POINT", "spot": "SPOT", "directional": "SUN"}
 
 
 def cycles_properties(described: dict[str, Any]) -> dict[str, Any]:
-    """Return what to create in Blender and which properties to assign.
+    """Return what to create in Blender and which properties to assign, from what `describe_scene` found.
 
-    Parameters
-    ----------
-    described
-        What `reports.interchange.scene.describe_scene` found.
-
-    Returns
-    -------
-    dict
-        `scene`, `image_settings` and `layered_image_settings`: properties by name. `camera` and each of `lights`:
-        `data` (properties) and `matrix_world` (4 x 4, rows); lights also `type`. `world` and each of `media`, by mesh:
-        `phase` and `inputs` of a node "Volume Coefficients", None where there is no medium. `materials`, by mesh:
-        `inputs` of a node "Diffuse BSDF" and whether it is `two_sided`, black from behind otherwise. `objects`:
-        properties of every mesh. What Cycles does not have is a dictionary with `cannot`, the reason in words.
+    `scene`, `image_settings` and `layered_image_settings` are properties by name. `camera` and each of `lights` have
+    `data` (properties) and `matrix_world` (4 x 4, rows); lights also `type`. `world` and each of `media`, by mesh, have
+    `phase` and `inputs` of a node "Volume Coefficients", None where there is no medium. `materials`, by mesh, have
+    `inputs` of a node "Diffuse BSDF" and say whether it is `two_sided`, black from behind otherwise. `objects` are
+    properties of every mesh. What Cycles does not have is a dictionary with `cannot`, the reason in words.
     """
     camera = described["camera"]
     width, height = camera["size"]

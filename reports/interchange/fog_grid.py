@@ -20,13 +20,7 @@ _MOST = 1 << 20
 
 
 def fog_grid(medium: HeightMedium) -> NDArray[np.float64]:
-    """Return the densities of voxels from the floor to the cap, (N,) [1/m].
-
-    Raises
-    ------
-    InputError
-        For fog that would take more than a million voxels.
-    """
+    """Return the densities of voxels from the floor to the cap, (N,) [1/m], at most a million."""
     least = min((scale for _, _, scale in medium.layers), default=medium.cap - medium.floor)
     count = max(2, int(np.ceil(_VOXELS * (medium.cap - medium.floor) / least)))
     if count > _MOST:

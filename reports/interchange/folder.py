@@ -29,13 +29,7 @@ class FileOutcome:
 
 
 def describe_folder(folder: Path) -> list[FileOutcome]:
-    """Return what `describe` makes of each XML file in a folder and its folders.
-
-    Raises
-    ------
-    InputError
-        For a folder without XML files.
-    """
+    """Return what `describe` makes of each XML file in a folder and its folders."""
     files = sorted(folder.rglob("*.xml"))
     if not files:
         raise InputError(f"scene: the folder {folder} holds no .xml file; wanted Mitsuba scene files")

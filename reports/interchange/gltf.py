@@ -56,24 +56,9 @@ _TURNS: dict[str, list[list[int]]] = {
 
 
 def write_gltf(path: Path, loaded: LoadedScene) -> dict[str, Any]:
-    """Write a scene as a .glb file, whole or not at all.
+    """Write a scene as a .glb file, whole or not at all; the camera's aspect ratio is that of the image.
 
-    Parameters
-    ----------
-    path
-        The file.
-    loaded
-        The scene, at the size of the image: the camera's aspect ratio is that of the image.
-
-    Returns
-    -------
-    dict
-        `path`, `triangles`, `bytes` and `tessellated`, the names of the shapes that are not triangles by nature.
-
-    Raises
-    ------
-    InputError
-        For a scene without a reference, a shape that cannot be made a mesh, and a file that cannot be written.
+    Returns `path`, `triangles`, `bytes` and `tessellated`, the names of the shapes that are not triangles by nature.
     """
     described = describe_scene(loaded)
     truth = read_truth(loaded.scene)

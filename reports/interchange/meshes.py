@@ -31,18 +31,7 @@ class ShapeMesh:
 
 
 def shape_mesh(shape: Any) -> ShapeMesh:
-    """Return a shape as a mesh.
-
-    Parameters
-    ----------
-    shape
-        A shape of a Mitsuba scene.
-
-    Raises
-    ------
-    InputError
-        For a shape that cannot be made one, with its name.
-    """
+    """Return a shape of a Mitsuba scene as a mesh; one that cannot be made a mesh is refused by name."""
     unit = {"Rectangle": _rectangle, "Sphere": _sphere, "Disk": _disk, "Cylinder": _cylinder}.get(shape.class_name())
     if unit is None and shape.is_mesh():  # Mitsuba's rectangle claims to be a mesh, but has no vertices
         return _of_mesh(shape)

@@ -26,13 +26,7 @@ _LUXCORE = (
 
 
 def recipes(described: dict[str, Any]) -> dict[str, list[str]]:
-    """Return what to set by the name of the renderer.
-
-    Parameters
-    ----------
-    described
-        What `reports.interchange.scene.describe_scene` found, `lights`, `medium`, `bounded_media` and `camera`.
-    """
+    """Return what to set by the name of the renderer, from what `describe_scene` found."""
     every = [medium for medium in (described["medium"], *described["bounded_media"]) if medium is not None]
     media = [medium for medium in every if "layers" not in medium]
     phases = {medium["phase"]["name"] for medium in media}

@@ -44,26 +44,13 @@ CONVENTION = (
 
 
 def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
-    """Return everything that a renderer needs to render a scene, as plain data.
+    """Return everything that a renderer needs to render a scene, at the size of its image, as plain data.
 
-    Parameters
-    ----------
-    loaded
-        The scene, at the size of the image.
-
-    Returns
-    -------
-    dict
-        `scene`, `source`, `purpose`, `up`, `handedness`, `camera`, `medium`, `bounded_media`, `lights`, `surfaces`,
-        `radiance`, `notes`, `file`, `recipes`, and `properties`, the scene as
-        `reports.interchange.cycles.cycles_properties` returns it; of a random scene also `drawn`. Lengths in metres,
-        angles in degrees, extinction in 1/m, intensity in W/sr, power in W. Black shapes of lights with extent are
-        among the lights, not the surfaces.
-
-    Raises
-    ------
-    InputError
-        For a scene without a reference, with the name of what is in the way.
+    These are `scene`, `source`, `purpose`, `up`, `handedness`, `camera`, `medium`, `bounded_media`, `lights`,
+    `surfaces`, `radiance`, `notes`, `file`, `recipes`, and `properties`, the scene as `cycles_properties` returns it;
+    of a random scene also `drawn`. Lengths in metres, angles in degrees, extinction in 1/m, intensity in W/sr, power in
+    W. Black shapes of area lights are among the lights, not the surfaces. A scene without a reference is refused, with
+    what is in the way.
     """
     notes = read_scene(loaded.scene).features.notes  # it refuses what `render` refuses, in its words
     truth = read_truth(loaded.scene)

@@ -145,19 +145,11 @@ def _size(size: float) -> str:
 
 
 def diagnose() -> dict[str, Any]:
-    """Examine this machine.
+    """Examine this machine, ready for JSON.
 
-    Returns
-    -------
-    dict
-        JSON-ready. ``works`` says whether kernels run here, ``problem`` what is wrong and what to do (None if nothing),
-        ``variant`` what was chosen and ``kernel`` what the test kernel found: the libLLVM that it really loaded, its
-        threads and the shadow-ray epsilon.
-
-    Raises
-    ------
-    InputError
-        If ``AIRLIGHT_VARIANT`` (or ``--variant``) names no variant.
+    ``works`` says whether kernels run here, ``problem`` what is wrong and what to do (None if nothing), ``variant``
+    what was chosen and ``kernel`` what the test kernel found: the libLLVM that it really loaded, its threads and the
+    shadow-ray epsilon.
     """
     import platform
 

@@ -65,22 +65,12 @@ class Prepared:
 
 
 def prepare(variant: str | None = None) -> Prepared:
-    """Check that kernels can be compiled here, and tell Dr.Jit which libLLVM to use.
+    """Check that kernels can be compiled here, and tell Dr.Jit which libLLVM to use; raises MissingError if one is
+    missing.
 
     Call it before Dr.Jit compiles anything: it sets ``DRJIT_LIBLLVM_PATH``. Takes a few milliseconds. Where
     ``AIRLIGHT_COMPILATION`` is ``quick``, kernels compile quickly and run slowly (`reports.machine.quick_compilation`).
-
-    Parameters
-    ----------
-    variant
-        One of `VARIANTS`; by default ``AIRLIGHT_VARIANT`` (which ``--variant`` sets), else the best that works.
-
-    Raises
-    ------
-    MissingError
-        If a library is missing, or the variant asked for does not work here.
-    analytic.errors.InputError
-        For an unknown variant.
+    The variant is by default ``AIRLIGHT_VARIANT`` (which ``--variant`` sets), else the best that works.
     """
     variant = variant or os.environ.get(VARIANT_VARIABLE) or None
     if variant is not None:

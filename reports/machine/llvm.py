@@ -111,17 +111,9 @@ def llvm_folders(machine: Machine | None = None) -> list[Path]:
 
 
 def find_llvm(folders: Iterable[Path] | None = None) -> list[Llvm]:
-    """List every libLLVM of this machine, the one to use first.
+    """List every libLLVM of this machine: the user's setting first, then those that work, then the newest.
 
-    Parameters
-    ----------
-    folders
-        Where to look; `llvm_folders` by default. The file named by ``DRJIT_LIBLLVM_PATH`` is always looked at.
-
-    Returns
-    -------
-    list of Llvm
-        The user's setting first, then those that work, then the newest.
+    The file named by ``DRJIT_LIBLLVM_PATH`` is always looked at, and `llvm_folders` by default.
     """
     setting = os.environ.get(LLVM_VARIABLE)
     seen: dict[str, Llvm] = {}

@@ -41,31 +41,12 @@ def in_own_process(
     what: str = "method",
     quick: bool = False,
 ) -> Any:
-    """Call a function in a new process with the current variant, and return what it returns.
+    """Call a function in a new process with the current variant; return what it returns, raise what it raises.
 
-    Parameters
-    ----------
-    function
-        At the top of a module of ours; it must not print on the output.
-    arguments
-        Of the function. They are pickled, as is what it returns.
-    name
-        Of the user's method, or of the work, for messages.
-    limit
-        After so long the process is ended [s]: math.inf is never, None what the environment says of user methods.
-    what
-        Has this name, for messages.
-    quick
-        Whether kernels may run slowly if they compile quickly (`reports.machine.quick_compilation`): nothing is timed.
-
-    Raises
-    ------
-    InputError
-        As the function.
-    EndedError
-        If the process ends without an answer or not in time; the message begins with what it is and its name.
-    MissingError
-        As the function.
+    The function is at the top of a module of ours and prints nothing on the output; arguments and result are pickled.
+    `what` and `name` name the work in messages. After `limit` [s] the process is ended: math.inf is never, None what
+    the environment says of user methods. `quick` compiles kernels quickly: nothing is timed. EndedError says that the
+    process ended without an answer, or not in time.
     """
     seconds = method_limit() if limit is None else limit
     # -P: modules of ours come before those of the user's folder.

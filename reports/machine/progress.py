@@ -27,17 +27,7 @@ def progress_bar(title: str) -> Iterator[Progress]:
 
 
 def part_of(progress: Progress | None, first: float, last: float, *, before: str = "") -> Progress:
-    """Return the callback for a part of some work, whose share is one of the whole.
-
-    Parameters
-    ----------
-    progress
-        Callback of the whole work, or None.
-    first, last
-        What fraction of the work is done when the part begins and when it ends.
-    before
-        Put before what comes next.
-    """
+    """Return the callback for a part of some work, from fraction `first` to `last`; `before` precedes its words."""
     if progress is None:
         return lambda share, what: None
     # This form, unlike first + share (last - first), gives both ends exactly.

@@ -47,13 +47,7 @@ for line in sys.stdin.buffer:
 
 
 def is_asked_for() -> bool:
-    """Return whether the environment asks for quick compilation.
-
-    Raises
-    ------
-    analytic.errors.InputError
-        For a value that is neither 'quick' nor 'full'.
-    """
+    """Return whether the environment asks for quick compilation."""
     value = os.environ.get(VARIABLE) or "full"
     if value not in ("quick", "full"):
         from analytic.errors import InputError
@@ -70,14 +64,9 @@ def settings() -> dict[str, str]:
 
 @cache
 def compile_quickly(library: str) -> None:
-    """Let a libLLVM compile quickly in this process; call it before Dr.Jit is imported.
+    """Let the libLLVM that Dr.Jit will load compile quickly in this process; call it before Dr.Jit is imported.
 
     A process that has imported it and was not started with `settings` stays as it is.
-
-    Parameters
-    ----------
-    library
-        Path of the libLLVM that Dr.Jit will load.
     """
     if "drjit" in sys.modules and not _has_settings():
         return  # Dr.Jit has chosen its folder, where the kernels of both kinds would mix

@@ -10,13 +10,7 @@ from reports.plotting.style import report_styles
 
 
 def speed_error_chart(scenes: list[dict[str, Any]]) -> str:
-    """Return speed against error as inline SVG: one panel a scene, one colour and marker a configuration everywhere.
-
-    Parameters
-    ----------
-    scenes
-        The scenes of report.json.
-    """
+    """Return speed against error as inline SVG: one panel a scene, one colour and marker a configuration everywhere."""
     from matplotlib.figure import Figure
 
     styles = report_styles(scenes)
@@ -33,16 +27,9 @@ def speed_error_chart(scenes: list[dict[str, Any]]) -> str:
 
 
 def scene_chart(scenes: list[dict[str, Any]], place: int) -> str:
-    """Return speed against error in one scene as inline SVG, in the styles of the whole report.
+    """Return speed against error in one of the scenes as inline SVG, in the styles of the whole report.
 
     The point of the n-th method that has images has the name "point-n".
-
-    Parameters
-    ----------
-    scenes
-        The scenes of report.json.
-    place
-        Of the scene among them.
     """
     from matplotlib.figure import Figure
 
@@ -108,15 +95,7 @@ def _points(style: dict[str, Any]) -> dict[str, Any]:
 
 
 def svg_text(figure, salt: str = "airlight") -> str:
-    """Return a figure of matplotlib as inline SVG, the same bytes for the same figure.
-
-    Parameters
-    ----------
-    figure
-        Of matplotlib.
-    salt
-        Of the names in it, another for each chart of a page.
-    """
+    """Return a figure of matplotlib as inline SVG, the same bytes for the same figure; each chart has its salt."""
     import matplotlib
 
     # A fixed salt, another for each chart of a page, and no date: the same data give the same bytes.

@@ -63,18 +63,10 @@ PRECISIONS = (Precision(1000, 5e-5), Precision(250, 1e-4), Precision(100, 1e-4))
 
 @dataclass(frozen=True)
 class Packed:
-    """Planes of one image, compressed.
+    """Planes of one image, compressed."""
 
-    Attributes
-    ----------
-    data
-        A zlib stream.
-    planes
-        For each plane whether it is the difference from the first (0 or 1), and its predictor.
-    """
-
-    data: bytes
-    planes: tuple[tuple[int, int], ...]
+    data: bytes  #: a zlib stream
+    planes: tuple[tuple[int, int], ...]  #: whether each is the difference from the first (0 or 1), its predictor
 
 
 def reference_codes(radiance: NDArray[np.floating]) -> Codes:
@@ -105,15 +97,7 @@ def difference_codes(difference: Array, precision: Precision) -> tuple[Codes, fl
 
 
 def pack_planes(codes: Codes, bits: int) -> Packed:
-    """Compress planes of codes.
-
-    Parameters
-    ----------
-    codes
-        (height, width, planes); signed or unsigned, taken modulo 2^bits.
-    bits
-        8, 16 or 24.
-    """
+    """Compress planes of codes, (height, width, planes), taken modulo 2^bits; bits are 8, 16 or 24."""
     parts: list[bytes] = []
     planes = []
     for number in range(codes.shape[-1]):

@@ -47,18 +47,10 @@ LADDER: tuple[tuple[Precision, int], ...] = (
 
 @dataclass(frozen=True)
 class SceneImages:
-    """The images of one scene for the page.
+    """The images of one scene for the page."""
 
-    Attributes
-    ----------
-    index
-        What the page's script reads, JSON-ready; offsets count the bytes before base64.
-    data
-        All packed planes, in base64.
-    """
-
-    index: dict[str, Any]
-    data: str
+    index: dict[str, Any]  #: what the page's script reads, JSON-ready; offsets count the bytes before base64
+    data: str  #: all packed planes, in base64
 
 
 @dataclass(frozen=True)
@@ -70,23 +62,9 @@ class StoredImages:
 
 
 def page_images(scenes: Sequence[Mapping[str, Any]], folder: Path, limit: int) -> list[SceneImages]:
-    """Return the images of scenes, all together in no more than so many characters.
+    """Return the images of scenes of report.json from a folder, all together in at most `limit` characters.
 
     Every scene begins with the finest rung of `LADDER`; while the page is too large the largest goes a rung down.
-
-    Parameters
-    ----------
-    scenes
-        Scenes of report.json.
-    folder
-        Where the files that they name lie.
-    limit
-        Of the sum of the lengths of `data`.
-
-    Raises
-    ------
-    InputError
-        If a file is missing or cannot be read, its size is not that of the reference, or nothing of `LADDER` fits.
     """
     rungs = [0] * len(scenes)
     packed = [packed_scene(scene, read_images(scene, folder), *LADDER[0]) for scene in scenes]
@@ -104,13 +82,7 @@ def page_images(scenes: Sequence[Mapping[str, Any]], folder: Path, limit: int) -
 
 
 def read_images(scene: Mapping[str, Any], folder: Path) -> StoredImages:
-    """Return the images of a scene of report.json from the files that it names.
-
-    Raises
-    ------
-    InputError
-        If a file is missing or cannot be read, or its size is not that of the reference.
-    """
+    """Return the images of a scene of report.json from the files that it names, all of the size of the reference."""
     reference = _layers(folder / scene["files"]["exr"])
     files = [folder / entry["files"]["exr"] for entry in scene["methods"] if entry["files"]]
     methods = [_layers(path) for path in files]  # not in parallel: reading turns the standard error stream off
@@ -133,19 +105,7 @@ def _layers(path: Path) -> dict[str, Array]:
 
 
 def packed_scene(scene: Mapping[str, Any], images: StoredImages, precision: Precision, stride: int) -> SceneImages:
-    """Return the images of a scene for the page.
-
-    Parameters
-    ----------
-    scene
-        A scene of report.json.
-    images
-        From its files.
-    precision
-        Of the differences.
-    stride
-        One pixel in so many is kept, along both axes.
-    """
+    """Return the images of a scene of report.json for the page: one pixel in `stride` along both axes."""
 
     def thin(layers: Mapping[str, Array]) -> dict[str, Array]:
         return {name: layer[::stride, ::stride] for name, layer in layers.items()}
@@ -204,16 +164,9 @@ def packed_scene(scene: Mapping[str, Any], images: StoredImages, precision: Prec
 
 
 def relative_difference(exact: Array, rounded: Array, test: Array, floor: float) -> Array:
-    """Return the difference of an image from the reference, in units of the larger of that and the floor.
+    """Return the difference of an image from the reference, in units of the larger of that and a positive floor.
 
-    Parameters
-    ----------
-    exact, test
-        Reference and image as they are.
-    rounded
-        The reference as the page will have it, which it multiplies with.
-    floor
-        Of the reference; positive.
+    `rounded` is the reference as the page will have it, which it multiplies with.
     """
     with np.errstate(invalid="ignore"):
         difference = test - np.where(np.isfinite(exact), exact, 0)

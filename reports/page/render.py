@@ -29,22 +29,7 @@ TEMPLATES = Path(__file__).parent / "templates"
 
 
 def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) -> str:
-    """Return the HTML page of a report.
-
-    Parameters
-    ----------
-    data
-        The content of report.json, schema "airlight-report/2".
-    folder
-        Where the files that it names lie.
-    limit
-        Of the page [bytes]; images are thinned out to keep it.
-
-    Raises
-    ------
-    InputError
-        If a file is missing or cannot be used, or if the page cannot be made small enough.
-    """
+    """Return the HTML page of a report whose files lie in a folder; images are thinned out to keep the limit."""
     from markupsafe import Markup
 
     # A scene without any image has no viewer.

@@ -22,17 +22,7 @@ ENDINGS = tuple(_METADATA)
 
 
 def save_figure(path: Path, draw: Callable[[str], "Figure"], column: str = "double") -> Path:
-    """Write a figure as PDF or PNG, by the ending of the path; return the path.
-
-    Parameters
-    ----------
-    path
-        Of the file.
-    draw
-        Returns the figure for a column of `reports.plotting.style.WIDTHS`.
-    column
-        'single' or 'double'.
-    """
+    """Write a figure for a column, 'single' or 'double', as PDF or PNG, by the ending of the path; return the path."""
     with figure_style(column):
         buffer = io.BytesIO()
         draw(column).savefig(buffer, format=path.suffix[1:], metadata=_METADATA[path.suffix])
@@ -58,16 +48,9 @@ def name_sizes(panel: "Axes", sizes: Iterable[float]) -> None:
 
 
 def picture_grid(pictures: Sequence[tuple[str, Any]], column: str, *, across: int = 3) -> "Figure":
-    """Return a figure of pictures with titles, in rows.
+    """Return a figure of pictures with titles, in rows of `across`, for a column, 'single' or 'double'.
 
-    Parameters
-    ----------
-    pictures
-        Titles and pictures, (height, width, 3) in 8 bits, or (height, width) for shades of grey.
-    column
-        Of `reports.plotting.style.WIDTHS`.
-    across
-        Pictures in a row.
+    Pictures are (height, width, 3) in 8 bits, or (height, width) for shades of grey.
     """
     wide, down = WIDTHS[column], -(-len(pictures) // across)
     height, width = pictures[0][1].shape[:2]

@@ -69,18 +69,9 @@ _SHEETS = Path(__file__).parent / "styles"
 def method_style(method: str, variant: int = 0) -> dict[str, Any]:
     """Return matplotlib's properties of a method's markers and lines.
 
-    Parameters
-    ----------
-    method
-        Its name. One that is not built in ('module:function', an image) has one of the two styles kept for such, always
-        the same for the same name; `report_styles` keeps several apart.
-    variant
-        Which of its variants: other fillings of the same marker, all different up to the twelfth.
-
-    Returns
-    -------
-    dict
-        `color`, `marker`, `fillstyle`, `markerfacecoloralt` and `markeredgecolor`.
+    A method that is not built in ('module:function', an image) has one of the two styles kept for such, always the same
+    for the same name; `report_styles` keeps several apart. Variants have other fillings of the same marker, all
+    different up to the twelfth.
     """
     colour, marker = _METHODS.get(method) or _OTHERS[zlib.crc32(method.encode()) % len(_OTHERS)]
     return _marker_style(colour, marker, variant)
@@ -109,11 +100,6 @@ def report_styles(scenes: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, An
 
     Variants of a method are numbered in the order in which the scenes name them. Of methods that are not built in the
     first two have styles of their own, and those after them begin again.
-
-    Parameters
-    ----------
-    scenes
-        The scenes of report.json.
     """
     variants: dict[str, list[str]] = {}
     for scene in scenes:
@@ -135,20 +121,7 @@ def report_styles(scenes: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, An
 
 @contextmanager
 def figure_style(column: str = "double", extra: Sequence[str] = ()) -> Iterator[float]:
-    """Use the style sheets for papers for a block; give the width of the column [inches].
-
-    Parameters
-    ----------
-    column
-        'single' (3.5 inches) or 'double' (7.16 inches).
-    extra
-        Further style sheets of matplotlib, by name or path, on top of ours.
-
-    Raises
-    ------
-    InputError
-        For another column or a style sheet that matplotlib does not find.
-    """
+    """Use the style sheets for papers for a block; give the width of the column, 'single' or 'double' [inches]."""
     import matplotlib.style
 
     if column not in WIDTHS:

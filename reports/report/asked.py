@@ -13,21 +13,9 @@ from validation.scenes.registry import SCENES
 def scenes_of_images(
     asked: Sequence[str] | None, images: str | os.PathLike[str] | None, usual: Sequence[str]
 ) -> tuple[list[str], dict[str, tuple[EngineImage, ...]]]:
-    """Return the scenes to study and the images by scene.
+    """Return the scenes to study and the images by scene, from a folder of images or None.
 
-    Parameters
-    ----------
-    asked
-        Built-in names and paths of Mitsuba XML files; None for those of the images, or the usual ones without images.
-    images
-        A folder, see `find_images`; of its images those of `asked` are taken.
-    usual
-        Scenes of the effort.
-
-    Raises
-    ------
-    InputError
-        If no scene is asked for, or the folder has no image of the scenes.
+    Scenes are those `asked` for; for None those of the images, or the `usual` ones without images.
     """
     if asked is not None and not asked:
         raise InputError(f"scenes: got none, wanted some of {', '.join(SCENES)}, or the paths of Mitsuba XML files")

@@ -54,40 +54,14 @@ def write_report(
     noted: Callable[[Sequence[str]], None] = lambda notes: None,
     cluster: Cluster | None = None,
 ) -> dict[str, Any]:
-    """Study scenes and write the report.
+    """Study scenes and write the report into a folder; return the content of report.json, see docs/formats.md.
 
-    Parameters
-    ----------
-    folder
-        Where `report.html`, `report.json` and a folder for each scene go.
-    study
-        Which scenes and configurations, and how; of its sizes and media the first alone.
-    images
-        By scene, images from elsewhere to judge; such a scene is studied at their size.
-    command
-        The command line that the page names under "how to reproduce".
-    fresh
-        Compute everything again, references, batches and rays too.
-    apart
-        Whether user methods run in processes of their own, where a fault becomes a row (`own_faults`). In this process
-        it ends the report.
-    progress
-        Called with (fraction done, what) now and then.
-    noted
-        Called with what is to be said of the scenes before they are studied.
-    cluster
-        Whose workers compute references and the batches that check them; methods run here.
-
-    Returns
-    -------
-    dict
-        The content of `report.json`, see docs/formats.md.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be written, a scene or an image cannot be used, or a method of one's own that runs in
-        this process is at fault; nothing that was there before is damaged.
+    Of the sizes and media of the study the first alone counts. `images` from elsewhere are judged, by scene, at their
+    size. The page names `command` under "how to reproduce". `fresh` computes everything again. With `apart` user
+    methods run in processes of their own, where a fault becomes a row (`own_faults`); else it ends the report. `noted`
+    is called with what is to be said of the scenes before the work. Workers of `cluster` compute references and the
+    batches that check them; methods run here. What cannot be used is refused, and nothing that was there before is
+    damaged.
     """
     names = tuple(study.scene_names())
     _refuse_twins(names)

@@ -21,16 +21,6 @@ def staged(target: Path) -> Iterator[Path]:
 
     Files of the same name are replaced one by one, the page and its data last; others stay. Any exception, a
     KeyboardInterrupt too, leaves the target as it was; that of a full disk names the target.
-
-    Parameters
-    ----------
-    target
-        A folder that can be written.
-
-    Yields
-    ------
-    Path
-        Where to write.
     """
     for left in target.glob(f"{_PREFIX}*"):
         if time.time() - left.stat().st_mtime > _STALE:

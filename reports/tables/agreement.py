@@ -70,10 +70,7 @@ def worst_interval(compared: Iterable[Mapping[str, Any]]) -> tuple[Mapping[str, 
 def trust_table(scenes: Sequence[Mapping[str, Any]]) -> Table:
     """Return how far the reference of each scene can be trusted: its own bound, its checks, the estimators' intervals.
 
-    Parameters
-    ----------
-    scenes
-        Of report.json. An estimator has the worst of its intervals over the layers of a scene.
+    An estimator has the worst of its intervals over the layers of a scene.
     """
     estimators = list(dict.fromkeys(entry["estimator"] for scene in scenes for entry in scene["agreement"].values()))
     columns = (
@@ -115,16 +112,10 @@ def _trust(scene: Mapping[str, Any], estimators: Iterable[str]) -> Row:
 def agreement_table(
     title: str, compared: Iterable[tuple[str, Mapping[str, Any]]], *keys: str, explanation: str = ""
 ) -> Table:
-    """Return the table of comparisons of the reference, each with the name of what it compares.
+    """Return the table of comparisons of the reference, `agreement` in report.json, each with the name of what it
+    compares.
 
-    Parameters
-    ----------
-    title, explanation
-        See `reports.tables.table.Table`.
-    compared
-        Names, and the values of `agreement` in report.json.
-    keys
-        Of `COLUMNS`; `BENCH` by default.
+    `keys` are those of `COLUMNS`; `BENCH` by default.
     """
     rows = (_values(name, comparison) for name, comparison in compared)
     return table(title, COLUMNS, rows, explanation=explanation).only(*(keys or BENCH))

@@ -49,17 +49,10 @@ class _Style:
 
 
 def text(table: Table, *, width: int | None = None, styled: bool = False) -> str:
-    """Return a table for a terminal.
+    """Return a table for a terminal of a width [characters]; as wide as the table needs by default.
 
-    Parameters
-    ----------
-    table
-        What to draw.
-    width
-        Of the terminal [characters]; as wide as the table needs by default. Where it is too narrow, sentences are
-        wrapped, and columns that are still too many are left out and named below; a table of sentences becomes a list.
-    styled
-        Whether headings are bold, by the codes of terminals.
+    Where it is too narrow, sentences are wrapped, and columns that are still too many are left out and named below; a
+    table of sentences becomes a list. With `styled` headings are bold, by the codes of terminals.
     """
     from rich import box
     from rich.console import Console
@@ -196,15 +189,7 @@ def _meanings(columns: Sequence[Column]) -> list[str]:
 
 
 def latex(tables: Sequence[Table], *, comment: Sequence[str] = ()) -> str:
-    r"""Return tables with the same columns as one `tabular`, each under its title if it has one.
-
-    Parameters
-    ----------
-    tables
-        What to draw.
-    comment
-        Lines of comment at the top, after the one that says what the preamble needs.
-    """
+    r"""Return tables with the same columns as one `tabular`, each under its title, below lines of comment."""
 
     def line(cells: Iterable[str]) -> str:
         return " & ".join(cells) + r" \\"

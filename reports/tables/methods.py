@@ -75,31 +75,16 @@ BENCH = (
 
 
 def methods_table(title: str, methods: Iterable[Entry | Row], *keys: str, explanation: str = "") -> Table:
-    """Return the table of the methods in a scene.
+    """Return the table of the `methods` of a scene of report.json, or of rows that have some of `COLUMNS`.
 
-    Parameters
-    ----------
-    title, explanation
-        See `reports.tables.table.Table`.
-    methods
-        The `methods` of a scene of report.json, or rows that have some of `COLUMNS`.
-    keys
-        Of `COLUMNS`; `BENCH` by default.
+    `keys` are those of `COLUMNS`; `BENCH` by default.
     """
     rows = tuple(entry if isinstance(entry, Row) else method_row(entry) for entry in methods)
     return Table(title, tuple(COLUMNS.values()), rows, explanation).only(*(keys or BENCH))
 
 
 def method_row(entry: Entry, *, shadows: bool = False) -> Row:
-    """Return what a method costs and how wrong it is as a row.
-
-    Parameters
-    ----------
-    entry
-        Of report.json.
-    shadows
-        Whether something casts a shadow, so that a method that knows none is marked.
-    """
+    """Return what a method costs and how wrong it is as a row; with `shadows` a method that knows none is marked."""
     kind, layer = entry.get("kind"), entry.get("layer")
     remarks = [f"image, {layer}"] if kind == "image" else ["user's function"] if kind == "function" else []
     if shadows and kind != "image" and not entry["knows_shadows"]:
@@ -143,15 +128,7 @@ def fastest_within(error: float, entries: Iterable[Entry]) -> Entry | None:
 
 
 def fastest_table(scenes: Iterable[Entry], *, code: bool = False) -> Table:
-    """Return for every scene of a report the fastest method within each relative RMSE of `TARGETS`.
-
-    Parameters
-    ----------
-    scenes
-        Of report.json.
-    code
-        Whether the names of scenes are code.
-    """
+    """Return for every scene of a report the fastest method within each relative RMSE of `TARGETS`."""
     columns = [Column(f"within_{target:g}", f"within {100 * target:g} %", words=True) for target in TARGETS]
     rows = (
         (

@@ -19,12 +19,6 @@ _VALUES = {
 
 
 def published_as(entry: Mapping[str, Any]) -> str:
-    """Return which paper a configuration reproduces with its errors, and what is wrong; empty for all others.
-
-    Parameters
-    ----------
-    entry
-        Of a method in report.json.
-    """
+    """Return which paper a method of report.json reproduces with its errors, and what is wrong; else nothing."""
     values = (_VALUES.get((name, value), "") for name, value in entry.get("parameters", {}).items())
     return next(filter(None, values), "") or _KERNELS.get(entry.get("kernel") or "", "")

@@ -91,13 +91,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """A table as data.
-
-    Raises
-    ------
-    ValueError
-        For a value that belongs to no column.
-    """
+    """A table as data; each value belongs to a column."""
 
     title: str
     columns: tuple[Column, ...]
@@ -125,17 +119,7 @@ def table(
     *,
     explanation: str = "",
 ) -> Table:
-    """Return a table.
-
-    Parameters
-    ----------
-    title, explanation
-        See `Table`.
-    columns
-        Of the table.
-    rows
-        A row may be its values in the order of the columns, or a mapping that has them among others by key.
-    """
+    """Return a table; a row may be its values in the order of the columns, or a mapping that has them by key."""
     known = tuple(columns)
 
     def row(given: Row | Sequence[Value] | Mapping[str, Any]) -> Row:
@@ -160,17 +144,7 @@ def numbers(*keys: str, how: Mapping[str, Any] | None = None, **headings: str) -
 
 
 def number(value: float | None, digits: int = 3, *, zeros: bool = False) -> str:
-    """Return a number with some significant digits, a hyphen for none.
-
-    Parameters
-    ----------
-    value
-        May be infinite or not a number.
-    digits
-        Significant digits.
-    zeros
-        Keep zeros at the end: they say how exact a number is.
-    """
+    """Return a number with some significant digits, a hyphen for none; `zeros` at the end say how exact a number is."""
     if value is None:
         return "-"
     if value == 0:
@@ -182,16 +156,7 @@ def number(value: float | None, digits: int = 3, *, zeros: bool = False) -> str:
 def digits_of(value: float, column: Column, *, zeros: bool = False, percent: bool = False) -> str:
     """Return a number of a column in ASCII digits, without what stands behind it.
 
-    Parameters
-    ----------
-    value
-        As it is in the row.
-    column
-        Where it stands.
-    zeros
-        See `number`.
-    percent
-        Write a share in per cent although the column does not ask for it.
+    With `percent` a share is in per cent although the column does not ask for it.
     """
     shown = 100 * value if percent or column.percent else value
     if isinstance(value, int) and shown is value:

@@ -21,13 +21,7 @@ def terminal_width() -> int | None:
 
 
 def print_json(data: Any) -> None:
-    """Print data as JSON.
-
-    Raises
-    ------
-    InputError
-        For a number that is not finite: what has none is None.
-    """
+    """Print data as JSON; a number that is not finite is refused: what has none is None."""
     import json
 
     try:

@@ -76,10 +76,7 @@ class LiveScene:
     def choose(self, chosen: Configuration) -> float:
         """Render by another configuration from now on; return what its preparation takes [ms].
 
-        Raises
-        ------
-        InputError
-            If the method refuses the scene or a parameter; then all is as it was.
+        If the method refuses the scene or a parameter, all is as it was.
         """
         begin = time.perf_counter()
         before, self.chosen = self.chosen, chosen
@@ -93,13 +90,7 @@ class LiveScene:
         return 1e3 * (time.perf_counter() - begin)
 
     def change(self, changes: Mapping[str, Values]) -> None:
-        """Change the scene; names that are not given are as they were.
-
-        Raises
-        ------
-        InputError
-            If the scene or the method cannot have that; then all is as it was.
-        """
+        """Change the scene; names that are not given are as they were. If scene or method refuse, all is as it was."""
         before, renderer = self.changes, self.renderer
         wanted = before | dict(changes)
         moved = {name for name, value in changes.items() if before.get(name) != tuple(value)}
@@ -129,13 +120,7 @@ class LiveScene:
         self.renderer = self._find_renderer()
 
     def frame(self, *, by_stage: bool = False) -> Shown:
-        """Render the next frame; `by_stage` times its stages, which makes it a little slower.
-
-        Raises
-        ------
-        realtime.errors.InputError
-            For what the method refuses in its first frame.
-        """
+        """Render the next frame; `by_stage` times its stages, which makes it a little slower."""
         begin = time.perf_counter()
         renderer, times = timed_stages(self.renderer) if by_stage else (self.renderer, {})
         cache, moved = self._cache, dict(self._moved)

@@ -33,19 +33,7 @@ class Pictures:
         self._draw: Callable[..., Any] = Frozen(_drawn)
 
     def of_frame(self, pixel, surface, airlight, *, layer: str, factor: float) -> memoryview:
-        """Return the picture of a frame on the device, 8-bit RGBA row by row.
-
-        Parameters
-        ----------
-        pixel
-            Pixel numbers in the order of the lanes.
-        surface, airlight
-            Radiance in that order [W/(m^2 sr)].
-        layer
-            One of `LAYERS`.
-        factor
-            Exposure.
-        """
+        """Return the picture of a frame on the device, 8-bit RGBA row by row; `pixel` numbers its lanes."""
         weights = [dr.opaque(mi.Float, factor * weight) for weight in LAYERS[layer]]
         return np.array(self._draw(self._levels, pixel, surface, airlight, *weights)).data.cast("B")
 

@@ -70,14 +70,10 @@ class Page:
 
 
 class Server:
-    """The server of one view.
+    """The server of one view; port 0 is any free one.
 
-    Parameters
-    ----------
-    host, port
-        Where it listens; port 0 is any free one.
-    opened, told, closed
-        Called in threads of their own: with a page that was opened, with a page and what it says, with a closed page.
+    `opened`, `told`, `closed` are called in threads of their own: with a page that was opened, with a page and what it
+    says, with a closed page.
     """
 
     def __init__(

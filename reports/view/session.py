@@ -342,13 +342,7 @@ class Session:
 
 
 def sparing(method: str, kernel: Any, given: Mapping[str, Any]) -> Configuration:
-    """Return a configuration that names only what differs from the method's defaults, and a kernel only if it has one.
-
-    Raises
-    ------
-    InputError
-        As `validation.study.configuration.configuration`.
-    """
+    """Return a configuration that names only what differs from the method's defaults."""
     record = find_method(method)
     own, light_points = method_parameters(record, given)
     now = values(light_points) | values(own)

@@ -19,12 +19,7 @@ from validation.scenes.changes import Values
 class TruthInBackground:
     """A process that computes references, and what it has found for the last task.
 
-    Parameters
-    ----------
-    told
-        Called in a thread of its own whenever more is known.
-    variant
-        Mitsuba's.
+    `told` is called in a thread of its own whenever more is known.
     """
 
     def __init__(self, told: Callable[[], None], variant: str) -> None:
@@ -47,15 +42,7 @@ class TruthInBackground:
         self._listener.start()
 
     def start(self, scene: str, size: tuple[int, int], changes: Mapping[str, Values]) -> None:
-        """Compute the reference of a scene from now on.
-
-        Parameters
-        ----------
-        scene, changes
-            See `reports.view.state.ViewState`.
-        size
-            Of the image [pixels].
-        """
+        """Compute the reference of a scene from now on."""
         with self._lock:
             self._number += 1
             self.truth, self.done, self.failure = KnownTruth.of_size(*size), False, ""

@@ -55,13 +55,7 @@ def yield_processor() -> None:
 
 
 def answers(task: Task) -> Iterator[Answer]:
-    """Yield the reference of an image, rays after rays.
-
-    Raises
-    ------
-    InputError
-        For a scene that has no reference.
-    """
+    """Yield the reference of an image, rays after rays."""
     from reports.view.truth_order import pixel_order
     from validation.estimates.quadrature import truth_of_pixels
     from validation.estimates.reference_layers import reference_error

@@ -28,15 +28,7 @@ def kernel_widgets() -> list[dict[str, Any]]:
 
 
 def parameter_widgets(chosen: Configuration, *, area_lights: bool) -> list[dict[str, Any]]:
-    """Return the parameters of a method with their values, ranges and help.
-
-    Parameters
-    ----------
-    chosen
-        The configuration.
-    area_lights
-        Whether the scene has lights with extent, of which each method has parameters.
-    """
+    """Return the parameters of a method with values, ranges and help; for area lights also of their points."""
     method = find_method(chosen.method)
     own, light_points = method_parameters(method, dict(chosen.parameters))
     widgets = [_parameter(item, getattr(own, item.name)) for item in fields(own)]
