@@ -74,21 +74,8 @@ def time_repeated(
 ) -> Timing:
     """Time a piece of work repeatedly.
 
-    Parameters
-    ----------
-    work
-        A function without arguments that evaluates its results.
-    seconds
-        Stop after about this long [s], but not before `least` repetitions.
-    least, most
-        Bounds of the number of repetitions.
-    warm_up
-        Runs before these: the first compiles and records, the second is the first replay.
-
-    Returns
-    -------
-    Timing
-        Median and quartiles [ms].
+    It takes about so many `seconds`, and `least` to `most` repetitions, after some runs of `warm_up`: the first
+    compiles and records, the second is the first replay.
     """
     (timing,) = time_in_turns([work], seconds=seconds, least=least, most=most, warm_up=warm_up)
     return timing

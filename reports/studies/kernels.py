@@ -28,7 +28,6 @@ else:
 # What they cost
 
 _STATISTICS = {"median": "half of the rays", "p99": "99 % of the rays", "max": "worst ray"}
-_TIMED_RAYS = 480_000
 _SHOWN = (1e-7, 10.0)  # errors; those outside are drawn at the edge
 
 
@@ -58,7 +57,7 @@ def kernels(*, kernel: Kernels = (), phase: str | None = None, progress: Progres
     phases = PHASES if phase is None else ((phase, phase_from_words(phase).g),)
     named = [kernel_name(each) or "" for each in several(kernel)] or None
     with telling(progress, "kernels") as tell:
-        found = bench_kernels(named, phases=phases, rays=_TIMED_RAYS, progress=counted(tell))
+        found = bench_kernels(named, phases=phases, progress=counted(tell))
     data = {"costs": plain(found), "levels": plain(speed_against_error(found))}
     drawn = kernel_tables(data["costs"], data["levels"])
     said = ("ns/ray: the kernel alone by Dr.Jit's history, median.",)

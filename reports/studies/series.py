@@ -39,8 +39,7 @@ def polynomials() -> Study:
             curves = _curves(phase, a, theta)
             for values in zip(theta.tolist(), *(curves[name].tolist() for name in _CURVES)):
                 rows.append({"phase": phase, "a": a, **dict(zip(("theta", *_CURVES), values))})
-    names = ("phase", "region", "kernel", "rays", "within_1_percent", "within_10_percent")
-    within = [{name: getattr(each, name) for name in names} for each in printed_against_derived(_RAYS)]
+    within = list(printed_against_derived(_RAYS))
     percent = {"percent": True}
     columns = (
         *words("phase", "region", "kernel"),

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Values of kernels on rays, all of whose numbers are arrays: what is compiled serves every value."""
 
+from dataclasses import replace
 from typing import Any
 
 import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.cases import Cases
 from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction
 from realtime.numerics.array_types import ArrayTypes, aligned_array, array_types
@@ -70,3 +72,15 @@ def relative_error(values: Array, expected: Array) -> Array:
 def single_precision(*columns: Any) -> list[Array]:
     """Return columns as float32 has them, in float64."""
     return [np.asarray(column).astype(np.float32).astype(np.float64) for column in columns]
+
+
+def take(cases: Cases, rows: NDArray[Any]) -> Cases:
+    """Return the cases of some rows, (n,): numbers, or truth values of all cases."""
+    numbers = np.arange(len(cases.phase))[rows]
+    columns = ("g", "foot", "height", "x0", "x1", "sigma_t", "value", "origin", "direction", "light")
+    arrays = {name: getattr(cases, name) for name in columns}
+    chosen: dict[str, Any] = {name: None if column is None else column[numbers] for name, column in arrays.items()}
+    for name in ("phase", "tag", "rows"):
+        words = getattr(cases, name)
+        chosen[name] = tuple(words[k] for k in numbers) if words else words
+    return replace(cases, **chosen)

@@ -130,12 +130,6 @@ def compare_images(
         Also HDR-FLIP, in a child process; what goes wrong with it is a note.
     exposure
         Of the colour differences and of FLIP [stops]; each chooses its own from the reference by default.
-
-    Raises
-    ------
-    InputError
-        If a layer is not there, the sizes differ, a standard error is negative or not finite, or an exposure is given
-        for nothing.
     """
     extras: dict[str, Any] = {"all_metrics": all_metrics, "flip": flip, "exposure": exposure}
     return _compare(
@@ -169,11 +163,6 @@ def compare_files(
         See `compare_images`.
     by_order
         Compare as well the layers by order of scattering that both files have, such as `airlight_3_4`.
-
-    Raises
-    ------
-    InputError
-        Also if a file is missing, broken or of a kind that is not read, or has no layer by order.
     """
     reference_image, test_image = read_exr(reference), read_exr(test)
     chosen = test_image.with_data(reference_image.with_data(None if mask is None else read_mask(mask)))
@@ -252,13 +241,7 @@ def _compare(
 
 
 def read_mask(path: str | os.PathLike[str]) -> NDArray[np.bool_]:
-    """Return where the plain channels of an EXR file are not zero: truth values [1], (height, width).
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, has no plain channels or values that are not finite.
-    """
+    """Return where the plain channels of an EXR file are not zero: truth values [1], (height, width)."""
     values = np.asarray(image_layer(read_exr(path), TOTAL, path))
     if not np.isfinite(values).all():
         raise InputError(f"{path} as a mask has values that are not finite; wanted 0 for out and 1 for in")

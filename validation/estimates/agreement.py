@@ -83,28 +83,12 @@ def agreement(
     It runs until the half width of every interval is below 0.4 times the margin: a rule that looks at the spread
     alone, so that stopping favours no verdict. Nor does the end of its time.
 
-    Parameters
-    ----------
-    scene
-        The `mi.Scene`; a small size will do, since the comparison pools all pixels.
-    estimator
-        'volpath' or 'single-scatter'.
-    margin
-        The two agree if the 95 % interval of the relative bias lies inside +- this.
-    batches, samples
-        Batches at most, and samples a pixel in each; those of volpath go where its pilot spread most
-        (`reference.monte_carlo.allocation`).
-    seconds
-        Trace no further batch after so long, the pilot not counted; without a limit by default.
-    progress
-        Called with (done, total, what) after every batch.
-    spread
-        Lets other processes trace batches.
-
-    Returns
-    -------
-    dict
-        By layer; the surface is left out where nothing lit is visible.
+    The `mi.Scene` may be small, since all pixels are pooled. The estimator, 'volpath' or 'single-scatter', agrees if
+    the 95 % interval of the relative bias lies inside +- `margin`. So many `batches` are traced at most, of `samples` a
+    pixel each; those of volpath go where its pilot spread most (`reference.monte_carlo.allocation`). After so many
+    `seconds`, the pilot not counted, no further batch is traced. `progress` is called with (done, total, what) after
+    every batch, and `spread` lets other processes trace some. The result is by layer, without the surface where nothing
+    lit is visible.
     """
     epsilon = measure_shadow_epsilon() if estimator == "volpath" else 0.0
     plain = truth_image(scene)
@@ -182,25 +166,9 @@ def agreements(
 ) -> dict[str, Agreement]:
     """Compare several estimators with the quadrature image.
 
-    Parameters
-    ----------
-    scene
-        The `mi.Scene`.
-    margins
-        By estimator, the margin of the relative bias [1]; under lights with extent at least `WIDE_MARGIN`.
-    samples
-        By estimator, see `agreement`; its default otherwise.
-    batches, seconds
-        How many batches at most, and how long [s], for each estimator; see `agreement`.
-    progress
-        Called with (share done, what).
-    spread
-        Lets other processes trace batches.
-
-    Returns
-    -------
-    dict
-        By estimator and layer, as in 'volpath airlight'.
+    By estimator there are the `margins` of the relative bias [1], under lights with extent at least `WIDE_MARGIN`, and
+    the `samples`; each takes so many `batches` and `seconds` at most. The result is by estimator and layer, as in
+    'volpath airlight'.
     """
     tell = progress or (lambda share, what: None)
     by_name: dict[str, Agreement] = {}

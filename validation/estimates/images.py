@@ -72,22 +72,9 @@ def monte_carlo_reference(
 
     The same samples and seed give the same numbers, whatever was in the cache.
 
-    Parameters
-    ----------
-    loaded
-        The scene.
-    estimator
-        'single-scatter', 'volpath' or 'cloud-paths'.
-    budget
-        When to stop; an error is that of the layers `airlight` and `surface`.
-    seed
-        Seed of the first batch; the others count up.
-    orders
-        Of a scene of clouds: the sets of orders with a layer of their own, see `cloud_orders`.
-    progress
-        Called with (share done, what) after every batch.
-    elsewhere
-        Traces batches in other processes, see `validation.estimates.monte_carlo.monte_carlo_batches`.
+    The `budget` says when to stop by the error of the layers `airlight` and `surface`. The first batch has the `seed`,
+    the others count up. A scene of clouds has layers for sets of `orders`, see `cloud_orders`. Progress is called with
+    (share done, what) after every batch; `elsewhere` traces batches in other processes.
     """
     seen = None
     if orders is None:
@@ -125,13 +112,7 @@ def monte_carlo_reference(
 
 
 def cloud_orders(words: str) -> tuple[str, ...]:
-    """Return the sets of orders that words name, disjoint: '1,2,3-4', 'sets' for the usual ones, 'all' for none.
-
-    Raises
-    ------
-    InputError
-        For words that name none, or the same order twice.
-    """
+    """Return the sets of orders that words name, disjoint: '1,2,3-4', 'sets' for the usual ones, 'all' for none."""
     names = tuple(name for name in parse_orders(words) if name != "all")
     ranges = sorted(order_range(name) for name in names)
     for (_, last), (first, _) in pairwise(ranges):

@@ -45,17 +45,8 @@ class _Part:
 def merged_references(files: Sequence[tuple[str, Image]]) -> Image:
     """Return the reference of all batches of several files.
 
-    Parameters
-    ----------
-    files
-        Name and image of each: references as `validation.estimates.images.monte_carlo_reference` makes them, or merged
-        ones. Their order does not matter.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than two files, one of them is no such reference, they are of different scenes, estimators,
-        sizes of batches or versions of Mitsuba, or two of them share a seed.
+    Each has a name and an image: one of `validation.estimates.images.monte_carlo_reference`, or a merged one. Their
+    order does not matter; those that were not made alike, or share a seed, are refused.
     """
     if len(files) < 2:
         raise InputError(f"got {len(files)} file to merge; wanted at least two")

@@ -109,13 +109,6 @@ def monte_carlo_batches(
         Called with (done, total, estimator) after every batch that was traced.
     elsewhere
         Traces batches in other processes; what these do not bring is traced here.
-
-    Raises
-    ------
-    InputError
-        If a seed would be out of range, if a ray meets a light, and for samples that are not finite.
-    OSError
-        If the disk of the cache is full, with a word on how many batches are kept.
     """
     if batches < 2:
         raise ValueError(f"batches: got {batches}, wanted at least 2 for a standard error")

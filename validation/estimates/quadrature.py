@@ -34,17 +34,8 @@ def truth_image(
 ) -> TruthImage:
     """Return the quadrature truth of a Mitsuba scene at its own size, (height, width, 3) [W/(m^2 sr)].
 
-    Parameters
-    ----------
-    scene
-        The `mi.Scene`.
-    checks, shadow_scale, pixel, progress
-        See `reference.quadrature.image.quadrature_image`.
-
-    Raises
-    ------
-    InputError
-        For a scene that cannot be read, and for radiance that is not finite, see `validation.estimates.light_on_ray`.
+    `checks`, `shadow_scale`, `pixel` and `progress` are those of `reference.quadrature.image.quadrature_image`.
+    Radiance that is not finite is refused, see `validation.estimates.light_on_ray`.
     """
     settings: dict[str, Any] = {"checks": checks, "shadow_scale": shadow_scale, "pixel": pixel}
     return kept_truth(scene, settings, progress=progress)[0]

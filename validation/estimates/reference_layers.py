@@ -20,14 +20,7 @@ Array = NDArray[np.float64]
 def reference_layer(truth: TruthImage, layer: str, *, emitted: bool = True) -> Array:
     """Return 'airlight', 'surface' or 'total', (height, width, 3) [W/(m^2 sr)].
 
-    Parameters
-    ----------
-    truth
-        The quadrature image of the scene.
-    layer
-        Which one.
-    emitted
-        Whether area lights that the camera sees are part of the total.
+    `emitted` says whether area lights that the camera sees are part of the total.
     """
     if layer != TOTAL:
         return np.asarray(getattr(truth, layer))

@@ -7,7 +7,6 @@ kernel alone) and from the wall clock (launch and replay included). Errors are o
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -26,7 +25,7 @@ from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import named_phase
-from validation.clock import time_repeated
+from validation.clock import time_repeated, timing_of
 from validation.kernels.errors import relative_error
 from validation.kernels.rays import wide_rays
 from validation.kernels.values import TABLE, Kernel
@@ -50,73 +49,49 @@ SIZES: dict[str, tuple[int, ...]] = {
 _MOST_STEPS = 64  # of marching, timed on all rays; on fewer in proportion where there are more
 
 
-@dataclass(frozen=True)
-class Spread:
-    """Median and quartiles of repeated measurements [ns a ray]."""
-
-    median: float
-    low: float
-    high: float
-    repetitions: int
-
-
-@dataclass(frozen=True)
-class KernelCost:
-    """What one kernel of one size costs for one phase function, and its relative errors in float32."""
-
-    kernel: str  #: as in `validation.study.configuration.find_kernel`
-    family: str  #: the kernel without its size
-    size: int | None
-    phase: str
-    g: float
-    rays: int = 0  #: that were timed
-    device: Spread | None = None  #: of the kernel alone
-    wall: Spread | None = None  #: with launch and replay
-    median: float | None = None
-    p99: float | None = None
-    max: float | None = None
-    nonfinite: int = 0
-    refused: str | None = None  #: the kernel's words
-
-    @property
-    def ns(self) -> float | None:
-        """The cost that kernels are compared by [ns a ray]: the device's where it is known."""
-        spread = self.device or self.wall
-        return None if spread is None else spread.median
+Cost = dict[str, Any]  # see `measure`
 
 
 def bench_kernels(
     names: Sequence[str] | None = None,
     *,
     phases: Sequence[tuple[str, float]] = PHASES,
-    rays: int = RAYS,
-    seconds: float = 0.3,
     progress: Progress | None = None,
-) -> list[KernelCost]:
+) -> list[Cost]:
     """Measure kernels, all of the registry by default: 'name' stands for all its sizes, 'name-N' for one.
 
-    Of the phase functions, with their g, the first is measured with all sizes, the others with the default sizes. So
-    many rays are timed for so many seconds each; progress is called with (done, total, what) before every kernel.
+    Of the phase functions, with their g, the first is measured with all sizes, the others with the default sizes.
     """
     ladders = [_ladder(name) for name in names or KERNELS]
     total = len(ladders) * len(phases)
-    costs: list[KernelCost] = []
+    costs: list[Cost] = []
     for number, (phase, g) in enumerate(phases):
-        truth, timed = wide_rays(ERROR_RAYS, phase, g), wide_rays(rays, phase, g, truth=False)
+        truth, timed = wide_rays(ERROR_RAYS, phase, g), wide_rays(RAYS, phase, g, truth=False)
         for done, (family, default, sizes) in enumerate(ladders):
             if progress is not None:
                 progress(number * len(ladders) + done, total, f"{family}, {phase}")
             for size in sizes if number == 0 else (default,):
-                cost = measure(family, size, truth=truth, timed=timed, seconds=seconds)
-                if cost.refused is None or size == default:  # a size that the kernel does not have is left out
+                cost = measure(family, size, truth=truth, timed=timed)
+                if cost["refused"] is None or size == default:  # a size that the kernel does not have is left out
                     costs.append(cost)
     return costs
 
 
-def measure(family: str, size: int | None, *, truth: Cases, timed: Cases, seconds: float = 0.3) -> KernelCost:
-    """Measure the kernel 'family-size': its error on rays with known J, its time on others, of one phase function."""
+def measure(family: str, size: int | None, *, truth: Cases, timed: Cases, seconds: float = 0.3) -> Cost:
+    """Measure the kernel 'family-size': its error on rays with known J, its time on others, of one phase function.
+
+    Returns
+    -------
+    dict
+        The `kernel`, its `family` and `size`, `phase` and `g`; how many `rays` were timed, and the times a ray [ns] of
+        the `device`, the kernel alone, and of the `wall` clock, with launch and replay, each with its `median`, the
+        quartiles `low` and `high` and its `repetitions`; `median`, `p99` and `max` of the relative errors in float32,
+        and how many are `nonfinite`; or in `refused` the kernel's words.
+    """
     name, phase, g = sized(family, size), truth.phase[0], float(truth.g[0])
     function = find_kernel(name)
+    cost: Cost = {"kernel": name, "family": family, "size": size, "phase": phase, "g": g, "rays": 0, "nonfinite": 0}
+    cost |= dict.fromkeys(("device", "wall", "median", "p99", "max", "refused"))
     rays = len(timed.x0)
     if size is not None and family in KERNELS and next(iter(KERNELS[family].parameters), None) == "steps":
         rays //= max(1, size // _MOST_STEPS)
@@ -124,31 +99,37 @@ def measure(family: str, size: int | None, *, truth: Cases, timed: Cases, second
         J = np.array(_frozen(function, truth)(), dtype=np.float64)
         device, wall = times_per_ray(_frozen(function, timed, rays), rays, seconds)
     except (InputError, RealtimeInputError) as reason:
-        return KernelCost(name, family, size, phase, g, refused=str(reason))
+        return cost | {"refused": str(reason)}
     error = relative_error(J, np.asarray(truth.value), "single")
     finite = np.isfinite(error)
     median, p99, largest = np.percentile(error[finite], [50, 99, 100]).tolist() if finite.any() else [None] * 3
-    nonfinite = int(np.sum(~finite))
-    return KernelCost(name, family, size, phase, g, rays, device, wall, median, p99, largest, nonfinite)
+    errors = {"median": median, "p99": p99, "max": largest, "nonfinite": int(np.sum(~finite))}
+    return cost | {"rays": rays, "device": device, "wall": wall} | errors
 
 
-def speed_against_error(costs: Sequence[KernelCost]) -> list[dict[str, Any]]:
+def speed_against_error(costs: Sequence[Cost]) -> list[dict[str, Any]]:
     """Return the cheapest kernel, and its cost [ns a ray], for each phase function, statistic and error level.
 
     A kernel reaches a level if its error stays at or below it; one that gave values that are not finite reaches none.
     """
     levels = []
-    for phase, statistic, level in product(dict.fromkeys(cost.phase for cost in costs), ("max", "p99"), LEVELS):
-        good = [cost for cost in costs if cost.phase == phase and _reaches(cost, statistic, level)]
-        best = min(good, key=lambda cost: cost.ns or 0.0, default=None)
-        of_best = {"cheapest": best.kernel if best else None, "ns": best.ns if best else None}
+    for phase, statistic, level in product(dict.fromkeys(cost["phase"] for cost in costs), ("max", "p99"), LEVELS):
+        good = [cost for cost in costs if cost["phase"] == phase and _reaches(cost, statistic, level)]
+        best = min(good, key=_ns, default=None)
+        of_best = {"cheapest": best and best["kernel"], "ns": best and _ns(best)}
         levels.append({"phase": phase, "statistic": statistic, "level": level, **of_best})
     return levels
 
 
-def _reaches(cost: KernelCost, statistic: str, level: float) -> bool:
-    error = getattr(cost, statistic)
-    return cost.ns is not None and error is not None and not cost.nonfinite and error <= level
+def _reaches(cost: Cost, statistic: str, level: float) -> bool:
+    return (
+        cost["refused"] is None and cost[statistic] is not None and not cost["nonfinite"] and cost[statistic] <= level
+    )
+
+
+def _ns(cost: Cost) -> float:
+    """Return what kernels are compared by [ns a ray]: the device's time where it is known."""
+    return float((cost["device"] or cost["wall"])["median"])
 
 
 def _ladder(name: str) -> tuple[str, int | None, tuple[int | None, ...]]:
@@ -198,18 +179,21 @@ def _frozen(function: Kernel, cases: Cases, rays: int | None = None) -> Callable
     return work
 
 
-def times_per_ray(work: Callable[[], Any], rays: int, seconds: float) -> tuple[Spread | None, Spread]:
+def times_per_ray(work: Callable[[], Any], rays: int, seconds: float) -> tuple[Cost | None, Cost]:
     """Return the time of the compiled kernels alone, where the device tells it, and of the wall clock [ns a ray]."""
-    wall = time_repeated(work, seconds=seconds)
+    whole = time_repeated(work, seconds=seconds)
     times: list[float] = []
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         dr.kernel_history_clear()
-        for _ in range(max(5, min(wall.repetitions, 50))):
+        for _ in range(max(5, min(whole.repetitions, 50))):
             work()
             dr.sync_thread()
             times.append(sum(entry.get("execution_time", 0.0) for entry in dr.kernel_history((dr.KernelType.JIT,))))
             dr.kernel_history_clear()
     scale = 1e6 / rays
-    low, median, high = (float(q) * scale for q in np.percentile(times, [25, 50, 75]))
-    device = Spread(median, low, high, len(times)) if median > 0 else None
-    return device, Spread(wall.median_ms * scale, wall.low_ms * scale, wall.high_ms * scale, wall.repetitions)
+    device, wall = (
+        {name: getattr(each, f"{name}_ms") * scale for name in ("median", "low", "high")}
+        | {"repetitions": each.repetitions}
+        for each in (timing_of(times), whole)
+    )
+    return device if device["median"] > 0 else None, wall

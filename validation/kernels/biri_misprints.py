@@ -11,10 +11,11 @@ near-foot       both ends within one radian of the foot of the perpendicular, as
                 in that angle should be good
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from functools import partial
+from itertools import product
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,31 +36,22 @@ COMPARED: Mapping[str, Kernel] = MappingProxyType(
 _NEAR_FOOT = 1.0  # [rad]
 
 
-@dataclass(frozen=True)
-class Accuracy:
-    """How far a kernel is from the truth on a set of rays."""
+def printed_against_derived(
+    count: int = 100_000, *, kernels: Mapping[str, Kernel] = COMPARED
+) -> Iterator[dict[str, Any]]:
+    """Yield for each of the paper's phase functions, region and kernel which fraction of rays is how accurate.
 
-    phase: str
-    kernel: str
-    region: str  #: 'all', 'moderate' or 'near-foot', see the module
-    rays: int
-    within_1_percent: float  #: share of the rays [1]
-    within_10_percent: float  #: share of the rays [1]
-
-
-def printed_against_derived(count: int = 100_000, *, kernels: Mapping[str, Kernel] = COMPARED) -> list[Accuracy]:
-    """Return the accuracy for each of the paper's phase functions, each region and each kernel, in this order.
-
-    Of each phase function there are `count` rays, at most 2^20; a power of two keeps them balanced.
+    Of each phase function there are `count` rays, at most 2^20; a power of two keeps them balanced. A row has `phase`,
+    `region`, `kernel`, how many `rays`, and of these the fractions `within_1_percent` and `within_10_percent`.
     """
-    accuracies = []
     for phase in PRINTED_PHASES:
         cases = wide_rays(count, phase)
         regions = {"all": np.ones(count, dtype=bool), "moderate": _moderate(cases), "near-foot": _near_foot(cases)}
         errors = {name: relative_errors(cases, function) for name, function in kernels.items()}
-        for region, chosen in regions.items():
-            accuracies += [_accuracy(phase, name, region, error[chosen]) for name, error in errors.items()]
-    return accuracies
+        for (region, chosen), (name, error) in product(regions.items(), errors.items()):
+            of = error[chosen]
+            within = {f"within_{percent}_percent": _within(of, percent / 100) for percent in (1, 10)}
+            yield {"phase": phase, "region": region, "kernel": name, "rays": len(of), **within}
 
 
 def relative_errors(cases: Cases, function: Kernel) -> Array:
@@ -83,6 +75,5 @@ def _near_foot(cases: Cases) -> NDArray[np.bool_]:
     return np.maximum(*ends) <= _NEAR_FOOT
 
 
-def _accuracy(phase: str, kernel: str, region: str, error: Array) -> Accuracy:
-    within_1, within_10 = (float(np.mean(error <= bound)) if len(error) else float("nan") for bound in (0.01, 0.1))
-    return Accuracy(phase, kernel, region, len(error), within_1, within_10)
+def _within(error: Array, bound: float) -> float:
+    return float(np.mean(error <= bound)) if len(error) else float("nan")

@@ -30,8 +30,8 @@ The allowance a is in the units of J, and it is small: relative to V it is 1e-38
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,20 +55,11 @@ _FARTHEST = 2.0**63  # [m]
 _SMALLEST = {"single": 2.0**-126, "double": 2.0**-1022}
 
 
-@dataclass(frozen=True)
-class Errors:
-    """Relative errors of one group of rays [1]; the quantiles are of the finite ones, None where there is none."""
-
-    rays: int  #: that the kernel did not refuse
-    refused: int  #: rays that it refused
-    median: float | None
-    p99: float | None  #: 99 % quantile
-    max: float | None
-    mean: float | None
-    nan: int  #: rays with a NaN
-    infinite: int  #: rays with an infinity where the truth is finite
-    negative: int  #: rays with a negative value
-    worst: str | None  #: the ray with the largest error, or the first that is not finite, as a line of CSV
+#: Of one group of rays, by name: how many `rays` the kernel did not refuse and how many it `refused`; `median`, `p99`,
+#: `max` and `mean` of the relative errors that are finite [1], None where there is none; how many values are `nan`,
+#: `infinite` where the truth is finite, or `negative`; and the `worst` ray, that of the largest error or the first that
+#: is not finite, as a line of CSV.
+Errors = Mapping[str, Any]
 
 
 def groups(cases: Cases) -> dict[str, Rows]:
@@ -133,15 +124,12 @@ def _errors(cases: Cases, values: Values, error: Array, known: Rows, group: Rows
         worst = int(np.argmax(np.where(finite, error, -1.0)))
     if bad.any():
         worst = int(np.argmax(bad))
-    return Errors(
-        rays=int(tried.sum()),
-        refused=int((group & ~values.accepted).sum()),
-        median=median,
-        p99=p99,
-        max=largest,
-        mean=mean,
-        nan=int(np.isnan(J).sum()),
-        infinite=int((np.isinf(values.J) & known & tried).sum()),
-        negative=int((J < 0).sum()),
-        worst=None if worst is None else case_row(cases, worst),
-    )
+    return {
+        "rays": int(tried.sum()),
+        "refused": int((group & ~values.accepted).sum()),
+        **{"median": median, "p99": p99, "max": largest, "mean": mean},
+        "nan": int(np.isnan(J).sum()),
+        "infinite": int((np.isinf(values.J) & known & tried).sum()),
+        "negative": int((J < 0).sum()),
+        "worst": None if worst is None else case_row(cases, worst),
+    }

@@ -5,19 +5,19 @@ The certified values are the files of `validation.certified`.
 
 A light volume and shadow planes add and subtract Gamma(x) = J(0, x). Of a sliver far from the light two nearly equal
 numbers are subtracted, and with relative rounding errors of size eps the difference J(0, x1) - J(0, x0) is wrong by
-about eps (J(0, x0) + J(0, x1)), however exact the kernel: `GammaDifference` compares both.
+about eps (J(0, x0) + J(0, x1)), however exact the kernel: `gamma_difference` compares both.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from analytic.cases import Cases, read_cases
 from realtime.kernels.registry import KERNELS
 from validation.certified.files import certified_data
-from validation.kernels.errors import EPSILON, Errors, Rows, errors_by_group, groups
+from validation.kernels.errors import EPSILON, Rows, errors_by_group, groups
 from validation.kernels.rays import hard_rays, slivers
 from validation.kernels.values import Kernel, Values, evaluate_cases
 from validation.study.configuration import find_kernel
@@ -41,50 +41,12 @@ BAR = {
 }
 
 
-@dataclass(frozen=True)
-class SetStability:
-    """A kernel on one set of rays: the errors of each group of rays."""
-
-    name: str
-    columns: str  #: header of the lines `worst`
-    single: dict[str, Errors]
-    double: dict[str, Errors]
-    single_against_double: dict[str, Errors]  #: float32 against float64 of the same source
-
-
-@dataclass(frozen=True)
-class GammaDifference:
-    """A short segment as J(x0, x1) and as J(0, x1) - J(0, x0), in one precision."""
-
-    direct: Errors
-    difference: Errors
-    median_rounding: float | None  #: error of the difference, in units of eps (J(0, x0) + J(0, x1))
-    max_rounding: float | None
-
-
-@dataclass(frozen=True)
-class KernelStability:
-    """All that is known of one kernel."""
-
-    kernel: str
-    exact: bool  #: claims to be exact
-    refused: dict[str, str]  #: phase function -> the kernel's words
-    sets: tuple[SetStability, ...]
-    gamma: dict[str, GammaDifference]  #: by precision
-    broken: tuple[str, ...]  #: bars that a kernel which claims to be exact does not keep
-
-
-def certified_files() -> tuple[Path, ...]:
-    """Return the files of certified values."""
-    return tuple(certified_data(name) for name in CERTIFIED)
-
-
 def stability(
     names: Sequence[str] | None = None, *, count: int = 100_000, progress: Progress | None = None
-) -> list[KernelStability]:
+) -> list[dict[str, Any]]:
     """Study kernels, all of the registry by default, on the certified rays and on so many generated ones."""
     chosen = [(name, find_kernel(name)) for name in names or KERNELS]  # refuse a wrong name before any work
-    sets = {path.name: read_cases(path) for path in certified_files()} | {GENERATED: hard_rays(count)}
+    sets = {name: read_cases(certified_data(name)) for name in CERTIFIED} | {GENERATED: hard_rays(count)}
     thin = slivers()
     results = []
     for number, (name, function) in enumerate(chosen):
@@ -94,8 +56,17 @@ def stability(
     return results
 
 
-def kernel_stability(name: str, function: Kernel, sets: dict[str, Cases], thin: Cases) -> KernelStability:
-    """Study one kernel on sets of rays with known J, the generated ones among them, and on slivers."""
+def kernel_stability(name: str, function: Kernel, sets: dict[str, Cases], thin: Cases) -> dict[str, Any]:
+    """Study one kernel on sets of rays with known J, the generated ones among them, and on slivers.
+
+    Returns
+    -------
+    dict
+        The `kernel`, and whether it claims to be `exact`; its words by phase functions that it `refused`; the `sets`,
+        each with its `name`, the `columns` of the lines `worst`, and by group of rays the errors in `single` and in
+        `double` precision, and of `single_against_double` of the same source; `gamma`, see `gamma_difference`, by
+        precision; and what is `broken`, the bars that a kernel which claims to be exact does not keep.
+    """
     exact = claims_exact(name)
     broken: list[str] = []
     studied = []
@@ -103,11 +74,14 @@ def kernel_stability(name: str, function: Kernel, sets: dict[str, Cases], thin: 
     for label, cases in sets.items():
         values = {precision: evaluate_cases(cases, function, precision) for precision in PRECISIONS}
         refused |= values["single"].refused
-        studied.append(_set_stability(label, cases, values))
+        rows = groups(cases)
+        errors: dict[str, Any] = {each: errors_by_group(cases, values[each], each, rows) for each in PRECISIONS}
+        both = errors_by_group(cases, values["single"], "single", rows, expected=values["double"].J)
+        studied.append({"name": label, "columns": ",".join(cases.header), **errors, "single_against_double": both})
         if exact:
             broken += _broken(label, cases, values)
     gamma = {precision: gamma_difference(function, thin, precision) for precision in PRECISIONS}
-    return KernelStability(name, exact, refused, tuple(studied), gamma, tuple(broken))
+    return {"kernel": name, "exact": exact, "refused": refused, "sets": studied, "gamma": gamma, "broken": broken}
 
 
 def claims_exact(name: str) -> bool:
@@ -115,8 +89,12 @@ def claims_exact(name: str) -> bool:
     return name == "exact" or bool(getattr(KERNELS.get(name), "exact", False))
 
 
-def gamma_difference(function: Kernel, cases: Cases, precision: str) -> GammaDifference:
-    """Compare J(x0, x1) with J(0, x1) - J(0, x0)."""
+def gamma_difference(function: Kernel, cases: Cases, precision: str) -> dict[str, Any]:
+    """Compare J(x0, x1) with J(0, x1) - J(0, x0).
+
+    The errors of both are `direct` and `difference`; `median_rounding` and `max_rounding` are the error of the
+    difference in units of eps (J(0, x0) + J(0, x1)).
+    """
     direct = evaluate_cases(cases, function, precision)
     start = np.zeros(len(cases.x0))
     far = evaluate_cases(replace(cases, x0=start), function, precision)
@@ -128,19 +106,12 @@ def gamma_difference(function: Kernel, cases: Cases, precision: str) -> GammaDif
         rounding = np.abs(J - cases.value) / (EPSILON[precision] * (np.abs(far.J) + np.abs(near.J)))
     everything = {"all": np.ones(len(J), dtype=bool)}
     finite = rounding[np.isfinite(rounding)]
-    return GammaDifference(
-        direct=errors_by_group(cases, direct, precision, everything)["all"],
-        difference=errors_by_group(cases, Values(J, direct.refused, direct.accepted), precision, everything)["all"],
-        median_rounding=float(np.median(finite)) if len(finite) else None,
-        max_rounding=float(finite.max()) if len(finite) else None,
-    )
-
-
-def _set_stability(name: str, cases: Cases, values: dict[str, Values]) -> SetStability:
-    rows = groups(cases)
-    single, double = (errors_by_group(cases, values[precision], precision, rows) for precision in PRECISIONS)
-    between = errors_by_group(cases, values["single"], "single", rows, expected=values["double"].J)
-    return SetStability(name, ",".join(cases.header), single, double, between)
+    return {
+        "direct": errors_by_group(cases, direct, precision, everything)["all"],
+        "difference": errors_by_group(cases, replace(direct, J=J), precision, everything)["all"],
+        "median_rounding": float(np.median(finite)) if len(finite) else None,
+        "max_rounding": float(finite.max()) if len(finite) else None,
+    }
 
 
 def _broken(name: str, cases: Cases, values: dict[str, Values]) -> list[str]:
@@ -165,11 +136,11 @@ def _broken(name: str, cases: Cases, values: dict[str, Values]) -> list[str]:
         ]
     faults = []
     for what, errors, quantile, limit in limits:
-        value = getattr(errors, quantile)
+        value = errors[quantile]
         if value is not None and value > limit:
-            at = f" at {errors.worst}" if quantile == "max" else ""
+            at = f" at {errors['worst']}" if quantile == "max" else ""
             faults.append(f"{name}: {what} {value:.3g} > {limit:g}{at}")
     for precision, errors in (("float32", single["all"]), ("float64", double["all"])):
-        counts = {"NaN": errors.nan, "infinite": errors.infinite, "negative": errors.negative}
+        counts = {"NaN": errors["nan"], "infinite": errors["infinite"], "negative": errors["negative"]}
         faults += [f"{name}: {precision}: {number} {what}" for what, number in counts.items() if number]
     return faults

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Values of a kernel on tables of cases."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -60,15 +60,8 @@ def evaluate_rows(
 ) -> Array:
     """Return J of cases that share a phase function, (rows,) [1/m].
 
-    Parameters
-    ----------
-    cases, rows
-        The cases and which of them; where they have rays, foot and height are computed from them in the precision,
-        'single' or 'double'.
-    table
-        Values of the phase function 'tabulated', of mean 1.
-    intensity
-        Of the light [W/sr].
+    Where cases have rays, foot and height are computed from them in the precision, 'single' or 'double'. The `table`
+    has the values of the phase function 'tabulated', of mean 1; the light has an `intensity` [W/sr].
     """
     types = array_types(precision)
     name = cases.phase[rows[0]]
@@ -89,17 +82,3 @@ def evaluate_rows(
         geometry = ray_geometry(types.vector(cases.origin[rows].T), direction, light)
     x0, x1 = column(cases.x0[rows]), column(cases.x1[rows])
     return np.array(function(geometry, x0, x1, medium, light), dtype=np.float64)
-
-
-def take(cases: Cases, rows: NDArray[Any]) -> Cases:
-    """Return the cases of some `rows`, (n,): numbers, or truth values of all cases; units [m, 1/m] stay."""
-    numbers = np.arange(len(cases.phase))[rows]
-
-    def words(column: Sequence[Any] | None):
-        return None if column is None else tuple(column[k] for k in numbers)
-
-    columns = ("g", "foot", "height", "x0", "x1", "sigma_t", "value", "origin", "direction", "light")
-    arrays = {name: getattr(cases, name) for name in columns}
-    chosen: dict[str, Any] = {name: None if column is None else column[numbers] for name, column in arrays.items()}
-    chosen |= {"phase": words(cases.phase), "tag": words(cases.tag), "rows": words(cases.rows) if cases.rows else ()}
-    return replace(cases, **chosen)

@@ -64,20 +64,8 @@ def colour_difference(
 ) -> ColourDifference:
     """Return how different two images look (see the module).
 
-    Parameters
-    ----------
-    reference, test
-        Radiance [W/(m^2 sr)], (height, width), (height, width, 1) for grey or (height, width, 3).
-    exposure
-        In stops; None for `auto_exposure` of the reference.
-    mask
-        Pixels to compare, (height, width) of truth values; all by default.
-
-    Raises
-    ------
-    InputError
-        If the sizes differ, the channels are neither one nor three, the mask does not fit or leaves nothing, or a
-        number is out of range.
+    Radiances [W/(m^2 sr)] are (height, width), (height, width, 1) for grey or (height, width, 3). The exposure is in
+    stops, that of `auto_exposure` by default; the mask, (height, width) of truth values, says which pixels to compare.
     """
     if exposure is not None and not np.isfinite(exposure):
         raise InputError(f"exposure: got {exposure}, wanted a number of stops such as -2, or none to choose it")

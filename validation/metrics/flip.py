@@ -82,21 +82,10 @@ def flip_hdr(
 
     The map has the error of every pixel, (height, width); None where there is no answer.
 
-    Parameters
-    ----------
-    reference, test
-        Radiance [W/(m^2 sr)], (height, width) or (height, width, 1) for grey, or (height, width, 3) in linear sRGB.
-    mask
-        Pixels to average over, (height, width) of truth values; all by default. The others show the reference in both
-        images, black where that cannot be shown, so that they add nothing to their neighbours either.
-    exposure
-        A single exposure [stops] instead of the range of `exposure_range`.
-
-    Raises
-    ------
-    InputError
-        If the sizes differ, the channels are neither one nor three, the mask does not fit or leaves nothing, or a
-        number is out of range.
+    Radiances [W/(m^2 sr)] are (height, width) or (height, width, 1) for grey, or (height, width, 3) in linear sRGB.
+    Pixels that the mask leaves out, (height, width), show the reference in both images, black where that cannot be
+    shown, so that they add nothing to their neighbours either. An `exposure` [stops] takes the place of the range of
+    `exposure_range`.
     """
     if exposure is not None and not np.isfinite(exposure):
         raise InputError(f"exposure: got {exposure}, wanted a number of stops such as -2, or none to choose a range")

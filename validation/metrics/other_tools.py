@@ -82,26 +82,11 @@ def published_errors(
 ) -> PublishedErrors:
     """Compare a test image with a reference by the formulae of other tools.
 
-    Parameters
-    ----------
-    reference, test
-        Radiance [W/(m^2 sr)], (height, width) or (height, width, channels).
-    mask
-        Pixels to compare, (height, width) of truth values; all by default.
-    unit
-        Radiance that counts as 1; None for the mean of the reference over the pixels compared, or 1 if that is not
-        above zero.
+    Images and mask are those of `validation.metrics.errors.error_metrics`. The `unit` is the radiance that counts as 1;
+    None for the mean of the reference over the pixels compared, or 1 if that is not above zero.
 
-    Returns
-    -------
-    PublishedErrors
-        If no pixel is finite in both images, every error is NaN. Negative values stay in, and a denominator that they
-        make zero gives an infinite error. If the reference is black, `relative`, `dark_max` and `psnr` are NaN.
-
-    Raises
-    ------
-    InputError
-        If the sizes differ, an image is empty, the mask does not fit or leaves nothing, or the unit is not above zero.
+    If no pixel is finite in both images, every error is NaN. Negative values stay in, and a denominator that they make
+    zero gives an infinite error. If the reference is black, `relative`, `dark_max` and `psnr` are NaN.
     """
     if unit is not None and not 0 < unit < np.inf:
         raise InputError(f"unit: got {unit}, wanted a radiance above 0, or none for the mean of the reference")

@@ -72,12 +72,7 @@ ENTRIES = (
 def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, Any]:
     """Return rates as published and by our exact form, fractions of stages [%], and the largest median error.
 
-    Parameters
-    ----------
-    scale
-        Of the width and height of all images; 1 for the published sizes.
-    seconds
-        For each timing, about [s].
+    All images have the published width and height times `scale`; each timing takes about so many `seconds`.
     """
     figures: dict[str, Any] = {}
     errors = []
@@ -103,14 +98,8 @@ def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, A
 def as_published(kernel: str, *, white: float, cone: int = 0) -> Configuration:
     """Return shadow planes with all that the paper has.
 
-    Parameters
-    ----------
-    kernel
-        The polynomial, 'taylor' or 'taylor-printed'.
-    white
-        The radiance that fills the buffer [W/(m^2 sr)].
-    cone
-        Edges of the cone over a spot; 0 for other lights.
+    The kernel is 'taylor' or 'taylor-printed', `white` the radiance that fills the buffer [W/(m^2 sr)], and `cone` the
+    edges of the cone over a spot, 0 for other lights.
     """
     media = {"media": "printed"} if kernel == "taylor-printed" else {}
     values = {"order": "paper", "evaluation": "vertex", "buffer": "8bit", "white": white, "cone": cone}
@@ -122,11 +111,6 @@ def fractions(times: list[Timing]) -> dict[str, list[float]]:
 
     Each has the ends of its interval: the quartile of the stage that is least, with the others' that are most, and the
     other way round.
-
-    Parameters
-    ----------
-    times
-        Of `_stage_works`.
     """
     silhouettes, surface, unshadowed, host, airlight = (milliseconds(time) for time in times)
 

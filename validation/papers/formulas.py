@@ -22,13 +22,7 @@ _HAZY = PhaseFunction("hazy")
 
 
 def formulas() -> dict[str, float]:
-    """Return what printed formulas are over what they must be, and what light does in the paper's cloud.
-
-    Returns
-    -------
-    dict
-        See the claims whose experiment is `formulas`.
-    """
+    """Return what printed formulas are over what they must be, and what light does in the paper's cloud."""
     return {"biri angle": _angular_form()} | _annex() | _within_ten_percent() | _cloud_equations() | _droplets()
 
 
@@ -91,9 +85,9 @@ def _within_ten_percent() -> dict[str, float]:
     """Return the fraction of moderate rays on which the isotropic polynomials are within 10 %."""
     kernels = {"printed": COMPARED["taylor-printed"], "derived": COMPARED["taylor"]}
     return {
-        f"within 10 %, {accuracy.kernel}": accuracy.within_10_percent
-        for accuracy in printed_against_derived(_WIDE_RAYS, kernels=kernels)
-        if (accuracy.phase, accuracy.region) == ("isotropic", "moderate")
+        f"within 10 %, {each['kernel']}": each["within_10_percent"]
+        for each in printed_against_derived(_WIDE_RAYS, kernels=kernels)
+        if (each["phase"], each["region"]) == ("isotropic", "moderate")
     }
 
 

@@ -148,13 +148,7 @@ def corner_heights(shadow_map: ShadowMap) -> Array:
 
 
 def quad_levels(divided: list[Any]) -> NDArray[np.int64]:
-    """Return the level of the quad in which each texel lies, (faces, size, size); 0 is a whole face.
-
-    Parameters
-    ----------
-    divided
-        From `realtime.methods.light_volumes.published.tessellation.divide`.
-    """
+    """Return the level of the quad in which each texel lies, (faces, size, size); 0 is a whole face."""
     size = 2 ** len(divided)
     level = np.zeros((len(divided[0]), size, size), dtype=np.int64)
     for number, numbers, _ in quads(divided):
@@ -175,12 +169,8 @@ def _jumps(heights: Array) -> NDArray[np.bool_]:
 def plain_edges(heights: Array, wanted: int) -> list[Any]:
     """Return the nodes of each level that hold a texel beyond the threshold of the plain Laplacian of the depth.
 
-    Parameters
-    ----------
-    heights
-        Inverse depths, (faces, N + 1, N + 1) [1/m].
-    wanted
-        Triangles of the mesh; the threshold is found by bisection, so their number is close to it.
+    The `heights` are inverse depths, (faces, N + 1, N + 1) [1/m]. The threshold is found by bisection, so that the mesh
+    has about as many triangles as are `wanted`.
     """
     response = laplacian(heights)
     low, high = -20.0, float(np.log(response.max() + 1))
@@ -196,10 +186,7 @@ def plain_edges(heights: Array, wanted: int) -> list[Any]:
 def laplacian(heights: Array) -> Array:
     """Return |sum of the four neighbours - 4 times the corner| of the depth, (faces, N + 1, N + 1), edges repeated.
 
-    Parameters
-    ----------
-    heights
-        Inverse depths at the corners of texels [1/m]; where they are 0 the depth is that of the farthest other corner.
+    Where the inverse depths at the corners, `heights` [1/m], are 0, the depth is that of the farthest other corner.
     """
     depth = 1 / np.maximum(heights, heights[heights > 0].min())
     wide = np.pad(depth, ((0, 0), (1, 1), (1, 1)), mode="edge")

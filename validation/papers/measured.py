@@ -23,13 +23,7 @@ def rate(timing: Timing) -> list[float]:
 
 
 def frame_within(renderer: FrameRenderer, limit: float = LIMIT) -> Frame:
-    """Render a frame, unless frames take too long for timing.
-
-    Raises
-    ------
-    TimeoutError
-        If the frame took longer than `limit` [s], compilation included.
-    """
+    """Render a frame, unless frames take too long for timing."""
     frame, milliseconds, _ = timed(lambda: render_frame(renderer))
     if milliseconds > 1e3 * limit:
         raise TimeoutError(f"a frame takes {1e-3 * milliseconds:.0f} s, more than the limit of {limit:g} s")

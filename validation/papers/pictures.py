@@ -50,13 +50,7 @@ def two_lights_image(size: tuple[int, int]) -> Array:
 
 
 def tessellations(size: int) -> dict[str, Array]:
-    """Return by filter the side of the quads of one face of the colonnade's map, (size, size) [texels].
-
-    Parameters
-    ----------
-    size
-        Of a face, a power of two [texels].
-    """
+    """Return by filter the side of the quads of one face of the colonnade's map, (size, size) [texels]."""
     scene = read_scene(load_scene("colonnade", (64, 48)).scene)
     heights = corner_heights(cast_shadow_map(scene.geometry, scene.lights[0], size))
     ours = divide(edges(heights, THRESHOLD))

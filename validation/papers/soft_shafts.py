@@ -93,15 +93,7 @@ class Reference:
 
 
 def soft_shafts(size: tuple[int, int] = SIZE, *, seconds: float = 0.3) -> dict[str, Any]:
-    """Return errors, ratios of errors, edges, flicker and rates by the names of the renderings.
-
-    Parameters
-    ----------
-    size
-        Of the frames [pixels].
-    seconds
-        For the timings of each rendering [s].
-    """
+    """Return errors, ratios of errors, edges, flicker and rates by the names of the renderings."""
     scene = read_scene(load_scene(SCENE, size).scene)
     reference = shafts_reference(size)
     times = timings(scene, RENDERINGS, seconds)

@@ -15,10 +15,7 @@ _RAYS = 4000
 def stencil() -> dict[str, float]:
     """Return the fraction of random rays with up to five overlapping shadows whose lit length comes out right.
 
-    Returns
-    -------
-    dict
-        `section 5.1.5` and `stage 5`, by the rules that these print.
+    They are `section 5.1.5` and `stage 5`, by the rules that these print.
     """
     random = np.random.default_rng(65)
     rays = [_shadows(random) for _ in range(_RAYS)]

@@ -40,13 +40,7 @@ Array = NDArray[np.float64]
 
 
 def parse_moves(text: str) -> tuple[str, ...]:
-    """Return what moves, from words separated by commas such as 'light,colour'.
-
-    Raises
-    ------
-    InputError
-        For a word that is not in `validation.scenes.registry.MOVES`.
-    """
+    """Return what moves, from words separated by commas such as 'light,colour'."""
     moves = tuple(dict.fromkeys(word.strip() for word in text.split(",")))
     for move in moves:
         if move not in MOVES:
@@ -68,16 +62,6 @@ def animate(scene: Scene, animation: Animation, frames: int) -> Iterator[Scene]:
 
     A yielded scene is valid only until the next one is asked for: all of them share one Mitsuba scene, in which the
     objects move.
-
-    Parameters
-    ----------
-    scene
-        As `realtime.scene.read_scene.read_scene` returns it.
-
-    Raises
-    ------
-    InputError
-        If there are no frames, or if objects shall move and no mesh is closed.
     """
     if frames < 1:
         raise InputError(f"frames: got {frames}, wanted at least 1")

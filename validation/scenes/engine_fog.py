@@ -72,13 +72,7 @@ ENGINES = {
 
 
 def layers_of(engine: str, given: Mapping[str, float]) -> tuple[tuple[Layer, ...], bool]:
-    """Return the layers that an engine's parameters stand for, and whether they are constant below their bases.
-
-    Raises
-    ------
-    ValueError
-        For another engine, a parameter that is missing, or one that makes no fog.
-    """
+    """Return the layers that an engine's parameters stand for, and whether they are constant below their bases."""
     if engine not in ENGINES:
         raise ValueError(f"heightfog has engine = {engine}; wanted one of {', '.join(ENGINES)}")
     values = {name: given.get(name, default) for name, default in ENGINES[engine].parameters.items()}

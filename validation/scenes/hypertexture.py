@@ -33,18 +33,9 @@ def hypertexture(
 
     The distance is computed on every second voxel, and linear between these; it takes seconds.
 
-    Parameters
-    ----------
-    mesh
-        A closed mesh.
-    voxels
-        Along each axis.
-    cells, amplitude, seed
-        Of the four octaves of noise: size of the first's cells, and largest value [m].
-    depths
-        Between which the density rises from 0 to 1, where there is no noise [m].
-    margin
-        Of the box around the mesh [m].
+    The mesh is closed; there are so many `voxels` along each axis, in a box with a `margin` around the mesh [m]. Of the
+    four octaves of noise there are the size of the first's `cells`, the largest value, `amplitude` [m], and the `seed`;
+    without noise the density rises from 0 to 1 between two `depths` [m].
     """
     low, high = mesh[0].min(axis=0) - margin, mesh[0].max(axis=0) + margin
     coarse = voxels // 2

@@ -175,12 +175,6 @@ def compare_statistics(
         Probability [1] that a comparison of agreeing images rejects any pixel, and likewise any block.
     plain_level
         Level at which exceeding values are counted.
-
-    Raises
-    ------
-    InputError
-        If sizes differ, no standard error is given, one is negative or not finite, a number of batches is below 2, the
-        batch means are not of these pixels, or a level or the margin is out of range.
     """
     _check_levels(margin, family_level, plain_level)
     ref, tst, asked = compared(reference.mean, test.mean, mask)

@@ -128,14 +128,8 @@ def drift(pairs: Iterable[tuple[Times, Times]]) -> float:
 def least_ratio(spread_of_both: float, *, same_machine: bool, tolerance: float = TIME_TOLERANCE) -> float:
     """Return the least ratio [1] of two times that means something.
 
-    Parameters
-    ----------
-    spread_of_both
-        By how much the machine's noise alone moves the ratio, at least 1: the larger `spread` of both.
-    same_machine
-        Whether one machine took both times; the band is four times as wide where not.
-    tolerance
-        Relative band of a time on one machine [1].
+    `spread_of_both` is by how much the machine's noise alone moves the ratio, at least 1: the larger `spread` of both.
+    The band of `tolerance` is four times as wide where not one machine took both times.
     """
     return (1 + tolerance * (1 if same_machine else 4)) * spread_of_both
 
@@ -143,18 +137,8 @@ def least_ratio(spread_of_both: float, *, same_machine: bool, tolerance: float =
 def slower_stages(old: Times, new: Times, *, least: float, scale: float) -> list[str]:
     """Return the stages of a frame that got slower.
 
-    Parameters
-    ----------
-    old, new
-        The times of one configuration in two reports.
-    least
-        Least ratio of two times that means something [1], from `least_ratio`.
-    scale
-        How much slower than before everything else is [1]: at least 1 on the same machine.
-
-    Notes
-    -----
-    What got faster are the stages that get slower from new to old.
+    Ratios of times mean something from `least` on, see `least_ratio`; `scale` is how much slower than before everything
+    else is [1], at least 1 on the same machine. What got faster are the stages that get slower from new to old.
     """
     before = {stage: timing for stage, timing in old.items() if stage in new}
     after = {stage: _scaled(new[stage], 1 / scale) for stage in before}
@@ -189,13 +173,7 @@ def _scaled(timing: Timing, factor: float) -> dict[str, Any]:
 
 
 def other_power(old: Mapping[str, Any], new: Mapping[str, Any]) -> float:
-    """Return by how much a time grows with another power of the work than before, 0 where noise may explain it.
-
-    Parameters
-    ----------
-    old, new
-        `exponent` and `standard_error` of fits [1], None where there were too few steps for them.
-    """
+    """Return by how much a time grows with another power of the work than before, 0 where noise may explain it."""
     before, after = old["exponent"], new["exponent"]
     if before is None or after is None:
         return 0.0

@@ -21,18 +21,7 @@ def satterthwaite(variance: ArrayLike, spread: ArrayLike) -> Array:
 
     degrees of freedom (Satterthwaite 1946, eq. 17; Welch 1947 for two terms).
 
-    Parameters
-    ----------
-    variance
-        V, of any shape and in any unit, such as [1].
-    spread
-        sum(v^2 / (K - 1)), in the shape of V and the square of its unit; 0 for variances known exactly, which gives an
-        infinite nu.
-
-    Returns
-    -------
-    array
-        nu [1], in their shape.
+    `variance` is V and `spread` the sum, 0 for variances that are known exactly, which gives an infinite nu [1].
     """
     v, s = np.asarray(variance, dtype=np.float64), np.asarray(spread, dtype=np.float64)
     return np.divide(v**2, s, out=np.full(np.broadcast_shapes(v.shape, s.shape), np.inf), where=s > 0)

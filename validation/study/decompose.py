@@ -77,19 +77,8 @@ def decompose(
 ) -> Decomposition:
     """Return the error of a configuration by its causes.
 
-    Parameters
-    ----------
-    truth
-        Airlight at pixel centres, (height, width, 3) [W/(m^2 sr)].
-    render
-        What renders a configuration, for a method of one's own in a process of its own; a frame here by default.
-    exact
-        What renders the exact sum over light points, for callers that keep it; `exact_sum` by default.
-
-    Raises
-    ------
-    realtime.errors.InputError
-        For what the method refuses, and `shadow-planes` where the scene has lights with extent.
+    The truth is that at pixel centres, (height, width, 3) [W/(m^2 sr)]. `render` renders a configuration of one's own,
+    in a process of its own for example, and `exact` the exact sum over light points, for callers that keep it.
     """
 
     def airlight(configuration: Configuration) -> Array:

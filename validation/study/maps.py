@@ -99,11 +99,6 @@ def map_flicker(
         `nonfinite`, pixels that are left out because some image has NaN or infinity there; and lists, by
         configuration: `texels`, by how many a shadow moves from frame to frame, `flicker`, the root mean square of the
         change of the image less that of the reference, and `relative_rmse` of all frames, both over that mean.
-
-    Raises
-    ------
-    InputError
-        For fewer than two frames or a step that is not above 0 and below a radian.
     """
     if frames < 2:
         raise InputError(f"frames: got {frames}, wanted at least 2: flicker is the difference between frames")

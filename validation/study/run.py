@@ -74,27 +74,10 @@ def run(
 ) -> tuple[Row, Frame | None]:
     """Render, time and compare a cell.
 
-    Parameters
-    ----------
-    cell
-        What to render and to measure.
-    scene
-        That of the cell at its size, from `realtime.scene.read_scene.read_scene`.
-    reference
-        Of the same image.
-    timed_scene
-        The scene at the size of the timed frames; None if that is the size of the image.
-    whole
-        The `mi.Scene` that both were read from; without it no error is held against what the method states.
-    paint
-        Makes the picture of the row.
-    apart
-        Calls a user's method in a process of its own.
-
-    Returns
-    -------
-    tuple
-        The row, without what only the caller knows (key, study, origin), and the frame, if there is one.
+    Scene and reference are of the same image, at the size of the cell; frames are timed in `timed_scene` where that is
+    given. `whole` is the `mi.Scene` that both were read from: without it no error is held against what the method
+    states. `paint` makes the picture of the row, and `apart` calls a user's method in a process of its own. The row
+    lacks what only the caller knows: key, study, origin.
     """
     took = stopwatch()
     if apart is not None and cell.chosen.own:

@@ -186,22 +186,10 @@ def study_scene(
 ) -> SceneResult:
     """Return what a study says of a scene.
 
-    Parameters
-    ----------
-    study
-        The scene.
-    images
-        From elsewhere, to judge.
-    apart
-        Calls a user's method in a process of its own.
-    ended
-        Configurations that ended such a process before, with how: they are not called again.
-    progress
-        Called with the name of each part, as of `SceneStudy.seconds`, before it begins.
-    spread
-        Lets other processes trace the batches that check the reference.
-    workers
-        Processes of HDR-FLIP at once: each runs on one processor.
+    `images` from elsewhere are judged. `apart` calls a user's method in a process of its own; configurations that
+    `ended` such a process before, with how, are not called again. `progress` is called with the name of each part, as
+    of `SceneStudy.seconds`, before it begins. `spread` lets other processes trace the batches that check the reference.
+    So many `workers` compute HDR-FLIP at once, each on one processor.
     """
     progress("reference")
     truth, kept = study.kept_truth

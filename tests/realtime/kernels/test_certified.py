@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from analytic.cases import read_cases
-from tests.helpers.kernel_values import relative_error
+from tests.helpers.kernel_values import relative_error, take
 from validation.kernels.cases import integrate_cases
-from validation.kernels.values import take
 
 FEET, RAYS, DROPLETS = (f"airlight_integral{name}.csv" for name in ("", "_rays", "_droplets"))
 LOBES = ("rayleigh", "hazy", "murky", "hg")

@@ -8,8 +8,7 @@ import pytest
 from analytic.cases import read_cases
 from realtime.kernels.closed_form import closed_form, scaled_e1
 from realtime.numerics.array_types import aligned_array, array_types
-from tests.helpers.kernel_values import kernel_values, relative_error
-from validation.kernels.values import take
+from tests.helpers.kernel_values import kernel_values, relative_error, take
 
 pytestmark = pytest.mark.usefixtures("variant")
 

@@ -23,8 +23,9 @@ import numpy as np
 import pytest
 
 from realtime.kernels.exact import exact
+from tests.helpers.kernel_values import take
 from validation.kernels.rays import hard_rays, table, wide_rays
-from validation.kernels.values import evaluate_cases, take
+from validation.kernels.values import evaluate_cases
 
 pytestmark = pytest.mark.usefixtures("variant")
 

@@ -7,8 +7,7 @@ from mpmath import exp, inf, mpf, pi, quad, tan
 
 from analytic.cases import read_cases
 from realtime.kernels.table import table, table_records
-from tests.helpers.kernel_values import RAY, kernel_values
-from validation.kernels.values import take
+from tests.helpers.kernel_values import RAY, kernel_values, take
 
 
 @pytest.fixture(scope="module")

@@ -164,7 +164,7 @@ QUICK = {
 @pytest.mark.parametrize("name", QUICK)
 def test_a_figure_is_drawn_twice_to_the_same_bytes(name, variant, tmp_path, monkeypatch):
     """What is embedded are TrueType fonts, no date."""
-    monkeypatch.setattr("reports.studies.kernels._TIMED_RAYS", 3000)
+    monkeypatch.setattr("validation.kernels.benchmark.RAYS", 3000)
     monkeypatch.setattr("reports.studies.estimators._SIZE", (32, 24))
     found = airlight.study(name, **QUICK[name])
     first = found.save(tmp_path / "first.pdf", "single").read_bytes()

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: the table of speed against error names the cheapest kernel that keeps each error, by what was measured."""
 
-from validation.kernels.benchmark import KernelCost, Spread, measure, speed_against_error
+from validation.kernels.benchmark import measure, speed_against_error
 from validation.kernels.rays import wide_rays
 
 
 def cost(family, size, ns, error, **others):
-    spread = Spread(ns, ns, ns, 5)
-    fields = {"device": spread, "wall": spread, "p99": error / 10, "max": error} | others
-    return KernelCost(f"{family}-{size}", family, size, "isotropic", 0.0, 1000, **fields)
+    spread = {"median": ns, "low": ns, "high": ns, "repetitions": 5}
+    errors = {"p99": error / 10, "max": error, "nonfinite": 0, "refused": None}
+    return {"kernel": f"{family}-{size}", "phase": "isotropic", "device": spread, "wall": spread} | errors | others
 
 
 COSTS = (
@@ -44,11 +44,12 @@ def test_values_that_are_not_finite_reach_no_level():
 def test_measured_errors_and_times_are_those_of_the_kernel(variant):
     truth, timed = wide_rays(512), wide_rays(4096, truth=False)
     coarse, fine = (measure("quadrature", n, truth=truth, timed=timed, seconds=0.05) for n in (4, 16))
-    assert (fine.kernel, fine.family, fine.size, fine.rays) == ("quadrature-16", "quadrature", 16, 4096)
+    names = ("kernel", "family", "size", "rays")
+    assert [fine[name] for name in names] == ["quadrature-16", "quadrature", 16, 4096]
     # The certified bound of 16 nodes is 4e-6; float32 rounds exponents of up to 60.
-    assert fine.max < 3e-5 < coarse.max
-    assert fine.nonfinite == 0
-    for spread in (fine.device, fine.wall):
-        assert 0 < spread.low <= spread.median <= spread.high
-        assert spread.repetitions >= 5
-    assert coarse.refused is None
+    assert fine["max"] < 3e-5 < coarse["max"]
+    assert fine["nonfinite"] == 0
+    for spread in (fine["device"], fine["wall"]):
+        assert 0 < spread["low"] <= spread["median"] <= spread["high"]
+        assert spread["repetitions"] >= 5
+    assert coarse["refused"] is None

@@ -17,13 +17,7 @@ _TEXTURES = ("bitmap", "checkerboard", "mesh_attribute", "volume")
 
 
 def check_kinds(state: Any) -> None:
-    """Refuse what no command takes.
-
-    Raises
-    ------
-    InputError
-        With the id of the part, its plugin, and what is wanted in its place.
-    """
+    """Refuse what no command takes."""
     for kind, taken in _TAKEN.items():
         for index in of_kind(state, kind):
             props = properties(state, index)

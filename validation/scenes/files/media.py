@@ -38,13 +38,7 @@ _MATERIALS = {
 
 
 def give_extinction(state: Any) -> list[str]:
-    """Give homogeneous media extinction and albedo in place of scattering and absorption; return what was changed.
-
-    Raises
-    ------
-    InputError
-        For the name of a material, a density, and coefficients that are no numbers, with what to write instead.
-    """
+    """Give homogeneous media extinction and albedo in place of scattering and absorption; return what was changed."""
     notes = []
     for index in of_kind(state, "Medium"):
         props = properties(state, index)

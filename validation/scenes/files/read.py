@@ -29,17 +29,7 @@ _FILM = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_
 def read_file(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> Any:
     """Read a scene file with what Mitsuba has in place of a scene where it holds none.
 
-    Parameters
-    ----------
-    path
-        Of the XML file.
-    lobes
-        Mean cosines by the ids of isotropic media that shall have them.
-
-    Raises
-    ------
-    InputError
-        For a file that Mitsuba cannot read, and for what no command can take.
+    Isotropic media get the mean cosines that `lobes` has for their ids. What no command can take is refused.
     """
     config = mi.parser.ParserConfig(mi.variant())
     resolver = mi.file_resolver()

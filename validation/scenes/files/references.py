@@ -23,20 +23,7 @@ _OPEN = ("Rectangle", "Disk", "Cylinder")  # which bound no medium: readers say 
 
 
 def leave_out_media(state: Any, scene: Any) -> bool:
-    """Leave out the media of opaque shapes and of lamps; return whether there were any.
-
-    Parameters
-    ----------
-    state
-        The parsed file.
-    scene
-        Mitsuba's scene of it.
-
-    Raises
-    ------
-    InputError
-        For a reference that contradicts, with the shape, the medium and what is there.
-    """
+    """Leave out the media of opaque shapes and of lamps; return whether there were any."""
     nodes = {properties(state, index).id(): index for index in of_kind(state, "Shape")}
     shapes = [
         shape

@@ -112,13 +112,6 @@ def lamps_as_rectangles(state: Any, shapes: Iterable[Any]) -> bool:
     """Make lamps on meshes rectangles where their triangles are halves of some; return whether there were any.
 
     A lamp of one rectangle keeps its name; to others a number is added.
-
-    Parameters
-    ----------
-    state
-        The parsed file.
-    shapes
-        Its shapes as Mitsuba built them.
     """
     nodes = {properties(state, index).id(): index for index in of_kind(state, "Shape")}
     lamps = [shape for shape in shapes if shape.is_emitter() and shape.id() in nodes]
