@@ -144,7 +144,7 @@ def _memory(size: int) -> NDArray[np.uint8]:
 def host_numbers(*values: Any) -> tuple[NDArray[np.float64], ...]:
     """Bring values to the host together.
 
-    `values`: Dr.Jit numbers and vectors of one type and one entry each, in any unit. Returns `numbers`: by value its
+    `values`: Dr.Jit numbers and vectors of one entry each, in any unit and precision. Returns `numbers`: by value its
     components, (n,), in float64.
     """
     components = [tuple(value) if dr.depth_v(value) > 1 else (value,) for value in values]
@@ -165,4 +165,4 @@ def _element_by_element(numbers: list[Any]) -> NDArray[np.float64]:
 
 def _in_one_transfer(numbers: list[Any]) -> NDArray[np.float64]:
     """Gather on the device, then transfer once: every transfer from a GPU waits for all that runs there."""
-    return np.array(dr.concat(numbers), dtype=np.float64)
+    return np.array(dr.concat([mi.Float64(number) for number in numbers]))

@@ -100,7 +100,7 @@ def row_and_column(camera: Camera, pixel):
 
 def read_camera(camera: Camera) -> HostCamera:
     """Bring a camera to the host, which waits for the device."""
-    return HostCamera(camera.width, camera.height, *host_numbers(camera.origin), *host_numbers(*camera.axes))
+    return HostCamera(camera.width, camera.height, *host_numbers(camera.origin, *camera.axes))
 
 
 def shifted_camera(camera: Camera, right: float, down: float) -> Camera:

@@ -55,10 +55,9 @@ class HostLightPoints:
 
 def read_light_points(points: Sequence[Light]) -> HostLightPoints:
     """Bring light points to the host together, which waits for the device once."""
-    facing = [point.facing for point in points if point.facing is not None]
-    normal = np.stack(host_numbers(*(own.exact_normal for own in facing)))
-    numbers = host_numbers(*(point.position for point in points), *(own.lift for own in facing))
-    position, lift = np.stack(numbers[: len(points)]), np.stack(numbers[len(points) :])
+    each = [(point.position, own.exact_normal, own.lift) for point in points if (own := point.facing)]
+    numbers = host_numbers(*(value for of_point in each for value in of_point))
+    position, normal, lift = (np.stack(numbers[first::3]) for first in range(3))
     helper = np.where(np.abs(normal[:, :1]) < 0.5, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     across = np.cross(helper, normal)
     return HostLightPoints(position, normal, across / np.linalg.norm(across, axis=1, keepdims=True), lift)

@@ -40,7 +40,7 @@ WAITS: dict[str, tuple[tuple[str, ...], str, dict[str, int]]] = {
     "shadow-planes": (
         ("camera", "light", "objects"),
         READ,
-        {"lamp": 2, "spot": 3, "sun": 2, "area": 3 * POINTS, "box": 2},
+        {"lamp": 2, "spot": 2, "sun": 2, "area": 2 * POINTS, "box": 2},
     ),
     "light-volumes": (
         ("light", "objects"),
