@@ -39,6 +39,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +61,9 @@ _FACTORS = ("intensity", "exposure", "albedo")
 _SEARCHES, _SHORT, _LONG = 5, 20, 60  # of starts that are followed, and steps
 _USUAL = 0.05  # relative error that a start may well have
 _DIM = 0.01  # of the mean of the image: below it a value need not be right relative to itself
-_FARTHEST = 10.0  # of the start: a factor of 22 000, or an artanh g of 10: an image that asks for more says nothing
+# Of the start of a search: a factor of 22 000, or an artanh g of 10. An image that asks for more says nothing, and a
+# step that is not bounded may ask for a factor that no number holds.
+_FARTHEST = 10.0
 _ROUNDS = 6
 _LEAST_KEPT = 0.5  # fraction of the pixels that must agree with one another
 _OUTLIER = 6.0  # standard deviations beyond which a value is left out
@@ -155,11 +158,21 @@ def _search(model: ImageModel, unknowns: Sequence[Unknown], start: Array, steps:
     def slopes(inner: Array) -> Array:
         return np.asarray(-(model.derivatives(unknowns, inner) / scale[:, :, None]).reshape(-1, len(inner)))
 
-    reach = np.array([np.inf if unknown.moves else _FARTHEST for unknown in unknowns])
     unit = max(2 * 1.4826 * float(np.median(np.abs(residuals(start)))), 1e-7)
+    return _least(residuals, slopes, unknowns, start, loss="cauchy", f_scale=unit, max_nfev=steps)
+
+
+def _least(
+    residuals: Callable[[Array], Array],
+    slopes: Callable[[Array], Array],
+    unknowns: Sequence[Unknown],
+    start: Array,
+    **how: Any,
+) -> Array:
+    """Return the end of a search for the least sum of squares, not `_FARTHEST` from its start."""
+    reach = np.array([np.inf if unknown.moves else _FARTHEST for unknown in unknowns])
     ends = start - reach, start + reach
-    how = {"loss": "cauchy", "f_scale": unit, "x_scale": "jac", "max_nfev": steps}
-    return np.asarray(least_squares(residuals, start, slopes, bounds=ends, **how).x)
+    return np.asarray(least_squares(residuals, start, slopes, bounds=ends, x_scale="jac", **how).x)
 
 
 def _trials(model: ImageModel, unknowns: Sequence[Unknown]) -> list[tuple[float, Array]]:
@@ -209,11 +222,8 @@ def weighted_fit(model: ImageModel, unknowns: Sequence[Unknown], start: Array) -
             # Nothing explains most of the image: what is left is no noise. All pixels count, relative to themselves.
             weights, kept = 1 / model.relative(), np.ones_like(kept)
             break
-        method = "lm" if 3 * int(kept.sum()) >= len(inner) else "trf"
-        functions = _weighted(model, unknowns, weights, kept)
-        solved = least_squares(functions[0], inner, functions[1], method=method, x_scale="jac", max_nfev=40)
-        moved = float(np.max(np.abs(solved.x - inner), initial=0.0))
-        inner = solved.x
+        last, inner = inner, _least(*_weighted(model, unknowns, weights, kept), unknowns, inner, max_nfev=40)
+        moved = float(np.max(np.abs(inner - last), initial=0.0))
         if moved < 1e-9 and np.array_equal(before, kept):
             break
     radiance = model.values(unknowns, inner)
@@ -337,15 +347,14 @@ def _profile(
 
     best = place
     if free.any():
-        solved = least_squares(
+        others = _least(
             lambda others: residual(whole(others)),
-            place[free],
             lambda others: slopes(whole(others))[:, free],
-            method="lm",
-            x_scale="jac",
+            [unknown for unknown, is_free in zip(unknowns, free, strict=True) if is_free],
+            place[free],
             ftol=1e-5,  # of Q, some thousand: standard errors are told to 1 %
             max_nfev=20,
         )
-        best = whole(solved.x)
+        best = whole(others)
     least = float(np.sum((solution.residual * solution.weights)[solution.kept] ** 2))
     return best, math.sqrt(max(float(np.sum(residual(best) ** 2)) - least, 0.0) / float(solution.stretch[number]))
