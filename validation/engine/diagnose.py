@@ -320,7 +320,7 @@ class _Attempt:
         # Of those that explain it alike, such as a factor and a near plane before dark fog, the simplest and the first.
         alike = [each for each in explanations if evidence(each, self.right, scale) >= most - _ALIKE]
         best = min(alike, key=lambda each: each.parameters)
-        return best if is_enough(best, self.right, scale) else self.right
+        return best if is_enough(best, self.right, scale, self.predictor.pairs) else self.right
 
     def _try_pairs(self, chosen: Explanation) -> list[Explanation]:
         """Return explanations by two faults of different kinds.

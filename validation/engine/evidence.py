@@ -58,13 +58,16 @@ def _likelihood(errors: Array, scale: float) -> float:
     return -float(np.sum(np.mean(np.log1p((errors / scale) ** 2), axis=1)))
 
 
-def is_enough(explanation: Explanation, right: Explanation, scale: float) -> bool:
+def is_enough(explanation: Explanation, right: Explanation, scale: float, pairs: tuple[Index, Index]) -> bool:
     """Return whether a fault is worth a name: nobody doubts it, and it changes the image by `LEAST_EFFECT`.
 
-    A fault without a number that leaves a fifth of a smaller difference is one too: nothing was fitted.
+    A fault without a number may change less, since nothing was fitted, if it leaves a fifth of the difference, or noise
+    alone where the unchanged scene leaves more: shadows that are missing in the fog change a few pixels by a tenth.
     """
     changed = float(np.mean(np.abs(explanation.errors - right.errors)))
-    exact = not explanation.parameters and explanation.error < _EXACT * right.error
+    exact = not explanation.parameters and (
+        explanation.error < _EXACT * right.error or (is_noise(explanation, pairs) and not is_noise(right, pairs))
+    )
     return evidence(explanation, right, scale) > _LEAST_EVIDENCE and changed > (_LEAST_EXACT if exact else LEAST_EFFECT)
 
 

@@ -23,7 +23,9 @@ Bools = NDArray[np.bool_]
 
 _LEAST_SCALE, _LEAST_COARSE = 1e-4, 1e-2  # where most pixels do not know a parameter, those that do are no outliers
 _COARSE = 0.02  # on a line, of a logarithm or in units of the parameter: enough to tell faults apart
-_BEGUN = 2  # of the best starts: the best one may lead to a lesser minimum
+# Starts that are followed where no paths move, on a line and by steps: the best one may lead to a lesser minimum. Half
+# of the starts of fog that thins with height lead to even fog.
+_BEGUN, _BEGUN_BY_STEPS = 2, 3
 _TURNS, _TURNS_COARSE = 8, 4  # steps of Gauss and Newton at most
 _LITTLE = 0.9  # fraction of the loss that a step leaves which gains little
 _SMALL = 0.02  # of the step of differences: a change that is none
@@ -79,7 +81,9 @@ def explain(
         scale = min(search.scale(start, fine) for start in starts)
         starts = sorted(starts, key=lambda start: search.loss(start, scale))
         on_a_line = len(parameters) == 1
-        places = [search.inward(start) for start in starts[: _BEGUN if on_a_line and not parameters[0].step else 1]]
+        moves = any(parameter.step for parameter in parameters)
+        followed = 1 if moves else _BEGUN if on_a_line else _BEGUN_BY_STEPS
+        places = [search.inward(start) for start in starts[:followed]]
         for turn in range(2 if fine else 1):
             scale = scale if turn == 0 else search.scale(search.outward(places[0]), fine)
             improve = search.on_line if on_a_line else search.by_steps
