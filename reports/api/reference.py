@@ -22,7 +22,7 @@ from reports.api.inputs import (
 
 if TYPE_CHECKING:
     from reports.api.results import Reference
-    from reports.cluster.connect import Cluster
+    from reports.cluster.connect import Client
     from validation.estimates.budget import Budget
     from validation.scenes.loading import LoadedScene
 
@@ -150,7 +150,7 @@ def reference(
     note(progress, scene_notes(loaded.scene))
     _check_work(loaded, estimator, pixel, budget, clouds=wanted is not None)
 
-    def compute(tell: Callable[[float, str], None], workers: "Cluster | None" = None) -> "Reference":
+    def compute(tell: Callable[[float, str], None], workers: "Client | None" = None) -> "Reference":
         elsewhere = None
         if workers is not None:
             elsewhere = _elsewhere(workers, loaded, changes, estimator, pixel=pixel, budget=budget, orders=wanted)
@@ -180,7 +180,7 @@ def _check_work(loaded: Any, estimator: str, pixel: str, budget: "Budget | None"
 
 
 def _elsewhere(
-    workers: "Cluster",
+    workers: "Client",
     loaded: "LoadedScene",
     changes: Any,
     estimator: str,

@@ -55,7 +55,6 @@ class SweepRun(Result):
         lines += [f"  {status}: {number}" for status, number in sorted(said["counts"].items())]
         for each in said["problems"]:
             lines.append(f"  {each['status']}: {each['scene']}, {each['label']}: {each['reason']}")
-        lines += [f"  refused: {words}" for words in said["refused_workers"]]
         if said["parquet"]:
             lines += [f"  rows in {said['parquet']}", f"  what they say: airlight sweep --from {said['output']}"]
         return lines
@@ -180,7 +179,7 @@ def _run(
     from validation.study.keys import made_here, scene_identities
 
     made, scenes = made_here(__version__, variant), scene_identities(study.scenes)
-    how: dict[str, Any] = {"store": store, "scenes": scenes}
+    problems: list[dict[str, Any]] = []
 
     def with_errors(cell: Any, key: str, outcome: Any) -> dict[str, Any]:
         value = outcome.value if outcome.status == "done" else row_without_numbers(cell, key, outcome)
@@ -189,32 +188,30 @@ def _run(
     def with_times(cell: Any, key: str, outcome: Any) -> dict[str, Any]:
         return store.row(key) | (outcome.value if outcome.status == "done" else {})
 
-    # Images that nobody times are rendered once: their kernels compile longer than they run.
-    part = partial(_part, study, store, made=made, progress=progress)
-    parts = [
-        part(
-            place,
-            partial(cell_groups, again=again, **how),
-            with_errors,
-            quick=study.measure.times not in ("with", "stages"),
+    def part(place: "Place", groups: Callable[..., Any], row_from: Callable[..., Any], *, quick: bool = False) -> Any:
+        groups = partial(groups, study, made, store=store, scenes=scenes)
+        return _part(
+            study, store, place, groups, row_from, made=made, problems=problems, progress=progress, quick=quick
         )
-    ]
+
+    # Images that nobody times are rendered once: their kernels compile longer than they run.
+    quick = study.measure.times not in ("with", "stages")
+    missing, counts = part(place, partial(cell_groups, again=again), with_errors, quick=quick)
+    untimed, timed = 0, Counter[str]()
     if study.measure.times == "alone":
         where = replace(place, workers=1) if place.workers else place
-        parts.append(part(where, partial(timing_groups, **how), with_times))
-    total = study.scene_count * study.cells_by_scene
-    counts = parts[0]["counts"]
+        untimed, timed = part(where, timing_groups, with_times)
+    total, computed = study.scene_count * study.cells_by_scene, counts.total() - counts["lost"]
     return {
         "study": study.name,
         "scenes": study.scene_count,
         "cells": total,
-        "cached": total - parts[0]["missing"],
-        "computed": sum(counts.values()) - counts["lost"],
-        "timed_alone": parts[1]["counts"]["done"] if len(parts) > 1 else 0,
+        "cached": total - missing,
+        "computed": computed,
+        "timed_alone": timed["done"],
         "counts": dict(counts),
-        "left": sum(part["left"] for part in parts),
-        "problems": [problem for part in parts for problem in part["problems"]],
-        "refused_workers": [words for part in parts for words in part["refused_workers"]],
+        "left": missing - computed + untimed - (timed.total() - timed["lost"]),
+        "problems": problems,
         "output": str(store.folder),
     }
 
@@ -227,34 +224,28 @@ def _part(
     row_from: Callable[..., dict[str, Any]],
     *,
     made: "Made",
+    problems: list[dict[str, Any]],
     progress: Any,
-    quick: bool = False,
-) -> dict[str, Any]:
-    """Run the groups of a study, and add a row for each outcome."""
+    quick: bool,
+) -> tuple[int, Counter[str]]:
+    """Run groups, and add a row for each outcome; return how many cells were missing, and what came of them."""
     from reports.cluster.connect import connected
     from reports.cluster.run import run_groups
-    from validation.study.study import Cell
 
-    missing = sum(len(cells) for _, cells in groups_of(study, made))
-    counts: Counter[str] = Counter()
-    problems: list[dict[str, Any]] = []
-    refused: list[str] = []
-    open_cells: dict[str, Cell] = {}
-    written = time.monotonic()
+    missing = sum(len(cells) for _, cells in groups_of())
+    counts, open_cells, written = Counter[str](), dict[str, Any](), time.monotonic()
 
     def groups() -> Any:
-        for group, cells in groups_of(study, made):
+        for group, cells in groups_of():
             open_cells.update(cells)
             yield group
 
     if not missing:
-        return {"counts": counts, "problems": problems, "refused_workers": refused, "left": 0, "missing": 0}
+        return 0, counts
     with connected(place, quick=quick) as cluster, telling(progress, f"sweep {study.name}") as tell:
-        for outcome in run_groups(cluster, groups(), made=made, retries=study.retries, refused=refused.append):
+        for outcome in run_groups(cluster, groups(), made=made, retries=study.retries):
             key = outcome.task.name
-            cell = open_cells.pop(key, None)
-            if cell is None:
-                continue  # the reference of an image: its cells say what came of it
+            cell = open_cells.pop(key)
             if outcome.status != "lost":
                 store.add(row_from(cell, key, outcome))
             counts[outcome.status if outcome.status != "done" else store.status(key) or "done"] += 1
@@ -264,7 +255,5 @@ def _part(
             if time.monotonic() - written > _EVERY:
                 store.write_parquet()
                 written = time.monotonic()
-            done = sum(counts.values())
-            tell(done / missing, f"{done} of {missing} cells, {cell.scene}")
-    left = missing - sum(counts.values()) + counts["lost"]
-    return {"counts": counts, "problems": problems, "refused_workers": refused, "left": left, "missing": missing}
+            tell(counts.total() / missing, f"{counts.total()} of {missing} cells, {cell.scene}")
+    return missing, counts

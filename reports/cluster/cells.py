@@ -3,7 +3,7 @@
 
 import io
 import platform
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import nullcontext
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -67,57 +67,43 @@ def times_of(cell: Cell) -> dict[str, Any]:
     return {name: value for name, value in values.items() if name.startswith(("times.", "cost."))}
 
 
-def timing_groups(
-    study: Study, made: Made, *, store: RowStore, scenes: dict[str, str]
-) -> Iterator[tuple[Group, dict[str, Cell]]]:
-    """Yield what `cell_groups` does, of the rows of a study that are timed alone, were done and have no times."""
-    for cells in study.timed_images():
-        keyed = {cell_key(cell, made, scenes): cell for cell in cells}
+Groups = Iterator[tuple[Group, dict[str, Cell]]]  #: and the cells by the names of their tasks, which are their keys
+
+
+def timing_groups(study: Study, made: Made, *, store: RowStore, scenes: dict[str, str]) -> Groups:
+    """Yield the tasks of the rows of a study that are timed alone, were done and have no times."""
+    for keyed in _keyed(study.timed_images(), made, scenes):
         wanted = {key: cell for key, cell in keyed.items() if store.status(key) == "done"}
         missing = {key: cell for key, cell in wanted.items() if store.row(key)[FRAME_MS] is None}
-        tasks = tuple(Task(key, times_of, (cell,), study.limit, alone=True) for key, cell in missing.items())
-        if tasks:
-            yield Group(tasks), missing
+        if missing:
+            yield (
+                Group(tuple(Task(key, times_of, (cell,), study.limit, alone=True) for key, cell in missing.items())),
+                missing,
+            )
 
 
-def cell_groups(
-    study: Study, made: Made, *, store: RowStore, again: bool, scenes: dict[str, str]
-) -> Iterator[tuple[Group, dict[str, Cell]]]:
-    """Yield the tasks of every image that lacks rows, and its cells by the names of their tasks, which are their keys.
-
-    Parameters
-    ----------
-    study
-        Which cells there are.
-    made
-        What computes them.
-    store
-        The rows that are there.
-    again
-        Whether cells that failed, hung or aborted are computed again.
-    scenes
-        Digests of scenes of files, see `validation.study.keys.cell_key`.
-    """
-    for cells in study.images():
-        keyed = {cell_key(cell, made, scenes): cell for cell in cells}
+def cell_groups(study: Study, made: Made, *, store: RowStore, again: bool, scenes: dict[str, str]) -> Groups:
+    """Yield the tasks of every image that lacks rows; `again` computes those that failed, hung or aborted again."""
+    for keyed in _keyed(study.images(), made, scenes):
         missing = {
             key: cell for key, cell in keyed.items() if key not in store or (again and store.status(key) in _AGAIN)
         }
         if missing:
-            yield _group(study, missing), missing
+            image = next(iter(missing.values())).image
+            words = " ".join((image.scene, *image.medium, f"{image.size[0]}x{image.size[1]}"))
+            tasks = tuple(Task(key, row_of, (cell, key), study.limit) for key, cell in missing.items())
+            yield Group(tasks, Task(f"{NO_REFERENCE}{words}", reference_of, (image,), study.limit)), missing
+
+
+def _keyed(images: Iterable[Iterable[Cell]], made: Made, scenes: dict[str, str]) -> Iterator[dict[str, Cell]]:
+    """Yield the cells of each image by their keys; `scenes` are digests of files, see `validation.study.keys`."""
+    return ({cell_key(cell, made, scenes): cell for cell in cells} for cells in images)
 
 
 def row_without_numbers(cell: Cell, key: str, outcome: Outcome) -> dict[str, Any]:
     """Return the row of a cell that came to nothing: the outcome says why."""
     origin = Origin(__version__, row_source()[:12])
     return row_values(cell_row(cell, status=outcome.status, reason=outcome.reason, key=key, origin=origin))
-
-
-def _group(study: Study, cells: dict[str, Cell]) -> Group:
-    image = next(iter(cells.values())).image
-    words = " ".join((image.scene, *image.medium, f"{image.size[0]}x{image.size[1]}"))
-    tasks = tuple(Task(key, row_of, (cell, key), study.limit) for key, cell in cells.items())
-    return Group(tasks, Task(f"{NO_REFERENCE}{words}", reference_of, (image,), study.limit))
 
 
 @lru_cache(maxsize=1)

@@ -21,54 +21,35 @@ _WORKERS = 30.0  # until a worker has come [s]
 _ADDRESS = re.compile(r"(tcp|tls|ucx|ws|wss)://[^\s/]+")
 
 
+Client = Any  #: `distributed.Client`
+
+
 @dataclass(frozen=True)
 class Place:
     """What `--cluster` names."""
 
     workers: int = 0  #: of this machine; 0 for a scheduler
-    address: str | None = None  #: of a scheduler
-    file: Path | None = None  #: of a scheduler, which has its address
-
-    @property
-    def words(self) -> str:
-        """What the user typed, in other words."""
-        return self.address or (str(self.file) if self.file else f"local:{self.workers}")
-
-
-@dataclass(frozen=True)
-class Cluster:
-    """A connection."""
-
-    client: Any  #: `distributed.Client`
-    place: Place
+    scheduler: str = ""  #: its address, or the file that has it
 
 
 def parse_place(word: str | None) -> Place:
-    """Return the place that a word names; a worker for each processor of this machine for None.
-
-    Raises
-    ------
-    InputError
-        For another word, a number of workers out of range, and a file that is not there.
-    """
+    """Return the place that a word names; a worker for each processor of this machine for None."""
     from analytic.errors import InputError
 
     word = "local" if word is None else word.strip()
     kind, _, number = word.partition(":")
+    if word == "local":
+        return Place(threads())
     if kind == "local":
-        if not number and word == "local":
-            return Place(threads())
         if not (number.isascii() and number.isdigit() and 1 <= int(number) <= 4096):
             raise InputError(f"--cluster: got {word!r}, wanted local:N with a number of processes from 1 to 4096")
         return Place(int(number))
-    if _ADDRESS.fullmatch(word):
-        return Place(address=word)
-    path = Path(word)
-    if path.is_file():
-        return Place(file=path)
-    if word.endswith(".json"):
-        raise InputError(f"--cluster: there is no file {word}; wanted what `dask scheduler --scheduler-file` writes")
-    raise InputError(f"--cluster: got {word!r}, wanted local, local:N, tcp://HOST:PORT or a scheduler file (.json)")
+    if _ADDRESS.fullmatch(word) or Path(word).is_file():
+        return Place(scheduler=word)
+    raise InputError(
+        f"--cluster: got {word!r}, wanted local, local:N, tcp://HOST:PORT, or the file that "
+        "`dask scheduler --scheduler-file` writes"
+    )
 
 
 def check_library() -> None:
@@ -83,39 +64,24 @@ def check_library() -> None:
 
 
 @contextmanager
-def connected(place: Place, *, quick: bool = False) -> Iterator[Cluster]:
-    """Give the connection to a place, with workers that are of our version.
+def connected(place: Place, *, quick: bool = False) -> Iterator[Client]:
+    """Give the connection to a place, with workers that are of our version; others are refused by name.
 
-    Parameters
-    ----------
-    place
-        From `parse_place`.
-    quick
-        Whether kernels may run slowly if they compile quickly, where the workers are started here: nothing is timed.
-
-    Raises
-    ------
-    InputError
-        Where there is no scheduler or no worker, and for workers of another version, by name.
-    MissingError
-        Where Dask is not installed.
+    `quick` compiles kernels quickly in processes of this machine, where nothing is timed.
     """
     check_library()
     _quiet()
     with ExitStack() as stack:
-        client = stack.enter_context(_local(place.workers, quick=quick) if place.workers else _remote(place))
+        client = stack.enter_context(_local(place.workers, quick=quick) if place.workers else _remote(place.scheduler))
         check_workers(client)
-        yield Cluster(client, place)
+        yield client
 
 
-def check_workers(client: Any) -> None:
+def check_workers(client: Client) -> None:
     """Raise InputError for workers that have another version of airlight, or none, by address."""
     from analytic.errors import InputError
-    from reports import __version__
-    from reports.machine.environment import activate
-    from validation.study.keys import made_here
 
-    own = made_here(__version__, activate())
+    own = facts()
     wrong = []
     for address, answer in client.run(facts, on_error="return").items():
         if isinstance(answer, OSError):  # it went away meanwhile
@@ -129,7 +95,7 @@ def check_workers(client: Any) -> None:
 
 
 @contextmanager
-def _local(workers: int, *, quick: bool = False) -> Iterator[Any]:
+def _local(workers: int, *, quick: bool = False) -> Iterator[Client]:
     """Give the client of processes of this machine, one thread each; a single one has all threads and is alone."""
     import dask
     from distributed import Client, LocalCluster
@@ -144,7 +110,7 @@ def _local(workers: int, *, quick: bool = False) -> Iterator[Any]:
     # No group waits behind another that takes minutes while a worker has nothing to do.
     counts["distributed.scheduler.worker-saturation"] = 1.0
     # Dask lets the C library give every freed block back, and arrays of a frame's size come as new, zeroed pages: a
-    # quarter of a sweep's time was the kernel's. `reports.cluster.run` gives memory back where there is much of it.
+    # quarter of a sweep's time was the kernel's.
     counts["distributed.nanny.pre-spawn-environ"] = {
         "MALLOC_TRIM_THRESHOLD_": _KEPT,
         "MALLOC_MMAP_THRESHOLD_": _KEPT,
@@ -201,25 +167,25 @@ def _without_interrupts() -> Iterator[None]:
 
 
 @contextmanager
-def _remote(place: Place) -> Iterator[Any]:
+def _remote(scheduler: str) -> Iterator[Client]:
     from distributed import Client
 
     from analytic.errors import InputError
 
-    given = {"address": place.address} if place.address else {"scheduler_file": str(place.file)}
+    given = {"address" if _ADDRESS.fullmatch(scheduler) else "scheduler_file": scheduler}
     try:
         client = Client(**given, timeout=_PATIENCE, set_as_default=False)
     except (OSError, TimeoutError, ValueError, KeyError) as error:
         words = " ".join(str(error).split()) or type(error).__name__
         raise InputError(
-            f"--cluster: no scheduler answers at {place.words} ({words}): start `dask scheduler`, or give its address"
+            f"--cluster: no scheduler answers at {scheduler} ({words}): start `dask scheduler`, or give its address"
         ) from None
     try:
         client.wait_for_workers(1, timeout=_WORKERS)
         yield client
     except TimeoutError:
         raise InputError(
-            f"--cluster: the scheduler at {place.words} has no worker: start `dask worker` with its address, in an "
+            f"--cluster: the scheduler at {scheduler} has no worker: start `dask worker` with its address, in an "
             "environment that has airlight"
         ) from None
     finally:

@@ -5,7 +5,7 @@ So the bytes of a file do not depend on where its numbers were computed. What wo
 them, is computed here.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -17,14 +17,11 @@ from analytic.errors import InputError
 from reference.monte_carlo.batches import Batches
 from reference.quadrature.ray_values import TruthImage
 from reference.storage.kept import Spent, fresh_results, fresh_since, stopwatch
-from reports import __version__
-from reports.cluster.connect import Cluster
+from reports.cluster.connect import Client, facts
 from reports.cluster.run import Group, Task, run_groups
-from reports.machine.environment import activate
 from validation.estimates.monte_carlo import Elsewhere, ElsewhereFor, Trace, batch_tracer
 from validation.estimates.quadrature import has_truth, keep_truth, truth_image
 from validation.scenes.loading import load_scene
-from validation.study.keys import Made, made_here
 
 _LIMIT = 6 * 3600.0  # of a reference or a batch [s]
 _WAVE = 8  # batches that are asked for at once by worker, where their number is not known before
@@ -49,39 +46,25 @@ class Picture:
 
 
 def bring_references(
-    cluster: Cluster,
+    cluster: Client,
     pictures: Sequence[Picture],
     *,
     pixel: str = "centre",
-    told: Callable[[int, int], None] = lambda done, total: None,
 ) -> None:
-    """Let workers compute the quadrature references of scenes that are not in the cache, and keep them here.
-
-    Parameters
-    ----------
-    cluster
-        From `reports.cluster.connect.connected`.
-    pictures
-        The scenes.
-    pixel
-        See `validation.estimates.quadrature.truth_image`.
-    told
-        Called with (done, all) after each.
-    """
+    """Let workers compute the quadrature references of scenes that are not in the cache, and keep them here."""
     lacking = [picture for picture in pictures if not has_truth(picture.load(), pixel=pixel)]
     named = {f"reference {number}": picture for number, picture in enumerate(lacking)}
     given = pixel, fresh_since()
     groups = [Group((Task(name, _truth, (picture, *given), _LIMIT),)) for name, picture in named.items()]
-    for number, outcome in enumerate(run_groups(cluster, groups, made=_made()), 1):
+    for outcome in run_groups(cluster, groups, made=facts()):
         if outcome.status == "refused":
             raise InputError(outcome.reason or "")
         if outcome.status == "done":
             keep_truth(named[outcome.task.name].load(), *outcome.value, pixel=pixel)
-        told(number, len(named))
 
 
 def tracing(
-    cluster: Cluster,
+    cluster: Client,
     picture: Picture,
     estimator: str,
     *,
@@ -90,16 +73,9 @@ def tracing(
     orders: tuple[str, ...] | None = None,
     counts: NDArray[np.integer] | None = None,
 ) -> Elsewhere:
-    """Return what lets workers trace the batches of an estimator.
+    """Return what lets workers trace the batches of an estimator, `batches` of them, None where an error decides.
 
-    Parameters
-    ----------
-    cluster, picture
-        Where, and of what.
-    estimator, samples, orders, counts
-        See `validation.estimates.monte_carlo.monte_carlo_batches`.
-    batches
-        How many there will be; None where an error decides.
+    The rest is as for `validation.estimates.monte_carlo.monte_carlo_batches`.
     """
     by_pixel = None if counts is None else (counts.shape, counts.astype(np.int64).tobytes())
     kind = _Kind(picture, estimator, samples, orders, by_pixel)
@@ -107,17 +83,17 @@ def tracing(
     def bring(seeds: list[int]) -> Iterator[tuple[Batches, Spent]]:
         # One task in a group: what is sent at once then depends on the workers alone.
         groups = (Group((Task(f"batch {seed}", _batch, (kind, seed), _LIMIT),)) for seed in seeds)
-        for outcome in run_groups(cluster, groups, made=_made()):
+        for outcome in run_groups(cluster, groups, made=facts()):
             if outcome.status == "refused":
                 raise InputError(outcome.reason or "")
             if outcome.status == "done":
                 yield outcome.value
 
-    workers = len(cluster.client.scheduler_info(n_workers=-1)["workers"])
+    workers = len(cluster.scheduler_info(n_workers=-1)["workers"])
     return Elsewhere(bring, batches or _WAVE * max(1, workers))
 
 
-def spread(cluster: Cluster, picture: Picture) -> ElsewhereFor:
+def spread(cluster: Client, picture: Picture) -> ElsewhereFor:
     """Return what lets workers trace the batches that check a reference."""
     return lambda estimator, samples, counts: tracing(cluster, picture, estimator, samples=samples, counts=counts)
 
@@ -152,7 +128,3 @@ def _tracer(kind: _Kind) -> Trace:
         counts = np.frombuffer(content, dtype=np.int64).reshape(shape)
     given: dict[str, Any] = {"samples": kind.samples, "orders": kind.orders, "counts": counts}
     return batch_tracer(kind.picture.load(), kind.estimator, **given)[1]
-
-
-def _made() -> Made:
-    return made_here(__version__, activate())

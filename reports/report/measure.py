@@ -17,7 +17,7 @@ from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
 from reference.storage.files import ensure_folder
 from reference.storage.kept import fresh_results
-from reports.cluster.connect import Cluster
+from reports.cluster.connect import Client
 from reports.cluster.references import Picture, bring_references, spread
 from reports.data.claims import claims, growth_claims, unstudied
 from reports.data.own_faults import own_fault
@@ -52,7 +52,7 @@ def write_report(
     apart: bool = False,
     progress: Progress | None = None,
     noted: Callable[[Sequence[str]], None] = lambda notes: None,
-    cluster: Cluster | None = None,
+    cluster: Client | None = None,
 ) -> dict[str, Any]:
     """Study scenes and write the report into a folder; return the content of report.json, see docs/formats.md.
 

@@ -12,7 +12,6 @@ import pytest
 pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
 
 from reports.cluster import connect
-from reports.cluster.connect import Cluster, Place
 from reports.cluster.run import Group, Task, run_groups
 from tests.helpers import cluster_tasks as tasks
 
@@ -22,7 +21,7 @@ def cluster():
     """Two processes, without the check of versions, which imports Mitsuba in each."""
     connect._quiet()
     with connect._local(2) as client:
-        yield Cluster(client, Place(2))
+        yield client
 
 
 def outcomes(cluster, *groups, **options):
@@ -94,9 +93,9 @@ def test_twenty_kills_during_two_hundred_tasks(cluster):
 
     def kill():
         while len(killed) < 20 and not stop.wait(0.35):
-            told = cluster.client.sync(cluster.client.scheduler.identity, n_workers=-1)
+            told = cluster.sync(cluster.scheduler.identity, n_workers=-1)
             known = [worker["nanny"] for worker in told["workers"].values()]
-            pids = cluster.client.run(os.getpid, on_error="ignore")
+            pids = cluster.run(os.getpid, on_error="ignore")
             if known and pids:
                 victim = sorted(pids.values())[len(killed) % len(pids)]
                 try:
