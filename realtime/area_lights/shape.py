@@ -143,8 +143,8 @@ def read_area_light(shape: Any, camera: Array) -> AreaLight:
     kind = _KINDS.get(shape.class_name())
     if kind is None and not shape.is_mesh():
         raise InputError(
-            f"light '{name}': its shape is a {shape.class_name()}; wanted a 'rectangle', 'disk', 'sphere' or mesh with "
-            "an 'area' emitter"
+            f"light '{name}': its shape is a {shape.class_name().lower()}; wanted a 'rectangle', 'disk', 'sphere' or "
+            "mesh with an 'area' emitter"
         )
     radiance = _read_radiance(shape.emitter(), name)
     opaque = shape.bsdf().class_name() != "Null"

@@ -185,11 +185,17 @@ def frame_renderer(
 def _check_clouds(scene: Scene, method: Method) -> None:
     """Refuse clouds and skies where a method does not know them, and where it does what clouds cannot have."""
     features, name = scene.features, method.name
+    near = [light.kind for light in scene.lights if light.w] + [f"area ({light.kind})" for light in scene.area_lights]
     if not method.renders_clouds:
         if features.uneven:
+            way_out = (
+                f"replace it, since no method has one with a light of kind {near[0]}"
+                if near
+                else ("use cloud-collectors or cloud-octaves")
+            )
             raise InputError(
-                f"method {name}: the scene has a HeterogeneousMedium, and this method knows homogeneous ones only; use "
-                "cloud-collectors or cloud-octaves"
+                f"method {name}: the scene has a heterogeneous medium, and this method knows media of type "
+                f"'homogeneous' only; {way_out}"
             )
         if features.concave:
             raise InputError(
@@ -208,10 +214,9 @@ def _check_clouds(scene: Scene, method: Method) -> None:
             f"method {name}: the scene has no clouds; wanted media with closed bounds in clear air: give the medium "
             "bounds, or use another method"
         )
-    kinds = [light.kind for light in scene.lights if light.w] + [f"area ({light.kind})" for light in scene.area_lights]
-    if kinds:
+    if near:
         raise InputError(
-            f"method {name}: the scene has a light of kind {kinds[0]}, and clouds are lit from infinity; wanted "
+            f"method {name}: the scene has a light of kind {near[0]}, and clouds are lit from infinity; wanted "
             "emitters of type 'directional', and at most one 'constant': replace it or remove it"
         )
 

@@ -54,7 +54,7 @@ def read_bounds(shape) -> tuple[Bounds | None, ClosedMesh | None]:
     if shape.class_name() == "Sphere":
         return _read_sphere(shape), None
     if not shape.is_mesh() or shape.class_name() == "Rectangle":
-        raise _refusal(name, f"is a {shape.class_name()}", "a sphere, a cube or a closed mesh")
+        raise _refusal(name, f"is a {shape.class_name().lower()}", "a sphere, a cube or a closed mesh")
     vertices, faces = mesh_triangles(shape)
     faces = faces[:, ::-1] if shape.has_flipped_normals() else faces
     mesh = closed_mesh(name, vertices, faces)

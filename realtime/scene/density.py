@@ -108,7 +108,7 @@ def read_density(medium: Any, mesh: ClosedMesh) -> DensityGrid:
     Raises InputError for a `heterogeneous` medium whose extinction is no grid of one channel, linear between voxels,
     that covers the mesh, or whose albedo is not the same everywhere.
     """
-    name, parameters = f"the {medium.class_name()} of shape '{mesh.name}'", mi.traverse(medium)
+    name, parameters = f"the heterogeneous medium of shape '{mesh.name}'", mi.traverse(medium)
     if "sigma_t.data" not in parameters:
         raise InputError(f"{name} has an extinction that is no grid; wanted a 'gridvolume' as sigma_t")
     if "albedo.value.value" not in parameters:

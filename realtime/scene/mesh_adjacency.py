@@ -141,8 +141,8 @@ def _triangles(shape) -> tuple[Array, NDArray[np.int64]]:
     if shape.is_mesh():
         return mesh_triangles(shape)
     raise InputError(
-        f"shape '{shape.id()}' is a {shape.class_name()}, which has no triangles and so no silhouette edges; wanted "
-        "meshes (obj, ply, cube, rectangle); replace it by a mesh, or use --method ray-march"
+        f"shape '{shape.id()}' is a {shape.class_name().lower()}, which has no triangles and so no silhouette edges; "
+        "wanted meshes (obj, ply, cube, rectangle); replace it by a mesh, or use --method ray-march"
     )
 
 

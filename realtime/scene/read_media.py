@@ -155,7 +155,7 @@ def _closed_meshes(
     for bounds, mesh in shapes:
         if mesh is None and bounds is not None:
             cloud = _first_cloud(shapes, uneven)
-            flaw = "bounds a HeterogeneousMedium" if cloud in uneven else "is not convex"
+            flaw = "bounds a heterogeneous medium" if cloud in uneven else "is not convex"
             raise InputError(
                 f"shape '{bounds.name}' is a sphere, and shape '{cloud}' {flaw}; wanted meshes for all of them: "
                 "replace the sphere by a mesh"
@@ -318,7 +318,7 @@ def _height_fog(medium, types: ArrayTypes) -> HeightFog:
 
 def _homogeneous(medium, types: ArrayTypes) -> Homogeneous:
     if not medium.is_homogeneous():
-        raise InputError(f"the medium is a {medium.class_name()}; wanted a medium of type 'homogeneous'")
+        raise InputError("the medium is heterogeneous; wanted a medium of type 'homogeneous'")
     _require_constant(medium, "sigma_t", "albedo")
     sigma_s, _, sigma_t = medium.get_scattering_coefficients(dr.zeros(mi.MediumInteraction3f))
     dr.eval(sigma_s, sigma_t)  # in one kernel: Mitsuba's scale is a literal in it

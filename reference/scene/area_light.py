@@ -101,7 +101,7 @@ def read_area_light(emitter: Any, camera: Array) -> TruthAreaLight:
     shape = emitter.get_shape()
     kind = _KINDS.get(shape.class_name())
     if kind is None and not shape.is_mesh():
-        raise _refusal(shape, f"is a {shape.class_name()}", "a rectangle, a disk, a sphere, or a mesh")
+        raise _refusal(shape, f"is a {shape.class_name().lower()}", "a rectangle, a disk, a sphere, or a mesh")
     parameters = mi.traverse(emitter)
     if "radiance.value" not in parameters:
         raise _refusal(shape, "has a texture as radiance", "one radiance: give its mean as 'rgb'")

@@ -30,7 +30,7 @@ def check_closed(shape: Any) -> None:
             raise _refusal(shape, "is inside out", "normals that point outwards: remove flip_normals")
         return
     if not shape.is_mesh():
-        raise _refusal(shape, f"is a {shape.class_name()}", "a sphere, a cube or a closed mesh")
+        raise _refusal(shape, f"is a {shape.class_name().lower()}", "a sphere, a cube or a closed mesh")
     vertices, faces = _merged(shape)
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     size = len(vertices)

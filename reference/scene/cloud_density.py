@@ -65,7 +65,7 @@ def read_cloud_density(shape: Any, name: str) -> CloudDensity:
     parameters = mi.traverse(medium)
     for key, what in (("sigma_t.data", "a grid as its extinction"), ("albedo.value.value", "one albedo everywhere")):
         if key not in parameters:
-            raise InputError(f"{name} is a {medium.class_name()} without {what}; the truth of clouds wants one")
+            raise InputError(f"{name} is heterogeneous without {what}; the truth of clouds wants one")
     values = np.array(parameters["sigma_t.data"], dtype=np.float64)
     if values.ndim > 3 and values.shape[3] != 1:
         raise InputError(f"{name} has a grid of {values.shape[3]} channels; wanted a grid of one: grey extinction")

@@ -57,7 +57,7 @@ def read_bounds(shape: Any) -> Bounds:
     if shape.class_name() == "Sphere":
         return _read_sphere(shape, np.array(parameters["to_world"].matrix, dtype=np.float64).reshape(4, 4))
     if not shape.is_mesh() or "vertex_positions" not in parameters:
-        raise _refusal(shape, f"is a {shape.class_name()}", "a sphere, a cube or a closed convex mesh")
+        raise _refusal(shape, f"is a {shape.class_name().lower()}", "a sphere, a cube or a closed convex mesh")
     vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
     faces = np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
     if len(faces) > LARGEST_MESH:

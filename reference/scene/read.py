@@ -269,7 +269,7 @@ def read_medium(medium, name: str) -> TruthMedium:
     if is_height_fog(medium):
         raise InputError(f"{name} is height fog, which has no sides; wanted it in the sensor, and no shape around it")
     if not medium.is_homogeneous():
-        raise InputError(f"{name} is a {medium.class_name()}; wanted a medium of type 'homogeneous'")
+        raise InputError(f"{name} is heterogeneous; wanted a medium of type 'homogeneous'")
     parameters = mi.traverse(medium)
     _require_constant(parameters, "sigma_t", name)
     sigma_t = _rgb(parameters["sigma_t.value.value"]) * float(parameters["scale"])

@@ -75,8 +75,8 @@ def _read(shape) -> Array | Sphere | Disks:
         return Sphere(matrix[:3, 3], float(length[0]))
     if shape.class_name() != "Disk":
         raise InputError(
-            f"shape '{shape.id()}' is a {shape.class_name()}; wanted meshes, rectangles, spheres and disks, whose "
-            "shadows are exact: replace it by a mesh, as fine as you need"
+            f"shape '{shape.id()}' is a {shape.class_name().lower()}; wanted meshes, rectangles, spheres and disks, "
+            "whose shadows are exact: replace it by a mesh, as fine as you need"
         )
     if abs(length[0] - length[1]) > _ROUND * length[0] or abs(matrix[:3, 0] @ matrix[:3, 1]) > _ROUND * length[0] ** 2:
         raise InputError(f"shape '{shape.id()}' is an oval disk; wanted a round one, or a mesh")

@@ -74,7 +74,7 @@ def _sheared():
 @pytest.mark.parametrize(
     ("lamp", "message"),
     [
-        (lambda: area_lamp("cylinder"), "light 'lamp': its shape is a Cylinder"),
+        (lambda: area_lamp("cylinder"), "light 'lamp': its shape is a cylinder"),
         (lambda: area_lamp("rectangle") | {"to_world": _sheared()}, "light 'lamp': the rectangle is sheared"),
         (lambda: area_lamp("disk", size=(0.3, 0.2)), "light 'lamp': the disk is scaled by 0.3 x 0.2"),
         (lambda: area_lamp("sphere", size=0.3, flip_normals=True), "light 'lamp': the sphere shines inwards"),

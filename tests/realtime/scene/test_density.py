@@ -99,6 +99,6 @@ def test_methods_for_fog_refuse_a_density_and_name_those_for_clouds(name):
     convex = placed(box((50.0, 60.0, 70.0)), (3.0, 1.0, 2.0))
     read = read_scene(mi.load_dict(cloud_scene(sun=SUN, box=cloud("box", convex, dense(ROUGH, LOW, HIGH)))))
     kernel = {"kernel": exact} if METHODS[name]().uses_kernel else {}
-    with pytest.raises(InputError, match=r"HeterogeneousMedium.*cloud-collectors or cloud-octaves") as refusal:
+    with pytest.raises(InputError, match=r"heterogeneous medium.*cloud-collectors or cloud-octaves") as refusal:
         frame_renderer(read, METHODS[name], **kernel)
     assert "\n" not in str(refusal.value)

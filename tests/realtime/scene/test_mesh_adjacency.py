@@ -82,7 +82,7 @@ def test_seams_are_closed_and_shapes_kept_apart():
 
 @pytest.mark.claim("shapes-without-edges-refused")
 def test_shapes_without_triangles_are_refused_by_name(variant):
-    with pytest.raises(InputError, match=r"shape 'ball' is a Sphere.*replace it by a mesh"):
+    with pytest.raises(InputError, match=r"shape 'ball' is a sphere.*replace it by a mesh"):
         read_casters(mi.load_dict(tiny_scene()))
 
 

@@ -74,7 +74,7 @@ def refused():
     at = {"center": [0.0, 0.0, 5.0]}
     inside = {"interior": {"type": "homogeneous", "sigma_t": 0.3, "albedo": 0.5}}
     return {
-        "is a Cylinder": lamp("cylinder", to_world=placed()),
+        "is a cylinder": lamp("cylinder", to_world=placed()),
         "texture": lamp() | {"emitter": {"type": "area", "radiance": texture}},
         "no area": lamp(to_world=placed((0.0, 1.0, 1.0))),
         "sheared": lamp(to_world=mi.ScalarTransform4f(shear)),
@@ -85,7 +85,7 @@ def refused():
     }
 
 
-MESSAGES = "is a Cylinder, texture, no area, sheared, different scales, holds the camera, inside out, bounds a medium"
+MESSAGES = "is a cylinder, texture, no area, sheared, different scales, holds the camera, inside out, bounds a medium"
 
 
 @pytest.mark.parametrize("message", MESSAGES.split(", "))

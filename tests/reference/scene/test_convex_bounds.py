@@ -77,7 +77,7 @@ def test_refused_meshes(variant):
         read_bounds(mesh(square, faces[:-1]))
     with pytest.raises(InputError, match="bounds a medium and is inside out"):
         read_bounds(mesh(square, [face[::-1] for face in faces]))
-    with pytest.raises(InputError, match="is a Rectangle"):
+    with pytest.raises(InputError, match="is a rectangle"):
         bounds_of({"type": "rectangle"})
     with pytest.raises(InputError, match="inside out"):
         bounds_of(sphere() | {"flip_normals": True})
@@ -103,7 +103,7 @@ AMBIENT = {"type": "homogeneous", "sigma_t": 0.2, "albedo": 0.5}
         (lambda: {"a": bounded_medium(box(), 0.3, GREY) | {"exterior": AMBIENT}}, "exterior medium of shape 'a'"),
         (lambda: {"a": box() | {"bsdf": {"type": "null"}, "exterior": AMBIENT}}, "'a' is a hole in a medium"),
         (lambda: {"a": box() | {"bsdf": {"type": "mask", "opacity": 0.5, "nested": {"type": "diffuse"}}}}, "partly"),
-        (lambda: {"a": bounded_medium({"type": "cylinder"}, 0.3, GREY)}, "is a Cylinder"),
+        (lambda: {"a": bounded_medium({"type": "cylinder"}, 0.3, GREY)}, "is a cylinder"),
         (lambda: {}, "references no medium"),
     ],
 )

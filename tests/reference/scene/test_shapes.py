@@ -28,7 +28,7 @@ def test_shapes_are_sorted_and_others_refused_by_name(variant):
     assert shapes.triangles.shape == (2, 3, 3)
     assert shapes.centre == pytest.approx(np.array([[0.1, 0.1, 0.7]]), rel=1e-6)
     assert shapes.disks.centre == pytest.approx(np.array([[0.0, 0.0, 3.0]]))
-    with pytest.raises(InputError, match="'lid' is a Cylinder; wanted meshes, rectangles, spheres and disks"):
+    with pytest.raises(InputError, match="'lid' is a cylinder; wanted meshes, rectangles, spheres and disks"):
         read_shapes(mi.load_dict(tiny_scene(lid=disk | {"type": "cylinder"})))
     oval = disk | {"to_world": mi.ScalarTransform4f().scale([1.0, 2.0, 1.0])}
     with pytest.raises(InputError, match="'lid' is an oval disk"):

@@ -25,6 +25,14 @@ _OPEN = ("Rectangle", "Disk", "Cylinder")  # which bound no medium: readers say 
 def leave_out_media(state: Any, scene: Any) -> bool:
     """Leave out the media of opaque shapes and of lamps; return whether there were any."""
     nodes = {properties(state, index).id(): index for index in of_kind(state, "Shape")}
+    for shape in scene.shapes():
+        material = child(state, nodes[shape.id()], "BSDF") if shape.id() in nodes else None
+        if material is not None and _media(shape) and not _is_opaque(shape) and shape.bsdf().class_name() != "Null":
+            word = properties(state, material).plugin_name()
+            raise InputError(
+                f"shape '{shape.id()}' bounds a medium and has the material '{word}'; "
+                "wanted 'null', which lets light pass straight on: replace the material, or remove the media"
+            )
     shapes = [
         shape
         for shape in scene.shapes()

@@ -104,5 +104,5 @@ def test_ambient_light_is_added_by_its_formula(variant):
 
 @pytest.mark.claim("shapes-without-edges-refused")
 def test_shapes_without_triangles_are_refused_by_name(variant):
-    with pytest.raises(InputError, match="shape 'ball' is a Sphere"):
+    with pytest.raises(InputError, match="shape 'ball' is a sphere"):
         render(mi.load_dict(tiny_scene()), "shadow-planes")
