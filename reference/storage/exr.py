@@ -39,6 +39,8 @@ _STANDARD = frozenset((
     "tiles", "type", "version", "view",
 ))
 # fmt: on
+_ONE_LEVEL = str(OpenEXR.ONE_LEVEL)
+_SRGB = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.329)  # x and y of red, green, blue and white, the default
 _INTEGERS = "colours in unsigned integers"
 _COLOURS = {"r": "R", "g": "G", "b": "B", "red": "R", "green": "G", "blue": "B"}  # as other programs name channels
 _WHOLE = frozenset((*_COLOURS, "y"))
@@ -150,17 +152,23 @@ def read_exr(path: str | os.PathLike[str]) -> Image:
     Raises
     ------
     InputError
-        If the file is missing, broken, not an EXR file, deep, stored as luminance and chroma, or has a channel twice.
+        If the file is missing, broken, not an EXR file, deep, a mipmap, stored as luminance and
+        chroma, or has a channel twice.
     """
     _check_kind(path)
     try:
         with _quiet(), OpenEXR.File(str(path), header_only=True) as file:
             declared = len(file.parts)
+            levels = any(
+                str(getattr(part.header.get("tiles"), "mode", _ONE_LEVEL)) != _ONE_LEVEL for part in file.parts
+            )
         with _quiet(), OpenEXR.File(str(path), separate_channels=True) as file:
             # The binding empties its own headers when the file is closed.
             parts = [_Part(part.name(), dict(part.header), _planes(part.channels)) for part in file.parts]
     except (RuntimeError, ValueError, MemoryError, TypeError) as error:
         raise InputError(f"{path} is a broken EXR file: its pixels cannot be read; write or copy it again") from error
+    if levels:
+        raise InputError(f"{path} has tiles of several resolutions, a mipmap; save it with one level, or in scan lines")
     if len(parts) != declared:  # the binding leaves out a part that it cannot read
         raise InputError(
             f"{path} is a broken EXR file: of its {declared} parts {len(parts)} can be read; copy it again"
@@ -168,6 +176,8 @@ def read_exr(path: str | os.PathLike[str]) -> Image:
     if not any(part.planes for part in parts):
         raise InputError(f"{path} is a broken EXR file: it has no channels; write or copy it again")
     channels, window, notes = _channels_of(parts, path)
+    if not np.allclose(parts[0].header.get("chromaticities", _SRGB), _SRGB, atol=0.002):
+        notes.append("colours of other primaries than sRGB's, read as they are")
     return _image(channels, parts[0].header, window, notes)
 
 

@@ -23,7 +23,7 @@ from validation.comparison.compare_text import (
     statistics_lines,
 )
 from validation.metrics.colour import ColourDifference, colour_difference
-from validation.metrics.errors import Metrics, error_metrics, plain
+from validation.metrics.errors import Metrics, compared, error_metrics, plain, wrong_pixels
 from validation.metrics.flip import Flip, flip_hdr
 from validation.metrics.other_tools import PublishedErrors, published_errors
 from validation.statistics.comparison import Estimate, Statistics, compare_statistics
@@ -41,6 +41,7 @@ class Comparison:
     metrics: Metrics  #: of all pixels that the mask leaves
     statistics: Statistics | None  #: None where neither image has standard errors
     masked: int = 0  #: pixels that the mask leaves out
+    wrong: tuple[str, ...] = ()  #: how many pixels are not finite, or negative, and where the first of them is
     errors: PublishedErrors | None = None  #: as other tools print them
     errors_normalised: PublishedErrors | None = None  #: the same with the mean of the reference as the unit
     colour: ColourDifference | None = None  #: None if it was not asked for
@@ -51,11 +52,7 @@ class Comparison:
     @property
     def failures(self) -> tuple[str, ...]:
         """Why the comparison must be called failed; empty if it is not."""
-        reasons = []
-        if self.metrics.nonfinite:
-            reasons.append(f"{self.metrics.nonfinite} pixels are NaN or infinite")
-        if self.metrics.negative:
-            reasons.append(f"{self.metrics.negative} pixels of the test image are negative")
+        reasons = list(self.wrong)
         if self.statistics is not None and self.statistics.equivalent is False:
             reasons.append(f"the relative bias is not shown to be within +-{self.statistics.margin:.3g}")
         reasons += [f"{each.layer}: {reason}" for each in self.orders for reason in each.failures]
@@ -228,10 +225,17 @@ def _compare(
             f"'{name}_se'; leave the margin out, or make the reference by Monte Carlo"
         )
     images: tuple[ArrayLike, ArrayLike] = (reference.mean, test.mean)
+    ref, tst, chosen = compared(*images, mask)
+    finite = (np.isfinite(ref) & np.isfinite(tst)).all(axis=2)
+    wrong = (
+        *wrong_pixels(chosen & ~finite, "NaN or infinite"),
+        *wrong_pixels(chosen & (tst < 0).any(axis=2), "negative in the test image"),
+    )
     return Comparison(
         name,
         metrics,
         statistics,
+        wrong=wrong,
         masked=0 if mask is None else int((~np.asarray(mask)).sum()),
         errors=published_errors(*images, mask=mask) if all_metrics else None,
         errors_normalised=published_errors(*images, mask=mask, unit=None) if all_metrics else None,

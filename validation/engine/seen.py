@@ -18,6 +18,7 @@ from reference.storage.exr import TOTAL, Image
 from validation.engine.judged_layer import AIRLIGHT, SURFACE, JudgedLayer, judged_layer
 from validation.fog_model.radiance import FogModel, scene_fog
 from validation.fog_model.view import SAMPLES, View, scattering_paths, view_of
+from validation.metrics.errors import wrong_pixels
 from validation.scenes.loading import LoadedScene, load_scene
 
 Array = NDArray[np.float64]
@@ -116,12 +117,7 @@ def seen_image(
         lit = emitted_light(truth, surface_hits(truth).distance).any(axis=1).reshape(truth.height, truth.width)
         used &= ~binary_dilation(lit, np.ones((3, 3), dtype=bool)).ravel()
     seen = Seen(truth, values, judged.holds, np.asarray(used), samples=needed_samples(truth))
-    wrong = np.flatnonzero(~finite)
-    if not len(wrong):
-        return seen, ()
-    row, column = divmod(int(wrong[0]), truth.width)
-    many = f"{len(wrong)} pixels are" if len(wrong) > 1 else "1 pixel is"
-    return seen, (f"{many} NaN or infinite, the first in column {column}, row {row}, and left out",)
+    return seen, wrong_pixels(~finite.reshape(truth.height, truth.width), "left out, NaN or infinite")
 
 
 def layers_of(image: Image, path: str, name: str | None, holds: str | None) -> tuple[JudgedLayer, ...]:

@@ -119,6 +119,17 @@ def compared(
     return ref.reshape(*ref.shape[:2], -1), tst.reshape(*tst.shape[:2], -1), chosen
 
 
+def wrong_pixels(wrong: NDArray[np.bool_], what: str) -> tuple[str, ...]:
+    """Return how many pixels, (height, width), are wrong and where the first is, in words; nothing where none is."""
+    if not wrong.any():
+        return ()
+    row, column = (int(place) for place in np.argwhere(wrong)[0])
+    many = int(wrong.sum())
+    if many == 1:
+        return (f"1 pixel is {what}, in column {column}, row {row}",)
+    return (f"{many} pixels are {what}, the first in column {column}, row {row}",)
+
+
 def colours(image: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return an image, (height, width, channels), with three channels; one becomes grey, other numbers are refused."""
     if image.shape[2] not in (1, 3):

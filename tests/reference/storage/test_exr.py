@@ -200,6 +200,10 @@ def test_the_image_is_the_frame_whatever_window_a_file_holds(tmp_path):
     tiles = {"type": OpenEXR.tiledimage, "tiles": OpenEXR.TileDescription()}
     write_raw(tmp_path / "tiled.exr", plane, tiles)
     np.testing.assert_array_equal(read_exr(tmp_path / "tiled.exr").layers["total"][..., 0], values)
+    tiles["tiles"].mode = OpenEXR.MIPMAP_LEVELS
+    write_raw(tmp_path / "levels.exr", plane, tiles)
+    with pytest.raises(InputError, match="a mipmap"):
+        read_exr(tmp_path / "levels.exr")
     write_raw(tmp_path / "over.exr", plane, {"dataWindow": window(-2, -1, 5, 4), "displayWindow": window(0, 0, 3, 2)})
     over = read_exr(tmp_path / "over.exr")
     np.testing.assert_array_equal(over.layers["total"][..., 1], values[1:4, 2:6])

@@ -44,8 +44,8 @@ def test_failures_name_what_is_wrong(pair):
     wrong[2, 1:3, 1] = -1e-9
     comparison = compare_images(reference, Image({"airlight": wrong}), margin=0.01)
     assert comparison.failures == (
-        "1 pixels are NaN or infinite",
-        "2 pixels of the test image are negative",
+        "1 pixel is NaN or infinite, in column 0, row 0",
+        "2 pixels are negative in the test image, the first in column 1, row 2",
         "the relative bias is not shown to be within +-0.01",
     )
     assert comparison.metrics.relative_bias == pytest.approx(comparison.statistics.relative_bias, rel=1e-12)
