@@ -50,6 +50,16 @@ class Timing:
     repetitions: int = column("repetitions", "1", "how often it was measured")
     cpu_ms: float | None = column("processor", "ms", "least processor time, of all threads", default=None)
 
+    @property
+    def interval(self) -> list[float]:
+        """The median with its quartiles [ms]."""
+        return [self.median_ms, self.low_ms, self.high_ms]
+
+    @property
+    def rate(self) -> list[float]:
+        """How often a second, with its quartiles [1/s]."""
+        return [1000 / self.median_ms, 1000 / self.high_ms, 1000 / self.low_ms]
+
 
 def stopwatch() -> Callable[[], Took]:
     """Return a function that says what was taken since now, until all arrays are ready."""

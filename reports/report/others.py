@@ -14,9 +14,8 @@ from reports.machine.environment import machine
 from reports.machine.own_process import in_own_process
 from reports.machine.progress import Progress, counted, part_of
 from validation.metrics.errors import plain
-from validation.papers.claims import Claim, claims, judged
-from validation.papers.experiments import EFFORTS, EXPERIMENTS
-from validation.study.growth import METHODS, Scaling, study_scaling
+from validation.papers.claims import EFFORTS, Claim, claims, experiments, judged
+from validation.study.growth import METHODS, study_scaling
 from validation.study.ladders import ladder
 from validation.study.results import Computed, Result, cached_result
 from validation.study.study import Study, standard_study
@@ -106,11 +105,9 @@ def _scaling(kind: str, seconds: float) -> OtherPart:
     return OtherPart("scaling", "how times grow", key, _GROWTH, compute)
 
 
-def scaling_data(name: str, size: tuple[int, int], found: Scaling) -> dict[str, Any]:
+def scaling_data(name: str, size: tuple[int, int], found: Mapping[str, Any]) -> dict[str, Any]:
     """Return how a method grows with one kind of work, in a scene with images of a size [pixels]."""
-    shown = {"scene": Path(name).stem, "size": list(size), "label": found.configuration.label, "kind": found.kind}
-    growth = {time: plain(of_time) for time, of_time in found.growth.items()}
-    return shown | {"costs": plain(found.costs), "growth": growth, "refused": found.refused}
+    return {"scene": Path(name).stem, "size": list(size), **found}
 
 
 # --- claims of papers ------------------------------------------------------------------------------------------------
@@ -120,11 +117,11 @@ def experiments_of(chosen: Sequence[Claim], effort: str = EFFORTS[-1]) -> list[s
     """Return the names of the experiments that claims need and that an effort has."""
     needed = {claim.experiment for claim in chosen}
     most = EFFORTS.index(effort)
-    return [name for name, each in EXPERIMENTS.items() if name in needed and EFFORTS.index(each.effort) <= most]
+    return [name for name, each in experiments().items() if name in needed and EFFORTS.index(each.effort) <= most]
 
 
 def _paper(name: str) -> OtherPart:
-    experiment = EXPERIMENTS[name]
+    experiment = experiments()[name]
 
     def compute(progress: Progress) -> Computed:
         progress(0.0, "claims of papers")

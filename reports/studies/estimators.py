@@ -35,8 +35,7 @@ def convergence(scene: SceneLike = "open-fog", *, progress: Progress = None) -> 
     import numpy as np
 
     from reports.api.scenes import opened
-    from validation.estimates.agreement import layer_mean
-    from validation.estimates.expected_airlight import estimator_truth
+    from validation.estimates.agreement import estimator_truth, layer_mean
     from validation.estimates.monte_carlo import monte_carlo_batches
     from validation.study.maps import fitted_slope
 
@@ -142,8 +141,7 @@ def _z(scene: Any, estimator: str, samples: int, progress: Any) -> Any:
     """Return z of the compared pixels that have a standard error, (n,)."""
     import numpy as np
 
-    from validation.estimates.agreement import batch_estimate
-    from validation.estimates.expected_airlight import estimator_truth
+    from validation.estimates.agreement import batch_estimate, estimator_truth
     from validation.estimates.monte_carlo import monte_carlo_batches
 
     expected, mask = estimator_truth(scene, estimator)

@@ -286,7 +286,7 @@ def _split(loaded: Any, chosen: list[Any], *, apart: bool, progress: Any) -> tup
     from reports.machine.own_process import in_own_process
     from validation.estimates.quadrature import truth_image
     from validation.metrics.errors import plain
-    from validation.study.decompose import decompose, exact_sum, part_numbers
+    from validation.study.decompose import decompose, exact_sum
     from validation.study.run import frame_of
     from validation.study.scene import configurations_for
     from validation.study.study import Cell
@@ -313,8 +313,8 @@ def _split(loaded: Any, chosen: list[Any], *, apart: bool, progress: Any) -> tup
         except MethodError as error:
             entries.append(entry | {"refused": str(error)})
             continue
-        split.append(found)
-        parts = [plain(part_numbers(part)) for part in (found.whole, *found.parts)]
+        split.append((each.label, truth, found))
+        parts = [plain(numbers) for numbers, _ in found]
         entries.append(entry | {"refused": None, "whole": parts[0], "parts": parts[1:]})
     return entries, split
 
@@ -339,20 +339,20 @@ def _draw_parts(split: list[Any], column: str) -> Any:
     from reports.plotting.pictures import error_map, exposure, tone_mapped
     from reports.plotting.style import WIDTHS
 
-    across = 3 + max(len(each.parts) for each in split)
+    across = 2 + max(len(parts) for _, _, parts in split)
     wide, size = WIDTHS[column], 6 if column == "double" else 4.5
-    height, width = split[0].truth.shape[:2]
+    height, width = split[0][1].shape[:2]
     figure = new_figure(wide, len(split) * (wide / across * height / width + 0.36))
     panels = figure.subplots(len(split), across, squeeze=False)
-    for each, line in zip(split, panels):
+    for (label, given, parts), line in zip(split, panels):
         for panel in line:
             panel.set_axis_off()
-        truth, image = (np.asarray(values, dtype=np.float64) for values in (each.truth, each.image))
+        truth = np.asarray(given, dtype=np.float64)
         factor = exposure(truth)
         show_picture(line[0], tone_mapped(truth, factor), "reference", size)
-        show_picture(line[1], tone_mapped(image, factor), each.configuration.label.replace(" (", "\n("), size)
-        for panel, part in zip(line[2:], (each.whole, *each.parts)):
-            fraction = "" if math.isnan(part.share) or part.cause == "whole" else f", {100 * part.share:.0f} %"
-            title = f"{part.cause}\n{part.relative_rmse:.1e}{fraction}"
-            show_picture(panel, error_map(truth, truth + part.image), title, size)
+        show_picture(line[1], tone_mapped(truth + parts[0][1], factor), label.replace(" (", "\n("), size)
+        for panel, (part, image) in zip(line[2:], parts):
+            fraction = "" if math.isnan(part["share"]) or part["cause"] == "whole" else f", {100 * part['share']:.0f} %"
+            title = f"{part['cause']}\n{part['relative_rmse']:.1e}{fraction}"
+            show_picture(panel, error_map(truth, truth + image), title, size)
     return figure

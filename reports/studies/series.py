@@ -30,7 +30,7 @@ def polynomials() -> Study:
     activate()
     import numpy as np
 
-    from validation.kernels.biri_misprints import printed_against_derived
+    from validation.papers.formulas import printed_against_derived
 
     theta = np.linspace(-1.5, 1.5, 301)
     rows = []

@@ -57,8 +57,7 @@ def yield_processor() -> None:
 def answers(task: Task) -> Iterator[Answer]:
     """Yield the reference of an image, rays after rays."""
     from reports.view.truth_order import pixel_order
-    from validation.estimates.quadrature import truth_of_pixels
-    from validation.estimates.reference_layers import reference_error
+    from validation.estimates.quadrature import reference_error, truth_of_pixels
     from validation.scenes.loading import load_scene
 
     scene = load_scene(task.scene, task.size, task.changes).scene

@@ -26,7 +26,7 @@ from reference.scene.directional_light import is_directional
 from reference.scene.read import TruthLight, TruthScene
 from validation.engine.curves import agx, blender_filmic, filmic, to_srgb
 from validation.engine.prediction import Scenery
-from validation.estimates.reference_layers import reference_layer
+from validation.estimates.quadrature import reference_layer
 from validation.fog_model.radiance import FogModel, scene_fog
 from validation.fog_model.view import scattering_paths, view_of
 

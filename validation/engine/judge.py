@@ -42,8 +42,7 @@ from validation.engine.hints import GAIN, OUTLIERS, Hints, find_hints
 from validation.engine.judged_layer import KINDS, JudgedLayer, expected_layer, judged_layer
 from validation.engine.seen import Progress, pixel_kinds, scene_of_size
 from validation.estimates.agreement import pixel_angle
-from validation.estimates.quadrature import truth_image
-from validation.estimates.reference_layers import reference_error, reference_layer
+from validation.estimates.quadrature import reference_error, reference_layer, truth_image
 from validation.metrics.errors import FLOOR, plain
 from validation.scenes.loading import LoadedScene
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from reference.quadrature.ray_values import TruthImage
 from reference.storage.exr import TOTAL, Image, layer, layer_names
-from validation.estimates.reference_layers import reference_layer
+from validation.estimates.quadrature import reference_layer
 
 AIRLIGHT, SURFACE = "airlight", "surface"
 KINDS = (AIRLIGHT, SURFACE, TOTAL)  #: what a layer may hold; the total is the sum of the others

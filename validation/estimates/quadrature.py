@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The truth of a scene, from the cache where it was computed before."""
+"""The truth of a scene, from the cache where it was computed before, and what the image of a renderer holds of it."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import Field, fields, replace
@@ -15,6 +15,7 @@ from reference.quadrature.replicates import Keep
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import TruthScene, read_truth
 from reference.storage.cache import drop_arrays
+from reference.storage.exr import TOTAL
 from reference.storage.kept import Kept, Spent, is_kept, kept, key_of, load, stopwatch, store
 from reference.storage.scene_digest import scene_digest
 from validation.estimates.light_on_ray import check_camera, check_rays, check_values
@@ -116,3 +117,33 @@ class _Parts:
 def _as_kept(field: Field, value: Any) -> Any:
     """Return an array, or the number that was stored as an array without dimensions."""
     return field.type(value) if field.type in (int, float) else value
+
+
+Array = NDArray[np.float64]
+
+
+def reference_layer(truth: TruthImage, layer: str, *, emitted: bool = True) -> Array:
+    """Return 'airlight', 'surface' or 'total', (height, width, 3) [W/(m^2 sr)].
+
+    A renderer shows the area lights that the camera sees: Mitsuba's integrators do unless `hide_emitters` is set, and
+    so do those of Blender for an emitting mesh. So `total` is airlight, lit surface and `emitted` together. It is
+    without `emitted` where a file has that as a layer beside it, as the files of `airlight reference` do, and for
+    frames of our own methods, which show no light. Where a renderer hides its lights (Blender's light objects by
+    default, `hide_emitters`), compare the layer `airlight`, or leave the lights out here.
+    """
+    if layer != TOTAL:
+        return np.asarray(getattr(truth, layer))
+    total = truth.airlight + truth.surface
+    return total if truth.emitted is None or not emitted else total + truth.emitted
+
+
+def reference_error(truth: TruthImage, layer: str) -> Array | None:
+    """Return the standard error of a layer, (height, width, 3) [W/(m^2 sr)]; None without area lights, where it is 0.
+
+    Airlight and surface have draws of their own, so that the variances of the total add up; what lights emit is exact.
+    """
+    if truth.airlight_se is None or truth.surface_se is None:
+        return None
+    if layer == TOTAL:
+        return np.hypot(truth.airlight_se, truth.surface_se)
+    return np.asarray(getattr(truth, f"{layer}_se"))

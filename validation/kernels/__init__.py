@@ -7,7 +7,6 @@ Read in this order:
 - `values.py`: values of a kernel on tables of cases;
 - `cases.py`: kernels on certified cases;
 - `rays.py`: quasi-random rays with their truth;
-- `biri_misprints.py`: what the misprints of Biri 2006 cost;
 - `stability.py`: where kernels break;
 - `benchmark.py`: time against error.
 """

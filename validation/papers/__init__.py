@@ -3,12 +3,9 @@
 
 Read in this order:
 
-- `claims.py`: a claim, its figure and the rule that makes its verdict; `claims.toml` has them all
-- `experiments.py`: which experiment is which function, and how long it takes
-- `measured.py`: times and refusals as figures
-- `formulas.py`: printed formulas beside what they must be, and droplets
-- `stencil.py`: the stencil of shadow planes along a ray
-- `shadow_planes.py`: orders and shortcuts of shadow planes in images
+- `claims.py`: a claim, its figure and the rule that makes its verdict; `claims.toml` has all claims and experiments
+- `formulas.py`: printed formulas beside what they must be, what misprints cost, and droplets
+- `shadow_planes.py`: orders and shortcuts of shadow planes in images, and the stencil along a ray
 - `scattering.py`: multiple scattering, and the constant R of bounded media
 - `biri_tables.py`: Tables 1 and 2 of Biri 2006
 - `light_volumes.py`: meshes, depths and maps of light volumes

@@ -22,15 +22,16 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.frame.renderer import FrameRenderer, run_cast_and_shade, run_method
+from analytic.errors import InputError
+from realtime.errors import InputError as RealtimeError
+from realtime.frame.renderer import Frame, FrameRenderer, render_frame, run_cast_and_shade, run_method
 from realtime.methods.light_volumes.published.mesh import tessellation_stages
 from realtime.scene.read_scene import Scene, read_scene
 from realtime.shadow_maps.shadow_map import cast_shadow_map
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import TruthScene, read_truth
-from validation.clock import time_repeated
+from validation.clock import time_repeated, timed
 from validation.metrics.errors import error_metrics
-from validation.papers.measured import attempted, frame_within, milliseconds, rate
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.registry import SCENES
 from validation.study.configuration import configuration, prepared
@@ -42,6 +43,7 @@ SIZE = (1024, 1024)  #: of the published images [pixels]
 MAPS = (1024, 2048, 4096)  #: of Table 1 [texels]
 PASSES = ("laplacian", "edge map", "tessellate", "vertices")  #: of the adaptive tessellation
 _SECONDS = 0.1  # for each timing [s]
+_LONGEST = 30.0  # frames that take longer are not measured [s]
 _MESH: dict[str, Any] = {"evaluation": "mesh"}
 _MARCH: dict[str, Any] = {"sum": "transitions", "spacing": "uniform", "shadow": "map"}
 #: Scene, method and parameters of the images, by the names of their figures.
@@ -84,7 +86,7 @@ def _image(name: str, renderer: Callable[[], FrameRenderer], true: Array, stride
 
 
 def _rate(renderer: FrameRenderer) -> list[float]:
-    return rate(time_repeated(moved_light(renderer), seconds=_SECONDS, least=3))
+    return time_repeated(moved_light(renderer), seconds=_SECONDS, least=3).rate
 
 
 def sampled(image: Array, stride: int) -> Array:
@@ -144,7 +146,7 @@ def _view(scene: Scene, view: str, texels: int, tessellation: str) -> dict[str, 
         cast, by_light = run_cast_and_shade(renderer)
         dr.eval(cast, by_light)
         volume = time_repeated(lambda: dr.eval(run_method(renderer, ready, cast, by_light)), seconds=_SECONDS, least=3)
-        found: dict[str, Any] = {f"{named} fps": _rate(renderer), f"{named} volume": milliseconds(volume)}
+        found: dict[str, Any] = {f"{named} fps": _rate(renderer), f"{named} volume": volume.interval}
         if tessellation == "static":
             return found | {f"{view} triangles": sum(len(mesh.triangles) for of_group in ready for mesh in of_group)}
         return found | {f"{named} {name}": time for name, time in _passes(scene, texels).items()}
@@ -159,3 +161,19 @@ def _passes(scene: Scene, texels: int) -> dict[str, float]:
     pairs = [(cast_shadow_map(scene.geometry, light, texels), light) for light in scene.lights]
     runs = [[tessellation_stages(shadow_map, light)[0] for shadow_map, light in pairs] for _ in range(3)]
     return {name: float(np.median([sum(times[name] for times in run) for run in runs])) for name in runs[0][0]}
+
+
+def frame_within(renderer: FrameRenderer) -> Frame:
+    """Render a frame, unless frames take too long for timing."""
+    frame, milliseconds, _ = timed(lambda: render_frame(renderer))
+    if milliseconds > 1e3 * _LONGEST:
+        raise TimeoutError(f"a frame takes {1e-3 * milliseconds:.0f} s, more than the limit of {_LONGEST:g} s")
+    return frame
+
+
+def attempted(names: tuple[str, ...], work: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """Return what a piece of work gives; what it does not give, by `names`, is why it could not."""
+    try:
+        return work()
+    except (InputError, RealtimeError, MemoryError, TimeoutError) as reason:
+        return dict.fromkeys(names, f"not measured: {str(reason) or 'out of memory'}")

@@ -38,7 +38,6 @@ from realtime.scene.read_scene import Scene, read_scene
 from validation.clock import Timing, time_in_turns
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import error_metrics
-from validation.papers.measured import milliseconds, rate
 from validation.scenes.loading import load_scene
 from validation.study.configuration import Configuration, configuration, prepared
 from validation.study.frame_times import first_frame, moved_light
@@ -89,7 +88,7 @@ def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, A
         works = [moved_light(published), moved_light(ours)]
         stages = _stage_works(published, "taylor") if entry.staged else []
         times = time_in_turns(works + stages, seconds=(len(works) + len(stages)) * seconds)
-        figures |= {f"{entry.name} fps": rate(times[0]), f"{entry.name} ours fps": rate(times[1])}
+        figures |= {f"{entry.name} fps": times[0].rate, f"{entry.name} ours fps": times[1].rate}
         if entry.staged:
             figures |= {f"{entry.name} {name}": each for name, each in fractions(times[2:]).items()}
     return figures | {"median error": max(errors)}
@@ -112,7 +111,7 @@ def fractions(times: list[Timing]) -> dict[str, list[float]]:
     Each has the ends of its interval: the quartile of the stage that is least, with the others' that are most, and the
     other way round.
     """
-    silhouettes, surface, unshadowed, host, airlight = (milliseconds(time) for time in times)
+    silhouettes, surface, unshadowed, host, airlight = (time.interval for time in times)
 
     def less(whole: list[float], part: list[float]) -> list[float]:
         return [max(0.0, whole[at] - part[other]) for at, other in ((0, 0), (1, 2), (2, 1))]

@@ -12,6 +12,7 @@ impossible      the figure cannot be measured here, or its interval holds both a
 A row without a direction is a number beside ours and has no verdict: rates of graphics cards of 2004 to 2016 are such.
 """
 
+import importlib
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -22,6 +23,7 @@ from typing import Any
 
 REPRODUCED, NOT_REPRODUCED, DIFFERS, IMPOSSIBLE = "reproduced", "not reproduced", "differs", "impossible"
 VERDICTS = (REPRODUCED, NOT_REPRODUCED, DIFFERS, IMPOSSIBLE)
+EFFORTS = ("quick", "default", "full", "paper")
 DIRECTIONS = ("at most", "at least", "equal", "unequal", "within")
 
 #: What an experiment gives: by name a number, a number with the ends of its interval, or why there is none.
@@ -85,6 +87,20 @@ class Claim:
         return words + (f" to {percent}" if self.tolerance > 1e-6 else "")
 
 
+@dataclass(frozen=True)
+class Experiment:
+    """What measures the figures of some claims."""
+
+    function: str  #: of a module beside this one, 'module:function'; called without arguments it gives the figures
+    seconds: float  #: that it takes on two threads, about
+    effort: str = "paper"  #: the least of `EFFORTS` whose reports have it; 'paper': only the command
+
+    def run(self) -> dict[str, Any]:
+        """Return the `Figures`."""
+        module, function = self.function.split(":")
+        return getattr(importlib.import_module(f"validation.papers.{module}"), function)()
+
+
 @cache
 def _data() -> dict[str, Any]:
     return tomllib.loads(Path(__file__).with_name("claims.toml").read_text(encoding="utf-8"))
@@ -93,6 +109,12 @@ def _data() -> dict[str, Any]:
 def papers() -> dict[str, str]:
     """Return the papers, by the name of the command line, in words."""
     return dict(_data()["papers"])
+
+
+@cache
+def experiments() -> dict[str, Experiment]:
+    """Return the experiments by name."""
+    return {name: Experiment(**given) for name, given in _data()["experiments"].items()}
 
 
 @cache

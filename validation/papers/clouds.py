@@ -30,7 +30,6 @@ from reference.scene.clouds import CloudScene, read_clouds
 from validation.clock import Timing, time_repeated
 from validation.estimates.budget import Budget
 from validation.estimates.images import monte_carlo_reference
-from validation.papers.measured import rate
 from validation.scenes.loading import LoadedScene, load_scene, resize
 from validation.scenes.parts import fog, medium_boundary, sun, tabulated_phase
 from validation.scenes.registry import SCENES
@@ -89,7 +88,7 @@ def clouds_figures(*, size: tuple[int, int] = SIZE, samples: int = SAMPLES) -> d
 
 def cloud_frames() -> dict[str, Any]:
     """Return the frames a second of section 9."""
-    return {name: rate(time_frames(read_scene(load_scene(name, (800, 600)).scene))["light_moved"]) for name in FRAMES}
+    return {name: time_frames(read_scene(load_scene(name, (800, 600)).scene))["light_moved"].rate for name in FRAMES}
 
 
 def time_frames(scene: Scene, *, seconds: float = 1.0) -> dict[str, Timing]:

@@ -43,7 +43,6 @@ from reference.scene.read import read_truth
 from validation.clock import time_in_turns
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import error_metrics
-from validation.papers.measured import milliseconds
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.meshes import lathe, placed
 from validation.scenes.parts import mitsuba_mesh
@@ -90,7 +89,7 @@ def triangle_times(seconds: float = 0.3) -> dict[str, Any]:
         planes = methods.prepared(scene, methods.configuration("shadow-planes", "exact"))
         works = [_evaluation(volumes, state, cast, by_light), moved_light(planes)]
         volume, frame = time_in_turns(works, seconds=seconds * len(works))
-        times |= {f"volume, {name}": milliseconds(volume), f"planes, {name}": milliseconds(frame)}
+        times |= {f"volume, {name}": volume.interval, f"planes, {name}": frame.interval}
     return times
 
 

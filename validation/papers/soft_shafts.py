@@ -31,7 +31,6 @@ from realtime.frame.renderer import render_frame, run_cast_and_shade
 from realtime.scene.read_scene import Scene, read_scene
 from validation.clock import Timing, time_in_turns
 from validation.estimates.quadrature import truth_image
-from validation.papers.measured import rate
 from validation.scenes.loading import load_scene
 from validation.study.configuration import SHARED_POINTS, Configuration, prepared
 from validation.study.frame_times import moved_light
@@ -107,7 +106,7 @@ def soft_shafts(size: tuple[int, int] = SIZE, *, seconds: float = 0.3) -> dict[s
         **{f"{name} error": error for name, error in errors.items()},
         **{f"{name} flicker": each for name, each in _flicker(scene, reference).items()},
         "R4 edges": reference.edges(images["R4"]),
-        "R4 fps": rate(times["R4"]),
+        "R4 fps": times["R4"].rate,
         "R4 over R1": ratio["R4"](images["R1"]),
         "R4 over R2": ratio["R4"](images["R2, equal time"]),
         "R4 over R3": ratio["R4"](images["R3, equal time"]),

@@ -17,10 +17,9 @@ import mitsuba as mi
 
 from analytic.errors import InputError, nearest
 from reference.storage.scene_digest import scene_digest
-from validation.scenes.changes import change_scene, isotropic_media
+from validation.scenes.changes import change_scene, isotropic_media, scene_with_lobes
 from validation.scenes.files.read import read_file
 from validation.scenes.height_fog import register_height_fog
-from validation.scenes.lobes import scene_with_lobes
 from validation.scenes.numbers import check_numbers
 from validation.scenes.random.ranges import FILE as RANGES
 from validation.scenes.random.scene import PREFIX, is_random, random_parts, random_record

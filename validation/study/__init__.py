@@ -19,7 +19,6 @@ Read in this order:
 - `cost.py`: what a command will take, and the question before it starts;
 - `decompose.py`: the error of an image by its causes, which add up to it;
 - `maps.py`: error against the size of the shadow map, and the flicker of a light that moves;
-- `subdivision.py`: meshes with four times the triangles at each level;
-- `ladders.py`: a scene with less and more of one kind of work;
+- `ladders.py`: a scene with less and more of one kind of work, meshes with four times the triangles among it;
 - `growth.py`: what methods cost at each step, and how times grow.
 """

@@ -18,8 +18,8 @@ With <a, b> the mean of a b over pixels and channels, the *share* of a part P in
 so that the shares add up to 1. A share below 0 is of a part that hides others.
 """
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -39,32 +39,10 @@ Render = Callable[[Configuration], Array]  #: airlight of a configuration, (heig
 REST, POINTS = "rest", "light points"
 
 
-@dataclass(frozen=True)
-class Part:
-    """A part of an error."""
-
-    cause: str
-    without: str  #: what has this cause no more: values of parameters, 'exact sum' or 'reference'
-    image: Array  #: signed, (height, width, 3) [W/(m^2 sr)]
-    relative_rmse: float  #: root of its mean square over the mean of the reference
-    relative_bias: float  #: its mean over that of the reference
-    share: float  #: in the square of the whole error; NaN where there is none
-
-
-@dataclass(frozen=True)
-class Decomposition:
-    """The error of a configuration in a scene by its causes."""
-
-    configuration: Configuration
-    truth: Array  #: airlight, (height, width, 3) [W/(m^2 sr)]
-    image: Array  #: that of the configuration
-    parts: tuple[Part, ...]  #: add up to `whole.image`
-
-    @property
-    def whole(self) -> Part:
-        """The error itself."""
-        difference = self.image - self.truth
-        return _part("whole", "reference", difference, difference, self.truth)
+#: What a table says of a part of an error, and its signed image, (height, width, 3) [W/(m^2 sr)]: `cause`; `without`,
+#: what has this cause no more, values of parameters, 'exact sum' or 'reference'; `relative_rmse` and `relative_bias`,
+#: over the mean of the reference; and the `share` in the square of the whole error, NaN where there is none.
+Part = tuple[dict[str, Any], Array]
 
 
 def decompose(
@@ -74,8 +52,8 @@ def decompose(
     *,
     render: Render | None = None,
     exact: Callable[[LightPoints], Array] | None = None,
-) -> Decomposition:
-    """Return the error of a configuration by its causes.
+) -> list[Part]:
+    """Return the whole error of a configuration, and the parts by its causes, which add up to it.
 
     The truth is that at pixel centres, (height, width, 3) [W/(m^2 sr)]. `render` renders a configuration of one's own,
     in a process of its own for example, and `exact` the exact sum over light points, for callers that keep it.
@@ -107,8 +85,8 @@ def decompose(
     else:
         steps.append((left, "reference", last - truth))
     whole = image - truth
-    parts = tuple(_part(cause, without, part, whole, truth) for cause, without, part in steps)
-    return Decomposition(chosen, truth, image, parts)
+    steps = [("whole", "reference", whole), *steps]
+    return [(_numbers(cause, without, part, whole, truth), part) for cause, without, part in steps]
 
 
 def exact_sum(scene: Scene, points: LightPoints) -> Array:
@@ -146,19 +124,13 @@ def _changes(before: Configuration, after: Configuration) -> str:
     return ", ".join([f"kernel={after.kernel}"] * (before.kernel != after.kernel) + words)
 
 
-def _part(cause: str, without: str, image: Array, whole: Array, truth: Array) -> Part:
+def _numbers(cause: str, without: str, image: Array, whole: Array, truth: Array) -> dict[str, Any]:
     mean, square = float(truth.mean()), float(np.mean(whole * whole))
-    rmse = float(np.sqrt(np.mean(image * image)))
-    relative = (rmse / mean, float(image.mean()) / mean) if mean > 0 else (np.nan, np.nan)
-    return Part(cause, without, image, *relative, float(np.mean(image * whole)) / square if square > 0 else np.nan)
-
-
-def part_numbers(part: Part) -> Mapping[str, Any]:
-    """Return what a table says of a part, JSON-ready but for numbers that are not finite."""
+    rmse, bias = float(np.sqrt(np.mean(image * image))), float(image.mean())
     return {
-        "cause": part.cause,
-        "without": part.without,
-        "relative_rmse": part.relative_rmse,
-        "relative_bias": part.relative_bias,
-        "share": part.share,
+        "cause": cause,
+        "without": without,
+        "relative_rmse": rmse / mean if mean > 0 else np.nan,
+        "relative_bias": bias / mean if mean > 0 else np.nan,
+        "share": float(np.mean(image * whole)) / square if square > 0 else np.nan,
     }

@@ -17,12 +17,13 @@ A step that is steeper by more than `CLIFF` is a cliff, where it takes longer th
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 from realtime.errors import InputError
 from realtime.scene.read_scene import Scene
-from validation.clock import Timing, time_repeated
+from validation.clock import time_repeated
+from validation.metrics.errors import plain
 from validation.study.configuration import Configuration, configuration, prepared
 from validation.study.frame_times import camera_rays
 from validation.study.ladders import Step
@@ -52,38 +53,7 @@ GROWTH = {
 }
 
 
-@dataclass(frozen=True)
-class Cost:
-    """What a frame costs at one step."""
-
-    work: float
-    frame: Timing
-    light_moved: Timing
-    objects_moved: Timing
-    rays: Timing  #: the camera rays alone: the least that a frame takes which casts them
-    memory: float | None  #: at the peak, beyond what was there before [MiB]; None where the system does not say
-
-
-@dataclass(frozen=True)
-class Growth:
-    """How one time grows with the work."""
-
-    exponent: float  #: NaN for fewer than two steps
-    standard_error: float  #: from the scatter about the line; NaN for fewer than three steps
-    steepest: float  #: exponent between two steps that follow one another
-    at: float  #: the work of the second of these
-    cliff: bool  #: whether that is more than it may be
-
-
-@dataclass(frozen=True)
-class Scaling:
-    """How a method grows with one kind of work."""
-
-    kind: str
-    configuration: Configuration
-    costs: tuple[Cost, ...]
-    growth: dict[str, Growth]  #: of `TIMES`
-    refused: str | None = None  #: why there are no more steps
+Record = dict[str, Any]
 
 
 def study_scaling(
@@ -93,34 +63,42 @@ def study_scaling(
     *,
     seconds: float = 0.3,
     progress: Progress | None = None,
-) -> list[Scaling]:
-    """Measure how methods grow with a kind of work, in steps of `validation.study.ladders.ladder`."""
-    costs: dict[Configuration, list[Cost]] = {chosen: [] for chosen in configurations}
-    refused: dict[Configuration, str] = {}
+) -> list[Record]:
+    """Measure how methods grow with a kind of work, in steps of `validation.study.ladders.ladder`.
+
+    Returns
+    -------
+    list of dict
+        For each method its `label` and the `kind`; `costs`, by step, see `_cost`; `growth`, by name of `TIMES`, see
+        `growth`; and in `refused` why there are no more steps, or None.
+    """
+    costs: dict[str, list[Record]] = {chosen.label: [] for chosen in configurations}
+    refused: dict[str, str] = {}
     total = len(steps) * len(configurations)
     for number, step in enumerate(steps):
         scene = step.scene()
         for place, chosen in enumerate(configurations):
-            if chosen not in refused:
+            if chosen.label not in refused:
                 try:
-                    costs[chosen].append(_cost(scene, step, chosen, seconds))
+                    costs[chosen.label].append(_cost(scene, step, chosen, seconds))
                 except REFUSALS as error:
-                    refused[chosen] = str(error)
+                    refused[chosen.label] = str(error)
             if progress is not None:
                 progress(number * len(configurations) + place + 1, total, f"{kind} {step.work:g}, {chosen.label}")
-    return [
-        Scaling(
-            kind,
-            chosen,
-            tuple(found),
-            {name: growth(kind, name, found) for name in TIMES},
-            refused.get(chosen),
-        )
-        for chosen, found in costs.items()
-    ]
+    records = []
+    for label, found in costs.items():
+        works = [cost["work"] for cost in found]
+        times = {name: growth(kind, name, works, [cost[name]["median_ms"] for cost in found]) for name in TIMES}
+        records.append({"label": label, "kind": kind, "costs": found, "growth": times, "refused": refused.get(label)})
+    return records
 
 
-def _cost(scene: Scene, step: Step, chosen: Configuration, seconds: float) -> Cost:
+def _cost(scene: Scene, step: Step, chosen: Configuration, seconds: float) -> Record:
+    """Return what a frame costs at one step.
+
+    Beside the `work` and the `TIMES` there are those of the camera `rays` alone, the least that a frame takes which
+    casts them, and the `memory` at the peak, beyond what was there before [MiB].
+    """
     if step.parameters:
         own = dict(chosen.parameters) | dict(step.parameters)
         chosen = configuration(chosen.method, chosen.kernel, own)
@@ -129,19 +107,27 @@ def _cost(scene: Scene, step: Step, chosen: Configuration, seconds: float) -> Co
     if done.times is None:
         raise InputError(done.reason or "")
     rays = time_repeated(camera_rays(prepared(scene, chosen)), seconds=0.5 * seconds, least=3)
-    frame, light, objects = (getattr(done.times, name) for name in TIMES)
-    return Cost(step.work, frame, light, objects, rays, done.memory)
+    times = {name: getattr(done.times, name) for name in TIMES} | {"rays": rays}
+    return {"work": step.work} | {name: plain(time) for name, time in times.items()} | {"memory": done.memory}
 
 
-def growth(kind: str, name: str, costs: Sequence[Cost]) -> Growth:
-    """Return how one of `TIMES` grows with the work, from the costs of steps, the least work first."""
-    times = [getattr(cost, name).median_ms for cost in costs]
-    order, standard_error = fitted_slope([cost.work for cost in costs], times)
+def growth(kind: str, name: str, works: Sequence[float], times: Sequence[float]) -> Record:
+    """Return how one of `TIMES`, [ms] at steps of a kind of work, the least first, grows with the work.
+
+    Returns
+    -------
+    dict
+        The `exponent`, None for fewer than two steps, and its `standard_error` from the scatter about the line, None
+        for fewer than three; the `steepest` exponent between two steps that follow one another, the work of the second
+        of them, `at`, and whether that is a `cliff`, more than it may be.
+    """
+    order, standard_error = fitted_slope(works, times)
+    steps = list(pairwise(zip(works, times)))
     local = [
-        (math.log(after / before) / math.log(second.work / first.work), second.work, after)
-        for (first, second), (before, after) in zip(pairwise(costs), pairwise(times))
+        (math.log(after / before) / math.log(second / first), second) for (first, before), (second, after) in steps
     ]
-    steepest, at, _ = max(local, default=(math.nan, math.nan, 0.0))
+    steepest, at = max(local, default=(math.nan, math.nan))
     most = GROWTH[kind][TIMES.index(name)] + CLIFF
-    cliff = any(slope > most and time > _SHORT for slope, _, time in local)
-    return Growth(-order, standard_error, steepest, at, cliff)
+    cliff = any(slope > most and after > _SHORT for (slope, _), (_, (_, after)) in zip(local, steps))
+    found = {"exponent": -order, "standard_error": standard_error, "steepest": steepest, "at": at, "cliff": cliff}
+    return dict(plain(found))

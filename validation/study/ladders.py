@@ -4,29 +4,43 @@
 | kind | work | what changes |
 |---|---|---|
 | `size` | pixels | the image has half, twice and four times the width and height |
-| `triangles` | triangles of opaque meshes | each is cut into four, with bumps (`validation.study.subdivision`) |
+| `triangles` | triangles of opaque meshes | each is cut into four, with bumps (see below) |
 | `lights` | lights without extent | each stands beside itself again, with its fraction of the intensity |
 | `media` | bounded media | the last ones are left out |
 | `map` | texels on a side of a shadow map | the parameter `map` |
 
 The other kinds keep the image at the size that is asked for.
+
+A flat triangle cut into four has no new silhouette. So all vertices move by one smooth map of space,
+
+    u(p) = p + sum_i a_i sin(k_i . p + i),     |a_i| |k_i| = 0.15,     i = 1 .. 4,
+
+with wavelengths from a quarter to a thirtieth of the scene's size. The norms of its derivative less the identity add
+up to 0.6 < 1: it is one to one, so that closed meshes stay closed, and what was disjoint is disjoint. Its bumps turn
+smooth outlines into silhouettes of which more and more edges are found as triangles shrink below the wavelengths, about
+the root of their number. Equal places move equally, so that seams of doubled vertices stay closed. Bounds of media and
+lights with extent stay as they are: they must be convex, or of their shape.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from realtime.area_lights.shape import is_area_light
 from realtime.scene.animate import turned_light
 from realtime.scene.lights import Light
+from realtime.scene.mesh_adjacency import mesh_triangles
+from realtime.scene.named_shapes import scene_of
 from realtime.scene.read_media import sort_shapes
 from realtime.scene.read_scene import Scene, read_scene
 from validation.scenes.loading import load_scene
-from validation.scenes.meshes import rotation
-from validation.study.subdivision import subdivided, triangles_of, with_shapes
+from validation.scenes.meshes import divided, rotation
+from validation.scenes.parts import mesh_with_material
 
 KINDS = ("size", "triangles", "lights", "media", "map")
 MOST_TRIANGLES = 5_300_000  #: a mesh of so many takes some gigabytes with what is made of it
@@ -34,6 +48,8 @@ _SIDES = (0.5, 1, 2, 4)  # of the image
 _COPIES = (1, 2, 4, 8)  # of each light
 _MAPS = (128, 256, 512, 1024, 2048)
 _ASIDE = 0.07  # between the copies of a light, as a share of its distance from the camera
+_WAVES = ((3.1, 2.3, -1.1), (-5.3, 6.7, 3.7), (11.3, -7.9, 9.1), (-17.3, 15.1, 13.9))  # along the size of the scene
+_STEEPNESS = 0.15
 _TURN = 2.3  # between the copies of a light from infinity [degrees]
 
 
@@ -130,3 +146,51 @@ def _fewer_media(name: str, size: tuple[int, int], count: int) -> Scene:
 
 def _maps(name: str, size: tuple[int, int]) -> list[Step]:
     return [Step(side, partial(_read, name, size), {"map": side}) for side in _MAPS]
+
+
+def triangles_of(scene) -> int:
+    """Return how many triangles the meshes of a Mitsuba scene have that `subdivided` cuts."""
+    return sum(int(shape.face_count()) for shape in scene.shapes() if _is_cut(shape))
+
+
+def subdivided(scene, levels: int) -> Any:
+    """Return a Mitsuba scene whose opaque meshes, if any, have 4^levels times the triangles, and bumps."""
+    if not triangles_of(scene):
+        raise InputError("triangles: the scene has no opaque meshes, which alone can have more triangles; use another")
+    box = scene.bbox()
+    low, high = (np.array(corner, dtype=np.float64) for corner in (box.min, box.max))
+    shapes = [_cut(shape, levels, low, float(np.linalg.norm(high - low))) for shape in scene.shapes()]
+    return with_shapes(scene, shapes)
+
+
+def with_shapes(scene, shapes: Iterable[Any]) -> Any:
+    """Return a Mitsuba scene of other shapes, with the camera and the lights without extent of one."""
+    emitters = (emitter for emitter in scene.emitters() if not is_area_light(emitter))
+    parts = {f"emitter-{number}": emitter for number, emitter in enumerate(emitters)}
+    return scene_of(list(shapes), {"sensor": scene.sensors()[0]} | parts)
+
+
+def _cut(shape, levels: int, corner: NDArray[np.float64], size: float) -> Any:
+    if not _is_cut(shape):
+        return shape
+    mesh = mesh_triangles(shape)
+    for _ in range(levels):
+        mesh = divided(mesh)
+    vertices, faces = mesh
+    cut = mesh_with_material(shape.id(), (bumpy(vertices, corner, size), faces), shape.bsdf())
+    cut.set_id(shape.id())
+    return cut
+
+
+def bumpy(points: NDArray[np.float64], corner: NDArray[np.float64], size: float) -> NDArray[np.float64]:
+    """Return points (n, 3) after the map of space above, for a scene of a `size` from a `corner` on [m]."""
+    moved = points.copy()
+    for number, wave in enumerate(np.asarray(_WAVES) * (2 * np.pi / size), 1):
+        across = np.cross(wave, (0.31, 0.53, 0.79))
+        height = _STEEPNESS / np.linalg.norm(wave)
+        moved += height * across / np.linalg.norm(across) * np.sin((points - corner) @ wave + number)[:, None]
+    return moved
+
+
+def _is_cut(shape) -> bool:
+    return shape.is_mesh() and not shape.is_emitter() and shape.bsdf().class_name() != "Null"

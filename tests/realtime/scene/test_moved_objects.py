@@ -12,7 +12,7 @@ from tests.helpers.scenes import tiny_scene
 from validation.scenes.meshes import grid, icosphere, rotation
 from validation.scenes.parts import mitsuba_mesh
 from validation.study.configuration import configuration, prepared
-from validation.study.subdivision import bumpy
+from validation.study.ladders import bumpy
 
 TURN = rotation((0.3, -0.2, 1), 71.0)
 

@@ -6,23 +6,21 @@ import json
 import pytest
 
 from reports.commands import main as cli
-from validation.papers.experiments import EXPERIMENTS, Experiment
+from validation.papers import claims as papers
 
 
 @pytest.fixture
 def experiments(own_cache, monkeypatch):
     """Experiments that give the same number for every figure; returns which were run."""
-    from validation.papers.claims import claims
-
     ran = []
 
     def run(self):
-        (name,) = (name for name, each in EXPERIMENTS.items() if each is self)
+        (name,) = (name for name, each in papers.experiments().items() if each is self)
         ran.append(name)
-        names = [part for each in claims() if each.experiment == name for part in each.figure.split(" / ")]
+        names = [part for each in papers.claims() if each.experiment == name for part in each.figure.split(" / ")]
         return dict.fromkeys(names, 1.0)
 
-    monkeypatch.setattr(Experiment, "run", run)
+    monkeypatch.setattr(papers.Experiment, "run", run)
     return ran
 
 

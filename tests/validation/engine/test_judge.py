@@ -11,8 +11,7 @@ from validation.engine.images import EngineImage, measure_image
 from validation.engine.judge import compare_scene, truths
 from validation.engine.judged_layer import expected_layer, judged_layer
 from validation.engine.seen import scene_of_size, seen_image
-from validation.estimates.quadrature import truth_image
-from validation.estimates.reference_layers import reference_error, reference_layer
+from validation.estimates.quadrature import reference_error, reference_layer, truth_image
 from validation.scenes.loading import load_scene
 
 SCENE = """<scene version="3.0.0">

@@ -10,8 +10,7 @@ from reference.storage.exr import Image, write_exr
 from validation.engine.error_place import error_place
 from validation.engine.hints import find_hints
 from validation.engine.judge import compare_scene, judge
-from validation.estimates.quadrature import truth_image
-from validation.estimates.reference_layers import reference_layer
+from validation.estimates.quadrature import reference_layer, truth_image
 from validation.scenes.loading import load_scene
 
 SIZE = (80, 60)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
-from validation.estimates.expected_airlight import estimator_truth
+from validation.estimates.agreement import estimator_truth
 from validation.estimates.quadrature import truth_image
 from validation.scenes.loading import load_scene
 

@@ -11,7 +11,7 @@ from reference.quadrature.replicates import PointPlan
 from reference.scene.read import read_truth
 from tests.helpers.area_lights import NULL, fog, lamp, lit_scene
 from validation.estimates.agreement import truth_estimate
-from validation.estimates.reference_layers import reference_error, reference_layer
+from validation.estimates.quadrature import reference_error, reference_layer
 from validation.statistics.comparison import Estimate, compare_statistics
 
 

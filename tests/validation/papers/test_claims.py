@@ -11,14 +11,15 @@ import pytest
 
 from validation.papers.claims import (
     DIRECTIONS,
+    EFFORTS,
     Claim,
     Figure,
     claims,
+    experiments,
     judged,
     papers,
     verdict,
 )
-from validation.papers.experiments import EFFORTS, EXPERIMENTS
 
 MEASURED = json.loads(Path(__file__).with_name("figures.json").read_text(encoding="utf-8"))
 JUDGED = [claim for claim in claims() if claim.direction]
@@ -54,8 +55,8 @@ def test_the_recorded_figures_are_those_of_the_claims():
 def test_every_claim_is_whole():
     assert {each.paper for each in claims()} == set(papers())
     assert len({key(each) for each in claims()}) == len(claims())
-    assert {each.experiment for each in claims() if each.experiment} == set(EXPERIMENTS)
-    assert {each.effort for each in EXPERIMENTS.values()} == set(EFFORTS)
+    assert {each.experiment for each in claims() if each.experiment} == set(experiments())
+    assert {each.effort for each in experiments().values()} == set(EFFORTS)
     for each in claims():
         assert each.figure if each.experiment else each.why and not each.direction, each.item
         if each.direction:

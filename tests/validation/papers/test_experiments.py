@@ -9,11 +9,10 @@ from tests.validation.papers.test_claims import JUDGED, key, measured
 from validation.clock import Timing
 from validation.papers import billeter_tables, biri_tables, soft_shafts
 from validation.papers.biri_tables import STAGES, fractions
-from validation.papers.claims import claims, taken, verdict
-from validation.papers.experiments import EXPERIMENTS
+from validation.papers.claims import claims, experiments, taken, verdict
 from validation.papers.formulas import _annex, _cloud_equations, _droplets
 from validation.papers.scattering import fitted_constant, left_over
-from validation.papers.stencil import drawn
+from validation.papers.shadow_planes import drawn
 from validation.scenes.loading import load_scene
 
 
@@ -70,10 +69,10 @@ def test_what_a_constant_leaves_of_two_noisy_images():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name, each in EXPERIMENTS.items() if each.effort in ("quick", "default")])
+@pytest.mark.parametrize("name", [name for name, each in experiments().items() if each.effort in ("quick", "default")])
 def test_experiments_have_the_recorded_verdicts(variant, name):
     """Verdicts on the machine or on our scenes are not compared: they are those of the machine at hand."""
-    figures = EXPERIMENTS[name].run()
+    figures = experiments()[name].run()
     for each in JUDGED:
         if each.experiment == name:
             figure = taken(each, figures)

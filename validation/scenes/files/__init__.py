@@ -8,9 +8,8 @@ command can take is refused in Mitsuba's own words. What was changed is said in 
 Read in this order:
 
 - `nodes.py`: the nodes of a parsed file;
-- `kinds.py`: plugins that no command takes, refused by name;
 - `media.py`: extinction and albedo from what old files have;
 - `shapes.py`: instances written out, lamps on quads as rectangles, rooms of fog as boxes;
 - `references.py`: media that opaque shapes reference;
-- `read.py`: a file made into a scene.
+- `read.py`: a file made into a scene; what no command takes is refused by name.
 """

@@ -11,9 +11,9 @@ import mitsuba as mi
 
 from analytic.errors import InputError
 from reference.storage.files import temporary_folder
-from validation.scenes.files.kinds import check_kinds
+from validation.scenes.changes import give_lobes
 from validation.scenes.files.media import give_extinction, grey_height_fog, pass_where_no_material
-from validation.scenes.files.nodes import kind, name_nodes, properties, references
+from validation.scenes.files.nodes import kind, name_nodes, of_kind, properties, references
 from validation.scenes.files.references import leave_out_media, touching
 from validation.scenes.files.shapes import (
     cylinders_as_meshes,
@@ -21,8 +21,15 @@ from validation.scenes.files.shapes import (
     rooms_as_boxes,
     write_out_instances,
 )
-from validation.scenes.lobes import give_lobes
 
+_TAKEN = {
+    "Emitter": ("point", "spot", "directional", "area", "constant", "envmap"),
+    "Medium": ("homogeneous", "heterogeneous"),
+    "PhaseFunction": ("isotropic", "hg", "rayleigh", "tabphase"),
+}
+_WORDS = {"Emitter": "light", "Medium": "medium", "PhaseFunction": "phase function"}
+_COLOURS = {"point": "intensity", "spot": "intensity", "directional": "irradiance", "area": "radiance"}
+_TEXTURES = ("bitmap", "checkerboard", "mesh_attribute", "volume")
 _FILM = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y")
 
 
@@ -108,3 +115,46 @@ def _leave_out_rendering(state: Any) -> None:
                     if name in film:
                         kept[name] = film[name]
                 state.nodes[at].props = kept
+
+
+def check_kinds(state: Any) -> None:
+    """Refuse what no command takes."""
+    for part, taken in _TAKEN.items():
+        for index in of_kind(state, part):
+            props = properties(state, index)
+            if props.plugin_name() not in taken:
+                name = f"{_WORDS[part]} '{props.id()}'" if props.id() else f"a {_WORDS[part]} of the scene"
+                raise InputError(
+                    f"{name} is of type '{props.plugin_name()}'; wanted one of {', '.join(taken)}: replace it"
+                    + " or remove it" * (part == "Emitter")
+                )
+    for index in of_kind(state, "Emitter"):
+        _check_light(state, index)
+    sensors = of_kind(state, "Sensor")
+    if sensors:
+        _check_camera(properties(state, sensors[0]))
+
+
+def _check_camera(props: Any) -> None:
+    name = f"camera '{props.id()}'"
+    if props.plugin_name() != "perspective":
+        raise InputError(
+            f"{name} is of type '{props.plugin_name()}'; wanted a sensor of type 'perspective', a pinhole: replace it"
+        )
+    for axis in "xy":
+        key = f"principal_point_offset_{axis}"
+        if key in props and float(props[key]):
+            raise InputError(f"{name} has {key} = {float(props[key]):g}; wanted none: remove it")
+
+
+def _check_light(state: Any, index: int) -> None:
+    props = properties(state, index)
+    name = f"light '{props.id()}'"
+    wanted = _COLOURS.get(props.plugin_name())
+    for key, at in references(props):
+        textured = properties(state, at).plugin_name() in _TEXTURES
+        if key == "texture" or (key == wanted and textured):
+            raise InputError(
+                f"{name}, of type '{props.plugin_name()}', has a texture as {key}; wanted one colour: remove the "
+                "texture, or give its mean as 'rgb'"
+            )

@@ -2,8 +2,8 @@
 import numpy as np
 import pytest
 
-from validation.kernels.biri_misprints import printed_against_derived, relative_errors
 from validation.kernels.rays import wide_rays
+from validation.papers.formulas import printed_against_derived, relative_errors
 
 
 @pytest.fixture(scope="module")

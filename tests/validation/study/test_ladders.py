@@ -7,7 +7,7 @@ import pytest
 from analytic.errors import InputError
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
-from validation.study.subdivision import subdivided, triangles_of
+from validation.study.ladders import subdivided, triangles_of
 
 
 def test_a_scene_keeps_what_has_no_triangles_to_cut(variant):
