@@ -141,7 +141,7 @@ def _by_replicate(
         for number, beam in enumerate(beams):
             for replicate in range(REPLICATES):
                 square = square_points(chosen, number, replicate, beam.light.kind)[slice(*numbers)]
-                one = partial(work, beam, active, square, _turn(chosen, number, replicate))
+                one = partial(work, beam, active, square, turn_of_sections(chosen, number, replicate))
                 got = keep(f"{layer}-{part}{number}-{numbers[1]}-{replicate}", one)
                 total[..., replicate] += got["radiance"]
                 if part != PILOT:
@@ -153,7 +153,7 @@ def _by_replicate(
     return sums
 
 
-def _turn(plan: PointPlan, number: int, replicate: int) -> float:
+def turn_of_sections(plan: PointPlan, number: int, replicate: int) -> float:
     """Return by what angle a replicate's sections are turned: by a half or one and a half right angles, and around."""
     along, across = divmod(replicate, 2)
     shift = (along + np.random.default_rng((plan.seed, number)).random()) / (REPLICATES // 2)

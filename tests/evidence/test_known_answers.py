@@ -269,12 +269,11 @@ def lid(corners: np.ndarray, height: float):
 
 
 @pytest.mark.claim("known-answers")
-@pytest.mark.claim("area-light-closed-forms", tolerance="1.1e-4 by 8 x 65536 samples: three standard errors")
-@pytest.mark.parametrize("samples", [64, pytest.param(65536, marks=pytest.mark.slow)])
+@pytest.mark.claim("area-light-closed-forms", tolerance="8e-5 by 8 x 4096 samples: three standard errors")
 @pytest.mark.parametrize(
     ("kind", "corners"), [("disk", HALF_PLANE), ("rectangle", TRIANGLE)], ids=["half plane", "triangle"]
 )
-def test_what_a_polygon_leaves_of_a_light(variant, kind, corners, samples):
+def test_what_a_polygon_leaves_of_a_light(variant, kind, corners):
     """A light at the height 4 over points at 0, where a polygon at the height 2 is in the way.
 
     Of a disk a half plane leaves 1 - (acos u - u sqrt(1 - u^2))/pi, of a rectangle a triangle what clipping leaves.
@@ -285,7 +284,7 @@ def test_what_a_polygon_leaves_of_a_light(variant, kind, corners, samples):
     light = replace(truth.area[0], centre=np.array([*middle, 4.0]), half=half, frame=np.diag([1.0, 1.0, -1.0]))
     truth = replace(truth, area=(light,), occluders=lid(corners, 2.0))
     place = np.array([[-0.375, 0.25, 0], [-0.1875, 0.125, 0], [0.0, 0.0625, 0], [0.125, 0.25, 0], [0.3125, 0.125, 0]])
-    share = visible_share(truth, place, [0.0, 0.0, 1.0], samples).mean(axis=1)
+    share = visible_share(truth, place, [0.0, 0.0, 1.0], 4096).mean(axis=1)
     # A corner at half the height is twice as far from the foot of the point where it falls on the light's plane.
     fallen = [foot + 2 * (corners - foot) - middle for foot in place[:, :2]]
     if kind == "disk":
@@ -294,5 +293,6 @@ def test_what_a_polygon_leaves_of_a_light(variant, kind, corners, samples):
     else:
         sides = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
         expected = [1 - polygon_overlap(shape, sides) / (4 * half[0] * half[1]) for shape in fallen]
-    # Three times the standard error of 8 x 64 sections, 1.6e-3; it falls as N^-3/2, and more slowly at corners.
-    np.testing.assert_allclose(share, expected, atol=5e-3 * (64 / samples), rtol=0)
+    # Three standard errors of 8 x 64 sections, 1.65e-3 measured over 24 seeds, at the least rate: as N^-1 where an edge
+    # of the shadow is along the sections of one of the replicates, else as N^-3/2.
+    np.testing.assert_allclose(share, expected, atol=3 * 1.65e-3 * 64 / 4096, rtol=0)

@@ -7,7 +7,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from reference.quadrature.area_lights import AreaAirlight, area_airlight, beams_of, seen_samples
+from reference.quadrature.area_lights import AreaAirlight, area_airlight, beams_of, seen_samples, turn_of_sections
 from reference.quadrature.light_samples import sections_for_points
 from reference.quadrature.replicates import REPLICATES, PointPlan, square_points
 from reference.quadrature.surface import surface_hits
@@ -110,8 +110,9 @@ def visible_share(truth: TruthScene, place, normal, samples: int):
         down = replace(truth, origin=point + normal, direction=-normal[None])
         known = obstacles(down, Ball(light.centre, light.radius), np.ones(1), shapes)
         for replicate in range(REPLICATES):
-            square = square_points(PointPlan(most=samples), 0, replicate, light.kind)
-            sections = sections_for_points(light, point[None], square)
+            plan = PointPlan(most=samples)
+            square = square_points(plan, 0, replicate, light.kind)
+            sections = sections_for_points(light, point[None], square, turn_of_sections(plan, 0, replicate))
             eye, of = np.broadcast_to(point + 1e-6 * normal, (samples, 3)), np.zeros(samples, np.int64)
             _, seen_at, angle = seen_samples(sections, eye, known, of, square[:, 1])
             way = point - seen_at

@@ -38,7 +38,7 @@ Array = NDArray[Any]
 Progress = Callable[[float, str], None]
 
 #: Raise this when a fit to the same tables gives other numbers.
-VERSION = 1
+VERSION = 2
 
 _THICKNESSES, _DEPTHS, _SUNS, _DIRECTIONS, _AZIMUTHS = 10, 10, 5, 13, 3
 _ANGLES = 61  #: of P
@@ -206,7 +206,8 @@ def _fit_thickness(
     first = _DIRECTIONS * 4
     if start is None:
         typical = max(float(np.median(T[T > 0])) if (T > 0).any() else 1e-30, 1e-30)
-        begin = np.tile([np.log(typical), t / 3, max(t / 2, 0.1), 0.5], (_DIRECTIONS, 1))
+        # A bell far wider than the slab shows no slope in its width, and 12 steps would leave it so.
+        begin = np.tile([np.log(typical), t / 3, t / 2, 0.5], (_DIRECTIONS, 1))
         start = begin, np.zeros((_SUNS, 2))
     else:
         directions, suns = start

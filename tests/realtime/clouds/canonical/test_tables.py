@@ -106,9 +106,12 @@ def test_outside_the_tables_what_happens_is_what_the_page_says(look_up):
 
 
 def _printed(number, t, d, mu, cos_phi, sin_phi, mu_l):
-    """Return a transport of the form of Bouthors 2008, section 5.2, with numbers of our own."""
+    """Return a transport of the form of Bouthors 2008, section 5.2, with numbers of our own and depths in shares of t.
+
+    A bell at a depth that does not shrink with t is beyond thin slabs, where nothing of it is left to fit.
+    """
     phi_l = dr.acos(mu_l)
-    b, shift = 0.4 * t + 0.1 * mu - 0.05 * mu_l, 2.3 + 0.2 * mu
+    b, shift = (0.4 + 0.1 * mu - 0.05 * mu_l) * t, 2.3 + 0.2 * mu
     bell = dr.exp(-0.5 * dr.square((d - b) / (0.6 * t)))
     T = (0.7 + 0.2 * mu) * mu_l * dr.log(d + shift) / dr.log(b + shift) * bell
     depth = dr.log(1 + 0.8 * d)
@@ -119,14 +122,17 @@ def _printed(number, t, d, mu, cos_phi, sin_phi, mu_l):
 
 @pytest.mark.slow
 def test_a_transport_of_the_printed_form_is_fitted_by_itself(variant, monkeypatch):
-    """The 22 functions, fitted and looked up, at entries of their tables: between these they are interpolated."""
-    monkeypatch.setattr(fit_module, "SETS", SETS[:2])
+    """The 22 functions, fitted and looked up, at entries of their tables: between these they are interpolated.
+
+    In 12 steps a fit ends within some thousandths: a tenth of the 10 to 30 % by which the form misses real transport.
+    """
+    thicknesses, directions = 4, 5
+    for name, value in (("SETS", SETS[:2]), ("_THICKNESSES", thicknesses), ("_DIRECTIONS", directions)):
+        monkeypatch.setattr(fit_module, name, value)
     types, random = array_types(), np.random.default_rng(3)
     fitted = fit_on_device(fit_tables(_printed, types), types)
-    t, mu, mu_l = (
-        random.choice(axis, 2000)
-        for axis in (coordinates.thicknesses(10), coordinates.directions(13), coordinates.suns(5))
-    )
+    axes = coordinates.thicknesses(thicknesses), coordinates.directions(directions), coordinates.suns(5)
+    t, mu, mu_l = (random.choice(axis, 2000) for axis in axes)
     d, phi = t * random.uniform(0, 1, 2000), random.uniform(0, 2 * np.pi, 2000)
     for number in range(2):
         found, expected = (values(each, number, t, d, mu, phi, mu_l) for each in (fitted, _printed))
