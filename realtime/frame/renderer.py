@@ -208,6 +208,11 @@ def _check_clouds(scene: Scene, method: Method) -> None:
                 f"method {name}: the scene has a sky, an emitter of type 'constant', which this method does not know; "
                 "use cloud-collectors or cloud-octaves, or remove it"
             )
+        if features.grid and method.uses_kernel:
+            raise InputError(
+                f"method {name}: the medium is a density grid, and this method adds up integrals of lit segments, for "
+                "which no kernel knows a grid; use froxel-fog, soft-shafts, or ray-march with sum=steps"
+            )
         return
     if scene.medium.clouds is None:
         raise InputError(

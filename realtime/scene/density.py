@@ -102,13 +102,29 @@ def _cell(place, count) -> tuple[Any, Any]:
     return number, inside - Float(number)
 
 
-def read_density(medium: Any, mesh: ClosedMesh) -> DensityGrid:
-    """Return the grid of a Mitsuba medium within a mesh.
+def read_cloud_density(medium: Any, mesh: ClosedMesh) -> DensityGrid:
+    """Return the grid of a Mitsuba medium within a mesh, which it must cover; see `read_density`."""
+    name = f"the heterogeneous medium of shape '{mesh.name}'"
+    grid = read_density(medium, name)
+    reach = grid.to_grid[:, :3] @ mesh.vertices.T + grid.to_grid[:, 3:]
+    beyond = (reach < -_BEYOND) | (reach > 1 + _BEYOND)
+    if beyond.any():
+        vertex = int(np.argmax(beyond.any(axis=0)))
+        place = ", ".join(f"{x:.6g}" for x in mesh.vertices[vertex])
+        raise InputError(
+            f"{name} has a grid that does not cover the shape: vertex {mesh.own[vertex]} at ({place}) lies beside it; "
+            "wanted a to_world of the volume whose unit cube holds the shape"
+        )
+    return grid
 
-    Raises InputError for a `heterogeneous` medium whose extinction is no grid of one channel, linear between voxels,
-    that covers the mesh, or whose albedo is not the same everywhere.
+
+def read_density(medium: Any, name: str) -> DensityGrid:
+    """Return the grid of a Mitsuba medium; messages call it by `name`.
+
+    Raises InputError for a `heterogeneous` medium whose extinction is no grid of one channel, linear between voxels, or
+    whose albedo is not the same everywhere.
     """
-    name, parameters = f"the heterogeneous medium of shape '{mesh.name}'", mi.traverse(medium)
+    parameters = mi.traverse(medium)
     if "sigma_t.data" not in parameters:
         raise InputError(f"{name} has an extinction that is no grid; wanted a 'gridvolume' as sigma_t")
     if "albedo.value.value" not in parameters:
@@ -118,7 +134,7 @@ def read_density(medium: Any, mesh: ClosedMesh) -> DensityGrid:
     values = np.array(parameters["sigma_t.data"], dtype=np.float64)
     if values.ndim == 4 and values.shape[3] > 1:
         raise InputError(
-            f"{name} has an extinction of {values.shape[3]} channels on its grid; wanted one channel: clouds are grey"
+            f"{name} has an extinction of {values.shape[3]} channels on its grid; wanted one channel: grey"
         )
     values = values.reshape(values.shape[:3])
     wrong = ~(np.isfinite(values) & (values >= 0))
@@ -132,17 +148,8 @@ def read_density(medium: Any, mesh: ClosedMesh) -> DensityGrid:
     if not (scale >= 0 and np.isfinite(scale)):
         raise InputError(f"{name} has the scale {scale:g}; wanted a finite number of 0 or more")
     if not largest * scale > 0:
-        raise InputError(f"{name} is empty: its grid is 0 everywhere; wanted densities above 0 somewhere, or no cloud")
+        raise InputError(f"{name} is empty: its grid is 0 everywhere; wanted densities above 0 somewhere")
     grid = DensityGrid((values / largest).astype(np.float32), largest * scale, _transform(medium))
-    reach = grid.to_grid[:, :3] @ mesh.vertices.T + grid.to_grid[:, 3:]
-    beyond = (reach < -_BEYOND) | (reach > 1 + _BEYOND)
-    if beyond.any():
-        vertex = int(np.argmax(beyond.any(axis=0)))
-        place = ", ".join(f"{x:.6g}" for x in mesh.vertices[vertex])
-        raise InputError(
-            f"{name} has a grid that does not cover the shape: vertex {mesh.own[vertex]} at ({place}) lies beside it; "
-            "wanted a to_world of the volume whose unit cube holds the shape"
-        )
     _compare(name, medium, grid)
     return grid
 

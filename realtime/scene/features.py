@@ -26,6 +26,7 @@ class SceneFeatures:
     uneven: int = 0  #: clouds whose density differs from place to place
     sky: str = ""  #: the axis from which a uniform sky shines, '' where there is none; it is seen behind the scene
     height_fog: bool = False  #: the density of the medium depends on height
+    grid: bool = False  #: the density of the medium is a grid
     notes: tuple[str, ...] = ()  #: what the user should know of this scene
 
 
@@ -77,6 +78,8 @@ def describe(features: SceneFeatures) -> dict[str, str]:
         if features.bounded
         else "height fog: depths and suns in closed form, panels of nodes for lights at places"
         if features.height_fog
+        else "a density grid: marched, depths from cell to cell"
+        if features.grid
         else "unbounded: every ray lies in it whole",
         "lights": " and ".join(lights),
         "spot falloff": "inside the cone: integrand weighted"

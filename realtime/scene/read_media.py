@@ -27,8 +27,9 @@ from realtime.scene.convex_bounds import (
     read_bounds,
     touches,
 )
-from realtime.scene.density import DensityGrid, density_on_device, read_density
+from realtime.scene.density import DensityGrid, density_on_device, read_cloud_density, read_density
 from realtime.scene.media.bounded import BoundedMedia, Clouds
+from realtime.scene.media.density_grid import GridMedium
 from realtime.scene.media.height_fog import HeightFog, Layer
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.media.light_paths import BoundedMedium
@@ -104,6 +105,8 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[Cl
             )
         if _is_height_fog(sensor.get_medium()):
             return _height_fog(sensor.get_medium(), types), ()
+        if "sigma_t.data" in mi.traverse(sensor.get_medium()):
+            return _grid_medium(sensor.get_medium(), types), ()
         return _homogeneous(sensor.get_medium(), types), ()
     for shape in boundaries:
         for own in (shape.interior_medium(), shape.exterior_medium()):
@@ -128,7 +131,9 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[Cl
             "medium is not homogeneous; wanted clear air around it: remove the exterior medium, and the camera's"
         )
     grids = [
-        read_density(shape.interior_medium(), meshes[number]) if meshes and meshes[number].name in uneven else None
+        read_cloud_density(shape.interior_medium(), meshes[number])
+        if meshes and meshes[number].name in uneven
+        else None
         for number, shape in enumerate(boundaries)
     ]
     media = [_filling(shape.interior_medium(), grid, types) for shape, grid in zip(boundaries, grids, strict=True)]
@@ -265,13 +270,18 @@ def _filling(medium, grid: DensityGrid | None, types: ArrayTypes) -> Homogeneous
     """Return the medium of a boundary, one with a grid by its largest extinction."""
     if grid is None:
         return _homogeneous(medium, types)
+    largest, phase = dr.opaque(types.scalar, grid.largest), _read_phase(medium.phase_function(), types)
+    return Homogeneous((largest,), _constant_albedo(medium, types), phase)
+
+
+def _constant_albedo(medium, types: ArrayTypes):
+    """Return the albedo of a medium, a colour that is the same everywhere."""
     _require_constant(medium, "albedo")
-    albedo = np.array(mi.traverse(medium)["albedo.value.value"], dtype=np.float64).reshape(-1)
-    albedo = np.broadcast_to(albedo, 3)
+    albedo = np.broadcast_to(np.array(mi.traverse(medium)["albedo.value.value"], dtype=np.float64).reshape(-1), 3)
     _check_albedo(albedo)
     color = types.color(*(float(value) for value in albedo))
     dr.make_opaque(color)
-    return Homogeneous((dr.opaque(types.scalar, grid.largest),), color, _read_phase(medium.phase_function(), types))
+    return color
 
 
 def _require_constant(medium, *coefficients: str) -> None:
@@ -294,7 +304,6 @@ def _is_height_fog(medium) -> bool:
 
 def _height_fog(medium, types: ArrayTypes) -> HeightFog:
     """Read a medium whose extinction is a volume of type `heightfog`, which answers for its numbers."""
-    _require_constant(medium, "albedo")
     parameters = mi.traverse(medium)
     scale = float(parameters["scale"])
 
@@ -306,14 +315,28 @@ def _height_fog(medium, types: ArrayTypes) -> HeightFog:
         for i in "12"
         if float(parameters[f"sigma_t.sigma_{i}"][0]) > 0
     )
-    albedo = np.broadcast_to(np.array(parameters["albedo.value.value"], dtype=np.float64).reshape(-1), 3)
-    _check_albedo(albedo)
+    color = _constant_albedo(medium, types)
     up = types.vector(*(float(each) for each in np.array(parameters["sigma_t.up"]).ravel()))
-    color = types.color(*(float(value) for value in albedo))
-    dr.make_opaque(up, color)
+    dr.make_opaque(up)
     clamped = bool(parameters["sigma_t.clamped"][0])
     ends, phase = (number("floor"), number("cap")), _read_phase(medium.phase_function(), types)
     return HeightFog(layers, number("sigma_0", scale), clamped, *ends, up, color, phase)
+
+
+def _grid_medium(medium, types: ArrayTypes) -> GridMedium:
+    """Read a grid around the camera, in a box along the axes of coordinates."""
+    name = f"medium '{medium.id()}'"
+    albedo, grid = _constant_albedo(medium, types), read_density(medium, name)
+    sides = grid.to_grid[:, :3]
+    if np.abs(sides - np.diag(np.diag(sides))).max() > 1e-5 * np.abs(sides).max() or np.diag(sides).min() <= 0:
+        raise InputError(
+            f"{name} has a grid whose box is turned or mirrored; wanted a to_world that scales and moves alone"
+        )
+    corner = -grid.to_grid[:, 3] / np.diag(sides)
+    low, high = (types.vector(*(float(each) for each in end)) for end in (corner, corner + 1 / np.diag(sides)))
+    dr.make_opaque(low, high)
+    density, largest = density_on_device([grid], types), dr.opaque(types.scalar, grid.largest)
+    return GridMedium(density, largest, low, high, albedo, _read_phase(medium.phase_function(), types))
 
 
 def _homogeneous(medium, types: ArrayTypes) -> Homogeneous:

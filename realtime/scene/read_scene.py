@@ -28,6 +28,7 @@ from realtime.scene.directional_extent import (
 )
 from realtime.scene.features import SceneFeatures, backgrounds, scene_notes
 from realtime.scene.lights import Light, spot_fields
+from realtime.scene.media.density_grid import GridMedium
 from realtime.scene.media.height_fog import HeightFog
 from realtime.scene.media.medium import Medium
 from realtime.scene.read_media import opaque_scene, read_medium, sort_shapes
@@ -134,7 +135,7 @@ class _Bodies:
 
     def beam(self, axis, types: ArrayTypes) -> dict[str, Any]:
         """Return the fields of a `Light` from infinity, which travels along a unit vector."""
-        if isinstance(self.medium, HeightFog):
+        if isinstance(self.medium, HeightFog | GridMedium):
             spheres = shape_spheres(self.opaque)
         else:
             spheres = mesh_spheres(self.meshes) if self.meshes else media_spheres(self.medium.bounded_media)
@@ -201,7 +202,7 @@ def _read_directional(emitter, bodies: _Bodies, types: ArrayTypes) -> Light:
                 f"light '{emitter.id()}' is directional and shines from the horizon or below: each of its light paths "
                 "through height fog, which has no sides, is infinitely deep; wanted a light from above the horizon"
             )
-    elif not (medium.clear and medium.clouds):
+    elif not (isinstance(medium, GridMedium) or (medium.clear and medium.clouds)):
         raise InputError(
             "the scene has a directional light and a medium without bounds, which lets nothing of it through from "
             "infinity: wanted media with bounds in clear air; give the medium bounds, or use a 'point' or 'spot' light"
@@ -295,6 +296,7 @@ def _scene_features(
         bounded=bool(medium.bounded_media),
         clear=medium.clear,
         height_fog=isinstance(medium, HeightFog),
+        grid=isinstance(medium, GridMedium),
         vacuum=medium.vacuum,
         point_lights=sum(light.kind == "point" for light in lights),
         spot_lights=sum(light.kind == "spot" for light in lights),

@@ -9,6 +9,8 @@ Read in this order:
 - `pieces.py`: smooth pieces of lit stretches in bounded media;
 - `adaptive_panels.py`: panels that are halved until a sum meets its tolerance;
 - `bounded.py`: sums over lit stretches in bounded media, for all lights;
+- `cell_walk.py`: optical depths through a grid from cell to cell;
+- `density_grid.py`: sums over lit stretches in density grids;
 - `fields.py`: what every medium answers, the door for new ones;
 - `light_airlight.py`: the airlight of one point, spot or directional light;
 - `surface.py`: the lit surface behind the medium;

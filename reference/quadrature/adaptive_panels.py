@@ -53,10 +53,17 @@ class Panels:
 class Integrand(Protocol):
     """What a medium scatters along pieces: exp(-tau) p, to be multiplied by albedo sigma_t."""
 
-    #: (pieces, 3): what multiplies the values, such as albedo sigma_t where that is constant [1/m]
-    factor: Array
-    extinction: Array  #: (pieces,): the largest, by which pieces under directions are parted [1/m]
-    same: Index  #: (3,): which column of the values each channel has
+    @property
+    def factor(self) -> Array:
+        """What multiplies the values, such as albedo sigma_t where that is constant, (pieces, 3) [1/m]."""
+
+    @property
+    def extinction(self) -> Array:
+        """The largest, by which pieces under directions are parted, (pieces,) [1/m]."""
+
+    @property
+    def same(self) -> Index:
+        """Which column of the values each channel has, (3,)."""
 
     def __call__(self, rows: Index, x: Array, inside: Array, r: Array, scatter: Array) -> tuple[Array, Array]:
         """Return values and optical depths of nodes, (m, nodes, columns) each.

@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.quadrature.bounded import Bounded
+from reference.quadrature.density_grid import GridField
 from reference.quadrature.height_fog import HeightField
 from reference.quadrature.unbounded import TERMS, Stretches, Terms, Unbounded
+from reference.scene.density_grid import GridMedium
 from reference.scene.height_fog import HeightMedium
-from reference.scene.read import TruthScene
+from reference.scene.read import TruthScene, homogeneous_around
 from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
@@ -53,7 +55,9 @@ def field_of(truth: TruthScene) -> Field:
     """Return what fills a scene."""
     if isinstance(truth.medium, HeightMedium):
         return HeightField(truth.medium)
-    return Bounded(truth) if truth.media else Unbounded(truth.medium)
+    if isinstance(truth.medium, GridMedium):
+        return GridField(truth.medium)
+    return Bounded(truth) if truth.media else Unbounded(homogeneous_around(truth))
 
 
 def optical_depth(truth: TruthScene, origin: Array, direction: Array, low: Array, high: Array) -> Array:

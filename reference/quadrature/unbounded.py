@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.panels import airlight_segments
-from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthLight, TruthMedium
+from reference.scene.varying import VaryingMedium
 from reference.visibility.certificate import LitIntervals
 from reference.visibility.planes import Rays, cone_interval, falloff
 
@@ -82,7 +82,7 @@ def weight_of(profile: Profile | None, ray: Index) -> Callable[[Array, Index], A
     return None if profile is None else lambda x, row: profile(x, ray[row])
 
 
-def strongest(medium: TruthMedium | HeightMedium) -> Array:
+def strongest(medium: TruthMedium | VaryingMedium) -> Array:
     """Return the most that a metre of a ray scatters in a medium, albedo sigma_t p, (3,) [1/m]."""
     return medium.albedo * medium.largest * float(medium.phase(np.linspace(-1, 1, 1001)).max())
 

@@ -10,7 +10,9 @@ Read in this order:
 - `convex_bounds.py`: convex bounds of media, read and checked;
 - `directional_light.py`: directional lights: direction and irradiance;
 - `area_light.py`: lights with extent, read and checked;
+- `varying.py`: what media have whose extinction differs from place to place;
 - `height_fog.py`: media whose density depends on height;
+- `density_grid.py`: media whose density is a grid;
 - `read.py`: the whole scene: lights, media, camera rays;
 - `closed_mesh.py`: whether meshes bound bodies apart from one another;
 - `cloud_density.py`: clouds whose density differs from place to place;

@@ -13,19 +13,14 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
 from analytic.phase import PhaseFunction
+from reference.scene.varying import VaryingMedium
 
 Array = NDArray[np.float64]
 
-NO_EXTINCTION = (
-    "the medium is height fog, whose extinction differs from place to place, and this asks for one number; wanted a "
-    "medium of type 'homogeneous'"
-)
 
-
-@dataclass(frozen=True)
-class HeightMedium:
+@dataclass(frozen=True, kw_only=True)
+class HeightMedium(VaryingMedium):
     """A medium whose density depends on height alone."""
 
     layers: tuple[tuple[float, float, float], ...]  #: extinction at the base [1/m], base [m], scale height [m]
@@ -34,15 +29,6 @@ class HeightMedium:
     floor: float  #: [m]
     cap: float  #: [m]
     up: Array  #: unit vector, (3,): heights are along it
-    albedo: Array  #: RGB
-    phase: PhaseFunction
-    largest: Array  #: Mitsuba's bound of the extinction, RGB [1/m]
-    plugin: Any  #: Mitsuba's medium
-
-    @property
-    def sigma_t(self) -> Array:
-        """Refuse: code that asks for one extinction would take the fog for a homogeneous one."""
-        raise InputError(NO_EXTINCTION)
 
 
 def is_height_fog(medium) -> bool:
@@ -64,7 +50,16 @@ def read_height_fog(medium, albedo: Array, phase: PhaseFunction) -> HeightMedium
     largest = np.array(medium.get_majorant(dr.zeros(mi.MediumInteraction3f)), dtype=np.float64).reshape(-1)
     clamped, constant = bool(number["clamped"][0]), scale * float(number["sigma_0"][0])
     return HeightMedium(
-        layers, constant, clamped, *ends, number["up"], albedo, phase, np.array(np.broadcast_to(largest, 3)), medium
+        layers=layers,
+        constant=constant,
+        clamped=clamped,
+        floor=ends[0],
+        cap=ends[1],
+        up=number["up"],
+        albedo=albedo,
+        phase=phase,
+        largest=np.array(np.broadcast_to(largest, 3)),
+        plugin=medium,
     )
 
 

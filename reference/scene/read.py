@@ -19,6 +19,7 @@ from analytic.phase import PhaseFunction
 from reference.scene.area_light import TruthAreaLight, is_area, read_area_light
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from reference.scene.convex_bounds import Bounds, holds, in_surface, overlap, read_bounds
+from reference.scene.density_grid import is_grid, read_grid
 from reference.scene.directional_light import (
     DirectionalLight,
     endless_medium,
@@ -26,7 +27,8 @@ from reference.scene.directional_light import (
     read_directional,
     sun_below,
 )
-from reference.scene.height_fog import NO_EXTINCTION, HeightMedium, is_height_fog, read_height_fog
+from reference.scene.height_fog import HeightMedium, is_height_fog, read_height_fog
+from reference.scene.varying import NO_EXTINCTION, VaryingMedium
 
 Array = NDArray[np.float64]
 
@@ -86,7 +88,7 @@ class TruthScene:
     height: int  #: [pixels]
     origin: Array  #: the pinhole [m], (3,)
     direction: Array  #: unit directions through the pixel centres, (pixels, 3), row by row
-    medium: TruthMedium | HeightMedium  #: without sides, a vacuum of extinction 0 where there is none
+    medium: TruthMedium | VaryingMedium  #: around the camera, a vacuum of extinction 0 where there is none
     lights: tuple[TruthLight, ...]  #: point and spot lights
     media: tuple[BoundedMedium, ...] = ()  #: the media with bounds, disjoint
     directional: tuple[DirectionalLight, ...] = ()  #: directional lights; all media then have bounds, or a cap
@@ -121,7 +123,7 @@ def read_truth(scene) -> TruthScene:
     medium = _read_ambient(sensor, origin, media, boundaries)
     suns = tuple(read_directional(emitter) for emitter in far)
     for emitter, sun in zip(far, suns, strict=True):
-        if not isinstance(medium, HeightMedium) and np.any(medium.sigma_t > 0):
+        if isinstance(medium, TruthMedium) and np.any(medium.sigma_t > 0):
             raise InputError(endless_medium(emitter))
         if isinstance(medium, HeightMedium) and not -sun.direction @ medium.up > 0:
             raise InputError(sun_below(emitter))
@@ -144,9 +146,9 @@ def read_truth(scene) -> TruthScene:
 def homogeneous_around(truth: TruthScene) -> TruthMedium:
     """Return the medium without bounds, where it has one extinction.
 
-    Raises InputError for height fog.
+    Raises InputError for height fog and grids.
     """
-    if isinstance(truth.medium, HeightMedium):
+    if isinstance(truth.medium, VaryingMedium):
         raise InputError(NO_EXTINCTION)
     return truth.medium
 
@@ -223,8 +225,8 @@ def _check_disjoint(media: tuple[BoundedMedium, ...]) -> None:
 
 def _read_ambient(
     sensor, origin: Array, media: tuple[BoundedMedium, ...], boundaries: list[Any]
-) -> TruthMedium | HeightMedium:
-    """Return the medium without bounds; refuse a camera or a boundary that says otherwise."""
+) -> TruthMedium | VaryingMedium:
+    """Return the medium around the camera; refuse a camera or a boundary that says otherwise."""
     own = sensor.get_medium()
     ambient = own
     for medium, shape in zip(media, boundaries, strict=True):
@@ -243,13 +245,14 @@ def _read_ambient(
                 f"the exterior medium of shape '{medium.name}' is not what surrounds the others or the camera; wanted "
                 "the medium that the camera references as exterior of all shapes, or none at all"
             )
-    if is_height_fog(ambient):
+    if is_height_fog(ambient) or is_grid(ambient):
+        kind = "height fog" if is_height_fog(ambient) else "a density grid"
         if media:
             raise InputError(
-                f"shape '{media[0].name}' bounds a medium in height fog; wanted height fog alone: remove the medium of "
-                "the shape, or take a medium of type 'homogeneous' around it"
+                f"shape '{media[0].name}' bounds a medium in {kind}; wanted {kind} alone: remove the medium of the "
+                "shape, or take a medium of type 'homogeneous' around it"
             )
-        return read_height_fog(ambient, *read_scattering(ambient))
+        return (read_height_fog if is_height_fog(ambient) else read_grid)(ambient, *read_scattering(ambient))
     if ambient is not None:
         return read_medium(ambient, "the medium")
     if not media:
@@ -269,7 +272,10 @@ def read_medium(medium, name: str) -> TruthMedium:
     if is_height_fog(medium):
         raise InputError(f"{name} is height fog, which has no sides; wanted it in the sensor, and no shape around it")
     if not medium.is_homogeneous():
-        raise InputError(f"{name} is heterogeneous; wanted a medium of type 'homogeneous'")
+        raise InputError(
+            f"{name} is heterogeneous; wanted a medium of type 'homogeneous', or a density grid in the sensor, and no "
+            "shape around it"
+        )
     parameters = mi.traverse(medium)
     _require_constant(parameters, "sigma_t", name)
     sigma_t = _rgb(parameters["sigma_t.value.value"]) * float(parameters["scale"])

@@ -114,8 +114,8 @@ def _light(light: dict[str, Any]) -> dict[str, Any]:
 def _volume(medium: dict[str, Any]) -> dict[str, Any]:
     """Return a homogeneous medium by sigma_s and sigma_a [1/m], which no colour picker touches."""
     phase = medium["phase"]
-    if "layers" in medium:
-        return {"cannot": "height fog was not tried in Cycles"}
+    if "sigma_s" not in medium:
+        return {"cannot": "height fog and grids were not tried in Cycles"}
     if phase["name"] not in _PHASES:
         return {"cannot": f"Cycles has no {phase['name']} phase function"}
     inputs = {"Scatter Coefficients": medium["sigma_s"], "Absorption Coefficients": medium["sigma_a"]}

@@ -18,7 +18,7 @@ _CYCLES = (
     "surfaces: Diffuse BSDF of the reflectance, Roughness 0; Shadow Terminator offsets 0",
     "`--json` has all of this as names and values of Blender's Python, `properties`",
 )
-_HEIGHT_FOG = "media: height fog was not tried"
+_VARYING = "media: height fog and grids were not tried"
 _LUXCORE = (
     "`path.pathdepth.total` 1, `path.clamping.variance.maxvalue` 0, `film.filter.type` BOX of width 0.5, output RGB",
     "its images are a pixel too low: move `scene.camera.screenwindow` up by one",
@@ -28,13 +28,13 @@ _LUXCORE = (
 def recipes(described: dict[str, Any]) -> dict[str, list[str]]:
     """Return what to set by the name of the renderer, from what `describe_scene` found."""
     every = [medium for medium in (described["medium"], *described["bounded_media"]) if medium is not None]
-    media = [medium for medium in every if "layers" not in medium]
+    media = [medium for medium in every if "sigma_s" in medium]
     phases = {medium["phase"]["name"] for medium in media}
     lights = described["lights"]
     cycles = [_cycles_light(light, _name(number, lights)) for number, light in enumerate(lights)]
-    cycles += [_cycles_media(phases)] if media else [_HEIGHT_FOG] if every else []
+    cycles += [_cycles_media(phases)] if media else [_VARYING] if every else []
     luxcore = [_luxcore_light(light, _name(number, lights)) for number, light in enumerate(lights)]
-    luxcore += [_luxcore_media(phases)] if media else [_HEIGHT_FOG] if every else []
+    luxcore += [_luxcore_media(phases)] if media else [_VARYING] if every else []
     longer = (
         "horizontal" if described["camera"]["fov_horizontal"] >= described["camera"]["fov_vertical"] else "vertical"
     )

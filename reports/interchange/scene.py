@@ -10,9 +10,11 @@ from analytic.errors import InputError
 from realtime.scene.read_scene import read_scene
 from reference.scene.area_light import TruthAreaLight
 from reference.scene.camera import camera_matrix
+from reference.scene.density_grid import GridMedium
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthLight, TruthMedium, TruthScene, read_truth
+from reference.scene.varying import VaryingMedium
 from reports.interchange.cycles import cycles_properties
 from reports.interchange.recipes import recipes
 from validation.scenes.engine_fog import ENGINES, parameters_of
@@ -135,13 +137,23 @@ def _camera(sensor: Any, truth: TruthScene) -> dict[str, Any]:
     }
 
 
-def _medium(medium: TruthMedium | HeightMedium) -> dict[str, Any] | None:
+def _medium(medium: TruthMedium | VaryingMedium) -> dict[str, Any] | None:
     """Return the numbers of a medium, None for a vacuum."""
     if medium.plugin is None:
         return None
     phase: dict[str, Any] = {"name": medium.phase.name}
     phase |= {"g": _number(medium.phase.g)} if medium.phase.name == "hg" else {}
     phase |= {"table": _numbers(medium.phase.table)} if medium.phase.table is not None else {}
+    scattering = {"albedo": _numbers(medium.albedo), "phase": phase | {"formula": _PHASES[medium.phase.name]}}
+    if isinstance(medium, GridMedium):
+        return {
+            "voxels": list(medium.values.shape[::-1]),
+            "low": _numbers(medium.low),
+            "high": _numbers(medium.high),
+            "mean": _number(float(medium.values.mean())),
+            "largest": _number(float(medium.values.max())),
+            **scattering,
+        }
     if isinstance(medium, HeightMedium):
         return {
             "layers": [
@@ -154,17 +166,15 @@ def _medium(medium: TruthMedium | HeightMedium) -> dict[str, Any] | None:
             "cap": _number(medium.cap),
             "up": up_axis(medium.up),
             "engines": {name: _in_engine(name, medium) for name in ENGINES},
-            "albedo": _numbers(medium.albedo),
-            "phase": phase | {"formula": _PHASES[medium.phase.name]},
+            **scattering,
         }
     sigma_t, albedo = (np.array(_numbers(values)) for values in (medium.sigma_t, medium.albedo))
     return {
         "sigma_t": _numbers(sigma_t),
-        "albedo": _numbers(albedo),
         "sigma_s": _numbers(albedo * sigma_t),
         "sigma_a": _numbers((1 - albedo) * sigma_t),
         "mean_free_path": [_number(1 / value) if value > 0 else None for value in sigma_t],
-        "phase": phase | {"formula": _PHASES[medium.phase.name]},
+        **scattering,
     }
 
 

@@ -86,6 +86,12 @@ def _medium(name: str, medium: Mapping[str, Any] | None) -> Iterator[Cells]:
             yield "", "bounds", f"a convex mesh of {bounds['facets']} facets; -o writes it"
     if "layers" in medium:
         yield from _height_fog(medium)
+    elif "voxels" in medium:
+        size = " x ".join(map(str, medium["voxels"]))
+        yield "", "extinction", f"sigma_t a grid of {size} voxels, linear between their centres"
+        yield "", "box", f"from {_vector(medium['low'])} to {_vector(medium['high'])}, with nothing beyond"
+        yield "", "values", f"{medium['mean']:.7g} 1/m on average, {medium['largest']:.7g} 1/m at most"
+        yield "", "albedo", _colour(medium["albedo"])
     else:
         yield "", "extinction", f"sigma_t {_colour(medium['sigma_t'])} 1/m"
         yield "", "albedo", _colour(medium["albedo"])

@@ -81,7 +81,7 @@ def height_fog(
         "type": "heterogeneous",
         "id": "fog",
         "sigma_t": {"type": "heightfog", "to_world": box} | numbers,
-        "has_spectral_extinction": False,  # see `validation.scenes.files.media.grey_height_fog`
+        "has_spectral_extinction": False,  # see `validation.scenes.files.media.grey_densities`
         "albedo": {"type": "rgb", "value": list(albedo)},
         "phase": phase,
     }

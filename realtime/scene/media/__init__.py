@@ -30,6 +30,7 @@ Read in this order:
 - `medium.py`: the protocol, `Medium`, and rays with one light, `LitRays`;
 - `homogeneous.py`: one extinction everywhere, and the kernels;
 - `height_fog.py`: density by height: optical depths and suns in closed form;
+- `density_grid.py`: density on a grid, marched;
 - `bounded.py`: homogeneous media with bounds, in clear air or in another; clouds;
 - `light_paths.py`: how much of the paths from a light to the points of a ray lies in a convex medium;
 - `bounded_rays.py`: their airlight, by few nodes between the bends of these paths;

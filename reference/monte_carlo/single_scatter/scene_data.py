@@ -68,11 +68,11 @@ def read_task(scene, medium, samples: int) -> Task:
                 "take the estimator volpath"
             )
         return Task(around, lights, directional, samples, grey=True, fog=fog)
-    if directional:
-        _refuse_endless(scene, medium, directional[0])
     if isinstance(medium, mi.Medium):
         require_homogeneous(medium)
         media = [*media, medium]
+    if directional:
+        _refuse_endless(scene, medium, directional[0])
     known = medium is None or isinstance(medium, mi.Medium)
     return Task(around, lights, directional, samples, grey=known and all(_is_grey(each) for each in media), area=area)
 

@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.monte_carlo.batches import Batches, check_samples, single_batch
+from reference.scene.density_grid import GridMedium
 from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthMedium, TruthScene
 
@@ -82,16 +83,18 @@ def volpath_batch(
 
 
 def _check_sun(truth: TruthScene) -> None:
-    """Refuse height fog whose light paths to a sun Mitsuba would cut: they are twice the radius of all shapes long."""
-    if not isinstance(truth.medium, HeightMedium):
-        return
-    fog, radius = truth.medium, float(truth.scene.bbox().bounding_sphere().radius)
+    """Refuse fog whose light paths to a sun Mitsuba would cut: they are twice the radius of all shapes long."""
+    medium, radius = truth.medium, float(truth.scene.bbox().bounding_sphere().radius)
     for sun in truth.directional:
-        needed = 0.5 * (fog.cap - fog.floor) / float(-sun.direction @ truth.medium.up)
+        needed = 0.0
+        if isinstance(medium, HeightMedium):
+            needed = 0.5 * (medium.cap - medium.floor) / float(-sun.direction @ medium.up)
+        if isinstance(medium, GridMedium):
+            needed = 0.5 * float(np.linalg.norm(medium.high - medium.low))
         if radius < needed:
             raise InputError(
-                f"volpath: the light paths of a sun end within the height fog, since the shapes of the scene have a "
-                f"radius of {radius:.4g} m; wanted {needed:.4g} m: lower the cap, or add ground"
+                f"volpath: the light paths of a sun end within the fog, since the shapes of the scene have a radius of "
+                f"{radius:.4g} m; wanted {needed:.4g} m: add ground, or lower the cap of height fog"
             )
 
 

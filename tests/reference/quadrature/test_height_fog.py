@@ -15,6 +15,7 @@ from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthMedium, read_truth
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
 from tests.evidence.injected import Wrap, injected
+from tests.helpers.biases import biases
 from tests.helpers.height_fog import LAMP, SPOT, SUN, fog_xml
 from validation.scenes.loading import load_scene
 
@@ -74,17 +75,6 @@ def test_bounds_are_below_a_millionth_of_the_mean(scene):
     assert image.left == 0
 
 
-def _biases(truth, image, batches):
-    """Relative biases of airlight and surface, pixels near the lamp left out, and half of their 95 % intervals."""
-    away = (image.light_angle > 0.12)[..., None]
-    found = []
-    for number, layer in enumerate((image.airlight, image.surface)):
-        means = np.array([np.sum(each.mean[number].reshape(layer.shape) * away) for each in batches])
-        ratio = means / np.sum(layer * away)
-        found.append((ratio.mean() - 1, 2.02 * ratio.std(ddof=1) / np.sqrt(len(ratio))))  # Student, 39 degrees
-    return found
-
-
 #: Faults that the comparison with volpath must find, by name.
 FAULTS = {
     "height of the wrong light path": Wrap(
@@ -138,7 +128,7 @@ def test_volpath_agrees_and_injected_faults_are_found(scene):
         with injected(*changes):
             found = read_truth(loaded) if changes else truth
             image = quadrature_image(found, checks=0, shadow_scale=1 - measure_shadow_epsilon())
-        return [abs(bias) + half > 0.01 for bias, half in _biases(truth, image, batches)]
+        return [abs(bias) + half > 0.01 for bias, half in biases(truth, image, batches)]
 
     assert not any(outside())
     for name, change in FAULTS.items():

@@ -89,5 +89,5 @@ def test_refusals_of_the_scene(loaded):
     with pytest.raises(InputError, match="shape 'drop' bounds a medium in height fog"):
         read_truth(loaded(fog_xml(LAMP, ball)))
     truth = read_truth(loaded(fog_xml(SPOT)))
-    with pytest.raises(InputError, match="height fog, whose extinction differs from place to place"):
+    with pytest.raises(InputError, match="an extinction that differs from place to place"):
         _ = truth.medium.sigma_t

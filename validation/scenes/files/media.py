@@ -79,15 +79,16 @@ def _make_homogeneous(state: Any, props: Any) -> None:
                 del props[key]
 
 
-def grey_height_fog(state: Any) -> None:
-    """Say of height fog that it is grey.
+def grey_densities(state: Any) -> None:
+    """Say of media whose density is height fog or a grid that they are grey.
 
     Mitsuba 3.9.1 multiplies shadow rays through other media by exp(-m d)/exp(-m d), m the largest density and d what is
     left of the way to the light, and takes 0 for it where the exponential underflows: suns went out from far away.
     """
     for index in of_kind(state, "Medium"):
         props = properties(state, index)
-        if any(properties(state, at).plugin_name() == "heightfog" for _, at in references(props)):
+        volumes = {key: properties(state, at).plugin_name() for key, at in references(props)}
+        if volumes.get("sigma_t") in ("heightfog", "gridvolume"):
             props["has_spectral_extinction"] = False
 
 

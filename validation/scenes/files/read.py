@@ -12,7 +12,7 @@ import mitsuba as mi
 from analytic.errors import InputError
 from reference.storage.files import temporary_folder
 from validation.scenes.changes import give_lobes
-from validation.scenes.files.media import give_extinction, grey_height_fog, pass_where_no_material
+from validation.scenes.files.media import give_extinction, grey_densities, pass_where_no_material
 from validation.scenes.files.nodes import kind, name_nodes, of_kind, properties, references
 from validation.scenes.files.references import leave_out_media, touching
 from validation.scenes.files.shapes import (
@@ -97,7 +97,7 @@ def _mend(state: Any) -> None:
     check_kinds(state)
     for note in give_extinction(state):
         mi.Log(mi.LogLevel.Warn, note)
-    grey_height_fog(state)
+    grey_densities(state)
     pass_where_no_material(state)
     write_out_instances(state)
 

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""A medium whose extinction is a grid: a `heterogeneous` medium with a `gridvolume`, around the camera.
+
+Values sit at the centres of voxels, (i + 1/2)/n of the box of `to_world`. Between centres the extinction is trilinear,
+in the outer half voxels constant across the faces, beyond the box 0. Mitsuba tells Python values and, in words of six
+digits, the box; rays find its corners to all digits. Extinctions at random places are then compared with Mitsuba's, so
+that no other filter, wrap mode or transform is taken for this.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from analytic.phase import PhaseFunction
+from reference.scene.varying import VaryingMedium
+
+Array = NDArray[np.float64]
+
+_PLACES = 512  # at which extinctions are compared
+_DIFFERENCE = 2e-3  # of the largest value: Mitsuba's places are rounded in float32
+
+
+@dataclass(frozen=True, kw_only=True)
+class GridMedium(VaryingMedium):
+    """A medium in a box along the axes, with an extinction on a grid."""
+
+    values: Array  #: extinction at the centres of voxels, (z, y, x) [1/m]
+    low: Array  #: corner of the box, (3,) [m]
+    high: Array  #: the opposite corner, (3,) [m]
+
+    def crossed(self, origin: Array, direction: Array) -> tuple[Array, Array]:
+        """Return the distances at which rays enter and leave the box, (n,) [m]; equal where they miss it."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends = np.stack([(corner - origin) / direction for corner in (self.low, self.high)])
+        # Along a face: within both planes or beyond one.
+        inside = (origin >= self.low) & (origin <= self.high)
+        near = np.where(direction == 0, np.where(inside, -np.inf, np.inf), ends.min(axis=0)).max(axis=-1)
+        far = np.where(direction == 0, np.where(inside, np.inf, -np.inf), ends.max(axis=0)).min(axis=-1)
+        meets = (far > near) & (far > 0)
+        return np.where(meets, np.maximum(near, 0.0), 0.0), np.where(meets, far, 0.0)
+
+    def voxels(self, point: Array) -> Array:
+        """Return places in voxels from the centre of the first, (n, 3)."""
+        return (point - self.low) * self.voxels_per_metre - 0.5
+
+    @property
+    def voxels_per_metre(self) -> Array:
+        """Voxels along each axis over the side of the box, (3,) [1/m]."""
+        return np.array(self.values.shape[::-1]) / (self.high - self.low)
+
+
+def is_grid(medium) -> bool:
+    """Return whether a medium of Mitsuba has an extinction on a grid."""
+    return medium is not None and "sigma_t.data" in mi.traverse(medium)
+
+
+def read_grid(medium, albedo: Array, phase: PhaseFunction) -> GridMedium:
+    """Read a grid; its albedo, RGB, and its phase function were read.
+
+    Raises InputError for a grid of several channels, values below 0 or not finite, and one that Mitsuba reads otherwise
+    than `GridMedium`.
+    """
+    name, parameters = f"medium '{medium.id()}'", mi.traverse(medium)
+    values = np.array(parameters["sigma_t.data"], dtype=np.float64)
+    if values.ndim > 3 and values.shape[3] != 1:
+        raise InputError(f"{name} has a grid of {values.shape[3]} channels; wanted a grid of one: grey extinction")
+    values = values.reshape(values.shape[:3]) * float(parameters["scale"])
+    if not (np.isfinite(values).all() and values.min() >= 0 and values.max() > 0):
+        raise InputError(f"{name} has a grid with values below 0 or not finite, or 0 alone; wanted extinctions [1/m]")
+    low, high = _box(medium)
+    largest = np.full(3, values.max())
+    grid = GridMedium(values=values, low=low, high=high, albedo=albedo, phase=phase, largest=largest, plugin=medium)
+    share = np.random.default_rng(1).random((_PLACES, 3))
+    place = dr.zeros(mi.MediumInteraction3f, _PLACES)
+    place.p = mi.Point3f((low + share * (high - low)).T)
+    theirs = np.array(medium.get_scattering_coefficients(place)[2], dtype=np.float64)[0]
+    worst = np.abs(theirs - _trilinear(values, share * values.shape[::-1] - 0.5)).max() / values.max()
+    if worst > _DIFFERENCE:
+        raise InputError(
+            f"{name} has a grid that is not read as Mitsuba reads it, by {worst:.2g} of its largest value; wanted a "
+            "'gridvolume' with filter_type 'trilinear', wrap_mode 'clamp' and a to_world that scales and moves alone"
+        )
+    return grid
+
+
+def _box(medium: Any) -> tuple[Array, Array]:
+    """Return the corners of the box of a medium [m]: roughly by words, then by rays along the axes."""
+    words = str(medium).partition("sigma_t =")[2]
+    found = re.search(r"min = \[(.*?)\],\s*max = \[(.*?)\]", words, re.S)
+    if found is None:
+        raise InputError(f"Mitsuba says no box of medium '{medium.id()}'; wanted a 'gridvolume' as sigma_t")
+    low, high = (np.array([float(number) for number in part.split(",")]) for part in found.groups())
+    middle, corners = 0.5 * (low + high), np.stack([low, high])
+    for axis in range(3):
+        start = middle - np.eye(3)[axis] * (high - low)
+        ray = mi.Ray3f(mi.Point3f(*start.tolist()), mi.Vector3f(*np.eye(3)[axis].tolist()))
+        meets, near, far = medium.intersect_aabb(ray)
+        if meets[0]:
+            corners[:, axis] = float(np.float32(start[axis])) + np.array([float(near[0]), float(far[0])])
+    return corners[0], corners[1]
+
+
+def _trilinear(values: Array, place: Array) -> Array:
+    """Return what a grid (z, y, x) holds at places in voxels, (n, 3)."""
+    most = np.array(values.shape[::-1]) - 1
+    place = np.clip(place, 0, most)
+    cell = np.minimum(place.astype(np.int64), np.maximum(most - 1, 0))
+    total = np.zeros(len(place))
+    for corner in np.ndindex(2, 2, 2):
+        x, y, z = np.minimum(cell + corner, most).T
+        total += np.where(corner, place - cell, 1 - (place - cell)).prod(axis=1) * values[z, y, x]
+    return total

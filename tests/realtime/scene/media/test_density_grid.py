@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A density grid around the camera on the device: methods against the reference, and refusals."""
+
+import numpy as np
+import pytest
+
+from realtime.errors import InputError
+from realtime.frame.renderer import frame_renderer, render_frame
+from realtime.kernels.exact import exact
+from realtime.methods.registry import FOG_METHODS, METHODS
+from realtime.scene.read_scene import read_scene
+from reference.quadrature.image import quadrature_image
+from reference.scene.read import read_truth
+from tests.helpers.density_grid import INSIDE, LAMP, ROUGH, SPOT, SUN, grid_xml, volume
+from tests.helpers.frames import relative_rmse
+from validation.scenes.loading import load_scene
+
+
+@pytest.fixture
+def scene(variant, tmp_path):
+    def load(*lights, **how):
+        path = tmp_path / "grid.xml"
+        path.write_text(grid_xml(volume(tmp_path / "smoke.vol", ROUGH, **how), *lights))
+        return load_scene(str(path)).scene
+
+    return load
+
+
+@pytest.mark.claim("density-grid-methods", tolerance="5e-3 of 400 steps: they know no faces and edges")
+@pytest.mark.parametrize("light", [LAMP, INSIDE, SPOT, SUN])
+def test_a_ray_march_goes_to_the_reference(scene, light):
+    loaded = scene(light)
+    reference = quadrature_image(read_truth(loaded), checks=0)
+    errors = []
+    for precision, steps in (("single", 400), ("double", 100), ("double", 400)):
+        frame = render_frame(frame_renderer(read_scene(loaded, precision), METHODS["ray-march"], steps=steps))
+        errors.append(relative_rmse(frame.airlight, reference.airlight))
+        # Depths are exact by cells: only rounding is left of a surface.
+        np.testing.assert_allclose(frame.surface, reference.surface, rtol=1e-4, atol=1e-4 * reference.surface.max())
+    assert max(errors[::2]) < 5e-3
+    assert errors[2] < 0.5 * errors[1]
+
+
+@pytest.mark.claim("density-grid-methods", tolerance="5 %: froxels of 6 cm in a box that ends within them")
+def test_froxels_go_to_the_reference(scene):
+    loaded = scene(SUN)
+    reference = quadrature_image(read_truth(loaded), checks=0)
+    how = {"slices": 256, "far": 15.0, "shadow": "ray"}
+    frame = render_frame(frame_renderer(read_scene(loaded), METHODS["froxel-fog"], **how))
+    assert relative_rmse(frame.airlight, reference.airlight) < 0.05
+
+
+@pytest.mark.claim("density-grid-refused", tolerance="none: an error and its words")
+def test_methods_of_lit_segments_and_turned_boxes_are_refused(scene):
+    read = read_scene(scene(LAMP))
+    refused = [name for name in FOG_METHODS if METHODS[name]().uses_kernel]
+    assert {"shadow-planes", "light-volumes", "unshadowed"} <= set(refused)
+    for name in refused:
+        with pytest.raises(
+            InputError, match=r"the medium is a density grid.*use froxel-fog, soft-shafts, or ray-march"
+        ):
+            frame_renderer(read, METHODS[name], kernel=exact)
+    with pytest.raises(InputError, match="turned or mirrored"):
+        read_scene(scene(LAMP, turn='<rotate z="1" angle="30"/>'))
