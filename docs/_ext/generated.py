@@ -96,8 +96,14 @@ def _replace(app: Sphinx, docname: str, content: list[str]) -> None:
     content[0] = fill(text)
 
 
+def _escape(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
+    """Keep the underscore at the end of a parameter's name, which reStructuredText would take for a link."""
+    lines[:] = [re.sub(r"^:param (\w+)_:", r":param \1\\_:", line) for line in lines]
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Fill every page when it is read."""
     listed.commands()
     app.connect("source-read", _replace)
+    app.connect("autodoc-process-docstring", _escape, priority=900)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -264,10 +264,9 @@ class Reference(LayeredImage):
     """The reference of a scene, with its error."""
 
     estimator: str  #: 'quadrature', 'single-scatter', 'volpath' or 'cloud-paths'
-    relative_error: float  #: of the airlight: the mean bound over the mean, or the relative standard error of the image
-    details: Mapping[str, Any] = field(
-        default_factory=dict
-    )  #: how it was made: samples, seeds, shadow rays that checked the intervals
+    relative_error: float  #: the mean bound of the airlight over its mean, or the relative standard error of the image
+    #: How it was made, with samples, seeds, shadow rays that checked the intervals.
+    details: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def bound(self) -> Array | None:

@@ -16,7 +16,6 @@ from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthLight, TruthMedium, TruthScene, read_truth
 from reference.scene.varying import VaryingMedium
 from reports.interchange.cycles import cycles_properties
-from reports.interchange.recipes import recipes
 from validation.scenes.engine_fog import ENGINES, parameters_of
 from validation.scenes.loading import LoadedScene, scene_stem
 from validation.scenes.random.scene import drawn_values, is_random
@@ -49,7 +48,7 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
     """Return everything that a renderer needs to render a scene, at the size of its image, as plain data.
 
     These are `scene`, `source`, `purpose`, `up`, `handedness`, `camera`, `medium`, `bounded_media`, `lights`,
-    `surfaces`, `radiance`, `notes`, `file`, `recipes`, and `properties`, the scene as `cycles_properties` returns it;
+    `surfaces`, `radiance`, `notes`, `file`, and `properties`, the scene as `cycles_properties` returns it;
     of a random scene also `drawn`. Lengths in metres, angles in degrees, extinction in 1/m, intensity in W/sr, power in
     W. Black shapes of area lights are among the lights, not the surfaces. A scene without a reference is refused, with
     what is in the way.
@@ -84,7 +83,7 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
         },
     }
     drawn = {"drawn": drawn_values(loaded.name)} if loaded.path is None and is_random(loaded.name) else {}
-    return described | drawn | {"recipes": recipes(described), "properties": {"Cycles": cycles_properties(described)}}
+    return described | drawn | {"properties": {"Cycles": cycles_properties(described)}}
 
 
 def up_axis(up: Array) -> str:

@@ -37,9 +37,7 @@ def _rows(described: Mapping[str, Any]) -> Iterator[Cells]:
     yield "radiance", "", described["radiance"]
     file = described["file"]
     yield "file to write", "", f"{file['name']}: {file['format']}; {'; '.join(file['layers'].values())}"
-    for renderer, lines in described["recipes"].items():
-        for number, line in enumerate(lines):
-            yield "" if number else f"in {renderer}", "", line
+    yield "in Blender", "", "--json has `properties`: all of this by the names of Blender's Python"
 
 
 def _drawn(drawn: Mapping[str, Any]) -> Iterator[Cells]:
