@@ -5,7 +5,9 @@ A user's method that is named, 'module:function' or 'file.py:function', runs in 
 or never leave. A function that Python gives runs here.
 """
 
-from dataclasses import replace
+import operator
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
     from validation.study.configuration import Configuration
 
 _ENDINGS = (".exr", ".png")
+_STAGES = ("surface", "shade", "render")  # the recorded functions of a frame
 
 
 @one_error
@@ -146,26 +149,40 @@ def render(
     activate()  # a user's module may need a variant when it is imported
     named = checked_configuration(method, kernel, parameters)
     chosen, apart = named
-    pixels, changes = pixels_of(size), changes_of(change)
+    asked = _Asked(scene, pixels_of(size), changes_of(change), precision, chosen)
     shown = progress if isinstance(progress, bool) else None
-    call: Any = _call
+    call: Any = operator.call
     if apart and isinstance(scene, str):
         from reports.machine.own_process import in_own_process
 
         call, progress = partial(in_own_process, name=chosen.method), shown
     if plan:
-        return call(_plan, scene, pixels, changes, precision, chosen)
-    how = (scene, pixels, changes, precision, chosen)
+        return call(_plan, asked)
     if frames is not None:
-        return call(_animation, *how, files, frames, animate, progress)
-    rendered: Rendering = call(_frame, *how, samples, timed, progress)
+        return call(_animation, asked, files, frames, animate, progress)
+    rendered: Rendering = call(_frame, asked, samples, timed, progress)
     for path in files:
         rendered.save(path)
     return replace(rendered, files=tuple(map(str, files)))
 
 
-def _call(function: Any, *arguments: Any) -> Any:
-    return function(*arguments)
+@dataclass(frozen=True)
+class _Asked:
+    """What to render, and by what."""
+
+    scene: Any
+    pixels: tuple[int, int] | None
+    changes: Mapping[str, tuple[float, ...]]
+    precision: str
+    chosen: "Configuration"
+
+    def read(self) -> tuple[Any, Any]:
+        """Return the scene, loaded, and as methods read it."""
+        from realtime.scene.read_scene import read_scene
+        from reports.api.scenes import opened
+
+        loaded = opened(self.scene, self.pixels, self.changes)
+        return loaded, read_scene(loaded.scene, self.precision)
 
 
 def _check(
@@ -216,40 +233,19 @@ def checked_configuration(method: Any, kernel: Any = None, parameters: Any = Non
     return in_own_process(configuration, method, name, parameters or {}, name=method), True
 
 
-def _ready(
-    scene: Any,
-    pixels: Any,
-    changes: Any,
-    precision: str,
-    chosen: "Configuration",
-    frames: int,
-    layers: bool,
-    progress: Progress,
-) -> tuple[Any, Any, Any, bool]:
+def _ready(asked: _Asked, frames: int, layers: bool, progress: Progress) -> tuple[Any, Any, Any, bool]:
     """Return a scene, loaded and read, what renders it, and whether with the further layers of the method."""
     from realtime.methods.registry import find_method
-    from realtime.scene.read_scene import read_scene
-    from reports.api.scenes import opened
     from validation.study.configuration import prepared
 
-    loaded = opened(scene, pixels, changes)
-    read = read_scene(loaded.scene, precision)
-    _check_work(loaded.name, read, chosen, frames)
+    loaded, read = asked.read()
+    _check_work(loaded.name, read, asked.chosen, frames)
     note(progress, read.features.notes)
-    layered = layers and bool(find_method(chosen.method).layers)
-    return loaded, read, prepared(read, chosen, extra_layers=layered), layered
+    layered = layers and bool(find_method(asked.chosen.method).layers)
+    return loaded, read, prepared(read, asked.chosen, extra_layers=layered), layered
 
 
-def _frame(
-    scene: Any,
-    pixels: Any,
-    changes: Any,
-    precision: str,
-    chosen: "Configuration",
-    samples: int,
-    timed: bool,
-    progress: Progress,
-) -> "Rendering":
+def _frame(asked: _Asked, samples: int, timed: bool, progress: Progress) -> "Rendering":
     """Render a frame, and time it where that is asked for."""
     import drjit as dr
 
@@ -262,10 +258,8 @@ def _frame(
     from validation.study.frame_times import time_frame
     from validation.study.run import layered_frame
 
-    variant = activate()
-    count = samples + (TIMED if timed else 0)
-    given = scene, pixels, changes, precision, chosen, count
-    loaded, read, renderer, layered = _ready(*given, layers=samples == 1, progress=progress)
+    variant, chosen = activate(), asked.chosen
+    loaded, read, renderer, layered = _ready(asked, samples + (TIMED if timed else 0), samples == 1, progress)
     warnings = _warnings(renderer)
     with telling(progress, f"{loaded.name}: {samples} rays a pixel") as tell:
         frame = render_samples(renderer, samples, lambda done: tell(done, "the picture"))
@@ -280,7 +274,7 @@ def _frame(
         kernel=chosen.kernel,
         parameters=dict(chosen.parameters),
         label=chosen.label,
-        precision=precision,
+        precision=asked.precision,
         plan=describe(read.features),
         notes=(*read.features.notes, *warnings),
         # The further layers of a method do not belong to what a frame costs.
@@ -290,17 +284,7 @@ def _frame(
     )
 
 
-def _animation(
-    scene: Any,
-    pixels: Any,
-    changes: Any,
-    precision: str,
-    chosen: "Configuration",
-    files: list[Path],
-    frames: int,
-    moves: str | None,
-    progress: Progress,
-) -> "Animation":
+def _animation(asked: _Asked, files: list[Path], frames: int, moves: str | None, progress: Progress) -> "Animation":
     """Render the frames of an animation and write each as soon as it is done."""
     import time
 
@@ -313,12 +297,11 @@ def _animation(
     from validation.study.frame_times import timed_image
     from validation.study.run import layered_frame
 
-    variant = activate()
-    given = scene, pixels, changes, precision, chosen, frames
-    asked = None if moves is None else parse_moves(moves)
+    variant, chosen = activate(), asked.chosen
+    moved_by = None if moves is None else parse_moves(moves)
     layers = any(path.suffix.lower() == ".exr" for path in files)
-    loaded, read, renderer, _ = _ready(*given, layers=layers, progress=progress)
-    animation = loaded.animation if asked is None else replace(loaded.animation, moves=asked)
+    loaded, read, renderer, _ = _ready(asked, frames, layers, progress)
+    animation = loaded.animation if moved_by is None else replace(loaded.animation, moves=moved_by)
     _warnings(renderer)
     costs: list[tuple[float, float]] = []
     kept = curve = None  # all frames share the tone curve of the first, so that a light that fades looks it
@@ -343,13 +326,10 @@ def _animation(
         moves=tuple(animation.moves),
         move_ms=moving,
         render_ms=rendering,
-        recordings={stage: getattr(getattr(renderer.stages, stage), "n_recordings", 0) for stage in STAGES},
+        recordings={stage: getattr(getattr(renderer.stages, stage), "n_recordings", 0) for stage in _STAGES},
         device=variant,
         files=tuple(str(_numbered(path, number, frames)) for path in files for number in range(1, frames + 1)),
     )
-
-
-STAGES = ("surface", "shade", "render")  #: the recorded functions of a frame
 
 
 def _numbered(path: Path, number: int, frames: int) -> Path:
@@ -358,7 +338,7 @@ def _numbered(path: Path, number: int, frames: int) -> Path:
     return path.with_name(f"{path.stem}-{number:0{digits}d}{path.suffix}")
 
 
-def _plan(scene: Any, pixels: Any, changes: Any, precision: str, chosen: "Configuration") -> "Plan":
+def _plan(asked: _Asked) -> "Plan":
     """Return what a scene needs of a method."""
     from realtime.methods.registry import find_method
     from realtime.methods.shadow_planes.method import ShadowPlanes
@@ -366,42 +346,36 @@ def _plan(scene: Any, pixels: Any, changes: Any, precision: str, chosen: "Config
     from realtime.parameters import values
     from realtime.scene.features import describe
     from realtime.scene.light_points import with_light_points
-    from realtime.scene.read_scene import read_scene
     from reports.api.results import Plan
-    from reports.api.scenes import opened
+    from validation.study.configuration import prepared
 
-    read = read_scene(opened(scene, pixels, changes).scene, precision)
+    _, read = asked.read()
     words, notes = describe(read.features), tuple(read.features.notes)
-    method = find_method(chosen.method)
+    method, seen = find_method(asked.chosen.method), read
     if read.area_lights:
-        own: dict[str, Any] = {name: value for name, value in chosen.parameters if name in values(method.light_points)}
+        own: dict[str, Any] = {
+            name: value for name, value in asked.chosen.parameters if name in values(method.light_points)
+        }
         points = replace(method.light_points, **own)
         words["light points"] = f"{points.points} of each area light, {points.pattern}"
-        read = with_light_points(read, 1, "ring")  # the casters as the middle of each sees them
+        seen = with_light_points(read, 1, "ring")  # the casters as the middle of each sees them
     if issubclass(method, ShadowPlanes):
-        casters = caster_plan(read)
-        words |= describe_casters(casters)
-        if dict(chosen.parameters).get("order", "exact") != "exact":
-            _warn(casters.warnings)
+        words |= describe_casters(caster_plan(seen))
+        _warnings(prepared(read, asked.chosen))
     return Plan(words, notes)
 
 
 def _warnings(renderer: Any) -> tuple[str, ...]:
     """Return what planes in an order of a paper do not count right, said on the error stream too."""
+    import sys
+
     from realtime.methods.shadow_planes.method import PlanePreparation
 
     preparation = renderer.stages.prepare
-    if not isinstance(preparation, PlanePreparation):
-        return ()
-    _warn(preparation.warnings)
-    return preparation.warnings
-
-
-def _warn(warnings: Any) -> None:
-    import sys
-
+    warnings: tuple[str, ...] = preparation.warnings if isinstance(preparation, PlanePreparation) else ()
     for warning in warnings:
         print(f"airlight: warning: {warning}", file=sys.stderr)
+    return warnings
 
 
 def _check_work(name: str, scene: Any, chosen: "Configuration", frames: int) -> None:
@@ -424,8 +398,6 @@ def asked_configurations(
     configurations; 'all', the default, for `usual`, or those of every built-in method for fog. Every method is measured
     with each kernel and with all settings, given by name or as NAME=VALUE.
     """
-    from collections.abc import Mapping
-
     from realtime.methods.registry import FOG_METHODS
     from validation.study.configuration import Configuration, chosen_configurations, configuration, parse_settings
 
