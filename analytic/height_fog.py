@@ -159,6 +159,25 @@ class HeightFog:
                 total = total + layer.sigma_t * (below + layer.scale_height * np.exp(up) * shallow)
         return np.asarray(total)
 
+    def along(self, start: ArrayLike, end: ArrayLike, length: ArrayLike, rise: ArrayLike) -> Array:
+        """Return the optical depth of segments that may have no end; `rise`: vertical components of unit directions."""
+        start, end, length, rise = np.broadcast_arrays(
+            *(np.asarray(v, dtype=np.float64) for v in (start, end, length, rise))
+        )
+        endless = np.isinf(length)
+        finite = self.optical_depth(start, np.where(endless, start, end), np.where(endless, 0.0, length))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sloped = np.where(rise > 0, self.column(start), self._below(start)) / np.abs(rise)
+        level = np.where(self.log_density(start) > -np.inf, np.inf, 0.0)
+        return np.where(endless, np.where(rise == 0, level, sloped), finite)
+
+    def _below(self, z: Array) -> Array:
+        """Return the optical depth straight down from heights [m]; infinite without a floor."""
+        if np.isinf(self.floor):
+            return np.full(z.shape, np.inf if self.constant or any(layer.sigma_t for layer in self.layers) else 0.0)
+        within = np.clip(z, self.floor, self.cap)
+        return self.optical_depth(self.floor, within, within - self.floor)
+
     def _mean(self, low: Array, high: Array) -> Array:
         """Return the mean density between two heights, low <= high, within floor and cap [1/m]."""
         rise = high - low
@@ -232,9 +251,9 @@ def height_fog_sun(
         b = np.maximum(np.where(outside, a, np.minimum(x1, leave)), a)
         b = np.where(np.isinf(a), a, b)
         za, zb = (origin + np.where(level, 0.0, rise * x) for x in (a, b))
-        tau = np.where(b > a, _along(fog, za, zb, b - a, rise), 0.0)
+        tau = np.where(b > a, fog.along(za, zb, b - a, rise), 0.0)
         first = fog.optical_depth(origin, za, a) + fog.column(za) / sun
-        last = _along(fog, origin, zb, b, rise) + np.where(np.isinf(zb) & (rise > 0), 0.0, fog.column(zb) / sun)
+        last = fog.along(origin, zb, b, rise) + np.where(np.isinf(zb) & (rise > 0), 0.0, fog.column(zb) / sun)
         bend = 1 - rise / sun
         q = bend * tau
         from_first = np.exp(-first) * np.where(
@@ -243,14 +262,6 @@ def height_fog_sun(
         from_last = np.exp(-last) * tau * phi(np.abs(q))
         value = np.where(q >= 0, from_first, from_last)
     return np.where((b > a) & (tau > 0), p * value, 0.0)
-
-
-def _along(fog: HeightFog, start: Array, end: Array, length: Array, rise: Array) -> Array:
-    """Return the optical depth of segments that may have no end: then it is what is above, or infinite."""
-    endless = np.isinf(length)
-    finite = fog.optical_depth(start, np.where(endless, start, end), np.where(endless, 0.0, length))
-    forever = np.where(rise > 0, fog.column(start) / rise, np.where(fog.log_density(start) > -np.inf, np.inf, 0.0))
-    return np.where(endless, forever, finite)
 
 
 def height_fog_segments(

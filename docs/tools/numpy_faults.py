@@ -54,7 +54,7 @@ class Engine:
     fog: tuple[float, ...] = (1.0, 1.0)  # factors on the fog of each lamp
     surface: float = 1.0
     shadows: tuple[bool, bool] = (True, True)  # in the fog, on surfaces
-    density: Callable[[Array], Array] | None = None  # by height
+    layer: tuple[float, float] | None = None  # base and scale height of a density that falls exponentially [m]
     start: float = 0.0
     end: float = math.inf
     planar: bool = False
@@ -67,6 +67,13 @@ class Engine:
     block: int = 1  # pixels along a side that share their fog
     steps: int = _STEPS
 
+    def density(self, z: Array) -> Array:
+        """Return the density at heights."""
+        if self.layer is None:
+            return np.ones_like(z)
+        base, scale_height = self.layer
+        return np.exp(-(z - base) / scale_height)
+
 
 ORIGIN, TARGET, FOV = np.array([0.35, -5.15, 1.45]), np.array([0.05, 0.4, 0.85]), math.radians(49)
 BALL, RADIUS, HALF = np.array([0.45, 0.6, 0.55]), 0.53, (8.3, 7.7)
@@ -78,6 +85,17 @@ def _triple(values: Any) -> str:
 
 def scene_xml(engine: Engine) -> str:
     """Return the scene as Mitsuba reads it."""
+    kind, sigma_t = "homogeneous", f'<rgb name="sigma_t" value="{engine.sigma_t}"/>'
+    if engine.layer is not None:
+        pairs = zip(("sigma_1", "z_1", "H_1"), (engine.sigma_t, *engine.layer))
+        numbers = "".join(f'<float name="{name}" value="{value}"/>' for name, value in pairs)
+        kind, sigma_t = (
+            "heterogeneous",
+            (
+                '<volume type="heightfog" name="sigma_t"><transform name="to_world"><scale x="200" y="200" z="91"/>'
+                f'<translate z="-1"/></transform>{numbers}</volume>'
+            ),
+        )
     lights = "".join(
         f'<emitter type="point" id="lamp-{n}"><point name="position" value="{_triple(lamp.place)}"/>'
         f'<rgb name="intensity" value="{_triple(lamp.intensity)}"/></emitter>'
@@ -89,7 +107,7 @@ def scene_xml(engine: Engine) -> str:
         for n, lamp in enumerate(engine.lamps)
     )
     return f"""<scene version="3.0.0">
-    <medium type="homogeneous" id="fog"><rgb name="sigma_t" value="{engine.sigma_t}"/>
+    <medium type="{kind}" id="fog">{sigma_t}
         <rgb name="albedo" value="{_triple(engine.albedo)}"/>
         <phase type="hg"><float name="g" value="0.35"/></phase></medium>
     <sensor type="perspective"><float name="fov" value="49"/><ref name="medium" id="fog"/>
@@ -144,7 +162,7 @@ def _light(engine: Engine, lamp: Lamp, point: Array, shadows: bool) -> tuple[Arr
 
 def _depth(engine: Engine, low: Array, high: Array, length: Array) -> Array:
     """Return the optical depth of a straight path between two heights."""
-    if engine.density is None:
+    if engine.layer is None:
         return engine.sigma_t * length
     parts = (np.arange(16) + 0.5) / 16
     mean = sum(engine.density(low + part * (high - low)) for part in parts) / len(parts)
@@ -186,10 +204,15 @@ def _layers(engine: Engine, positions: Array) -> tuple[Array, Array, Array]:
             size = height / np.cos(angle) ** 2 * (ends[1] - ends[0]) / engine.steps
             here = ORIGIN + x[:, None] * way
             sent, to, r = _light(engine, lamp, here, engine.shadows[0])
-            density = 1.0 if engine.density is None else engine.density(here[:, 2])
             depth = engine.legs[0] * _depth(engine, ORIGIN[2] + 0 * x, here[:, 2], np.maximum(x - engine.start, 0))
             depth = depth + engine.legs[1] * _depth(engine, here[:, 2], lamp.place[2] + 0 * r, r)
-            value = sent * engine.phase(np.sum(to * way, axis=1)) * density * np.exp(-depth) * np.maximum(size, 0)
+            value = (
+                sent
+                * engine.phase(np.sum(to * way, axis=1))
+                * engine.density(here[:, 2])
+                * np.exp(-depth)
+                * np.maximum(size, 0)
+            )
             scale = engine.fog[number] * engine.sigma_t / (4 * math.pi)
             fog += scale * value[:, None] * np.multiply(engine.albedo, lamp.intensity)
     return fog, engine.surface * surface, left[:, None]
@@ -237,7 +260,7 @@ FAULTS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("near-plane", "no fog before 0.5 m", {"start": 0.5}),
     ("fog-end", "no fog beyond 6 m", {"end": 6.0}),
     ("depth-axis", "depth along the axis", {"planar": True}),
-    ("height-fog", "density falls to 1/e in 1.1 m", {"density": lambda z: np.exp(-z / 1.1)}),
+    ("height-fog", "density falls to 1/e in 1.1 m", {"layer": (0.0, 1.1)}),
     ("distance-law", "one over the distance", {"power": 1.0}),
     ("light-range", "lights end at 5 m", {"reach": 5.0}),
     ("no-shadow", "no shadows", {"shadows": (False, False)}),
@@ -254,6 +277,18 @@ FAULTS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("unexplained", "the fog at a quarter of the resolution", {"block": 4}),
     ("unexplained", "five steps a ray", {"steps": 5}),
 )
+
+LAYERED = replace(RIGHT, sigma_t=0.31, layer=(0.2, 1.3))
+FAULTS_OF_LAYERS: tuple[tuple[str, str, dict[str, Any]], ...] = (
+    ("right", "nothing, in height fog", {}),
+    ("homogeneous", "homogeneous fog where height fog was asked for", {"layer": None, "sigma_t": 0.11}),
+    ("scale-height", "a falloff for the scale height", {"layer": (0.2, 1 / 1.3)}),
+    ("scale-height", "density halves in the scale height", {"layer": (0.2, 1.3 / math.log(2))}),
+    ("scale-height", "the scale height 1.8 times", {"layer": (0.2, 1.8 * 1.3)}),
+    ("height-fog", "the scale height 0.7 times, and the base 0.6 m too high", {"layer": (0.8, 0.7 * 1.3)}),
+    ("camera-leg", "the way to the camera not attenuated, in height fog", {"legs": (0.0, 1.0)}),
+)
+CASES = (*((RIGHT, *fault) for fault in FAULTS), *((LAYERED, *fault) for fault in FAULTS_OF_LAYERS))
 
 
 def main() -> None:
@@ -274,18 +309,21 @@ def main() -> None:
     from validation.engine.prediction import SceneLight
     from validation.scenes.loading import load_scene
 
+    scenes = {}
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "scene.xml"
-        path.write_text(scene_xml(RIGHT), encoding="utf-8")
-        loaded = load_scene(str(path), _SIZE)
-        light = SceneLight(read_truth(loaded.scene))
+        for engine in (RIGHT, LAYERED):
+            path = Path(folder) / "scene.xml"
+            path.write_text(scene_xml(engine), encoding="utf-8")
+            loaded = load_scene(str(path), _SIZE)
+            scenes[engine] = loaded, SceneLight(read_truth(loaded.scene))
     old = json.loads(RECORD.read_text(encoding="utf-8"))["rows"] if RECORD.exists() else []
     rows = {row["number"]: row for row in old}
-    for number, (planted, words, given) in enumerate(FAULTS):
+    for number, (engine, planted, words, given) in enumerate(CASES):
         if chosen.only and number not in chosen.only:
             continue
         area = number % 2 == 1
-        image = rendered(replace(RIGHT, **given), area=area, noise=chosen.noise, seed=number)
+        loaded, light = scenes[engine]
+        image = rendered(replace(engine, **given), area=area, noise=chosen.noise, seed=number)
         said = diagnose_image(Image({"total": image}), loaded, light=light)
         rows[number] = {
             "number": number,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.quadrature.fields import field_of
-from reference.quadrature.unbounded import Terms, lit_stretches, profile_of
+from reference.quadrature.unbounded import Stretches, Terms, lit_stretches, profile_of
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import TruthLight, TruthScene
 from reference.scene.shapes import Shapes, read_shapes
@@ -98,19 +98,25 @@ def directional_airlight(truth: TruthScene, light: DirectionalLight, distance: A
     found = lit_parallel_rays(truth, light, distance, **how)
     rays, lit = found.rays, found.lit
     field, angle = field_of(truth), np.full(len(distance), np.pi)
-    # Behind all that could stand in the light, a ray is lit or not as at the end of what was looked at.
-    goes_on = (reaches(lit, found.end) & np.isinf(distance))[lit.ray]
-    last = lit.high * (1 + _END) >= found.end[lit.ray]
-    leaves = np.where(goes_on & last, field.leave(truth.origin, truth.direction)[lit.ray], lit.high)
-    high = np.maximum(lit.high, leaves)
+    _, _, high = stretches = sun_stretches(truth, found)
     # What the uncertainty of coordinates is worth on a ray, through an edge or a kink; at most all of the ray.
     scale = np.maximum(coordinates(rays, found.shapes), lit.high.max(initial=0.0) / rays.height)
     edge = np.minimum(lit.edge * scale, np.bincount(lit.ray, high - lit.low, len(distance)))
     terms = Terms(edge=edge, rounding=np.finfo(float).eps * scale)
-    sums = field.sums(rays, (lit.ray, lit.low, high), distance, terms)
+    sums = field.sums(rays, stretches, distance, terms)
     radiance, bound = (part * light.irradiance for part in sums)
     bound = bound + worth_of_doubt(truth, rays, lit) * light.irradiance
     return LightAirlight(radiance, bound, angle, lit, reaches(lit, distance))
+
+
+def sun_stretches(truth: TruthScene, found: LitRays) -> Stretches:
+    """Return which parts of rays a directional light reaches; the last may end where its ray leaves the media."""
+    lit = found.lit
+    # Behind all that could stand in the light, a ray is lit or not as at the end of what was looked at.
+    goes_on = (reaches(lit, found.end) & np.isinf(found.distance))[lit.ray]
+    last = lit.high * (1 + _END) >= found.end[lit.ray]
+    leaves = np.where(goes_on & last, field_of(truth).leave(truth.origin, truth.direction)[lit.ray], lit.high)
+    return lit.ray, lit.low, np.maximum(lit.high, leaves)
 
 
 def lit_parallel_rays(

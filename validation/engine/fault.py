@@ -168,6 +168,11 @@ def fog_surrounds(predictor: Predictor) -> bool:
     return not predictor.truth.media
 
 
+def in_height_fog(predictor: Predictor) -> bool:
+    """Return whether the scene asks for height fog."""
+    return predictor.fog.height is not None
+
+
 def shows_fog(predictor: Predictor) -> bool:
     """Return whether the image shows what media scatter."""
     return predictor.seen.holds != "surface"

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Faults of the medium, and of the laws of scattering and attenuation."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from analytic.height_fog import HeightFog, Layer
 from reference.scene.camera import camera_matrix
 from reference.scene.read import TruthScene
 from validation.engine.curves import from_srgb, to_srgb
@@ -25,6 +27,7 @@ from validation.engine.fault import (
     has_near_lights,
     has_no_lobe,
     has_shapes,
+    in_height_fog,
     short,
     shows_both,
     shows_fog,
@@ -34,6 +37,7 @@ from validation.engine.prediction import Guess, Layers, Predictor
 from validation.fog_model.radiance import Colour, Fog, PhaseLaw, colour
 
 _FACTOR = (0.5, 0.7, 1.4, 2.0)
+_SHIFT = Parameter(-100.0, 100.0, (-10.0, -2.0, -0.5, 0.5, 2.0, 10.0))  # of heights [m]
 _USUAL_NEAR = (0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0)  # of cameras in engines and modelling programs [m]
 
 
@@ -116,9 +120,41 @@ def _depths(predictor: Predictor, guess: Guess) -> Sequence[Values]:
     return [(far * part,) for part in (0.9, 0.6, 0.35)]
 
 
-def _height(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+def _falling(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+    """Return homogeneous fog with a density that falls with height, from the camera's on."""
+    up = _up(predictor.truth)
+    height = HeightFog((Layer(1.0, float(predictor.truth.origin @ up), p[0]),))
     fog = changed_optics(guess.fog, lambda sigma_t, albedo: (sigma_t * p[1], albedo))
-    return replace(guess, fog=replace(fog, height=(p[0], _up(predictor.truth))))
+    return replace(guess, fog=replace(fog, height=height, up=up))
+
+
+def _even(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+    """Return height fog with one extinction at all heights."""
+    return replace(guess, fog=replace(guess.fog, sigma_t=((p[0],) * 3,), height=HeightFog(constant=1.0)))
+
+
+def _densities(predictor: Predictor, guess: Guess) -> Sequence[Values]:
+    """Return extinctions that height fog has at the camera and at lights, and fractions of them."""
+    fog, places = guess.fog.height, [predictor.truth.origin, *(light.position for light in predictor.truth.lights)]
+    assert fog is not None
+    mean = float(np.mean(fog.density([place @ guess.fog.up for place in places])))
+    return [(max(mean, 1e-3) * part,) for part in (1.0, 0.3, 3.0)]
+
+
+def _layers(change: Callable[..., Layer]) -> Change:
+    """Return what changes every layer of height fog."""
+
+    def changed(fog: Fog, *p: float) -> Fog:
+        assert fog.height is not None
+        layers = tuple(change(layer, *p) for layer in fog.height.layers)
+        return replace(fog, height=replace(fog.height, layers=layers))
+
+    return changed_fog(changed)
+
+
+def _stretched(factor: Callable[..., float]) -> Change:
+    """Return what gives every layer another scale height."""
+    return _layers(lambda layer, *p: replace(layer, scale_height=factor(layer.scale_height, *p)))
 
 
 def _up(truth: TruthScene) -> Colour:
@@ -165,6 +201,7 @@ MEDIUM = (
         "medium",
         "the extinction is one over what it should be: a mean free path was asked for",
         _optics(lambda sigma_t, albedo: (1 / sigma_t, albedo)),
+        applies=lambda predictor: not in_height_fog(predictor),
     ),
     Fault(
         "extinction",
@@ -319,11 +356,58 @@ MEDIUM = (
         "height-fog",
         "medium",
         "the density falls with height, to 1/e in {0:.3g} m, and is {1:.3g} times what it should be at the camera",
-        _height,
+        _falling,
         (Parameter(1e-2, 1e4, logarithmic=True), Parameter(1e-2, 1e2, logarithmic=True)),
         begin=_heights,
         single=True,
-        applies=fog_surrounds,
+        applies=lambda predictor: fog_surrounds(predictor) and not in_height_fog(predictor),
+    ),
+    Fault(
+        "homogeneous",
+        "medium",
+        "the fog is homogeneous, of the extinction {0:.4g} 1/m: its density does not fall with height",
+        _even,
+        (Parameter(1e-5, 1e3, logarithmic=True),),
+        begin=_densities,
+        single=True,
+        applies=in_height_fog,
+    ),
+    *(
+        Fault("scale-height", "medium", words, _stretched(factor), applies=in_height_fog)
+        for words, factor in (
+            ("scale heights are one over what they should be: a falloff was asked for", lambda h: 1 / h),
+            ("densities halve in what should be the scale height", lambda h: h / math.log(2)),
+            (
+                "scale heights are ln 2 times what they should be: heights were taken that halve densities",
+                lambda h: h * math.log(2),
+            ),
+        )
+    ),
+    Fault(
+        "scale-height",
+        "medium",
+        "scale heights are {0:.4g} times what they should be",
+        _stretched(lambda h, factor: h * factor),
+        (Parameter(1e-3, 1e3, _FACTOR, logarithmic=True),),
+        applies=in_height_fog,
+    ),
+    Fault(
+        "base-height",
+        "medium",
+        "bases of layers are {0:+.4g} m higher than they should be",
+        _layers(lambda layer, shift: replace(layer, base=layer.base + shift)),
+        (_SHIFT,),
+        applies=in_height_fog,
+    ),
+    Fault(
+        "height-fog",
+        "medium",
+        "scale heights are {0:.4g} times what they should be, and bases {1:+.4g} m higher",
+        _layers(lambda layer, factor, shift: Layer(layer.sigma_t, layer.base + shift, layer.scale_height * factor)),
+        (Parameter(1e-3, 1e3, logarithmic=True), _SHIFT),
+        begin=lambda predictor, guess: [(factor, shift) for factor in (0.5, 1.0, 2.0) for shift in (-1.0, 0.0, 1.0)],
+        single=True,
+        applies=in_height_fog,
     ),
     Fault(
         "multiple",

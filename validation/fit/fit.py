@@ -153,9 +153,9 @@ def fit_image(
 
     Notes
     -----
-    Valid for single scattering: homogeneous media, point and spot lights, directional ones where media have bounds;
-    area lights are 16 to 128 samples here, which leaves some 0.5 % in a pixel. The intervals count pixels as
-    independent of one another.
+    Valid for single scattering: homogeneous media and height fog, point and spot lights, directional ones where media
+    have bounds or density falls with height; area lights are 16 to 128 samples here, which leaves some 0.5 % in a
+    pixel. The intervals count pixels as independent of one another.
     """
     started = time.perf_counter()
     kinds = pixel_kinds(image, pixel)

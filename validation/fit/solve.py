@@ -61,9 +61,6 @@ _FACTORS = ("intensity", "exposure", "albedo")
 _SEARCHES, _SHORT, _LONG = 5, 20, 60  # of starts that are followed, and steps
 _USUAL = 0.05  # relative error that a start may well have
 _DIM = 0.01  # of the mean of the image: below it a value need not be right relative to itself
-# Of the start of a search: a factor of 22 000, or an artanh g of 10. An image that asks for more says nothing, and a
-# step that is not bounded may ask for a factor that no number holds.
-_FARTHEST = 10.0
 _ROUNDS = 6
 _LEAST_KEPT = 0.5  # fraction of the pixels that must agree with one another
 _OUTLIER = 6.0  # standard deviations beyond which a value is left out
@@ -169,8 +166,8 @@ def _least(
     start: Array,
     **how: Any,
 ) -> Array:
-    """Return the end of a search for the least sum of squares, not `_FARTHEST` from its start."""
-    reach = np.array([np.inf if unknown.moves else _FARTHEST for unknown in unknowns])
+    """Return the end of a search for the least sum of squares, not farther from its start than parameters allow."""
+    reach = np.array([unknown.farthest for unknown in unknowns])
     ends = start - reach, start + reach
     return np.asarray(least_squares(residuals, start, slopes, bounds=ends, x_scale="jac", **how).x)
 
@@ -182,7 +179,7 @@ def _trials(model: ImageModel, unknowns: Sequence[Unknown]) -> list[tuple[float,
     lie decades apart lead to no common end.
     """
     given = np.array([unknown.scale.inward(unknown.start) for unknown in unknowns])
-    sigmas = [n for n, unknown in enumerate(unknowns) if unknown.kind == "sigma_t"]
+    sigmas = [n for n, unknown in enumerate(unknowns) if unknown.kind.startswith("sigma")]
     gs = [n for n, unknown in enumerate(unknowns) if unknown.kind == "phase.g"]
     factors = [n for n, unknown in enumerate(unknowns) if unknown.kind in _FACTORS]
     # Of several that multiply the same, such as albedo and exposure, only the first kind takes the factor.

@@ -5,6 +5,8 @@
 |---|---|
 | `sigma_t` | extinction of a medium [1/m]; `sigma_t.r`, `.g`, `.b` one channel of it |
 | `albedo` | single-scattering albedo; `albedo.r`, `.g`, `.b` |
+| `sigma_1`, `z_1`, `H_1` | extinction at its base [1/m], base height and scale height [m] of a layer of height fog |
+| `sigma_2`, `z_2`, `H_2`, `sigma_0` | the second layer, and the constant part [1/m] |
 | `phase.g` | g of Henyey and Greenstein's function |
 | `intensity` | factor on a light |
 | `light.x`, `light.y`, `light.z` | position of a light [m] |
@@ -26,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError, nearest
+from analytic.height_fog import HeightFog
 from reference.scene.read import TruthScene
 from validation.fog_model.radiance import Fog
 from validation.fog_model.view import light_sources
@@ -33,6 +36,13 @@ from validation.fog_model.view import light_sources
 CHANNELS = ("r", "g", "b")
 AXES = ("x", "y", "z")
 NAMES = ("sigma_t", "albedo", "phase.g", "intensity", "light.x", "light.y", "light.z", "exposure")
+LAYERS = ("sigma_1", "z_1", "H_1", "sigma_2", "z_2", "H_2", "sigma_0")  #: of height fog, as scenes have them
+_PARTS = {"sigma": "sigma_t", "z": "base", "H": "scale_height"}  # of a layer of height fog, by the letters of a scene
+
+
+# Of the start of a search: a factor of 22 000, or an artanh g of 10. An image that asks for more says nothing, and a
+# step that is not bounded may ask for a factor that no number holds.
+_FARTHEST = 10.0
 
 
 @dataclass(frozen=True)
@@ -76,10 +86,17 @@ class Unknown:
         if self.kind == "exposure":
             red, green, blue = (value if c in self.channels else fog.exposure[c] for c in range(3))
             return replace(fog, exposure=(red, green, blue))
+        if self.kind in LAYERS:
+            return replace(fog, height=_with_layer(fog.height, self.kind, value))
         axis = AXES.index(self.kind[-1])
         place = fog.moved[self.number]
         new_place = tuple(value - self.place if each == axis else place[each] for each in range(3))
         return fog.with_entry("moved", self.number, new_place)
+
+    @property
+    def farthest(self) -> float:
+        """How far from its start it is looked for, as a number on the whole line; see `_FARTHEST`."""
+        return math.inf if self.scale is _PLAIN else _FARTHEST
 
     @property
     def moves(self) -> bool:
@@ -131,21 +148,28 @@ def _read(name: str, truth: TruthScene, fog: Fog) -> list[Unknown]:
         base = word.removesuffix(f".{letter}")
         if base in ("sigma_t", "albedo", "exposure") and base != word:
             kind, channels = base, (channel,)
-    if kind not in NAMES:
-        raise InputError(f"fit: got '{name}', wanted some of {', '.join(NAMES)}" + nearest(word, NAMES))
+    if fog.height is None and kind in LAYERS:
+        raise InputError(f"fit: got '{name}'; the scene has no height fog: write it as such, or look for 'sigma_t'")
+    names = NAMES if fog.height is None else (*_layers_of(fog.height), *NAMES[1:])
+    if kind not in names:
+        raise InputError(f"fit: got '{name}', wanted some of {', '.join(names)}" + nearest(word, names))
+    if fog.height is not None and kind in LAYERS:
+        return [_of_layer(kind, fog.height)]
     if kind == "exposure":
         if place:
             raise InputError(f"fit: got '{name}'; the exposure is that of the whole image: write '{word}'")
         return [Unknown(name, kind, 0, channels, 1.0, _LOG, "1")]
     if kind in ("sigma_t", "albedo", "phase.g"):
         return [
-            each for number in _media(name, place, truth) for each in _of_medium(kind, channels, number, truth, fog)
+            each
+            for number in _media(name, place, truth, fog)
+            for each in _of_medium(kind, channels, number, truth, fog)
         ]
     return [_of_light(kind, number, truth) for number in _lights(name, place, kind, truth)]
 
 
 def _of_medium(kind: str, channels: tuple[int, ...], number: int, truth: TruthScene, fog: Fog) -> list[Unknown]:
-    several = len(_scattering(truth)) > 1
+    several = len(_scattering(fog)) > 1
     ending = f":{_medium_name(number, truth)}" if several else ""
     if kind == "phase.g":
         phase = (truth.medium, *truth.media)[number].phase
@@ -185,9 +209,30 @@ def _of_light(kind: str, number: int, truth: TruthScene) -> Unknown:
     )
 
 
-def _scattering(truth: TruthScene) -> list[int]:
+def _of_layer(kind: str, height: HeightFog) -> Unknown:
+    part, number = kind.split("_")
+    value = height.constant if number == "0" else getattr(height.layers[int(number) - 1], _PARTS[part])
+    return Unknown(kind, kind, 0, (0, 1, 2), value, _PLAIN if part == "z" else _LOG, "1/m" if part == "sigma" else "m")
+
+
+def _layers_of(height: HeightFog) -> tuple[str, ...]:
+    """Return the names of the numbers that height fog has."""
+    return tuple(name for name in LAYERS if 0 < int(name[-1]) <= len(height.layers) or name == "sigma_0")
+
+
+def _with_layer(height: HeightFog | None, kind: str, value: float) -> HeightFog:
+    assert height is not None
+    part, number = kind.split("_")
+    if number == "0":
+        return replace(height, constant=value)
+    layers = list(height.layers)
+    layers[int(number) - 1] = replace(layers[int(number) - 1], **{_PARTS[part]: value})
+    return replace(height, layers=tuple(layers))
+
+
+def _scattering(fog: Fog) -> list[int]:
     """Return the numbers of the media that are there."""
-    return [number for number, medium in enumerate((truth.medium, *truth.media)) if max(medium.sigma_t) > 0]
+    return [number for number, sigma_t in enumerate(fog.sigma_t) if max(sigma_t) > 0]
 
 
 def _medium_name(number: int, truth: TruthScene) -> str:
@@ -199,8 +244,8 @@ def light_names(truth: TruthScene) -> list[str]:
     return [source.name for source in light_sources(truth)]
 
 
-def _media(name: str, place: str, truth: TruthScene) -> list[int]:
-    there = _scattering(truth)
+def _media(name: str, place: str, truth: TruthScene, fog: Fog) -> list[int]:
+    there = _scattering(fog)
     return _chosen(name, place, there, [_medium_name(number, truth) for number in there], "medium")
 
 

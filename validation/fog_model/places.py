@@ -14,6 +14,10 @@ which it falls by many orders is the only hard one, and what is left beyond it i
 The path from a directional light is unbounded, so that only media with bounds attenuate it; between the kinks of its
 lengths (`reference.quadrature.segments`) the integrand is an exponential of a linear function, and eight nodes
 are exact to rounding over up to four optical depths.
+
+In height fog pieces end where the density has kinks too, and panels span four scale heights at most, two under a sun:
+over these the density changes smoothly. A light path out of the fog has the length 0 here, as in homogeneous fog; its
+optical depth is that of a column, which the fog knows.
 """
 
 from collections.abc import Sequence
@@ -22,12 +26,15 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.panels import equal_panels
 from reference.quadrature.bounded import smooth_pieces
-from reference.quadrature.light_airlight import LitRays
-from reference.quadrature.pieces import by_medium
+from reference.quadrature.height_fog import fog_of
+from reference.quadrature.light_airlight import LitRays, sun_stretches
+from reference.quadrature.pieces import Pieces, by_medium, cut, whole
 from reference.quadrature.segments import camera_segments
 from reference.quadrature.unbounded import lit_stretches, profile_of
 from reference.scene.directional_light import DirectionalLight
+from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthLight, TruthScene
 from reference.visibility.line_crossings import crossings
 from reference.visibility.planes import falloff, rays_at
@@ -44,6 +51,9 @@ _AT_LIGHT = 1e-290  # height [m] below which a ray meets the light
 _NEAR_ZERO = 1e-15  # height over distance below which a light beside a piece may as well be at this height
 _PANEL, _SHORT = 2.4, 0.6
 _DEEP, _SHALLOW = 4.0, 0.5  # the same in optical depths, at the scene's own extinction
+_SCALE_HEIGHTS = 4.0  # that a panel spans at most
+_HALVES = 8  # times that a stretch before a sun is halved towards its beginning: dense fog ends within the first
+_MOST = 64  # panels of a piece
 _OF_ONE, _OF_MANY = (8, 4), (4, 2)  # nodes on a panel and on a short one: of a light, of a sample of an area light
 
 
@@ -99,8 +109,11 @@ def point_nodes(
     used = x1 > x0
     ray, x0, x1 = ray[used], x0[used], x1[used]
     if not truth.media:
+        x1 = np.where(np.isinf(x1), np.maximum(x0, rays.foot[ray]) + _long_enough(truth, light.position), x1)
+        if isinstance(truth.medium, HeightMedium):
+            pieces = _by_height(truth, (ray, x0, x1))
+            ray, x0, x1 = pieces.ray, pieces.x0, pieces.x1
         medium = np.full(len(ray), AROUND)
-        x1 = np.where(np.isinf(x1), np.maximum(x0, rays.foot[ray]) + _long_enough(truth), x1)
     else:
         pieces, _ = smooth_pieces(truth, rays, camera_segments(truth, reach.distance), (ray, x0, x1))
         # The reference counts media with bounds from 0 and calls what surrounds them -1.
@@ -109,8 +122,17 @@ def point_nodes(
     beside = np.where(s0 > 0, s0, np.where(s1 < 0, -s1, 0.0))
     height = np.maximum(rays.height[ray], np.maximum(_NEAR_ZERO * beside, _AT_LIGHT))
     start = np.arcsinh(s0 / height)
+    width = np.arcsinh(s1 / height) - start
+    if isinstance(truth.medium, HeightMedium):
+        piece, start, width = equal_panels(np.arange(len(ray)), start, width, np.maximum(np.ceil(width / _PANEL), 1))
+        low, high = (foot[piece] + height[piece] * np.sinh(w) for w in (start, start + width))
+        low, high = _heights(truth, ray[piece], low), _heights(truth, ray[piece], high)
+        span = _scale_heights(truth.medium, low, high) / _SCALE_HEIGHTS
+        number, start, width = equal_panels(np.arange(len(piece)), start, width, np.clip(np.ceil(span), 1, _MOST))
+        piece = piece[number]
+        ray, foot, height, medium = ray[piece], foot[piece], height[piece], medium[piece]
     orders = _OF_MANY if light.cosine else _OF_ONE
-    owner, w, weight = panel_nodes(start, np.arcsinh(s1 / height) - start, orders=orders)
+    owner, w, weight = panel_nodes(start, width, orders=orders)
     ray, foot, height = ray[owner], foot[owner], height[owner]
     sine, r = np.tanh(w), height * np.cosh(w)
     x = foot + height * np.sinh(w)
@@ -126,15 +148,18 @@ def parallel_nodes(
     truth: TruthScene, light: DirectionalLight, reach: LitRays, ends: tuple[Array, Array] | None = None
 ) -> Places:
     """Return the nodes of a directional light on the lit parts of all rays, see `point_nodes`."""
-    rays, lit = reach.rays, reach.lit
-    x0, x1 = lit.low, lit.high
+    rays = reach.rays
+    ray, x0, x1 = sun_stretches(truth, reach)
     if ends is not None:
-        x0, x1 = np.maximum(x0, ends[0][lit.ray]), np.minimum(x1, ends[1][lit.ray])
+        x0, x1 = np.maximum(x0, ends[0][ray]), np.minimum(x1, ends[1][ray])
     used = x1 > x0
-    stretches = lit.ray[used], x0[used], x1[used]
-    pieces, _ = smooth_pieces(truth, rays, camera_segments(truth, reach.distance), stretches)
-    width = pieces.x1 - pieces.x0
-    depth = np.maximum(width * by_medium(truth, "sigma_t", pieces.medium).max(axis=1), 1e-300)
+    stretches = ray[used], x0[used], x1[used]
+    if isinstance(truth.medium, HeightMedium):
+        pieces, depth = _before_sun(truth, light, stretches)
+    else:
+        pieces, _ = smooth_pieces(truth, rays, camera_segments(truth, reach.distance), stretches)
+        depth = (pieces.x1 - pieces.x0) * by_medium(truth, "sigma_t", pieces.medium).max(axis=1)
+    width, depth = pieces.x1 - pieces.x0, np.maximum(depth, 1e-300)
     owner, place, weight = panel_nodes(np.zeros(len(width)), depth, most=_DEEP, short=_SHALLOW)
     place, weight, ray = place / depth[owner], weight / depth[owner], pieces.ray[owner]
     x, direction = pieces.x0[owner] + width[owner] * place, truth.direction[ray]
@@ -229,9 +254,61 @@ def lengths(truth: TruthScene, origin: Array, direction: Array, reach: Array) ->
     return np.stack([np.maximum(around, 0.0), *inside], axis=1)
 
 
-def _long_enough(truth: TruthScene) -> float:
-    """Return how far behind its foot point an unbounded ray is followed [m]."""
-    sigma_t = truth.medium.sigma_t
+def _by_height(truth: TruthScene, stretches: tuple[Index, Array, Array]) -> Pieces:
+    """Cut lit stretches where rays cross heights at which the density of height fog has kinks."""
+    medium = truth.medium
+    assert isinstance(medium, HeightMedium)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x = (np.array(fog_of(medium).kinks)[:, None] - truth.origin @ medium.up) / (truth.direction @ medium.up)
+    number, ray = np.nonzero(np.isfinite(x) & (x > 0))
+    return cut(whole(stretches), (ray, x[number, ray]))
+
+
+def _heights(truth: TruthScene, ray: Index, x: Array) -> Array:
+    """Return the heights at distances along rays [m]."""
+    assert isinstance(truth.medium, HeightMedium)
+    up = truth.medium.up
+    return np.asarray(truth.origin @ up + x * (truth.direction[ray] @ up))
+
+
+def _scale_heights(medium: HeightMedium, low: Array, high: Array) -> Array:
+    """Return how many of the least scale height lie between two heights, in the fog [1]."""
+    least = min((scale_height for *_, scale_height in medium.layers), default=np.inf)
+    low, high = (np.clip(z, medium.floor, medium.cap) for z in (low, high))
+    return np.asarray(np.abs(high - low) / least)
+
+
+def _before_sun(
+    truth: TruthScene, light: DirectionalLight, stretches: tuple[Index, Array, Array]
+) -> tuple[Pieces, Array]:
+    """Return pieces of lit stretches in height fog, and how long each is in optical depths and in height."""
+    medium = truth.medium
+    assert isinstance(medium, HeightMedium)
+    fog, mu = fog_of(medium), float(-light.direction @ medium.up)
+    ray, x0, x1 = stretches
+    x1 = np.where(np.isinf(x1), x0 + _long_enough(truth, truth.origin), x1)
+    pieces = _by_height(truth, (ray, x0, x1))
+    for _ in range(_HALVES):
+        first = pieces.first
+        middle = 0.5 * (pieces.x0 + pieces.x1)[first]
+        pieces = cut(pieces, (pieces.ray[first], middle))
+    middle = _heights(truth, pieces.ray, 0.5 * (pieces.x0 + pieces.x1))
+    pieces = pieces[np.isfinite(fog.log_density(middle))]
+    low, high = (_heights(truth, pieces.ray, x) for x in (pieces.x0, pieces.x1))
+    steep = 1 + np.abs(truth.direction[pieces.ray] @ medium.up) / mu
+    depth = steep * fog.optical_depth(low, high, pieces.x1 - pieces.x0)
+    return pieces, np.minimum(np.maximum(depth, 2 * _scale_heights(medium, low, high)), _MOST * _DEEP)
+
+
+def _long_enough(truth: TruthScene, place: Array) -> float:
+    """Return how far behind its foot point from a place an unbounded ray is followed [m]."""
+    if isinstance(truth.medium, HeightMedium):
+        fog = fog_of(truth.medium)
+        bases = [layer.base for layer in fog.layers]
+        heights = np.clip([place @ truth.medium.up, truth.origin @ truth.medium.up, *bases], fog.floor, fog.cap)
+        sigma_t = np.array([fog.density(heights).max()])
+    else:
+        sigma_t = truth.medium.sigma_t
     return float(_NOTHING_LEFT / (_THINNEST * sigma_t[sigma_t > 0].min())) if np.any(sigma_t > 0) else 0.0
 
 

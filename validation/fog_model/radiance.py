@@ -11,9 +11,9 @@ from it (v of unit length, w along the ray) has
 
     r' = |r v - d|,    cos = -(r v - d) . w / r',
 
-and the lengths of its segment change as r'/r, which is right where the medium has no bounds. In a fog whose density
-falls as exp(-z/H), a path of the length s between the heights u H and v H has the optical depth of the length
-s (e^-u - e^-v)/(v - u).
+and the lengths of its segment change as r'/r, which is right where the medium has no bounds. In height fog a path
+counts by its length times the mean density between its ends (`analytic.height_fog`), and one to a directional light by
+the column above over the cosine of the light's height; the extinction is then a factor on that density.
 """
 
 from collections.abc import Callable
@@ -23,6 +23,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.height_fog import HeightFog
+from reference.quadrature.height_fog import fog_of
+from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthScene
 from validation.fog_model.places import AROUND, Places
 from validation.fog_model.view import ScatteringPaths
@@ -38,7 +41,7 @@ _LARGEST = 1e100  # whose square is a number too
 class Fog:
     """Media, lights and laws. Tuples have an entry for each medium, that without bounds first, or for each light."""
 
-    sigma_t: tuple[Colour, ...]  #: extinction [1/m]
+    sigma_t: tuple[Colour, ...]  #: extinction [1/m]; of height fog a factor on its density
     albedo: tuple[Colour, ...]  #: single-scattering albedo [1]
     phase: tuple[float | PhaseLaw | None, ...]  #: g of Henyey and Greenstein's function, or a law; None: the scene's
     intensity: tuple[float, ...]  #: factors on the lights [1]
@@ -58,7 +61,8 @@ class Fog:
     planar: frozenset[str] = frozenset()
     distance_power: float = 2.0  #: the irradiance falls as the distance to this power [1]
     window: Callable[[Array], Array] | None = None  #: factor on the light by the distance from it [m]
-    height: tuple[float, Colour] | None = None  #: H [m] and the unit vector up: density falls from the camera's height
+    height: HeightFog | None = None  #: how the density of the medium without bounds depends on height
+    up: Colour = (0.0, 0.0, 1.0)  #: unit vector along which heights are
 
     def with_entry(self, name: str, number: int, value: Any) -> "Fog":
         """Return the fog with another entry of one of its tuples, such as the `sigma_t` of a medium."""
@@ -80,16 +84,19 @@ class Fog:
 
 def scene_fog(truth: TruthScene) -> Fog:
     """Return the fog as the scene has it."""
-    media = truth.medium, *truth.media
+    media, medium = (truth.medium, *truth.media), truth.medium
+    height, up = (fog_of(medium), colour(medium.up)) if isinstance(medium, HeightMedium) else (None, (0.0, 0.0, 1.0))
     one = (1.0,) * (len(truth.lights) + len(truth.directional) + len(truth.area))
     return Fog(
-        sigma_t=tuple(colour(medium.sigma_t) for medium in media),
+        sigma_t=tuple(colour(each.sigma_t) for each in media) if height is None else ((1.0, 1.0, 1.0),),
         albedo=tuple(colour(medium.albedo) for medium in media),
         phase=tuple(medium.phase.g if medium.phase.name == "hg" else None for medium in media),
         intensity=one,
         airlight=one,
         surface=one,
         moved=((0.0, 0.0, 0.0),) * len(one),
+        height=height,
+        up=up,
     )
 
 
@@ -138,6 +145,10 @@ class FogModel:
         slant = 1.0 if fog.spherical else 1 / (view.truth.direction @ view.axis)
         length = view.length.copy()
         length[:, AROUND] = np.maximum(np.minimum(length[:, AROUND], fog.far * slant) - fog.near * slant, 0.0)
+        if fog.height is not None:
+            origin, rise = view.truth.origin @ fog.up, view.truth.direction @ fog.up
+            end = origin + np.where(rise == 0, 0.0, rise * length[:, AROUND])
+            length[:, AROUND] = fog.height.along(origin, end, length[:, AROUND], rise)
         some = np.any(np.array(fog.sigma_t) > 0, axis=1)
         depth = length[:, some] @ np.array(fog.sigma_t)[some]
         count = np.bincount(view.ray_pixel)
@@ -149,9 +160,9 @@ class FogModel:
         layer = int(places.is_surface)
         direction, pixel = view.truth.direction[places.ray], view.ray_pixel[places.ray]
         slant = 1 / (direction @ view.axis)
-        r, cosine, light = places.r, places.cosine, places.light
+        r, cosine, light, away = places.r, places.cosine, places.light, places.towards * places.r[:, None]
         if any(fog.moved[number]):
-            away = places.towards * r[:, None] - np.array(fog.moved[number])
+            away = away - np.array(fog.moved[number])
             r = np.linalg.norm(away, axis=1)
             cosine = -np.sum(away * direction, axis=1) / r if len(cosine) else cosine
             light = light * (r / places.r)[:, None]
@@ -160,14 +171,13 @@ class FogModel:
             strength = strength * places.r**2
         else:
             strength = strength * places.value[:, 0] / (4 * np.pi * (slant if "steps" in fog.planar else 1.0))
-        camera = self._camera_lengths(places, fog, slant)
+        camera, log_density = self._camera_lengths(places, fog, slant), np.zeros(len(places.r))
         if fog.height is not None:
-            camera, light, density = self._falling(places, fog.height, camera, light, direction)
-            strength = strength * (1.0 if places.is_surface else density)
+            camera, light, log_density = self._by_height(places, fog, number, camera, light, away)
         total, sigma_t, count = np.zeros((len(view.pixels), 3)), np.array(fog.sigma_t), len(view.pixels)
         for channels in _alike(fog):
             depth = (fog.camera_leg[layer] * camera + fog.light_leg[layer] * light) @ sigma_t[:, channels[0]]
-            left = strength * np.exp(-depth)
+            left = strength * np.exp(np.nan_to_num(log_density - depth, nan=-np.inf, neginf=-np.inf))
             if places.is_surface:
                 for channel in channels:
                     total[:, channel] = np.bincount(pixel, left * places.value[:, channel], count)
@@ -190,17 +200,24 @@ class FogModel:
             camera[:, AROUND] = np.maximum(around, 0.0)
         return camera
 
-    def _falling(
-        self, places: Places, height: tuple[float, Colour], camera: Array, light: Array, direction: Array
+    def _by_height(
+        self, places: Places, fog: Fog, number: int, camera: Array, light: Array, away: Array
     ) -> tuple[Array, Array, Array]:
-        """Return the lengths in a fog whose density falls with height, as lengths of the same optical depth."""
-        scale, up = height[0], np.array(height[1])
-        here = places.x * (direction @ up) / scale
-        there = here - places.r * (places.towards @ up) / scale
-        camera, light = camera.copy(), light.copy()
-        camera[:, AROUND] *= _mean_density(0 * here, here)
-        light[:, AROUND] *= _mean_density(there, here)
-        return camera, light, np.exp(-np.clip(here, -300, 300))
+        """Return lengths that in a density of 1 have the depths of height fog, and the logarithm of its density.
+
+        `away` is from the light to the places, (n, 3) [m]. Surfaces scatter by no density.
+        """
+        truth, density = self.paths.view.truth, fog.height
+        assert density is not None
+        origin = truth.origin @ fog.up
+        z = origin + places.x * (truth.direction[places.ray] @ fog.up)
+        camera, light, sun = camera.copy(), light.copy(), number - len(truth.lights)
+        camera[:, AROUND] = density.optical_depth(origin, z, camera[:, AROUND])
+        if 0 <= sun < len(truth.directional):
+            light[:, AROUND] = density.column(z) / max(float(-truth.directional[sun].direction @ fog.up), 1e-300)
+        else:
+            light[:, AROUND] = density.optical_depth(z - away @ fog.up, z, light[:, AROUND])
+        return camera, light, np.zeros_like(z) if places.is_surface else density.log_density(z)
 
     def _phase(self, places: Places, number: int, medium: int, fog: Fog, cosine: Array) -> Array:
         law = fog.phase[medium]
@@ -227,11 +244,3 @@ def _alike(fog: Fog) -> list[list[int]]:
     for channel in range(3):
         groups.setdefault(tuple(colours[channel] for colours in fog.sigma_t), []).append(channel)
     return list(groups.values())
-
-
-def _mean_density(low: Array, high: Array) -> Array:
-    """Return the mean of e^-z between two heights."""
-    low, high = np.clip(low, -300, 300), np.clip(high, -300, 300)
-    apart = high - low
-    safe = np.where(np.abs(apart) < 1e-9, 1.0, apart)
-    return np.exp(-low) * np.where(np.abs(apart) < 1e-9, 1.0, -np.expm1(-safe) / safe)

@@ -21,7 +21,8 @@ from reference.scene.area_light import TruthAreaLight, is_area
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from reference.scene.device import as_rows, vectors
 from reference.scene.directional_light import DirectionalLight, is_directional
-from reference.scene.read import TruthLight, TruthMedium, TruthScene, homogeneous_around
+from reference.scene.height_fog import HeightMedium
+from reference.scene.read import TruthLight, TruthMedium, TruthScene
 from reference.scene.shapes import read_shapes
 from reference.visibility.before_light import before_light
 from reference.visibility.exact_distance import exact_distance
@@ -172,7 +173,7 @@ class ScatteringPaths:
     """All paths of some pixels of an image."""
 
     view: View
-    media: tuple[TruthMedium, ...]  #: that without bounds first
+    media: tuple[TruthMedium | HeightMedium, ...]  #: that without bounds first
     lights: tuple[LightPaths, ...]
 
 
@@ -215,7 +216,8 @@ def scattering_paths(
         nodes, lit = [no_places(len(truth.media) + 1, surface=False)], [no_places(len(truth.media) + 1, surface=True)]
         for given in source.lights:
             light = _whole_within(given, blend) if blend else given
-            if airlight and not (isinstance(light, DirectionalLight) and not truth.media):  # which scatters nowhere
+            nowhere = not truth.media and not isinstance(truth.medium, HeightMedium)  # directional light scatters
+            if airlight and not (isinstance(light, DirectionalLight) and nowhere):
                 reach = view.reach(light, shadows=shadows, area=source.area)
                 make: Any = parallel_nodes if isinstance(light, DirectionalLight) else point_nodes
                 nodes.append(_edged(make(truth, light, reach, ends), light, source, blend))
@@ -226,7 +228,7 @@ def scattering_paths(
         paths.append(LightPaths(source.name, np.asarray(source.intensity), Places.joined(nodes), Places.joined(lit)))
         if progress is not None:
             progress((number + 1) / len(sources), "lit intervals")
-    return ScatteringPaths(view, (homogeneous_around(truth), *truth.media), tuple(paths))
+    return ScatteringPaths(view, (truth.medium, *truth.media), tuple(paths))
 
 
 @dataclass(frozen=True)

@@ -22,33 +22,37 @@ SIZE = (64, 48)
 
 
 @pytest.fixture(scope="module")
-def engine(variant, tmp_path_factory):
-    """The scene that the renderer shows, and its light, which all images share."""
-    path = tmp_path_factory.mktemp("engine") / "scene.xml"
-    path.write_text(numpy_faults.scene_xml(numpy_faults.RIGHT))
-    loaded = load_scene(str(path), SIZE)
-    return loaded, SceneLight(read_truth(loaded.scene))
+def scenes(variant, tmp_path_factory):
+    """By what is right, the scene that the renderer shows, and its light, which all images share."""
+
+    def scene(engine):
+        path = tmp_path_factory.mktemp("engine") / "scene.xml"
+        path.write_text(numpy_faults.scene_xml(engine))
+        loaded = load_scene(str(path), SIZE)
+        return loaded, SceneLight(read_truth(loaded.scene))
+
+    return {engine: scene(engine) for engine in (numpy_faults.RIGHT, numpy_faults.LAYERED)}
 
 
-def named(engine, number, noise=0.01):
-    planted, _, given = numpy_faults.FAULTS[number]
-    loaded, light = engine
-    image = numpy_faults.rendered(replace(numpy_faults.RIGHT, **given), area=False, noise=noise, seed=number)
+def named(scenes, number, noise=0.01):
+    engine, planted, _, given = numpy_faults.CASES[number]
+    loaded, light = scenes[engine]
+    image = numpy_faults.rendered(replace(engine, **given), area=False, noise=noise, seed=number)
     return planted, diagnose_image(Image({"total": image}), loaded, light=light)
 
 
 @pytest.mark.slow
 @pytest.mark.claim("diagnosis-engines")
-@pytest.mark.parametrize("number", range(len(numpy_faults.FAULTS)))
-def test_what_is_set_wrong_in_an_engine_is_named_or_placed(engine, number):
-    planted, said = named(engine, number)
+@pytest.mark.parametrize("number", range(len(numpy_faults.CASES)))
+def test_what_is_set_wrong_in_an_engine_is_named_or_placed(scenes, number):
+    planted, said = named(scenes, number)
     assert said.first == planted, [row.words for row in said.ranked]
     assert said.place == "" or planted == "unexplained"
 
 
 @pytest.mark.claim("diagnosis-engines")
-def test_the_fog_alone_is_too_bright(engine):
-    planted, said = named(engine, 2)
+def test_the_fog_alone_is_too_bright(scenes):
+    planted, said = named(scenes, 2)
     assert said.first == planted == "fog-factor"
     assert said.ranked[0].parameter == pytest.approx(8.3, rel=1e-2)
     assert said.rest.startswith("noise")

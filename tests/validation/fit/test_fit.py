@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight compare --fit`: what explains an image, how sure that is, and what no image can tell."""
 
+import importlib
 import re
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,6 +31,7 @@ from validation.fog_model.radiance import scene_fog
 from validation.scenes.loading import load_scene
 
 SIZE = (48, 36)
+TOOLS = Path(__file__).resolve().parents[3] / "docs/tools"
 
 
 def scene_file(tmp_path, *, sigma_t="0.31", albedo="0.83", g="0.4", lights=1, position="0.7, 0.3, 1.9"):
@@ -76,6 +80,28 @@ def test_another_fog_is_found_from_any_start(variant, tmp_path, start):
     assert fit.confounded == ()
     assert fit.residual < 1e-5
     assert fit.explained > 0.999999
+
+
+@pytest.mark.claim("fit-height-fog")
+def test_heights_of_a_layer_are_found_in_an_image_by_other_code(variant, tmp_path):
+    """NumPy makes the image: no code of it is the fog model's."""
+    sys.path.insert(0, str(TOOLS))
+    numpy_faults = importlib.import_module("numpy_faults")
+    sys.path.remove(str(TOOLS))
+    scene, wanted = tmp_path / "scene.xml", replace(numpy_faults.LAYERED, layer=(0.2, 0.83), sigma_t=0.47)
+    scene.write_text(numpy_faults.scene_xml(numpy_faults.LAYERED))
+    image = Image({"total": numpy_faults.rendered(wanted, area=False, noise=0.003, seed=3)})
+    fit = fit_image(image, load_scene(str(scene), (64, 48)), ["sigma_1", "H_1", "albedo"], pixel="centre")
+    values = {each.name: each for each in fit.parameters}
+    # 96 steps a ray and 16 parts of a path err by some 1e-3; the noise is 3e-3 in each of 3072 pixels.
+    assert values["sigma_1"].value == pytest.approx(0.47, rel=5e-3)
+    assert values["H_1"].value == pytest.approx(0.83, rel=5e-3)
+    assert fit.explained > 0.999
+    # A layer has three numbers and is two: what its base does, its extinction does too.
+    both = fit_image(image, load_scene(str(scene), (64, 48)), ["sigma_1", "z_1"], pixel="centre")
+    assert both.confounded[0].parameters == ("sigma_1", "z_1")
+    with pytest.raises(InputError, match="wanted some of sigma_1, z_1, H_1, sigma_0, albedo"):
+        fit_image(image, load_scene(str(scene), (64, 48)), ["sigma_t"], pixel="centre")
 
 
 @pytest.mark.slow
@@ -199,6 +225,7 @@ def test_groups_of_dependent_columns():
         ([], {}, "wanted some of sigma_t"),
         (["sigma"], {}, "did you mean 'sigma_t'"),
         (["sigma_t"], {"starts": {"albedo": 0.5}}, "is not looked for"),
+        (["H_1"], {}, "the scene has no height fog"),
         (["sigma_t"], {"starts": {"sigma_t": -1.0}}, "a number above 0"),
         (["sigma_t"], {"mask": np.ones((3, 4))}, "the mask is 4 x 3 pixels"),
     ],
