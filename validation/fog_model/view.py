@@ -24,6 +24,7 @@ from reference.scene.directional_light import DirectionalLight, is_directional
 from reference.scene.height_fog import HeightMedium
 from reference.scene.read import TruthLight, TruthMedium, TruthScene
 from reference.scene.shapes import read_shapes
+from reference.scene.varying import VaryingMedium
 from reference.visibility.before_light import before_light
 from reference.visibility.exact_distance import exact_distance
 from validation.fog_model.places import Places, lengths, no_places, parallel_nodes, point_nodes, surface_points
@@ -173,7 +174,7 @@ class ScatteringPaths:
     """All paths of some pixels of an image."""
 
     view: View
-    media: tuple[TruthMedium | HeightMedium, ...]  #: that without bounds first
+    media: tuple[TruthMedium | VaryingMedium, ...]  #: that without bounds first
     lights: tuple[LightPaths, ...]
 
 
