@@ -13,7 +13,8 @@ Read in this order:
 - `kernels/`: errors, cost, convergence and stability of airlight kernels;
 - `papers/`: the claims of papers as data, and the experiments that decide them;
 - `slab/`: a slab by order of scattering, on both sides;
-- `comparison/`: images from files and engines against the truth.
+- `comparison/`: images from files and engines against the truth;
+- `motion/`: sequences of frames against the reference of each: flicker, lag, ghosts.
 
 `baselines/` holds what `bench --scaling` measured once.
 """

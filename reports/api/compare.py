@@ -25,7 +25,7 @@ from reports.api.inputs import (
 
 if TYPE_CHECKING:
     from reference.storage.exr import Image
-    from reports.api.comparisons import Diagnosed, Fitted, ImageComparison, SceneComparison
+    from reports.api.comparisons import Diagnosed, Fitted, FramesComparison, ImageComparison, SceneComparison
 
 _ENDINGS = (".exr", ".png")
 
@@ -44,9 +44,10 @@ def compare(
     all_metrics: bool = False,
     diagnose: bool = False,
     fit: Words | None = None,
+    frames: str | os.PathLike[str] | None = None,
     output: Files = (),
     progress: Progress = None,
-) -> "ImageComparison | SceneComparison | Diagnosed | Fitted":
+) -> "ImageComparison | SceneComparison | Diagnosed | Fitted | FramesComparison":
     """Compare an image with another, or with the reference of a scene.
 
     The result has the bias and quantiles of the error, and statistics if there are standard errors. With a scene it
@@ -56,7 +57,8 @@ def compare(
 
     `--diagnose` predicts the image that each of a hundred faults would make, of medium, lights, camera and encoding,
     and ranks them by evidence. `--fit` finds the parameters of the fog that explain the image, each with its 95 %
-    interval. See docs/your-engine.md.
+    interval. `--frames` compares all frames of a scene that changes with the reference of each: flicker, lag, ghosts.
+    See docs/your-engine.md.
 
     Parameters
     ----------
@@ -64,7 +66,8 @@ def compare(
         What to compare with: an EXR file, or a scene (built-in or a Mitsuba XML file); from Python also what
         `reference` or `render` returned, or an array (height, width, 3) [W/(m^2 sr)].
     test
-        The image to judge, an EXR file; from Python also a result or an array.
+        The image to judge, an EXR file; from Python also a result or an array. With `--frames`, the files of all
+        frames, with # for each digit of their number, such as frames/####.exr.
     layer
         Layer to compare: 'airlight' by default, or 'total' (R/G/B) if there is no airlight.
     holds
@@ -86,6 +89,8 @@ def compare(
         With a scene: which parameters to fit, such as sigma_t,albedo (each also with .r, .g or .b), phase.g, intensity,
         exposure, light.x, light.y, light.z; sigma_t:NAME for one medium or light. sigma_t=0.1 starts the fit at
         that value; without a value it starts at the scene's.
+    frames
+        With a scene: the file frames.json that says what each frame shows.
     output
         Write the difference: a .png file shows the signed relative error of each pixel in false colours, an .exr file
         has the values.
@@ -115,7 +120,7 @@ def compare(
     scene = reference if _is_scene(reference) else None
     if scene is None and _is_scene(test) and not Path(str(test)).is_file():
         raise InputError(f"compare: the scene stands first: airlight compare {test!s} {reference!s}")
-    own = {"holds": holds, "pixel": pixel, "diagnose": diagnose or None, "fit": fit}
+    own = {"holds": holds, "pixel": pixel, "diagnose": diagnose or None, "fit": fit, "frames": frames}
     for name, value in own.items():
         if value is not None and scene is None:
             raise InputError(f"{name}: goes with a scene in the place of the reference; two images are what they are")
@@ -124,6 +129,14 @@ def compare(
     given = [name for name, value in about.items() if value is not None]
     if diagnose and fit is not None:
         raise InputError("diagnose, fit: are two questions; give one of them")
+    if frames is not None:
+        single: dict[str, Any] = about | {"mask": mask, "diagnose": diagnose or None, "fit": fit}
+        others = [name for name, value in single.items() if value is not None and name != "margin"]
+        if others:
+            raise InputError(f"frames: {', '.join(others)} is about one image; leave one out")
+        return _frames(
+            str(scene), test, frames, layer=layer, holds=holds, pixel=pixel, margin=margin, progress=progress
+        )
     if (diagnose or fit is not None) and given:
         asked = "fit" if fit is not None else "diagnose"
         raise InputError(f"{asked}: {', '.join(given)} is about a comparison; leave one out")
@@ -155,6 +168,21 @@ def compare(
         if diagnose:
             return _diagnose(str(scene), path, progress=progress, **how)
         return _with_scene(str(scene), path, files=files, progress=progress, **how, **options)
+
+
+def _frames(scene: str, test: Any, frames: Any, *, progress: Any, **how: Any) -> "FramesComparison":
+    if not isinstance(test, str | os.PathLike):
+        raise InputError("frames: wanted the files of all frames, such as 'frames/####.exr'; save the images first")
+    from reports.api.comparisons import FramesComparison
+    from reports.machine.environment import activate
+    from validation.motion.frames_file import frame_paths, read_frames
+
+    frame_paths(test, read_frames(frames), str(frames))  # what is missing is refused before Mitsuba starts
+    activate()
+    from validation.motion.judge import compare_frames
+
+    with telling(progress, "frames") as tell:
+        return FramesComparison(compare_frames(scene, test, frames, progress=tell, **how))
 
 
 def _is_scene(word: Any) -> bool:

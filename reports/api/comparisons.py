@@ -30,6 +30,7 @@ from validation.engine.diagnose import Diagnosis
 from validation.engine.judge import EngineComparison
 from validation.fit.fit import Fit
 from validation.metrics.errors import FLOOR, Metrics, colours
+from validation.motion.judge import MotionComparison
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -236,6 +237,32 @@ class Fitted(Result):
     def passed(self) -> bool:
         """Whether all pixels of the image are finite."""
         return not self.fit.failures
+
+
+@dataclass(frozen=True, repr=False)
+class FramesComparison(Result):
+    """How far the frames of a scene that changes are from the reference of each."""
+
+    compared: MotionComparison
+
+    @property
+    def title(self) -> str:
+        """What was compared."""
+        return f"{self.compared.pattern} against {self.compared.scene}: {self.compared.verdict.words}"
+
+    @property
+    def passed(self) -> bool:
+        """Whether all values are finite, and the bias within the margin."""
+        return not self.compared.failures
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The numbers, a line for each group."""
+        return self.compared.lines()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `airlight compare SCENE FILES --frames FILE --json` prints."""
+        return self.compared.to_json()
 
 
 def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None) -> str:

@@ -114,7 +114,8 @@ def render(
     samples
         Camera rays per pixel. More than one gives a picture without aliasing; errors are measured at pixel centres.
     frames
-        Render an animation with this many frames, as NAME-0001.exr and so on.
+        Render an animation with this many frames, as NAME-0001.exr and so on. NAME.json says what changes in them, for
+        `compare --frames`, where lights, colours or a homogeneous medium do.
     animate
         What moves: light, objects, medium, colour, or several with commas; the scene's animation by default.
     output
@@ -293,7 +294,7 @@ def _animation(asked: _Asked, files: list[Path], frames: int, moves: str | None,
     from reports.api.results import Animation, write_image
     from reports.machine.environment import activate
     from reports.plotting.pictures import tone_curve
-    from validation.scenes.animation import animate, moved_parts, parse_moves
+    from validation.scenes.animation import animate, frame_changes, moved_parts, parse_moves
     from validation.study.frame_times import timed_image
     from validation.study.run import layered_frame
 
@@ -304,6 +305,7 @@ def _animation(asked: _Asked, files: list[Path], frames: int, moves: str | None,
     animation = loaded.animation if moved_by is None else replace(loaded.animation, moves=moved_by)
     _warnings(renderer)
     costs: list[tuple[float, float]] = []
+    changes_by_frame: list[dict[str, tuple[float, ...]] | None] = []
     kept = curve = None  # all frames share the tone curve of the first, so that a light that fades looks it
     start = time.perf_counter()
     with telling(progress, f"{loaded.name}: {frames} frames") as tell:
@@ -311,12 +313,19 @@ def _animation(asked: _Asked, files: list[Path], frames: int, moves: str | None,
             to_move = 1e3 * (time.perf_counter() - start)
             frame, kept, to_render = timed_image(renderer, moved, kept, **moved_parts(animation))
             costs.append((to_move, to_render))
+            changes_by_frame.append(frame_changes(moved, animation))
             curve = curve or tone_curve(frame.airlight + frame.surface)
             for path in files:
                 write_image(_numbered(path, number, frames), layered_frame(loaded.name, chosen, frame), curve)
             del frame  # the next one needs its room
             tell(number / frames, f"frame {number} of {frames}")
             start = time.perf_counter()
+    about = [
+        written
+        for path in files
+        if path.suffix.lower() == ".exr"
+        for written in _write_frames(path, loaded.name, frames, changes_by_frame)
+    ]
     moving, rendering = (float(value) for value in np.median(np.array(costs[1:] or costs), axis=0))
     return Animation(
         scene=loaded.name,
@@ -328,8 +337,24 @@ def _animation(asked: _Asked, files: list[Path], frames: int, moves: str | None,
         render_ms=rendering,
         recordings={stage: getattr(getattr(renderer.stages, stage), "n_recordings", 0) for stage in _STAGES},
         device=variant,
-        files=tuple(str(_numbered(path, number, frames)) for path in files for number in range(1, frames + 1)),
+        files=(*(str(_numbered(path, number, frames)) for path in files for number in range(1, frames + 1)), *about),
     )
+
+
+def _write_frames(
+    path: Path, scene: str, frames: int, changes: list[dict[str, tuple[float, ...]] | None]
+) -> tuple[str, ...]:
+    """Write NAME.json beside the frames NAME-0001.exr, which `compare --frames` reads, where changes have names."""
+    from reference.storage.files import write_text
+    from validation.motion.frames_file import FramesRecord
+
+    named = [each for each in changes if each is not None]
+    if len(named) < max(frames, 2):
+        return ()
+    by_name = {name: tuple(each[name] for each in named) for name in named[0]}
+    record = FramesRecord(frames, scene=scene, pixel="centre", layer="airlight", changes=by_name)
+    write_text(path.with_suffix(".json"), record.text() + "\n")
+    return (str(path.with_suffix(".json")),)
 
 
 def _numbered(path: Path, number: int, frames: int) -> Path:

@@ -369,7 +369,8 @@ class Animation(Result):
         for ending in dict.fromkeys(Path(path).suffix for path in self.files):
             files = [path for path in self.files if path.endswith(ending)]
             size = " x ".join(map(str, self.size))
-            lines.append(f"wrote {files[0]} to {files[-1]}: {len(files)} files, {size} pixels")
+            pixels = f"{files[0]} to {files[-1]}: {len(files)} files, {size} pixels"
+            lines.append(f"wrote {f'{files[0]}: what changes' if ending == '.json' else pixels}")
         return lines
 
 

@@ -15,6 +15,7 @@ the first frame.
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ from realtime.scene.animate import (
     turned_objects,
     with_area_lights,
 )
+from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.mesh_adjacency import read_casters
 from realtime.scene.read_scene import Scene
 from validation.scenes.meshes import rotation
@@ -68,6 +70,28 @@ def animate(scene: Scene, animation: Animation, frames: int) -> Iterator[Scene]:
     step = _step(scene, animation)
     for number in range(frames):
         yield step(number / frames)
+
+
+def frame_changes(moved: Scene, animation: Animation) -> dict[str, tuple[float, ...]] | None:
+    """Return what a frame changes in its scene, by the names of `validation.scenes.changes`.
+
+    None where these names cannot say it: objects that turn, lights with extent, media that are not the same everywhere.
+    """
+    moves = set(animation.moves)
+    homogeneous = moved.medium if isinstance(moved.medium, Homogeneous) else None
+    if "objects" in moves or moved.area_lights or ("medium" in moves and homogeneous is None):
+        return None
+    changes: dict[str, Any] = {}
+    for number, light in enumerate(moved.lights, 1):
+        prefix = "light" if number == 1 else f"light-{number}"
+        if "light" in moves:
+            changes |= {f"{prefix}.position": light.position} if light.w else {}
+            changes |= {} if light.exact_axis is None else {f"{prefix}.direction": light.exact_axis}
+        if "colour" in moves:
+            changes[f"{prefix}.{'intensity' if light.w else 'irradiance'}"] = light.intensity
+    if homogeneous is not None and "medium" in moves:
+        changes["medium.sigma_t"] = [float(own[0]) for own in homogeneous.sigma_t]
+    return {name: tuple(np.array(value, dtype=np.float64).ravel().tolist()) for name, value in changes.items()}
 
 
 def _step(scene: Scene, animation: Animation) -> Callable[[float], Scene]:

@@ -24,6 +24,7 @@ def test_frames_are_numbered_files_that_differ_and_begin_as_the_scene_stands(var
     run("open-fog", *SMALL, "--frames", "3", "-o", str(output), "-o", str(preview), "--json")
     printed = json.loads(capfd.readouterr().out)
     names = [f"fog-000{number}.{kind}" for kind in ("exr", "png") for number in (1, 2, 3)]
+    names += ["fog.json"]
     assert sorted(path.name for path in tmp_path.iterdir() if path.is_file()) == sorted(names)
     assert [path.rsplit("/", 1)[-1] for path in printed["files"]] == names
     assert printed["moves"] == ["light"]

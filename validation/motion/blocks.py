@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Regressions over many frames whose standard errors hold for pixels that are correlated in place and time.
+
+The pixels of a block, with all their frames, are left out in turn (a jackknife): no independence is assumed within a
+block. What a regression needs of a block is the matrix of the products of its columns, so frames are read one by one
+and only these matrices are kept. Blocks are collected in at most `GROUPS` groups, neighbours in different ones.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+BLOCK = 8  #: side of a block [pixels]
+GROUPS = 100  #: their scatter gives a standard error to 7 %
+_SINGULAR = 1e-10  # of the product of its own terms, below which the determinant of a correlation says nothing
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number and its standard error; None where the frames do not tell it."""
+
+    value: float | None
+    error: float | None = None
+
+    def above(self, errors: float) -> bool:
+        """Return whether the number is above zero by so many standard errors."""
+        return self.value is not None and self.error is not None and self.value > errors * self.error
+
+
+UNKNOWN = Estimate(None)
+
+
+def products(columns: Array, side: int = BLOCK) -> Array:
+    """Return the sums of the products of columns by group of blocks, (groups, columns, columns).
+
+    `columns`: (columns, height, width, channels); `side`: of a block [elements of an image].
+    """
+    count, height, width, channels = columns.shape
+    rows, across = -(-height // side), -(-width // side)
+    groups = min(GROUPS, rows * across)
+    sums = np.zeros((-(-rows * across // groups) * groups, count, count))
+    padded = np.zeros((count, side, across * side, channels), columns.dtype)
+    for row in range(rows):
+        strip = columns[:, row * side : (row + 1) * side]
+        padded[:, strip.shape[1] :] = 0
+        padded[:, : strip.shape[1], :width] = strip
+        blocks = padded.reshape(count, side, across, side * channels).transpose(2, 0, 1, 3).reshape(across, count, -1)
+        sums[row * across : (row + 1) * across] = blocks @ blocks.transpose(0, 2, 1)
+    return sums.reshape(-1, groups, count, count).sum(axis=0)
+
+
+def regression(sums: Array) -> tuple[Estimate, ...]:
+    """Return the coefficients of the last column on the others; unknown where the columns do not tell them apart."""
+    total = sums.sum(axis=0)
+    unknowns = len(total) - 1
+    if not _told_apart(total[:-1, :-1]):
+        return (UNKNOWN,) * unknowns
+    found = np.linalg.solve(total[:-1, :-1], total[:-1, -1])
+    left = total - sums[[_told_apart(each) for each in (total - sums)[:, :-1, :-1]]]
+    return estimates(found, np.linalg.solve(left[:, :-1, :-1], left[:, :-1, -1:])[..., 0])
+
+
+def relative_mean(sums: Array, value: int, *, to: int, counted: int = 0) -> Estimate:
+    """Return the mean of a column over that of another; column `counted` is one where a value counts, else zero."""
+    several = _left_out(sums)
+    lower = several[:, counted, to]
+    return _relative(several[:, counted, value], lower)
+
+
+def relative_root(sums: Array, value: int, *, to: int, counted: int = 0, values: int = 0) -> Estimate:
+    """Return the root mean square of a column, counted by column `values`, over the mean of another."""
+    several = _left_out(sums)
+    square = several[:, value, value] / np.maximum(several[:, values, values], 1e-300)
+    return _relative(np.sqrt(square) * several[:, counted, counted], several[:, counted, to])
+
+
+def _left_out(sums: Array) -> Array:
+    """Return the products of all pixels, then those without each group."""
+    total = sums.sum(axis=0)
+    return np.concatenate([total[None], total - sums])
+
+
+def _relative(upper: Array, lower: Array) -> Estimate:
+    if not (lower > 0).all():
+        return UNKNOWN
+    values = upper / lower
+    return estimates(values[:1], values[1:, None])[0]
+
+
+def estimates(found: Array, left_out: Array) -> tuple[Estimate, ...]:
+    """Return numbers with the standard errors of the jackknife, from those without each group, (groups, numbers)."""
+    groups = len(left_out)
+    if groups < 2:
+        return tuple(Estimate(float(value)) for value in found)
+    spread = ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0)
+    errors = np.sqrt(spread * (groups - 1) / groups)
+    return tuple(Estimate(float(value), float(error)) for value, error in zip(found, errors, strict=True))
+
+
+def _told_apart(matrix: Array) -> bool:
+    scale = np.sqrt(np.diag(matrix))
+    return bool((scale > 0).all()) and bool(np.linalg.det(matrix / np.outer(scale, scale)) > _SINGULAR)

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The file `frames.json`: what each frame of a renderer shows, and which of its files has it.
+
+```json
+{"schema": "airlight-frames/1", "scene": "hall", "first": 1, "frames": 2, "fps": 60, "exposure": 0,
+ "layer": "airlight", "pixel": "centre", "resets": [0], "changes": {"light.position": [[0.1, 2, 3.1], [0.1, 2.1, 3.1]]}}
+```
+
+`first`: number of the file that shows frame 0; `exposure`: stops, one number or a list: values are divided by
+2^stops; `resets`: frames with which a history begins; `changes`: a list by frame for each name of `--change`.
+"""
+
+import json
+import math
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from analytic.errors import InputError, nearest
+
+SCHEMA = "airlight-frames/1"
+_MARK = "#"
+
+
+@dataclass(frozen=True)
+class FramesRecord:
+    """What the frames of a sequence show."""
+
+    frames: int
+    scene: str | None = None
+    first: int = 1
+    fps: float | None = None
+    exposure: float | tuple[float, ...] = 0.0  #: [stops]
+    layer: str | None = None
+    pixel: str | None = None
+    resets: tuple[int, ...] = (0,)
+    changes: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
+
+    def stops(self, frame: int) -> float:
+        """Return the exposure of a frame [stops]."""
+        return self.exposure[frame] if isinstance(self.exposure, tuple) else self.exposure
+
+    def changes_of(self, frame: int) -> dict[str, tuple[float, ...]]:
+        """Return the changes of the scene in a frame, by name."""
+        return {name: values[frame] for name, values in self.changes.items()}
+
+    def text(self) -> str:
+        """Return the file."""
+        return json.dumps({"schema": SCHEMA} | {k: v for k, v in asdict(self).items() if v is not None})
+
+
+def read_frames(path: str | os.PathLike[str]) -> FramesRecord:
+    """Read `frames.json`.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, has a key that is not known or a value of another kind, or lists of other lengths than
+        there are frames.
+    """
+    try:
+        given = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot be read as JSON: {reason}; see docs/your-engine.md for an example") from error
+    if not isinstance(given, dict) or given.pop("schema", SCHEMA) != SCHEMA:
+        raise InputError(f'{path}: wanted an object with "schema": "{SCHEMA}"')
+    for name in ("jitter", "objects"):
+        if given.pop(name, None):
+            raise InputError(
+                f"{path}: {name} is not followed; wanted frames without it"
+                + (', or averaged frames with "pixel": "area"' if name == "jitter" else "")
+            )
+    for name in given.keys() - _KINDS.keys():
+        raise InputError(f"{path}: got {name!r}, wanted some of {', '.join(_KINDS)}{nearest(name, _KINDS)}")
+    if "frames" not in given:
+        raise InputError(f'{path}: the number of frames is missing; wanted such as "frames": 60')
+    read = {name: _KINDS[name](f"{path}: {name}", value) for name, value in given.items() if value is not None}
+    record = FramesRecord(**read)
+    lists: dict[str, Any] = dict(record.changes)
+    lists |= {"exposure": record.exposure} if isinstance(record.exposure, tuple) else {}
+    for name, values in lists.items():
+        if len(values) != record.frames:
+            raise InputError(f"{path}: {name} has {len(values)} values, wanted one for each of {record.frames} frames")
+    for reset in record.resets:
+        if not 0 <= reset < record.frames:
+            raise InputError(f"{path}: resets has {reset}, wanted frames from 0 to {record.frames - 1}")
+    return record
+
+
+def frame_paths(pattern: str | os.PathLike[str], record: FramesRecord, about: str) -> tuple[Path, ...]:
+    """Return the file of each frame: in the pattern, the signs # stand for the digits of its number.
+
+    `about`: the file that says which frames there are. Raises InputError for a pattern without #, and a frame without
+    a file.
+    """
+    text = str(pattern)
+    start, digits = text.find(_MARK), text.count(_MARK)
+    if not digits or _MARK * digits not in text:
+        raise InputError(
+            f"frames: got {text}, wanted the files of all frames with # for each digit, such as frames/####.exr"
+        )
+    paths = []
+    for frame in range(record.frames):
+        number = record.first + frame
+        paths.append(Path(text[:start] + f"{number:0{digits}d}" + text[start + digits :]))
+        if not paths[-1].is_file():
+            raise InputError(
+                f"frame {frame} has no file: there is no {paths[-1]}; {about} wants {record.frames} frames from number "
+                f"{record.first} on"
+            )
+    return tuple(paths)
+
+
+def _number(what: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InputError(f"{what}: got {value!r}, wanted a finite number")
+    return float(value)
+
+
+def _positive(what: str, value: Any) -> float:
+    if _number(what, value) <= 0:
+        raise InputError(f"{what}: got {value!r}, wanted a number above 0")
+    return float(value)
+
+
+def _whole(what: str, value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise InputError(f"{what}: got {value!r}, wanted a whole number from 0 on")
+    return value
+
+
+def _count(what: str, value: Any) -> int:
+    if _whole(what, value) < 2:
+        raise InputError(f"{what}: got {value!r}, wanted at least 2")
+    return int(value)
+
+
+def _word(what: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"{what}: got {value!r}, wanted a word")
+    return value
+
+
+def _several(kind: Callable[[str, Any], Any]) -> Callable[[str, Any], tuple]:
+    def read(what: str, value: Any) -> tuple:
+        if not isinstance(value, list):
+            raise InputError(f"{what}: got {value!r}, wanted a list")
+        return tuple(kind(f"{what}[{place}]", each) for place, each in enumerate(value))
+
+    return read
+
+
+def _stops(what: str, value: Any) -> float | tuple[float, ...]:
+    return _several(_number)(what, value) if isinstance(value, list) else _number(what, value)
+
+
+def _values(what: str, value: Any) -> tuple[float, ...]:
+    return _several(_number)(what, value) if isinstance(value, list) else (_number(what, value),)
+
+
+def _changes(what: str, value: Any) -> dict[str, tuple[tuple[float, ...], ...]]:
+    if not isinstance(value, dict):
+        raise InputError(f"{what}: got {value!r}, wanted names with a list by frame each")
+    return {name: _several(_values)(f"{what}: {name}", values) for name, values in value.items()}
+
+
+_KINDS: dict[str, Callable[[str, Any], Any]] = {
+    "frames": _count,
+    "scene": _word,
+    "first": _whole,
+    "fps": _positive,
+    "exposure": _stops,
+    "layer": _word,
+    "pixel": _word,
+    "resets": _several(_whole),
+    "changes": _changes,
+}

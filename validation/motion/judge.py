@@ -1,0 +1,404 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Frames that another renderer made of a scene, against the reference of each frame, and what is said of them.
+
+**Masks.** Every measure is taken of all pixels, of those that were disoccluded up to eight frames ago, of the others,
+and of those within a pixel of a lamp. A surface point was disoccluded where it lay outside the frame before, or was
+hidden there: what stood in its pixel was nearer by more than 5 %. Shadows that move are no disocclusion.
+
+**Verdict.** A lag is told where its error is below a quarter of a frame. Frames are late, or early, where only a delay
+is left: nothing persists within four errors, and the delay describes 95 % of what an impulse response does. They lag
+where a lag describes 90 %; what is less is not one lag, and a ghost where light that left is still there by more than
+four errors. Without any of these the error is noise, a factor and an offset.
+"""
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from reference.quadrature.ray_values import TruthImage
+from reference.scene.read import read_truth
+from reference.storage.exr import NOTE, read_exr
+from validation.engine.judge import lamp_distance, relative_bound
+from validation.engine.judged_layer import JudgedLayer, expected_layer, judged_layer
+from validation.engine.seen import PIXELS, Progress, pixel_kinds, scene_of_size
+from validation.estimates.quadrature import truth_image
+from validation.metrics.errors import plain
+from validation.motion.blocks import Estimate
+from validation.motion.frames_file import FramesRecord, frame_paths, read_frames
+from validation.motion.measures import AGES, Measures, Sequence, measure
+from validation.scenes.loading import load_scene
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+_ROUNDING = 1e-6  # relative error of exact frames in files of float32
+_TOLD = 0.25  # largest error of a lag that is told [frames]
+_SURE = 4.0  # errors from which on a number is not zero
+_ONE_LAG, _ONE_DELAY = 0.9, 0.95  # of what an impulse response describes
+_HIDDEN = 0.95  # of the distance of a point: what stood before it by less hid it
+_POP = 3.0  # times the median change of the error
+_RECENT = 8  # frames since a point was disoccluded
+_BESIDE = 1.0  # of a lamp [pixels]
+_BESIDE_LAMP = "beside a lamp"
+
+
+@dataclass(frozen=True)
+class MotionVerdict:
+    """What is said of a sequence."""
+
+    kind: str  #: 'exact', 'noise', 'lag', 'late', 'ghost', 'not one lag' or 'cannot be told'
+    words: str
+
+
+@dataclass(frozen=True)
+class MotionComparison:
+    """Frames of a renderer against the reference of each."""
+
+    scene: str
+    pattern: str
+    size: tuple[int, int]
+    record: FramesRecord
+    layer: JudgedLayer
+    pixel: str
+    reference_error: float  #: of the worst frame, relative to its mean
+    masks: Mapping[str, Measures]  #: 'all' first
+    verdict: MotionVerdict
+    shifts: Mapping[int, float]  #: relative RMSE of frames against the reference so many frames before
+    margin: float | None
+    notes: tuple[str, ...]
+
+    @property
+    def measures(self) -> Measures:
+        """Those of all pixels."""
+        return self.masks["all"]
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """Why the comparison must be called failed; empty if it is not."""
+        reasons = []
+        if self.measures.nonfinite:
+            reasons.append(f"{self.measures.nonfinite} values are NaN or infinite")
+        bias = self.measures.bias
+        if self.margin is not None and bias.value is not None:
+            most = abs(bias.value) + 2 * (bias.error or 0.0)
+            if most > self.margin:
+                reasons.append(f"the relative bias is not shown to be within +-{self.margin:.3g}")
+        return tuple(reasons)
+
+    def lines(self) -> list[str]:
+        """Return the numbers as text, a line for each group."""
+        found, lag = self.measures, self.measures.lag
+        width, height = self.size
+        lines = [
+            f"scene            {self.scene}, {width} x {height}, {self.record.frames} frames; reference: "
+            f"{self.layer.holds}, pixel {self.pixel}, known to {self.reference_error:.2g} of its mean",
+            f"values           {found.values}, {found.nonfinite} not finite; the reference changes by "
+            f"{_percent(found.reference_change)} a frame",
+            f"relative RMSE    {_told(found.relative_rmse, 100)} %, relative bias {_told(found.bias, 100)} %",
+            f"flicker          {_told(found.flicker, 100)} % a frame, {_told(found.flicker_beside_lag, 100)} % beside "
+            "the lag",
+            f"lag              {_told(lag.lag)} frames: delay {_told(lag.delay)}, persistence "
+            f"{_told(lag.persistence)}, gain {_told(lag.gain)}",
+            f"ghost            {_told(found.ghost, 100)} % of the light that left in {AGES} frames"
+            + (
+                ""
+                if found.trail_rmse is None
+                else f"; its trail, {_percent(found.trail_share)} of the values, is {_percent(found.trail_rmse)} off"
+            ),
+        ]
+        if found.pop is not None:
+            words = "a pop" if found.pop >= _POP else "no pop"
+            lines.append(
+                f"largest change   of the error in frame {found.pop_frame}, {found.pop:.3g} times the median: {words}"
+            )
+        if found.convergence is not None:
+            lines.append(f"at rest          within 5 % of the floor after {_frames(found.convergence)}")
+        for name, each in self.masks.items():
+            if name != "all":
+                lines.append(
+                    f"{name:16} {each.values} values: relative RMSE {_told(each.relative_rmse, 100)} %, flicker "
+                    f"{_told(each.flicker, 100)} %, lag {_told(each.lag.lag)}, ghost {_told(each.ghost, 100)} %"
+                )
+        shifts = ", ".join(f"{shift:+d}: {_percent(error)}" for shift, error in self.shifts.items())
+        lines += [f"shifted          {shifts} off the reference so many frames before"] if shifts else []
+        lines += [f"note             {note}" for note in self.notes]
+        lines += [f"failed           {reason}" for reason in self.failures]
+        return [*lines, f"verdict          {self.verdict.words}"]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return every number by name, those of all pixels first."""
+        head = {"scene": self.scene, "files": self.pattern, "size": list(self.size), "frames": self.record.frames}
+        head |= {"layer": self.layer.name, "expected": self.layer.holds, "pixel": self.pixel}
+        head |= {"reference_error": self.reference_error}
+        lag, fps = self.measures.lag.lag.value, self.record.fps
+        numbers: dict[str, Any] = plain(
+            {
+                **head,
+                **self.measures.to_json(),
+                "lag_ms": None if lag is None or fps is None else 1000 * lag / fps,
+                "shifts": {str(shift): error for shift, error in self.shifts.items()},
+                "masks": {name: each.to_json() for name, each in self.masks.items() if name != "all"},
+                "verdict": {"kind": self.verdict.kind, "words": self.verdict.words},
+                "notes": list(self.notes),
+                "failures": list(self.failures),
+            }
+        )
+        return numbers
+
+
+def compare_frames(
+    scene: str,
+    pattern: str | os.PathLike[str],
+    about: str | os.PathLike[str],
+    *,
+    layer: str | None = None,
+    holds: str | None = None,
+    pixel: str | None = None,
+    margin: float | None = None,
+    progress: Progress | None = None,
+) -> MotionComparison:
+    """Compare the frames of a renderer with the references of a scene that changes.
+
+    `pattern`: the EXR files, # for each digit of their numbers; `about`: `frames.json`, see
+    `validation.motion.frames_file`; the rest as of `validation.engine.judge.compare_scene`. Raises InputError for what
+    cannot be read, frames of two sizes, and changes that the scene does not have.
+    """
+    record = read_frames(about)
+    paths = frame_paths(pattern, record, str(about))
+    first = read_exr(paths[0])
+    judged = judged_layer(first, paths[0], name=layer or record.layer, holds=holds)
+    kinds = pixel_kinds(first, pixel or record.pixel)
+    kind = kinds[0]
+    scene_of_size(scene, judged.size, paths[0])
+    frames = _Frames(scene, paths, record, judged, kind)
+    for frame in range(record.frames):
+        if progress is not None:
+            progress(0.8 * frame / record.frames, f"the reference of frame {frame}")
+        frames.check(frame)
+    if progress is not None:
+        progress(0.8, "measures")
+    masks = {name: measured for name in frames.masks if (measured := measure(frames.sequence(name))) is not None}
+    notes: tuple[str, ...] = ()
+    if "all" not in masks:
+        raise InputError(f"{pattern}: the reference of every frame is dark: nothing is relative to it")
+    if len(kinds) > 1:
+        notes += (f'judged at pixel centres: the files do not say; wanted "pixel": {" or ".join(PIXELS)}',)
+    note = str(first.attributes.get(NOTE, ""))
+    repeated = masks["all"].repeated
+    if repeated:
+        notes += (f"frames {_listed(repeated)} repeat the frame before them, though the reference changed",)
+    return MotionComparison(
+        scene=scene,
+        pattern=str(pattern),
+        size=judged.size,
+        record=record,
+        layer=judged,
+        pixel=kind,
+        reference_error=frames.reference_error,
+        masks=masks,
+        verdict=motion_verdict(masks["all"], frames.reference_error),
+        shifts=_shifts(frames.sequence("all")),
+        margin=margin,
+        notes=(*notes, *([f"{paths[0]}: {note}"] if note else [])),
+    )
+
+
+class _Frames:
+    """The frames of a renderer and their references, each read when it is asked for."""
+
+    def __init__(
+        self, scene: str, paths: tuple[Path, ...], record: FramesRecord, judged: JudgedLayer, pixel: str
+    ) -> None:
+        self._scene, self._paths, self._record, self._judged, self._pixel = scene, paths, record, judged, pixel
+        self.reference_error = 0.0
+        self._ages: dict[int, Array] = {}
+        self._image = lru_cache(maxsize=3)(self._image_of)  # by changes: frames at rest are one
+        self._expected = lru_cache(maxsize=20)(lambda key: expected_layer(self._image(key), judged))
+        self._lamps = False
+
+    def check(self, frame: int) -> None:
+        """Compute the reference of a frame; refuse changes that the scene does not have, by the number of the frame."""
+        try:
+            image = self._image(self._key(frame))
+        except InputError as error:
+            raise InputError(f"frame {frame}: {error}") from error
+        self.reference_error = max(self.reference_error, relative_bound(image))
+        self._lamps |= bool(self._selected(frame, _BESIDE_LAMP).any())
+        self._aged(frame)
+
+    @property
+    def masks(self) -> tuple[str, ...]:
+        """Return the masks that some pixel of some frame is in."""
+        moved = any((ages <= _RECENT).any() for ages in self._ages.values())
+        return ("all", *(("disoccluded", "rest") if moved else ()), *((_BESIDE_LAMP,) if self._lamps else ()))
+
+    def sequence(self, mask: str) -> Sequence:
+        """Return the sequence with the pixels of a mask."""
+        return Sequence(
+            self._record.frames,
+            lru_cache(maxsize=2)(self.frame),
+            lambda n: self._expected(self._key(n)),
+            lambda n: self._selected(n, mask),
+            self._record.resets,
+        )
+
+    def frame(self, n: int) -> Array:
+        """Return the layer of a frame that is judged."""
+        image = read_exr(self._paths[n])
+        values = judged_layer(image, self._paths[n], name=self._judged.name, holds=self._judged.holds).values
+        if values.shape != self._judged.values.shape:
+            sizes = [" x ".join(str(side) for side in each.shape[1::-1]) for each in (values, self._judged.values)]
+            raise InputError(f"frame {n}: {self._paths[n]} has {sizes[0]} pixels, the first frame {sizes[1]}")
+        return np.asarray(values, dtype=np.float64) / 2 ** self._record.stops(n)
+
+    def _key(self, frame: int) -> tuple:
+        return tuple(sorted(self._record.changes_of(frame).items()))
+
+    def _loaded(self, key: tuple):
+        return load_scene(self._scene, self._judged.size, dict(key))
+
+    def _image_of(self, key: tuple) -> TruthImage:
+        return truth_image(self._loaded(key).scene, pixel=self._pixel)
+
+    def _selected(self, n: int, mask: str) -> Bools:
+        image = self._image(self._key(n))
+        if mask == _BESIDE_LAMP:
+            return np.asarray(lamp_distance(self._loaded(self._key(n)), image) <= _BESIDE)
+        if mask == "all":
+            return np.ones(image.distance.shape, dtype=bool)
+        recent = self._ages[n] <= _RECENT
+        return np.asarray(recent if mask == "disoccluded" else ~recent)
+
+    def _aged(self, n: int) -> None:
+        """Tell how many frames ago each pixel was disoccluded, infinite for never."""
+        distance = self._image(self._key(n)).distance
+        self._ages[n] = np.full(distance.shape, math.inf, dtype=np.float32)
+        if n == 0 or not any(name.startswith("camera.") for name in self._record.changes):
+            return
+        if self._key(n) == self._key(n - 1):
+            self._ages[n] = self._ages[n - 1] + 1
+            return
+        here, before = (read_truth(self._loaded(self._key(each)).scene) for each in (n, n - 1))
+        there = self._image(self._key(n - 1)).distance
+        far = 1e6 * (1.0 + float(np.abs(here.origin).max()))
+        points = here.origin + np.where(np.isfinite(distance), distance, far).reshape(-1, 1) * here.direction
+        row, column, inside = _pixel_of(before, points)
+        length = np.linalg.norm(points - before.origin, axis=1)
+        hidden = there[row, column] < _HIDDEN * length
+        age = np.where(~inside | hidden, 0.0, self._ages[n - 1][row, column] + 1)
+        self._ages[n] = age.reshape(distance.shape).astype(np.float32)
+
+
+def _pixel_of(truth, points: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Bools]:
+    """Return row and column of the pixels that show points, and whether these lie in the image.
+
+    Rays through pixel centres are affine in row and column before they are scaled: three of them give the map.
+    """
+    rays = truth.direction.reshape(truth.height, truth.width, 3)
+    axis = np.cross(rays[0, -1] - rays[0, 0], rays[-1, 0] - rays[0, 0])
+    axis /= np.linalg.norm(axis)
+    flat = rays / (rays @ axis)[..., None]
+    across = (flat[0, -1] - flat[0, 0]) / max(truth.width - 1, 1)
+    down = (flat[-1, 0] - flat[0, 0]) / max(truth.height - 1, 1)
+    to = points - truth.origin
+    depth = to @ axis
+    ahead = depth > 0
+    offset = to / np.where(ahead, depth, 1.0)[:, None] - flat[0, 0]
+    column = np.rint(offset @ across / (across @ across))
+    row = np.rint(offset @ down / (down @ down))
+    inside = ahead & (column >= 0) & (column < truth.width) & (row >= 0) & (row < truth.height)
+    place = [np.where(inside, each, 0).astype(np.int64) for each in (row, column)]
+    return place[0], place[1], inside
+
+
+def _shifts(sequence: Sequence) -> dict[int, float]:
+    """Return the relative RMSE of frames against the reference so many frames before, of the same frames."""
+    shifts = range(-2, 4)
+    frames = range(max(shifts), sequence.frames + min(shifts))
+    sums, light = dict.fromkeys(shifts, 0.0), 0.0
+    for n in frames:
+        frame = sequence.frame(n)
+        light += float(sequence.reference(n).mean())
+        for shift in shifts:
+            error = frame - sequence.reference(n - shift)
+            sums[shift] += float(np.mean(error[np.isfinite(error)] ** 2))
+    if not light:
+        return {}
+    return {shift: math.sqrt(sums[shift] * len(frames)) / light for shift in shifts}
+
+
+def motion_verdict(measures: Measures, reference_error: float = 0.0) -> MotionVerdict:
+    """Return what measures of a sequence say of it, see the module."""
+    rmse = measures.relative_rmse.value or 0.0
+    if rmse <= max(_ROUNDING, 3 * reference_error):
+        return MotionVerdict("exact", f"exact: relative RMSE {rmse:.2g}")
+    lag, persistence, delay = measures.lag.lag, measures.lag.persistence, measures.lag.delay
+    noise = (measures.flicker_beside_lag.value or 0.0) / math.sqrt(2)
+    if lag.value is None or lag.error is None or lag.error > _TOLD or (delay.error or 0.0) > _TOLD:
+        return MotionVerdict(
+            "cannot be told",
+            f"no lag can be told: the reference changes by {_percent(measures.reference_change)} a frame, the noise is "
+            f"{_percent(noise)}",
+        )
+    assert persistence.value is not None
+    assert delay.value is not None
+    kept = abs(persistence.value) > max(_SURE * (persistence.error or 0.0), _ROUNDING)
+    described = measures.lag.described if measures.lag.described is not None else 1.0
+    if delay.value and not kept and described > _ONE_DELAY:
+        words = "late" if delay.value > 0 else "early"
+        return MotionVerdict("late", f"the frames are {words} by {_frames(abs(delay.value))}")
+    if (kept or delay.value) and described >= _ONE_LAG:
+        constant = measures.lag.time_constant.value
+        after = "" if constant is None else f"; what is missing of a change falls as exp(-n/{constant:.3g})"
+        return MotionVerdict("lag", f"the frames lag by {lag.value:.4g} +- {lag.error:.2g} frames{after}")
+    if measures.ghost.above(_SURE):
+        ages = [each.value or 0.0 for each in measures.ghost_by_age]
+        return MotionVerdict(
+            "ghost",
+            f"a ghost: {_percent(measures.ghost.value or 0.0)} of the light that left a place is still there"
+            + (f"; the impulse response is largest {_oldest(measures)} after it" if ages else ""),
+        )
+    if kept or delay.value:
+        return MotionVerdict(
+            "not one lag",
+            f"not one lag: it describes {_percent(described)} of what the frames keep of earlier ones; see the impulse "
+            "response",
+        )
+    gain = measures.lag.gain
+    factor = ""
+    if gain.value is not None and abs(gain.value - 1) > max(_SURE * (gain.error or 0.0), 1e-5):
+        factor = f", and a factor of {gain.value:.5g}"
+    return MotionVerdict("noise", f"no lag: noise of {_percent(noise)}{factor}")
+
+
+def _told(estimate: Estimate, times: float = 1.0) -> str:
+    if estimate.value is None:
+        return "unknown"
+    error = "" if estimate.error is None else f" +- {times * estimate.error:.2g}"
+    return f"{times * estimate.value:.4g}{error}"
+
+
+def _oldest(measures: Measures) -> str:
+    response = [each.value or 0.0 for each in measures.lag.response]
+    return _frames(1 + int(np.argmax(response[1:]))) if len(response) > 1 else "some frames"
+
+
+def _frames(count: float) -> str:
+    return f"{count:.3g} frame{'' if count == 1 else 's'}"
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.3g} %"
+
+
+def _listed(numbers: tuple[int, ...]) -> str:
+    shown = ", ".join(map(str, numbers[:5]))
+    return shown if len(numbers) <= 5 else f"{shown} and {len(numbers) - 5} more"

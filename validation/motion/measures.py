@@ -1,0 +1,280 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Every measure of a sequence of frames against the reference of each frame.
+
+With r_n the reference of frame n, t_n the frame, e = t - r, and m the mean of r over all values that count:
+
+- relative RMSE: the root mean square of e, over m;
+- relative bias: the mean of e over m. It has an error only where the means of the frames are independent: from an
+  autocorrelation of 3 over the root of their number on they are not, and several runs of the sequence are needed;
+- flicker: the root mean square of e_n - e_(n-1), over m: the change of the reference is out of it. Beside the lag: the
+  same of t - c m - g y, what no lag explains (`validation.motion.lag`);
+- ghost: light that left a place in the last twelve frames is w = max(r_(n-12) .. r_n) - r_n; the share G of it that is
+  still there is a coefficient of e = c m + b r + G w. By age k, w is max(r_(n-k) - r_n, 0);
+- trail: the error where w is above 0.05 m;
+- pop: the largest root mean square of e_n - e_(n-1) of a frame, over the median of all frames;
+- convergence at rest: after how many frames of a history, while the reference does not change, the error is within 5 %
+  of the floor that it reaches.
+
+Pairs of frames across the beginning of a history do not count. A sequence that does not begin with one has frames that
+only start the filter. Values that are not finite are counted, and left out: there the frame is taken for its reference.
+"""
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validation.motion.blocks import UNKNOWN, Estimate, products, regression, relative_root
+from validation.motion.lag import CELL, DARK, Cells, Lag, filtered_frames, fit_lag
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+AGES = 12  #: of light that left [frames]
+STARTING = 16  #: frames that only start the filter of a sequence without a first reset
+_TRAIL = 0.05  # of the mean: light that left, from which on a value belongs to a trail
+_FLOOR = 1.05  # of the error at rest, within which it is reached
+_RESTING = 8  # frames at rest after a reset, of which convergence is told
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """Frames, references and which pixels count, by number from zero; histories begin at the frames `resets`."""
+
+    frames: int
+    frame: Callable[[int], Array]  #: (height, width, 3)
+    reference: Callable[[int], Array]  #: (height, width, 3), finite
+    selected: Callable[[int], Bools]  #: (height, width)
+    resets: tuple[int, ...] = (0,)
+
+    @property
+    def start(self) -> tuple[int, ...]:
+        """The frame with which the history of each frame begins."""
+        return tuple(max(r for r in (0, *self.resets) if r <= n) for n in range(self.frames))
+
+    def counts(self, n: int) -> bool:
+        """Return whether a frame counts, or only starts the filter."""
+        return self.start[n] in self.resets or n >= STARTING
+
+    def pair_counts(self, n: int) -> bool:
+        """Return whether the change from the frame before counts."""
+        return n > 0 and n != self.start[n] and self.counts(n) and self.counts(n - 1)
+
+
+@dataclass(frozen=True)
+class Measures:
+    """What a sequence is like; everything relative is so to the mean of the references."""
+
+    values: int  #: in all frames, that count
+    nonfinite: int  #: values of frames that are NaN or infinite
+    mean: float  #: of the references [W/(m^2 sr)]
+    relative_rmse: Estimate
+    bias: Estimate
+    flicker: Estimate  #: per frame
+    flicker_beside_lag: Estimate  #: per frame
+    reference_change: float  #: root mean square change of the references [per frame]
+    lag: Lag
+    ghost: Estimate
+    ghost_by_age: tuple[Estimate, ...]  #: from one frame on
+    trail_rmse: float | None
+    trail_bias: float | None
+    trail_share: float  #: of the values
+    pop: float | None  #: ratio to the median
+    pop_frame: int | None
+    convergence: int | None  #: frames after a reset; None where the reference moves
+    rmse_by_frame: tuple[float, ...]
+    change_by_frame: tuple[float, ...]  #: of the reference
+    repeated: tuple[int, ...]  #: frames that are the one before, bit by bit, though the reference moved
+
+    def to_json(self) -> dict:
+        """Return every number by name; `NAME_se` is the standard error of NAME, null where it is not known."""
+        found: dict = {}
+        lag = self.lag
+        several = {"lag": lag.lag, "time_constant": lag.time_constant, "gain": lag.gain, "offset": lag.offset}
+        several |= {"persistence": lag.persistence, "delay": lag.delay}
+        several |= {each.name: getattr(self, each.name) for each in fields(self) if each.name != "lag"}
+        for name, value in several.items():
+            if isinstance(value, Estimate):
+                found |= {name: value.value, f"{name}_se": value.error}
+            elif name != "ghost_by_age":
+                found[name] = list(value) if isinstance(value, tuple) else value
+        found["described"] = lag.described
+        for name, values in (("impulse_response", lag.response), ("ghost_by_age", self.ghost_by_age)):
+            found |= {name: [each.value for each in values], f"{name}_se": [each.error for each in values]}
+        return found
+
+
+def measure(sequence: Sequence) -> Measures | None:
+    """Return all measures of a sequence, which is read twice; None where nothing counts, or all is dark."""
+    first = _first_pass(sequence)
+    if not first.mean > 0:
+        return None
+    lag = fit_lag(first.cells(sequence))
+    return _second_pass(sequence, first, lag)
+
+
+class _FirstPass:
+    """Sums of errors, and cells for the fit of a lag."""
+
+    def __init__(self, shape: tuple[int, ...], frames: int) -> None:
+        rows, columns = (-(-side // CELL) for side in shape)
+        self.reference, self.test = np.zeros((2, frames, rows, columns, 3))
+        self.share = np.zeros((frames, rows, columns, 1))
+        self.sums: Array = np.zeros(())
+        self.brightness = np.zeros((*shape, 3))
+        self.frame_sums: list[Array] = []
+        self.repeated: list[int] = []
+        self.nonfinite = 0
+
+    @property
+    def mean(self) -> float:
+        total = self.sums.sum(axis=0) if self.sums.ndim else np.zeros((5, 5))
+        return float(total[0, 2] / total[0, 0]) if total[0, 0] > 0 else 0.0
+
+    def cells(self, sequence: Sequence) -> Cells:
+        weight = self.share / (self.reference.mean(axis=0) + DARK * self.mean) ** 2
+        return Cells(self.reference, self.test, weight, self.mean, sequence.start)
+
+
+def _first_pass(sequence: Sequence) -> _FirstPass:
+    found: _FirstPass | None = None
+    error = reference = frame = np.zeros(())
+    for n in range(sequence.frames):
+        before, last, shown = error, reference, frame
+        reference, frame = sequence.reference(n), sequence.frame(n)
+        if found is None:
+            found = _FirstPass(sequence.selected(n).shape, sequence.frames)
+        selected = sequence.selected(n)[..., None] & np.ones(3, dtype=bool)
+        finite = np.isfinite(frame)
+        found.nonfinite += int((selected & ~finite).sum())
+        frame = np.where(finite, frame, reference)
+        selected &= finite
+        error = frame - reference
+        found.brightness += reference / sequence.frames
+        found.reference[n], found.test[n] = _cell_means(reference), _cell_means(frame)
+        if not sequence.counts(n):
+            continue
+        found.share[n] = _cell_means(selected.astype(np.float64)).mean(axis=2, keepdims=True)
+        pair = np.where(selected, float(sequence.pair_counts(n)), 0.0)
+        change = (error - before) * pair if n else np.zeros_like(error)
+        moved = (reference - last) * pair if n else np.zeros_like(error)
+        one = selected.astype(np.float64)
+        sums = products(np.stack([one, error * one, reference * one, pair, change, moved]))
+        found.sums = found.sums + sums
+        found.frame_sums.append(sums.sum(axis=0))
+        if n and sequence.pair_counts(n) and moved.any() and np.array_equal(frame, shown):
+            found.repeated.append(n)
+    assert found is not None
+    return found
+
+
+def _second_pass(sequence: Sequence, first: _FirstPass, lag: Lag) -> Measures:
+    """Return the measures: those that need the mean in time, and the lag, are summed here."""
+    mean = first.mean
+    scale = 1 / (first.brightness + DARK * mean)
+    offset, gain = (lag.offset.value or 0.0) * mean, 1.0 if lag.gain.value is None else lag.gain.value
+    persistence = min(max(lag.persistence.value or 0.0, 0.0), 1.0)
+    shown_light = filtered_frames(
+        sequence.reference, sequence.frames, sequence.start, persistence, int(lag.delay.value or 0)
+    )
+    window: deque[Array] = deque(maxlen=AGES + 1)
+    left: Array = np.zeros(())
+    ghosts: Array = np.zeros(())
+    beside: Array = np.zeros(())
+    trail = np.zeros(3)
+    for n, light in enumerate(shown_light):
+        if n == sequence.start[n]:
+            window.clear()
+        reference, frame = sequence.reference(n), sequence.frame(n)
+        window.append(reference)
+        frame = np.where(np.isfinite(frame), frame, reference)
+        before, left = left, frame - offset - gain * light
+        if not sequence.counts(n):
+            continue
+        one = np.where(sequence.selected(n)[..., None], 1.0, 0.0) + np.zeros(3)
+        if sequence.pair_counts(n):
+            beside = beside + products(np.stack([one, (left - before) * one, reference * one]))
+        past = list(window)[::-1]
+        gone = [np.maximum(past[min(age, len(past) - 1)] - reference, 0.0) for age in range(1, AGES + 1)]
+        most = np.maximum.reduce(gone)
+        error = frame - reference
+        weight = one * scale
+        columns = [
+            (each * weight).astype(np.float32) for each in (np.full_like(error, mean), reference, most, *gone, error)
+        ]
+        ghosts = ghosts + products(np.stack(columns)).astype(np.float64)
+        there = one * (most > _TRAIL * mean)
+        trail += [there.sum(), (there * error).sum(), (there * error**2).sum()]
+    total = first.sums.sum(axis=0)
+    by_frame = np.array(first.frame_sums)
+    pairs = by_frame[:, 3, 3] > 0
+    jumps = np.sqrt(by_frame[pairs, 4, 4] / by_frame[pairs, 3, 3])
+    counted = [n for n in range(sequence.frames) if sequence.counts(n)]
+    places = np.flatnonzero(pairs)
+    rmse = np.sqrt(by_frame[:, 1, 1] / np.maximum(by_frame[:, 0, 0], 1)) / mean
+    moved = np.sqrt(by_frame[:, 5, 5] / np.maximum(by_frame[:, 3, 3], 1)) / mean
+    median = float(np.median(jumps)) if len(jumps) else 0.0
+    return Measures(
+        values=int(total[0, 0]),
+        nonfinite=first.nonfinite,
+        mean=mean,
+        relative_rmse=relative_root(first.sums, 1, to=2),
+        bias=_bias(by_frame),
+        flicker=relative_root(first.sums, 4, to=2, values=3),
+        flicker_beside_lag=relative_root(beside, 1, to=2) if beside.ndim else UNKNOWN,
+        reference_change=float(np.sqrt(total[5, 5] / max(total[3, 3], 1)) / mean),
+        lag=lag,
+        ghost=regression(ghosts[:, [0, 1, 2, -1]][:, :, [0, 1, 2, -1]])[2],
+        ghost_by_age=tuple(
+            regression(ghosts[:, [0, 1, 2 + age, -1]][:, :, [0, 1, 2 + age, -1]])[2] for age in range(1, AGES + 1)
+        ),
+        trail_rmse=math.sqrt(trail[2] / trail[0]) / mean if trail[0] else None,
+        trail_bias=trail[1] / trail[0] / mean if trail[0] else None,
+        trail_share=float(trail[0] / total[0, 0]),
+        pop=float(jumps.max() / median) if median > 0 else None,
+        pop_frame=counted[places[int(np.argmax(jumps))]] if median > 0 else None,
+        convergence=_convergence(
+            sequence, dict(zip(counted, rmse, strict=True)), dict(zip(counted, moved, strict=True))
+        ),
+        rmse_by_frame=tuple(rmse.tolist()),
+        change_by_frame=tuple(moved.tolist()),
+        repeated=tuple(first.repeated),
+    )
+
+
+def _cell_means(values: Array) -> Array:
+    """Return means over cells of pixels, those at the ends smaller."""
+    rows, columns = (np.arange(0, side, CELL) for side in values.shape[:2])
+    height, width = (np.diff(np.r_[starts, side]) for starts, side in zip((rows, columns), values.shape, strict=False))
+    sums = np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1)
+    return np.asarray(sums / (height[:, None] * width)[..., None])
+
+
+def _bias(by_frame: Array) -> Estimate:
+    """Return the mean error over the mean reference; its error only where the means of frames are independent."""
+    light = by_frame[:, 0, 2]
+    value = float(by_frame[:, 0, 1].sum() / light.sum())
+    lit = light > 0
+    means = by_frame[lit, 0, 1] / light[lit]
+    count = len(means)
+    apart = means - means.mean()
+    square = float(apart @ apart)
+    if count < 3 or square == 0.0 or abs(apart[1:] @ apart[:-1]) > 3 / math.sqrt(count) * square:
+        return Estimate(value, 0.0 if count >= 3 and square == 0.0 else None)
+    return Estimate(value, math.sqrt(square / (count - 1) / count))
+
+
+def _convergence(sequence: Sequence, rmse: dict[int, float], moved: dict[int, float]) -> int | None:
+    """Return how many frames after the first reset at rest the error is within 5 % of its floor."""
+    for reset in sequence.resets:
+        last = reset
+        while last + 1 in rmse and sequence.start[last + 1] == reset and moved[last + 1] == 0.0:
+            last += 1
+        errors = [rmse[n] for n in range(reset, last + 1) if n in rmse]
+        if len(errors) >= _RESTING:
+            floor = float(np.median(errors[-len(errors) // 4 :]))
+            return next(n for n, error in enumerate(errors) if error <= _FLOOR * floor)
+    return None
