@@ -19,8 +19,9 @@ extent leave out none: their fluence is bounded.
 """
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +38,6 @@ from validation.statistics.comparison import Estimate, Statistics, compare_stati
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-Progress = Callable[[int, int, str], None]
 
 MASK_PIXELS = 2.0
 #: The least margin under area lights, where the quadrature has errors of its own: 3.4e-4 of the mean airlight of
@@ -74,7 +74,6 @@ def agreement(
     batches: int = 256,
     samples: int = _SAMPLES,
     seconds: float | None = None,
-    progress: Progress | None = None,
     spread: ElsewhereFor | None = None,
 ) -> dict[str, Agreement]:
     """Compare an estimator with the quadrature image of a Mitsuba scene at its own size.
@@ -85,9 +84,8 @@ def agreement(
     The `mi.Scene` may be small, since all pixels are pooled. The estimator, 'volpath' or 'single-scatter', agrees if
     the 95 % interval of the relative bias lies inside +- `margin`. So many `batches` are traced at most, of `samples` a
     pixel each; those of volpath go where its pilot spread most (`reference.monte_carlo.allocation`). After so many
-    `seconds`, the pilot not counted, no further batch is traced. `progress` is called with (done, total, what) after
-    every batch, and `spread` lets other processes trace some. The result is by layer, without the surface where nothing
-    lit is visible.
+    `seconds`, the pilot not counted, no further batch is traced; `spread` lets other processes trace some. The result
+    is by layer, without the surface where nothing lit is visible.
     """
     epsilon = measure_shadow_epsilon() if estimator == "volpath" else 0.0
     plain = truth_image(scene)
@@ -107,21 +105,11 @@ def agreement(
     # From here on: where a pilot alone takes long, no time was left for the batches that count.
     start = time.monotonic()
     go_on = None if seconds is None else (lambda done: time.monotonic() - start <= seconds)
-    expected = least = _LEAST_BATCHES[estimator]
 
     def enough(so_far: Batches) -> bool:
-        nonlocal expected
-        if not layers:
-            return True
-        widest = max(width_to_reach(compared(so_far, layer), margin) for layer in layers)
-        done = len(so_far.seeds)
-        # The width falls with the square root of the batches: that is when this will be over.
-        expected = max(least, round(done * widest**2) if np.isfinite(widest) else batches)
-        return done >= least and widest < 1
-
-    def tell(done: int, total: int, what: str) -> None:
-        if progress is not None:
-            progress(min(done, expected), min(total, expected), what)
+        if layers and len(so_far.seeds) < _LEAST_BATCHES[estimator]:
+            return False
+        return all(width_to_reach(compared(so_far, layer), margin) < 1 for layer in layers)
 
     traced = monte_carlo_batches(
         scene,
@@ -131,7 +119,6 @@ def agreement(
         counts=counts,
         enough=enough,
         go_on=go_on,
-        progress=tell,
         elsewhere=None if spread is None else spread(estimator, samples, counts),
     ).batches
     results = {layer: compared(traced, layer) for layer in layers}
@@ -160,7 +147,6 @@ def agreements(
     batches: int = 256,
     samples: Mapping[str, int] | None = None,
     seconds: float | None = None,
-    progress: Callable[[float, str], None] | None = None,
     spread: ElsewhereFor | None = None,
 ) -> dict[str, Agreement]:
     """Compare several estimators with the quadrature image.
@@ -169,24 +155,12 @@ def agreements(
     the `samples`; each takes so many `batches` and `seconds` at most. The result is by estimator and layer, as in
     'volpath airlight'.
     """
-    tell = progress or (lambda share, what: None)
     by_name: dict[str, Agreement] = {}
     least = WIDE_MARGIN if read_truth(scene).area else 0.0
-    for number, (estimator, margin) in enumerate(margins.items()):
-
-        def told(done: int, total: int, what: str, first: int = number) -> None:
-            tell((first + done / total) / len(margins), what)
-
-        by_layer = agreement(
-            scene,
-            estimator=estimator,
-            margin=max(margin, least),
-            batches=batches,
-            samples=(samples or {}).get(estimator, _SAMPLES),
-            seconds=seconds,
-            progress=told,
-            spread=spread,
-        )
+    for estimator, margin in margins.items():
+        how: dict[str, Any] = {"batches": batches, "samples": (samples or {}).get(estimator, _SAMPLES)}
+        how |= {"seconds": seconds, "spread": spread}
+        by_layer = agreement(scene, estimator=estimator, margin=max(margin, least), **how)
         by_name |= {f"{estimator} {layer}": result for layer, result in by_layer.items()}
     return by_name
 

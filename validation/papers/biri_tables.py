@@ -17,8 +17,7 @@ The stages of Table 1 are wall-clock times, measured in turns with the whole fra
 5. Shadow planes: the airlight after the tile lists, less stage 3.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import drjit as dr
@@ -47,25 +46,16 @@ _COMPARED = (320, 240)  # size of the frames that are compared: the default repo
 _SECONDS = 0.1  # for each timing [s]
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A scene that stands for one of the paper, at a size."""
-
-    name: str  #: of its figures
-    scene: str
-    size: tuple[int, int] = (800, 600)  #: [pixels]
-    cone: int = 0  #: edges of the paper's cone over the spot; 0: no spot
-    staged: bool = False  #: whether Table 1 has it
-
-
-ENTRIES = (
-    Entry("sphere-spot 800", "sphere-spot", cone=32),
-    Entry("sphere-spot 1024", "sphere-spot", (1024, 768), cone=32),
-    Entry("two-pens", "two-pens", staged=True),
-    Entry("three-media", "three-media"),
-    Entry("clutter", "clutter", staged=True),
-    Entry("hall", "hall"),
-)
+#: By the name of its figures a scene that stands for one of the paper, its size [pixels], the edges of the paper's cone
+#: over the spot, 0 where there is none, and whether Table 1 has it.
+ENTRIES: Mapping[str, tuple[str, tuple[int, int], int, bool]] = {
+    "sphere-spot 800": ("sphere-spot", (800, 600), 32, False),
+    "sphere-spot 1024": ("sphere-spot", (1024, 768), 32, False),
+    "two-pens": ("two-pens", (800, 600), 0, True),
+    "three-media": ("three-media", (800, 600), 0, False),
+    "clutter": ("clutter", (800, 600), 0, True),
+    "hall": ("hall", (800, 600), 0, False),
+}
 
 
 def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, Any]:
@@ -75,22 +65,22 @@ def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, A
     """
     figures: dict[str, Any] = {}
     errors = []
-    for entry in ENTRIES:
-        size, compared = _scaled(entry.size, scale), _scaled(_COMPARED, scale)
-        scene = read_scene(load_scene(entry.scene, size).scene)
-        small = load_scene(entry.scene, compared).scene
+    for name, (scene_name, full, cone, staged) in ENTRIES.items():
+        size, compared = _scaled(full, scale), _scaled(_COMPARED, scale)
+        scene = read_scene(load_scene(scene_name, size).scene)
+        small = load_scene(scene_name, compared).scene
         truth = truth_image(small)
         whole = truth.airlight + truth.surface
-        chosen = as_published("taylor", white=float(np.quantile(whole.max(axis=-1), 0.999)), cone=entry.cone)
+        chosen = as_published("taylor", white=float(np.quantile(whole.max(axis=-1), 0.999)), cone=cone)
         frame = render_frame(prepared(read_scene(small), chosen))
         errors.append(error_metrics(whole, frame.airlight + frame.surface).p50)
         published, ours = prepared(scene, chosen), prepared(scene, configuration("shadow-planes", "exact"))
         works = [moved_light(published), moved_light(ours)]
-        stages = _stage_works(published, "taylor") if entry.staged else []
+        stages = _stage_works(published, "taylor") if staged else []
         times = time_in_turns(works + stages, seconds=(len(works) + len(stages)) * seconds)
-        figures |= {f"{entry.name} fps": times[0].rate, f"{entry.name} ours fps": times[1].rate}
-        if entry.staged:
-            figures |= {f"{entry.name} {name}": each for name, each in fractions(times[2:]).items()}
+        figures |= {f"{name} fps": times[0].rate, f"{name} ours fps": times[1].rate}
+        if staged:
+            figures |= {f"{name} {stage}": each for stage, each in fractions(times[2:]).items()}
     return figures | {"median error": max(errors)}
 
 

@@ -28,19 +28,8 @@ DIRECTIONS = ("at most", "at least", "equal", "unequal", "within")
 
 #: What an experiment gives: by name a number, a number with the ends of its interval, or why there is none.
 Figures = Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A measured number with the interval of its noise."""
-
-    value: float
-    low: float
-    high: float
-
-    def scaled(self, factor: float) -> "Figure":
-        """Return the figure times a factor."""
-        return Figure(self.value * factor, *sorted((self.low * factor, self.high * factor)))
+#: A measured number with the ends of the interval of its noise.
+Figure = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -130,25 +119,27 @@ def claims() -> tuple[Claim, ...]:
 def taken(claim: Claim, figures: Figures) -> Figure | str:
     """Return the figure of a claim, or why there is none."""
     parts = [_figure(figures[name]) for name in claim.figure.split(" / ")]
+    numbers: list[Figure] = []
     for part in parts:
         if isinstance(part, str):
             return part
-    first, *below = (part for part in parts if isinstance(part, Figure))
-    for other in below:
-        first = Figure(first.value / other.value, first.low / other.high, first.high / other.low)
-    return first if math.isfinite(first.value) else "the measured figure is not finite"
+        numbers.append(part)
+    value, low, high = numbers[0]
+    for other, least, most in numbers[1:]:
+        value, low, high = value / other, low / most, high / least
+    return (value, low, high) if math.isfinite(value) else "the measured figure is not finite"
 
 
 def _figure(number: Any) -> Figure | str:
     if isinstance(number, str):
         return number
     value, low, high = number if isinstance(number, Sequence) else (number, number, number)
-    return Figure(float(value), float(low), float(high))
+    return float(value), float(low), float(high)
 
 
 def verdict(claim: Claim, figure: Figure) -> str:
     """Return the verdict on a claim. Where the ends of the interval disagree, nothing can be told."""
-    answers = {claim.holds(value) for value in (figure.low, figure.value, figure.high)}
+    answers = {claim.holds(value) for value in figure}
     if len(answers) == 2:
         return IMPOSSIBLE
     return REPRODUCED if answers == {True} else DIFFERS if claim.ours else NOT_REPRODUCED
@@ -162,11 +153,11 @@ def judged(claim: Claim, figures: Figures) -> dict[str, Any]:
     figure = taken(claim, figures) if claim.experiment else claim.why
     if isinstance(figure, str):
         return row | {"verdict": IMPOSSIBLE if claim.direction or not claim.experiment else None, "why": figure}
-    row |= {"measured": figure.value, "low": figure.low, "high": figure.high}
+    row |= dict(zip(("measured", "low", "high"), figure, strict=True))
     if not claim.direction:
         return row
     found = verdict(claim, figure)
     why = f"{claim.rule}: {claim.why}"
     if found == IMPOSSIBLE:
-        why = f"cannot be told apart, the figure lies between {figure.low:.3g} and {figure.high:.3g}; {why}"
+        why = f"cannot be told apart, the figure lies between {figure[1]:.3g} and {figure[2]:.3g}; {why}"
     return row | {"verdict": found, "why": why}

@@ -13,8 +13,7 @@ sphere. A path from far away has a mean length of 0.75 radii within the sphere (
 volume): R is 60 % too long, and the airlight too dark by about exp(-0.45 sigma_t radius).
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from itertools import product
 from statistics import median
 from typing import Any
 
@@ -94,42 +93,30 @@ def _fog(scene: Scene) -> Array:
     return (lit - unlit).reshape(-1, 3)
 
 
-@dataclass(frozen=True)
-class ConstantDistance:
-    """The errors of one medium with the constant R, over the pixels that see the medium, against `media=exact`."""
+def constant_distance(image: tuple[int, int] = (64, 48)) -> dict[str, float]:
+    """Return the largest bias of the constant R, and what the polynomial and the printed equation have of its error.
 
-    size: float  #: radius over the distance of the lamp
-    optical_depth: float  #: of the diameter
-    bias: float  #: relative
-    rmse: float  #: relative
-    polynomial: float  #: relative RMSE of the same by the kernel 'taylor', of degree 4 as in the paper
-    printed: float  #: relative RMSE of the equation as printed, summed over nodes
-
-
-def constant_distance() -> dict[str, float]:
-    """Return the largest bias of the constant R, and what the polynomial and the printed equation have of its error."""
-    rows = list(constant_distances())
-    printed, polynomial = ([getattr(row, name) / row.rmse for row in rows] for name in ("printed", "polynomial"))
+    The errors are those of `SIZES` and `OPTICAL_DEPTHS` over the pixels that see the medium, in float64: with the
+    constant R against `media=exact`, of the same by the polynomial of degree 4, and of the equation as printed, summed
+    over nodes.
+    """
+    biases, ratios = [], []
+    for size, depth in product(SIZES, OPTICAL_DEPTHS):
+        scene = read_scene(mi.load_dict(sphere_in_clear_air(size, depth, image)), "double")
+        exact = _airlight(scene, "exact")
+        forms = [("paper", "exact"), ("paper", "taylor"), ("printed", "exact")]
+        paper, taylor, printed = (
+            error_metrics(exact, _airlight(scene, *form), mask=exact[..., 1] > 0) for form in forms
+        )
+        biases.append(abs(paper.relative_bias))
+        ratios.append((taylor.relative_rmse / paper.relative_rmse, printed.relative_rmse / paper.relative_rmse))
+    polynomial, printed_form = zip(*ratios)
     return {
-        "largest bias": max(abs(row.bias) for row in rows),
-        "printed, median": median(printed),
+        "largest bias": max(biases),
+        "printed, median": median(printed_form),
         "polynomial, median": median(polynomial),
         "polynomial, largest": max(polynomial),
     }
-
-
-def constant_distances(image: tuple[int, int] = (64, 48)) -> Iterator[ConstantDistance]:
-    """Yield the errors by `SIZES` and `OPTICAL_DEPTHS`, in float64, at a size of the images [pixels]."""
-    for size in SIZES:
-        for depth in OPTICAL_DEPTHS:
-            scene = read_scene(mi.load_dict(sphere_in_clear_air(size, depth, image)), "double")
-            exact = _airlight(scene, "exact")
-            forms = [("paper", "exact"), ("paper", "taylor"), ("printed", "exact")]
-            paper, taylor, printed = (
-                error_metrics(exact, _airlight(scene, *form), mask=exact[..., 1] > 0) for form in forms
-            )
-            errors = paper.relative_bias, paper.relative_rmse, taylor.relative_rmse, printed.relative_rmse
-            yield ConstantDistance(size, depth, *errors)
 
 
 def sphere_in_clear_air(size: float, optical_depth: float, image: tuple[int, int]) -> dict[str, Any]:

@@ -31,7 +31,7 @@ def key(claim: Claim) -> str:
 
 def measured(claim: Claim) -> Figure:
     value = MEASURED[key(claim)]
-    return Figure(*value) if isinstance(value, list) else Figure(value, value, value)
+    return tuple(value) if isinstance(value, list) else (value, value, value)
 
 
 def claim(direction: str, limit: float | list[float], **more) -> Claim:
@@ -43,8 +43,9 @@ def claim(direction: str, limit: float | list[float], **more) -> Claim:
 def test_a_change_of_the_figure_changes_the_verdict(each):
     """A verdict that half, double and negative figures leave as it is, and the claim's own number, carries nothing."""
     figure = measured(each)
-    own = Figure(each.goal, each.goal, each.goal)
-    changed = {verdict(each, other) for other in (figure.scaled(0.5), figure.scaled(2), figure.scaled(-1), own)}
+    own = (each.goal, each.goal, each.goal)
+    scaled = [tuple(factor * end for end in figure) for factor in (0.5, 2, -1)]
+    changed = {verdict(each, other) for other in (*scaled, own)}
     assert changed - {verdict(each, figure)}
 
 
@@ -96,10 +97,10 @@ def test_rules(each, inside, outside):
 
 def test_an_interval_that_holds_both_answers_tells_nothing():
     each = claim("at most", 1.0)
-    assert verdict(each, Figure(0.9, 0.8, 0.99)) == "reproduced"
-    assert verdict(each, Figure(0.9, 0.8, 1.01)) == "impossible"
-    assert verdict(each, Figure(1.2, 1.1, 1.3)) == "not reproduced"
-    assert verdict(claim("at most", 1.0, ours=True), Figure(1.2, 1.1, 1.3)) == "differs"
+    assert verdict(each, (0.9, 0.8, 0.99)) == "reproduced"
+    assert verdict(each, (0.9, 0.8, 1.01)) == "impossible"
+    assert verdict(each, (1.2, 1.1, 1.3)) == "not reproduced"
+    assert verdict(claim("at most", 1.0, ours=True), (1.2, 1.1, 1.3)) == "differs"
 
 
 def test_figures_are_divided_with_their_intervals_and_reasons_stay():
