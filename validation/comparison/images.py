@@ -96,32 +96,49 @@ def compare_images(
     all_metrics: bool = False,
     flip: bool = False,
     exposure: float | None = None,
+    names: tuple[str, str] = ("the reference", "the test image"),
 ) -> Comparison:
-    """Compare a layer of two images.
+    """Compare a layer of two images whose errors are independent, `total` for the plain channels.
 
     Statistics need the standard errors in the layer `<layer>_se` of either image; with both, both count. The header
     attribute `airlight:batches` says from how many batch means they come.
 
-    Parameters
-    ----------
-    reference, test
-        The images; their errors must be independent.
-    layer
-        The layer, `total` for the plain channels.
-    mask
-        Pixels to compare, (height, width) of truth values; all by default.
-    margin
-        Largest relative bias that counts as agreement, such as 0.005; wants standard errors.
-    all_metrics
-        Also the errors by the formulae of other tools (`published_errors`) and the colour differences.
-    flip
-        Also HDR-FLIP, in a child process; what goes wrong with it is a note.
-    exposure
-        Of the colour differences and of FLIP [stops]; each chooses its own from the reference by default.
+    The mask says which pixels to compare, (height, width) of truth values. The `margin` is the largest relative bias
+    that counts as agreement; it wants standard errors. `all_metrics` adds the errors by the formulae of other tools and
+    the colour differences, `flip` HDR-FLIP, what goes wrong with which is a note. The exposure of these two [stops] is
+    chosen from the reference by default. Messages call the images by their `names`.
     """
-    extras: dict[str, Any] = {"all_metrics": all_metrics, "flip": flip, "exposure": exposure}
-    return _compare(
-        ("the reference", reference), ("the test image", test), name=layer, mask=mask, margin=margin, **extras
+    if exposure is not None and not (all_metrics or flip):
+        raise InputError("an exposure is for the colour differences and FLIP; ask for all metrics or for FLIP too")
+    if exposure is not None and not abs(exposure) <= STOPS:
+        raise InputError(f"exposure: got {exposure:g} stops, wanted -{STOPS:g} to {STOPS:g}")
+    expected, tested = (_estimate(path, image, layer) for path, image in zip(names, (reference, test)))
+    metrics = error_metrics(expected.mean, tested.mean, mask=mask)
+    statistics = None
+    if expected.standard_error is not None or tested.standard_error is not None:
+        statistics = compare_statistics(expected, tested, mask=mask, margin=margin)
+    elif margin is not None:
+        raise InputError(
+            f"a margin wants standard errors, and neither {names[0]} nor {names[1]} has a layer "
+            f"'{layer}_se'; leave the margin out, or make the reference by Monte Carlo"
+        )
+    images: tuple[ArrayLike, ArrayLike] = (expected.mean, tested.mean)
+    ref, tst, chosen = compared(*images, mask)
+    finite = (np.isfinite(ref) & np.isfinite(tst)).all(axis=2)
+    wrong = (
+        *wrong_pixels(chosen & ~finite, "NaN or infinite"),
+        *wrong_pixels(chosen & (tst < 0).any(axis=2), "negative in the test image"),
+    )
+    return Comparison(
+        layer,
+        metrics,
+        statistics,
+        wrong=wrong,
+        masked=0 if mask is None else int((~np.asarray(mask)).sum()),
+        errors=published_errors(*images, mask=mask) if all_metrics else None,
+        errors_normalised=published_errors(*images, mask=mask, unit=None) if all_metrics else None,
+        colour=colour_difference(*images, mask=mask, exposure=exposure) if all_metrics else None,
+        flip=flip_hdr(*images, mask=mask, exposure=exposure)[0] if flip else None,
     )
 
 
@@ -132,39 +149,27 @@ def compare_files(
     *,
     mask: str | os.PathLike[str] | None = None,
     margin: float | None = None,
-    all_metrics: bool = False,
-    flip: bool = False,
-    exposure: float | None = None,
     by_order: bool = False,
+    **options: Any,
 ) -> Comparison:
-    """Compare a layer of two EXR files (see `compare_images`); messages name the file.
+    """Compare a layer of two EXR files, by default the airlight where both have one, else the plain channels.
 
-    Parameters
-    ----------
-    layer
-        The layer to compare, (height, width, 3) [W/(m^2 sr)]: by default the airlight where both files have one, else
-        the plain channels.
-    mask
-        An EXR file; pixels whose R, G and B (or Y) are all zero there are left out, and so are pixels of the frame
-        that a file does not hold.
-    margin, all_metrics, flip, exposure
-        See `compare_images`.
-    by_order
-        Compare as well the layers by order of scattering that both files have, such as `airlight_3_4`.
+    The mask is an EXR file: pixels whose R, G and B (or Y) are all zero there are left out, and so are pixels of the
+    frame that a file does not hold. `by_order` compares as well the layers by order of scattering that both files have,
+    such as `airlight_3_4`. Margin and other options are those of `compare_images`.
     """
-    reference_image, test_image = read_exr(reference), read_exr(test)
-    chosen = test_image.with_data(reference_image.with_data(None if mask is None else read_mask(mask)))
-    names = (str(reference), reference_image), (str(test), test_image)
-    layer = common_layer(*names) if layer is None else layer
-    extras: dict[str, Any] = {"all_metrics": all_metrics, "flip": flip, "exposure": exposure}
-    whole = _compare(*names, name=layer, mask=chosen, margin=margin, **extras)
-    whole = replace(
-        whole, notes=tuple(f"{path}: {image.attributes[NOTE]}" for path, image in names if NOTE in image.attributes)
-    )
-    if not by_order:
-        return whole
-    by_name = [_compare(*names, name=name, mask=chosen, margin=margin) for name in _layers_by_order(*names)]
-    return replace(whole, orders=tuple(by_name))
+    images = read_exr(reference), read_exr(test)
+    chosen = images[1].with_data(images[0].with_data(None if mask is None else read_mask(mask)))
+    names = str(reference), str(test)
+    named = tuple(zip(names, images))
+
+    def compare(layer: str, **more: Any) -> Comparison:
+        return compare_images(*images, layer=layer, mask=chosen, margin=margin, names=names, **more)
+
+    whole = compare(common_layer(*named) if layer is None else layer, **options)
+    notes = tuple(f"{path}: {image.attributes[NOTE]}" for path, image in named if NOTE in image.attributes)
+    orders = tuple(compare(name) for name in _layers_by_order(*named)) if by_order else ()
+    return replace(whole, notes=notes, orders=orders)
 
 
 def common_layer(reference: tuple[str, Image], test: tuple[str, Image]) -> str:
@@ -187,52 +192,6 @@ def _layers_by_order(reference: tuple[str, Image], test: tuple[str, Image]) -> l
         told = "; ".join(f"{path} has {', '.join(names) or 'none'}" for path, names in have.items())
         raise InputError(f"--by-order: the files share no layer by order of scattering, such as airlight_3_4: {told}")
     return sorted(of_both, key=lambda name: int(name.split("_")[1]))
-
-
-def _compare(
-    reference_image: tuple[str, Image],
-    test_image: tuple[str, Image],
-    *,
-    name: str,
-    mask: ArrayLike | None,
-    margin: float | None,
-    all_metrics: bool = False,
-    flip: bool = False,
-    exposure: float | None = None,
-) -> Comparison:
-    """Compare a layer of two images that have names."""
-    if exposure is not None and not (all_metrics or flip):
-        raise InputError("an exposure is for the colour differences and FLIP; ask for all metrics or for FLIP too")
-    if exposure is not None and not abs(exposure) <= STOPS:
-        raise InputError(f"exposure: got {exposure:g} stops, wanted -{STOPS:g} to {STOPS:g}")
-    reference, test = (_estimate(path, image, name) for path, image in (reference_image, test_image))
-    metrics = error_metrics(reference.mean, test.mean, mask=mask)
-    statistics = None
-    if reference.standard_error is not None or test.standard_error is not None:
-        statistics = compare_statistics(reference, test, mask=mask, margin=margin)
-    elif margin is not None:
-        raise InputError(
-            f"a margin wants standard errors, and neither {reference_image[0]} nor {test_image[0]} has a layer "
-            f"'{name}_se'; leave the margin out, or make the reference by Monte Carlo"
-        )
-    images: tuple[ArrayLike, ArrayLike] = (reference.mean, test.mean)
-    ref, tst, chosen = compared(*images, mask)
-    finite = (np.isfinite(ref) & np.isfinite(tst)).all(axis=2)
-    wrong = (
-        *wrong_pixels(chosen & ~finite, "NaN or infinite"),
-        *wrong_pixels(chosen & (tst < 0).any(axis=2), "negative in the test image"),
-    )
-    return Comparison(
-        name,
-        metrics,
-        statistics,
-        wrong=wrong,
-        masked=0 if mask is None else int((~np.asarray(mask)).sum()),
-        errors=published_errors(*images, mask=mask) if all_metrics else None,
-        errors_normalised=published_errors(*images, mask=mask, unit=None) if all_metrics else None,
-        colour=colour_difference(*images, mask=mask, exposure=exposure) if all_metrics else None,
-        flip=flip_hdr(*images, mask=mask, exposure=exposure)[0] if flip else None,
-    )
 
 
 def read_mask(path: str | os.PathLike[str]) -> NDArray[np.bool_]:

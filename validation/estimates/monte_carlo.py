@@ -180,8 +180,21 @@ def batch_tracer(
 ) -> tuple[tuple[str, ...], Trace]:
     """Return the layers of a batch, and the function that traces one from its seed; see `monte_carlo_batches`."""
     if orders is None:
-        return LAYERS, _tracer(scene, estimator, samples, max_depth, counts)
-    return _cloud_tracer(scene, estimator, samples, orders)
+        truth = read_truth(scene)
+        check_camera(truth)
+        check_rays(truth, surface_hits(truth).distance)
+        if estimator == "volpath":
+            return LAYERS, lambda seed: volpath_batch(truth, seed, samples, max_depth=max_depth, counts=counts)
+        if estimator == "single-scatter" and max_depth == 2 and counts is None:
+            return LAYERS, lambda seed: single_scatter_batch(truth, seed, samples)
+    else:
+        clouds, sets, layers = read_clouds(scene), [(name, order_range(name)) for name in orders], set_layers(orders)
+        if estimator == "volpath":
+            return layers[:-1], lambda seed: volpath_orders_batch(clouds, seed, samples, sets=sets)
+        if estimator == "cloud-paths":
+            seen = seen_clouds(clouds).meets
+            return layers, lambda seed: cloud_paths_batch(clouds, seed, samples, sets=sets, seen=seen)
+    raise ValueError(f"estimator: got {estimator!r}, which has no max_depth {max_depth} and orders {orders}")
 
 
 def _has(folder: str, seed: int) -> bool:
@@ -193,29 +206,6 @@ def _has(folder: str, seed: int) -> bool:
 def _all(done: Batches | None) -> Batches:
     assert done is not None, "the first two batches are always traced"
     return done
-
-
-def _tracer(scene, estimator: str, samples: int, max_depth: int, counts: NDArray[np.integer] | None) -> Trace:
-    truth = read_truth(scene)
-    check_camera(truth)
-    check_rays(truth, surface_hits(truth).distance)
-    if estimator == "volpath":
-        return lambda seed: volpath_batch(truth, seed, samples, max_depth=max_depth, counts=counts)
-    if estimator == "single-scatter" and max_depth == 2 and counts is None:
-        return lambda seed: single_scatter_batch(truth, seed, samples)
-    raise ValueError(f"estimator: got {estimator!r} with max_depth {max_depth}, wanted one of {', '.join(ESTIMATORS)}")
-
-
-def _cloud_tracer(scene, estimator: str, samples: int, orders: tuple[str, ...]) -> tuple[tuple[str, ...], Trace]:
-    """Return the layers of a scene of clouds, and what traces them."""
-    clouds, sets = read_clouds(scene), [(name, order_range(name)) for name in orders]
-    if estimator == "volpath":
-        layers = set_layers(orders)[:-1]
-        return layers, lambda seed: volpath_orders_batch(clouds, seed, samples, sets=sets)
-    if estimator != "cloud-paths":
-        raise ValueError(f"estimator: got {estimator!r} with orders, wanted 'volpath' or 'cloud-paths'")
-    seen = seen_clouds(clouds).meets
-    return set_layers(orders), lambda seed: cloud_paths_batch(clouds, seed, samples, sets=sets, seen=seen)
 
 
 def _blocks(first_seed: int, batches: int) -> Iterator[range]:

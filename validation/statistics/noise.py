@@ -140,36 +140,29 @@ def slower_stages(old: Times, new: Times, *, least: float, scale: float) -> list
     Ratios of times mean something from `least` on, see `least_ratio`; `scale` is how much slower than before everything
     else is [1], at least 1 on the same machine. What got faster are the stages that get slower from new to old.
     """
-    before = {stage: timing for stage, timing in old.items() if stage in new}
-    after = {stage: _scaled(new[stage], 1 / scale) for stage in before}
-    return [stage for stage in before if stage in _WITNESSES and _slower(stage, before, after, least)]
+    shared = [stage for stage in old if stage in new]
+    before, after = ({stage: times[stage] for stage in shared} for times in (old, new))
+    was, now = _medians(before), {stage: ms / scale for stage, ms in _medians(after).items()}
+    slow = []
+    for stage in (each for each in shared if each in _WITNESSES):
+        growth = now[stage] - was[stage]
+        witnesses = [now[name] - was[name] for name in _WITNESSES[stage] if name in was]
+        power = max(1, 3 - len(witnesses))
+        if min(before[stage]["repetitions"], after[stage]["repetitions"]) < _FEW:
+            power = max(2, power)
+        longer = growth >= SHORTEST and now[stage] >= least**power * was[stage]
+        apart = after[stage]["low_ms"] / scale > before[stage]["high_ms"]
+        if longer and apart and all(witness >= 0.5 * growth for witness in witnesses):
+            slow.append(stage)
+    return slow
 
 
-def _slower(stage: str, old: Times, new: Times, least: float) -> bool:
-    before, after = old[stage], new[stage]
-    growth = after["median_ms"] - before["median_ms"]
-    witnesses = [_median(new, name) - _median(old, name) for name in _WITNESSES[stage] if _known(old, name)]
-    power = max(1, 3 - len(witnesses))
-    if min(before["repetitions"], after["repetitions"]) < _FEW:
-        power = max(2, power)
-    if growth < SHORTEST or after["median_ms"] < least**power * before["median_ms"]:
-        return False
-    return after["low_ms"] > before["high_ms"] and all(witness >= 0.5 * growth for witness in witnesses)
-
-
-def _known(times: Times, stage: str) -> bool:
-    return stage in times or (stage == "sum" and {"surface", "airlight"} <= set(times))
-
-
-def _median(times: Times, stage: str) -> float:
-    if stage == "sum":
-        return times["surface"]["median_ms"] + times["airlight"]["median_ms"]
-    return times[stage]["median_ms"]
-
-
-def _scaled(timing: Timing, factor: float) -> dict[str, Any]:
-    scaled = ("median_ms", "low_ms", "high_ms")
-    return {name: factor * value if name in scaled else value for name, value in timing.items()}
+def _medians(times: Times) -> dict[str, float]:
+    """Return the medians of stages, and that of surface and airlight together as 'sum' [ms]."""
+    medians = {stage: float(timing["median_ms"]) for stage, timing in times.items()}
+    if {"surface", "airlight"} <= set(times):
+        medians["sum"] = medians["surface"] + medians["airlight"]
+    return medians
 
 
 def other_power(old: Mapping[str, Any], new: Mapping[str, Any]) -> float:

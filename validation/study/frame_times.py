@@ -63,16 +63,6 @@ def moved_light(renderer: FrameRenderer) -> Callable[[], Any]:
     return _step(renderer, None, light_moved=True)
 
 
-def moved_light_alone(renderer: FrameRenderer, cache: FrameCache) -> Callable[[], Any]:
-    """Return the work of a frame after the light alone moved, which reuses the camera rays of the cache."""
-    return _step(renderer, cache, light_moved=True)
-
-
-def changed_look(renderer: FrameRenderer, cache: FrameCache) -> Callable[[], Any]:
-    """Return the work of a frame after only the medium or colours changed: surface and airlight are computed."""
-    return _step(renderer, cache, light_moved=False)
-
-
 def camera_rays(renderer: FrameRenderer) -> Callable[[], Any]:
     """Return the work of casting the camera rays without shading, the least time of a frame that casts them."""
     scene = renderer.scene
@@ -85,6 +75,7 @@ def camera_rays(renderer: FrameRenderer) -> Callable[[], Any]:
 
 
 def _step(renderer: FrameRenderer, cache: FrameCache | None, *, light_moved: bool) -> Callable[[], Any]:
+    """Return the work of the next frame, which reuses what a cache has; without one camera rays are cast too."""
     moved = {"camera_moved": cache is None, "geometry_moved": False, "light_moved": light_moved}
     return lambda: next_frame(renderer, renderer.scene, cache, **moved)
 
@@ -175,8 +166,8 @@ def time_frame(
         airlight=time_repeated(airlight, seconds=seconds),
         light_moved=few(moved_light(renderer)),
         objects_moved=few(objects_moved),
-        light_moved_camera_cached=few(moved_light_alone(renderer, cache)),
-        colours_changed=few(changed_look(renderer, cache)),
+        light_moved_camera_cached=few(_step(renderer, cache, light_moved=True)),
+        colours_changed=few(_step(renderer, cache, light_moved=False)),
     )
 
 

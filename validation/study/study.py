@@ -234,11 +234,10 @@ def default_configurations() -> tuple[Configuration, ...]:
     return (*kinds, *(configuration(name) for name in others))
 
 
-def default_study(count: int, first: int = 0) -> Study:
-    """Return the study without a file: `count` random scenes from a seed on, every method once, 160 x 120 pixels."""
+def default_study(count: int) -> Study:
+    """Return the study without a file: so many random scenes, every method once, 160 x 120 pixels."""
     _number("--random", count, 1, _MOST_SCENES)
-    scenes = RandomScenes(count, first)
-    return Study(f"random-{count}", random=scenes, configurations=default_configurations())
+    return Study(f"random-{count}", random=RandomScenes(count), configurations=default_configurations())
 
 
 def read_study(path: Path, *, count: int | None = None) -> Study:
