@@ -53,7 +53,7 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from reports.studies.registry import STUDIES as STUDIES
     from reports.studies.registry import study as study
     from validation.certified.files import certified_data as certified_data
-    from validation.estimates.budget import Budget as Budget
+    from validation.estimates.images import Budget as Budget
     from validation.estimates.multiple_scattering import multiple_scattering_fraction as multiple_scattering_fraction
     from validation.metrics.errors import error_metrics as error_metrics
     from validation.scenes.registry import SCENES as SCENES
@@ -93,7 +93,7 @@ _API = {
     "render_frame": "realtime.frame.renderer",
     "time_frame": "validation.study.frame_times",
     "error_metrics": "validation.metrics.errors",
-    "Budget": "validation.estimates.budget",
+    "Budget": "validation.estimates.images",
     "multiple_scattering_fraction": "validation.estimates.multiple_scattering",
     "certified_data": "validation.certified.files",
     "read_exr": "reference.storage.exr",

@@ -23,7 +23,7 @@ from reports.api.inputs import (
 if TYPE_CHECKING:
     from reports.api.results import Reference
     from reports.cluster.connect import Client
-    from validation.estimates.budget import Budget
+    from validation.estimates.images import Budget
     from validation.scenes.loading import LoadedScene
 
 USUAL_SAMPLES = 2048  #: samples a pixel of a sampling estimator without a budget
@@ -191,8 +191,7 @@ def _elsewhere(
 ) -> Any:
     """Let workers compute what is not in the cache: a quadrature at once, batches as they are asked for."""
     from reports.cluster.references import Picture, bring_references, tracing
-    from validation.estimates.budget import batch_plan
-    from validation.estimates.images import cloud_orders
+    from validation.estimates.images import batch_plan, cloud_orders
 
     width, height = (int(side) for side in loaded.scene.sensors()[0].film().size())
     picture = Picture.of(str(loaded.path.resolve() if loaded.path else loaded.name), (width, height), changes)
@@ -277,7 +276,7 @@ def _batches(attributes: Any) -> dict[str, Any]:
 
 
 def _budget(given: dict[str, Any], target: Any, *, usual: int) -> "Budget":
-    from validation.estimates.budget import Budget
+    from validation.estimates.images import Budget
 
     named = [name for name, value in given.items() if value is not None]
     if len(named) > 1:

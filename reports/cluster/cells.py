@@ -61,7 +61,7 @@ def times_of(cell: Cell) -> dict[str, Any]:
     """Return the columns of a cell's times, of a worker that is alone on its host."""
     from distributed import get_worker
 
-    done = render(_opened(cell.image)[1], replace(cell, measure=replace(cell.measure, times="with")))
+    done, _ = render(_opened(cell.image)[1], replace(cell, measure=replace(cell.measure, times="with")))
     row = cell_row(cell, times=done.times, cost=done.cost and replace(done.cost, alone=is_alone(get_worker())))
     values = {name: value for name, value in row_values(row).items() if value is not None}
     return {name: value for name, value in values.items() if name.startswith(("times.", "cost."))}

@@ -3,12 +3,11 @@
 
 Read in this order:
 
-- `light_on_ray.py`: refuses radiance that is infinite;
-- `quadrature.py`: the quadrature image of a scene, and what the reference of another renderer's image holds;
+- `quadrature.py`: the quadrature image of a scene, radiance that is refused as infinite, and what the reference of
+  another renderer's image holds;
 - `monte_carlo.py`: batches of a Monte Carlo estimator;
-- `budget.py`: when a Monte Carlo run ends;
-- `images.py`: references as layered images;
+- `images.py`: references as layered images, and when a Monte Carlo run ends;
 - `merge.py`: references of several machines as one;
 - `agreement.py`: Monte Carlo estimators against the quadrature image;
-- `multiple_scattering.py`: the share of light that single scattering leaves out;
+- `multiple_scattering.py`: the share of light that single scattering leaves out.
 """

@@ -32,7 +32,7 @@ from reference.storage.cache import cache_folder, drop_arrays
 from reference.storage.files import NO_SPACE
 from reference.storage.kept import Spent, add_spent, is_damaged, is_kept, key_of, load, stopwatch, store
 from reference.storage.scene_digest import scene_digest
-from validation.estimates.light_on_ray import check_camera, check_rays
+from validation.estimates.quadrature import check_camera, check_rays
 from validation.slab.request import order_range
 
 Progress = Callable[[int, int, str], None]

@@ -3,10 +3,9 @@
 
 Read in this order:
 
-- `errors.py`: relative errors on rays with a known J, and what a value may lose near the smallest numbers;
-- `values.py`: values of a kernel on tables of cases;
-- `cases.py`: kernels on certified cases;
+- `cases.py`: values of a kernel on tables of cases, certified ones among them;
 - `rays.py`: quasi-random rays with their truth;
+- `errors.py`: relative errors on rays with a known J, and what a value may lose near the smallest numbers;
 - `stability.py`: where kernels break;
 - `benchmark.py`: time against error.
 """

@@ -26,9 +26,8 @@ from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import named_phase
 from validation.clock import time_repeated, timing_of
-from validation.kernels.errors import relative_error
+from validation.kernels.cases import TABLE, Kernel, relative_error
 from validation.kernels.rays import wide_rays
-from validation.kernels.values import TABLE, Kernel
 from validation.study.configuration import find_kernel, sized, split_name
 
 Progress = Callable[[int, int, str], None]

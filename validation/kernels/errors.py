@@ -38,16 +38,14 @@ from numpy.typing import NDArray
 
 from analytic.cases import Cases
 from analytic.phase import PhaseFunction, phase_from_words
+from validation.kernels.cases import TABLE, Values, relative_error
 from validation.kernels.rays import case_row
-from validation.kernels.values import TABLE, Values
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 #: Distance from 1 to the next number: the unit of Boost's reports.
 EPSILON = {"single": 2.0**-23, "double": 2.0**-52}
-#: Below these a precision has no normal numbers: such values are compared in absolute terms.
-TINY = {"single": 1e-37, "double": 1e-300}
 
 _NODES = 8
 _LARGEST_DEPTH = 87.0
@@ -70,13 +68,6 @@ def groups(cases: Cases) -> dict[str, Rows]:
         groups |= {tag: tags == tag for tag in sorted(set(cases.tag))}
     phases = np.asarray(cases.phase)
     return groups | {f"phase {name}": phases == name for name in sorted(set(cases.phase))}
-
-
-def relative_error(results: Array, expected: Array, precision: str, allowance: Array | float = 0.0) -> Array:
-    """Return |results - expected| / |expected| [1] beyond an allowance [1/m], NaN where either is not finite."""
-    with np.errstate(invalid="ignore", over="ignore"):
-        error = np.maximum(np.abs(results - expected) - allowance, 0.0) / np.maximum(np.abs(expected), TINY[precision])
-    return np.where(np.isfinite(results) & np.isfinite(expected), error, np.nan)
 
 
 def underflow_allowance(cases: Cases, precision: str) -> Array:

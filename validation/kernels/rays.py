@@ -24,7 +24,7 @@ from analytic.cases import Cases
 from analytic.panels import airlight_segments
 from analytic.phase import PHASE_NAMES, PhaseFunction, phase_from_words
 from reference.storage.kept import kept, key_of
-from validation.kernels.values import TABLE
+from validation.kernels.cases import TABLE
 
 Array = NDArray[np.float64]
 

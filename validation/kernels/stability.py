@@ -17,9 +17,9 @@ import numpy as np
 from analytic.cases import Cases, read_cases
 from realtime.kernels.registry import KERNELS
 from validation.certified.files import certified_data
+from validation.kernels.cases import Kernel, Values, evaluate_cases
 from validation.kernels.errors import EPSILON, Rows, errors_by_group, groups
 from validation.kernels.rays import hard_rays, slivers
-from validation.kernels.values import Kernel, Values, evaluate_cases
 from validation.study.configuration import find_kernel
 
 Progress = Callable[[int, int, str], None]

@@ -28,8 +28,7 @@ from realtime.scene.mesh_adjacency import mesh_triangles
 from realtime.scene.read_scene import Scene, read_scene
 from reference.scene.clouds import CloudScene, read_clouds
 from validation.clock import Timing, time_repeated
-from validation.estimates.budget import Budget
-from validation.estimates.images import monte_carlo_reference
+from validation.estimates.images import Budget, monte_carlo_reference
 from validation.scenes.loading import LoadedScene, load_scene, resize
 from validation.scenes.parts import fog, medium_boundary, sun, tabulated_phase
 from validation.scenes.registry import SCENES

@@ -30,8 +30,8 @@ from analytic.phase import PhaseFunction
 from analytic.series import taylor_coefficients
 from realtime.kernels.exact import exact
 from realtime.kernels.taylor import PRINTED_PHASES, printed_coefficients, taylor
+from validation.kernels.cases import Kernel, evaluate_cases
 from validation.kernels.rays import wide_rays
-from validation.kernels.values import Kernel, evaluate_cases
 
 Array = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from validation.scenes.changes import change_scene, isotropic_media, scene_with_
 from validation.scenes.files.read import read_file
 from validation.scenes.height_fog import register_height_fog
 from validation.scenes.numbers import check_numbers
-from validation.scenes.random.ranges import FILE as RANGES
+from validation.scenes.random.design import FILE as RANGES
 from validation.scenes.random.scene import PREFIX, is_random, random_parts, random_record
 from validation.scenes.registry import SCENES, Animation, SceneRecord
 

@@ -103,7 +103,7 @@ def _cost(scene: Scene, step: Step, chosen: Configuration, seconds: float) -> Re
         own = dict(chosen.parameters) | dict(step.parameters)
         chosen = configuration(chosen.method, chosen.kernel, own)
     camera = scene.camera
-    done = render(scene, Cell("", (camera.width, camera.height), (), chosen, Measure("stages", seconds)))
+    done, _ = render(scene, Cell("", (camera.width, camera.height), (), chosen, Measure("stages", seconds)))
     if done.times is None:
         raise InputError(done.reason or "")
     rays = time_repeated(camera_rays(prepared(scene, chosen)), seconds=0.5 * seconds, least=3)

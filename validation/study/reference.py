@@ -19,8 +19,7 @@ from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_truth
 from reference.storage.kept import Spent, kept, key_of, stopwatch
 from reference.storage.scene_digest import scene_digest
-from validation.estimates.light_on_ray import check_camera, check_rays
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import check_camera, check_rays, truth_image
 from validation.metrics.errors import FLOOR
 from validation.scenes.changes import parse_changes
 from validation.scenes.loading import LoadedScene, load_scene

@@ -10,7 +10,7 @@ import shlex
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -30,7 +30,7 @@ from validation.metrics.errors import FLOOR, error_metrics
 from validation.metrics.flip import flip_hdr
 from validation.metrics.other_tools import published_errors
 from validation.study.configuration import Configuration, prepared, rendered_lights
-from validation.study.frame_times import FrameTimes, brief_times, time_frame
+from validation.study.frame_times import brief_times, time_frame
 from validation.study.reference import Reference, load_cell
 from validation.study.row import Cost, Row, StatedError
 from validation.study.stated_errors import stated_bound, worth_of_ends
@@ -47,19 +47,6 @@ PROBE = (64, 48)  #: size of the frame from which the time of a full-size frame 
 _DOUBTFUL = 0.5  # fraction of the limit: after a longer preparation, the time of a frame is estimated before it begins
 _RECORDED = 1.0  # in a first frame that takes less, its recording takes a part of time and memory that counts [s]
 _LONG = 25.0  # after a longer first frame, compilation included, no larger frame is timed [s]
-
-
-class Rendered(NamedTuple):
-    """A frame and its cost, not yet compared with anything."""
-
-    frame: Frame | None  #: None if there is none
-    status: str = "done"
-    reason: str | None = None
-    note: str | None = None
-    times: FrameTimes | None = None
-    memory: float | None = None
-    cost: Cost | None = None
-    knows_shadows: bool = True
 
 
 def run(
@@ -82,27 +69,17 @@ def run(
     took = stopwatch()
     if apart is not None and cell.chosen.own:
         try:
-            done = apart(render_cell, cell, name=cell.chosen.method)
+            row, frame = apart(render_cell, cell, name=cell.chosen.method)
         except REFUSALS as error:
-            done = Rendered(None, "refused", str(error))
+            row, frame = cell_row(cell, status="refused", reason=str(error)), None
     else:
-        done = render(scene, cell, timed_scene=timed_scene)
-    row = replace(
-        cell_row(cell),
-        status=done.status,
-        reason=done.reason,
-        note=done.note,
-        times=done.times,
-        memory=done.memory,
-        cost=done.cost,
-        knows_shadows=done.knows_shadows,
-        reference=reference.own_error,
-    )
-    if done.frame is None:
+        row, frame = render(scene, cell, timed_scene=timed_scene)
+    row = replace(row, reference=reference.own_error)
+    if frame is None:
         return row, None
-    row = replace(row, **_errors(cell, done.frame, scene, reference, whole))
+    row = replace(row, **_errors(cell, frame, scene, reference, whole))
     if paint is not None:
-        shown = np.asarray(done.frame.airlight, dtype=np.float64)
+        shown = np.asarray(frame.airlight, dtype=np.float64)
         # Pixels without a reference are shown as if they were right.
         known = (
             reference.airlight
@@ -110,10 +87,10 @@ def run(
             else np.where(reference.mask[..., None], reference.airlight, shown)
         )
         row = replace(row, picture=paint(known, shown))
-    assert done.cost is not None
+    assert row.cost is not None
     lights, (work_ms, cpu_ms) = rendered_lights(scene, cell.chosen), took()
-    cost = replace(done.cost, lights=lights, peak_mib=largest_memory(), work_ms=work_ms, cpu_ms=cpu_ms)
-    return replace(row, cost=cost), done.frame
+    cost = replace(row.cost, lights=lights, peak_mib=largest_memory(), work_ms=work_ms, cpu_ms=cpu_ms)
+    return replace(row, cost=cost), frame
 
 
 def cell_row(cell: Cell, **outcome: Any) -> Row:
@@ -136,7 +113,7 @@ def cell_row(cell: Cell, **outcome: Any) -> Row:
     )
 
 
-def render_cell(cell: Cell) -> Rendered:
+def render_cell(cell: Cell) -> tuple[Row, Frame | None]:
     """Render and time a cell in a process that has loaded nothing."""
     larger = cell.measure.timed_size
     timed_scene = None
@@ -145,10 +122,10 @@ def render_cell(cell: Cell) -> Rendered:
     return render(read_scene(load_cell(cell).scene), cell, timed_scene=timed_scene)
 
 
-def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> Rendered:
-    """Render and time a cell; see `run`."""
+def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> tuple[Row, Frame | None]:
+    """Render and time a cell; return its row, not yet compared with anything, and its frame, if there is one."""
     chosen, wanted = cell.chosen, cell.measure
-    shadows = knows_shadows(chosen)
+    row_of = partial(cell_row, cell, knows_shadows=knows_shadows(chosen))
     dr.sync_thread()
     dr.detail.malloc_clear_statistics()
     before = dr.detail.launch_stats()
@@ -156,20 +133,19 @@ def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> Ren
         renderer, making, _ = timed(partial(prepared, scene, chosen))
         reason = _too_long(renderer, cell, 1e-3 * making)
         if reason:
-            return Rendered(None, "left out", reason, knows_shadows=shadows)
+            return row_of(status="left out", reason=reason), None
         frame, first, _ = timed(partial(render_frame if wanted.times == "stages" else _unchecked, renderer))
     except InputError as error:
-        return Rendered(None, "refused", str(error), knows_shadows=shadows)
+        return row_of(status="refused", reason=str(error)), None
     after = dr.detail.launch_stats()
     backend = dr.JitBackend.CUDA if (mi.variant() or "").startswith("cuda") else dr.JitBackend.LLVM
     watermark = int(dr.detail.malloc_watermark(backend))
     cost = Cost(making + first, None, after[0] - before[0], after[2] - before[2], watermark)
-    done = Rendered(frame, cost=cost, knows_shadows=shadows)
     if wanted.times == "with":
         times, prepare = brief_times(renderer)
-        return done._replace(times=times, cost=replace(cost, prepare_ms=prepare))
+        return row_of(times=times, cost=replace(cost, prepare_ms=prepare)), frame
     if wanted.times != "stages":
-        return done
+        return row_of(cost=cost), frame
     notes = []
     if timed_scene is not None and first > 1e3 * _LONG:
         timed_scene = None
@@ -183,7 +159,7 @@ def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> Ren
     if timed_scene is not None and took and took[0] < _RECORDED:
         memory = peak_memory(again)
     times = time_frame(shown, seconds=wanted.seconds, slow=wanted.slow, took=took[-1] if took else None)
-    return done._replace(times=times, memory=memory, note="; ".join(notes) or None)
+    return row_of(cost=cost, times=times, memory=memory, note="; ".join(notes) or None), frame
 
 
 def frame_of(cell: Cell) -> Frame:

@@ -24,8 +24,8 @@ import pytest
 
 from realtime.kernels.exact import exact
 from tests.helpers.kernel_values import take
+from validation.kernels.cases import evaluate_cases
 from validation.kernels.rays import hard_rays, table, wide_rays
-from validation.kernels.values import evaluate_cases
 
 pytestmark = pytest.mark.usefixtures("variant")
 

@@ -11,7 +11,7 @@ from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_truth
 from tests.helpers.scenes import tiny_scene
 from validation.estimates.agreement import MASK_PIXELS, pixel_angle
-from validation.estimates.budget import Budget, batch_plan, near_light, relative_errors
+from validation.estimates.images import Budget, batch_plan, near_light, relative_errors
 from validation.estimates.quadrature import truth_image
 
 

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from validation.estimates.budget import Budget
-from validation.estimates.images import cloud_orders, monte_carlo_reference
+from validation.estimates.images import Budget, cloud_orders, monte_carlo_reference
 from validation.scenes.loading import load_scene
 
 

@@ -10,8 +10,7 @@ import pytest
 import validation.estimates.images
 from reference.monte_carlo.batches import single_batch
 from tests.helpers.scenes import tiny_scene
-from validation.estimates.budget import Budget
-from validation.estimates.images import monte_carlo_reference
+from validation.estimates.images import Budget, monte_carlo_reference
 from validation.scenes.loading import LoadedScene
 
 

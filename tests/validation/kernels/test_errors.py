@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from validation.kernels.cases import Values
 from validation.kernels.rays import table
 from validation.kernels.stability import GENERATED, _broken
-from validation.kernels.values import Values
 
 # Rays of which single terms are below 2^-126 though their sums are far above, with the J of each. A processor that
 # flushes lost all of the first and the third, a nearly isotropic lobe, and 2.4 % of the second.

@@ -6,8 +6,8 @@ import pytest
 
 from analytic.phase import PHASE_NAMES, PhaseFunction
 from tests.evidence.certified.integral import integrate_certified
+from validation.kernels.cases import TABLE
 from validation.kernels.rays import hard_rays, slivers, wide_rays
-from validation.kernels.values import TABLE
 
 COLUMNS = ("g", "foot", "height", "x0", "x1", "sigma_t")
 

@@ -11,10 +11,10 @@ from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
 from realtime.kernels.quadrature import quadrature
 from tests.helpers.kernel_values import take
+from validation.kernels.cases import Values, evaluate_cases
 from validation.kernels.errors import errors_by_group, groups
 from validation.kernels.rays import hard_rays, slivers, table
 from validation.kernels.stability import GENERATED, gamma_difference, kernel_stability
-from validation.kernels.values import Values, evaluate_cases
 
 
 def gauss(geometry, x0, x1, medium, light):

@@ -8,8 +8,7 @@ from realtime.frame.renderer import frame_renderer, render_frame
 from realtime.methods.registry import METHODS
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import SUN, cloud, loaded, ring
-from validation.estimates.budget import Budget
-from validation.estimates.images import monte_carlo_reference
+from validation.estimates.images import Budget, monte_carlo_reference
 from validation.scenes.loading import LoadedScene
 
 pytestmark = pytest.mark.usefixtures("variant")

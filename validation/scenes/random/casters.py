@@ -33,9 +33,8 @@ from validation.scenes.meshes import (
     tetrahedron,
     torus,
 )
-from validation.scenes.random.design import Draws
+from validation.scenes.random.design import Draws, Ranges
 from validation.scenes.random.lights import Light
-from validation.scenes.random.ranges import Ranges
 
 Array = NDArray[np.float64]
 

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.scenes.random.design import Draws
+from validation.scenes.random.design import Draws, Ranges
 from validation.scenes.random.media import Medium, Ways, optical_depths, unit_airlight
-from validation.scenes.random.ranges import Ranges
 
 Array = NDArray[np.float64]
 

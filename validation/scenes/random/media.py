@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.phase import phase_from_words
-from validation.scenes.random.design import Draws
-from validation.scenes.random.ranges import Ranges
+from validation.scenes.random.design import Draws, Ranges
 
 Array = NDArray[np.float64]
 

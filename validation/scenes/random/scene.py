@@ -25,10 +25,9 @@ from validation.properties.view import LightPlace, distance, lit_points
 from validation.scenes.meshes import box, gem, icosphere, placed, rotation, scaled
 from validation.scenes.parts import camera, fog, light, medium_boundary, mitsuba_mesh, phase_function
 from validation.scenes.random.casters import Caster, draw_casters, draw_ground
-from validation.scenes.random.design import Draws
+from validation.scenes.random.design import Draws, Ranges, ranges_from, read_ranges
 from validation.scenes.random.lights import AREA_KINDS, Light, draw_lights
 from validation.scenes.random.media import Medium, draw_media, ways
-from validation.scenes.random.ranges import Ranges, ranges_from, read_ranges
 from validation.scenes.registry import Animation, SceneRecord
 
 Array = NDArray[np.float64]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from validation.scenes.meshes import rotation
-from validation.scenes.random.ranges import ranges_from
+from validation.scenes.random.design import ranges_from
 from validation.scenes.random.scene import draw_stage
 
 SEEDS = range(300)

@@ -4,7 +4,7 @@
 import pytest
 
 from analytic.errors import InputError
-from validation.scenes.random.ranges import ranges_from
+from validation.scenes.random.design import ranges_from
 from validation.scenes.random.scene import draw_stage
 
 

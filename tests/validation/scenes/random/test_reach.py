@@ -8,8 +8,8 @@ import numpy as np
 
 from validation.scenes.meshes import grid
 from validation.scenes.parts import mitsuba_mesh
+from validation.scenes.random.design import ranges_from
 from validation.scenes.random.lights import Light
-from validation.scenes.random.ranges import ranges_from
 from validation.scenes.random.scene import Camera, draw_stage, reach
 
 
