@@ -27,25 +27,14 @@ VARIANTS = ("cuda_ad_rgb", "llvm_ad_rgb")
 VARIANT_VARIABLE = "AIRLIGHT_VARIANT"
 
 _PACKAGES = ("mitsuba", "drjit", "numpy", "scipy", "mpmath", "OpenEXR", "colour-science", "matplotlib")
-# Debian's package names, and how each installer names the same two libraries. Checked on Debian 12; the others are
-# read up and untried. An installer that needs no superuser is marked so.
+# Debian's package names, and how other installers name the same two libraries; these were not tried.
 _INSTALLERS = {
     "apt-get": ("sudo apt-get install -y", {}),
     "dnf": ("sudo dnf install -y", {"libllvm19": "llvm-libs", "libatomic1": "libatomic"}),
     "zypper": ("sudo zypper install -y", {"libllvm19": "libLLVM19"}),
     "pacman": ("sudo pacman -S", {"libllvm19": "llvm-libs", "libatomic1": "gcc-libs"}),
-    "winget": ("winget install -e --id", {"libllvm19": "LLVM.LLVM"}),
-    "choco": ("choco install -y", {"libllvm19": "llvm"}),
-    "scoop": ("scoop install", {"libllvm19": "llvm"}),
-    "brew": ("brew install", {"libllvm19": "llvm", "libatomic1": "gcc"}),
-    "port": ("sudo port install", {"libllvm19": "llvm-19"}),
 }  # fmt: skip
 _CONDA = "conda install -y -c conda-forge"
-#: Where LLVM comes from if no installer is at hand.
-_BY_HAND = {
-    "win32": "LLVM's installer for Windows, LLVM-*-win64.exe of https://github.com/llvm/llvm-project/releases",
-    "darwin": "Homebrew (https://brew.sh), and then brew install llvm",
-}
 
 
 class MissingError(RuntimeError):
@@ -182,14 +171,12 @@ def install_line(packages: list[str]) -> str:
     In an environment of conda that is conda's, which needs no superuser; else that of the first installer there is.
     """
     if Path(sys.prefix, "conda-meta").is_dir():
-        names = {"libllvm19": "libllvm-c19" if sys.platform == "win32" else "libllvm19", "libatomic1": "libgcc"}
-        return f"{_CONDA} {' '.join(names[package] for package in packages)}"
+        return f"{_CONDA} {' '.join(packages)}".replace("libatomic1", "libgcc")
     for program, (line, names) in _INSTALLERS.items():
         if shutil.which(program):
-            superuser = hasattr(os, "geteuid") and os.geteuid() == 0
-            line = line.removeprefix("sudo ") if superuser else line
+            line = line.removeprefix("sudo ") if os.geteuid() == 0 else line
             return f"{line} {' '.join(names.get(package, package) for package in packages)}"
-    return _BY_HAND.get(sys.platform) or f"your system's installer for {' and '.join(packages)}"
+    return f"your system's installer for {' and '.join(packages)}"
 
 
 def threads() -> int:

@@ -12,23 +12,23 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 OLDEST_LLVM = 17
-_PROGRAMS = ("ProgramW6432", "ProgramFiles", "ProgramFiles(x86)")  # where Windows keeps programs
 LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"
 
-# libLLVM-14.so.1, libLLVM-14.0.6.so, libLLVM.so.19.1, libLLVM.19.1.dylib, without a version libLLVM.so, libLLVM.dylib,
-# and on Windows LLVM-C.dll; not the libraries of single components, such as libLLVMCore.so.19.1.
-_LIBRARY = re.compile(
-    r"libLLVM(?:-(\d+)(?:\.(\d+))?[^/]*\.(?:so|dylib)[^/]*|\.so\.(\d+)(?:\.(\d+))?[^/]*|\.(\d+)(?:\.(\d+))?[^/]*\.dylib"
-    r"|\.so|\.dylib)|LLVM-C\.dll"
+# Of the distributions and apt.llvm.org, of Homebrew, and of archives unpacked in /opt or /usr/local.
+_FOLDERS = (
+    *("usr/lib/*-linux-gnu", "usr/lib/llvm-*/lib", "usr/lib64/llvm*/lib*", "usr/lib64", "usr/lib", "usr/local/lib"),
+    *("home/linuxbrew/.linuxbrew/opt/llvm*/lib", "opt/[lL][lL][vV][mM]*/lib", "usr/local/[lL][lL][vV][mM]*/lib"),
 )
-# Homebrew, MacPorts and archives name the version in a folder: /opt/homebrew/Cellar/llvm/19.1.7/lib,
-# /usr/local/opt/llvm@18/lib, /opt/local/libexec/llvm-19/lib, /opt/LLVM-19.1.7-Linux-X64/lib
-_FOLDER = re.compile(r"/llvm(?:@[\d.]+)?(?:@|/|-)(\d+)(?:\.(\d+))?[^/]*/(?:lib|bin)", flags=re.IGNORECASE)
+# libLLVM-14.so.1, libLLVM-14.0.6.so, libLLVM.so.19.1, without a version libLLVM.so; not the libraries of single
+# components, such as libLLVMCore.so.19.1.
+_LIBRARY = re.compile(r"libLLVM(?:-(\d+)(?:\.(\d+))?[^/]*\.so[^/]*|\.so\.(\d+)(?:\.(\d+))?[^/]*|\.so)")
+# Homebrew and archives name the version in a folder: /opt/llvm@18/lib, /opt/LLVM-19.1.7-Linux-X64/lib
+_FOLDER = re.compile(r"/llvm(?:@|-)(\d+)(?:\.(\d+))?[^/]*/lib", flags=re.IGNORECASE)
 _ASK_VERSION = (
     "import ctypes, sys\n"
     "numbers = [ctypes.c_uint() for _ in range(3)]\n"
@@ -52,72 +52,18 @@ class Llvm:
         return "version unknown" if self.version is None else f"LLVM {self.version[0]}.{self.version[1]}"
 
 
-def _processor() -> str:
-    import platform
-
-    return platform.machine()
-
-
-@dataclass(frozen=True)
-class Machine:
-    """What decides where libraries lie; another one than this for tests."""
-
-    system: str = sys.platform
-    processor: str = field(default_factory=_processor)
-    root: Path = Path("/")  #: of the file system
-    prefix: Path = field(default_factory=lambda: Path(sys.prefix))
-    environment: Mapping[str, str] = field(default_factory=lambda: os.environ)
-
-    def folders(self, variable: str) -> list[Path]:
-        """Return the folders of a variable such as PATH."""
-        separator = ";" if self.system == "win32" else ":"
-        return [Path(folder) for folder in self.environment.get(variable, "").split(separator) if folder]
-
-    def matching(self, *patterns: str) -> list[Path]:
-        """Return the folders that exist under the root, for each pattern the later name first."""
-        return [path for pattern in patterns for path in sorted(self.root.glob(pattern), reverse=True)]
+def llvm_folders() -> list[Path]:
+    """Return the folders in which a libLLVM may lie: those of LD_LIBRARY_PATH, of conda, and of the system."""
+    named = [Path(folder) for folder in os.environ.get("LD_LIBRARY_PATH", "").split(":") if folder]
+    conda = [Path(prefix, "lib") for prefix in (sys.prefix, os.environ.get("CONDA_PREFIX")) if prefix]
+    return [*named, *conda, *(path for each in _FOLDERS for path in sorted(Path("/").glob(each), reverse=True))]
 
 
-def llvm_folders(machine: Machine | None = None) -> list[Path]:
-    """Return the folders in which a libLLVM may lie, the most particular first.
-
-    They are those of conda (of the environment that Python is in, and of the one that is active), and by platform: on
-    Linux of the distributions, apt.llvm.org, Homebrew and archives unpacked in /opt; on macOS of Homebrew and MacPorts;
-    on Windows of LLVM's installer, which winget and Chocolatey run, and of Scoop.
-    """
-    machine = machine or Machine()
-    conda = [machine.prefix, *machine.folders("CONDA_PREFIX")]
-    if machine.system == "win32":
-        programs = [f"{folder}/LLVM/bin" for name in _PROGRAMS for folder in machine.folders(name)]
-        local = [f"{folder}/Programs/LLVM/bin" for folder in machine.folders("LOCALAPPDATA")]
-        scoop = [f"{folder}/scoop/apps/llvm/current/bin" for folder in machine.folders("USERPROFILE")]
-        here = [folder / "Library" / "bin" for folder in conda]
-        return [*here, *map(Path, (*programs, *local, *scoop)), *machine.folders("PATH")]
-    here = [folder / "lib" for folder in conda]
-    if machine.system == "darwin":
-        # Of the other processor's Homebrew nothing can be loaded.
-        brew = "opt/homebrew" if machine.processor == "arm64" else "usr/local"
-        known = [f"{brew}/opt/llvm*/lib", f"{brew}/Cellar/llvm*/*/lib", "opt/local/libexec/llvm-*/lib", "usr/local/lib"]
-        return [*machine.folders("DYLD_LIBRARY_PATH"), *here, *machine.matching(*known)]
-    known = [
-        f"usr/lib/{machine.processor}-linux-gnu",
-        "usr/lib/llvm-*/lib",
-        "usr/lib64/llvm*/lib*",
-        "usr/lib64",
-        "usr/lib",
-    ]
-    known += ["home/linuxbrew/.linuxbrew/opt/llvm*/lib", "opt/[lL][lL][vV][mM]*/lib", "usr/local/[lL][lL][vV][mM]*/lib"]
-    return [*machine.folders("LD_LIBRARY_PATH"), *here, *machine.matching(*known, "usr/local/lib")]
-
-
-def find_llvm(folders: Iterable[Path] | None = None) -> list[Llvm]:
-    """List every libLLVM of this machine: the user's setting first, then those that work, then the newest.
-
-    The file named by ``DRJIT_LIBLLVM_PATH`` is always looked at, and `llvm_folders` by default.
-    """
+def find_llvm() -> list[Llvm]:
+    """List every libLLVM of this machine: the user's setting first, then those that work, then the newest."""
     setting = os.environ.get(LLVM_VARIABLE)
     seen: dict[str, Llvm] = {}
-    for path in _libraries(llvm_folders() if folders is None else folders):
+    for path in _libraries(llvm_folders()):
         seen.setdefault(os.path.realpath(path), examine_llvm(str(path)))
     libraries = sorted(seen.values(), key=lambda llvm: (llvm.works, llvm.version or (0, 0)), reverse=True)
     if setting:
