@@ -194,17 +194,17 @@ def view(
     parameters
         Parameters of the method.
     """
-    from reports.view.server import Server, check_library
+    from reports.machine.environment import activate, require
 
-    check_library()
+    require("websockets", "view", "the live view")
     if not 0 <= port <= 65535:
         raise InputError(f"port: got {port}, wanted a number from 0 to 65535; 0 is any free one")
-    from reports.machine.environment import activate
     from validation.study.configuration import Configuration, configuration
 
     chosen = method if isinstance(method, Configuration) else configuration(method, kernel_name(kernel), parameters)
     changes, pixels = changes_of(change), pixels_of(size)
     variant = activate()
+    from reports.view.server import Server
     from reports.view.session import Session
     from reports.view.state import ViewState
 

@@ -242,12 +242,10 @@ def _measured(
     """Measure and write a report; unusable input is refused before the work begins."""
     import gc
 
-    from reports.cluster.connect import check_library, connected, parse_place
+    from reports.cluster.connect import connected, parse_place
     from reports.machine.environment import activate
 
     place = None if cluster is None else parse_place(cluster)
-    if place is not None:
-        check_library()
     activate()
     from reports.api.render import asked_configurations
     from reports.report.asked import scenes_of_images

@@ -138,13 +138,9 @@ def sweep(
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from reports.machine.environment import MissingError
+    from reports.machine.environment import activate, require
 
-    try:
-        import pyarrow  # noqa: F401 - asked for here, before any work
-    except ImportError:
-        words = "sweeps need the package pyarrow: install it with `pip install '.[sweep]'` in a clone"
-        raise MissingError(words) from None
+    require("pyarrow", "sweep", "a sweep")
     if from_ is not None:
         given = {"a study": study, "random": random, "cluster": cluster, "again": again or None}
         for name, value in given.items():
@@ -153,13 +149,11 @@ def sweep(
         from reports.sweep.page import write_sweep
 
         return SweepFindings(*write_sweep(Path(from_), None if output is None else Path(output)))
-    from reports.cluster.connect import check_library, parse_place
-    from reports.machine.environment import activate
+    from reports.cluster.connect import parse_place
     from validation.study.rows import RowStore
     from validation.study.study import default_study, read_study
 
     place = parse_place(cluster)
-    check_library()
     count = _USUAL if random is None else random
     chosen = default_study(count) if study is None else read_study(Path(study), count=random)
     folder = Path(output or f"sweep-{chosen.name}")

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from reports.machine import quick_compilation
-from reports.machine.environment import MissingError, threads
+from reports.machine.environment import require, threads
 
 MEMORY = "2GiB"  #: of a local worker, above which Dask ends it
 _KEPT = 2**28  # of freed memory that a local worker keeps, and the largest array that may come of it [bytes]
@@ -36,6 +36,7 @@ def parse_place(word: str | None) -> Place:
     """Return the place that a word names; a worker for each processor of this machine for None."""
     from analytic.errors import InputError
 
+    require("distributed", "sweep", "work on several processes or machines")
     word = "local" if word is None else word.strip()
     kind, _, number = word.partition(":")
     if word == "local":
@@ -52,24 +53,12 @@ def parse_place(word: str | None) -> Place:
     )
 
 
-def check_library() -> None:
-    """Raise MissingError where Dask is not installed."""
-    try:
-        import distributed  # noqa: F401 - asked for here, before any work
-    except ImportError:
-        raise MissingError(
-            "work on several processes or machines needs the packages dask and distributed: install them with "
-            "`pip install '.[sweep]'` in a clone"
-        ) from None
-
-
 @contextmanager
 def connected(place: Place, *, quick: bool = False) -> Iterator[Client]:
     """Give the connection to a place, with workers that are of our version; others are refused by name.
 
     `quick` compiles kernels quickly in processes of this machine, where nothing is timed.
     """
-    check_library()
     _quiet()
     with ExitStack() as stack:
         client = stack.enter_context(_local(place.workers, quick=quick) if place.workers else _remote(place.scheduler))

@@ -6,6 +6,7 @@ Importing this module imports neither Mitsuba nor Dr.Jit. `activate` is the only
 
 import ctypes
 import difflib
+import importlib
 import os
 import shutil
 import sys
@@ -116,6 +117,16 @@ def activate(variant: str | None = None) -> str:
 
     log_to_error_stream()
     return chosen.variant
+
+
+def require(package: str, extra: str, what: str) -> None:
+    """Raise MissingError where a package of an extra is not installed, before any work."""
+    try:
+        importlib.import_module(package)
+    except ImportError:
+        raise MissingError(
+            f"{what} needs the package {package}: install it with `pip install '.[{extra}]'` in a clone"
+        ) from None
 
 
 def check_variant(variant: str) -> None:

@@ -11,8 +11,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from reports.machine.environment import MissingError
-
 _PAGE = Path(__file__).parent / "page"
 _FILES = {
     "": ("view.html", "text/html; charset=utf-8"),
@@ -29,16 +27,6 @@ _HEADERS = (
         "base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
     ),
 )
-
-
-def check_library() -> None:
-    """Raise MissingError where the library of the server is not installed."""
-    try:
-        import websockets.sync.server  # noqa: F401 - asked for here, before any work
-    except ImportError:
-        raise MissingError(
-            "the live view needs the package websockets: install it with `pip install '.[view]'` in a clone"
-        ) from None
 
 
 class Page:

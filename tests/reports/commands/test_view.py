@@ -24,7 +24,7 @@ def run(*arguments, status):
 
 @pytest.mark.claim("view-extra")
 def test_without_the_extra_one_line_says_what_to_type(monkeypatch, capfd):
-    monkeypatch.setitem(sys.modules, "websockets.sync.server", None)
+    monkeypatch.setitem(sys.modules, "websockets", None)
     run("sphere-spot", status=3)
     said = capfd.readouterr()
     assert said.err == (
