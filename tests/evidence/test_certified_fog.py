@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: the certified scenes of fog are what their program gives, and what quadrature and single-scatter compute."""
+"""Claim: certified scenes of fog and rows of area lights are what their programs give and the reference computes."""
 
 import json
 import re
@@ -12,11 +12,17 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from analytic.phase import PhaseFunction
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_truth
+from reference.quadrature.unbounded import Terms, Unbounded, lit_stretches, profile_of
+from reference.scene.read import TruthLight, TruthMedium, read_truth
+from reference.visibility.certificate import LitIntervals
+from reference.visibility.planes import Rays, cone_interval
+from tests.evidence.certified import area_lights
 from tests.evidence.certified.fog import certify_pixel, directions, scene_data
 from tests.evidence.certified.model import FogBox, FogScreen, load_fog, mitsuba_dict
 from tests.evidence.certified.scenes import fog_scenes
+from tests.evidence.closed_forms import sphere_airlight
 
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = [scene.name for scene in fog_scenes()]
@@ -146,3 +152,51 @@ def test_the_pages_tell_of_every_scene_and_the_snippet_runs(variant):
     bias, interval = (float(word) for word in re.fullmatch(r"bias (\S+)% \+- (\S+)%\n", ran.stdout).groups())
     assert interval < 1.5
     assert abs(bias) < 2.5 * interval  # five standard errors
+
+
+@pytest.fixture(scope="module")
+def area_rows(data_folder):
+    return json.loads((data_folder / "certified_area_lights.json").read_text())
+
+
+def test_rows_are_those_of_the_generator(area_rows):
+    assert area_rows["schema"] == area_lights.SCHEMA
+    for rows, inputs in ((area_rows["points"], area_lights.POINTS), (area_rows["spheres"], area_lights.SPHERES)):
+        assert [tuple(list(row.values())[:-1]) for row in rows] == list(inputs)
+    assert area_lights._text(area_lights.point_integral(*area_lights.POINTS[0])) == area_rows["points"][0]["J"]
+
+
+@pytest.mark.slow
+def test_all_rows_again(area_rows):
+    assert area_lights.certified_rows() == json.loads(json.dumps(area_rows))
+
+
+@pytest.mark.claim("area-light-certified", tolerance="1e-10 relative: Gauss-Kronrod's own")
+@pytest.mark.parametrize("number", range(len(area_lights.POINTS)))
+def test_the_truth_of_one_point(area_rows, number):
+    row = area_rows["points"][number]
+    phase = PhaseFunction("isotropic") if row["g"] is None else PhaseFunction("hg", g=row["g"])
+    medium = TruthMedium(np.full(3, row["sigma_t"]), np.ones(3), phase, None)
+    # In the plane of ray and light; what the normal has across the plane does not matter.
+    beside = np.sqrt(max(0.0, 1 - row["axial"] ** 2 - row["across"] ** 2))
+    quarter = 0.5 * np.pi
+    normal = np.array([beside, row["across"], row["axial"]])
+    light = TruthLight(np.zeros(3), np.ones(3), normal, cutoff=quarter, beam=quarter, cosine=True)
+    place, along, across = np.zeros((1, 3)), np.array([[0.0, 0, 1]]), np.array([[0.0, 1, 0]])
+    origin = row["height"] * across[0] - row["foot"] * along[0]
+    rays = Rays(origin, along, place, across, np.array([row["foot"]]), np.array([row["height"]]))
+    low, high = (rays.distance(end) for end in cone_interval(rays, light, light.cutoff))
+    lit = LitIntervals(np.array([0]), np.maximum(row["x0"], low), np.minimum(row["x1"], high), edge=0.0)
+    stretches, profile = lit_stretches(light, rays, lit), profile_of(light, rays)
+    value, bound = Unbounded(medium).sums(rays, stretches, np.array([np.inf]), Terms(profile))
+    expected = float(row["J"]) * row["sigma_t"] / (4 * np.pi)
+    assert value[0] == pytest.approx(expected, rel=1e-10)
+    assert abs(value[0, 0] - expected) <= bound[0, 0]
+
+
+@pytest.mark.parametrize("number", range(len(area_lights.SPHERES)))
+def test_the_closed_form_of_a_sphere(area_rows, number):
+    row = dict(area_rows["spheres"][number])
+    expected = float(row.pop("K"))
+    value = sphere_airlight(row.pop("sigma_t"), row.pop("height"), row.pop("radius"), **row)
+    assert value == pytest.approx(expected, rel=1e-12)

@@ -1,25 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The closed forms that the truth of lights with extent is held against are right themselves."""
+"""Closed forms of lights with extent and the oracle of light volumes are right themselves."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
-from tests.evidence.closed_forms import polygon_in_disk, polygon_overlap, sphere_airlight, sphere_fluence
-
-#: Foot at 0, from -2 to 3, attenuation from -2 on; computed twice in mpmath, over directions and over the cap.
-CERTIFIED = [
-    (0.21, 0.83, 0.1, 0.04880854432449),
-    (0.21, 0.83, 0.3, 0.4626164168379),
-    (0.21, 0.83, 0.6, 2.123635219885),
-    (1.3, 0.83, 0.3, 0.02890607888329),
-    (0.21, 0.35, 0.3, 1.619271567439),
-]
-
-
-@pytest.mark.parametrize(("sigma_t", "height", "radius", "expected"), CERTIFIED)
-def test_sphere_beside_a_ray(sigma_t, height, radius, expected):
-    value = sphere_airlight(sigma_t, height, radius, foot=2.0, x0=0.0, x1=5.0)
-    assert value == pytest.approx(expected, rel=2e-12)
+from analytic.geometry import foot_and_height
+from analytic.panels import airlight_segments
+from realtime.scene.read_scene import read_scene
+from realtime.shadow_maps.projection import Projection
+from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
+from reference.scene.read import read_truth
+from tests.evidence.closed_forms import polygon_in_disk, polygon_overlap, sphere_fluence
+from tests.evidence.oracles.light_volume import oracle_airlight
+from tests.helpers.scenes import spot, tiny_scene
+from validation.estimates.quadrature import truth_image
+from validation.metrics.errors import error_metrics
 
 
 def test_a_sphere_in_clear_air_fills_its_cone():
@@ -41,3 +37,79 @@ def test_polygons_by_counting_points():
         np.mean(inside & (np.abs(x) < 0.5) & (np.abs(y) < 0.4)) * 4, rel=1e-3
     )
     assert polygon_overlap(triangle + 5, rectangle) == 0
+
+
+def maps_of(scene, size):
+    read = read_scene(scene)
+    return [cast_shadow_map(read.geometry, light, size) for light in read.lights]
+
+
+def variations():
+    """Return changes of the tiny scene by name."""
+    coloured = {"sigma_t": {"type": "rgb", "value": [0.2, 0.4, 0.9]}, "has_spectral_extinction": True}
+    return {
+        "point": {},
+        "soft spot": {"lamp": spot(beam=21.0)},
+        "coloured extinction": {"fog": tiny_scene()["fog"] | coloured},
+    }
+
+
+def twin_error(description, size):
+    """Return the error of the twin of a scene against the truth."""
+    scene = mi.load_dict(description)
+    return error_metrics(truth_image(scene).airlight, oracle_airlight(read_truth(scene), maps_of(scene, size)))
+
+
+@pytest.mark.parametrize("lamp", ["point", "soft spot"])
+def test_nothing_hides_nothing(variant, lamp):
+    """Rays are only cut at the edges of faces: what is left is the tolerance of the integrals, 1e-10."""
+    assert twin_error(tiny_scene(ball=None, floor=None, **variations()[lamp]), 8).max < 1e-10
+
+
+def plane_below(depth, size):
+    """Return the shadow map of an endless horizontal plane below a point light, whose horizon is on borders of texels.
+
+    Its height is -k_z / depth where a direction k points down, 0 elsewhere.
+    """
+    at = np.linspace(-1, 1, size + 1)
+    v, u = np.meshgrid(at, at, indexing="ij")
+    # Across and up are the two axes that follow a face's own: z is the second after x and the first after y.
+    down = np.stack([-v, -v, -u, -u, -1 + 0 * u, 1 + 0 * u])
+    length = np.sqrt(1 + u**2 + v**2)
+    distance = np.divide(length * depth, down, where=down > 0, out=np.full(down.shape, np.inf))
+    return ShadowMap(size, distance.ravel(), Projection(None))
+
+
+@pytest.mark.parametrize("level", [0.9, 1.5], ids=["below the camera", "above the camera"])
+@pytest.mark.parametrize("surface", [np.inf, 3.7])
+def test_shadow_of_a_plane_is_exact(variant, level, surface):
+    """Rays that start at 1.3 m are lit where they are above the plane, up to the visible surface."""
+    truth = read_truth(mi.load_dict(tiny_scene(size=(24, 18), ball=None, floor=None)))
+    light, direction = truth.lights[0], truth.direction
+    airlight = oracle_airlight(
+        truth, [plane_below(light.position[2] - level, 8)], distance=np.full((truth.height, truth.width), surface)
+    )
+    reaches = (level - truth.origin[2]) / direction[:, 2]
+    meets = (reaches > 0) & (reaches < surface)
+    assert 0.1 < np.mean(meets) < 0.9
+    crossing = np.where(meets, reaches, 0.0)
+    if truth.origin[2] > level:
+        x0, x1 = np.zeros(len(meets)), np.where(meets, crossing, surface)
+    else:
+        x0, x1 = crossing, np.where(meets, surface, 0.0)
+    foot, height = foot_and_height(np.broadcast_to(truth.origin, direction.shape), direction, light.position)
+    sigma_t = truth.medium.sigma_t[0]
+    J, _ = airlight_segments(foot, height, x0, x1, sigma_t, truth.medium.phase)
+    expected = J[:, None] * truth.medium.albedo * sigma_t * light.intensity / (4 * np.pi)
+    # The angles of crossings are rounded, the integrals right to 1e-10.
+    assert airlight.reshape(-1, 3) == pytest.approx(expected, rel=1e-9, abs=1e-10 * expected.max())
+
+
+@pytest.mark.claim("error-by-size-of-the-map")
+@pytest.mark.parametrize("what", ["point", "soft spot", "coloured extinction"])
+def test_errors_fall_with_the_map_size(variant, what):
+    """An edge is misplaced by a texel at most, so the error halves with it, give or take where edges fall in texels."""
+    description = tiny_scene(size=(32, 24), **variations()[what])
+    coarse, fine = (twin_error(description, size).relative_rmse for size in (16, 256))
+    assert coarse < 0.05
+    assert fine < coarse / 8

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The diagnosis of images: each hypothesis names the fault that is planted, alone, with another, or none."""
+"""Diagnoses name the fault that is planted, alone, with another, or none; also one in a renderer in NumPy."""
 
+import importlib
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +15,7 @@ from reference.storage.exr import Image
 from tests.helpers.planted_faults import PLANTED
 from validation.engine.diagnose import diagnose_image
 from validation.engine.evidence import is_noise
-from validation.engine.prediction import Guess
+from validation.engine.prediction import Guess, SceneLight
 from validation.engine.search import Explanation
 from validation.fog_model.radiance import FogModel, scene_fog
 from validation.fog_model.view import scattering_paths, view_of
@@ -126,3 +129,48 @@ def test_two_faults_of_different_kinds_are_both_named(truth):
     flipped = diagnosed(total(denser)[::-1])
     assert {row.name for row in flipped.ranked[:2]} == {"extinction", "flip"}
     assert "Two faults" in "\n".join(flipped.lines)
+
+
+TOOLS = Path(__file__).resolve().parents[3] / "docs/tools"
+sys.path.insert(0, str(TOOLS))
+numpy_faults = importlib.import_module("numpy_faults")
+sys.path.remove(str(TOOLS))
+LARGER = (64, 48)
+
+
+@pytest.fixture(scope="module")
+def scenes(variant, tmp_path_factory):
+    """By what is right, the scene that the renderer shows, and its light, which all images share."""
+
+    def scene(engine):
+        path = tmp_path_factory.mktemp("engine") / "scene.xml"
+        path.write_text(numpy_faults.scene_xml(engine))
+        loaded = load_scene(str(path), LARGER)
+        return loaded, SceneLight(read_truth(loaded.scene))
+
+    return {engine: scene(engine) for engine in (numpy_faults.RIGHT, numpy_faults.LAYERED)}
+
+
+def named(scenes, number, noise=0.01):
+    engine, planted, _, given = numpy_faults.CASES[number]
+    loaded, light = scenes[engine]
+    image = numpy_faults.rendered(replace(engine, **given), area=False, noise=noise, seed=number)
+    return planted, diagnose_image(Image({"total": image}), loaded, light=light)
+
+
+@pytest.mark.slow
+@pytest.mark.claim("diagnosis-engines")
+@pytest.mark.parametrize("number", range(len(numpy_faults.CASES)))
+def test_what_is_set_wrong_in_an_engine_is_named_or_placed(scenes, number):
+    planted, said = named(scenes, number)
+    assert said.first == planted, [row.words for row in said.ranked]
+    assert said.place == "" or planted == "unexplained"
+
+
+@pytest.mark.claim("diagnosis-engines")
+def test_the_fog_alone_is_too_bright(scenes):
+    planted, said = named(scenes, 2)
+    assert said.first == planted == "fog-factor"
+    assert said.ranked[0].parameter == pytest.approx(8.3, rel=1e-2)
+    assert said.rest.startswith("noise")
+    assert "which is noise" in "\n".join(said.lines)

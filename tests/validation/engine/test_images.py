@@ -1,4 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""Images of engines are found and compared with the reference of their pixels; hints say what looks wrong."""
+
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,6 +10,7 @@ import pytest
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
 from validation.clock import Timing
+from validation.engine.hints import find_hints
 from validation.engine.images import TIMES, EngineImage, find_images, image_times, images_size, measure_image
 from validation.scenes.loading import load_scene
 
@@ -24,7 +28,7 @@ def truth_of(pixel):
     return SimpleNamespace(**layers, **bounds, light_angle=np.ones(SHAPE[:2]))
 
 
-def write(folder, name, **layers):
+def written(folder, name, **layers):
     path = folder / name
     write_exr(path, Image(layers or {"total": np.ones(SHAPE, dtype=np.float32)}))
     return path
@@ -32,7 +36,7 @@ def write(folder, name, **layers):
 
 def test_files_are_found_by_the_name_of_their_scene(tmp_path):
     for name in ("open-fog.exr", "hall.godot.exr", "hall.unreal 5.4.exr", "hall.small.exr", "mine.EXR"):
-        write(tmp_path, "x.exr").rename(tmp_path / name)
+        written(tmp_path, "x.exr").rename(tmp_path / name)
     (tmp_path / "notes.txt").write_text("not an image")
     images = find_images(tmp_path, SCENES)
     labels = {scene: [image.label for image in several] for scene, several in images.items()}
@@ -45,7 +49,7 @@ def test_files_are_found_by_the_name_of_their_scene(tmp_path):
 
 
 def test_images_of_a_scene_have_one_size(tmp_path):
-    first, second = write(tmp_path, "hall.a.exr"), write(tmp_path, "hall.b.exr")
+    first, second = written(tmp_path, "hall.a.exr"), written(tmp_path, "hall.b.exr")
     images = tuple(find_images(tmp_path, SCENES)["hall"])
     assert images_size(images) == (6, 4)
     write_exr(second, Image({"total": np.ones((4, 8, 3), dtype=np.float32)}))
@@ -59,7 +63,7 @@ def measured(path, *, surfaces=True):
 
 
 def test_a_layer_of_airlight_is_judged_as_such(variant, tmp_path):
-    path = write(tmp_path, "hall.exr", airlight=1.1 * AIRLIGHT, surface=SURFACE)
+    path = written(tmp_path, "hall.exr", airlight=1.1 * AIRLIGHT, surface=SURFACE)
     found = measured(path)
     assert found.judged.expected == "airlight"
     # The file holds float32: 6e-8.
@@ -71,7 +75,7 @@ def test_a_layer_of_airlight_is_judged_as_such(variant, tmp_path):
 
 
 def test_a_file_without_any_light_is_refused(variant, tmp_path):
-    path = write(tmp_path, "hall.exr", beauty=np.ones(SHAPE), matte=np.ones(SHAPE))
+    path = written(tmp_path, "hall.exr", beauty=np.ones(SHAPE), matte=np.ones(SHAPE))
     for refused in (lambda: measured(path), lambda: images_size((EngineImage("hall", "godot", path),))):
         with pytest.raises(InputError, match="has no channels R, G, B and no layer 'airlight'; it has beauty, matte"):
             refused()
@@ -91,7 +95,7 @@ def test_colours_in_integers_are_refused_by_name(tmp_path):
 def test_the_truth_that_fits_is_taken(variant, tmp_path):
     for pixel in ("centre", "area"):
         truth = truth_of(pixel)
-        path = write(tmp_path, f"{pixel}.exr", total=0.999 * (truth.airlight + truth.surface))
+        path = written(tmp_path, f"{pixel}.exr", total=0.999 * (truth.airlight + truth.surface))
         found = measured(path)
         assert (found.judged.pixel, "means over the areas" in found.notes) == (pixel, pixel == "area")
         assert found.judged.comparison.metrics.relative_bias == pytest.approx(-0.001, abs=1e-6)
@@ -99,7 +103,7 @@ def test_the_truth_that_fits_is_taken(variant, tmp_path):
 
 
 def test_an_engine_says_how_long_its_images_took(variant, tmp_path):
-    path = write(tmp_path, "hall.godot.exr")
+    path = written(tmp_path, "hall.godot.exr")
     assert image_times(path) is None
     (tmp_path / TIMES).write_text('{"hall.godot.exr": {"ms": 3.1, "quartiles": [2.9, 3.4], "device": "a card"}}')
     found = measured(path)
@@ -110,3 +114,76 @@ def test_an_engine_says_how_long_its_images_took(variant, tmp_path):
         (tmp_path / TIMES).write_text(wrong)
         with pytest.raises(InputError, match="milliseconds of a frame above 0"):
             image_times(path)
+
+
+@pytest.fixture
+def pattern():
+    """An image without symmetry, its channels apart."""
+    row, column = np.mgrid[:12, :16]
+    light = np.exp(-0.1 * (row - 3.2) ** 2 - 0.05 * (column - 10.7) ** 2) + 0.02 * column
+    return light[..., None] * np.array([0.9, 0.4, 0.2])
+
+
+def srgb(image):
+    return np.where(image <= 0.0031308, 12.92 * image, 1.055 * image ** (1 / 2.4) - 0.055)
+
+
+@pytest.mark.claim("engine-suspects")
+def test_the_right_image_raises_no_suspicion(pattern):
+    noisy = pattern * (1 + 0.005 * np.random.default_rng(3).standard_normal(pattern.shape))
+    for image in (pattern, noisy):
+        hints = find_hints(pattern, image)
+        assert hints.words == ()
+        assert abs(hints.factor - 1) < 0.002
+    assert find_hints(pattern, pattern).factor_rmse == 0
+
+
+@pytest.mark.claim("engine-suspects")
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda image: image[::-1], ["upside down"]),
+        (lambda image: image[:, ::-1], ["mirrored left to right"]),
+        (lambda image: image[..., ::-1], ["channel order B, G, R"]),
+        (srgb, ["sRGB curve"]),
+        (lambda image: math.pi * image, ["3.142 times as bright as it should be (pi), +1.65 stops"]),
+        (lambda image: image / (4 * math.pi), ["(1/(4 pi)), -3.65 stops"]),
+        (lambda image: 683 * image, ["683, lumens a watt"]),
+        (lambda image: 4 * math.pi * image[::-1], ["upside down", "(4 pi), +3.65 stops"]),
+        (lambda image: -image, ["the image is negative"]),
+    ],
+)
+def test_each_fault_is_named_and_nothing_else(pattern, change, words):
+    hints = find_hints(pattern, change(pattern)).words
+    assert len(hints) == len(words)
+    for hint, word in zip(hints, words):
+        assert word in hint
+    assert hints[-1].endswith(f"instead of {relative_rmse(pattern, change(pattern)):.3g}")
+
+
+def relative_rmse(pattern, image):
+    return np.sqrt(np.mean((image - pattern) ** 2)) / pattern.mean()
+
+
+@pytest.mark.claim("engine-suspects", tolerance="1e-12 relative")
+def test_best_factor_is_the_median_of_the_ratios_of_lit_values(pattern):
+    noisy = pattern * np.exp(0.1 * np.random.default_rng(4).standard_normal(pattern.shape))
+    noisy[2:4] = 0
+    hints = find_hints(pattern, noisy)
+    lit = (noisy > 0) & (pattern > 1e-3 * pattern.mean())
+    np.testing.assert_allclose(hints.factor, np.exp(np.median(np.log(pattern[lit] / noisy[lit]))), rtol=1e-12)
+    np.testing.assert_allclose(hints.factor_rmse, relative_rmse(pattern, hints.factor * noisy), rtol=1e-12)
+
+
+@pytest.mark.claim("engine-suspects")
+@pytest.mark.parametrize("fault", [0, 50, np.inf])
+def test_one_pixel_decides_nothing(pattern, fault):
+    """The least squares were 0.001 times the image where one pixel beside a lamp was a thousand times too bright."""
+    image = pattern.copy()
+    image[5, 6] *= fault
+    hints = find_hints(pattern, image)
+    np.testing.assert_allclose(hints.factor, 1, rtol=1e-12)
+    assert hints.words == ()
+    for factor in (math.pi, 1e-3):
+        (words,) = find_hints(pattern, factor * image).words
+        assert f"the image is {factor:.4g} times as bright" in words

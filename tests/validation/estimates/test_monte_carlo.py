@@ -1,22 +1,38 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Batches through the cache: the same numbers whatever was in it, and nothing lost by an interruption."""
+"""Batches through the cache, merged or alone: the same numbers, nothing lost by an interruption; when runs end."""
 
 import errno
 import time
 from dataclasses import fields
+from types import SimpleNamespace
 
 import mitsuba as mi
 import numpy as np
 import pytest
 
+import validation.estimates.images
 import validation.estimates.monte_carlo
 from analytic.errors import InputError
 from reference.monte_carlo.batches import LARGEST_SEED, Batches, single_batch
+from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_truth
 from reference.storage.cache import cache_folder
+from reference.storage.exr import Image
 from reference.storage.kept import fresh_results
 from tests.helpers.scenes import tiny_scene
+from validation.estimates.agreement import MASK_PIXELS, pixel_angle
+from validation.estimates.images import (
+    Budget,
+    batch_plan,
+    cloud_orders,
+    monte_carlo_reference,
+    near_light,
+    relative_errors,
+)
+from validation.estimates.merge import merged_references
 from validation.estimates.monte_carlo import BLOCK, monte_carlo_batches
+from validation.estimates.quadrature import truth_image
+from validation.scenes.loading import LoadedScene, load_scene
 
 
 @pytest.fixture
@@ -164,3 +180,231 @@ def test_a_fresh_run_traces_again_what_is_older_than_it(scene, traced):
 def test_seeds_out_of_range_are_refused(scene, traced, seed):
     with pytest.raises(InputError, match=rf"seed: got {seed} for 2 batches"):
         volpath(scene, batches=2, first_seed=seed)
+
+
+SHAPE = (3, 4, 3)
+
+
+def batch_means(seeds):
+    """Random batch means, the same for a seed in every file, (batches, 2, height, width, 3)."""
+    return np.stack([np.random.default_rng(seed).exponential(size=(2, *SHAPE)) for seed in seeds])
+
+
+def header(seeds, words):
+    return {
+        "airlight:scene": "fog",
+        "airlight:scene_digest": "ab12",
+        "airlight:estimator": "volpath",
+        "airlight:spp": 16 * len(seeds),
+        "airlight:batch_spp": 16,
+        "airlight:batches": len(seeds),
+        "airlight:seed": min(seeds),
+        "airlight:seeds": words,
+        "airlight:version:mitsuba": "3.9.1",
+    }
+
+
+def reference(numbers, words, **changes):
+    means = batch_means(numbers)
+    layers = {}
+    for number, name in enumerate(("airlight", "surface")):
+        layers[name] = means[:, number].mean(axis=0)
+        layers[f"{name}_se"] = means[:, number].std(axis=0, ddof=1) / np.sqrt(len(numbers))
+    own = {f"airlight:{name.replace('__', ':')}": value for name, value in changes.items()}
+    return Image(layers, np.full(SHAPE[:2], 7.0), header(numbers, words) | own)
+
+
+A, B, C = (range(4), "0-3"), ((4, 5, 9), "4-5,9"), ((6, 7, 8, 10, 11), "6-8,10-11")
+
+
+@pytest.mark.claim("merge")
+def test_merged_moments_are_those_of_all_batches():
+    merged = merged_references([(words, reference(seeds, words)) for seeds, words in (A, B, C)])
+    means = batch_means(range(12))
+    for number, name in enumerate(("airlight", "surface")):
+        np.testing.assert_allclose(merged.layers[name], means[:, number].mean(axis=0), rtol=1e-13)
+        error = means[:, number].std(axis=0, ddof=1) / np.sqrt(12)
+        np.testing.assert_allclose(merged.layers[f"{name}_se"], error, rtol=1e-12)
+    expected = {"spp": 192, "batches": 12, "seed": 0, "seeds": "0-11", "merged": 3, "estimator": "volpath"}
+    assert {name: merged.attributes[f"airlight:{name}"] for name in expected} == expected
+
+
+@pytest.mark.claim("merge")
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"scene_digest": "cd34"}, r"a.exr and b.exr differ in the scene or its size \(ab12 and cd34\)"),
+        ({"estimator": "single-scatter"}, r"differ in the estimator \(volpath and single-scatter\)"),
+        ({"seeds": "3-5"}, "a.exr and b.exr share the seeds 3; compute one of them again with another --seed"),
+        ({"seeds": "4-9"}, "b.exr: its header names 6 seeds and 3 batches"),
+        ({"seeds": ""}, "b.exr is no Monte Carlo reference of `airlight reference`: it lacks seeds"),
+    ],
+)
+def test_files_that_do_not_go_together_are_refused(changes, words):
+    with pytest.raises(InputError, match=words):
+        merged_references([("a.exr", reference(*A)), ("b.exr", reference(*B, **changes))])
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({}, "got none of --samples, --error, --seconds; give one"),
+        ({"samples": 64, "error": 0.01}, "got --samples 64 and --error 0.01 of"),
+        ({"error": 0.01, "seconds": 3.0}, "got --error 0.01 and --seconds 3 of"),
+        ({"error": 0.0}, "--error: got 0, wanted a positive number"),
+        ({"seconds": -1.0}, "--seconds: got -1"),
+        ({"error": 1.5}, "--error: got 1.5, wanted less than 1; 0.01 is 1 %"),
+    ],
+)
+def test_exactly_one_limit_is_wanted(given, words):
+    with pytest.raises(InputError, match=words):
+        Budget(**given)
+
+
+@pytest.mark.parametrize("samples", [1, 2, 31, 64, 100, 1024, 2048, 4096, 8193, 100_000])
+def test_samples_are_split_into_batches_that_have_at_least_as_many(samples):
+    batches, each = batch_plan(Budget(samples=samples), 100)
+    assert batches >= min(32, max(2, samples))  # 32 give a standard error that is known to 13 %
+    assert each in (1, 2, 4, 8, 16, 32, 64)
+    # Never less than asked for, and not a whole batch more, but for the two that a standard error needs.
+    assert samples <= batches * each < samples + max(each, 2)
+
+
+def batches(mean, error, count=4):
+    mean, error = np.asarray(mean, float), np.asarray(error, float)
+    return Batches(tuple(range(count)), 1, mean, error**2 * count * (count - 1), np.zeros((count, 2, 3)))
+
+
+def test_errors_by_hand():
+    """Two pixels; each channel of each layer has its own error, and the largest counts."""
+    airlight = [[1.0, 2.0, 1.0], [3.0, 2.0, 1.0]]
+    airlight_error = [[0.3, 0.0, 0.0], [0.4, 0.0, 0.0]]  # red: sqrt(0.09 + 0.16)/4; the worst is 0.3 of 1
+    surface = [[5.0, 5.0, 5.0], [0.0, 5.0, 5.0]]
+    surface_error = [[0.5, 0.0, 0.0], [0.0, 0.0, 0.5]]  # 0.5 of 5 and of 10
+    traced = batches([airlight, surface], [airlight_error, surface_error])
+    errors = relative_errors(traced, np.zeros(2, dtype=bool))
+    assert errors["pooled"] == pytest.approx(0.125, rel=1e-12)
+    assert errors["worst"] == pytest.approx(0.3, rel=1e-12)
+    # Without the first pixel of the airlight: 0.4/3 pooled and worst.
+    errors = relative_errors(traced, np.array([True, False]))
+    assert (errors["pooled"], errors["worst"]) == pytest.approx((0.4 / 3, 0.4 / 3), rel=1e-12)
+
+
+@pytest.mark.claim("pixels-beside-a-light")
+def test_pixels_beside_a_light_are_those_that_the_truth_names(variant):
+    """The same pixels as from the quadrature's own angles; a light in view, one behind us, one in the sphere."""
+    behind = {"type": "point", "position": [0.3, -6.0, 1.1]}
+    hidden = {"type": "point", "position": [0.1, 0.3, 0.65]}
+    scene = mi.load_dict(tiny_scene(size=(40, 30), behind=behind, hidden=hidden))
+    truth = read_truth(scene)
+    expected = truth_image(scene, checks=2).light_angle <= MASK_PIXELS * pixel_angle(truth)
+    assert 0 < expected.sum() < 40
+    np.testing.assert_array_equal(near_light(truth, surface_hits(truth).distance), expected.ravel())
+
+
+@pytest.mark.parametrize("odd", [np.nan, np.inf])
+@pytest.mark.parametrize("layer", [0, 1])
+def test_no_target_is_met_by_what_is_no_number(odd, layer):
+    """A mean of NaN with a standard error of 0 ended a run at once."""
+    mean = np.ones((2, 4, 3))
+    mean[layer, 2] = odd
+    batches = Batches(tuple(range(32)), 1, mean, np.zeros_like(mean), np.ones((32, 2, 3)))
+    errors = relative_errors(batches, np.zeros(4, dtype=bool))
+    assert (errors["pooled"], errors["worst"]) == (np.inf, np.inf)
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """A clock of our own; `clock.now` is what it shows [s]."""
+    clock = SimpleNamespace(now=50.0)
+    monkeypatch.setattr(validation.estimates.images, "time", SimpleNamespace(monotonic=lambda: clock.now))
+    return clock
+
+
+@pytest.fixture
+def loaded(variant, monkeypatch, own_cache, clock):
+    """A scene whose batches are random numbers of relative deviation 0.4, and take a second each."""
+
+    import validation.estimates.monte_carlo
+
+    def trace(truth, seed, samples, **options):
+        clock.now += 1.0
+        mean = np.random.default_rng(seed).normal(1.0, 0.4, (2, 12, 3))
+        return single_batch(seed, samples, mean)
+
+    monkeypatch.setattr(validation.estimates.monte_carlo, "volpath_batch", trace)
+    lamp = {"type": "point", "position": [0.3, -9.0, 1.1]}  # behind the camera: no pixel is left out
+    return LoadedScene("tiny", mi.load_dict(tiny_scene(size=(4, 3), lamp=lamp)), "", "")
+
+
+def run(loaded, budget):
+    told = []
+    reference = monte_carlo_reference(loaded, "volpath", budget=budget, progress=lambda *args: told.append(args))
+    return reference, told
+
+
+def test_progress_shows_the_error_falling_to_its_target(loaded):
+    # One batch has the pooled error 0.4/sqrt(12) = 0.115, K batches 0.115/sqrt(K): some 133 for 0.01.
+    reference, told = run(loaded, Budget(error=0.01))
+    batches = reference.image.attributes["airlight:batches"]
+    assert reference.reached
+    assert 100 < batches < 200
+    assert batches % 8 == 0
+    shares = [share for share, _ in told]
+    assert shares[:8] == [0.0] * 8  # nothing is known of the error yet
+    # The share follows the estimate of the error, whose square is known to some 20 % by then.
+    assert shares[batches // 2] == pytest.approx(0.5, abs=0.15)
+    assert 0.85 < shares[-1] < 1
+    errors = [float(what.split()[5]) for _, what in told[8:]]
+    assert errors[0] > 2 * errors[-1]
+    assert told[-1][1].startswith(f"volpath, {batches} batches, pooled error 0.01")
+    assert told[-1][1].endswith(" of 0.01")
+
+
+@pytest.mark.claim("targets-of-a-run")
+def test_no_run_stops_on_a_target_before_its_error_is_known(loaded):
+    reference, _ = run(loaded, Budget(error=0.5))
+    assert reference.image.attributes["airlight:batches"] == 32
+
+
+@pytest.mark.claim("targets-of-a-run")
+def test_time_budget_never_starts_a_batch_that_would_end_too_late(loaded):
+    reference, told = run(loaded, Budget(seconds=10.5))
+    assert reference.image.attributes["airlight:batches"] == 10
+    assert [share for share, _ in told] == pytest.approx([n / 10.5 for n in range(1, 11)])
+    assert reference.reached is None
+    again, told = run(loaded, Budget(seconds=3.2))
+    # What is kept costs no time.
+    assert (again.cached, again.image.attributes["airlight:batches"]) == (10, 13)
+    assert len(told) == 3
+
+
+def test_sets_are_disjoint():
+    assert cloud_orders("1, 2,3-4,5-inf") == ("1", "2", "3-4", "5-inf")
+    assert cloud_orders("sets")[-1] == "31-inf"
+    assert cloud_orders("all") == ()
+    with pytest.raises(InputError, match="names order 3 twice"):
+        cloud_orders("1-3,3-4")
+    with pytest.raises(InputError, match="wanted for example"):
+        cloud_orders("many")
+
+
+def test_a_reference_has_the_layers_and_is_kept(variant, tmp_path, monkeypatch):
+    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path))
+    loaded = load_scene("ring", (8, 6))
+    orders = cloud_orders("1,2-inf")
+    first = monte_carlo_reference(loaded, "cloud-paths", budget=Budget(samples=64), orders=orders)
+    again = monte_carlo_reference(loaded, "cloud-paths", budget=Budget(samples=64), orders=orders)
+    assert (first.cached, again.cached) == (0, 32)
+    layers = first.image.layers
+    sampled = ("airlight", "surface", "airlight_1", "airlight_2_inf", "surface_straight")
+    assert set(layers) == {name + end for name in sampled for end in ("", "_se")} | {"opacity", "background"}
+    for name, values in layers.items():
+        np.testing.assert_array_equal(values, again.image.layers[name])
+    np.testing.assert_allclose(
+        layers["airlight"], layers["airlight_1"] + layers["airlight_2_inf"], rtol=1e-5, atol=1e-9
+    )
+    clear = layers["opacity"] == 0
+    assert clear.any()
+    assert not layers["airlight"][clear].any()
+    assert (layers["airlight"][~clear] > 0).any()

@@ -1,20 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: the study of kernels finds what is wrong, where it is wrong, and holds `exact` to its bar."""
+"""Claim: studies of kernels find what is wrong and where, and hold `exact` to its bar, on rays with a certified J."""
 
+import csv
 from dataclasses import replace
 
 import drjit as dr
 import numpy as np
 import pytest
 
+from analytic.cases import read_cases
 from analytic.errors import InputError
+from analytic.phase import PHASE_NAMES, PhaseFunction
 from realtime.errors import InputError as RealtimeInputError
 from realtime.kernels.quadrature import quadrature
+from tests.evidence.certified.integral import integrate_certified
 from tests.helpers.kernel_values import take
-from validation.kernels.cases import Values, evaluate_cases
+from validation.kernels.benchmark import measure, speed_against_error
+from validation.kernels.cases import TABLE, Values, evaluate_cases, integrate_cases, summary, write_results
 from validation.kernels.errors import errors_by_group, groups
-from validation.kernels.rays import hard_rays, slivers, table
-from validation.kernels.stability import GENERATED, gamma_difference, kernel_stability
+from validation.kernels.rays import hard_rays, slivers, table, wide_rays
+from validation.kernels.stability import GENERATED, _broken, gamma_difference, kernel_stability
 
 
 def gauss(geometry, x0, x1, medium, light):
@@ -108,3 +113,198 @@ def test_differences_of_gamma_lose_what_theory_says(variant):
     assert loss["direct"]["max"] < 1e-4
     assert loss["difference"]["median"] > 1e-3
     assert 0.05 < loss["median_rounding"] < 5
+
+
+# Rays of which single terms are below 2^-126 though their sums are far above, with the J of each. A processor that
+# flushes lost all of the first and the third, a nearly isotropic lobe, and 2.4 % of the second.
+FLUSHED = (
+    ("hazy", 132789.140625, 232308.1875, 0.0, 32985.58984375, 0.00022316776448860765, 1.2482876161892056e-33),
+    ("rayleigh", 689046.9375, 1363.2552490234375, 0.0, 372320.25, 8.510394400218502e-05, 8.723572803710459e-32),
+    ("isotropic", -438344.6875, 1188.7958984375, 0.0, 10104.048828125, 0.00013516764738596976, 3.828543456423609e-34),
+)
+
+
+def flushed(*given):
+    phase, foot, height, x0, x1, sigma_t, value = zip(*given)
+    columns = {"foot": foot, "height": height, "x0": x0, "x1": x1, "sigma_t": sigma_t}
+    arrays = {name: np.array(column, dtype=np.float64) for name, column in columns.items()}
+    return replace(table(phase, np.zeros(len(phase)), tags=["thick"] * len(phase), **arrays), value=np.array(value))
+
+
+def faults(cases, J, precision="single"):
+    """Return what values break of the bar, if the other precision is right."""
+    values = {precision: Values(cases.value, {}, np.ones(len(J), dtype=bool)) for precision in ("single", "double")}
+    values[precision] = replace(values[precision], J=np.asarray(J, dtype=np.float64))
+    return _broken(GENERATED, cases, values)
+
+
+@pytest.mark.claim("underflow-breaks-no-bar")
+@pytest.mark.parametrize("kept", [0.0, 0.5, 1.0])
+def test_what_a_processor_flushes_on_the_way_breaks_no_bar(kept):
+    cases = flushed(*FLUSHED[::2])
+    assert faults(cases, kept * cases.value) == []
+
+
+@pytest.mark.claim("underflow-breaks-no-bar")
+def test_what_remains_after_flushing_some_terms_breaks_no_bar():
+    cases = flushed(FLUSHED[1])
+    assert faults(cases, [8.516171514327399e-32]) == []
+
+
+def test_more_than_can_be_flushed_breaks_it():
+    cases = flushed(*FLUSHED)
+    assert any("float32 maximum" in words for words in faults(cases, 10 * cases.value))
+
+
+@pytest.mark.parametrize("value", [1e-20, 1e-27])
+def test_a_dim_value_that_does_not_underflow_is_held_to_the_bar(value):
+    """A short segment near the light in thick fog: its terms are far above the smallest numbers."""
+    cases = flushed(("isotropic", 5.0, 1.0, 0.0, 1.0, 10.0, value))
+    assert faults(cases, [0.0])
+    assert faults(cases, [1.001 * value])
+
+
+FILES = ("airlight_integral.csv", "airlight_integral_rays.csv")
+
+
+def test_order_of_the_rows_does_not_matter(variant, data_folder, tmp_path):
+    """Rows are evaluated by phase function and must go back to where they were."""
+    lines = (data_folder / FILES[1]).read_text().splitlines()
+    order = np.random.default_rng(5).permutation(len(lines) - 1)
+    (tmp_path / "mixed.csv").write_text("\n".join([lines[0], *(lines[1 + k] for k in order)]) + "\n")
+    straight = integrate_cases(read_cases(data_folder / FILES[1]), "quadrature", "double")
+    mixed = integrate_cases(read_cases(tmp_path / "mixed.csv"), "quadrature", "double")
+    np.testing.assert_array_equal(mixed, straight[order])
+
+
+def case_file(tmp_path, text):
+    path = tmp_path / "cases.csv"
+    path.write_text(text)
+    return path
+
+
+SHORT = "phase,t,h,x0,x1,sigma_t,value\n" + "isotropic,1,2,0,inf,0.5,1.0\n" * 4
+
+
+def test_summary_finds_the_worst_row_of_the_file(tmp_path):
+    cases = read_cases(case_file(tmp_path, SHORT))
+    counts = summary(cases, np.array([1.0, 1.1, 0.7, 1.2]))
+    # Line 1 of the file is its header, so the third case is in line 4.
+    assert (counts["rows"], counts["compared"], counts["nonfinite"], counts["worst_row"]) == (4, 4, 0, 4)
+    assert counts["max"] == pytest.approx(0.3)
+    assert counts["p50"] == pytest.approx(0.15)
+
+
+def test_values_below_float32_are_compared_in_absolute_terms(tmp_path):
+    cases = read_cases(case_file(tmp_path, "phase,t,h,x0,x1,sigma_t,value\nisotropic,1,2,0,inf,900,1e-60\n"))
+    assert summary(cases, np.array([0.0]))["max"] < 1e-20
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_written_rows_are_those_of_the_source_with_their_results(data_folder, tmp_path, name):
+    source = data_folder / name
+    cases = read_cases(source)
+    results = np.random.default_rng(3).lognormal(size=len(cases.x0)) / 3
+    write_results(cases, results, tmp_path / "out.csv")
+    with open(source, newline="") as given, open(tmp_path / "out.csv", newline="") as written:
+        before, after = list(csv.DictReader(given)), list(csv.DictReader(written))
+    assert [row | {"result": repr(float(value))} for row, value in zip(before, results, strict=True)] == after
+    assert list(after[0])[-1] == "result"
+    np.testing.assert_array_equal([float(row["result"]) for row in after], results)
+
+
+def cost(family, size, ns, error, **others):
+    spread = {"median": ns, "low": ns, "high": ns, "repetitions": 5}
+    errors = {"p99": error / 10, "max": error, "nonfinite": 0, "refused": None}
+    return {"kernel": f"{family}-{size}", "phase": "isotropic", "device": spread, "wall": spread} | errors | others
+
+
+COSTS = (
+    cost("uniform", 100, 100.0, 0.5),
+    cost("uniform", 1000, 1000.0, 5e-3),
+    cost("table", 64, 4.0, 0.05),
+    cost("quadrature", 8, 5.0, 2e-3),
+    cost("quadrature", 16, 8.0, 5e-6),
+)
+
+
+def level(levels, statistic, value):
+    return next(each for each in levels if (each["statistic"], each["level"]) == (statistic, value))
+
+
+def test_cheapest_kernel_of_each_level():
+    levels = speed_against_error(COSTS)
+    assert len(levels) == 12
+    coarse, fine, finest = (level(levels, "max", value) for value in (1e-1, 1e-2, 1e-6))
+    assert (coarse["cheapest"], coarse["ns"]) == ("table-64", 4.0)
+    assert fine["cheapest"] == "quadrature-8"
+    assert (finest["cheapest"], finest["ns"]) == (None, None)
+    # 99 % of the rays are ten times better here.
+    assert level(levels, "p99", 1e-2)["cheapest"] == "table-64"
+    assert level(levels, "p99", 1e-6)["cheapest"] == "quadrature-16"
+
+
+def test_values_that_are_not_finite_reach_no_level():
+    fast = cost("taylor", 4, 1.0, 1e-7, nonfinite=1)
+    assert level(speed_against_error([*COSTS, fast]), "max", 1e-1)["cheapest"] == "table-64"
+
+
+def test_measured_errors_and_times_are_those_of_the_kernel(variant):
+    truth, timed = wide_rays(512), wide_rays(4096, truth=False)
+    coarse, fine = (measure("quadrature", n, truth=truth, timed=timed, seconds=0.05) for n in (4, 16))
+    names = ("kernel", "family", "size", "rays")
+    assert [fine[name] for name in names] == ["quadrature-16", "quadrature", 16, 4096]
+    # The certified bound of 16 nodes is 4e-6; float32 rounds exponents of up to 60.
+    assert fine["max"] < 3e-5 < coarse["max"]
+    assert fine["nonfinite"] == 0
+    for spread in (fine["device"], fine["wall"]):
+        assert 0 < spread["low"] <= spread["median"] <= spread["high"]
+        assert spread["repetitions"] >= 5
+    assert coarse["refused"] is None
+
+
+COLUMNS = ("g", "foot", "height", "x0", "x1", "sigma_t")
+
+
+@pytest.fixture
+def rays():  # of one test, so that the truth is kept in the tests' own cache
+    return hard_rays(2048)
+
+
+def spans(column, low, high):
+    """Whether values reach within a factor of 4 of both ends and never leave the range (float32 rounding aside)."""
+    return low * 0.999 <= column.min() < 4 * low and 0.25 * high < column.max() <= high * 1.001
+
+
+def test_hard_rays_cover_every_magnitude(rays):
+    distance = np.hypot(rays.foot, rays.height)
+    assert spans(distance, 1e-6, 1e6)
+    assert spans(rays.height / distance, 1e-7, 1.0)
+    assert spans(rays.sigma_t * (rays.x0 + np.hypot(rays.x0 - rays.foot, rays.height)), 1e-6, 60)
+    assert np.abs(rays.g).max() == np.float32(0.95)
+    assert set(rays.phase) == set(PHASE_NAMES)
+    assert np.isinf(rays.x1).mean() == pytest.approx(0.1, abs=0.01)
+    assert len(set(rays.tag)) == 8
+    assert (rays.x1 > rays.x0).all()
+
+
+@pytest.mark.parametrize("draw", [lambda: hard_rays(1000), lambda: slivers(512), lambda: wide_rays(512, "hg", 0.8)])
+def test_inputs_are_exact_float32_and_values_fit_float32(draw):
+    cases = draw()
+    for name in COLUMNS:
+        column = getattr(cases, name)
+        np.testing.assert_array_equal(column, column.astype(np.float32), err_msg=name)
+    assert np.isfinite(cases.value).all()
+    assert (cases.value > 1.2e-38).all()  # the smallest normal number
+    assert cases.value.max() < 3e38
+
+
+def test_truth_is_certified(rays):
+    """A few of each tag by mpmath."""
+    for tag in set(rays.tag):
+        k = rays.tag.index(tag)
+        name = rays.phase[k]
+        phase = PhaseFunction(name, g=float(rays.g[k]), table=TABLE if name == "tabulated" else None)
+        columns = (rays.foot, rays.height, rays.x0, rays.x1, rays.sigma_t)
+        expected = integrate_certified(*(float(column[k]) for column in columns), phase, digits=16)
+        assert rays.value[k] == pytest.approx(float(expected), rel=1e-12), tag

@@ -1,11 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Intervals of shares, quantiles and rank correlations hold what they estimate as often as they say."""
+"""Intervals, p-values, powers and bands of noise hold what they estimate as often as they say."""
 
 import numpy as np
 import pytest
 from scipy import stats
 
+from tests.helpers.calibration import power
+from tests.helpers.reports import sampled, times
 from validation.statistics.intervals import binomial_interval, quantile_interval, rank_correlation
+from validation.statistics.noise import (
+    ERROR_TOLERANCE,
+    FLOORS,
+    ROUNDING,
+    error_band,
+    other_power,
+    slower_stages,
+    spread,
+)
+from validation.statistics.p_values import binomial_p, sidak, student_quantile
 
 
 @pytest.mark.parametrize(("successes", "trials"), [(0, 12), (12, 12), (3, 40), (992, 1000), (0, 0)])
@@ -79,3 +91,68 @@ def test_rank_correlation_holds_the_true_one_about_as_often_as_it_says():
             held += low <= truth <= high
         # An approximation: within 0.015 of the level, and four standard errors of a share of 2000, 0.0195.
         assert held / 2000 == pytest.approx(0.95, abs=0.035)
+
+
+def test_power_of_no_effect_is_the_level():
+    for freedom in (3.0, 15.0, np.inf):
+        assert power(0.0, freedom) == pytest.approx(0.05, rel=1e-9)
+        assert power(0.0, freedom, 0.01) == pytest.approx(0.01, rel=1e-9)
+
+
+@pytest.mark.claim("detectable-bias")
+def test_power_of_the_detectable_effect_is_ninety_percent():
+    assert power(1.959964 + 1.281552, np.inf) == pytest.approx(0.9, abs=1e-6)
+    assert power(-1.959964 - 1.281552, np.inf) == pytest.approx(0.9, abs=1e-6)
+    # The shifted law that the detectable bias uses is near the non-central one from some dozens of batches on.
+    for freedom, error in ((15.0, 0.02), (1000.0, 3e-4)):
+        effect = student_quantile(0.975, freedom) + student_quantile(0.90, freedom)
+        assert power(effect, freedom) == pytest.approx(0.9, abs=error)
+
+
+def test_sidak_and_the_binomial_law_by_hand():
+    assert sidak(0.01, 1) == pytest.approx(0.01, rel=1e-12)
+    assert sidak(0.19, 2) == pytest.approx(0.1, rel=1e-12)
+    assert binomial_p(0, 4, 0.5) == pytest.approx(2 / 16, rel=1e-12)
+    assert binomial_p(4, 4, 0.5) == pytest.approx(2 / 16, rel=1e-12)
+    assert binomial_p(2, 4, 0.5) == 1
+
+
+def test_the_band_of_an_error_is_relative_plus_rounding():
+    assert error_band("relative_rmse", 0.1) == pytest.approx(0.1 * ERROR_TOLERANCE + 24 * ROUNDING)
+    assert error_band("relative_bias", -0.1) == error_band("relative_bias", 0.1)
+    assert error_band("max", 0.1) == pytest.approx(0.2 * ERROR_TOLERANCE + FLOORS["max"])
+    assert error_band("p99", 0.0) == FLOORS["p99"]
+
+
+def test_spread_is_the_geometric_mean_of_the_quartiles():
+    wide = {"median_ms": 1.0, "low_ms": 1.0, "high_ms": 4.0, "repetitions": 9}
+    quiet = {"median_ms": 1.0, "low_ms": 1.0, "high_ms": 1.0, "repetitions": 9}
+    assert spread([{"frame": wide, "airlight": quiet}]) == pytest.approx(2.0)
+    # A single repetition, and what is shorter than a launch, say nothing of the machine.
+    assert spread([{"frame": wide | {"repetitions": 1}, "surface": wide | {"median_ms": 0.002}}]) == 1.0
+    assert spread([]) == 1.0
+
+
+def test_more_work_is_seen_in_all_that_contains_it():
+    old, new = times(1.0), times(1.0)
+    for stage in ("airlight", "frame", "light_moved", "objects_moved"):
+        new[stage] = sampled([old[stage]["median_ms"] + 0.7] * 20)
+    assert slower_stages(old, new, least=1.25, scale=1.0) == ["airlight", "frame"]
+    assert slower_stages(old, new, least=1.1, scale=1.0) == ["airlight", "frame", "light_moved", "objects_moved"]
+    assert slower_stages(new, old, least=1.1, scale=1.0) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "differs"),
+    [
+        ((0.5, 0.01), (0.69, 0.01), 0.0),  # a fifth
+        ((0.5, 0.01), (0.72, 0.01), 0.22),
+        ((0.72, 0.01), (0.5, 0.01), -0.22),
+        ((0.5, 0.06), (0.72, 0.08), 0.0),  # three standard errors are 0.3
+        ((0.5, None), (0.72, None), 0.22),  # two steps lie on a line
+        ((None, None), (0.72, 0.01), 0.0),  # one step has no power
+    ],
+)
+def test_another_power_is_beyond_tolerance_and_scatter(old, new, differs):
+    fits = [{"exponent": exponent, "standard_error": error} for exponent, error in (old, new)]
+    assert other_power(*fits) == pytest.approx(differs)

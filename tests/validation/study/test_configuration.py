@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""Claim: kernels, methods and studies are named by words, in every combination; each mistake is refused by name."""
+
 import re
+import sys
 
 import mitsuba as mi
 import numpy as np
 import pytest
 
 from analytic.errors import InputError
+from realtime.errors import InputError as MethodError
 from realtime.frame.renderer import render_frame
+from realtime.kernels.quadrature import quadrature
 from realtime.kernels.registry import KERNELS
-from realtime.methods.registry import FOG_METHODS
+from realtime.methods.registry import FOG_METHODS, METHODS
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
 from validation.study.configuration import (
@@ -17,9 +22,12 @@ from validation.study.configuration import (
     Configuration,
     chosen_configurations,
     configuration,
+    find_kernel,
     parse_settings,
     prepared,
+    split_name,
 )
+from validation.study.study import default_configurations, default_study, map_side, parse_study, read_study
 
 
 def refused(text):
@@ -102,3 +110,112 @@ def own_module(tmp_path):
     path = tmp_path / "own_configuration_for_tests.py"
     path.write_text("def f(view, on=True):\n    return 1\n\n\ndef g(view, *, kernel):\n    return 1\n")
     return path
+
+
+def test_number_behind_a_name_sets_the_first_parameter():
+    kernel = find_kernel("quadrature-24")
+    assert kernel.func is quadrature
+    assert kernel.keywords == {"nodes": 24}
+    assert find_kernel("taylor-6").keywords == {"degree": 6}
+    # The longest name of the registry wins: 'quadrature-theta-8' is no 'quadrature' of size 'theta-8'.
+    assert split_name("quadrature-theta-8") == (KERNELS["quadrature-theta"], 8)
+
+
+@pytest.mark.parametrize("name", ["fog_kernel:kernel", "fog_kernel.py:kernel", "{folder}/fog_kernel.py:kernel"])
+def test_a_users_kernel_is_found_in_the_current_folder_and_says_where_it_fails(tmp_path, monkeypatch, name):
+    folder = tmp_path / "with: colon"
+    folder.mkdir()
+    (folder / "fog_kernel.py").write_text("from beside_it import two\n\n\ndef kernel(x):\n    return two / x\n")
+    (folder / "beside_it.py").write_text("two = 2\n")
+    monkeypatch.chdir(folder)
+    for module in ("fog_kernel", "beside_it"):
+        monkeypatch.delitem(sys.modules, module, raising=False)
+    kernel = find_kernel(name.format(folder=folder))
+    assert kernel(2.0) == 1.0
+    with pytest.raises(MethodError, match=r"^kernel .*fog_kernel\.py, line 5: ZeroDivisionError"):
+        kernel(0.0)
+
+
+@pytest.mark.parametrize(
+    "name", ["gone:function", "realtime.kernels:gone", "realtime.kernels.:x", ":x", "realtime.kernels:", "math:pi"]
+)
+def test_what_is_no_kernel_is_refused_by_name(name):
+    with pytest.raises(InputError, match=f"^kernel.*{name}"):
+        find_kernel(name)
+
+
+@pytest.mark.parametrize(
+    "name", ["quadratur", "quadrature-", "quadrature-x", "quadrature-1.5", "-4", "", "quadrature--4"]
+)
+def test_other_names_are_refused(name):
+    with pytest.raises(InputError, match="wanted one of exact"):
+        find_kernel(name)
+
+
+SCENES = {"scenes": ["sphere-spot", "windows"]}
+
+
+def test_every_combination_is_a_cell():
+    study = parse_study(
+        SCENES
+        | {
+            "sizes": ["32x24", "16x12"],
+            "methods": ["ray-march", "light-volumes", "shadow-planes"],
+            "kernels": ["exact", "taylor"],
+            "maps": [64, 128],
+            "media": [{}, {"medium.sigma_t": 0.17}],
+            "parameters": {"ray-march": {"steps": [4, 9], "shadow": ["ray", "map"]}},
+        }
+    )
+    labels = {chosen.label for chosen in study.configurations}
+    assert "ray-march (steps=4, shadow=ray)" in labels  # without a map, whose size it does not know
+    assert {
+        "light-volumes (taylor, map=128)",
+        "shadow-planes (taylor)",
+        "ray-march (steps=9, shadow=map, map=64)",
+    } <= labels
+    assert len(study.configurations) == 2 * (1 + 2) + 2 * 2 + 2
+    images = list(study.images())
+    assert len(images) == 2 * 2 * 2
+    cells = [cell for image in images for cell in image]
+    assert len(set(cells)) == len(cells) == study.scene_count * study.cells_by_scene
+    assert all(len({cell.image for cell in image}) == 1 for image in images)
+    assert {cell.medium for cell in cells} == {(), ("medium.sigma_t=0.17",)}
+
+
+def test_without_a_file_every_method_of_fog_runs_at_160_by_120():
+    study = default_study(100)
+    assert list(study.scene_names())[::99] == ["random:0", "random:99"]
+    assert study.sizes == ((160, 120),)
+    fog = {name for name, record in METHODS.items() if not record.renders_clouds}
+    assert {chosen.method for chosen in default_configurations()} == fog
+    assert [map_side(chosen) for chosen in study.configurations if chosen.method == "unshadowed"] == [None]
+
+
+def test_a_file_with_its_own_scenes_and_fewer_random_ones(tmp_path):
+    (tmp_path / "hall.xml").write_text("<scene/>")
+    (tmp_path / "study.toml").write_text('scenes = ["hall.xml", "random:7"]\n[random]\ncount = 9\nfirst = 3\n')
+    study = read_study(tmp_path / "study.toml", count=2)
+    assert study.name == "study"
+    assert list(study.scene_names()) == [str(tmp_path / "hall.xml"), "random:7", "random:3", "random:4"]
+
+
+@pytest.mark.claim("sweep-studies", tolerance="none")
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        ({"scenes": ["spere-spot"]}, "'spere-spot', wanted .* did you mean 'sphere-spot'"),
+        ({"scenes": ["cumulus"]}, "cumulus scatters light many times"),
+        ({"scenes": ["windows", "windows"]}, "scenes: 'windows' is there twice"),
+        ({"sceens": ["windows"]}, "got sceens, wanted one of .* did you mean 'scenes'"),
+        ({"methods": ["unshadowed"], "kernels": ["exakt"]}, "exakt"),
+        ({"methods": ["froxel-fog"], "kernels": ["exact"]}, "kernels: none of the methods calls one"),
+        ({"methods": ["ray-march"], "parameters": {"ray-march": {"stepz": 3}}}, "stepz.*steps"),
+        ({"methods": ["light-volumes"], "maps": [64], "parameters": {"light-volumes": {"map": 3}}}, "give one of them"),
+        ({"media": [{"light.intensity": 3}]}, "media: got 'light.intensity', wanted medium.sigma_t"),
+        ({"timed": 3}, 'timed: it is of times = "alone", got times = "with"'),
+    ],
+)
+def test_mistakes_are_refused_by_name(data, message):
+    with pytest.raises(InputError, match=message):
+        parse_study(data)

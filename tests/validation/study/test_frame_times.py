@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: times are medians with quartiles, after warm-up, in turns; a slow frame is timed a few times."""
+"""Claim: times are medians with quartiles, after warm-up, in turns; peaks of memory are those of the work."""
+
+import sys
 
 import mitsuba as mi
+import numpy as np
 import pytest
 
 from realtime.frame.renderer import frame_renderer
 from realtime.methods.registry import METHODS
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
-from validation.clock import time_in_turns, time_repeated
+from validation.clock import peak_memory, time_in_turns, time_repeated
 from validation.study import frame_times as timing
 from validation.study.frame_times import time_frame
 
@@ -104,3 +107,15 @@ def test_a_slow_frame_is_timed_a_few_times(variant, monkeypatch, spent, turns):
     if turns == 1:
         assert times.frame.median_ms == pytest.approx(times.surface.median_ms + times.airlight.median_ms)
         assert all(spread.low_ms == spread.median_ms == spread.high_ms for spread in each)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux lets a process forget an earlier peak")
+def test_the_peak_is_that_of_what_was_held_together(variant):
+    def work(mebibytes):
+        held = np.ones(mebibytes * 2**17)
+        assert held.sum() > 0
+
+    work(200)  # an earlier peak does not count
+    # The kernel counts pages in batches, and the allocator takes some.
+    assert 94 < peak_memory(lambda: work(96)) < 104
+    assert peak_memory(lambda: None) < 4

@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Exponents are those of the times, a jump is called a cliff, and each kind of work has its steps."""
+"""Exponents are those of the times, a jump is called a cliff, and each kind of work has its steps and meshes."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from analytic.errors import InputError
+from realtime.scene.read_scene import read_scene
+from tests.helpers.scenes import tiny_scene
 from validation.study.configuration import configuration
 from validation.study.growth import growth, study_scaling
-from validation.study.ladders import ladder
+from validation.study.ladders import ladder, subdivided, triangles_of
 
 
 @pytest.mark.parametrize("exponent", [0.0, 0.37, 1.0, 1.7])
@@ -63,3 +66,18 @@ def test_a_study_measures_every_step_and_says_who_refuses(variant):
     assert refused["costs"] == []
     assert "map" in refused["refused"]
     assert told[-1][:2] == (4, 4)
+
+
+def test_a_scene_keeps_what_has_no_triangles_to_cut(variant):
+    box = mi.ScalarTransform4f().translate([0.13, 0.17, 0.71]).scale(0.37)
+    scene = mi.load_dict(tiny_scene(block={"type": "cube", "to_world": box}))
+    count = triangles_of(scene)
+    assert count == 12 + sum(shape.face_count() for shape in scene.shapes() if shape.id() == "floor")
+    finer = subdivided(scene, 2)
+    assert triangles_of(finer) == 16 * count
+    assert {shape.id() for shape in finer.shapes()} == {shape.id() for shape in scene.shapes()}
+    before, after = read_scene(scene), read_scene(finer)
+    assert after.features == before.features
+    assert (after.camera.width, after.camera.height) == (before.camera.width, before.camera.height)
+    with pytest.raises(InputError, match="no opaque meshes"):
+        subdivided(mi.load_dict(tiny_scene(floor=None)), 1)

@@ -1,13 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: a key changes with everything that decides the numbers of a cell, and with nothing else."""
+"""Claim: keys and results change with what decides the numbers alone; a row has every column and finite numbers."""
 
+import math
 from dataclasses import replace
 
 import mitsuba as mi
+import numpy as np
+import pytest
 
+from reference.storage.kept import fresh_results, is_kept
+from validation.metrics.errors import Metrics
 from validation.scenes.random.scene import random_name, random_parts
 from validation.study.configuration import Configuration
 from validation.study.keys import Made, cell_key, scene_identities
+from validation.study.results import cached_result
+from validation.study.row import COLUMNS, arrow_schema, property_names, row_values
+from validation.study.run import cell_row
 from validation.study.study import Cell, Measure
 
 CELL = Cell("windows", (32, 24), (), Configuration("ray-march", None, (("steps", 4), ("map", 64))))
@@ -93,3 +101,68 @@ def test_a_users_code_is_in_the_key(tmp_path):
     assert cell_key(replace(CELL, chosen=Configuration("gone:f")), MADE) != cell_key(
         replace(CELL, chosen=Configuration("gone:f")), MADE
     )
+
+
+MARCHED = Cell("random:7", (16, 12), ("medium.sigma_t=0.1",), Configuration("ray-march", None, (("steps", 4),)))
+
+
+def test_a_row_has_every_column_and_no_number_that_is_none():
+    error = Metrics(192, 0.1, math.nan, 0.2, np.float32(0.5), 0.1, 0.2, math.inf, 3, 0)
+    row = row_values(replace(cell_row(MARCHED, key="a", error=error), properties={"depth": 2}))
+    assert list(row) == [*(each.key for each in COLUMNS), "properties.depth"]
+    assert [row[f"error.{name}"] for name in ("pixels", "relative_bias", "relative_rmse", "max")] == [
+        192,
+        None,
+        0.5,
+        None,
+    ]
+    assert (row["scene"], row["seed"], row["medium"], row["parameters"]) == (
+        "random:7",
+        7,
+        "medium.sigma_t=0.1",
+        '{"steps": 4}',
+    )
+    assert (row["status"], row["times.frame.median_ms"], row["published.psnr"]) == ("done", None, None)
+    assert row["command"] == (
+        "airlight view random:7 --method ray-march --set steps=4 --change medium.sigma_t=0.1 --size 16x12"
+    )
+
+
+def test_a_parquet_holds_rows_with_units_and_meanings():
+    pa = pytest.importorskip("pyarrow", reason="the extra `sweep` is not installed")
+    row = row_values(replace(cell_row(MARCHED, key="a"), properties={"depth": 2}))
+    schema = arrow_schema(property_names([row]))
+    table = pa.Table.from_pylist([row], schema=schema)
+    assert table.to_pylist() == [row | {"properties.depth": 2.0}]
+    about = schema.field("error.bias").metadata
+    assert about == {b"unit": b"W/(m^2 sr)", b"meaning": b"mean error"}
+    assert all(each.meaning for each in COLUMNS)
+
+
+def test_what_was_computed_is_found_again_as_it_comes_from_the_disk(own_cache):
+    image = np.random.default_rng(3).normal(size=(7, 5, 3)).astype(np.float32)
+    calls = []
+
+    def compute():
+        calls.append(1)
+        return {"error": 0.1 * 3, "none": None, "pair": (1, 2)}, {"airlight": image}
+
+    first, second = (cached_result("cell-a", compute) for _ in range(2))
+    assert len(calls) == 1
+    assert (first.cached, second.cached) == (False, True)
+    assert first.data == second.data == {"error": 0.1 * 3, "none": None, "pair": [1, 2]}
+    assert first.arrays.keys() == second.arrays.keys() == {"airlight"}
+    np.testing.assert_array_equal(second.arrays["airlight"], image)
+    assert second.arrays["airlight"].dtype == np.float32
+    assert (first.measured, first.seconds) == (second.measured, second.seconds)
+    with fresh_results(2e9):
+        assert not is_kept("cell-a")
+
+
+def test_what_is_not_a_number_or_not_worth_it_is_not_kept(own_cache):
+    """A report may not hold it: better said where it comes from."""
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        cached_result("cell-a", lambda: ({"error": float("nan")}, {}))
+    refused = cached_result("cell-a", lambda: ({"status": "refused"}, {}), worth=lambda row: row["status"] == "done")
+    assert refused.data == {"status": "refused"}
+    assert not is_kept("cell-a")

@@ -1,28 +1,35 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: a cell becomes a row of finite numbers that are those of the metrics, or says why there are none."""
+"""Claim: a cell becomes a row of finite numbers that are those of the metrics, or says why; costly work asks first."""
 
 import weakref
 from dataclasses import replace
+from types import SimpleNamespace
 
 import mitsuba as mi
 import numpy as np
 import pytest
 from scipy import stats
 
+from analytic.errors import InputError
+from realtime.memory import Memory
 from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import read_scene
+from reports.commands.main import run as run_command
 from tests.helpers.scenes import tiny_scene
+from validation.estimates import agreement
 from validation.estimates.quadrature import truth_image, truth_of_pixels
 from validation.metrics.errors import error_metrics
+from validation.study import cost as expected_work
 from validation.study import reference as sampled
 from validation.study import run as module
 from validation.study.configuration import STANDARD, Configuration, configuration, prepared
+from validation.study.cost import Work, check_work
 from validation.study.reference import cell_reference, load_cell, of_image
 from validation.study.row import row_values
 from validation.study.run import run
-from validation.study.scene import configurations_for
+from validation.study.scene import check_reference, configurations_for, open_scene
 from validation.study.stated_errors import ROUNDING
-from validation.study.study import Cell, Measure
+from validation.study.study import Cell, Checks, Measure, Study
 
 SIZE = (24, 18)
 MARCH = Configuration("ray-march", None, (("steps", 200),))
@@ -194,3 +201,67 @@ def test_variants_of_shadows_are_left_out_where_nothing_casts_one():
     assert 0 < len(left) < len(STANDARD)
     assert all(not {"shadow", "map"} & set(dict(configuration.parameters)) for configuration in left)
     assert {configuration.method for configuration in left} == {configuration.method for configuration in STANDARD}
+
+
+def test_an_hour_and_the_memory_are_the_bounds(variant, monkeypatch):
+    monkeypatch.setattr(expected_work.dr, "thread_count", lambda: 2)
+    monkeypatch.setattr(expected_work, "usable_memory", lambda: Memory(10**9, "this machine has"))
+    monkeypatch.setattr(expected_work.mi, "variant", lambda: "llvm_ad_rgb")
+    check_work("x", [Work(3600, 1e9), Work(3600, 1e9)])
+    with pytest.raises(
+        InputError, match=r"^x: would take about 1 hours; ask for less, or set AIRLIGHT_FORCE=1 to start it"
+    ):
+        check_work("x", [Work(3700), Work(3600)])
+    with pytest.raises(InputError, match=r"^x: needs about 2 GB of memory, of which this machine has 1 GB; ask"):
+        check_work("x", [Work(1, 2e9)])
+    with pytest.raises(InputError, match=r"about 6\.[0-9]* years and needs"):
+        check_work("x", [Work(4e8, 2e9)])
+    check_work("x", [])
+    monkeypatch.setenv("AIRLIGHT_FORCE", "1")
+    check_work("x", [Work(1e9, 2e9)])
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["render", "open-fog", "--size", "16384x16384"],
+        ["render", "open-fog", "--size", "8x6", "--set", "steps=9999999999999"],
+        ["reference", "open-fog", "--estimator", "volpath", "--samples", "100000000000"],
+        ["study", "methods", "open-fog", "--size", "16384x16384"],
+        ["study", "map-size", "sphere-spot", "--size", "16384x16384", "--sizes", "32"],
+    ],
+    ids=" ".join,
+)
+def test_every_command_that_renders_asks(variant, tmp_path, monkeypatch, capsys, command):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(expected_work.dr, "thread_count", lambda: 2)
+    monkeypatch.setattr(expected_work, "usable_memory", lambda: Memory(16 * 10**9, "this machine has"))
+    assert run_command(command) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert "set AIRLIGHT_FORCE=1 to start it" in err
+    assert not list(tmp_path.iterdir())
+
+
+TINY = Study("tiny", ("open-fog",), sizes=((16, 12),))
+CHECKS = Checks((8, 6), {"volpath": 0.5}, {"volpath": 8})
+
+
+@pytest.mark.slow
+def test_without_patience_the_clock_decides_nothing(variant, own_cache, monkeypatch):
+    """Two runs, one of them on a machine so busy that hours pass between two batches: the same samples."""
+
+    def checked(**changes):
+        study = replace(TINY, checks=replace(CHECKS, **changes))
+        return check_reference(open_scene("open-fog", study, {}))
+
+    exact = {"margins": {"single-scatter": 0.01}, "samples": {"single-scatter": 8}}
+    hours = iter(range(0, 10**9, 3600))
+    quiet = checked(**exact)
+    own_cache.rename(own_cache.with_name("other"))
+    monkeypatch.setattr(agreement, "time", SimpleNamespace(monotonic=lambda: float(next(hours))))
+    busy = checked(**exact)
+    assert quiet
+    assert busy == quiet
+    impatient = checked(margins={"volpath": 1e-6}, patience=1.0)
+    assert not any(verdict.finished for verdict in impatient.values())

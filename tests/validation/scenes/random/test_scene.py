@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: `random:SEED` is a scene wherever one is taken, valid, the same on every run, lit, with a finite truth."""
+"""Claim: `random:SEED` is a scene wherever one is taken, valid, the same on every run, sound and lit."""
 
 import hashlib
+from dataclasses import replace
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -11,7 +13,11 @@ from realtime.scene.read_scene import read_scene
 from reference.scene.read import read_truth
 from reference.storage.scene_digest import scene_digest
 from validation.scenes.loading import load_scene
-from validation.scenes.random.scene import drawn_values
+from validation.scenes.meshes import grid, rotation
+from validation.scenes.parts import mitsuba_mesh
+from validation.scenes.random.design import COORDINATES, LARGEST_SEED, Draws, point, ranges_from
+from validation.scenes.random.lights import Light
+from validation.scenes.random.scene import Camera, draw_stage, drawn_values, reach
 
 
 @pytest.mark.claim("random-valid", tolerance="none: both readers take seeds 0 to 47, with all that was drawn")
@@ -57,3 +63,139 @@ def test_a_name_that_is_no_seed_is_refused():
             load_scene(name)
     with pytest.raises(InputError, match="wanted a whole number from 0"):
         load_scene("random:1000000001")
+
+
+_POINTS = 512
+
+
+@pytest.fixture(scope="module")
+def points():
+    return np.array([[point(seed)[name] for name in COORDINATES] for seed in range(_POINTS)])
+
+
+@pytest.mark.claim("random-cover", tolerance="a sixteenth of the range holds 0.4 to 1.6 times its share of 512 points")
+def test_the_first_points_cover_every_coordinate(points):
+    counts = np.array([np.histogram(column, bins=16, range=(0, 1))[0] for column in points.T])
+    assert counts.min() > 0.4 * _POINTS / 16
+    assert counts.max() < 1.6 * _POINTS / 16
+
+
+def test_a_seed_has_one_point_and_parts_have_streams_of_their_own():
+    assert point(5) == point(5) != point(6)
+    first, again, other = Draws(5).of("lights"), Draws(5).of("lights"), Draws(5).of("casters")
+    numbers = [first.share() for _ in range(4)]
+    assert numbers == [again.share() for _ in range(4)]
+    assert numbers != [other.share() for _ in range(4)]
+    assert numbers != [draws.share() for draws in [Draws(5, 1).of("lights")] for _ in range(4)]
+    assert min(numbers) > 0
+    assert max(numbers) < 1
+
+
+@pytest.mark.parametrize("seed", [-1, LARGEST_SEED + 1])
+def test_a_seed_that_no_scene_has_is_refused(seed):
+    with pytest.raises(InputError, match="wanted a whole number from 0"):
+        point(seed)
+
+
+@pytest.mark.claim("random-ranges", tolerance="none: what is drawn lies within the range")
+def test_what_is_set_is_drawn():
+    ranges = ranges_from(
+        {"optical_depth": [0.5, 0.7], "lights": 2, "light_kinds": {"spot": 1}, "media": {"endless": 1}}
+    )
+    for seed in range(12):
+        drawn = draw_stage(seed, ranges)
+        assert [light.kind for light in drawn.lights] == ["spot", "spot"]
+        assert [medium.bounds for medium in drawn.media] == ["endless"]
+        assert 0.5 <= drawn.media[0].optical_depth <= 0.7
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({"optical_dept": [1, 2]}, "got 'optical_dept', wanted some of scale, .*did you mean 'optical_depth'"),
+        ({"fov": [50, 20]}, r"fov is \[50, 20\]; wanted \[from, to\], two numbers from 1 to 160"),
+        ({"light_kinds": {"laser": 1}}, "got 'laser', wanted some of point, spot"),
+        ({"light_kinds": {"point": 0}}, "no weight is above 0"),
+        ({"light_kinds": {"point": -1}}, "point has the weight -1; wanted a number of 0 or more"),
+        ({"meshes": "/nowhere/at/all"}, "wanted a folder of .obj and .ply files"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_by_name(table, words):
+    with pytest.raises(InputError, match=words):
+        ranges_from(table)
+
+
+SEEDS = range(300)
+
+
+@pytest.fixture(scope="module")
+def scenes():
+    return [draw_stage(seed, ranges_from({})) for seed in SEEDS]
+
+
+def _clearance(caster, place):
+    return np.linalg.norm(np.subtract(caster.position, place)) - caster.radius
+
+
+@pytest.mark.claim("random-clear", tolerance="none: the balls around casters hold neither")
+def test_no_caster_holds_the_camera_or_a_light_unless_meant_to(scenes):
+    for drawn in scenes:
+        for caster in drawn.casters:
+            if caster.kind in ("floor", "wall", "room"):
+                continue
+            assert _clearance(caster, drawn.camera.origin) > 0, drawn.seed
+            for light in drawn.lights:
+                caged = caster.kind == "cage" and np.all(caster.position == light.position)
+                assert caged or _clearance(caster, light.position) > 0, (drawn.seed, caster.name, light.name)
+
+
+def test_all_lie_on_one_side_of_floor_and_wall(scenes):
+    for drawn in scenes:
+        near = [light.position for light in drawn.lights if light.kind != "directional"]
+        for caster in drawn.casters:
+            if caster.kind in ("floor", "wall"):
+                normal = rotation(*caster.turn) @ [0, 0, 1]
+                for place in (drawn.camera.origin, *near):
+                    assert np.subtract(place, caster.position) @ normal > 0, drawn.seed
+            if caster.kind == "room":
+                for place in (drawn.camera.origin, *near):
+                    own = rotation(*caster.turn).T @ np.subtract(place, caster.position)
+                    assert np.all(np.abs(own) < caster.mesh[0].max(axis=0) * caster.radius), drawn.seed
+
+
+@pytest.mark.claim("random-not-round", tolerance="no number has fewer than four digits after the first in 300 scenes")
+def test_no_number_is_round(scenes):
+    for drawn in scenes:
+        numbers = [drawn.scale, *drawn.centre, *drawn.camera.origin, drawn.camera.fov]
+        for medium in drawn.media:
+            numbers += [*medium.sigma_t, *medium.albedo]
+        for light in drawn.lights:
+            numbers += [*light.position, *light.colour]
+        for number in numbers:
+            assert number != float(f"{number:.4g}"), drawn.seed
+
+
+def found(*meshes):
+    """What light reaches of a stage about the origin of radius 1 under a lamp, with casters."""
+    camera = Camera(np.array([0.0, -4.0, 0.1]), np.zeros(3), 47.0, "endless", False)
+    lamp = Light("light-1", "point", np.array([0.0, 0.3, 5.0]), np.zeros(3), np.ones(3), 1.0)
+    drawn = draw_stage(0, ranges_from({}))
+    stage = replace(drawn, centre=np.zeros(3), scale=1.0, camera=camera, lights=(lamp,))
+    shapes = {f"caster-{number}": mitsuba_mesh("caster", mesh, (0.5,) * 3) for number, mesh in enumerate(meshes)}
+    return reach(stage, mi.load_dict({"type": "scene"} | shapes))
+
+
+def test_without_casters_all_is_lit(variant):
+    without = found()
+    assert (without.lit, without.near, without.camera_lit) == (1.0, 0.0, True)
+    assert without.enough
+
+
+def test_a_plate_under_the_lamp_keeps_the_light_away(variant):
+    shaded = found(grid((-30.0, -30.0, 4.0), (60.0, 0, 0), (0, 60.0, 0), (1, 1)))
+    assert (shaded.lit, shaded.camera_lit) == (0.0, False)
+    assert not shaded.enough
+
+
+def test_a_wall_before_the_camera_is_near(variant):
+    assert found(grid((-30.0, -3.0, -30.0), (60.0, 0, 0), (0, 0, 60.0), (1, 1))).near == 1.0
