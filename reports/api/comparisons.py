@@ -24,7 +24,7 @@ from reports.plotting.pictures import (
     write_png,
 )
 from reports.tables.record import Result
-from reports.tables.table import Column, Interval, Table, number, table
+from reports.tables.table import Column, Interval, Table, table
 from validation.comparison.images import Comparison
 from validation.engine.diagnose import Diagnosis
 from validation.engine.judge import EngineComparison
@@ -63,7 +63,7 @@ class ImageComparison(Comparison, Pictured):
     @property
     def lines(self) -> Sequence[str]:
         """The numbers, a line for each group."""
-        return [self.summary(), *_difference_lines(self.files)]
+        return [*self.summary().split("\n"), *_difference_lines(self.files)]
 
     def numpy(self, dtype: DTypeLike | None = None) -> Array:
         """Return `error` as an array of one's own, which can be written to."""
@@ -85,7 +85,7 @@ class ImageComparison(Comparison, Pictured):
         return colours(reference), colours(test)
 
     def _repr_html_(self) -> str:
-        from reports.tables.record import block, bullets, facts_table, picture
+        from reports.tables.record import block, bullets, picture
 
         reference, test = self._colours()
         factor, width = exposure(reference), reference.shape[1]
@@ -95,25 +95,7 @@ class ImageComparison(Comparison, Pictured):
         ]
         scale = f"relative error: blue too dark, red too bright, logarithmic from {ERROR_FLOOR:g} to {ERROR_CEILING:g}"
         shown.append(picture(self._png, width, alt=f"signed relative error of the {self.layer}", caption=scale))
-        return block(
-            self.title, *shown, facts_table(self._rows()), bullets([f"failed: {why}" for why in self.failures])
-        )
-
-    def _rows(self) -> list[tuple[str, str]]:
-        m = self.metrics
-        rows = [
-            ("relative RMSE", _percent(m.relative_rmse)),
-            ("relative bias", _percent(m.relative_bias)),
-            ("relative error, median, 99 %, largest", f"{number(m.p50)}, {number(m.p99)}, {number(m.max)}"),
-            ("pixels, masked, not finite, negative", f"{m.pixels}, {self.masked}, {m.nonfinite}, {m.negative}"),
-        ]
-        if self.statistics is not None:
-            low, high = self.statistics.relative_bias_ci
-            rows.append(("95 % interval of the bias", f"{_percent(low)} to {_percent(high)}"))
-            rows.append(("bias that would have been detected", _percent(self.statistics.detectable_bias)))
-        if self.flip is not None:
-            rows.append(("HDR-FLIP", f"none: {self.flip.note}" if self.flip.value is None else number(self.flip.value)))
-        return rows
+        return block(self.title, *shown, bullets(self.lines))
 
     @property
     def title(self) -> str:
@@ -303,7 +285,3 @@ def _differences(files: Sequence[tuple[str, str]]) -> dict[str, Any]:
 
 def _difference_lines(files: Sequence[tuple[str, str]]) -> list[str]:
     return [f"wrote            {path}: {shown}" for path, shown in files]
-
-
-def _percent(value: float) -> str:
-    return f"{number(100 * value)} %"

@@ -36,6 +36,7 @@ from validation.metrics.errors import plain
 from validation.study.frame_times import FrameTimes
 
 Array = NDArray[np.floating]
+_NOTHING = "nothing written"
 
 
 def sealed(image: Image) -> Image:
@@ -163,29 +164,20 @@ class LayeredImage(Pictured):
         return target
 
     @property
-    def lines(self) -> Sequence[str]:
-        """Facts on the image."""
-        return [f"{name}: {words}" for name, words in self.facts().items()]
-
-    def facts(self) -> dict[str, str]:
-        """Return facts on the image, in words, by name."""
-        width, height = self.size
-        return {"scene": self.scene, "size": f"{width} x {height}"} | _levels(self)
-
-    @property
     def title(self) -> str:
         """Title of the image."""
         return self.scene
 
     def _repr_html_(self) -> str:
-        from reports.tables.record import block, facts_table, picture
+        from reports.tables.record import block, bullets, picture
 
         title = self.title
         shown = [picture(self._png, self.size[0], alt=f"{title}, all light", caption="all light")]
         if np.any(self.surface):
             png = png_bytes(self.picture("airlight"))
             shown.append(picture(png, self.size[0], alt=f"{title}, the airlight", caption="airlight"))
-        return block(title, *shown, facts_table(list(self.facts().items())))
+        said = [line for line in self.lines[1:] if not line.startswith(_NOTHING)]
+        return block(title, *shown, bullets([*said, *_levels(self)]))
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.title}, {self.size[0]} x {self.size[1]})"
@@ -206,18 +198,6 @@ class Rendering(LayeredImage):
     samples: int = 1  #: rays a pixel
     device: str = ""  #: where it was rendered
     files: tuple[str, ...] = ()  #: that were written
-
-    def facts(self) -> dict[str, str]:
-        """Return facts on the frame, in words, by name."""
-        facts = super().facts() | {"method": self.label, "precision": self.precision}
-        if self.times is not None:
-            frame = self.times.frame
-            facts["a frame"] = (
-                f"{number(frame.median_ms)} ms, quartiles {number(frame.low_ms)}..{number(frame.high_ms)}"
-            )
-            facts["of it airlight"] = f"{number(self.times.airlight.median_ms)} ms"
-            facts["after the light moved"] = f"{number(self.times.medians['light_moved'])} ms"
-        return facts | ({"notes": " ".join(self.notes)} if self.notes else {})
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `airlight render --json` prints: the times are there if they were measured [ms]."""
@@ -319,13 +299,6 @@ class Reference(LayeredImage):
             lines.append(f"  a standard error from {batches} batches is known to {known:.0f} % only")
         return lines if self.passed else [*lines, "  the target error was not reached"]
 
-    def facts(self) -> dict[str, str]:
-        """Return facts on the reference, in words, by name."""
-        kind = "mean bound of the airlight's error" if self.bound is not None else "standard error of the image"
-        error = {kind: f"{number(100 * self.relative_error)} %"} if math.isfinite(self.relative_error) else {}
-        words = {name.replace("_", " "): str(value) for name, value in self.details.items() if value is not None}
-        return super().facts() | {"estimator": self.estimator} | error | words
-
     @property
     def title(self) -> str:
         """Title of the reference."""
@@ -409,7 +382,7 @@ def _written(files: Sequence[str], size: tuple[int, int]) -> list[str]:
     shown = " x ".join(map(str, size))
     what = {True: "airlight, surface, their sum, depth", False: "a picture"}
     lines = [f"wrote {path}: {what[path.lower().endswith('.exr')]}, {shown} pixels" for path in files]
-    return lines or ["nothing written: -o NAME.png writes a picture, -o NAME.exr the layers"]
+    return lines or [f"{_NOTHING}: -o NAME.png writes a picture, -o NAME.exr the layers"]
 
 
 def as_array(values: Array, dtype: DTypeLike | None, copy: bool | None) -> Array:
@@ -421,13 +394,13 @@ def as_array(values: Array, dtype: DTypeLike | None, copy: bool | None) -> Array
     return values.copy() if copy else values
 
 
-def _levels(image: LayeredImage) -> dict[str, str]:
+def _levels(image: LayeredImage) -> list[str]:
     """Return the mean of each layer, and how many of its pixels are not finite or negative."""
-    levels = {}
+    levels = []
     for name, values in (("airlight", image.airlight), ("surface", image.surface)):
         finite = np.isfinite(values)
         mean = float(values[finite].mean(dtype=np.float64)) if finite.any() else math.nan
         odd = [f"{int((~finite).any(axis=-1).sum())} pixels not finite"] if not finite.all() else []
         odd += [f"{int((values < 0).any(axis=-1).sum())} pixels negative"] if (values < 0).any() else []
-        levels[f"mean {name}"] = ", ".join([f"{number(mean, 4)} W/(m^2 sr)", *odd])
+        levels.append(", ".join([f"mean {name} {number(mean, 4)} W/(m^2 sr)", *odd]))
     return levels
