@@ -6,7 +6,6 @@ They are drawn from report.json and the EXR files beside it, without Mitsuba.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from math import log10
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from reference.storage.exr import read_exr
 from reference.storage.files import write_text
 from reports.data.json_files import read_json
 from reports.data.reader import load_report
-from reports.plotting.figure import ENDINGS, new_figure, save_figure, show_picture
+from reports.plotting.figure import ENDINGS, new_figure, save_figure, show_picture, speed_panel
 from reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure, tone_mapped
 from reports.plotting.style import COLOURS, WIDTHS, report_styles
 from reports.tables.drawing import latex
@@ -114,32 +113,13 @@ def draw_speed(scenes: Sequence[Mapping[str, Any]], column: str) -> Any:
     figure = new_figure(width, down * min(0.75 * width / across, 2.4) + 0.14 * legend + 0.1)
     panels = figure.subplots(down, across, squeeze=False)
     for panel, (name, entries) in zip(panels.flat, timed.items()):
-        for entry in entries:
-            frame, error = entry["times"]["frame"], entry["error"]["relative_rmse"]
-            if not error:  # an error of 0 has no place on a logarithmic axis
-                continue
-            middle = frame["median_ms"]
-            spread = [[middle - frame["low_ms"]], [frame["high_ms"] - middle]]
-            panel.errorbar([middle], [error], xerr=spread, linestyle="none", **styles[entry["label"]])
-        panel.set(xscale="log", yscale="log", xlabel="time of a frame [ms]")
-        panel.set_title(name, parse_math=False)  # a dollar in a file name must not begin a formula
-        plain_times(panel)
+        speed_panel(panel, name, entries, styles)
     for panel in panels.flat[len(timed) :]:
         panel.set_axis_off()
     figure.supylabel("relative RMSE of the airlight [1]", fontsize="medium")
     handles = [panels.flat[0].plot([], [], linestyle="none", **style)[0] for style in styles.values()]
     figure.legend(handles, list(styles), loc="outside lower center", ncols=3 if double else 1)
     return figure
-
-
-def plain_times(panel: Any) -> None:
-    """Name 1, 2 and 5 of each decade, in plain numbers: times often span less than one."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    low, high = panel.get_xlim()
-    panel.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if log10(high / low) < 1.7 else (1,)))
-    panel.xaxis.set_major_formatter(FuncFormatter(lambda value, position: f"{value:g}"))
-    panel.xaxis.set_minor_formatter(NullFormatter())
 
 
 # Images with insets: the two squares in which the methods are wrong the most

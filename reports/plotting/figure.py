@@ -69,3 +69,36 @@ def show_picture(panel: "Axes", picture: Any, title: str = "", size: float = 6) 
     panel.set(xticks=[], yticks=[])
     panel.grid(False)
     panel.set_title(title, fontsize=size, parse_math=False)  # a dollar in a name must not begin a formula
+
+
+def speed_panel(
+    panel: "Axes", title: str, entries: Iterable[Mapping[str, Any]], styles: Mapping[str, Mapping[str, Any]]
+) -> dict[str, Any]:
+    """Draw times of frames, with quartiles, against errors of methods that have both; return their points by label."""
+    points = {}
+    for entry in entries:
+        frame, error = (entry["times"] or {}).get("frame"), (entry["error"] or {}).get("relative_rmse")
+        if frame and error:  # an error of 0 has no place on a logarithmic axis
+            middle = frame["median_ms"]
+            spread = [[middle - frame["low_ms"]], [frame["high_ms"] - middle]]
+            style = {**styles[entry["label"]], "linestyle": "none"}
+            points[entry["label"]] = panel.errorbar([middle], [error], xerr=spread, **style).lines[0]
+    panel.set(xscale="log", yscale="log", xlabel="time of a frame [ms]")
+    panel.set_title(title, parse_math=False)  # a dollar in a file name must not begin a formula
+    plain_times(panel)
+    return points
+
+
+def plain_times(panel: "Axes") -> None:
+    """Name 1, 2 and 5 of each decade, in plain numbers: times often span less than one."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = panel.get_xlim()
+    panel.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 50 * low else (1,)))
+    panel.xaxis.set_major_formatter(FuncFormatter(lambda value, position: f"{value:g}"))
+    panel.xaxis.set_minor_formatter(NullFormatter())
+
+
+def short(label: str, most: int = 56) -> str:
+    """Return a label that leaves room for others."""
+    return label if len(label) <= most else label[: most - 1].rstrip(" ,") + "\N{HORIZONTAL ELLIPSIS}"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reports.page.chart import short
+from reports.plotting.figure import plain_times, short
 from reports.plotting.style import report_styles
 from reports.sweep.claims import TARGETS
 from reports.sweep.read import Numbers
@@ -121,7 +121,7 @@ def medians(said: Summary) -> "Figure | None":
         style = styles[sample.label] | {"linestyle": "none", "markersize": 8}
         panel.errorbar(x, y, xerr=[[x - x0], [x1 - x]], yerr=[[y - y0], [y1 - y]], elinewidth=0.8, **style)
     panel.set(xscale="log", yscale="log", xlabel=TIME, ylabel=ERROR)
-    _plain_times(panel)
+    plain_times(panel)
     panel.grid(True, which="major", linewidth=0.4, alpha=0.5)
     handles = [panel.plot([], [], label=_cut(s.name), **(styles[s.label] | {"linestyle": "none"}))[0] for s in shown]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
@@ -219,12 +219,3 @@ def _own(sample: Sample) -> str:
 def _cut(name: str) -> str:
     """Return a name that leaves room for a panel: that of a user method may be a path."""
     return short(name, 38)
-
-
-def _plain_times(panel: "Axes") -> None:
-    """Name 1, 2 and 5 of each decade of the times, in plain numbers."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    panel.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    panel.xaxis.set_major_formatter(FuncFormatter(lambda value, position: f"{value:g}"))
-    panel.xaxis.set_minor_formatter(NullFormatter())
