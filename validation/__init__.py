@@ -14,7 +14,7 @@ Read in this order:
 - `papers/`: the claims of papers as data, and the experiments that decide them;
 - `slab/`: a slab by order of scattering, on both sides;
 - `comparison/`: images from files and engines against the truth;
-- `motion/`: sequences of frames against the reference of each: flicker, lag, ghosts.
+- `motion/`: independent renders and sequences of frames: bias apart from noise, flicker, lag, ghosts.
 
 `baselines/` holds what `bench --scaling` measured once.
 """

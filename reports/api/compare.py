@@ -58,7 +58,7 @@ def compare(
     `--diagnose` predicts the image that each of a hundred faults would make, of medium, lights, camera and encoding,
     and ranks them by evidence. `--fit` finds the parameters of the fog that explain the image, each with its 95 %
     interval. `--frames` compares all frames of a scene that changes with the reference of each: flicker, lag, ghosts.
-    See docs/your-engine.md.
+    Independent renders of one frame tell bias from noise. See docs/your-engine.md.
 
     Parameters
     ----------
@@ -66,8 +66,8 @@ def compare(
         What to compare with: an EXR file, or a scene (built-in or a Mitsuba XML file); from Python also what
         `reference` or `render` returned, or an array (height, width, 3) [W/(m^2 sr)].
     test
-        The image to judge, an EXR file; from Python also a result or an array. With `--frames`, the files of all
-        frames, with # for each digit of their number, such as frames/####.exr.
+        The image to judge, an EXR file; from Python also a result or an array. With a scene also several files, # for
+        each digit of their number, such as frames/####.exr: the frames of `--frames`, or independent renders.
     layer
         Layer to compare: 'airlight' by default, or 'total' (R/G/B) if there is no airlight.
     holds
@@ -129,11 +129,11 @@ def compare(
     given = [name for name, value in about.items() if value is not None]
     if diagnose and fit is not None:
         raise InputError("diagnose, fit: are two questions; give one of them")
-    if frames is not None:
+    if frames is not None or (scene is not None and _are_several(test)):
         single: dict[str, Any] = about | {"mask": mask, "diagnose": diagnose or None, "fit": fit}
         others = [name for name, value in single.items() if value is not None and name != "margin"]
         if others:
-            raise InputError(f"frames: {', '.join(others)} is about one image; leave one out")
+            raise InputError(f"{', '.join(others)}: is about one image; leave it out for several files")
         return _frames(
             str(scene), test, frames, layer=layer, holds=holds, pixel=pixel, margin=margin, progress=progress
         )
@@ -170,9 +170,16 @@ def compare(
         return _with_scene(str(scene), path, files=files, progress=progress, **how, **options)
 
 
+def _are_several(test: Any) -> bool:
+    """Return whether a word stands for several files: # for the digits of their numbers."""
+    return isinstance(test, str | os.PathLike) and "#" in str(test) and not Path(test).exists()
+
+
 def _frames(scene: str, test: Any, frames: Any, *, progress: Any, **how: Any) -> "FramesComparison":
     if not isinstance(test, str | os.PathLike):
         raise InputError("frames: wanted the files of all frames, such as 'frames/####.exr'; save the images first")
+    if frames is None:
+        return _runs(scene, test, progress=progress, **how)
     from reports.api.comparisons import FramesComparison
     from reports.machine.environment import activate
     from validation.motion.frames_file import frame_paths, read_frames
@@ -183,6 +190,17 @@ def _frames(scene: str, test: Any, frames: Any, *, progress: Any, **how: Any) ->
 
     with telling(progress, "frames") as tell:
         return FramesComparison(compare_frames(scene, test, frames, progress=tell, **how))
+
+
+def _runs(scene: str, test: Any, *, progress: Any, **how: Any) -> "FramesComparison":
+    from reports.api.comparisons import FramesComparison
+    from reports.machine.environment import activate
+    from validation.motion.noise import compare_runs, run_paths
+
+    run_paths(test)  # what is missing is refused before Mitsuba starts
+    activate()
+    with telling(progress, "the reference") as tell:
+        return FramesComparison(compare_runs(scene, test, progress=tell, **how))
 
 
 def _is_scene(word: Any) -> bool:

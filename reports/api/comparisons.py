@@ -31,6 +31,7 @@ from validation.engine.judge import EngineComparison
 from validation.fit.fit import Fit
 from validation.metrics.errors import FLOOR, Metrics, colours
 from validation.motion.judge import MotionComparison
+from validation.motion.noise import NoiseComparison
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -223,14 +224,14 @@ class Fitted(Result):
 
 @dataclass(frozen=True, repr=False)
 class FramesComparison(Result):
-    """How far the frames of a scene that changes are from the reference of each."""
+    """How far frames of a scene that changes are from the reference of each, or independent renders from theirs."""
 
-    compared: MotionComparison
+    compared: MotionComparison | NoiseComparison
 
     @property
     def title(self) -> str:
         """What was compared."""
-        return f"{self.compared.pattern} against {self.compared.scene}: {self.compared.verdict.words}"
+        return f"{self.compared.pattern} against {self.compared.scene}: {self.compared.words}"
 
     @property
     def passed(self) -> bool:
@@ -243,7 +244,7 @@ class FramesComparison(Result):
         return self.compared.lines()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight compare SCENE FILES --frames FILE --json` prints."""
+        """Return what `airlight compare SCENE FILES [--frames FILE] --json` prints."""
         return self.compared.to_json()
 
 

@@ -33,6 +33,14 @@ class Estimate:
 UNKNOWN = Estimate(None)
 
 
+def told(estimate: Estimate, times: float = 1.0) -> str:
+    """Return a number, so many times, and its standard error in words."""
+    if estimate.value is None:
+        return "unknown"
+    error = "" if estimate.error is None else f" +- {times * estimate.error:.2g}"
+    return f"{times * estimate.value:.4g}{error}"
+
+
 def products(columns: Array, side: int = BLOCK) -> Array:
     """Return the sums of the products of columns by group of blocks, (groups, columns, columns).
 

@@ -31,7 +31,7 @@ from validation.engine.judged_layer import JudgedLayer, expected_layer, judged_l
 from validation.engine.seen import PIXELS, Progress, pixel_kinds, scene_of_size
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import plain
-from validation.motion.blocks import Estimate
+from validation.motion.blocks import told
 from validation.motion.frames_file import FramesRecord, frame_paths, read_frames
 from validation.motion.measures import AGES, Measures, Sequence, measure
 from validation.scenes.loading import load_scene
@@ -81,6 +81,11 @@ class MotionComparison:
         return self.masks["all"]
 
     @property
+    def words(self) -> str:
+        """Return the verdict."""
+        return self.verdict.words
+
+    @property
     def failures(self) -> tuple[str, ...]:
         """Why the comparison must be called failed; empty if it is not."""
         reasons = []
@@ -102,12 +107,12 @@ class MotionComparison:
             f"{self.layer.holds}, pixel {self.pixel}, known to {self.reference_error:.2g} of its mean",
             f"values           {found.values}, {found.nonfinite} not finite; the reference changes by "
             f"{_percent(found.reference_change)} a frame",
-            f"relative RMSE    {_told(found.relative_rmse, 100)} %, relative bias {_told(found.bias, 100)} %",
-            f"flicker          {_told(found.flicker, 100)} % a frame, {_told(found.flicker_beside_lag, 100)} % beside "
+            f"relative RMSE    {told(found.relative_rmse, 100)} %, relative bias {told(found.bias, 100)} %",
+            f"flicker          {told(found.flicker, 100)} % a frame, {told(found.flicker_beside_lag, 100)} % beside "
             "the lag",
-            f"lag              {_told(lag.lag)} frames: delay {_told(lag.delay)}, persistence "
-            f"{_told(lag.persistence)}, gain {_told(lag.gain)}",
-            f"ghost            {_told(found.ghost, 100)} % of the light that left in {AGES} frames"
+            f"lag              {told(lag.lag)} frames: delay {told(lag.delay)}, persistence "
+            f"{told(lag.persistence)}, gain {told(lag.gain)}",
+            f"ghost            {told(found.ghost, 100)} % of the light that left in {AGES} frames"
             + (
                 ""
                 if found.trail_rmse is None
@@ -124,8 +129,8 @@ class MotionComparison:
         for name, each in self.masks.items():
             if name != "all":
                 lines.append(
-                    f"{name:16} {each.values} values: relative RMSE {_told(each.relative_rmse, 100)} %, flicker "
-                    f"{_told(each.flicker, 100)} %, lag {_told(each.lag.lag)}, ghost {_told(each.ghost, 100)} %"
+                    f"{name:16} {each.values} values: relative RMSE {told(each.relative_rmse, 100)} %, flicker "
+                    f"{told(each.flicker, 100)} %, lag {told(each.lag.lag)}, ghost {told(each.ghost, 100)} %"
                 )
         shifts = ", ".join(f"{shift:+d}: {_percent(error)}" for shift, error in self.shifts.items())
         lines += [f"shifted          {shifts} off the reference so many frames before"] if shifts else []
@@ -377,13 +382,6 @@ def motion_verdict(measures: Measures, reference_error: float = 0.0) -> MotionVe
     if gain.value is not None and abs(gain.value - 1) > max(_SURE * (gain.error or 0.0), 1e-5):
         factor = f", and a factor of {gain.value:.5g}"
     return MotionVerdict("noise", f"no lag: noise of {_percent(noise)}{factor}")
-
-
-def _told(estimate: Estimate, times: float = 1.0) -> str:
-    if estimate.value is None:
-        return "unknown"
-    error = "" if estimate.error is None else f" +- {times * estimate.error:.2g}"
-    return f"{times * estimate.value:.4g}{error}"
 
 
 def _oldest(measures: Measures) -> str:

@@ -1,0 +1,332 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Independent renders of one frame against its reference: how much of the error is bias, and how much is noise.
+
+The reference has no noise: every random part is the renderer's. With e_i the error of run i of N, all relative to the
+mean of the reference, and G_ij the mean of e_i e_j over values,
+
+- the variance is V = (sum of G_ii - sum of G_ij / N)/(N - 1), the mean over values of the variance over runs;
+- the squared bias is b^2 = the mean of G_ij over pairs i != j. The naive mean of the squared mean error is b^2 + V/N.
+  By chance b^2 may be negative: it is printed as it is, and its root only from two errors on;
+- the relative bias B is the mean of the B_i = sum of e_i over sum of the reference, with Student's interval. A bias
+  that changes its sign over the image shows in b^2 alone.
+
+Errors of V and b^2 come from leaving out one run at a time. N runs averaged have the error sqrt(b^2 + V/N).
+
+**Noise between pixels.** With n_i = (e_i - mean of e) sqrt(N/(N - 1)) the error spectrum is the periodogram of n_i over
+its mean square, in rings of the frequency: white noise is 1 everywhere, however unequal the pixels are (Celarek, Jakob,
+Wimmer and Lehtinen 2019). The low share is its mean below 1/8 cycle a pixel: below 0.3 the noise is blue, above 1.5 it
+is filtered. The blur gain is the root mean square of n after a Gaussian of deviation s over that before, times
+2 sqrt(pi) s: 1 for white noise.
+"""
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+from scipy.optimize import brentq
+from scipy.stats import nct, t
+
+from analytic.errors import InputError
+from reference.storage.exr import read_exr
+from validation.engine.images import image_times
+from validation.engine.judge import relative_bound, truths
+from validation.engine.judged_layer import JudgedLayer, expected_layer, judged_layer
+from validation.engine.seen import Progress, pixel_kinds, scene_of_size
+from validation.metrics.errors import plain
+from validation.motion.blocks import Estimate, estimates, told
+
+Array = NDArray[np.float64]
+
+RINGS = 8  #: of the error spectrum, from 0 to 1/2 cycle a pixel
+BLURS = (1.0, 2.0, 4.0)  #: deviations of Gaussians [pixels]
+GOALS = (0.05, 0.01, 0.002)  #: relative errors whose time is told
+_LOW = 0.125  # cycles a pixel
+_DOUBTFUL = 0.01  # of the sum of squares: a single value from which on the variance may not exist
+_POWER, _LEVEL = 0.9, 0.05  # with which a bias is detected
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What independent renders of a frame are like; everything is relative to the mean of the reference."""
+
+    runs: int
+    bias: Estimate
+    bias_ci: tuple[float, float]  #: 95 %
+    detectable_bias: float  #: that would be found nine times of ten
+    squared_bias: Estimate
+    variance: Estimate
+    relative_rmse: float  #: of one run, root of the mean over runs
+    largest_share: float  #: of the sum of squared deviations, by a single value
+    spectrum: tuple[float, ...]  #: by ring
+    low_share: float
+    blurred_rmse: tuple[float, ...]  #: after each of `BLURS`
+    blur_gain: tuple[float, ...]
+    seconds: float | None = None  #: of a run [s]
+
+    @property
+    def root_bias(self) -> float | None:
+        """The root of the squared bias, where it is above zero by two errors."""
+        value = self.squared_bias.value
+        return math.sqrt(value) if value is not None and self.squared_bias.above(2) else None
+
+    @property
+    def efficiency(self) -> float | None:
+        """1/(V T), which does not change where samples and time are both doubled [1/s]."""
+        variance = self.variance.value
+        return 1 / (variance * self.seconds) if variance and self.seconds else None
+
+    def seconds_to(self, error: float) -> float | None:
+        """Return the time until averaged runs have an error [s]; infinite where the bias is larger."""
+        if self.seconds is None or self.variance.value is None:
+            return None
+        bias = (self.root_bias or 0.0) ** 2
+        return self.variance.value * self.seconds / (error**2 - bias) if error**2 > bias else math.inf
+
+    def after(self, runs: int) -> float:
+        """Return the error of so many averaged runs."""
+        return math.sqrt(max((self.squared_bias.value or 0.0) + (self.variance.value or 0.0) / runs, 0.0))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return every number by name; `NAME_se` is the standard error of NAME."""
+        found: dict[str, Any] = {}
+        for name, value in asdict(self).items():
+            own = getattr(self, name)
+            told = isinstance(own, Estimate)
+            found |= {name: own.value, f"{name}_se": own.error} if told else {name: value}
+        found |= {"root_bias": self.root_bias, "efficiency": self.efficiency}
+        found["error_of_runs"] = {str(count): self.after(count) for count in (1, 4, 16, 64, 256)}
+        return found | {"seconds_to": {str(goal): self.seconds_to(goal) for goal in GOALS}}
+
+
+def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None = None) -> Noise:
+    """Return what renders of a frame are like.
+
+    `reference`: (height, width, channels), finite; `runs`: independent renders of that shape, at least two, finite;
+    `seconds`: what one takes. Raises InputError for fewer, a dark reference, and runs that are the same.
+    """
+    count, mean = len(runs), float(reference.mean())
+    if count < 2:
+        raise InputError(f"runs: got {count}, wanted at least two independent renders of the frame")
+    if not mean > 0:
+        raise InputError("runs: the reference is dark: nothing is relative to it")
+    errors = np.array([(run - reference) / mean for run in runs])
+    if (errors[1:] == errors[0]).all():
+        raise InputError("runs: all are the same, bit by bit; wanted renders with a seed of their own each")
+    flat = errors.reshape(count, -1)
+    squared_bias, variance = _parts(flat @ flat.T / flat.shape[1])
+    biases = flat.mean(axis=1)
+    error = float(biases.std(ddof=1)) / math.sqrt(count)
+    bias = float(biases.mean())
+    half = float(t.ppf(0.975, count - 1)) * error
+    noise = (errors - errors.mean(axis=0)) * math.sqrt(count / (count - 1))
+    square = float(np.mean(noise**2))
+    spectrum, low = _spectrum(noise)
+    blurred = [np.array([gaussian_filter(each, (blur, blur, 0), mode="wrap") for each in errors]) for blur in BLURS]
+    gains = []
+    for blur, values in zip(BLURS, blurred, strict=True):
+        apart = (values - values.mean(axis=0)) * math.sqrt(count / (count - 1))
+        gains.append(math.sqrt(float(np.mean(apart**2)) / square) * 2 * math.sqrt(math.pi) * blur)
+    return Noise(
+        runs=count,
+        bias=Estimate(bias, error),
+        bias_ci=(bias - half, bias + half),
+        detectable_bias=detectable(count) * error * math.sqrt(count),
+        squared_bias=squared_bias,
+        variance=variance,
+        relative_rmse=math.sqrt(float(np.mean(errors**2))),
+        largest_share=float(np.max(noise**2) / np.sum(noise**2)),
+        spectrum=spectrum,
+        low_share=low,
+        blurred_rmse=tuple(math.sqrt(float(np.mean(values**2))) for values in blurred),
+        blur_gain=tuple(gains),
+        seconds=seconds,
+    )
+
+
+def detectable(runs: int) -> float:
+    """Return the bias, in deviations of one run, that a test of Student at 5 % finds nine times of ten."""
+    limit = float(t.ppf(1 - _LEVEL / 2, runs - 1))
+    root = math.sqrt(runs)
+
+    def lacking(bias: float) -> float:
+        found = float(nct.sf(limit, runs - 1, bias * root))  # on its side: the other is rarer than 1e-6
+        return (1.0 if math.isnan(found) else found) - _POWER
+
+    return float(brentq(lacking, 0.0, 10 * limit / root))
+
+
+def _parts(products: Array) -> tuple[Estimate, Estimate]:
+    """Return squared bias and variance from the mean products of errors of pairs of runs."""
+    count = len(products)
+
+    def parts(total: Array, own: Array, runs: int) -> Array:
+        return np.stack([(total - own) / (runs * (runs - 1)), (own - total / runs) / (runs - 1)], axis=-1)
+
+    total, own = products.sum(), np.trace(products)
+    found = parts(total, own, count)
+    if count < 3:
+        return Estimate(float(found[0])), Estimate(float(found[1]))
+    diagonal = np.diag(products)
+    left_out = parts(total - 2 * products.sum(axis=1) + diagonal, own - diagonal, count - 1)
+    told = estimates(found, left_out)
+    return told[0], told[1]
+
+
+def _spectrum(noise: Array) -> tuple[tuple[float, ...], float]:
+    """Return the error spectrum by ring, and its mean at low frequencies; NaN for rings without a frequency."""
+    power = np.mean(np.abs(np.fft.fft2(noise, axes=(1, 2))) ** 2, axis=(0, 3)) / (noise.shape[1] * noise.shape[2])
+    power /= np.mean(noise**2)
+    rows, columns = (np.fft.fftfreq(side) for side in noise.shape[1:3])
+    frequency = np.hypot(rows[:, None], columns)
+    ring = np.minimum((frequency * 2 * RINGS).astype(int), RINGS)  # the corners apart
+    ring[0, 0] = RINGS
+    known = [power[ring == each] for each in range(RINGS)]
+    low = power[(frequency > 0) & (frequency < _LOW)]
+    return tuple(float(each.mean()) if each.size else math.nan for each in known), float(
+        low.mean()
+    ) if low.size else math.nan
+
+
+@dataclass(frozen=True)
+class NoiseComparison:
+    """Independent renders of a frame against the reference of its scene."""
+
+    scene: str
+    pattern: str
+    size: tuple[int, int]
+    layer: JudgedLayer
+    pixel: str
+    reference_error: float  #: relative to the mean
+    noise: Noise
+    nonfinite: int  #: values that are not finite in some run, left out of all
+    device: str
+    margin: float | None
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """Why the comparison must be called failed; empty if it is not."""
+        reasons = [f"{self.nonfinite} values are NaN or infinite in some run"] if self.nonfinite else []
+        if self.margin is not None and max(map(abs, self.noise.bias_ci)) > self.margin:
+            reasons.append(f"the relative bias is not shown to be within +-{self.margin:.3g}")
+        return tuple(reasons)
+
+    @property
+    def words(self) -> str:
+        """Return what is said of bias and noise."""
+        noise = self.noise
+        low, high = (100 * end for end in noise.bias_ci)
+        if low <= 0 <= high and noise.root_bias is None:
+            return f"no bias in {noise.runs} runs; one of {100 * noise.detectable_bias:.2g} % would have been found"
+        if low <= 0 <= high:
+            return f"a bias that changes its sign over the image: {100 * (noise.root_bias or 0):.3g} %"
+        return f"a bias of {100 * (noise.bias.value or 0):+.3g} %, 95 % interval {low:+.3g} to {high:+.3g} %"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return every number by name."""
+        head: dict[str, Any] = {"scene": self.scene, "files": self.pattern, "size": self.size, "layer": self.layer.name}
+        head |= {"expected": self.layer.holds, "pixel": self.pixel, "reference_error": self.reference_error}
+        tail = {"nonfinite": self.nonfinite, "device": self.device or None, "verdict": self.words}
+        found: dict[str, Any] = plain(head | self.noise.to_json() | tail | {"failures": self.failures})
+        return found
+
+    def lines(self) -> list[str]:
+        """Return the numbers as text, a line for each group."""
+        noise, width, height = self.noise, *self.size
+        lines = [
+            f"scene            {self.scene}, {width} x {height}, {noise.runs} runs; reference: {self.layer.holds}, "
+            f"pixel {self.pixel}, known to {self.reference_error:.2g} of its mean",
+            f"bias             {told(noise.bias, 100)} %, squared {told(noise.squared_bias)}",
+            f"noise            {100 * math.sqrt(max(noise.variance.value or 0.0, 0.0)):.4g} % of a run, variance "
+            f"{told(noise.variance)}; relative RMSE {100 * noise.relative_rmse:.4g} %",
+            "averaged         "
+            + ", ".join(f"{count} runs: {100 * noise.after(count):.3g} %" for count in (4, 16, 64, 256)),
+            "error spectrum   "
+            + " ".join(f"{each:.3g}" for each in noise.spectrum)
+            + f"; low share {noise.low_share:.3g}",
+            "blurred          "
+            + ", ".join(
+                f"{blur:g} px: {100 * error:.3g} % (gain {gain:.3g})"
+                for blur, error, gain in zip(BLURS, noise.blurred_rmse, noise.blur_gain, strict=True)
+            ),
+        ]
+        if noise.seconds is not None:
+            times = ", ".join(f"{100 * goal:g} %: {_seconds(noise.seconds_to(goal))}" for goal in GOALS)
+            lines.append(f"time             {1000 * noise.seconds:.4g} ms a run {self.device}; to an error of {times}")
+        if noise.largest_share > _DOUBTFUL:
+            lines.append(
+                f"doubtful         one value has {100 * noise.largest_share:.3g} % of the variance: it may be infinite"
+            )
+        lines += [f"failed           {reason}" for reason in self.failures]
+        return [*lines, f"verdict          {self.words}"]
+
+
+def compare_runs(
+    scene: str,
+    pattern: str | os.PathLike[str],
+    *,
+    layer: str | None = None,
+    holds: str | None = None,
+    pixel: str | None = None,
+    margin: float | None = None,
+    progress: Progress | None = None,
+) -> NoiseComparison:
+    """Compare independent renders of a frame with the reference of its scene.
+
+    `pattern`: the EXR files, # for each digit of their numbers; the rest as of `validation.engine.judge.compare_scene`.
+    Where files do not say what a pixel is, the kind that their mean is nearer to is taken.
+    """
+    paths = run_paths(pattern)
+    images = [read_exr(path) for path in paths]
+    layers = [judged_layer(image, path, name=layer, holds=holds) for image, path in zip(images, paths, strict=True)]
+    first = layers[0]
+    for path, each in zip(paths, layers, strict=True):
+        if each.size != first.size:
+            raise InputError(
+                f"{path} has {each.size[0]} x {each.size[1]} pixels, {paths[0]} {first.size[0]} x {first.size[1]}"
+            )
+    loaded = scene_of_size(scene, first.size, paths[0])
+    reference_of = truths(loaded, progress)
+    runs = np.array([each.values for each in layers], dtype=np.float64)
+    finite = np.isfinite(runs).all(axis=0)
+
+    def distance(kind: str) -> float:
+        return float(np.mean((runs.mean(axis=0) - expected_layer(reference_of(kind), first))[finite] ** 2))
+
+    kind = min(pixel_kinds(images[0], pixel), key=distance)
+    reference = expected_layer(reference_of(kind), first)
+    time = image_times(paths[0])
+    filled = list(np.where(finite, runs, reference))
+    return NoiseComparison(
+        scene=loaded.name,
+        pattern=str(pattern),
+        size=first.size,
+        layer=first,
+        pixel=kind,
+        reference_error=relative_bound(reference_of(kind)),
+        noise=measure_noise(reference, filled, None if time is None else time[0].median_ms / 1e3),
+        nonfinite=int((~finite).sum()),
+        device="" if time is None or not time[1] else f"on {time[1]}",
+        margin=margin,
+    )
+
+
+def run_paths(pattern: str | os.PathLike[str]) -> list[Path]:
+    """Return the files of a pattern in which # stands for a digit. Raises InputError for fewer than two."""
+    path = Path(pattern)
+    paths = sorted(path.parent.glob(path.name.replace("#", "[0-9]")))
+    if len(paths) < 2:
+        raise InputError(
+            f"{pattern}: {len(paths)} files have such a name; wanted two or more independent renders, # for each digit "
+            "of their numbers, such as runs/####.exr, or --frames for the frames of a scene that changes"
+        )
+    return paths
+
+
+def _seconds(value: float | None) -> str:
+    return "unknown" if value is None else "never" if math.isinf(value) else f"{value:.3g} s"
