@@ -110,12 +110,15 @@ _FAST = ("rectangle, black, in view", "mesh, black, above")
 def test_both_estimators_agree(variant, name):
     """Rationale: they share no sample of the light: one draws points on it, the other asks Mitsuba.
 
-    Setup: ball and floor, 16 x 12 pixels, 24 batches of 256 samples, the light in the picture or not.
+    Setup: ball and floor, 16 x 12 pixels, 24 batches of 256 samples, the light in the picture or not. Behind a mesh that
+    hides nothing volpath's batches differ by 5 %: the error of 60 is below 1 % where that of 24 is 1.1 %, even if they
+    differ by 1.5 times that, three standard errors of the spread of 24.
     Expected: airlight and surface pooled within four standard errors, and 0.05 % for the shadow-ray epsilon.
     """
     kind, bsdf, in_view = _CASES[name]["lamp"]
     truth = _truth(lamp=_lamp(kind, bsdf, in_view=in_view))
-    ours, theirs = (_run(batch, truth, 256) for batch in (single_scatter_batch, volpath_batch))
+    batches = 60 if (kind, bsdf) == ("mesh", NULL) else _BATCHES
+    ours, theirs = (_run(batch, truth, 256, batches) for batch in (single_scatter_batch, volpath_batch))
     for layer in (0, 1):
         (mean, error), (other, other_error) = _pooled(ours, layer), _pooled(theirs, layer)
         together = np.hypot(error, other_error)
