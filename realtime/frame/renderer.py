@@ -33,6 +33,7 @@ from realtime.area_lights.points import LightPoints
 from realtime.errors import InputError, refusals
 from realtime.frame.adaptive_sampling import Corners, adaptive_layers, tile_corners
 from realtime.frame.light_on_ray import check_radiance
+from realtime.frame.sphere_lights import sampled_sphere, sphere_scales
 from realtime.frame.surface import Cast, surface_stages
 from realtime.kernels.table import prepare_kernel, with_tables
 from realtime.methods.interface.method import Layers, Method, Preparation, method_parameters
@@ -88,6 +89,7 @@ class FrameRenderer:
     tables: Any  #: what the kernel reads; None for most
     corners: Corners | None  #: how the tiles of the image lie; None where every pixel is computed
     extra_layers: bool  #: whether frames have the further layers that the method names
+    sphere_scales: Frozen | None  #: by what samples of sphere lights are scaled
 
     @property
     def by_rays(self) -> bool:
@@ -169,6 +171,7 @@ def frame_renderer(
         tables=prepare_kernel(kernel, type(scene.camera.origin.x)) if chosen.uses_kernel else None,
         corners=None,
         extra_layers=extra_layers and not scene.area_lights,
+        sphere_scales=sphere_scales(scene, chosen, kernel),
     )
     groups = _lights_by_group(made)
     if chosen.interpolated:
@@ -413,11 +416,15 @@ def run_method(renderer: FrameRenderer, state, cast: Cast, by_light, carried: An
     carried
         What the method handed on from the last frame; None for the first.
     """
-    groups, sums = light_groups(renderer), None
+    groups, sums, scales = light_groups(renderer), None, dict[int | None, Any]()
+    if renderer.sphere_scales is not None:
+        scales = _sphere_scales(renderer, groups, cast)
     for number, group in enumerate(groups):
         shaded = by_light[number] if by_light[number] is not None else _shaded(renderer, group, cast)
         own = state[number] if state[number] is not None else group.stages.prepare(group.scene)
         rendered, beyond = _run_group(renderer, group, own, cast, shaded, carried)
+        if (scale := scales.get(group.scene.lights[0].source)) is not None:
+            rendered = replace(rendered, airlight=rendered.airlight * scale)
         if sums is None:
             surface = rendered.surface if beyond is None else rendered.surface + beyond
             sums = replace(rendered, surface=surface)
@@ -428,6 +435,20 @@ def run_method(renderer: FrameRenderer, state, cast: Cast, by_light, carried: An
             dr.eval(sums.airlight, sums.surface)
     assert sums is not None
     return sums
+
+
+def _sphere_scales(renderer: FrameRenderer, groups: tuple[LightGroup, ...], cast: Cast) -> dict[int | None, Any]:
+    """Return by what the airlight of samples is scaled, by the number of their sphere light."""
+    scene, scales = renderer.scene, dict[int | None, Any]()
+    assert renderer.sphere_scales is not None
+    for number, light in enumerate(scene.area_lights):
+        if light.kind == "sphere":
+            sphere = sampled_sphere(light, renderer.light_points, type(scene.camera.origin.x))
+            like = next(group.lights[0] for group in groups if group.scene.lights[0].source == number)
+            shown = scene.camera, renderer.pixel, scene.medium, like, sphere, cast.distance, renderer.tables
+            scales[number] = renderer.sphere_scales(*shown)
+            dr.eval(scales[number])
+    return scales
 
 
 def _run_group(

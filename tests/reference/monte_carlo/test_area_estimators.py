@@ -110,9 +110,9 @@ _FAST = ("rectangle, black, in view", "mesh, black, above")
 def test_both_estimators_agree(variant, name):
     """Rationale: they share no sample of the light: one draws points on it, the other asks Mitsuba.
 
-    Setup: ball and floor, 16 x 12 pixels, 24 batches of 256 samples, the light in the picture or not. Behind a mesh that
-    hides nothing volpath's batches differ by 5 %: the error of 60 is below 1 % where that of 24 is 1.1 %, even if they
-    differ by 1.5 times that, three standard errors of the spread of 24.
+    Setup: ball and floor, 16 x 12 pixels, 24 batches of 256 samples, the light in the picture or not. Around a mesh
+    that hides nothing volpath's batches differ by 5 %: 24 leave 1.1 %. The error of 60 is below 1 % even if they differ
+    by 1.5 times that, three standard errors of the spread of 24.
     Expected: airlight and surface pooled within four standard errors, and 0.05 % for the shadow-ray epsilon.
     """
     kind, bsdf, in_view = _CASES[name]["lamp"]
