@@ -81,34 +81,17 @@ def monte_carlo_batches(
 ) -> Run:
     """Return batches, radiances [W/(m^2 sr)], of a Mitsuba scene at its own size.
 
-    Parameters
-    ----------
-    scene
-        The `mi.Scene`.
-    estimator
-        'single-scatter', 'volpath' or 'cloud-paths'.
-    batches
-        How many at most, at least 2.
-    samples
-        Samples a pixel in each, at most 256.
-    first_seed
-        Seed of the first batch; the others count up.
-    max_depth
-        Most edges of a path, see `reference.monte_carlo.volpath.integrator.volpath_batch`; volpath only.
-    counts
-        Samples of each pixel in each batch, (layers, pixels), with the mean `samples`, see
-        `reference.monte_carlo.allocation`; volpath only, the same for all pixels by default.
-    orders
-        Names of disjoint sets of orders of scattering, '3-4', each with a layer of its own: for a scene of clouds, by
-        'volpath' or 'cloud-paths'.
-    enough
-        Asked after every block, whose last seed is one less than a multiple of eight, whether to stop.
-    go_on
-        Asked with the number of finished batches before each one that is traced, from the third on.
-    progress
-        Called with (done, total, estimator) after every batch that was traced.
-    elsewhere
-        Traces batches in other processes; what these do not bring is traced here.
+    The estimator is 'single-scatter', 'volpath' or 'cloud-paths'. There are 2 `batches` at least, of at most 256
+    `samples` a pixel; the first has the seed `first_seed`, the others count up. For volpath alone there are
+    `max_depth`, the most edges of a path (`reference.monte_carlo.volpath.integrator.volpath_batch`), and `counts`,
+    samples of each pixel in each batch, (layers, pixels), with the mean `samples` (`reference.monte_carlo.allocation`).
+    `orders` are names of disjoint sets of orders of scattering, '3-4', each with a layer of its own: for a scene of
+    clouds, by 'volpath' or 'cloud-paths'.
+
+    `enough` is asked after every block, whose last seed is one less than a multiple of eight, whether to stop; `go_on`
+    with the number of finished batches before each one that is traced, from the third on. `progress` is called with
+    (done, total, estimator) after every batch that was traced. `elsewhere` traces batches in other processes; what
+    these do not bring is traced here.
     """
     if batches < 2:
         raise ValueError(f"batches: got {batches}, wanted at least 2 for a standard error")

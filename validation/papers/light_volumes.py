@@ -111,13 +111,10 @@ def _sphere(facets: int) -> Scene:
 def tessellation() -> dict[str, Any]:
     """Return what holds of the mesh of the colonnade, and what two filters and two treatments of depths cost.
 
-    Returns
-    -------
-    dict
-        `configurations`, `most triangles`: that occur, and of a quad. `level steps`: the largest difference of levels
-        between neighbours. `flat`, `jump`: median side of the quads without and with a jump of the map [texels]. `our
-        error`, `plain error`: of the airlight to that of the static mesh. `bias ...`, `best bias`: relative RMSE of the
-        sum with depth testing to the clamped sum.
+    Of its quads there are the number of `configurations` that occur, and the `most triangles`; `level steps` is the
+    largest difference of levels between neighbours, `flat` and `jump` are the median sides of the quads without and
+    with a jump of the map [texels]. `our error` and `plain error` are those of the airlight to that of the static mesh;
+    `bias ...` and `best bias` the relative RMSE of the sum with depth testing to the clamped sum.
     """
     scene = read_scene(load_scene("colonnade", SIZE).scene)
     light = scene.lights[0]

@@ -52,12 +52,9 @@ def orders() -> dict[str, float]:
 def shortcuts() -> dict[str, float]:
     """Return the errors of the polynomial, of Gamma at the vertices and of an 8-bit buffer.
 
-    Returns
-    -------
-    dict
-        `near, steps`: see `_steps`. `vertex`: Gamma at the vertices, in `two-pens`. `bright, bias` and
-        `dim, bias`: of an 8-bit buffer in `clutter`, over the pixels whose truth is below white, which is a quarter of
-        the brightest airlight of 99 % of the pixels, and four times as much.
+    `near, steps`: see `_steps`. `vertex`: Gamma at the vertices, in `two-pens`. `bright, bias` and `dim, bias`: of an
+    8-bit buffer in `clutter`, over the pixels whose truth is below white, which is a quarter of the brightest airlight
+    of 99 % of the pixels, and four times as much.
     """
     true = _truth("clutter")
     brightest = float(np.percentile(true.max(axis=2), 99))

@@ -123,11 +123,8 @@ def transport_figures() -> dict[str, Any]:
 def transport_curves() -> list[dict[str, Any]]:
     """Return T of Fig. 8 by direction.
 
-    Returns
-    -------
-    list of dict
-        `thickness` and `depth` [m], `orders`, and by zenith angle of the view, `angle` [degrees], in the plane of the
-        sun: `exact`, `table`, `fit`, and `all`, the light of all sets [1/sr].
+    Each has `thickness` and `depth` [m], `orders`, and by zenith angle of the view, `angle` [degrees], in the plane of
+    the sun: `exact`, `table`, `fit`, and `all`, the light of all sets [1/sr].
     """
     pair, types = phase_pair("mie-modified"), array_types("single")
     tables = canonical_tables(pair.deterministic, 1.0)

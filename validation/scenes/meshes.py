@@ -207,14 +207,9 @@ def pierced(
 ) -> Mesh:
     """Return an open wall with a round hole: 2 cells[0] cells[1] triangles, cells[0] of which touch the hole.
 
-    Parameters
-    ----------
-    corner, across, up
-        A corner of the rectangle and the two edges that start there, (3,) each [m]; the normal is across x up.
-    hole
-        Position of the centre along `across` and along `up`, as shares of them, and the radius [m].
-    cells
-        Number of cells around the hole, even and at least 8, and from the hole to the border.
+    A `corner` of the rectangle and the two edges that start there, (3,) each [m], have the normal across x up. The hole
+    has the position of its centre along `across` and along `up`, as shares of them, and a radius [m]. Cells are counted
+    around the hole, even and at least 8, and from the hole to the border.
     """
     u, v, radius = hole
     right, above = np.asarray(across, dtype=np.float64), np.asarray(up, dtype=np.float64)
@@ -242,14 +237,8 @@ def pierced(
 def pierced_slab(along: NDArray, up: NDArray, thickness: float, corner: Sequence[float]) -> Mesh:
     """Return a closed upright slab in the plane x = corner[0] with a hole in every cell (i, j) with i and j odd.
 
-    Parameters
-    ----------
-    along, up
-        Lines between cells along y and z, from the corner on, ascending, an even number of each, (n,) [m].
-    thickness
-        Towards -x [m].
-    corner
-        The lowest corner of the slab, (3,) [m].
+    Lines between cells along y and z ascend from the lowest `corner` of the slab, (3,) [m], on, an even number of each,
+    (n,) [m]; its thickness is towards -x [m].
     """
     n, m = len(along) - 1, len(up) - 1
     y, z = np.meshgrid(along, up, indexing="ij")

@@ -124,15 +124,10 @@ def tabulated_phase(words: str, values: int = 2001) -> dict[str, Any]:
 def light(type: str, colour: Sequence[float], **given: Any) -> dict[str, Any]:
     """Return a light of a type and a colour, RGB.
 
-    Parameters
-    ----------
-    type
-        'point' and 'spot' have an intensity [W/sr], a 'sun' an irradiance [W/m^2]; 'rectangle', 'disk', 'sphere' and
-        'sky' a radiance [W/(m^2 sr)].
-    given
-        Of all but sun and sky `position`; of all but these and points `target`. Of a spot the half angles `cutoff` and
-        `beam` [degrees], and perhaps `up`; of a sun the `direction` of its light; of others `size`, and `opaque`, which
-        is false for a light that only shines.
+    'point' and 'spot' have an intensity [W/sr], a 'sun' an irradiance [W/m^2]; 'rectangle', 'disk', 'sphere' and 'sky'
+    a radiance [W/(m^2 sr)]. Of all but sun and sky a `position` is given; of all but these and points a `target`. Of a
+    spot the half angles `cutoff` and `beam` [degrees], and perhaps `up`; of a sun the `direction` of its light; of
+    others `size`, and `opaque`, which is false for a light that only shines.
     """
     match type:
         case "point":

@@ -161,20 +161,11 @@ def compare_statistics(
     exceed the 1 % level, as a batch without a rare large value is too low and looks too sure at once. `exceeding_p` and
     `uniformity_p` show it; the interval of the image keeps its 95 % (tests/validation/statistics/test_rates.py).
 
-    Parameters
-    ----------
-    reference, test
-        Two independent estimates; at least one has a standard error.
-    mask
-        Pixels to compare, (height, width) of truth values; all by default. Pixels that are not finite in either mean
-        are left out too: `error_metrics` counts them. Batch means are then ignored, as they would not be of these
-        pixels.
-    margin
-        Largest relative bias [1] that counts as agreement, such as 0.005.
-    family_level
-        Probability [1] that a comparison of agreeing images rejects any pixel, and likewise any block.
-    plain_level
-        Level at which exceeding values are counted.
+    At least one of two independent estimates has a standard error. Pixels that the mask leaves out, (height, width) of
+    truth values, or that are not finite in either mean are not compared: `error_metrics` counts the latter, and batch
+    means, which would not be of these pixels, are then ignored. A relative bias up to the `margin` [1] counts as
+    agreement, such as 0.005. With the probability `family_level` a comparison of agreeing images rejects any pixel, and
+    likewise any block; values that exceed `plain_level` are counted.
     """
     _check_levels(margin, family_level, plain_level)
     ref, tst, asked = compared(reference.mean, test.mean, mask)

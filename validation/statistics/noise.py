@@ -85,18 +85,9 @@ def error_band(
 ) -> float:
     """Return how far an error may move [1].
 
-    Parameters
-    ----------
-    name
-        A field of `validation.metrics.errors.Metrics` without a unit, 'mean' (relative to itself) or 'flip'.
-    old
-        What it was [1].
-    tolerance
-        The relative band [1]; that of the maximum is twice as wide.
-    pixels
-        Number of pixels of the image, for counts.
-    rmse
-        The relative RMSE [1] of the same image, for a bias.
+    The name is a field of `validation.metrics.errors.Metrics` without a unit, 'mean' (relative to itself) or 'flip'.
+    The relative band, `tolerance` [1], is twice as wide for the maximum. Counts need the number of `pixels` of the
+    image, a bias the relative `rmse` [1] of the same image.
     """
     if name == "nonfinite":
         return 0.0

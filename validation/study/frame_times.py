@@ -120,16 +120,10 @@ def time_frame(
 ) -> FrameTimes:
     """Time the stages of a frame, the whole frame, and frames after light, objects or only colours changed.
 
-    Parameters
-    ----------
-    seconds
-        Time to spend on each of the first three, and half of it on each of the others.
-    slow
-        If a frame takes longer than this with its preparation, frames are run stage by stage and the seven are added up
-        from them: up to five frames in place of some forty; `SLOW` by default [s]. So are images that are rendered in
-        parts.
-    took
-        What the last frame took with its preparation, if one was rendered just before [s]; else two are.
+    So many `seconds` are spent on each of the first three, and half of it on each of the others. If a frame takes
+    longer than `slow` with its preparation [s], `SLOW` by default, frames are run stage by stage and the seven are
+    added up from them: up to five frames in place of some forty. So are images that are rendered in parts. `took` is
+    what the last frame took with its preparation, if one was rendered just before [s]; else two are.
     """
     if len(parts(renderer)) > 1:
         return _slow_frame(renderer, turns=3)

@@ -78,27 +78,15 @@ def map_flicker(
 ) -> dict[str, Any]:
     """Measure the flicker of the airlight under a slowly circling light, for each size of the shadow map.
 
-    Parameters
-    ----------
-    scene
-        The `mi.Scene`, at its own size.
-    configurations
-        Of one method, each with its parameter `map`.
-    frames
-        Number of frames, at least 2.
-    step
-        By how much the light turns from frame to frame [rad], rounded to a whole fraction of a turn. As seen from the
-        light, what stands in the middle of its circle moves by this angle: by `texels` of 2 / size each.
-    about
-        A point on the axis of the circle, (3,) [m]; None: the middle of the scene.
+    The configurations are of one method, each with its parameter `map`, the scene is an `mi.Scene` at its own size.
+    There are at least two frames. From one to the next the light turns by a `step` [rad], rounded to a whole fraction
+    of a turn, on a circle whose axis passes through `about`, (3,) [m], or the middle of the scene. As seen from the
+    light, what stands in the middle of its circle moves by this angle: by `texels` of 2 / size each.
 
-    Returns
-    -------
-    dict
-        `reference_change`, the root mean square of the change of the reference from frame to frame over its mean;
-        `nonfinite`, pixels that are left out because some image has NaN or infinity there; and lists, by
-        configuration: `texels`, by how many a shadow moves from frame to frame, `flicker`, the root mean square of the
-        change of the image less that of the reference, and `relative_rmse` of all frames, both over that mean.
+    Returned are `reference_change`, the root mean square of the change of the reference from frame to frame over its
+    mean; `nonfinite`, pixels that are left out because some image has NaN or infinity there; and lists, by
+    configuration: `texels`, by how many a shadow moves from frame to frame, `flicker`, the root mean square of the
+    change of the image less that of the reference, and `relative_rmse` of all frames, both over that mean.
     """
     if frames < 2:
         raise InputError(f"frames: got {frames}, wanted at least 2: flicker is the difference between frames")
