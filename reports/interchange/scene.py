@@ -18,7 +18,8 @@ from reference.scene.varying import VaryingMedium
 from reports.interchange.cycles import cycles_properties
 from validation.scenes.engine_fog import ENGINES, parameters_of
 from validation.scenes.loading import LoadedScene, scene_stem
-from validation.scenes.random.scene import drawn_values, is_random
+from validation.scenes.random.design import is_random
+from validation.scenes.random.scene import drawn_values
 
 Array = NDArray[np.float64]
 

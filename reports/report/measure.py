@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
@@ -29,15 +29,17 @@ from reports.page.render import render_page
 from reports.report.others import other_parts, paper_rows, shares
 from reports.report.scene import folder_of, write_scene
 from reports.report.staging import staged
-from validation.engine.images import EngineImage, images_size
 from validation.scenes.loading import scene_stem
-from validation.scenes.random.scene import is_random
+from validation.scenes.random.design import is_random
 from validation.scenes.registry import FOG_SCENES, SCENES
 from validation.study.configuration import Configuration
 from validation.study.results import Result, date
 from validation.study.run import PROBE, Apart, frame_of
 from validation.study.scene import SceneStudy, open_scene, study_scene
 from validation.study.study import STUDIES, Cell, Study, standard_study
+
+if TYPE_CHECKING:
+    from validation.engine.images import EngineImage
 
 _PAGE_SECONDS = 1.0  # to pack the images of a scene and draw its part of the page
 
@@ -46,7 +48,7 @@ def write_report(
     folder: Path | str,
     study: Study,
     *,
-    images: Mapping[str, Sequence[EngineImage]] | None = None,
+    images: Mapping[str, Sequence["EngineImage"]] | None = None,
     command: str = "airlight report",
     fresh: bool = False,
     apart: bool = False,
@@ -66,7 +68,11 @@ def write_report(
     names = tuple(study.scene_names())
     _refuse_twins(names)
     shown = dict(images or {})
-    sizes = {name: images_size(tuple(several)) for name, several in shown.items()}
+    sizes = {}
+    if shown:
+        from validation.engine.images import images_size
+
+        sizes = {name: images_size(tuple(several)) for name, several in shown.items()}
     environment, start = describe_environment(), time.monotonic()
     process = in_own_process if apart else None
     seconds = dict.fromkeys(("scenes", "stability", "scaling", "papers"), 0.0)

@@ -15,8 +15,6 @@ from reports.machine.own_process import in_own_process
 from reports.machine.progress import Progress, counted, part_of
 from validation.metrics.errors import plain
 from validation.papers.claims import EFFORTS, Claim, claims, experiments, judged
-from validation.study.growth import METHODS, study_scaling
-from validation.study.ladders import ladder
 from validation.study.results import Computed, Result, cached_result
 from validation.study.study import Study, standard_study
 
@@ -94,6 +92,8 @@ def known_kernels(rays: int) -> list[dict[str, Any]]:
 
 def _scaling(kind: str, seconds: float) -> OtherPart:
     """Return how times grow with one kind of work."""
+    from validation.study.growth import METHODS, study_scaling
+    from validation.study.ladders import ladder
 
     def compute(progress: Progress) -> Computed:
         steps = ladder(kind, _GROWING, _GROWING_SIZE)

@@ -39,7 +39,6 @@ from reference.storage.scene_digest import scene_digest
 from validation.estimates.agreement import MASK_PIXELS, pixel_angle
 from validation.estimates.monte_carlo import Elsewhere, monte_carlo_batches
 from validation.scenes.loading import LoadedScene
-from validation.slab.request import order_range, parse_orders
 
 Progress = Callable[[float, str], None]
 
@@ -164,6 +163,8 @@ def monte_carlo_reference(
 
 def cloud_orders(words: str) -> tuple[str, ...]:
     """Return the sets of orders that words name, disjoint: '1,2,3-4', 'sets' for the usual ones, 'all' for none."""
+    from validation.slab.request import order_range, parse_orders
+
     names = tuple(name for name in parse_orders(words) if name != "all")
     ranges = sorted(order_range(name) for name in names)
     for (_, last), (first, _) in pairwise(ranges):

@@ -33,7 +33,6 @@ from reference.storage.files import NO_SPACE
 from reference.storage.kept import Spent, add_spent, is_damaged, is_kept, key_of, load, stopwatch, store
 from reference.storage.scene_digest import scene_digest
 from validation.estimates.quadrature import check_camera, check_rays
-from validation.slab.request import order_range
 
 Progress = Callable[[int, int, str], None]
 Trace = Callable[[int], Batches]  # from the seed
@@ -171,6 +170,8 @@ def batch_tracer(
         if estimator == "single-scatter" and max_depth == 2 and counts is None:
             return LAYERS, lambda seed: single_scatter_batch(truth, seed, samples)
     else:
+        from validation.slab.request import order_range
+
         clouds, sets, layers = read_clouds(scene), [(name, order_range(name)) for name in orders], set_layers(orders)
         if estimator == "volpath":
             return layers[:-1], lambda seed: volpath_orders_batch(clouds, seed, samples, sets=sets)

@@ -18,11 +18,10 @@ import mitsuba as mi
 from analytic.errors import InputError, nearest
 from reference.storage.scene_digest import scene_digest
 from validation.scenes.changes import change_scene, isotropic_media, scene_with_lobes
-from validation.scenes.files.read import read_file
 from validation.scenes.height_fog import register_height_fog
 from validation.scenes.numbers import check_numbers
 from validation.scenes.random.design import FILE as RANGES
-from validation.scenes.random.scene import PREFIX, is_random, random_parts, random_record
+from validation.scenes.random.design import PREFIX, is_random, random_parts
 from validation.scenes.registry import SCENES, Animation, SceneRecord
 
 _LARGEST = 16384
@@ -88,7 +87,11 @@ def load_scene(
 
 def find_record(name: str) -> SceneRecord | None:
     """Return the record of a built-in or random scene, None for what must be a path."""
-    return random_record(name) if is_random(name) else SCENES.get(name)
+    if not is_random(name):
+        return SCENES.get(name)
+    from validation.scenes.random.scene import random_record
+
+    return random_record(name)
 
 
 def scene_stem(name_or_path: str) -> str:
@@ -164,6 +167,8 @@ def _check_films(loaded: LoadedScene) -> None:
 
 
 def _read(path: Path, lobes: Mapping[str, float] = MappingProxyType({})):
+    from validation.scenes.files.read import read_file
+
     _check_depth(path)
     scene = read_file(path, lobes)
     if not isinstance(scene, mi.Scene):

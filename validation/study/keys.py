@@ -9,7 +9,7 @@ from importlib.metadata import version
 from reference.storage.kept import key_of, source_digest
 from validation.properties.properties import scene_properties
 from validation.scenes.loading import scene_identity
-from validation.scenes.random.scene import is_random
+from validation.scenes.random.design import is_random
 from validation.scenes.registry import SCENES
 from validation.study.configuration import user_code
 from validation.study.reference import cell_reference

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, partial
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,6 @@ from realtime.scene.read_scene import Scene, read_scene
 from reference.quadrature.ray_values import TruthImage
 from reference.storage.exr import TOTAL, Image
 from reference.storage.kept import Kept, is_kept, key_of
-from validation.engine.images import EngineImage, image_times, measure_image
 from validation.estimates.agreement import agreements
 from validation.estimates.monte_carlo import ElsewhereFor
 from validation.estimates.multiple_scattering import multiple_scattering_fraction
@@ -39,6 +38,9 @@ from validation.study.results import Computed, Result, cached_result
 from validation.study.row import Row
 from validation.study.run import Apart, cell_row, layered_frame, run
 from validation.study.study import Cell, Study
+
+if TYPE_CHECKING:  # what only reports of images need is imported there
+    from validation.engine.images import EngineImage
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
@@ -177,7 +179,7 @@ def open_scene(name_or_path: str, study: Study, machine: Mapping[str, str]) -> S
 def study_scene(
     study: SceneStudy,
     *,
-    images: Sequence[EngineImage] = (),
+    images: Sequence["EngineImage"] = (),
     apart: Apart | None = None,
     ended: Mapping[Configuration, str] | None = None,
     progress: Callable[[str], None] = lambda part: None,
@@ -302,8 +304,10 @@ def _with_flip(judged: Judged) -> Judged:
     return replace(judged, row={**judged.row, "flip": result.data}, image=image, results=(*judged.results, result))
 
 
-def _image(study: SceneStudy, shown: EngineImage) -> Judged:
+def _image(study: SceneStudy, shown: "EngineImage") -> Judged:
     """Return the row of an image from elsewhere."""
+    from validation.engine.images import image_times
+
     digest = hashlib.sha256(shown.path.read_bytes()).hexdigest()
     key = key_of(
         "scene-image",
@@ -321,7 +325,9 @@ def _image(study: SceneStudy, shown: EngineImage) -> Judged:
     return Judged(result.data, Image(layers, attributes=attributes), result.arrays["expected"], whole, (result,))
 
 
-def _image_measured(study: SceneStudy, shown: EngineImage) -> Computed:
+def _image_measured(study: SceneStudy, shown: "EngineImage") -> Computed:
+    from validation.engine.images import measure_image
+
     measured = measure_image(shown, study.loaded, study.truth_of, surfaces=study.scene.features.surfaces)
     row = Row(
         scene=study.path,

@@ -62,8 +62,7 @@ from realtime.methods.registry import FOG_METHODS, METHODS
 from realtime.parameters import defaults
 from validation.scenes.changes import change_words
 from validation.scenes.loading import parse_size
-from validation.scenes.random.design import ranges_from, read_ranges
-from validation.scenes.random.scene import PREFIX, is_random, random_name
+from validation.scenes.random.design import PREFIX, is_random, random_name, ranges_from, read_ranges
 from validation.scenes.registry import FOG_SCENES, SCENES
 from validation.study.configuration import QUICK, Configuration, chosen_configurations, configuration, find_kernel
 

@@ -13,7 +13,7 @@ from reports.data.reader import SCHEMA_FILE, named_files
 from reports.report.measure import write_report
 from reports.report.scene import file_stems, folder_of
 from tests.helpers.reports import checked
-from validation.scenes.random.scene import random_name
+from validation.scenes.random.design import random_name
 from validation.study.configuration import Configuration
 from validation.study.study import Checks, Measure, Study
 

@@ -10,7 +10,7 @@ import pytest
 
 from reference.storage.kept import fresh_results, is_kept
 from validation.metrics.errors import Metrics
-from validation.scenes.random.scene import random_name, random_parts
+from validation.scenes.random.design import random_name, random_parts
 from validation.study.configuration import Configuration
 from validation.study.keys import Made, cell_key, scene_identities
 from validation.study.results import cached_result

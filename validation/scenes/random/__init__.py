@@ -5,7 +5,7 @@ The scene of seed N is point N of one quasi-random sequence, so the seeds from 0
 
 Read in this order:
 
-- `design.py`: the ranges, the sequence of points, and what follows from a point;
+- `design.py`: the names of scenes, the ranges, the sequence of points, and what follows from a point;
 - `media.py`: endless and bounded media, and how bright a light makes them without shadows;
 - `lights.py`: kinds, places and brightness of lights;
 - `casters.py`: solids, plates, fences, screens, cages and meshes that cast shadows, and the floor;

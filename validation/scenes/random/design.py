@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote, unquote
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,9 @@ from analytic.errors import InputError, nearest
 FILE = Path(__file__).with_name("ranges.toml")  #: of ranges as they are drawn without a file of one's own
 
 Ranges = dict[str, Any]
+
+PREFIX = "random:"
+_SAFE = "/:\\"  # what stands in a path as it is, besides letters, digits, '_', '.', '-' and '~'
 
 #: The coordinates of a point. A new one goes to the end: the others keep their scenes.
 COORDINATES = (
@@ -207,3 +211,38 @@ def _checked_weights(where: str, value: Any, names: tuple[str, ...]) -> dict[str
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+# Names --------------------------------------------------------------------------------------------------------------
+
+
+def is_random(name: str) -> bool:
+    """Return whether a name is that of a random scene."""
+    return name.startswith(PREFIX)
+
+
+def random_name(name: str, meshes: Path | None = None, ranges: Path | None = None) -> str:
+    """Return the name of a scene with a folder of meshes and a file of ranges, which random ones alone can have."""
+    given = {"meshes": meshes, "ranges": ranges}
+    words = [f"{option}={quote(str(path.resolve()), safe=_SAFE)}" for option, path in given.items() if path is not None]
+    if words and not is_random(name):
+        option = words[0].partition("=")[0]
+        given_scene = f"{name} is no random scene" if name else "got no scene"
+        raise InputError(f"--{option}: {given_scene}; wanted a scene such as {PREFIX}7, or no --{option}")
+    return ",".join([name, *words])
+
+
+def random_parts(name: str) -> tuple[int, dict[str, Path]]:
+    """Return the seed in a name, and the paths of `meshes` and `ranges` that it goes on with."""
+    seed, *options = name.removeprefix(PREFIX).split(",")
+    if not (seed.isascii() and seed.isdecimal()):
+        raise InputError(f"scene: got {name!r}, wanted {PREFIX}SEED, a whole number, for example {PREFIX}7")
+    given: dict[str, Path] = {}
+    for option in options:
+        key, _, value = option.partition("=")
+        if key not in ("meshes", "ranges") or not value or key in given:
+            raise InputError(
+                f"scene: got {option!r} in {name!r}, wanted meshes=FOLDER or ranges=FILE.toml after the seed, each once"
+            )
+        given[key] = Path(unquote(value))
+    return int(seed), given

@@ -12,28 +12,23 @@ place.
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import Any
-from urllib.parse import quote, unquote
 
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
 from validation.properties.view import LightPlace, distance, lit_points
 from validation.scenes.meshes import box, gem, icosphere, placed, rotation, scaled
 from validation.scenes.parts import camera, fog, light, medium_boundary, mitsuba_mesh, phase_function
 from validation.scenes.random.casters import Caster, draw_casters, draw_ground
-from validation.scenes.random.design import Draws, Ranges, ranges_from, read_ranges
+from validation.scenes.random.design import Draws, Ranges, random_parts, ranges_from, read_ranges
 from validation.scenes.random.lights import AREA_KINDS, Light, draw_lights
 from validation.scenes.random.media import Medium, draw_media, ways
 from validation.scenes.registry import Animation, SceneRecord
 
 Array = NDArray[np.float64]
 
-PREFIX = "random:"
-_SAFE = "/:\\"  # what stands in a path as it is, besides letters, digits, '_', '.', '-' and '~'
 _ATTEMPTS = 17
 _TABLE = 513  # values of a tabulated phase function
 _ACROSS, _UP, _ALONG = 7, 5, 3  # rays of the camera, and points on each, at which light is looked for
@@ -80,41 +75,6 @@ class Reach:
     def enough(self) -> bool:
         """Whether the scene is worth rendering."""
         return self.lit >= 0.23 and self.near <= 0.31
-
-
-# Names ----------------------------------------------------------------------------------------------------------------
-
-
-def is_random(name: str) -> bool:
-    """Return whether a name is that of a random scene."""
-    return name.startswith(PREFIX)
-
-
-def random_name(name: str, meshes: Path | None = None, ranges: Path | None = None) -> str:
-    """Return the name of a scene with a folder of meshes and a file of ranges, which random ones alone can have."""
-    given = {"meshes": meshes, "ranges": ranges}
-    words = [f"{option}={quote(str(path.resolve()), safe=_SAFE)}" for option, path in given.items() if path is not None]
-    if words and not is_random(name):
-        option = words[0].partition("=")[0]
-        given_scene = f"{name} is no random scene" if name else "got no scene"
-        raise InputError(f"--{option}: {given_scene}; wanted a scene such as {PREFIX}7, or no --{option}")
-    return ",".join([name, *words])
-
-
-def random_parts(name: str) -> tuple[int, dict[str, Path]]:
-    """Return the seed in a name, and the paths of `meshes` and `ranges` that it goes on with."""
-    seed, *options = name.removeprefix(PREFIX).split(",")
-    if not (seed.isascii() and seed.isdecimal()):
-        raise InputError(f"scene: got {name!r}, wanted {PREFIX}SEED, a whole number, for example {PREFIX}7")
-    given: dict[str, Path] = {}
-    for option in options:
-        key, _, value = option.partition("=")
-        if key not in ("meshes", "ranges") or not value or key in given:
-            raise InputError(
-                f"scene: got {option!r} in {name!r}, wanted meshes=FOLDER or ranges=FILE.toml after the seed, each once"
-            )
-        given[key] = Path(unquote(value))
-    return int(seed), given
 
 
 def random_record(name: str) -> SceneRecord:
