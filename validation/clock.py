@@ -92,12 +92,7 @@ def time_repeated(
 
 
 def time_in_turns(
-    works: Sequence[Callable[[], Any]],
-    *,
-    seconds: float = 3.0,
-    least: int = 5,
-    most: int = 200,
-    warm_up: int = 2,
+    works: Sequence[Callable[[], Any]], *, seconds: float = 3.0, least: int = 5, most: int = 200, warm_up: int = 2
 ) -> list[Timing]:
     """Time several pieces of work in turns, so that other load on the machine affects all of them alike.
 

@@ -216,7 +216,7 @@ def statistics_lines(s: Statistics) -> list[str]:
     low, high = s.relative_bias_ci
     lines = [
         f"relative bias    95 % interval {percent(low)} to {percent(high)}; {percent(s.detectable_bias)} would have "
-        "been found (90 % power, 5 % level)",
+        "been found (90 % power, 5 % level)"
     ]
     if s.relative_bias_ci_batches is not None:
         low, high = s.relative_bias_ci_batches

@@ -50,12 +50,7 @@ _USUAL: dict[str, Any] = {"checks": 32, "shadow_scale": 1.0, "pixel": "centre"}
 
 
 def truth_image(
-    scene,
-    *,
-    checks: int = 32,
-    shadow_scale: float = 1.0,
-    pixel: str = "centre",
-    progress: Progress | None = None,
+    scene, *, checks: int = 32, shadow_scale: float = 1.0, pixel: str = "centre", progress: Progress | None = None
 ) -> TruthImage:
     """Return the quadrature truth of a Mitsuba scene at its own size, (height, width, 3) [W/(m^2 sr)].
 

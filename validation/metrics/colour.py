@@ -56,11 +56,7 @@ class ColourDifference:
 
 
 def colour_difference(
-    reference: ArrayLike,
-    test: ArrayLike,
-    *,
-    exposure: float | None = None,
-    mask: ArrayLike | None = None,
+    reference: ArrayLike, test: ArrayLike, *, exposure: float | None = None, mask: ArrayLike | None = None
 ) -> ColourDifference:
     """Return how different two images look (see the module).
 

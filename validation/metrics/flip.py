@@ -72,11 +72,7 @@ class Flip:
 
 
 def flip_hdr(
-    reference: ArrayLike,
-    test: ArrayLike,
-    *,
-    mask: ArrayLike | None = None,
-    exposure: float | None = None,
+    reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike | None = None, exposure: float | None = None
 ) -> tuple[Flip, NDArray[np.float32] | None]:
     """Return HDR-FLIP of two images, through `flip-evaluator` in a child process (see the module), and its map.
 

@@ -23,13 +23,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from realtime.frame.renderer import (
-    FrameRenderer,
-    render_frame,
-    run_cast_and_shade,
-    run_method,
-    run_shade,
-)
+from realtime.frame.renderer import FrameRenderer, render_frame, run_cast_and_shade, run_method, run_shade
 from realtime.methods.shadow_planes.method import PlanePreparation
 from realtime.methods.shadow_planes.silhouettes import components_in_view, silhouette
 from realtime.scene.camera import read_camera

@@ -25,14 +25,7 @@ from numpy.typing import NDArray
 from analytic.geometry import foot_and_height
 from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction
-from realtime.frame.renderer import (
-    FrameRenderer,
-    evaluated,
-    image_frame,
-    render_frame,
-    run_cast_and_shade,
-    run_method,
-)
+from realtime.frame.renderer import FrameRenderer, evaluated, image_frame, render_frame, run_cast_and_shade, run_method
 from realtime.methods.light_volumes.published.mesh import THRESHOLD, VolumeMesh, adaptive_mesh, volume_mesh
 from realtime.methods.light_volumes.published.raster import signed_crossings
 from realtime.methods.light_volumes.published.tessellation import configuration, divide, edges, quads, triangles

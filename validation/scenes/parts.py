@@ -191,12 +191,7 @@ def area_lamp(
 
 
 def camera(
-    origin: Sequence[float],
-    target: Sequence[float],
-    *,
-    fov: float,
-    size: tuple[int, int],
-    in_fog: bool = True,
+    origin: Sequence[float], target: Sequence[float], *, fov: float, size: tuple[int, int], in_fog: bool = True
 ) -> dict[str, Any]:
     """Return a perspective sensor at an origin that looks at a target, (3,) each [m]; its up is z.
 

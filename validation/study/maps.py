@@ -30,7 +30,7 @@ the error of a frame and falls as 1/N.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import islice
 from typing import Any
@@ -41,11 +41,11 @@ from scipy.stats import linregress
 
 from analytic.errors import InputError
 from realtime.frame.renderer import render_frame
-from realtime.scene.lights import Light
-from realtime.scene.read_scene import Scene, read_scene
+from realtime.scene.read_scene import read_scene
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import TruthLight, TruthScene, read_truth
-from validation.scenes.animation import animate
+from reference.scene.read import read_truth
+from validation.scenes.animation import animate, frame_changes
+from validation.scenes.changes import change_scene
 from validation.scenes.registry import Animation
 from validation.study.configuration import Configuration, prepared
 
@@ -93,16 +93,26 @@ def map_flicker(
     if not 0 < step < 1:
         raise InputError(f"step: got {step:g}, wanted an angle above 0 and below 1 [rad]")
     turn = round(2 * np.pi / step)
-    read, known = read_scene(scene), read_truth(scene)
+    read, animation = read_scene(scene), Animation(moves=("light",), about=about)
+    moved = list(islice(animate(read, animation, turn), frames))
+    changes = [frame_changes(each, animation) for each in moved]
     total = 1 + len(configurations)
     if progress is not None:
         progress(0, total, "quadrature")
-    truth = np.stack([_truth_of(known, moved) for moved in _frames(read, about, turn, frames)])
+    truths: list[Array] = []
+    for change in [*changes, changes[0]]:  # in the end the scene is as it was
+        if change is None:
+            raise InputError("flicker: the scene has lights with extent, which do not circle; wanted a scene without")
+        change_scene(scene, change)
+        if len(truths) < frames:
+            truths.append(quadrature_image(read_truth(scene)).airlight)
+    truth = np.stack(truths)
     images = []
     for number, chosen in enumerate(configurations):
         if progress is not None:
             progress(1 + number, total, f"{chosen.label}, moving light")
-        images.append(_rendered(read, chosen, _frames(read, about, turn, frames)))
+        renderer = prepared(read, chosen)
+        images.append(np.array([render_frame(replace(renderer, scene=each)).airlight for each in moved], np.float64))
     finite = np.isfinite(np.stack([truth, *images])).all(axis=(0, 1, 4))
     truth = truth[:, finite]
     errors = [image[:, finite] - truth for image in images]
@@ -114,40 +124,6 @@ def map_flicker(
         "flicker": [_rms(np.diff(error, axis=0)) / mean for error in errors],
         "relative_rmse": [_rms(error) / mean for error in errors],
     }
-
-
-def _frames(scene: Scene, about: tuple[float, float, float] | None, turn: int, frames: int) -> Iterator[Scene]:
-    """Yield the first frames of a turn of the lights."""
-    return islice(animate(scene, Animation(moves=("light",), about=about), turn), frames)
-
-
-def _truth_of(known: TruthScene, moved: Scene) -> Array:
-    """Return the true airlight, (height, width, 3), with the lights at the places of a moved scene."""
-    near = [light for light in moved.lights if light.w]
-    far = [light for light in moved.lights if not light.w]
-    lights = tuple(_truth_light(light, there) for light, there in zip(known.lights, near, strict=True))
-    turned = zip(known.directional, far, strict=True)
-    directional = tuple(replace(light, direction=_axis(there)) for light, there in turned)
-    return quadrature_image(replace(known, lights=lights, directional=directional)).airlight
-
-
-def _truth_light(known: TruthLight, light: Light) -> TruthLight:
-    position = np.array(light.position, dtype=np.float64).reshape(3)
-    if light.axis is None:
-        return replace(known, position=position)
-    return replace(known, position=position, axis=_axis(light))
-
-
-def _axis(light: Light) -> Array:
-    axis = np.array(light.exact_axis).reshape(3)
-    return axis / np.linalg.norm(axis)
-
-
-def _rendered(scene: Scene, chosen: Configuration, frames: Iterator[Scene]) -> Array:
-    """Return the airlight of frames, (frames, height, width, 3)."""
-    renderer = prepared(scene, chosen)
-    images = [render_frame(replace(renderer, scene=moved)).airlight for moved in frames]
-    return np.array(images, dtype=np.float64)
 
 
 def _rms(values: Array) -> float:

@@ -1,31 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A study: which scenes, methods, parameters, media and sizes, as a TOML file says it, and the cells that come of it.
 
-    name = "steps"
-    scenes = ["sphere-spot", "windows", "own/hall.xml"]     # built-in scenes and Mitsuba XML files
-    sizes = ["160x120"]
-    methods = ["shadow-planes", "ray-march"]                # or "all", one of each kind, or "standard", as `bench`
-    kernels = ["exact", "taylor"]                           # of the methods that call one
-    maps = [256, 1024]                                      # sides of shadow maps, of the methods that have one
-    media = [{}, { "medium.sigma_t" = 0.17 }]               # changes as of `--change`; {} is the scene's own
-    flip = false                                            # HDR-FLIP takes about a second a cell
-    times = "with"                                          # or "none", or "alone"
-    # timed = 150                                           # with "alone": how many scenes, the first; else all
-    limit = 600                                             # seconds that a cell or a reference may take
-    retries = 3                                             # how often a cell is begun again whose process died
-
-    [random]
-    count = 100                                             # random:0 to random:99
-    first = 0
-    meshes = "meshes"                                       # a folder, as of `--meshes`
-    ranges = "ranges.toml"                                  # a file, as of `--ranges`
-
-    [parameters.ray-march]
-    steps = [16, 100]                                       # a list has a cell for each of its values
-    shadow = "map"
-
-A cell is one combination of all of these. Every mistake is refused by name before any work. What a report measures is
-a study too (`validation/study/studies/`), which says more:
+A cell is one combination of all of these; docs/many-scenes.md has the keys of a file. Every mistake is refused by name
+before any work. What a report measures is a study too (`validation/study/studies/`), which says more:
 
     scenes = "all"                                          # every built-in scene of fog
     half = ["fence"]                                        # scenes that are compared at half the width
@@ -52,7 +29,7 @@ a study too (`validation/study/studies/`), which says more:
 import itertools
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -265,8 +242,7 @@ def read_study(path: Path, *, count: int | None = None) -> Study:
 def parse_study(data: Mapping[str, Any], *, folder: Path = Path(), name: str = "sweep") -> Study:
     """Return the study that a table describes, as `tomllib` reads it; paths of scenes begin at `folder`."""
     others = ("scenes", "random", "methods", "kernels", "maps", "parameters")
-    _known("", data, (*_STUDY, *_MEASURE, *others))
-    given, measure = _read("", data, _STUDY), _read("", data, _MEASURE)
+    given, measure = _read("", data, _STUDY, *_MEASURE, *others), _read("", data, _MEASURE, *_STUDY, *others)
     times = measure.get("times", "with")
     if "timed" in given and times != "alone":
         raise InputError(f'timed: it is of times = "alone", got times = "{times}"; leave one of them out')
@@ -381,12 +357,9 @@ def _scene(what: str, item: Any, *, folder: Path) -> str:
 
 
 def _random(table: Any, folder: Path) -> RandomScenes:
-    given = _table("random", table)
-    _known("random.", given, [item.name for item in fields(RandomScenes)])
-    count = _number("random.count", given.get("count", 0), 0, _MOST_SCENES)
-    first = _number("random.first", given.get("first", 0), 0, 2**62)
-    places = {name: folder / _word(f"random.{name}", given[name]) for name in ("meshes", "ranges") if name in given}
-    drawn = RandomScenes(count, first, **{name: place.resolve() for name, place in places.items()})
+    given = _read("random.", _table("random", table), _RANDOM)
+    given |= {name: (folder / given[name]).resolve() for name in ("meshes", "ranges") if name in given}
+    drawn = RandomScenes(**given)
     if drawn.ranges is not None:
         read_ranges(drawn.ranges)  # refuses what cannot be drawn
     if drawn.meshes is not None:
@@ -404,12 +377,6 @@ def _medium(what: str, item: Any) -> tuple[str, ...]:
             raise InputError(f"media: got {value!r} for {name}, wanted a number or a list of numbers")
         changes[name] = tuple(float(number) for number in numbers)
     return tuple(change_words(changes))
-
-
-def _known(prefix: str, data: Mapping[str, Any], names: Sequence[str]) -> None:
-    for name in data:
-        if name not in names:
-            raise InputError(f"got {prefix}{name}, wanted one of {', '.join(names)}{nearest(name, names)}")
 
 
 def _table(what: str, value: Any) -> Mapping[str, Any]:
@@ -450,8 +417,11 @@ def _once(what: str, items: tuple[Any, ...]) -> tuple[Any, ...]:
     return items
 
 
-def _read(prefix: str, data: Mapping[str, Any], readers: Mapping[str, Reader]) -> dict[str, Any]:
-    """Return the values that a table has of some names."""
+def _read(prefix: str, data: Mapping[str, Any], readers: Mapping[str, Reader], *others: str) -> dict[str, Any]:
+    """Return the values that a table has of some names; it may have some others, and no more."""
+    for name in data:
+        if name not in (names := (*readers, *others)):
+            raise InputError(f"got {prefix}{name}, wanted one of {', '.join(names)}{nearest(name, names)}")
     return {name: read(prefix + name, data[name]) for name, read in readers.items() if name in data}
 
 
@@ -482,9 +452,7 @@ def _pair(what: str, value: Any) -> tuple[int, ...]:
 
 
 def _checks(what: str, value: Any) -> Checks:
-    table = _table(what, value)
-    _known(f"{what}.", table, tuple(_CHECKS))
-    checks = Checks(**_read(f"{what}.", table, _CHECKS))
+    checks = Checks(**_read(f"{what}.", _table(what, value), _CHECKS))
     if checks.margins.keys() != checks.samples.keys():
         raise InputError(f"{what}: margins and samples name other estimators; name the same in both")
     return checks
@@ -514,6 +482,12 @@ _MEASURE: Mapping[str, Reader] = {
     "slow": _seconds,
     "frame_limit": _seconds,
     "metrics": lambda what, value: _one_of(what, value, names=("usual", "all")) == "all",
+}
+_RANDOM: Mapping[str, Reader] = {
+    "count": _count,
+    "first": partial(_number, least=0, most=2**62),
+    "meshes": _word,
+    "ranges": _word,
 }
 _CHECKS: Mapping[str, Reader] = {
     "size": _size,

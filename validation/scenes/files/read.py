@@ -15,12 +15,7 @@ from validation.scenes.changes import give_lobes
 from validation.scenes.files.media import give_extinction, grey_densities, pass_where_no_material
 from validation.scenes.files.nodes import kind, name_nodes, of_kind, properties, references
 from validation.scenes.files.references import leave_out_media, touching
-from validation.scenes.files.shapes import (
-    cylinders_as_meshes,
-    lamps_as_rectangles,
-    rooms_as_boxes,
-    write_out_instances,
-)
+from validation.scenes.files.shapes import cylinders_as_meshes, lamps_as_rectangles, rooms_as_boxes, write_out_instances
 
 _TAKEN = {
     "Emitter": ("point", "spot", "directional", "area", "constant", "envmap"),

@@ -57,13 +57,7 @@ def draw_lights(draws: Draws, ranges: Ranges, media: list[Medium], camera: Array
 
 
 def _light(
-    draws: Draws,
-    ranges: Ranges,
-    kind: str,
-    number: int,
-    media: list[Medium],
-    camera: Array,
-    seen: Ways,
+    draws: Draws, ranges: Ranges, kind: str, number: int, media: list[Medium], camera: Array, seen: Ways
 ) -> Light:
     stream = draws.of(f"light-{number}")
     size = _size(draws, stream, ranges, kind, number)

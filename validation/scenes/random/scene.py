@@ -82,11 +82,7 @@ def random_record(name: str) -> SceneRecord:
     stage, occluders, _ = _drawn(*_parse(name))
     x, y, z = stage.place(np.zeros(3))
     return SceneRecord(
-        name,
-        lambda: _build(stage, occluders),
-        _purpose(stage),
-        "none: drawn from its seed",
-        Animation(about=(x, y, z)),
+        name, lambda: _build(stage, occluders), _purpose(stage), "none: drawn from its seed", Animation(about=(x, y, z))
     )
 
 
