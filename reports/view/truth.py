@@ -1,18 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The reference of what is shown, computed by another process while nothing moves."""
 
-import os
-import pickle
-import subprocess
-import sys
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from pathlib import Path
+from multiprocessing import get_context
 
-from reports.machine.environment import VARIANT_VARIABLE
 from reports.view.truth_order import KnownTruth
-from reports.view.truth_process import Answer, Task
+from reports.view.truth_process import Answer, Task, compute
 from validation.scenes.changes import Values
 
 
@@ -29,15 +24,11 @@ class TruthInBackground:
         self.truth: KnownTruth | None = None
         self.done = False
         self.failure = ""  #: why there is no reference, in one line
-        root = str(Path(__file__).resolve().parents[2])
-        paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
-        self.process = subprocess.Popen(
-            [sys.executable, "-P", "-c", "from reports.view.truth_process import main; main()"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env=os.environ | {"PYTHONPATH": os.pathsep.join(paths), VARIANT_VARIABLE: variant},
-            start_new_session=True,  # Ctrl-C reaches the view alone, which ends this
-        )
+        context = get_context("spawn")
+        self._pipe, other = context.Pipe()
+        self.process = context.Process(target=compute, args=(other, variant), daemon=True)
+        self.process.start()
+        other.close()
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
 
@@ -57,24 +48,18 @@ class TruthInBackground:
 
     def end(self) -> None:
         """End the process."""
-        assert self.process.stdin is not None
         self.process.kill()
-        with suppress(OSError):
-            self.process.stdin.close()
-        self.process.wait()
+        self.process.join()
         self._listener.join(1)
 
     def _send(self, task: Task | None) -> None:
-        assert self.process.stdin is not None
         with suppress(OSError):  # it has ended: `_listen` says so
-            pickle.dump(task, self.process.stdin)
-            self.process.stdin.flush()
+            self._pipe.send(task)
 
     def _listen(self) -> None:
-        assert self.process.stdout is not None
-        with self.process.stdout as given, suppress(EOFError, OSError, pickle.UnpicklingError):
+        with suppress(EOFError, OSError):
             while True:
-                self._take(pickle.load(given))
+                self._take(self._pipe.recv())
         with self._lock:
             self.failure = self.failure or "the process that computes the reference has ended; start the view again"
         self._told()

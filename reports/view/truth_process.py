@@ -1,19 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The process that computes the reference of what the view shows, and yields the processor to it.
 
-It reads tasks from its input and writes what it finds to its output, as pickles. A new task ends the one before it, at
-the next of its chunks. It ends when its input does, however the view has ended.
+A new task ends the one before it, at the next of its chunks. The process ends with the other end of its pipe, however
+the view has ended.
 """
 
 import os
-import pickle
-import queue
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, BinaryIO
+from multiprocessing.connection import Connection
+from typing import Any
 
 import numpy as np
 
@@ -80,57 +78,27 @@ def answers(task: Task) -> Iterator[Answer]:
     yield Answer(task.number, done=True)
 
 
-def serve(tasks: "queue.Queue[Task | None]", output: BinaryIO) -> None:
-    """Answer tasks, the newest first and alone; None for nothing to do."""
+def compute(pipe: Connection, variant: str) -> None:
+    """Answer the tasks of a pipe, the newest first and alone; None for nothing to do."""
     from analytic.errors import InputError
-
-    while True:
-        task = _newest(tasks)
-        if task is None:
-            continue
-        try:
-            for answer in answers(task):
-                if not tasks.empty():
-                    break
-                _write(output, answer)
-        except InputError as error:
-            _write(output, Answer(task.number, failure=" ".join(str(error).split())))
-
-
-def _newest(tasks: "queue.Queue[Task | None]") -> Task | None:
-    task = tasks.get()
-    while not tasks.empty():
-        task = tasks.get()
-    return task
-
-
-def _write(output: BinaryIO, answer: Answer) -> None:
-    try:
-        pickle.dump(answer, output)
-        output.flush()
-    except OSError:  # the view has ended
-        os._exit(0)
-
-
-def _read(given: BinaryIO, tasks: "queue.Queue[Task | None]") -> None:
-    """Hand tasks on, and end with the process that sends them."""
-    with suppress(EOFError, OSError):
-        while True:
-            tasks.put(pickle.load(given))
-    os._exit(0)
-
-
-def main() -> None:
-    """Serve the process that started this one."""
     from reports.machine.environment import activate
     from reports.machine.signals import default_signals
 
     default_signals()
-    given = os.fdopen(os.dup(0), "rb")
-    output = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what is printed does not come between answers
-    tasks: queue.Queue[Task | None] = queue.Queue()
-    threading.Thread(target=_read, args=(given, tasks), daemon=True).start()
+    with suppress(OSError, AttributeError):
+        os.setsid()  # Ctrl-C reaches the view alone, which ends this
+    os.dup2(2, 1)  # what is printed
     yield_processor()
-    activate()
-    serve(tasks, output)
+    activate(variant)
+    with suppress(EOFError, OSError):  # the view has ended
+        while True:
+            task: Task | None = pipe.recv()
+            while pipe.poll():
+                task = pipe.recv()
+            try:
+                for answer in () if task is None else answers(task):
+                    if pipe.poll():
+                        break
+                    pipe.send(answer)
+            except InputError as error:
+                pipe.send(Answer(task.number if task else 0, failure=" ".join(str(error).split())))

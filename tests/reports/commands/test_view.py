@@ -64,7 +64,7 @@ def test_ctrl_c_ends_it_and_its_processes_without_a_word(number):
     with opener.open(address, timeout=30) as response:
         assert response.status == 200
     children = _children(process.pid) if sys.platform == "linux" else []
-    assert len(children) == (1 if sys.platform == "linux" else 0)  # the truth
+    assert children or sys.platform != "linux"  # the reference
     process.send_signal(number)
     assert process.communicate(timeout=30) == ("", "")
     assert process.returncode == -number  # 130 and 143 for a shell
