@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The reference of what is shown, computed by another process while nothing moves."""
 
+import sys
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from multiprocessing import get_context
+from types import ModuleType
 
 from reports.view.truth_order import KnownTruth
 from reports.view.truth_process import Answer, Task, compute
@@ -27,7 +29,11 @@ class TruthInBackground:
         context = get_context("spawn")
         self._pipe, other = context.Pipe()
         self.process = context.Process(target=compute, args=(other, variant), daemon=True)
-        self.process.start()
+        main, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
+        try:
+            self.process.start()
+        finally:
+            sys.modules["__main__"] = main  # it is not imported again: a script would run once more
         other.close()
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
