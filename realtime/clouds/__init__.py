@@ -3,7 +3,7 @@
 
 Read in this order:
 
-- `slab_orders/`: the light of a slab by order of scattering, in float64, from which tables are made;
+- `slab_orders/`: the light of a slab by order of scattering, in float64, of which the grid is made;
 - `bounds.py`: where rays cross the boundaries of clouds of any shape;
 - `single_scattering.py`: opacity and the light of one scattering, which all methods for clouds share;
 - `canonical/`: radiance, collector centre and spread at any point of a slab, by set of orders, as frames look it up;

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A cloud as its sun sees it, filtered to any width.
 
-The first and the last surface of a cloud along parallel light, and the normal of the first, in plain arrays.
+The first and the last surface of a cloud along parallel light, in plain arrays.
 
 The rectangle of a directional light is cut into size^2 texels, and a ray goes through the middle of each: from before
 the rectangle's shapes to the first surface, and from behind back to the last. Heights are those of
@@ -61,7 +61,6 @@ class LitSurfaces:
     there: Any  #: whether the ray meets the cloud
     front: Any  #: height of the first surface, 0 where there is none [m]
     back: Any  #: height of the last surface, 0 where there is none [m]
-    normal: Any  #: outward unit normal of the first surface, towards the light; 0 where there is none
 
 
 def cast_surfaces(cloud, light: Light, size: int) -> LitSurfaces:
@@ -71,19 +70,17 @@ def cast_surfaces(cloud, light: Light, size: int) -> LitSurfaces:
     cloud; `size`: texels on a side, a power of two. Raises InputError if `size` is not a power of two from 4 to 8192.
     """
     check_size(size)
-    Float, Vector = type(light.position.x), type(light.position)
+    Float = type(light.position.x)
     start, axis, texel = texel_rays(light, size)
     depth = mi.Float64(light.extent.depth)
     first = mi.Ray3f(mi.Point3f(start), mi.Vector3f(axis))
     last = mi.Ray3f(mi.Point3f(start + axis * depth), mi.Vector3f(-axis))
-    hit = cloud.ray_intersect(first, mi.RayFlags.Minimal, True)
+    hit = cloud.ray_intersect_preliminary(first, coherent=True)
     behind = cloud.ray_intersect_preliminary(last, coherent=True, active=hit.is_valid())
     # At a silhouette one of both rays may slip past: there is no cloud of any thickness.
     there = hit.is_valid() & behind.is_valid()
     front, back = dr.select(there, Float(depth) - Float(hit.t), 0), dr.select(there, Float(behind.t), 0)
-    along = dr.dot(hit.n, mi.Vector3f(axis))
-    normal = Vector(dr.select(there, dr.select(along > 0, -hit.n, hit.n), 0))
-    return LitSurfaces(size, texel, there, front, back, normal)
+    return LitSurfaces(size, texel, there, front, back)
 
 
 HOLE = 1e-6  #: weight of a texel without cloud
@@ -126,25 +123,23 @@ class FilteredSurface:
     normal: Any  #: of unit length, towards the light
 
 
-def light_map(clouds: Sequence[Any], light: Light, size: int, *, slopes: bool = True) -> LightMap:
+def light_map(clouds: Sequence[Any], light: Light, size: int) -> LightMap:
     """Return the map of clouds under one directional light.
 
     `clouds`: by cloud a Mitsuba scene of its boundary alone; `light`, `size`: see `cast_surfaces`, which says what is
-    refused, too; `slopes`: whether normals are those of mean slopes, or means of unit normals, as printed.
+    refused, too.
     """
-    return filtered_map([cast_surfaces(cloud, light, size) for cloud in clouds], light, slopes=slopes)
+    return filtered_map([cast_surfaces(cloud, light, size) for cloud in clouds], light)
 
 
-def filtered_map(surfaces: Sequence[LitSurfaces], light: Light, *, slopes: bool = True) -> LightMap:
-    """Return all levels of a map from the finest of each cloud; `slopes` as of `light_map`."""
+def filtered_map(surfaces: Sequence[LitSurfaces], light: Light) -> LightMap:
+    """Return all levels of a map from the finest of each cloud."""
     Float = type(light.position.x)
     size, projection = surfaces[0].size, light_projection(light)
-    if slopes:
-        surfaces = [replace(cloud, normal=slope_normals(cloud, projection)) for cloud in surfaces]
     texels = _texels_before(size, size.bit_length())
     heights, normals = (dr.empty(Float, 4 * texels * len(surfaces)) for _ in range(2))
     for number, cloud in enumerate(surfaces):
-        _add_levels((heights, normals), cloud, projection.parallel_axis, number * texels)
+        _add_levels((heights, normals), cloud, projection, number * texels)
     assert projection.basis is not None
     across, up, _ = projection.basis
     texel = (2.0 / size) * dr.sqrt(dr.norm(across) * dr.norm(up))
@@ -182,15 +177,15 @@ def slope_normals(surfaces: LitSurfaces, projection: Projection) -> Any:
     return dr.select(surfaces.there, normal, 0)
 
 
-def _add_levels(tables: tuple[Any, Any], surfaces: LitSurfaces, axis: Any, before: int) -> None:
+def _add_levels(tables: tuple[Any, Any], surfaces: LitSurfaces, projection: Projection, before: int) -> None:
     """Write the levels of one cloud, without holes, behind so many texels of others.
 
     The finest level is most of the memory: it goes where it belongs at once, and its holes are written again. Dr.Jit
     would copy a table that the same kernel reads and writes, so that its holes are known beside it.
     """
-    Float, size = type(tables[0]), surfaces.size
+    Float, size, axis = type(tables[0]), surfaces.size, projection.parallel_axis
     Four = four_numbers(Float)
-    for table, values in zip(tables, _finest(surfaces), strict=True):
+    for table, values in zip(tables, _finest(surfaces, slope_normals(surfaces, projection)), strict=True):
         dr.scatter(table, values, surfaces.place + before)
     there = dr.empty(type(surfaces.there), size * size)
     dr.scatter(there, surfaces.there, surfaces.place)
@@ -216,9 +211,9 @@ def _add_levels(tables: tuple[Any, Any], surfaces: LitSurfaces, axis: Any, befor
     dr.eval(tables)
 
 
-def _finest(surfaces: LitSurfaces) -> tuple[Any, Any]:
+def _finest(surfaces: LitSurfaces, normal: Any) -> tuple[Any, Any]:
     """Return heights and normals of the finest level, with holes."""
-    Float, size, normal = type(surfaces.front), surfaces.size, surfaces.normal
+    Float, size = type(surfaces.front), surfaces.size
     Four = four_numbers(Float)
     row = surfaces.place // size
     u, v = (dr.fma(Float(texel), 2.0 / size, 1.0 / size - 1) for texel in (surfaces.place - row * size, row))

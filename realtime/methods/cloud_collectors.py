@@ -37,10 +37,8 @@ import numpy as np
 from realtime.clouds.bounds import CloudSurfaces, cloud_surfaces
 from realtime.clouds.canonical.coordinates import SETS, share_of_peak, slab_phase
 from realtime.clouds.canonical.fit import fit_on_device, fitted_functions
-from realtime.clouds.canonical.look_up import on_device
-from realtime.clouds.canonical.tables import canonical_tables
+from realtime.clouds.canonical.transport_grid import canonical_transport, on_device
 from realtime.clouds.collectors.search import Collector, OrdersLight, Search, light_of_orders
-from realtime.clouds.collectors.transport_grid import transport_grid
 from realtime.clouds.hypertexture.light_depths import (
     LightDepths,
     depths_memory,
@@ -102,27 +100,10 @@ class CloudCollectors(Method):
         0.0, "step with which a search ends early, as a share of sigma; 0: all steps are taken", least=0, below=1
     )
     transport: str = parameter(
-        "grid",
-        "the canonical transport by a grid for frames, by its tables, or by the paper's functions",
-        choices=("grid", "table", "fit"),
+        "grid", "the canonical transport by its grid, or by the paper's functions", choices=("grid", "fit")
     )
     thickness: str = parameter(
         "slab", "slabs as thick as they are across, or along the light, as printed", choices=("slab", "light")
-    )
-    normals: str = parameter(
-        "slopes",
-        "a filtered surface has the mean slope of the lit side, or the mean of its unit normals, as printed",
-        choices=("slopes", "printed"),
-    )
-    cover: str = parameter(
-        "share",
-        "light enters through the share of a collector that is cloud, or through all of it, as printed",
-        choices=("share", "printed"),
-    )
-    way: str = parameter(
-        "ray",
-        "light comes from as far behind a point as the ray is in cloud, or the slab reaches, as printed",
-        choices=("ray", "printed"),
     )
     kappa: str = parameter(
         "mie",
@@ -172,7 +153,7 @@ class CloudCollectors(Method):
         return self.carries
 
     def preparation(self, scene):
-        """Return what makes the light maps of a frame; tables and boundaries are made here, once.
+        """Return what makes the light maps of a frame; grids and boundaries are made here, once.
 
         Raises InputError if the maps need more memory than the machine has.
         """
@@ -238,10 +219,7 @@ def _preparation(scene: Scene, parameters: CloudCollectors) -> Callable[[Scene],
     surfaces = cloud_surfaces(scene)
     bodies = [scene_of((shape,)) for shape in scene.boundaries]
     stride, threshold = (dr.opaque(Float, value) for value in (parameters.stride, parameters.threshold))
-    slopes = parameters.normals == "slopes"
-    cast = Frozen(
-        lambda bodies, lights: tuple(light_map(bodies, light, parameters.map, slopes=slopes) for light in lights)
-    )
+    cast = Frozen(lambda bodies, lights: tuple(light_map(bodies, light, parameters.map) for light in lights))
     escapes = sky_escapes(scene) if len(suns) < len(scene.lights) else None
 
     def state(scene: Scene) -> CloudState:
@@ -261,7 +239,6 @@ def _preparation(scene: Scene, parameters: CloudCollectors) -> Callable[[Scene],
                     for cloud in range(clouds)
                 ],
                 light,
-                slopes=slopes,
             )
             for light in scene.lights
         )
@@ -293,12 +270,9 @@ def _fillings(scene: Scene, parameters: CloudCollectors) -> tuple[tuple[Filling,
             slab_phase(known, types, modified=parameters.peak != "full"),
             albedo * (1 - share) / (1 - albedo * share),
         )
-        tables = canonical_tables(*medium)
-        transport: Any = on_device(tables, types)
-        if parameters.transport == "grid":
-            transport = transport_grid(transport, tables.angular, len(SETS))
-        elif parameters.transport == "fit":
-            transport = fit_on_device(fitted_functions(*medium, tables, transport, types), types)
+        transport: Any = on_device(canonical_transport(*medium), types)
+        if parameters.transport == "fit":
+            transport = fit_on_device(fitted_functions(*medium, transport, types), types)
         by_channel = (mi.UInt32(row.astype(np.uint32)) if row.any() else None for row in filled)
         fillings.append(Filling(transport, tuple(by_channel)))
     lefts = tuple(types.scalar(row) for row in left)
@@ -452,8 +426,7 @@ def _many_times(
         parameters.settled,
         parameters.thickness == "light",
         # Where a density stays below the threshold the map has no cloud, but light passes there, too.
-        covered=parameters.cover == "share" and state.body is None,
-        as_ray=parameters.way == "ray",
+        covered=state.body is None,
     )
     of_sun = state.maps[sun]
     assert of_sun is not None

@@ -140,7 +140,7 @@ def _cloud_images(quick: bool, progress: Progress) -> PaperFigure:
 _ORDERS = ("2", "5-6", "13-18", "31-inf")  # that are drawn
 _WAYS = {
     "exact": ("-", "blue", "computed"),
-    "table": (":", "green", "tables"),
+    "grid": (":", "green", "grid of frames"),
     "fit": ("--", "vermillion", "22 functions"),
 }
 

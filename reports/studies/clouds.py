@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Studies of clouds: a slab in sunlight by order of scattering, and the tables of canonical transport."""
+"""Studies of clouds: a slab in sunlight by order of scattering, and the grid of canonical transport."""
 
 import json
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -210,9 +210,9 @@ def _draw_slab(record: Mapping[str, Any], column: str) -> Any:
 
 @one_error
 def transport(phase: str = "mie-modified", *, albedo: float = 1.0, progress: Progress = None) -> Study:
-    """Make the tables of canonical transport that methods for clouds look up.
+    """Make the grid of canonical transport that methods for clouds look up.
 
-    They hold light scattered in a slab by sets of orders, with where it entered: T, c and sigma. They are cached, so
+    It holds light scattered in a slab by sets of orders, with where it entered: T, c and sigma. It is cached, so
     that each phase function and albedo takes its minutes once. See docs/the-reference.md.
 
     Parameters
@@ -227,8 +227,7 @@ def transport(phase: str = "mie-modified", *, albedo: float = 1.0, progress: Pro
     from reports.machine.environment import activate
 
     activate()
-    from realtime.clouds.canonical.coordinates import set_name
-    from realtime.clouds.canonical.tables import RANKS, canonical_tables
+    from realtime.clouds.canonical.transport_grid import SIDES, canonical_transport
     from validation.slab.phases import phase_pair
 
     pair = phase_pair(phase)
@@ -239,25 +238,21 @@ def transport(phase: str = "mie-modified", *, albedo: float = 1.0, progress: Pro
             told.append(what)
             tell(share, what)
 
-        tables = canonical_tables(pair.deterministic, albedo, progress=making)
+        made = canonical_transport(pair.deterministic, albedo, progress=making)
     record: dict[str, Any] = {
         "phase": pair.name,
         "albedo": albedo,
-        "bytes": int(tables.size),
-        "seconds": tables.seconds,
+        "bytes": int(made.size),
+        "seconds": made.seconds,
         "cached": not told,
-        "grid": asdict(tables.grid),
-        "sets": [
-            {"orders": set_name(number), "bytes": int(part.nbytes + shapes.nbytes), "coefficients": sum(RANKS[number])}
-            for number, (part, shapes) in enumerate(zip(tables.coefficients, tables.shapes, strict=True))
-        ],
+        "entries": dict(zip(("thickness", "depth", "sun", "direction", "azimuth"), SIDES, strict=True)),
     }
-    columns = (*words("orders"), *numbers(coefficients="products", mb="MB"))
-    rows = [{**row, "mb": row["bytes"] / 1e6} for row in record["sets"]]
+    columns = (*words("coordinate"), *numbers(entries="entries"))
+    rows = [{"coordinate": name, "entries": count} for name, count in record["entries"].items()]
     where = "from the cache" if record["cached"] else "made now"
     said = (
-        f"{record['phase']}, albedo {record['albedo']:g}: {record['bytes'] / 1e6:.1f} MB, {where}; they took "
+        f"{record['phase']}, albedo {record['albedo']:g}: {record['bytes'] / 1e6:.1f} MB, {where}; it took "
         f"{record['seconds']:.0f} s to make."
     )
-    drawn = table("Tables of the canonical transport by set of orders", columns, rows)
-    return Study(name="transport", data=record, drawn=(drawn,), said=(said,), rows=tuple(record["sets"]))
+    drawn = table("Grid of the canonical transport, of every set of orders", columns, rows)
+    return Study(name="transport", data=record, drawn=(drawn,), said=(said,), rows=tuple(rows))

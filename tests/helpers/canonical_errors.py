@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from realtime.clouds.canonical.coordinates import LOWEST_SUN, SETS, THICKEST, THINNEST, set_name
 from realtime.clouds.canonical.directional_moments import DirectionalMoments
-from realtime.clouds.canonical.look_up import LookUp
+from realtime.clouds.canonical.transport_grid import Transport
 from realtime.clouds.slab_orders.phases import SlabPhase
 from realtime.numerics.array_types import ArrayTypes
 
@@ -97,7 +97,7 @@ def transport_at(
 
 
 def _looked_up(
-    look_up: LookUp, types: ArrayTypes, number: int, t: Array, d: Array, mu: Array, phi: Array, mu_l: Array
+    look_up: Transport, types: ArrayTypes, number: int, t: Array, d: Array, mu: Array, phi: Array, mu_l: Array
 ) -> Array:
     """Return T, c_x, c_y and sigma of one set, (4, N)."""
     given = [types.scalar(each) for each in (t, d, mu, np.cos(phi), np.sin(phi), mu_l)]
@@ -106,7 +106,7 @@ def _looked_up(
     return np.stack([np.array(each, dtype=np.float64) for each in results])
 
 
-def look_up_errors(look_up: LookUp, types: ArrayTypes, points: Points) -> list[dict[str, Any]]:
+def look_up_errors(look_up: Transport, types: ArrayTypes, points: Points) -> list[dict[str, Any]]:
     """Return errors by set: of T relative, of c over sigma, of sigma relative, each at 50 and 95 % of the points."""
     given = points.t, points.d, points.mu, points.phi, points.mu_l
     light = points.T.sum(0)

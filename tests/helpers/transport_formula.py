@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A canonical transport that is a formula, in place of tables that take minutes to make."""
+"""A canonical transport that is a formula, in place of a grid that takes minutes to make."""
 
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 import drjit as dr
@@ -35,13 +34,12 @@ class Formula:
 def use_formula(monkeypatch) -> None:
     """Let `cloud-collectors` ask the formula, whatever its transport."""
 
-    def on_device(tables, types):
+    def on_device(transport, types):
         weights = types.scalar(WEIGHTS)
         dr.make_opaque(weights)
         return Formula(weights)
 
-    monkeypatch.setattr(method, "canonical_tables", lambda phase, albedo: SimpleNamespace(angular=None))
+    monkeypatch.setattr(method, "canonical_transport", lambda phase, albedo: None)
     monkeypatch.setattr(method, "on_device", on_device)
-    monkeypatch.setattr(method, "transport_grid", lambda look_up, angular, sets: look_up)
-    monkeypatch.setattr(method, "fitted_functions", lambda phase, albedo, tables, look_up, types: look_up)
+    monkeypatch.setattr(method, "fitted_functions", lambda phase, albedo, look_up, types: look_up)
     monkeypatch.setattr(method, "fit_on_device", lambda look_up, types: look_up)

@@ -3,8 +3,8 @@
 
 Clouds are of droplets with r_e = 6 um, gamma = 2, 4e8 in a cubic metre, at 0.55 um; lengths in metres become optical by
 their extinction, lowered by what is cut out of the peak where the phase function is the modified one. For Fig. 8, light
-by direction, three ways to T stand side by side: the computation with more streams than the tables had, the tables that
-frames look up, and the paper's 22 functions, fitted to the tables.
+by direction, three ways to T stand side by side: the computation with more streams than the grid had, the grid that
+frames look up, and the paper's 22 functions, fitted to the grid.
 """
 
 import math
@@ -19,8 +19,7 @@ from analytic.droplets import Modified, optics
 from realtime.clouds.canonical.coordinates import SETS, set_name
 from realtime.clouds.canonical.directional_moments import DirectionalMoments
 from realtime.clouds.canonical.fit import fit_on_device, fitted_functions
-from realtime.clouds.canonical.look_up import LookUp, on_device
-from realtime.clouds.canonical.tables import canonical_tables
+from realtime.clouds.canonical.transport_grid import Transport, canonical_transport, on_device
 from realtime.clouds.slab_orders.moments import SlabOrders, order_sets
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SlabPhase, droplet_phase
 from realtime.numerics.array_types import ArrayTypes, array_types
@@ -124,12 +123,11 @@ def transport_curves() -> list[dict[str, Any]]:
     """Return T of Fig. 8 by direction.
 
     Each has `thickness` and `depth` [m], `orders`, and by zenith angle of the view, `angle` [degrees], in the plane of
-    the sun: `exact`, `table`, `fit`, and `all`, the light of all sets [1/sr].
+    the sun: `exact`, `grid`, `fit`, and `all`, the light of all sets [1/sr].
     """
     pair, types = phase_pair("mie-modified"), array_types("single")
-    tables = canonical_tables(pair.deterministic, 1.0)
-    look_up = on_device(tables, types)
-    fit = fit_on_device(fitted_functions(pair.deterministic, 1.0, tables, look_up, types), types)
+    grid = on_device(canonical_transport(pair.deterministic, 1.0), types)
+    fit = fit_on_device(fitted_functions(pair.deterministic, 1.0, grid, types), types)
     lowered = (1 - Modified(optics()).removed) * optics().extinction
     angles = (np.arange(_ANGLES) + 0.5) * np.pi / _ANGLES
     slab = DirectionalMoments(
@@ -143,14 +141,14 @@ def transport_curves() -> list[dict[str, Any]]:
         exact = np.einsum("smdv,m->sdv", modes, twice)
         for place, depth in enumerate(depths):
             for orders in range(len(SETS)):
-                table, fitted = (_looked_up(each, types, orders, t, at[place], angles) for each in (look_up, fit))
-                curve = {"exact": exact[orders, place], "table": table, "fit": fitted, "all": exact[:, place].sum(0)}
+                looked_up, fitted = (_looked_up(each, types, orders, t, at[place], angles) for each in (grid, fit))
+                curve = {"exact": exact[orders, place], "grid": looked_up, "fit": fitted, "all": exact[:, place].sum(0)}
                 named = {"thickness": thickness, "depth": depth, "orders": set_name(orders)}
                 curves.append(named | {"angle": np.degrees(angles)} | curve)
     return curves
 
 
-def _looked_up(look_up: LookUp, types: ArrayTypes, orders: int, t: float, d: float, angles: Array) -> Array:
+def _looked_up(look_up: Transport, types: ArrayTypes, orders: int, t: float, d: float, angles: Array) -> Array:
     numbers = np.broadcast_arrays(t, d, np.cos(angles), 1.0, 0.0, math.cos(math.radians(SUN)))
     T, *_ = look_up(orders, *(types.scalar(np.array(each)) for each in numbers))
     dr.eval(T)

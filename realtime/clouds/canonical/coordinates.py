@@ -1,55 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The coordinates of the canonical tables, and which factors of the light of a slab they leave out.
+"""The coordinates of the canonical transport, and which factors of the light of a slab its grid leaves out.
 
 **The eight sets of orders of Bouthors 2008, section 5.1**; order 1 stands apart.
 
-**The phase function scattered n times**, P_s of the coordinates of the tables.
+**The phase function scattered n times**, P_s: the mean over the orders of a set.
 
-**Fields over places and directions as sums of products.**
-
-A field q of the place p = (t, d, mu_L) and of the direction v = (mu, phi) is close to a sum of few products,
-
-    q(p, v) = sum_k a_k(p) g_k(v),
-
-coefficients of the place times shapes of the direction: places have little to tell each other apart by, and each tells
-it in all directions at once. Tables of three and of two coordinates take the place of one of five, so that both can be
-fine. The best g_k are the first eigenvectors of the mean of q(v) q(v') over places (Eckart and Young 1936): that of the
-weighted square error, for weights of places and of directions. They are orthonormal, which makes a_k = <q, g_k>.
-
-**The coordinates of the tables, and the steep factors** that they leave out, so that few entries serve.
+**The coordinates**, so that few entries serve:
 
     thickness    log(t + 0.02), for t from 0.01 to 200
     depth        a(d)/(a(d) + a(t - d)), a(z) = log(1 + z/0.1): 0 at the lit face, 1 at the other, fine at both
     sun          sqrt(2 asin(mu_L)/pi), for mu_L from 0.02 to 1: fine where the sun is low
-    direction    v in mu = +-(1 - cos(pi v))/2, v from -1 to 1: fine at the horizon, where light comes from within
-                 abs(mu) mean free paths of depth, and even in the angle at the normal, since waves of the azimuth grow
-                 with its sine there
+    direction    asin(mu)/pi + 1/2
+    azimuth      phi/pi
 
-What is looked up is not T, c and sigma but what is left of them without their steep factors. With L the way from the
-point back to where the line of sight enters the slab, and P_s the phase function scattered n times, the mean over the
-orders of the set,
-
-    T = P_s(cos Theta) (1 - exp(-L)) exp(r + b + F),     L = d/|mu| for mu < 0, (t - d)/mu for mu > 0,
-
-where 1 - exp(-L) leaves the mean of the source along that way, finite and smooth at mu = 0 and at both faces, and P_s
-holds lobe, glory and fogbow. r(t, d) is what an order does by itself. With n the first order of the set and m the mean
-of its orders, each less 1,
+**What an order does by itself.** With n the first order of a set and m the mean of its orders, each less 1,
 
     r = n log(t/(t + 0.02)) + m log(1 + d/m) - d        (31-inf: the first term alone):
 
 thin slabs scatter with the power n of their thickness, and deep in thick ones the light of an order is d^m exp(-d), as
-in Poisson's distribution. b(t, d, mu_L), the mean of the logarithm over directions, is smooth after that.
-
-On that way light comes a length s from its last scattering. Where the source is even, s has the mean and the variance
-
-    <s> = 1 - L e^{-L}/(1 - e^{-L}),     <s^2> = 2 - (L^2 + 2 L) e^{-L}/(1 - e^{-L}),
-
-which change from L/2 to 1 within |mu| about as small as t: these are left out too. With w the horizontal part of the
-direction and log s_b(t, d, mu_L) a mean over directions,
-
-    D = w <s> + s_b (X, Y),     sigma^2 = s_b^2 exp(2 Z) + |w|^2 (<s^2> - <s>^2)/2.
-
-F, X, Y and Z are sums of products, as above.
+in Poisson's distribution.
 
 **Interpolation on simplices:** the entries around a place of a regular grid, and what each counts.
 
@@ -132,30 +101,11 @@ def at_angle(table: Array, cosines: Array) -> Array:
     return np.interp(np.arccos(np.clip(cosines, -1.0, 1.0)), np.linspace(0.0, np.pi, ENTRIES), table)
 
 
-def direction_shapes(fields: Array, places: Array, directions: Array, rank: int) -> Array:
-    """Return the shapes that fields at some places have most of.
-
-    `fields`: (P, V), at P places in V directions; `places`, `directions`: (P,) and (V,), weights, not negative; those
-    of directions positive; `rank`: K, how many shapes. Returns `ndarray`: (K, V), with sum_v directions_v g_k g_l =
-    delta_kl.
-    """
-    roots = np.sqrt(directions)
-    weighted = fields * roots * np.sqrt(places / places.max())[:, None]
-    _, vectors = np.linalg.eigh(weighted.T @ weighted)
-    return np.ascontiguousarray((vectors[:, ::-1][:, :rank] / roots[:, None]).T)
-
-
-def coefficients(fields: Array, directions: Array, shapes: Array) -> Array:
-    """Return a_k of fields, (P, K); parameters as above."""
-    return (fields * directions) @ shapes.T
-
-
 THINNEST, THICKEST = 0.01, 200.0
 LOWEST_SUN = 0.02
 THICKNESS_SHIFT = 0.02
 DEPTH_SCALE = 0.1
-HORIZON = 5e-4  #: cosine of the entries at mu = 0
-SHORT = 0.05  #: way below which series take the place of differences
+HORIZON = 1e-4  #: cosine of the entries at mu = 0
 
 
 def thicknesses(count: int) -> Array:
@@ -178,14 +128,6 @@ def suns(count: int) -> Array:
     return values
 
 
-def directions(count: int) -> Array:
-    """Return cosines of directions at even steps, an odd number of them: the one in the middle is just off 0."""
-    places = np.linspace(-1.0, 1.0, count)
-    values = np.sign(places) * (1 - np.cos(np.pi * places)) / 2
-    values[count // 2] = HORIZON
-    return values
-
-
 def depth_coordinate(d: Array, t: float) -> Array:
     """Return the coordinate of depths in a slab."""
     upper, lower = np.log1p(d / DEPTH_SCALE), np.log1p((t - d) / DEPTH_SCALE)
@@ -205,33 +147,31 @@ def depths(count: int, t: float) -> Array:
     return values
 
 
-def powers(number: int) -> tuple[int, float]:
-    """Return n and m of r for a set of orders; m is 0 for the set without end."""
-    first, last = SETS[number]
-    return first - 1, (first + last) / 2 - 1 if math.isfinite(last) else 0.0
-
-
-def reference(number: int, t: float | Array, d: Array) -> Array:
+def steep_powers(number: int, t: float, d: Array) -> Array:
     """Return r of a set at depths in a slab."""
-    n, m = powers(number)
-    deep = m * np.log1p(d / m) - d if m else 0.0
-    return n * np.log(t / (t + THICKNESS_SHIFT)) + deep + 0.0 * d
+    first, last = SETS[number]
+    thin = (first - 1) * np.log(t / (t + THICKNESS_SHIFT))
+    if not math.isfinite(last):
+        return np.full_like(d, thin)
+    m = (first + last) / 2 - 1
+    return thin + m * np.log1p(d / m) - d
 
 
-def way_behind(d: Array, t: float | Array, mu: Array) -> Array:
-    """Return L [mean free paths]."""
+def way_behind(d: Array, t: float, mu: Array) -> Array:
+    """Return the way L from points back to where the line of sight enters the slab [mean free paths]."""
     return np.where(mu < 0, d, t - d) / np.maximum(np.abs(mu), 1e-9)
 
 
-def last_way(way: Array) -> tuple[Array, Array]:
-    """Return the mean and the variance of s for L [mean free paths and their square]."""
-    way = np.minimum(way, 200.0)
-    short = np.minimum(way, SHORT)
-    lost = np.exp(-way) / -np.expm1(-np.maximum(way, SHORT))
-    mean = 1 - way * lost
-    variance = 2 - (way + 2) * way * lost - mean**2
-    series = short / 2 - short**2 / 12, short**2 / 12 - short**4 / 240
-    return np.where(way < SHORT, series[0], mean), np.where(way < SHORT, series[1], np.maximum(variance, 0.0))
+def place_shares(t: Any, d: Any, sun: Any) -> tuple[Any, Any, Any]:
+    """Return the coordinates of thickness, depth and the cosine of the sun's zenith angle, from 0 to 1."""
+    low, high = (math.log(end + THICKNESS_SHIFT) for end in (THINNEST, THICKEST))
+    upper, lower = (dr.log(1 + length / DEPTH_SCALE) for length in (d, t - d))
+    low_sun = lowest_sun_coordinate()
+    return (
+        (dr.log(t + THICKNESS_SHIFT) - low) / (high - low),
+        upper / dr.maximum(upper + lower, 1e-30),
+        (dr.sqrt(dr.asin(sun) * (2 * dr.inv_pi)) - low_sun) / (1 - low_sun),
+    )
 
 
 #: Networks that sort so many numbers by comparisons of pairs.

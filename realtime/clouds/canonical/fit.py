@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The 22 functions of Bouthors 2008, section 5.2, fitted to the tables, in optical lengths.
+"""The 22 functions of Bouthors 2008, section 5.2, fitted to the canonical transport, in optical lengths.
 
 With theta the scattering angle, phi_L = acos(mu_L) and the paper's functions in capitals,
 
@@ -29,19 +29,19 @@ from scipy.optimize import least_squares
 from realtime.clouds.canonical import coordinates
 from realtime.clouds.canonical.coordinates import SETS
 from realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
-from realtime.clouds.canonical.look_up import LookUp, direction_share
-from realtime.clouds.canonical.tables import CanonicalTables, logged, tables_digest
+from realtime.clouds.canonical.transport_grid import Transport, logged, transport_digest
 from realtime.clouds.slab_orders.phases import SlabPhase
 from realtime.numerics.array_types import ArrayTypes
 
 Array = NDArray[Any]
 Progress = Callable[[float, str], None]
 
-#: Raise this when a fit to the same tables gives other numbers.
+#: Raise this when a fit to the same transport gives other numbers.
 VERSION = 2
 
 _THICKNESSES, _DEPTHS, _SUNS, _DIRECTIONS, _AZIMUTHS = 10, 10, 5, 13, 3
 _ANGLES = 61  #: of P
+_HORIZON = 5e-4  #: cosine of the direction at mu = 0
 _LEAST_D, _LEAST_SUM = 1.01, 1.05
 _FLOOR = 0.02  #: of the brightest of a thickness, below which errors count less
 _LARGEST = 1e6  #: of a parameter, which without light nothing else bounds
@@ -79,7 +79,7 @@ class FittedSet:
 
 @dataclass(frozen=True)
 class _Samples:
-    """Points (thicknesses, depths, suns, directions, azimuths), and what the tables say there."""
+    """Points (thicknesses, depths, suns, directions, azimuths), and what the transport is there."""
 
     t: Array
     d: Array
@@ -96,35 +96,32 @@ class _Samples:
 def fitted_functions(
     phase: SlabPhase,
     albedo: float,
-    tables: CanonicalTables,
-    look_up: LookUp,
+    look_up: Transport,
     types: ArrayTypes,
     *,
     progress: Progress | None = None,
 ) -> tuple[FittedSet, ...]:
-    """Return the functions fitted to the tables of a medium, from the disk where they are kept there.
+    """Return the functions fitted to the canonical transport of a medium, from the disk where they are kept there.
 
-    `phase`, `albedo`: of the medium; `tables`: from `realtime.clouds.canonical.tables.canonical_tables`; `look_up`: of
-    these; `types`: of its numbers; `progress`: called with (share done, what) while functions are fitted; without it
-    the log says how far they are.
+    `phase`, `albedo`: of the medium; `look_up`: its canonical transport; `types`: of its numbers; `progress`: called
+    with (share done, what) while functions are fitted; without it the log says how far they are.
     """
-    made = VERSION, tables_digest(tables.grid), types.scalar.__name__
+    made = VERSION, transport_digest(), types.scalar.__name__
     digest = hashlib.blake2b(repr(made).encode(), digest_size=8).hexdigest()
     medium = medium_numbers(phase, albedo)
     names = [field.name for field in fields(FittedSet)]
     arrays = load_kept(digest, medium)
     if arrays is None:
-        fitted = fit_tables(look_up, types, progress=progress or logged("functions fitted to tables of clouds"))
+        fitted = fit_transport(look_up, types, progress=progress or logged("functions fitted for clouds"))
         keep(digest, medium, {name: np.stack([getattr(each, name) for each in fitted]) for name in names})
         return fitted
     return tuple(FittedSet(*(arrays[name][number] for name in names)) for number in range(len(SETS)))
 
 
-def fit_tables(look_up: LookUp, types: ArrayTypes, *, progress: Progress | None = None) -> tuple[FittedSet, ...]:
-    """Fit the functions to tables.
+def fit_transport(look_up: Transport, types: ArrayTypes, *, progress: Progress | None = None) -> tuple[FittedSet, ...]:
+    """Fit the functions to the canonical transport.
 
-    `look_up`: of the tables, `realtime.clouds.canonical.look_up.on_device`; `types`: of its numbers; `progress`: called
-    with (share done, what).
+    `look_up`: the canonical transport; `types`: of its numbers; `progress`: called with (share done, what).
     """
     tell = progress or (lambda share, what: None)
     samples = _samples(look_up, types)
@@ -138,10 +135,24 @@ def fit_tables(look_up: LookUp, types: ArrayTypes, *, progress: Progress | None 
 
 
 def _axes() -> tuple[Array, Array, Array]:
-    return coordinates.thicknesses(_THICKNESSES), coordinates.suns(_SUNS), coordinates.directions(_DIRECTIONS)
+    return coordinates.thicknesses(_THICKNESSES), coordinates.suns(_SUNS), _directions(_DIRECTIONS)
 
 
-def _samples(look_up: LookUp, types: ArrayTypes) -> list[_Samples]:
+def _directions(count: int) -> Array:
+    """Return mu = +-(1 - cos(pi v))/2 at even v from -1 to 1, fine at the horizon; the one in the middle is off 0."""
+    places = np.linspace(-1.0, 1.0, count)
+    values = np.sign(places) * (1 - np.cos(np.pi * places)) / 2
+    values[count // 2] = _HORIZON
+    return values
+
+
+def _direction_share(mu: Any) -> Any:
+    """Return the coordinate of a direction, from 0 to 1."""
+    v = dr.safe_acos(dr.fma(-2, dr.abs(mu), 1)) * dr.inv_pi
+    return dr.fma(dr.mulsign(v, mu), 0.5, 0.5)
+
+
+def _samples(look_up: Transport, types: ArrayTypes) -> list[_Samples]:
     thicknesses, suns, directions = _axes()
     azimuths = (np.arange(_AZIMUTHS) + 0.5) * np.pi / _AZIMUTHS
     depths = np.stack([coordinates.depths(_DEPTHS, t) for t in thicknesses])
@@ -293,7 +304,7 @@ def _fit_spread(samples: _Samples) -> Array:
 
 
 def fit_on_device(fitted: tuple[FittedSet, ...], types: ArrayTypes) -> "DeviceFit":
-    """Return the look-up of fitted functions, with the arguments and results of that of tables.
+    """Return the look-up of fitted functions, with the arguments and results of a `Transport`.
 
     Depths are kept within the slab, thicknesses and suns within those that were fitted; sigma is kept positive.
     """
@@ -315,7 +326,7 @@ def fit_on_device(fitted: tuple[FittedSet, ...], types: ArrayTypes) -> "DeviceFi
 
 @dataclass(frozen=True)
 class DeviceFit:
-    """Fitted functions as a `LookUp`; their arrays are fields, so that recorded functions take them as inputs."""
+    """Fitted functions as a `Transport`; their arrays are fields, so that recorded functions take them as inputs."""
 
     tables: tuple[dict[str, Any], ...]
     spreads: tuple[tuple[float, ...], ...]
@@ -331,7 +342,7 @@ class DeviceFit:
         phi_l = dr.acos(sun)
         at_t = (dr.log(t + coordinates.THICKNESS_SHIFT) - low) / (high - low)
         at_sun = (dr.sqrt(dr.asin(sun) * (2 / np.pi)) - low_sun) / (1 - low_sun)
-        at_mu = direction_share(dr.clip(mu, -1, 1))
+        at_mu = _direction_share(dr.clip(mu, -1, 1))
         cosine = dr.fma(dr.safe_sqrt((1 - mu * mu) * (1 - sun * sun)), cos_phi, -mu * sun)
         (p,) = _along(Float, table["p"], [(dr.safe_acos(cosine) / np.pi, _ANGLES)], 1)
         direction, height = (at_mu, _DIRECTIONS), (at_sun, _SUNS)

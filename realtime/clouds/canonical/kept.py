@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tables kept on disk, whole or not at all, in the folder and under the names that `airlight doctor` lists.
+"""Numbers of slabs kept on disk, whole or not at all, in the folder and under the names that `airlight doctor` lists.
 
 The folder is that of `reference/storage/cache.py`, which this side does not import: AIRLIGHT_CACHE_DIR, or `airlight`
 in the user's cache folder. A file that is damaged or from elsewhere counts as none. With AIRLIGHT_CACHE_SIZE=0 nothing
 is kept.
 
-The name of a file tells how tables were made; which medium they are of, the moments of its phase function and its
+The name of a file tells how numbers were made; which medium they are of, the moments of its phase function and its
 albedo, stands in it. A phase function that a scene holds as a table in single precision has its moments to 1e-5, and
-finds the tables of the function that the table was made of.
+finds the numbers of the function that the table was made of.
 """
 
 import os
@@ -30,7 +30,7 @@ Array = NDArray[Any]
 
 _CHECK, _MEDIUM = "checksum", "medium"
 _TOLD_APART = 300  #: moments by which phase functions are told apart
-#: By which media may differ that share tables. In thick slabs light is scattered thousands of times.
+#: By which media may differ that share numbers. In thick slabs light is scattered thousands of times.
 _SAME_MOMENT, _SAME_ALBEDO = 2e-5, 1e-6
 
 
@@ -48,7 +48,7 @@ def medium_numbers(phase: SlabPhase, albedo: float) -> Array:
 def load_kept(digest: str, medium: Array) -> dict[str, Any] | None:
     """Return the arrays under a digest of a medium, None where there are none or the file is damaged.
 
-    `digest`: of how tables were made; `medium`: from `medium_numbers`.
+    `digest`: of how numbers were made; `medium`: from `medium_numbers`.
     """
     for path in sorted(_folder().glob(f"canonical-{digest}-*.npz")):
         arrays = _read(path, medium)

@@ -3,6 +3,5 @@
 
 Read in this order:
 
-- `search.py`: the fixed point of the collector, and the light that comes from there;
-- `transport_grid.py`: the canonical transport on a grid that frames read fast.
+- `search.py`: the fixed point of the collector, and the light that comes from there.
 """

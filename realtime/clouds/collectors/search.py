@@ -54,7 +54,7 @@ to p: where both are large it is no contraction, and steps overshoot.
 * *Way*. The ray behind p has the depth T in clouds, and the slab L along the same direction: d/|mu| upwards,
   (t - d)/mu downwards. Light that was scattered into the ray on the way T, not L, is what the eye gets: it counts
   (1 - exp(-T))/(1 - exp(-L)) times, as if its source were even. Where the ray leaves the slab through the lit face
-  (mu < 0), p lies |mu| T deep at least, as there is cloud so far. The paper takes L: then silhouettes of thin parts are
+  (mu < 0), p lies |mu| T deep at least, as there is cloud so far. With the paper's L silhouettes of thin parts are
   too bright, and slopes that face away from the sun are black.
 * *End*. After `iterations` steps; or in those rays that take no more than a share `settled` of sigma as their step. The
   light is that of the last slab: F gives it with the place and the width.
@@ -68,13 +68,13 @@ widths, which are 0 where there is none. Where the camera moved, a point of the 
 collector it takes, and its collector lies beside that too.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
+from realtime.clouds.canonical.transport_grid import Transport
 from realtime.clouds.light_maps import FilteredSurface, LightMap, filtered_surface
 
 LEAST_COSINE = 0.02  #: of the sun over a tangent plane
@@ -151,9 +151,6 @@ def _facing(normal: Any, axis: Any) -> tuple[Any, Any]:
     return normal, dr.select(low, type(cosine)(LEAST_COSINE), dr.minimum(cosine, 1))
 
 
-#: ``transport(set_number, t, d, mu, cos_phi, sin_phi, mu_l)`` -> T [1/sr], c_x, c_y, sigma [mean free paths].
-Transport = Callable[..., tuple[Any, Any, Any, Any]]
-
 _SKIN = 0.01  #: of a slab, which is left on the way out of it [mean free paths]
 _LEVEL = 1e-4  #: cosine of a direction that never leaves
 _NARROWEST = 1e-3  #: width of a collector [mean free paths]: where no light comes there is none
@@ -184,10 +181,7 @@ class Search:
     iterations: int = 10
     settled: float = 0.0  #: step at which a ray has found its collector [`Collector.width`]; 0: none has
     along_light: bool = False  #: whether slabs are as thick as the cloud is along the light, as printed
-    covered: bool = True  #: whether light enters only where there is cloud; as printed: everywhere
-    as_ray: bool = (
-        True  #: whether light comes from as far behind the point as the ray is in cloud; as printed: the slab
-    )
+    covered: bool = True  #: whether light enters only where the map has cloud
 
 
 def cold_start(light_map: LightMap, point) -> Collector:
@@ -229,13 +223,11 @@ def collector_light(
             extinction=extinction,
             along_light=search.along_light,
         )
-        if search.as_ray:
-            slab = _reaching_behind(slab, behind)
+        slab = _reaching_behind(slab, behind)
         found, c_x, c_y, spread = transport(
             set_number, slab.thickness, slab.depth, slab.mu, slab.cos_phi, slab.sin_phi, slab.mu_l
         )
-        if search.as_ray:
-            found *= (1 - dr.exp(-behind)) / (1 - dr.exp(-_way(slab)))
+        found *= (1 - dr.exp(-behind)) / (1 - dr.exp(-_way(slab)))
         if search.covered:
             found *= dr.minimum(surface.cover, 1)
         path = dr.rcp(extinction)

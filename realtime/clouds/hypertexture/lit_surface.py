@@ -13,8 +13,8 @@ light map keeps front and front - Z, so that the filter and the search are those
 surface, and the ways to collectors, are lengths times sigma_s: exact where rho is as in the body, which it is but for a
 layer at the surface.
 
-The normal is that of the surface rho = rho_0, or the hull's where the density exceeds it there. Along a ray the density
-is taken at the ends of steps of a voxel, and the place between two of them at which it passes rho_0 is linear.
+Along a ray the density is taken at the ends of steps of a voxel, and the place between two of them at which it passes
+rho_0 is linear.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.bounds import CloudSurfaces, next_crossing
+from realtime.clouds.bounds import CloudSurfaces
 from realtime.clouds.hypertexture.march import march, middle_density, voxel
 from realtime.clouds.light_maps import LitSurfaces
 from realtime.scene.lights import Light
@@ -37,7 +37,6 @@ class DenseSurface:
 
     distance: Any  #: infinite where they never do [m]
     cloud: Any  #: the number of the cloud there
-    hull: Any  #: whether it is the boundary of the cloud, or the start of the ray
     behind: Any  #: int rho dx from there on, 0 where it was not asked for [m]
 
 
@@ -66,7 +65,7 @@ def dense_surface(
         return stride * voxel(clouds, cloud, inside)
 
     def add(total, begin, finish, cloud, inside):
-        distance, number, hull, behind, last = total
+        distance, number, behind = total
         own = inside if only is None else inside & (cloud == only)
         searches = own & ~dr.isfinite(distance)
         # A cloud without a grid has steps as long as a stretch, which may be endless for a ray within rounding of one.
@@ -79,24 +78,20 @@ def dense_surface(
         met = at_once | passes
         distance = dr.select(met, begin + share * (far - begin), distance)
         number = dr.select(met, cloud, number)
-        hull = dr.select(met, at_once & (begin != last), hull)
-        last = dr.select(inside, finish, last)
         if only is None:
-            return (distance, number, hull, behind, last), inside & ~met
+            return (distance, number, behind), inside & ~met
         rho = middle_density(clouds, origin, direction, begin, far, cloud, own)
         counted = own & dr.isfinite(distance)
         behind += dr.select(counted, rho * (far - dr.maximum(begin, dr.select(counted, distance, 0))), 0)
-        return (distance, number, hull, behind, last), inside
+        return (distance, number, behind), inside
 
     total = (
         dr.full(Float, dr.inf, lanes),
         dr.zeros(mi.UInt32, lanes),
-        dr.full(mi.Bool, False, lanes),
         dr.zeros(Float, lanes),
-        dr.full(Float, -1, lanes),
     )
-    distance, number, hull, behind, _ = march(surfaces, origin, direction, end, total, step=step, add=add)
-    return DenseSurface(distance, number, hull, behind)
+    distance, number, behind = march(surfaces, origin, direction, end, total, step=step, add=add)
+    return DenseSurface(distance, number, behind)
 
 
 def lit_dense_surface(
@@ -124,29 +119,8 @@ def lit_dense_surface(
     )
     there = dr.isfinite(met.distance)
     distance = dr.select(there, met.distance, 0)
-    point = origin + direction * distance
-    # A little before the boundary, so that the next crossing is that of the boundary itself.
-    back_off = 1e-5 * (distance + dr.norm(point))
-    crossing = next_crossing(surfaces, point - direction * back_off, direction, dr.zeros(Float, size * size), met.hull)
-    slope = -_gradient(clouds, point, mi.UInt32(cloud), there)
-    normal = dr.select(met.hull, Vector(crossing.normal), slope)
-    normal = dr.select(dr.dot(normal, direction) > 0, -normal, normal)
-    length = dr.norm(normal)
-    normal = dr.select(length > 0, normal / length, -direction)
     front = dr.select(there, Float(light.extent.depth) - distance, 0)
     back = dr.select(there, front - met.behind / dr.gather(Float, body, mi.UInt32(cloud)), 0)
-    lit = LitSurfaces(size, texel, there, front, back, dr.select(there, normal, 0))
+    lit = LitSurfaces(size, texel, there, front, back)
     dr.eval(lit)
     return lit
-
-
-def _gradient(clouds: Clouds, point, cloud, active) -> Any:
-    """Return the slope of rho over a voxel [1/m], up to a factor."""
-    assert clouds.density is not None
-    Vector, width = type(point), voxel(clouds, cloud, active)
-    parts = []
-    for axis in range(3):
-        shift = Vector(*(width if axis == place else type(width)(0) for place in range(3)))
-        after, before = (clouds.density.at(place, cloud, active) for place in (point + shift, point - shift))
-        parts.append(after - before)
-    return Vector(*parts)

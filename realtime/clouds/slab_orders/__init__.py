@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The light of a homogeneous slab under a beam, by order of scattering, with the moments of its displacement.
 
-A deterministic computation in NumPy and SciPy, float64: it makes the tables of the canonical transport of Bouthors 2008
+A deterministic computation in NumPy and SciPy, float64: it makes the grid of the canonical transport of Bouthors 2008
 and runs nowhere in a frame. The truth that checks it is a walk of photons, on the other side
 (`reference/monte_carlo/slab_walk/`).
 

@@ -41,9 +41,9 @@ def _search(light_map, transport, points, towards, *, behind=100.0, **options):
         point=point,
         toward=toward,
         extinction=mi.Float(EXTINCTION),
-        behind=mi.Float(behind),
+        behind=aligned_array(mi.Float, np.atleast_1d(behind)),
         start=cold_start(light_map, point),
-        search=Search(**({"covered": False, "as_ray": False} | options)),
+        search=Search(**({"covered": False} | options)),
     )
     dr.eval(light)  # whatever is read of it
     return light
@@ -70,14 +70,15 @@ def test_a_slab_is_found_as_it_is(variant, lit_from_below):
     axis = horizontal * np.sqrt(1 - cosine**2) - normal * cosine
     light_map = _map(axis)
     rng = np.random.default_rng(11)
-    depths = rng.uniform(0, SLAB[2], 300)
+    depths = rng.uniform(0.01, SLAB[2] - 0.01, 300)  # where the skin of a slab, 0.01 mean free paths, changes none
     plane = rng.uniform(-1.5, 1.5, (300, 2)) @ SLAB_TURN[:, :2].T
     points = MIDDLE + plane + np.outer(0.5 * SLAB[2] - depths, normal)
     towards = rng.normal(size=(300, 3))
     towards /= np.linalg.norm(towards, axis=1)[:, None]
     beside = np.cross(normal, horizontal)
-    light = _search(light_map, _recording([]), points, towards, iterations=12)
     mu, x, y = towards @ normal, towards @ horizontal, towards @ beside
+    behind = EXTINCTION * np.where(mu < 0, depths, SLAB[2] - depths) / np.abs(mu)  # the ray is in cloud as in the slab
+    light = _search(light_map, _recording([]), points, towards, behind=behind, iterations=12)
     sine = np.sqrt(1 - mu**2)
     expected = EXTINCTION * (depths + 2 * SLAB[2]) + 3 * mu + (5 * x + 7 * y) * sine + 11 * cosine
     np.testing.assert_allclose(np.array(light.radiance), expected, rtol=2e-3, atol=5e-3)
@@ -97,8 +98,10 @@ def test_as_printed_lengths_are_those_along_the_light(variant):
         return t + 10 * d, 0 * t, 0 * t, 0 * t + 0.5
 
     point = MIDDLE + 0.1 * normal
+    below = EXTINCTION * (0.5 * SLAB[2] + 0.1)
     printed, corrected = (
-        float(_search(light_map, transport, point, normal, along_light=choice).radiance[0]) for choice in (True, False)
+        float(_search(light_map, transport, point, normal, behind=behind, along_light=choice).radiance[0])
+        for choice, behind in ((True, below / cosine), (False, below))
     )
     np.testing.assert_allclose(corrected, EXTINCTION * (SLAB[2] + 10 * (0.5 * SLAB[2] - 0.1)), rtol=2e-3)
     np.testing.assert_allclose(printed / corrected, 3.8637, rtol=2e-3)

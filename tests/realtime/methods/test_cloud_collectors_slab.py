@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A slab through the whole method, tables and grid, against its exact radiance: the claim of cloud-collectors.
+"""A slab through the whole method, its grid included, against its exact radiance: the claim of cloud-collectors.
 
-The exact radiance is that of `realtime.clouds.slab_orders`, which DISORT checks in `tests/realtime/clouds`. Tables are
-made for thicknesses and suns about those of the slab alone: those of all would take minutes.
+The exact radiance is that of `realtime.clouds.slab_orders`, which DISORT checks in `tests/realtime/clouds`. The grid
+is made for thicknesses and suns about those of the slab alone: those of all would take minutes.
 """
 
 import mitsuba as mi
 import numpy as np
 import pytest
 
-import realtime.clouds.collectors.transport_grid as grid
-import realtime.methods.cloud_collectors as method
+import realtime.clouds.canonical.transport_grid as grid
 from realtime.clouds.canonical import coordinates
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
 from realtime.clouds.slab_orders.radiance import slab_radiance
@@ -30,14 +29,9 @@ AXIS = np.array([0.517, 0.211, -0.829]) / np.linalg.norm([0.517, 0.211, -0.829])
 @pytest.mark.claim("collector-slab", tolerance="2 % RMSE of the mean: linear entries of the grid")
 @pytest.mark.parametrize("peak", ["matched", "full"])
 def test_a_slab_is_exact_to_two_percent(variant, monkeypatch, peak):
-    from realtime.clouds.canonical.tables import Grid, canonical_tables
-
     for name, value in (("THINNEST", 3.0), ("THICKEST", 4.8), ("LOWEST_SUN", 0.7)):
         monkeypatch.setattr(coordinates, name, value)
-    few = Grid(thicknesses=4, depths=12, suns=4, directions=25, azimuths=10)
-    monkeypatch.setattr(method, "canonical_tables", lambda phase, albedo: canonical_tables(phase, albedo, grid=few))
     monkeypatch.setattr(grid, "SIDES", (4, 8, 4, 33, 9))
-    monkeypatch.setattr(grid, "FINE", (5, 24, 5))
     medium = DROPLETS | {"sigma_t": EXTINCTION, "albedo": ALBEDO, "phase": {"type": "hg", "g": G}}
     scene = {
         "type": "scene",
