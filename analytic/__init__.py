@@ -6,7 +6,6 @@ Names and units are those of DESIGN section 2: lengths in metres, extinction in 
 Read in this order:
 
 - `errors.py`: the one exception for what a user gave wrong;
-- `columns.py`: records that know their columns: heading, unit, meaning;
 - `mie.py`: how a sphere scatters light;
 - `droplets.py`: the droplets of clouds and fog, their extinction and phase functions, full and modified;
 - `phase.py`: phase functions of mean 1 over the sphere;
@@ -14,6 +13,5 @@ Read in this order:
 - `kronrod.py`: nodes and weights of the Gauss-Kronrod pair;
 - `panels.py`: the airlight integral of millions of segments, in NumPy, each with its error estimate;
 - `height_fog.py`: media whose density depends on height alone: optical depths, suns in closed form, lights at places;
-- `series.py`: the power series behind the polynomial of Biri 2006;
-- `cases.py`: tables of cases in CSV files or in memory.
+- `series.py`: the power series behind the polynomial of Biri 2006.
 """

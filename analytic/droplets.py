@@ -43,8 +43,7 @@ takes what lies below the angle, and `cut="flat"` leaves the value at 5 degrees 
 
 Light of order 1 must not lose its peak, nor count it twice: with kappa' and albedo' it takes the full phase function
 divided by 1 - f (the correction of Nakajima and Tanaka 1988, TMS), since albedo' kappa' p/(1 - f) = albedo kappa p.
-That is `Modified.single_scattering_factor`, the factor of p_full where p_modified would stand. With kappa' and the
-albedo itself the divisor is 1 - albedo f.
+With kappa' and the albedo itself the divisor is 1 - albedo f.
 """
 
 from collections.abc import Callable
@@ -274,11 +273,6 @@ class Modified:
     def albedo(self) -> float:
         """Return the single-scattering albedo of what is left [1]."""
         return self.full.albedo * (1 - self.lowered) / (1 - self.full.albedo * self.lowered)
-
-    @property
-    def single_scattering_factor(self) -> float:
-        """Return the factor of the full phase function for light of order 1 in the lowered density [1] (TMS)."""
-        return 1 / (1 - self.lowered)
 
     def __call__(self, cos_scatter: ArrayLike) -> Array:
         """Return the phase function [1] at cosines of the scattering angle, of any shape; its mean is 1."""

@@ -27,7 +27,6 @@ from numpy.typing import ArrayLike, NDArray
 from analytic.errors import InputError
 
 Array = NDArray[np.float64]
-Values = Array | float  # arrays of shapes that broadcast, or numbers
 
 
 def foot_and_height(origin: ArrayLike, direction: ArrayLike, light: ArrayLike) -> tuple[Array, Array]:
@@ -55,20 +54,6 @@ def foot_and_height(origin: ArrayLike, direction: ArrayLike, light: ArrayLike) -
     cross = [_difference_of_products(v[:, i], d[:, j], v[:, j], d[:, i]) for i, j in ((1, 2), (2, 0), (0, 1))]
     height = np.hypot(np.hypot(cross[0], cross[1]), cross[2]) / length
     return foot, height
-
-
-def path_length(x: Values, foot: Values, height: Values) -> Array:
-    """Return q = (x - foot) + r [m], without cancellation, by the two branches in the module's docstring.
-
-    Valid for finite x and foot and height >= 0; it is 0 on a ray through the light, before the light.
-    """
-    s = np.asarray(x, dtype=np.float64) - foot
-    h = np.asarray(height, dtype=np.float64)
-    # r + |s| is zero only at the light itself, where q is zero.
-    q = np.abs(s) + np.hypot(h, s)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        below = h * (h / q)
-    return np.where(s >= 0, q, np.where(q > 0, below, 0.0))
 
 
 def _points(name: str, value: ArrayLike) -> Array:

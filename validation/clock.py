@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import numpy as np
 
-from analytic.columns import column
+from validation.columns import column
 
 _MIB = 1024  # of the numbers in `status` [KiB]
 _FORGET = "5"  # what makes Linux forget the peak so far

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import DTypeLike, NDArray
 
-    from analytic.cases import Cases
+    from validation.kernels.case_files import Cases
 
     CasesLike: TypeAlias = Mapping[str, Any] | Cases | File
 else:
@@ -348,8 +348,8 @@ def integrals(
     >>> bool(abs(found.error).max() < 1e-5)
     True
     """
-    from analytic.cases import integrate_cases as certified
     from reports.machine.environment import activate
+    from validation.kernels.case_files import integrate_cases as certified
 
     read, shape = _cases(cases, phase)
     activate()
@@ -373,7 +373,7 @@ def integrals(
 
 
 def _cases(cases: Any, phase: str | None) -> "tuple[Cases, tuple[int, ...]]":
-    from analytic.cases import Cases, cases_from_columns, read_cases
+    from validation.kernels.case_files import Cases, cases_from_columns, read_cases
 
     if isinstance(cases, str | os.PathLike):
         cases = read_cases(Path(cases), phase=phase)

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analytic.columns import column
 from reports.sweep.read import Sweep
 from reports.sweep.samples import FAULTS, Sample
+from validation.columns import column
 from validation.study.row import PROPERTY
 
 COUNT = 10  #: worst scenes of a configuration

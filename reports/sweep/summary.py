@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from analytic.columns import column
 from reports.sweep.claims import TARGETS, Claim, best_claims, claims, percent, written
 from reports.sweep.correlations import Correlation, correlations, property_words, sentences, strongest
 from reports.sweep.faults import Check, Fault, Reason, Worst, checks, faults, reasons, worst
 from reports.sweep.read import Numbers, Sweep
 from reports.sweep.samples import FAULTS, Sample, drawn_at_random, fastest_counts, samples
+from validation.columns import column
 from validation.metrics.errors import plain
 from validation.statistics.intervals import LEVEL, binomial_interval, quantile_interval
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from analytic.columns import columns_of
 from reports.sweep.claims import TARGETS, written
 from reports.sweep.correlations import property_words
 from reports.sweep.faults import Check, Fault
 from reports.sweep.samples import FAULTS, UNTOLD
 from reports.sweep.summary import Host, Property, ReferenceErrors, Summary, quantiles
 from reports.tables.table import Column, Measured, Name, Table, numbers, table, words
+from validation.columns import columns_of
 
 _SHARE = {"digits": 2, "share": True}
 

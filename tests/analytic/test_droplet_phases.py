@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 from mpmath import workdps
 
-from analytic.cases import integrate_cases, read_cases
 from analytic.droplets import moments
 from analytic.errors import InputError
-from analytic.phase import PhaseFunction, hg_draine_moments, phase_from_words
+from analytic.phase import PhaseFunction, phase_from_words
 from tests.evidence.certified.airlight_integral_droplets import FILE, value
+from tests.helpers.hg_draine import hg_draine_moments
+from validation.kernels.case_files import integrate_cases, read_cases
 
 
 @pytest.mark.claim("hg-draine", tolerance="1e-8: quadrature across a peak of g = 0.99")

@@ -60,7 +60,6 @@ def test_what_is_cut_is_what_the_density_loses(cut):
     # As much light as before is scattered outside of the peak.
     before = full.extinction * full(np.array([0.3]))
     assert matched.extinction * matched(np.array([0.3])) == pytest.approx(before, rel=1e-9)
-    assert matched.extinction * matched.single_scattering_factor == pytest.approx(full.extinction, rel=1e-9)
     printed = Modified(full, cut=cut, share="printed")
     assert printed.extinction == pytest.approx(0.5 * full.extinction, rel=1e-9)
     assert printed(0.3) == matched(0.3)

@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from analytic.cases import integrate_cases, read_cases
 from analytic.errors import InputError
 from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction
+from validation.kernels.case_files import integrate_cases, read_cases
 
 ISOTROPIC = PhaseFunction("isotropic")
 PHASES = [

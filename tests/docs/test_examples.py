@@ -171,7 +171,7 @@ def test_the_plain_method_returns_what_the_page_says(fog, variant):
 @pytest.mark.slow
 def test_the_kernel_of_the_page(variant, tmp_path, monkeypatch):
     """The snippet is what it says: `equiangular` with twelve steps."""
-    from analytic.cases import read_cases
+    from validation.kernels.case_files import read_cases
     from validation.kernels.cases import integrate_cases
 
     code = blocks(DOCS / "your-method.md", "python")[2]

@@ -8,7 +8,6 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.cases import Cases
 from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction
 from realtime.numerics.array_types import ArrayTypes, aligned_array, array_types
@@ -16,6 +15,7 @@ from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import Phase, named_phase
+from validation.kernels.case_files import Cases
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,6 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from analytic.cases import Cases
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
 from realtime.kernels.registry import KERNELS
@@ -26,6 +25,7 @@ from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import named_phase
 from validation.clock import time_repeated, timing_of
+from validation.kernels.case_files import Cases
 from validation.kernels.cases import TABLE, Kernel, relative_error
 from validation.kernels.rays import wide_rays
 from validation.study.configuration import find_kernel, sized, split_name

@@ -13,7 +13,6 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analytic.cases import Cases
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
 from realtime.numerics.array_types import aligned_array, array_types
@@ -22,6 +21,7 @@ from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import named_phase
 from reference.storage.files import write_text
+from validation.kernels.case_files import Cases
 from validation.study.configuration import find_kernel
 
 Array = NDArray[np.float64]

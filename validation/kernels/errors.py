@@ -36,8 +36,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.cases import Cases
 from analytic.phase import PhaseFunction, phase_from_words
+from validation.kernels.case_files import Cases
 from validation.kernels.cases import TABLE, Values, relative_error
 from validation.kernels.rays import case_row
 

@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from analytic.cases import Cases
 from analytic.panels import airlight_segments
 from analytic.phase import PHASE_NAMES, PhaseFunction, phase_from_words
 from reference.storage.kept import kept, key_of
+from validation.kernels.case_files import Cases
 from validation.kernels.cases import TABLE
 
 Array = NDArray[np.float64]

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from analytic.cases import Cases, read_cases
 from realtime.kernels.registry import KERNELS
 from validation.certified.files import certified_data
+from validation.kernels.case_files import Cases, read_cases
 from validation.kernels.cases import Kernel, Values, evaluate_cases
 from validation.kernels.errors import EPSILON, Rows, errors_by_group, groups
 from validation.kernels.rays import hard_rays, slivers

@@ -25,8 +25,8 @@ import colour
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analytic.columns import column
 from analytic.errors import InputError
+from validation.columns import column
 from validation.metrics.errors import colours, compared
 
 Array = NDArray[np.float64]

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analytic.columns import column
 from analytic.errors import InputError
+from validation.columns import column
 
 FLOOR = 1e-3  #: the least denominator of a relative error, as a share of the mean of the reference
 RADIANCE = "W/(m^2 sr)"

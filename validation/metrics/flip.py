@@ -30,9 +30,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analytic.columns import column
 from analytic.errors import InputError
 from reference.storage.files import temporary_folder
+from validation.columns import column
 from validation.metrics.errors import colours, compared
 
 PIXELS_PER_DEGREE = 67.0  #: of visual angle: a screen of 3840 pixels, 0.7 m wide, seen from 0.7 m

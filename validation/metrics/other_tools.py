@@ -41,8 +41,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analytic.columns import column
 from analytic.errors import InputError
+from validation.columns import column
 from validation.metrics.errors import FLOOR, RADIANCE, compared
 
 Array = NDArray[np.float64]

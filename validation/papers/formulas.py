@@ -24,12 +24,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import quad
 
-from analytic.cases import Cases
 from analytic.droplets import Modified, optics
 from analytic.phase import PhaseFunction
 from analytic.series import taylor_coefficients
 from realtime.kernels.exact import exact
 from realtime.kernels.taylor import PRINTED_PHASES, printed_coefficients, taylor
+from validation.kernels.case_files import Cases
 from validation.kernels.cases import Kernel, evaluate_cases
 from validation.kernels.rays import wide_rays
 

@@ -9,7 +9,6 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from analytic.columns import column
 from realtime.frame.incremental import FrameCache, next_frame, next_parts
 from realtime.frame.light_on_ray import check_radiance
 from realtime.frame.renderer import (
@@ -28,6 +27,7 @@ from realtime.scene.animate import Objects, read_objects, turned_objects
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import Scene
 from validation.clock import Timing, Took, stopwatch, time_repeated, timed, timing_of
+from validation.columns import column
 
 #: A frame that takes longer is timed stage by stage, in few frames [s]. Its spread matters little, and the usual thirty
 #: or more frames would take minutes.

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from analytic.columns import Column, column, columns_of, values_of
+from validation.columns import Column, column, columns_of, values_of
 from validation.metrics.colour import ColourDifference
 from validation.metrics.errors import RADIANCE, Metrics
 from validation.metrics.flip import Flip

@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
-from analytic.cases import read_cases
 from tests.helpers.kernel_values import relative_error, take
+from validation.kernels.case_files import read_cases
 from validation.kernels.cases import integrate_cases
 
 FEET, RAYS, DROPLETS = (f"airlight_integral{name}.csv" for name in ("", "_rays", "_droplets"))

@@ -5,10 +5,10 @@ import mpmath
 import numpy as np
 import pytest
 
-from analytic.cases import read_cases
 from realtime.kernels.closed_form import closed_form, scaled_e1
 from realtime.numerics.array_types import aligned_array, array_types
 from tests.helpers.kernel_values import kernel_values, relative_error, take
+from validation.kernels.case_files import read_cases
 
 pytestmark = pytest.mark.usefixtures("variant")
 

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from mpmath import exp, inf, mpf, pi, quad, tan
 
-from analytic.cases import read_cases
 from realtime.kernels.table import table, table_records
 from tests.helpers.kernel_values import RAY, kernel_values, take
+from validation.kernels.case_files import read_cases
 
 
 @pytest.fixture(scope="module")

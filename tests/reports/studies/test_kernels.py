@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import airlight
-from analytic.cases import read_cases
 from reports.commands import main as cli
 from reports.studies.registry import STUDIES
 from tests.helpers.api import third
+from validation.kernels.case_files import read_cases
 
 RAYS = {"phase": "isotropic", "foot": 0.5, "height": 0.3, "x0": 0.0, "x1": 1.0, "sigma_t": 0.3}
 
@@ -72,7 +72,7 @@ def test_what_is_no_case_is_refused(change, words, variant):
 
 @pytest.mark.claim("droplets-by-name")
 def test_integrals_of_a_file_take_a_phase_function_by_words(variant, capfd, tmp_path):
-    from analytic.cases import integrate_cases
+    from validation.kernels.case_files import integrate_cases
 
     rays, written = tmp_path / "rays.csv", tmp_path / "results.csv"
     rays.write_text("t,h,x0,x1,sigma_t,value\n1,0.5,0,3,0.2,7\n-1,0.25,0.5,inf,0.1,7\n")

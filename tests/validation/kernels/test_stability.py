@@ -8,7 +8,6 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from analytic.cases import read_cases
 from analytic.errors import InputError
 from analytic.phase import PHASE_NAMES, PhaseFunction
 from realtime.errors import InputError as RealtimeInputError
@@ -16,6 +15,7 @@ from realtime.kernels.quadrature import quadrature
 from tests.evidence.certified.integral import integrate_certified
 from tests.helpers.kernel_values import take
 from validation.kernels.benchmark import measure, speed_against_error
+from validation.kernels.case_files import read_cases
 from validation.kernels.cases import TABLE, Values, evaluate_cases, integrate_cases, summary, write_results
 from validation.kernels.errors import errors_by_group, groups
 from validation.kernels.rays import hard_rays, slivers, table, wide_rays

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from analytic.phase import PhaseFunction, hg_draine_moments
+from analytic.phase import PhaseFunction
+from tests.helpers.hg_draine import hg_draine_moments
 from validation.slab.light import slab_numbers
 from validation.slab.phases import phase_pair, read_phase_file
 from validation.slab.request import slab_request

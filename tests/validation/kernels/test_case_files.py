@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
-from analytic.cases import read_cases
 from analytic.errors import InputError
+from validation.kernels.case_files import read_cases
 
 HEAD = "phase,g,t,h,x0,x1,sigma_t\n"
 

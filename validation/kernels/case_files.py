@@ -76,7 +76,7 @@ def read_cases(path: str | Path, *, phase: str | None = None) -> Cases:
 def cases_from_columns(columns: Mapping[str, Any], *, name: str = "cases") -> tuple[Cases, tuple[int, ...]]:
     """Return cases from columns in memory, and the shape that their values have together.
 
-    `columns`: by name the columns of `analytic.cases`, of any shapes that broadcast together. `foot` and `height` may
+    `columns`: by name the columns of this module, of any shapes that broadcast together. `foot` and `height` may
     stand for `t` and `h`, and `origin`, `direction` and `light`, (..., 3), for the coordinates of rays. `name`: what
     messages call them; they count rows from 0. Raises InputError as `read_cases`, and for columns whose shapes do not
     go together.

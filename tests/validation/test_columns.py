@@ -4,7 +4,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from analytic.columns import Column, column, columns_of, flat, values_of
+from validation.columns import Column, column, columns_of, flat, values_of
 
 
 @dataclass(frozen=True)

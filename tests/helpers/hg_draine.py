@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The Legendre moments of the fit to droplets."""
+
+import numpy as np
+
+from analytic.phase import hg_draine_fit
+
+
+def hg_draine_moments(diameter: float, count: int):
+    """Return the first Legendre moments of 'hg-draine' [1], (count,), for a diameter of droplets [um].
+
+    hg has g^l. Twice c P_l = ((l + 1) P_{l+1} + l P_{l-1})/(2 l + 1) gives the moments of c^2 hg.
+    """
+    fit = hg_draine_fit(diameter)
+    order = np.arange(count)
+    plain = fit.g_d ** np.arange(count + 2.0)
+    once = ((order + 1) * plain[1 : count + 1] + order * np.append(0.0, plain)[:count]) / (2 * order + 1)
+    wide = np.append(once, ((count + 1) * plain[count + 1] + count * plain[count - 1]) / (2 * count + 1))
+    twice = ((order + 1) * wide[1:] + order * np.append(0.0, once)[:count]) / (2 * order + 1)
+    draine = (plain[:count] + fit.alpha * twice) / fit.norm
+    return (1 - fit.weight) * fit.g_hg**order + fit.weight * draine
