@@ -51,6 +51,7 @@ _CLOUDS = ("cloud-octaves", (), 1)  # seconds a frame
 #: How a scene is shown where `shadow-planes` would be slow or refused: method, settings, rays a pixel.
 _OTHERWISE = {
     "tangle": ("light-volumes", ("map=1024",), SAMPLES),
+    "smoke": ("ray-march", (), 4),
     **dict.fromkeys(("penumbra-plane", "fence", "soft-hall", "overlap"), _SOFT),
     **dict.fromkeys(
         ("cloud-slab", "stratocumulus", "cumulus", "cumulus-detail", "step-cloud", "ring", "two-lobes"), _CLOUDS

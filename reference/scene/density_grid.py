@@ -45,6 +45,10 @@ class GridMedium(VaryingMedium):
         meets = (far > near) & (far > 0)
         return np.where(meets, np.maximum(near, 0.0), 0.0), np.where(meets, far, 0.0)
 
+    def extinction(self, point: Array) -> Array:
+        """Return the extinction at places in the box, (n,) [1/m]."""
+        return _trilinear(self.values, self.voxels(point))
+
     def voxels(self, point: Array) -> Array:
         """Return places in voxels from the centre of the first, (n, 3)."""
         return (point - self.low) * self.voxels_per_metre - 0.5
@@ -80,7 +84,7 @@ def read_grid(medium, albedo: Array, phase: PhaseFunction) -> GridMedium:
     place = dr.zeros(mi.MediumInteraction3f, _PLACES)
     place.p = mi.Point3f((low + share * (high - low)).T)
     theirs = np.array(medium.get_scattering_coefficients(place)[2], dtype=np.float64)[0]
-    worst = np.abs(theirs - _trilinear(values, share * values.shape[::-1] - 0.5)).max() / values.max()
+    worst = np.abs(theirs - grid.extinction(low + share * (high - low))).max() / values.max()
     if worst > _DIFFERENCE:
         raise InputError(
             f"{name} has a grid that is not read as Mitsuba reads it, by {worst:.2g} of its largest value; wanted a "

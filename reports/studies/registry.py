@@ -20,6 +20,7 @@ STUDIES = {
     "polynomials": "series",
     "convergence": "estimators",
     "z-distribution": "estimators",
+    "transmittance": "transmittance",
     "slab": "clouds",
     "transport": "clouds",
 }

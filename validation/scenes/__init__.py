@@ -3,11 +3,12 @@
 
 Read in this order:
 
-- `fog.toml`, `height_fog.toml`, `clouds.toml`: the built-in scenes as data;
+- `fog.toml`, `height_fog.toml`, `density_grid.toml`, `clouds.toml`: the built-in scenes as data;
 - `registry.py`: their records by name, and the Mitsuba dictionaries that the data stand for;
 - `parts.py`: shapes of meshes, media, lights and cameras for such dictionaries;
 - `meshes.py`: meshes by their parameters;
 - `cloud_meshes.py`: surfaces of clouds by formulas;
+- `smoke.py`: smoke as a density grid;
 - `hypertexture.py`: density by the distance into a mesh and gradient noise;
 - `engine_fog.py`: the height fog of engines as layers;
 - `height_fog.py`: the volume `heightfog` of Mitsuba: density by height;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The built-in scenes: `fog.toml` and `clouds.toml` describe them, and a record of each builds Mitsuba's dictionary.
+"""The built-in scenes: files such as `fog.toml` describe them, and a record of each builds Mitsuba's dictionary.
 
 Their numbers are arbitrary, never round, so that no constant of the code can hide behind a constant of a scene. Those
 of `FOG_SCENES` scatter light once: the standard report, the baselines and the tests of all methods study these.
@@ -9,7 +9,7 @@ Each scene is a table with these keys; lengths are in metres, angles in degrees,
 * `purpose`: one sentence, what the scene is for; `published`: the published figure that it stands for;
 * `animation`: what moves in it, see `Animation`; `clouds`: whether light is scattered many times in it;
 * `fog`: the medium around all, with `sigma_t` (one number or RGB) [1/m], `albedo`, and `phase` in words of
-  `analytic.phase.phase_from_words`;
+  `analytic.phase.phase_from_words`; or with `layers`; or with `smoke`, whose densities `sigma_t` multiplies;
 * `camera`: `origin`, `target` and the horizontal `fov`;
 * `lights`: each with `name`, `type`, `colour` (intensity, irradiance or radiance) and what `parts.light` takes;
 * `shapes`: each with `name` and either `reflectance` or the `medium` that it bounds, which may have a `density`;
@@ -42,9 +42,12 @@ from validation.scenes.height_fog import register_height_fog
 from validation.scenes.hypertexture import hypertexture
 from validation.scenes.meshes import Mesh, bent, joined, placed, rotation, scaled
 from validation.scenes.parts import camera, fog, height_fog, light, medium_boundary, mitsuba_mesh, phase_function
+from validation.scenes.smoke import smoke
 
 MOVES = ("light", "objects", "medium", "colour")
-FILES = tuple(Path(__file__).with_name(name) for name in ("fog.toml", "height_fog.toml", "clouds.toml"))
+FILES = tuple(
+    Path(__file__).with_name(name) for name in ("fog.toml", "height_fog.toml", "density_grid.toml", "clouds.toml")
+)
 
 Table = dict[str, Any]
 
@@ -93,7 +96,7 @@ class SceneRecord:
     purpose: str  #: one sentence: what the scene is for
     published: str  #: the published figure that the scene stands for
     animation: Animation = field(default_factory=Animation)  #: what moves in it
-    layered: bool = False  #: whether its fog is height fog, which has no one extinction
+    varying: bool = False  #: whether its fog is height fog or a grid, which have no one extinction
     clouds: bool = False  #: whether light is scattered many times: then `cloud-paths` is its truth, and few methods fit
     digest: str = ""  #: of its description
 
@@ -108,8 +111,8 @@ def _record(name: str, table: Table) -> SceneRecord:
     animation = Animation(**{key: tuple(value) for key, value in table.get("animation", {}).items()})
     digest = hashlib.sha256(json.dumps(table).encode()).hexdigest()
     words = table["purpose"], table["published"]
-    layered = "layers" in table.get("fog", {})
-    return SceneRecord(name, partial(_build, table), *words, animation, layered, table.get("clouds", False), digest)
+    varying = bool({"layers", "smoke"} & set(table.get("fog", {})))
+    return SceneRecord(name, partial(_build, table), *words, animation, varying, table.get("clouds", False), digest)
 
 
 def _build(table: Table) -> dict[str, Any]:
@@ -184,9 +187,14 @@ def _medium(table: Table, shape: str = "") -> dict[str, Any]:
         register_height_fog()
         return height_fog(table["layers"], table["floor"], table["cap"], albedo=table["albedo"], phase=phase)
     medium = fog(table["sigma_t"], table["albedo"], phase)
-    if "density" not in table:
+    if "smoke" in table:
+        given = dict(table["smoke"])
+        low, high = np.array(given.pop("low")), np.array(given.pop("high"))
+        density = smoke(low, high, **given)
+    elif "density" in table:
+        density, low, high = _density(shape, json.dumps(table["density"]))
+    else:
         return medium
-    density, low, high = _density(shape, json.dumps(table["density"]))
     box = mi.ScalarTransform4f().translate(low.tolist()).scale((high - low).tolist())
     grid = {"type": "gridvolume", "grid": mi.VolumeGrid(density[..., None]), "to_world": box}
     return medium | {"type": "heterogeneous", "sigma_t": grid}
@@ -199,4 +207,4 @@ def _density(mesh: str, given: str) -> Any:
 
 #: The built-in scenes by name, and those of homogeneous fog.
 SCENES = {name: record for path in FILES for name, record in read_scenes(path).items()}
-FOG_SCENES = {name: record for name, record in SCENES.items() if not (record.clouds or record.layered)}
+FOG_SCENES = {name: record for name, record in SCENES.items() if not (record.clouds or record.varying)}

@@ -50,6 +50,16 @@ def test_froxels_go_to_the_reference(scene):
     assert relative_rmse(frame.airlight, reference.airlight) < 0.05
 
 
+@pytest.mark.claim("density-grid-methods", tolerance="3 % of 200 steps in a third of the box: edges of a grille")
+def test_the_built_in_scene(variant):
+    loaded = load_scene("smoke", (24, 18)).scene
+    reference = quadrature_image(read_truth(loaded), checks=8)
+    assert reference.left == 0
+    assert reference.airlight_bound.max() < 1e-4 * reference.airlight.mean()
+    frame = render_frame(frame_renderer(read_scene(loaded), METHODS["ray-march"], steps=200))
+    assert relative_rmse(frame.airlight, reference.airlight) < 0.03
+
+
 @pytest.mark.claim("density-grid-refused", tolerance="none: an error and its words")
 def test_methods_of_lit_segments_and_turned_boxes_are_refused(scene):
     read = read_scene(scene(LAMP))

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A study of estimators of the transmittance of rays through a density grid."""
+
+from dataclasses import asdict
+from functools import partial
+from typing import Any
+
+from reports.api.inputs import Progress, SceneLike, Words, listed, one_error, telling
+from reports.studies.result import FRACTION, Study, with_environment
+from reports.tables.table import numbers, table, words
+
+_STYLES = {
+    "naive": ("vermillion", "o"),
+    "jackknife": ("green", "^"),
+    "unbiased-ray-marching": ("blue", "s"),
+    "ratio-tracking": ("purple", "D"),
+}
+
+
+@one_error
+def transmittance(
+    scene: SceneLike = "smoke", *, steps: Words = "2,4,8,16,32", thicker: float = 1.0, progress: Progress = None
+) -> Study:
+    """Measure estimators of the transmittance of rays through a density grid.
+
+    Naive exponentials of a marched sum are too bright, by Jensen's inequality: the row says by how much, and how much
+    follows from the variance of the sum. Beside them stand ratio tracking, unbiased ray marching and the jackknife, all
+    against the exact optical depth, over 48 rays between random places of the grid.
+
+    Parameters
+    ----------
+    scene
+        A scene with a density grid around its camera.
+    steps
+        Of the marches, with commas.
+    thicker
+        What the extinction is multiplied by.
+    progress
+        Called with (fraction done, what); True shows a bar.
+    """
+    from analytic.errors import InputError
+    from reports.machine.environment import activate
+
+    counts = [int(each) if each.isdigit() else 0 for each in listed("steps", steps)]
+    if not counts or min(counts) < 1:
+        raise InputError(f"steps: got {steps!r}, wanted numbers of 1 or more, with commas")
+    if not 0 < thicker <= 1e6:
+        raise InputError(f"thicker: got {thicker:g}, wanted a number above 0, at most 1e6")
+    activate()
+    from reference.scene.read import read_truth
+    from reports.api.scenes import opened
+    from validation.estimates.transmittance import transmittance_errors
+
+    with telling(progress, "rays") as tell:
+        truth = read_truth(opened(scene, (8, 6)).scene)
+        rows = [asdict(each) for each in transmittance_errors(truth, counts, thicker, progress=tell)]
+    columns = (
+        *words("estimator"),
+        *numbers("steps", look_ups="look-ups"),
+        *numbers(bias="bias", bias_error="its error", jensen="by Jensen", spread="std. dev.", how=FRACTION),
+    )
+    title = f"{scene}, extinction x {thicker:g}: transmittance of 48 rays, relative to its mean"
+    data = with_environment(scene=str(scene), thicker=thicker, rows=rows)
+    drawn = table(title, columns, rows)
+    return Study(name="transmittance", data=data, drawn=(drawn,), rows=tuple(rows), draw=partial(_draw, rows))
+
+
+def _draw(rows: list[dict[str, Any]], column: str) -> Any:
+    """Return bias and spread over the look-ups; dotted, the brightening that Jensen's inequality predicts."""
+    from reports.plotting.figure import name_sizes, new_figure
+    from reports.plotting.style import COLOURS, WIDTHS
+
+    width, double = WIDTHS[column], column == "double"
+    figure = new_figure(width, (0.42 if double else 1.4) * width)
+    panels = figure.subplots(1, 2) if double else figure.subplots(2, 1)
+    for name, (colour, marker) in _STYLES.items():
+        own = [row for row in rows if row["estimator"] == name]
+        look_ups = [row["look_ups"] for row in own]
+        style: dict[str, Any] = {"color": COLOURS[colour], "marker": marker, "label": name}
+        panels[0].errorbar(look_ups, [abs(row["bias"]) for row in own], [2 * row["bias_error"] for row in own], **style)
+        panels[1].plot(look_ups, [row["spread"] for row in own], **style)
+    march = [row for row in rows if row["jensen"] is not None]
+    jensen = [row["look_ups"] for row in march], [row["jensen"] for row in march]
+    panels[0].plot(*jensen, color=COLOURS["vermillion"], linestyle=":", label="naive, by Jensen")
+    panels[0].set(ylabel="bias, absolute, relative to T [1]")
+    panels[1].set(ylabel="standard deviation, relative to T [1]")
+    for panel in panels:
+        panel.set(xlabel="look-ups a ray [1]", xscale="log", yscale="log")
+        name_sizes(panel, sorted({row["steps"] for row in march}))
+    panels[0].legend(loc="best")
+    return figure
