@@ -84,7 +84,7 @@ def read_grid(medium, albedo: Array, phase: PhaseFunction) -> GridMedium:
     place = dr.zeros(mi.MediumInteraction3f, _PLACES)
     place.p = mi.Point3f((low + share * (high - low)).T)
     theirs = np.array(medium.get_scattering_coefficients(place)[2], dtype=np.float64)[0]
-    worst = np.abs(theirs - grid.extinction(low + share * (high - low))).max() / values.max()
+    worst = np.abs(theirs - _trilinear(values, share * values.shape[::-1] - 0.5)).max() / values.max()
     if worst > _DIFFERENCE:
         raise InputError(
             f"{name} has a grid that is not read as Mitsuba reads it, by {worst:.2g} of its largest value; wanted a "

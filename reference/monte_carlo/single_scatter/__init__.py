@@ -9,6 +9,7 @@ Read in this order:
 - `area_sampling.py`: lights with extent, and points on them;
 - `stretches.py`: camera rays, their stretches in one medium, cells of samples;
 - `height_fog.py`: the estimate in height fog, with optical depths of its own;
+- `density_grid.py`: the estimate in density grids, by ratio tracking;
 - `scene_data.py`: what the integrator must know of a scene, read on its own;
 - `area_estimate.py`: the estimate under lights with extent;
 - `estimator.py`: the estimate of one camera ray;

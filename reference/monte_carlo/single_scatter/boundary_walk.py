@@ -82,10 +82,7 @@ def require_homogeneous(medium) -> None:
     Raises InputError for such a medium.
     """
     if not medium.is_homogeneous():
-        raise InputError(
-            f"single-scatter: got a {medium.class_name()}; wanted media of type 'homogeneous' or height fog: for a "
-            "density grid take the estimators quadrature and volpath"
-        )
+        raise InputError(f"single-scatter: got a {medium.class_name()}; wanted media of type 'homogeneous'")
     if "albedo.value.value" not in mi.traverse(medium):
         raise InputError(f"single-scatter: the albedo of medium '{medium.id()}' differs from place to place")
 

@@ -31,6 +31,7 @@ from reference.monte_carlo.single_scatter.boundary_walk import (
     step_beyond,
     transmittance,
 )
+from reference.monte_carlo.single_scatter.density_grid import grid_light
 from reference.monte_carlo.single_scatter.directional_sampling import sample_stretch
 from reference.monte_carlo.single_scatter.distance_sampling import (
     Span,
@@ -57,6 +58,8 @@ def ray_light(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
         medium = mi.MediumPtr(medium)
     if task.fog is not None:
         return height_fog_light(task, sampler, ray, medium, active)
+    if task.majorant:
+        return grid_light(task, sampler, ray, medium, active)
     if task.around.bounded:
         return _through_media(task, sampler, ray, medium, active)
     nothing = dr.zeros(mi.Spectrum, dr.width(active))

@@ -171,7 +171,7 @@ def _sun_airlight(task: Any, emitter, sampler, way: _Way, medium, active):
         sample, irradiance = emitter.sample_direction(point, mi.Point2f(0.5), active)
         phase, _ = medium.phase_function().eval_pdf(mi.PhaseFunctionContext(), point, sample.d, active)
         depth = fog.above(way.start + way.rise * x) / fog.height(sample.d)
-        seen = _seen(task.around, sample.p, -sample.d, sample.dist, active)
+        seen = lit(task.around, sample.p, -sample.d, sample.dist, active)
         value = _albedo(medium, point, active) * phase * irradiance * seen * mi.Float(arrived * dr.exp(-depth)) * width
         return index + 1, total + dr.select(active, value, 0), sampler
 
@@ -211,8 +211,8 @@ def _light_airlight(task: Any, light, sampler, way: _Way, medium, active):
         density = 0.5 * (flights + approach.height / (angle * square))
         phase, _ = medium.phase_function().eval_pdf(mi.PhaseFunctionContext(), point, -from_light, active)
         depth = fog.depth(way.start + way.rise * x, at_light, r)
-        seen = _seen(task.around, position, from_light, mi.Float(r), active)
-        value = sigma_s * phase * _intensity(light, point, active) * seen
+        seen = lit(task.around, position, from_light, mi.Float(r), active)
+        value = sigma_s * phase * intensity(light, point, active) * seen
         value *= mi.Float(kept * dr.exp(-depth) / (square * density)) * width
         return index + 1, total + dr.select(active & (density > 0), value, 0), sampler
 
@@ -230,13 +230,13 @@ def _surface(task: Any, way: _Way, hit, active):
         from_light = from_light / r
         material = hit.bsdf().eval(mi.BSDFContext(), hit, hit.to_local(-from_light), active)
         depth = camera + fog.depth(at_hit, fog.height(light.position), mi.Float64(r))
-        sent = material * _intensity(light, hit, active) / (r * r) * _seen(task.around, position, from_light, r, active)
+        sent = material * intensity(light, hit, active) / (r * r) * lit(task.around, position, from_light, r, active)
         total += dr.select(active, sent * mi.Float(dr.exp(-depth)), 0)
     for emitter in task.directional:
         sample, irradiance = emitter.sample_direction(hit, mi.Point2f(0.5), active)
         material = hit.bsdf().eval(mi.BSDFContext(), hit, hit.to_local(sample.d), active)
         depth = camera + fog.above(at_hit) / fog.height(sample.d)
-        sent = material * irradiance * _seen(task.around, sample.p, -sample.d, sample.dist, active)
+        sent = material * irradiance * lit(task.around, sample.p, -sample.d, sample.dist, active)
         total += dr.select(active, sent * mi.Float(dr.exp(-depth)), 0)
     return total
 
@@ -246,12 +246,13 @@ def _albedo(medium, point, active):
     return dr.select(sigma_t > 0, sigma_s / sigma_t, 0)
 
 
-def _seen(around: Surroundings, start, direction, distance, active):
+def lit(around: Surroundings, start, direction, distance, active):
     """Return 1 where nothing stands between a light and points, 0 elsewhere."""
     nothing = Leg(dr.zeros(mi.MediumPtr), dr.zeros(mi.Spectrum, dr.width(active)))
     return transmittance(around, start, direction, distance, media=nothing, active=active)
 
 
-def _intensity(light, interaction, active):
+def intensity(light, interaction, active):
+    """Return what a light at a place sends towards points [W/sr]."""
     sample, irradiance = light.emitter.sample_direction(interaction, mi.Point2f(0.5), active)
     return irradiance * sample.dist * sample.dist

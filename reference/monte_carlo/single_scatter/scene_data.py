@@ -21,6 +21,7 @@ from reference.monte_carlo.single_scatter.boundary_walk import (
     read_surroundings,
     require_homogeneous,
 )
+from reference.monte_carlo.single_scatter.density_grid import read_majorant
 from reference.monte_carlo.single_scatter.height_fog import HeightDensity, read_height_density
 
 
@@ -45,6 +46,7 @@ class Task:
     grey: bool  #: no medium's extinction depends on the channel
     area: tuple[AreaLight, ...] = ()  #: lights with extent
     fog: HeightDensity | None = None  #: what camera rays start in, where that is height fog
+    majorant: float = 0.0  #: the largest extinction of what camera rays start in, where that is a density grid [1/m]
 
 
 def read_task(scene, medium, samples: int) -> Task:
@@ -60,14 +62,15 @@ def read_task(scene, medium, samples: int) -> Task:
         _read_light(emitter) for emitter in scene.emitters() if not (_is_directional(emitter) or is_area(emitter))
     )
     around, media = read_surroundings(scene)
-    fog = read_height_density(medium) if isinstance(medium, mi.Medium) else None
-    if fog is not None:
+    own = medium if isinstance(medium, mi.Medium) else None
+    fog, majorant = read_height_density(own) if own else None, read_majorant(own) if own else 0.0
+    if fog is not None or majorant:
         if area:
             raise InputError(
-                "single-scatter: the scene has area lights in height fog; wanted point, spot and directional lights: "
-                "take the estimator volpath"
+                "single-scatter: the scene has area lights in height fog or a density grid; wanted point, spot and "
+                "directional lights: take the estimator volpath"
             )
-        return Task(around, lights, directional, samples, grey=True, fog=fog)
+        return Task(around, lights, directional, samples, grey=True, fog=fog, majorant=majorant)
     if isinstance(medium, mi.Medium):
         require_homogeneous(medium)
         media = [*media, medium]
