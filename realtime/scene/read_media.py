@@ -105,7 +105,7 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[Cl
             )
         if _is_height_fog(sensor.get_medium()):
             return _height_fog(sensor.get_medium(), types), ()
-        if "sigma_t.data" in mi.traverse(sensor.get_medium()):
+        if not sensor.get_medium().is_homogeneous() and "sigma_t.data" in mi.traverse(sensor.get_medium()):
             return _grid_medium(sensor.get_medium(), types), ()
         return _homogeneous(sensor.get_medium(), types), ()
     for shape in boundaries:

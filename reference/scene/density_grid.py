@@ -60,8 +60,8 @@ class GridMedium(VaryingMedium):
 
 
 def is_grid(medium) -> bool:
-    """Return whether a medium of Mitsuba has an extinction on a grid."""
-    return medium is not None and "sigma_t.data" in mi.traverse(medium)
+    """Return whether a medium of Mitsuba has an extinction on a grid; one that is called homogeneous has no box."""
+    return medium is not None and not medium.is_homogeneous() and "sigma_t.data" in mi.traverse(medium)
 
 
 def read_grid(medium, albedo: Array, phase: PhaseFunction) -> GridMedium:
