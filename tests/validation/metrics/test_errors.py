@@ -84,20 +84,6 @@ def test_black_reference_has_absolute_errors_only():
     assert as_json["rmse"] == 0.5
 
 
-@pytest.mark.parametrize(
-    ("reference", "test", "mask", "message"),
-    [
-        (np.ones((3, 4, 3)), np.ones((6, 8, 3)), None, "reference is 4 x 3 pixels.*the test 8 x 6 pixels"),
-        (np.ones((3, 4, 3)), np.ones((3, 4)), None, "with 3 channels, the test 4 x 3 pixels; render both"),
-        (np.ones((2, 2)), np.ones((2, 2)), np.ones((2, 3), bool), r"a mask of bool \(2, 3\)"),
-        (np.ones((2, 2)), np.ones((2, 2)), np.zeros((2, 2), bool), "leaves no pixel"),
-    ],
-)
-def test_refuses_what_does_not_fit(reference, test, mask, message):
-    with pytest.raises(InputError, match=message):
-        error_metrics(reference, test, mask=mask)
-
-
 ROUNDINGS = 1e-13  # some roundings of double precision
 
 # r = 0.09, 0.19, 0.99 and t = r + 0.1, r - 0.1, r: every denominator below is a number that a hand can divide by.
@@ -158,19 +144,6 @@ def test_with_the_mean_as_unit_nothing_has_a_unit(factor):
     for field in fields(PublishedErrors)[1:]:
         # 1e-11: the rounding of the factor, squared and divided.
         assert getattr(scaled, field.name) == pytest.approx(getattr(plain, field.name), rel=1e-11), field.name
-
-
-@pytest.mark.parametrize(
-    ("arguments", "options", "message"),
-    [
-        ((np.ones((3, 4)), np.ones((4, 3))), {}, "reference is 4 x 3 pixels, the test 3 x 4"),
-        ((np.ones((3, 4, 3)), np.ones((3, 4))), {}, "with 3 channels, the test 4 x 3 pixels; render both"),
-        ((np.ones((3, 4)), np.ones((3, 4))), {"unit": 0.0}, "unit: got 0.0, wanted a radiance above 0"),
-    ],
-)
-def test_published_errors_refuse(arguments, options, message):
-    with pytest.raises(InputError, match=message):
-        published_errors(*arguments, **options)
 
 
 # Sharma, Wu and Dalal 2005, table 1: L*, a*, b* of two colours and their CIEDE2000 to four digits.
@@ -255,13 +228,23 @@ def test_the_default_exposure_takes_the_unit_out(factor):
     assert 0.9 / np.percentile(reference, 99) == pytest.approx(2.0**here.exposure, rel=1e-12)
 
 
+@pytest.mark.parametrize("metric", [error_metrics, published_errors, colour_difference])
+def test_images_of_two_sizes_are_refused(metric):
+    with pytest.raises(InputError, match=r"reference is 4 x 3 pixels.*the test 3 x 4 pixels"):
+        metric(np.ones((3, 4, 3)), np.ones((4, 3, 3)))
+    with pytest.raises(InputError, match="with 3 channels, the test 4 x 3 pixels; render both"):
+        metric(np.ones((3, 4, 3)), np.ones((3, 4)))
+
+
 @pytest.mark.parametrize(
-    ("shapes", "message"),
+    ("metric", "shape", "options", "message"),
     [
-        (((3, 4, 3), (4, 3, 3)), "two sizes: the reference is 4 x 3"),
-        (((3, 4, 2), (3, 4, 2)), "2 channels has no colour; wanted one"),
+        (error_metrics, (2, 2), {"mask": np.ones((2, 3), bool)}, r"a mask of bool \(2, 3\)"),
+        (error_metrics, (2, 2), {"mask": np.zeros((2, 2), bool)}, "leaves no pixel"),
+        (published_errors, (3, 4), {"unit": 0.0}, "unit: got 0.0, wanted a radiance above 0"),
+        (colour_difference, (3, 4, 2), {}, "2 channels has no colour; wanted one"),
     ],
 )
-def test_colour_refuses(shapes, message):
+def test_refuses_what_does_not_fit(metric, shape, options, message):
     with pytest.raises(InputError, match=message):
-        colour_difference(*map(np.ones, shapes))
+        metric(np.ones(shape), np.ones(shape), **options)

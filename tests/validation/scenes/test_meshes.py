@@ -12,7 +12,7 @@ from validation.scenes.hypertexture import (
     gradient_noise,
     octaves,
 )
-from validation.scenes.meshes import arch, bent, box, gem, icosphere, lathe, prism, star, tetrahedron, torus
+from validation.scenes.meshes import arch, box, gem, icosphere, lathe, prism, star, tetrahedron, torus
 from validation.scenes.registry import FILES, mesh_of
 
 TABLES = tomllib.loads(FILES[0].read_text())
@@ -56,19 +56,6 @@ def test_volumes_of_solids_by_their_formulas():
     # Pappus, with both circles as polygons, in the limit: the corners of the polygons leave out less than 1e-3.
     assert volume(*torus(0.9, 0.3, (300, 200))) == pytest.approx(2 * np.pi**2 * 0.9 * 0.3**2, rel=1e-3)
     assert volume(*icosphere(5)) == pytest.approx(4 * np.pi / 3, rel=2e-3)
-
-
-def test_tangle_is_bent_without_folding_space():
-    """Two points move against each other by less than they are apart: the waves' Lipschitz bounds add to below 1."""
-    waves = TABLES["tangle"]["shapes"][0]["waves"]
-    assert sum(np.linalg.norm(displacement) * np.linalg.norm(wave) for displacement, wave, _ in waves) < 1
-    points = np.random.default_rng(20100621).uniform(-1.7, 1.7, (4000, 3))
-    step = 1e-5
-    either = [[bent(points + sign * step * axis, waves) for sign in (1, -1)] for axis in np.eye(3)]
-    columns = [(ahead - behind) / (2 * step) for ahead, behind in either]
-    determinants = np.linalg.det(np.stack(columns, axis=2))
-    assert determinants.min() > 0
-    assert determinants.max() / determinants.min() > 2  # and yet it is bent
 
 
 RANDOM = np.random.default_rng(71)

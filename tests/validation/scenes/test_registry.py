@@ -8,15 +8,11 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.frame.renderer import frame_renderer, render_frame
-from realtime.kernels.registry import KERNELS
-from realtime.methods.registry import METHODS
 from realtime.scene.read_scene import read_scene
 from reference.quadrature.light_airlight import lit_parallel_rays
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_truth
 from reference.storage.scene_digest import scene_digest
-from validation.estimates.quadrature import truth_image
 from validation.scenes.loading import load_scene
 from validation.scenes.registry import FILES, FOG_SCENES, SCENES
 
@@ -120,24 +116,3 @@ def test_sun_comes_in_by_the_windows_alone(variant):
     at_wall = point + ((left - point[:, 0]) / towards[0])[:, None] * towards
     along, up = np.searchsorted(wall["along"], at_wall[:, 1] - front), np.searchsorted(wall["up"], at_wall[:, 2])
     assert np.all((along % 2 == 0) & (up % 2 == 0))
-
-
-def frame_of(name, method, *, kernel=None, **parameters):
-    """Return a small frame of a scene."""
-    function = KERNELS[kernel].function if kernel else None
-    scene = read_scene(load_scene(name, (24, 18)).scene)
-    return render_frame(frame_renderer(scene, METHODS[method], kernel=function, **parameters))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["omni-box", "tangle"])
-def test_shadows_take_most_of_some_pixels_and_little_of_others(variant, name):
-    """By the truth against the same frame without volumetric shadows; and marching finds the same shadows."""
-    truth = truth_image(load_scene(name, (24, 18)).scene).airlight[..., 1]
-    kept = truth / frame_of(name, "unshadowed", kernel="exact").airlight[..., 1]
-    assert kept.max() < 1 + 1e-5  # shadows add nothing; float32 keeps 1e-6
-    assert kept.min() < 0.5
-    assert kept.max() > 0.9
-    marched = frame_of(name, "ray-march", steps=400).airlight[..., 1]
-    # 400 steps miss a little at each edge of a shadow: 8e-4 and 3e-3 of the mean.
-    assert np.sqrt(np.mean((marched - truth) ** 2)) < 0.01 * truth.mean()

@@ -62,28 +62,6 @@ def test_works_are_timed_in_turns(clock):
     assert (slow.median_ms, fast.median_ms) == pytest.approx((20, 5))
 
 
-@pytest.fixture(scope="module")
-def renderer(variant):
-    scene = read_scene(mi.load_dict(tiny_scene(size=(16, 12))))
-    return frame_renderer(scene, METHODS["ray-march"], steps=8, shadow="map", map=16)
-
-
-def test_every_stage_of_a_frame_is_timed(renderer):
-    times = time_frame(renderer, seconds=0.02)
-    for name in (
-        "frame",
-        "surface",
-        "airlight",
-        "light_moved",
-        "objects_moved",
-        "light_moved_camera_cached",
-        "colours_changed",
-    ):
-        timing = getattr(times, name)
-        assert 0 < timing.low_ms <= timing.median_ms <= timing.high_ms, name
-        assert timing.repetitions >= 3
-
-
 @pytest.mark.parametrize(("spent", "turns"), [(0.0, 1), (1e6, 5)])
 def test_a_slow_frame_is_timed_a_few_times(variant, monkeypatch, spent, turns):
     """A frame that takes minutes must not be rendered thirty times."""
@@ -102,6 +80,7 @@ def test_a_slow_frame_is_timed_a_few_times(variant, monkeypatch, spent, turns):
         times.colours_changed,
     )
     assert {spread.repetitions for spread in each} == {turns}
+    assert all(0 < spread.low_ms <= spread.median_ms <= spread.high_ms for spread in each)
     assert times.frame.median_ms <= times.light_moved.median_ms <= times.objects_moved.median_ms
     assert times.colours_changed.median_ms <= times.light_moved_camera_cached.median_ms
     if turns == 1:
