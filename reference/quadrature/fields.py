@@ -5,7 +5,7 @@ Everything else asks a field: the sums over lit intervals, surfaces, what the ca
 medium is a class with the four members of `Field` in a file of its own, and a line in `field_of`. Where its integrals
 have no closed form, `sums` cuts the stretches into smooth pieces (`whole` and `cut` of `reference.quadrature.pieces`),
 states its integrand, and gives both to `sum_pieces` of `reference.quadrature.adaptive_panels`: that knows lights,
-tolerances and edges. `tests/reference/quadrature/test_fields.py` does so for a density that grows with height.
+tolerances and edges. `reference.quadrature.density_grid` does so.
 """
 
 from typing import Protocol

@@ -1,26 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-from dataclasses import replace
-
 import mitsuba as mi
 import numpy as np
-import pytest
 
-from realtime.frame.renderer import render_frame
-from realtime.scene.animate import coloured_light, read_objects, turned_light, turned_objects
+from realtime.scene.animate import coloured_light, turned_light
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import cloud, cloud_scene, ring
-from validation.scenes.loading import load_scene
 from validation.scenes.meshes import rotation
-from validation.study.configuration import configuration, prepared
 
 
 def host(array) -> np.ndarray:
     return np.array(array, dtype=np.float64).ravel()
-
-
-@pytest.fixture
-def pens(variant):
-    return read_scene(load_scene("two-pens", (16, 12)).scene)
 
 
 def leaves(light) -> dict[str, np.ndarray]:
@@ -78,18 +67,3 @@ def test_moved_lights_of_every_kind_are_those_of_the_scene_read_anew(variant):
                     np.testing.assert_allclose(
                         moved[name], values, rtol=1e-5, atol=3e-6 * abs(values).max(), err_msg=name
                     )
-
-
-def test_moved_objects_render_as_a_scene_read_anew(pens):
-    """Frozen functions recorded before the move, against a renderer made after it."""
-    renderer = prepared(pens, configuration("shadow-planes"))
-    before = render_frame(renderer)
-    moved = turned_objects(pens, read_objects(pens, ["pens"]), rotation((0, 0, 1), 71.0))
-    frame = render_frame(replace(renderer, scene=moved))
-    fresh = render_frame(prepared(read_scene(pens.geometry), configuration("shadow-planes")))
-    assert np.abs(frame.airlight - before.airlight).max() > 1e-3 * before.airlight.mean()
-    # Planes come in another order: the float32 sums of a few segments differ by rounding.
-    np.testing.assert_allclose(frame.airlight, fresh.airlight, rtol=2e-5, atol=1e-6 * fresh.airlight.mean())
-    # A surface that ends a plane of its own silhouette is before or behind it by rounding: two pixels of 192 here.
-    same = np.isclose(frame.surface, fresh.surface, rtol=2e-5, atol=1e-6 * fresh.surface.mean()).all(axis=-1)
-    assert np.mean(~same) < 0.02

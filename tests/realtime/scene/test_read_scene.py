@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import mitsuba as mi
-import numpy as np
 import pytest
 
 from realtime.errors import InputError
@@ -10,20 +9,6 @@ from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 
 def read(**changes):
     return read_scene(mi.load_dict(tiny_scene(**changes)))
-
-
-def test_reads_what_the_scene_holds(variant):
-    scene = read(spot=spot(cutoff=33.0, beam=21.0))
-    assert float(scene.medium.sigma_t[0][0]) == pytest.approx(0.31)
-    assert np.array(scene.medium.albedo).ravel() == pytest.approx([0.9, 0.8, 0.7], rel=1e-6)
-    point, cone = scene.lights
-    assert np.array(point.position).ravel() == pytest.approx([0.9, 0.7, 1.9])
-    assert np.array(point.intensity).ravel() == pytest.approx([5, 4, 3])
-    assert np.array(cone.intensity).ravel() == pytest.approx([9, 7, 8])
-    assert float(cone.cutoff[0]) == pytest.approx(np.deg2rad(33))
-    assert float(cone.inverse_transition[0]) == pytest.approx(1 / np.deg2rad(12))
-    towards = np.array([0.1, 0.1, 0.4]) - [0.7, -0.3, 2.6]
-    assert np.array(cone.axis).ravel() == pytest.approx(towards / np.linalg.norm(towards), abs=1e-6)
 
 
 @pytest.mark.parametrize("names", [("a.b", "a-b"), ("Sphere-2", ""), ("", "Sphere-1"), ("", ""), ("a.b.c", "a-b.c")])
