@@ -222,4 +222,4 @@ def view(
         print(f"{server.address}\nCtrl-C ends the view.", flush=True)
         session.run()
     finally:
-        session.truth.end()
+        session.reference.end()

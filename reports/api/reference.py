@@ -211,16 +211,16 @@ def _quadrature(loaded: "LoadedScene", pixel: str, tell: Callable[[float, str], 
     from validation.estimates.images import whole_truth
     from validation.estimates.quadrature import truth_image
 
-    truth = truth_image(loaded.scene, pixel=pixel, progress=lambda done, total, what: tell(done / total, what))
-    finite = np.isfinite(truth.airlight)
-    mean = float(truth.airlight[finite].mean()) if finite.any() else 0.0
+    found = truth_image(loaded.scene, pixel=pixel, progress=lambda done, total, what: tell(done / total, what))
+    finite = np.isfinite(found.airlight)
+    mean = float(found.airlight[finite].mean()) if finite.any() else 0.0
     counts = ("transitions", "checked", "disagreements", "refined", "left")
     return Reference(
         scene=loaded.name,
-        image=sealed(whole_truth(loaded, truth, pixel=pixel)),
+        image=sealed(whole_truth(loaded, found, pixel=pixel)),
         estimator="quadrature",
-        relative_error=float(truth.airlight_bound[finite].mean()) / mean if mean > 0 else float("nan"),
-        details={"pixel": pixel} | {name: getattr(truth, name) for name in counts},
+        relative_error=float(found.airlight_bound[finite].mean()) / mean if mean > 0 else float("nan"),
+        details={"pixel": pixel} | {name: getattr(found, name) for name in counts},
     )
 
 

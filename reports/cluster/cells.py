@@ -135,12 +135,12 @@ def _origin() -> Origin:
     )
 
 
-def _picture(truth: NDArray[np.float64], test: NDArray[np.float64]) -> bytes:
+def _picture(reference: NDArray[np.float64], test: NDArray[np.float64]) -> bytes:
     """Return reference, image and error side by side as WebP."""
-    factor = exposure(truth)
-    parts = [tone_mapped(truth, factor), tone_mapped(test, factor), error_map(truth, test)]
+    factor = exposure(reference)
+    parts = [tone_mapped(reference, factor), tone_mapped(test, factor), error_map(reference, test)]
     shown = Image.fromarray(np.concatenate(parts, axis=1))
-    if truth.shape[1] > _SMALLER:
+    if reference.shape[1] > _SMALLER:
         shown.thumbnail((3 * _SMALLER, 3 * _SMALLER))
     file = io.BytesIO()
     shown.save(file, "WEBP", quality=_QUALITY)

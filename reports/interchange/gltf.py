@@ -61,11 +61,11 @@ def write_gltf(path: Path, loaded: LoadedScene) -> dict[str, Any]:
     Returns `path`, `triangles`, `bytes` and `tessellated`, the names of the shapes that are not triangles by nature.
     """
     described = describe_scene(loaded)
-    truth = read_truth(loaded.scene)
+    scene = read_truth(loaded.scene)
     turn = np.array(_TURNS[described["up"]], dtype=np.float64)
-    opaque = [shape_mesh(shape) for shape in truth.occluders.shapes() if not shape.is_emitter()]
-    lamps = [shape_mesh(light.shape) for light in truth.area]
-    names = {medium.name for medium in truth.media}
+    opaque = [shape_mesh(shape) for shape in scene.occluders.shapes() if not shape.is_emitter()]
+    lamps = [shape_mesh(light.shape) for light in scene.area]
+    names = {medium.name for medium in scene.media}
     bounds = [shape_mesh(shape) for shape in loaded.scene.shapes() if shape.id() in names]
     document, binary = _document(described, turn, [*opaque, *bounds, *lamps])
     data = _container(document, binary)

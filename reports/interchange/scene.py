@@ -55,8 +55,8 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
     what is in the way.
     """
     notes = read_scene(loaded.scene).features.notes  # it refuses what `render` refuses, in its words
-    truth = read_truth(loaded.scene)
-    camera = _camera(loaded.scene.sensors()[0], truth)
+    scene = read_truth(loaded.scene)
+    camera = _camera(loaded.scene.sensors()[0], scene)
     described = {
         "scene": loaded.name,
         "source": str(loaded.path or loaded.name),
@@ -64,13 +64,13 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
         "up": up_axis(camera_matrix(loaded.scene.sensors()[0])[:3, 1]),
         "handedness": "right",
         "camera": camera,
-        "medium": _medium(truth.medium),
+        "medium": _medium(scene.medium),
         "bounded_media": [
-            {"name": medium.name, **(_medium(medium) or {}), "bounds": _bounds(medium.bounds)} for medium in truth.media
+            {"name": medium.name, **(_medium(medium) or {}), "bounds": _bounds(medium.bounds)} for medium in scene.media
         ],
-        "lights": [*map(_light, truth.lights), *map(_directional, truth.directional), *map(_area, truth.area)],
+        "lights": [*map(_light, scene.lights), *map(_directional, scene.directional), *map(_area, scene.area)],
         "surfaces": [
-            surface(shape) for shape in truth.occluders.shapes() if not shape.is_emitter() or _reflects(shape)
+            surface(shape) for shape in scene.occluders.shapes() if not shape.is_emitter() or _reflects(shape)
         ],
         "radiance": CONVENTION,
         "notes": list(notes),
@@ -115,7 +115,7 @@ def surface(shape: Any) -> dict[str, Any]:
     }
 
 
-def _camera(sensor: Any, truth: TruthScene) -> dict[str, Any]:
+def _camera(sensor: Any, scene: TruthScene) -> dict[str, Any]:
     import mitsuba as mi
 
     matrix = camera_matrix(sensor)
@@ -128,9 +128,9 @@ def _camera(sensor: Any, truth: TruthScene) -> dict[str, Any]:
         "forward": _numbers(matrix[:3, 2]),
         "right": _numbers(-matrix[:3, 0]),
         "up": _numbers(matrix[:3, 1]),
-        "size": [truth.width, truth.height],
+        "size": [scene.width, scene.height],
         "fov_horizontal": x_fov,
-        "fov_vertical": float(2 * np.rad2deg(np.arctan(tangent * truth.height / truth.width))),
+        "fov_vertical": float(2 * np.rad2deg(np.arctan(tangent * scene.height / scene.width))),
         "projection": "pinhole; square pixels; the pixel in column i and row j, counted from 0 at the upper left, "
         "looks through (i + 0.5, j + 0.5); no depth of field, no jitter; the medium begins at the pinhole, so let the "
         "near plane cut nothing away",

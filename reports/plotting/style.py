@@ -90,7 +90,7 @@ def scene_styles() -> Iterator[dict[str, Any]]:
         yield _marker_style(colour, marker, 0)
 
 
-def truth_style() -> dict[str, Any]:
+def reference_style() -> dict[str, Any]:
     """Return matplotlib's properties of the line of what is known: black, without markers."""
     return {"color": "black", "linestyle": "-", "linewidth": 1.3}
 

@@ -32,12 +32,12 @@ _ENTRY = (
 
 def write_scene(result: SceneResult, folder: Path) -> dict[str, Any]:
     """Return what report.json says of a scene, and write its files into a folder of the report's."""
-    study, truth = result.study, result.reference
+    study, reference = result.study, result.reference
     files = _Files(folder, folder_of(study.path))
-    light = truth.airlight + truth.surface
+    light = reference.airlight + reference.surface
     factor = exposure(light)
-    pictures = {"picture": tone_mapped(light, factor), "airlight": tone_mapped(truth.airlight, factor)}
-    named = files.written(_REFERENCE, layered_truth(study.name, truth), pictures)
+    pictures = {"picture": tone_mapped(light, factor), "airlight": tone_mapped(reference.airlight, factor)}
+    named = files.written(_REFERENCE, layered_truth(study.name, reference), pictures)
     stems = file_stems([judged.row["label"] for judged in result.rows])
     size = list(study.size)
     return {
@@ -49,7 +49,7 @@ def write_scene(result: SceneResult, folder: Path) -> dict[str, Any]:
         "timed": list(study.study.measure.timed_size or size),
         "plan": describe(study.scene.features),
         "notes": list(study.scene.features.notes),
-        "reference": truth_data(truth),
+        "reference": reference_data(reference),
         "exposure": factor,
         "agreement": result.agreement,
         "multiple": result.multiple,
@@ -84,13 +84,13 @@ def row_entry(row: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def truth_data(truth: TruthImage) -> dict[str, Any]:
+def reference_data(reference: TruthImage) -> dict[str, Any]:
     """Return what the quadrature reference says of its errors, without its images."""
-    finite = np.isfinite(truth.airlight)
-    mean = float(truth.airlight[finite].mean()) if finite.any() else float("nan")
+    finite = np.isfinite(reference.airlight)
+    mean = float(reference.airlight[finite].mean()) if finite.any() else float("nan")
     numbers = ("transitions", "missed", "checked", "disagreements", "refined", "left")
-    bound = float(truth.airlight_bound[finite].mean()) / mean if mean > 0 else None
-    return plain({"mean": mean, "relative_bound": bound} | {name: getattr(truth, name) for name in numbers})
+    bound = float(reference.airlight_bound[finite].mean()) / mean if mean > 0 else None
+    return plain({"mean": mean, "relative_bound": bound} | {name: getattr(reference, name) for name in numbers})
 
 
 class _Files:

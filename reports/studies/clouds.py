@@ -174,14 +174,14 @@ def _draw_slab(record: Mapping[str, Any], column: str) -> Any:
     import numpy as np
 
     from reports.plotting.figure import new_figure
-    from reports.plotting.style import COLOURS, WIDTHS, truth_style
+    from reports.plotting.style import COLOURS, WIDTHS, reference_style
 
     rows, walked = record["orders"], record.get("photons")
     width, double = WIDTHS[column], column == "double"
     figure = new_figure(width, 0.42 * width if double else 1.5 * width)
     fractions, lengths = figure.subplots(*((1, 2) if double else (2, 1)))
     places = np.arange(len(rows))
-    dots = truth_style() | {"linestyle": "none", "marker": "o", "markersize": 2.5}
+    dots = reference_style() | {"linestyle": "none", "marker": "o", "markersize": 2.5}
 
     def values(of: Any, name: str) -> Any:
         return np.array([np.nan if row[name] is None else row[name] for row in of], dtype=float)

@@ -157,7 +157,7 @@ def _draw_z(rows: list[dict[str, Any]], moments: list[dict[str, Any]], column: s
     import numpy as np
 
     from reports.plotting.figure import new_figure
-    from reports.plotting.style import COLOURS, WIDTHS, truth_style
+    from reports.plotting.style import COLOURS, WIDTHS, reference_style
 
     width, double = WIDTHS[column], column == "double"
     figure = new_figure(width, 0.4 * width if double else 1.3 * width)
@@ -168,7 +168,7 @@ def _draw_z(rows: list[dict[str, Any]], moments: list[dict[str, Any]], column: s
         low, high, count, expected = (np.array([row[k] for row in own]) for k in ("low", "high", "count", "expected"))
         middle, spread = 0.5 * (low + high), 2 * np.sqrt(expected)  # counts of pixels follow Poisson's law
         panel.bar(low, count, high - low, align="edge", color=COLOURS["sky"], label="pixels")
-        panel.plot(middle, expected, label=f"Student's law, {_BATCHES - 1} degrees", **truth_style())
+        panel.plot(middle, expected, label=f"Student's law, {_BATCHES - 1} degrees", **reference_style())
         band = {"color": "black", "alpha": 0.2, "linewidth": 0, "label": "±2 standard deviations"}
         panel.fill_between(middle, expected - spread, expected + spread, **band)
         mean = f"mean {of['mean']:+.3f} ± {1 / np.sqrt(of['pixels']):.3f}"

@@ -293,7 +293,7 @@ def _split(loaded: Any, chosen: list[Any], *, apart: bool, progress: Any) -> tup
 
     scene = read_scene(loaded.scene)
     progress(0.0, f"{loaded.name}: the reference")
-    truth = truth_image(loaded.scene).airlight
+    reference = truth_image(loaded.scene).airlight
     exact = cache(partial(exact_sum, scene))
     entries, split = [], []
     useful = configurations_for(scene.features, chosen)
@@ -309,11 +309,11 @@ def _split(loaded: Any, chosen: list[Any], *, apart: bool, progress: Any) -> tup
         entry: dict[str, Any] = {"label": each.label, "method": each.method, "kernel": each.kernel}
         entry |= {"parameters": dict(each.parameters)}
         try:
-            found = decompose(scene, each, truth, render=own, exact=exact)
+            found = decompose(scene, each, reference, render=own, exact=exact)
         except MethodError as error:
             entries.append(entry | {"refused": str(error)})
             continue
-        split.append((each.label, truth, found))
+        split.append((each.label, reference, found))
         parts = [plain(numbers) for numbers, _ in found]
         entries.append(entry | {"refused": None, "whole": parts[0], "parts": parts[1:]})
     return entries, split
@@ -347,12 +347,12 @@ def _draw_parts(split: list[Any], column: str) -> Any:
     for (label, given, parts), line in zip(split, panels):
         for panel in line:
             panel.set_axis_off()
-        truth = np.asarray(given, dtype=np.float64)
-        factor = exposure(truth)
-        show_picture(line[0], tone_mapped(truth, factor), "reference", size)
-        show_picture(line[1], tone_mapped(truth + parts[0][1], factor), label.replace(" (", "\n("), size)
+        reference = np.asarray(given, dtype=np.float64)
+        factor = exposure(reference)
+        show_picture(line[0], tone_mapped(reference, factor), "reference", size)
+        show_picture(line[1], tone_mapped(reference + parts[0][1], factor), label.replace(" (", "\n("), size)
         for panel, (part, image) in zip(line[2:], parts):
             fraction = "" if math.isnan(part["share"]) or part["cause"] == "whole" else f", {100 * part['share']:.0f} %"
             title = f"{part['cause']}\n{part['relative_rmse']:.1e}{fraction}"
-            show_picture(panel, error_map(truth, truth + image), title, size)
+            show_picture(panel, error_map(reference, reference + image), title, size)
     return figure

@@ -70,10 +70,10 @@ def _curves(phase: str, a: float, theta: Any) -> dict[str, Any]:
 
 def _draw_polynomials(rows: list[dict[str, Any]], column: str) -> Any:
     from reports.plotting.figure import new_figure
-    from reports.plotting.style import WIDTHS, kernel_style, truth_style
+    from reports.plotting.style import WIDTHS, kernel_style, reference_style
 
     styles = {
-        "exact": truth_style(),
+        "exact": reference_style(),
         "taylor": {"color": kernel_style("taylor")["color"], "linestyle": "--"},
         "taylor-printed": {"color": kernel_style("taylor-printed")["color"], "linestyle": ":"},
     }

@@ -8,8 +8,8 @@ Read in this order:
 - `stages.py`: the stages of a frame, each timed;
 - `live_scene.py`: a scene of which camera, lights, media, method and parameters change from frame to frame;
 - `picture.py`: frames as pictures, on the device;
-- `truth_order.py`: in which order the reference of an image is computed, and what is known of it;
-- `truth_process.py`: the process that computes it while the view is idle;
+- `reference_order.py`: in which order the reference of an image is computed, and what is known of it;
+- `reference_process.py`: the process that computes it while the view is idle;
 - `reference.py`: the reference of what is shown, and the error of the method against it;
 - `session.py`: the loop that draws what the page asks for;
 - `server.py`: the page and its socket, for anyone who knows the token.

@@ -22,11 +22,11 @@ from realtime.parameters import defaults, values
 from reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure
 from reports.view.live_scene import LiveScene, Shown
 from reports.view.picture import LAYERS, Pictures, rgba
+from reports.view.reference import ReferenceInBackground
+from reports.view.reference_order import view_error
 from reports.view.server import Page
 from reports.view.stages import WORDS
 from reports.view.state import ViewState
-from reports.view.truth import TruthInBackground
-from reports.view.truth_order import view_error
 from reports.view.widgets import (
     calls_kernel,
     kernel_widgets,
@@ -53,7 +53,7 @@ class Session:
     def __init__(self, state: ViewState, variant: str) -> None:
         self._given = state
         self.live = LiveScene(state.scene, state.size, state.chosen, state.changes)
-        self.truth = TruthInBackground(self._wake, variant)
+        self.reference = ReferenceInBackground(self._wake, variant)
         self._pictures = Pictures()
         self._condition = threading.Condition()
         self._said: list[tuple[Page, dict[str, Any]]] = []
@@ -67,7 +67,7 @@ class Session:
         self._changed_at = time.perf_counter()
         self._asked_at: float | None = None  # of the change whose cost the next frame tells
         self._told = self._news_at = 0.0
-        self._truth_of: Any = None
+        self._reference_of: Any = None
         self._news = False
 
     # What the server's threads call -----------------------------------------------------------------------------------
@@ -115,9 +115,9 @@ class Session:
             said, self._said = self._said, []
             page = self._page
         if page is None:
-            if self._truth_of is not None:
-                self._truth_of = None
-                self.truth.stop()
+            if self._reference_of is not None:
+                self._reference_of = None
+                self.reference.stop()
             return
         self._take(page, said)
         if self._can_draw():
@@ -137,9 +137,9 @@ class Session:
         if self._told < self._changed_at:
             waits.append(self._changed_at + _QUIET - now)
         # Without a frame no reference begins, and without a reference there is no news to wait for.
-        if self._truth_of is None and self._shown is not None:
+        if self._reference_of is None and self._shown is not None:
             waits.append(self._changed_at + _STILL - now)
-        if self._news and self._truth_of is not None and self._shown is not None:
+        if self._news and self._reference_of is not None and self._shown is not None:
             waits.append(self._news_at + _NEWS - now)
         return max(min(waits), 0.001)
 
@@ -172,9 +172,9 @@ class Session:
             page.tell("mistake", message=" ".join(str(error).split()))
         else:
             page.tell("mistake", message="")
-            if of_scene and self._truth_of is not None:
-                self._truth_of = None
-                self.truth.stop()
+            if of_scene and self._reference_of is not None:
+                self._reference_of = None
+                self.reference.stop()
             self._news = True
         self._touch()
 
@@ -300,33 +300,33 @@ class Session:
         now = time.perf_counter()
         if self._told < self._changed_at and now >= self._changed_at + _QUIET:
             self._tell_state(page)
-        if self._truth_of is None and now >= self._changed_at + _STILL and self._shown is not None:
-            self._truth_of = dict(self.live.changes)
-            self.truth.start(self._given.scene, self._given.size, self._truth_of)
-        if self._news and now >= self._news_at + _NEWS and self._truth_of is not None and self._shown is not None:
+        if self._reference_of is None and now >= self._changed_at + _STILL and self._shown is not None:
+            self._reference_of = dict(self.live.changes)
+            self.reference.start(self._given.scene, self._given.size, self._reference_of)
+        if self._news and now >= self._news_at + _NEWS and self._reference_of is not None and self._shown is not None:
             self._news, self._news_at = False, now
             self._tell_error(page, self._shown)
 
     def _tell_error(self, page: Page, shown: Shown) -> None:
-        truth = self.truth.truth
-        if self.truth.failure or truth is None:
-            page.tell("error", failure=self.truth.failure)
+        found = self.reference.known
+        if self.reference.failure or found is None:
+            page.tell("error", failure=self.reference.failure)
             return
         try:
             frame = self.live.on_host(shown)
         except (InputError, MethodError) as mistake:
             page.tell("error", failure=" ".join(str(mistake).split()))
             return
-        error = view_error(truth, frame.airlight)
-        page.tell("error", failure="", error=plain(asdict(error)) if error else None, done=self.truth.done)
+        error = view_error(found, frame.airlight)
+        page.tell("error", failure="", error=plain(asdict(error)) if error else None, done=self.reference.done)
         if error is None or self._show["other"] == "none":
             return
         if self._show["other"] == "error":
-            test = truth.filled(np.asarray(frame.airlight, dtype=np.float64))
-            picture = rgba(error_map(truth.filled(truth.airlight), test))
+            test = found.filled(np.asarray(frame.airlight, dtype=np.float64))
+            picture = rgba(error_map(found.filled(found.airlight), test))
         else:
             weights = LAYERS[self._show["layer"]]
-            layers = truth.filled(truth.airlight), truth.filled(truth.surface)
+            layers = found.filled(found.airlight), found.filled(found.surface)
             radiance = sum(weight * layer for weight, layer in zip(weights, layers, strict=True) if weight)
             picture = self._pictures.of_image(np.asarray(radiance), self._exposed())
         page.show(picture, kind="other", size=self._size(), known=error.known, pixels=error.pixels)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from reports.report.scene import truth_data
+from reports.report.scene import reference_data
 from validation.metrics.errors import plain
 
 
@@ -32,7 +32,7 @@ def test_truth_without_light_that_is_finite_has_no_numbers_rather_than_nan(airli
     from reference.quadrature.ray_values import TruthImage
 
     black = np.zeros_like(airlight)
-    data = truth_data(TruthImage(airlight, black, black, np.ones((2, 3)), np.ones((2, 3)), 0, float("nan")))
+    data = reference_data(TruthImage(airlight, black, black, np.ones((2, 3)), np.ones((2, 3)), 0, float("nan")))
     json.dumps(data, allow_nan=False)
     assert data["relative_bound"] is None
     assert data["missed"] is None

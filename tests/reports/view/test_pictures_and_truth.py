@@ -9,7 +9,7 @@ import pytest
 from reports.plotting.colour_maps import NOT_FINITE
 from reports.plotting.pictures import tone_mapped
 from reports.view.picture import LAYERS, Pictures
-from reports.view.truth_order import KnownTruth, view_error
+from reports.view.reference_order import KnownReference, view_error
 from validation.metrics.errors import error_metrics
 
 WIDTH, HEIGHT = 50, 37
@@ -21,11 +21,11 @@ def test_error_of_a_part_covers_that_of_the_whole():
     reference = 1 + random.random((HEIGHT, WIDTH, 3))
     test = reference * (1 + 0.1 * random.standard_normal((HEIGHT, WIDTH, 3)))
     whole = error_metrics(reference, test)
-    assert view_error(KnownTruth.of_size(WIDTH, HEIGHT), test) is None
+    assert view_error(KnownReference.of_size(WIDTH, HEIGHT), test) is None
     flat, covered = reference.reshape(-1, 3), 0
     for seed in range(200):
         pixels = np.random.default_rng(seed).permutation(WIDTH * HEIGHT)[:400]
-        truth = KnownTruth.of_size(WIDTH, HEIGHT)
+        truth = KnownReference.of_size(WIDTH, HEIGHT)
         truth.add(pixels, flat[pixels], flat[pixels], np.full((400, 3), 1e-9))
         error = view_error(truth, test)
         assert (error.known, error.pixels) == (400, WIDTH * HEIGHT)

@@ -14,33 +14,33 @@ import pytest
 
 from reference.storage.exr import read_exr
 from reports.commands import main as cli
+from reports.view.reference_order import KnownReference
+from reports.view.reference_process import Task, answers
 from reports.view.session import Session
 from reports.view.state import ViewState
-from reports.view.truth_order import KnownTruth
-from reports.view.truth_process import Task, answers
 from validation.study.configuration import configuration
 
 SIZE = (20, 15)
 AIM = {"camera.origin": [0.61, -0.3, 0.4], "camera.target": [0.2, 0.1, 4.0], "camera.up": [0, 1, 0]}
 
 
-class TruthAtOnce:
+class ReferenceAtOnce:
     """A stand-in for the process of the truth; `starts` counts what it was asked for."""
 
     def __init__(self, told, variant):
-        self.told, self.truth, self.done, self.failure, self.starts = told, None, False, "", 0
+        self.told, self.known, self.done, self.failure, self.starts = told, None, False, "", 0
 
     def start(self, scene, size, changes):
         self.starts += 1
-        self.truth = KnownTruth.of_size(*size)
+        self.known = KnownReference.of_size(*size)
         for answer in answers(Task(1, scene, size, dict(changes))):
             if answer.pixels is not None:
-                self.truth.add(answer.pixels, answer.airlight, answer.surface, answer.bound)
+                self.known.add(answer.pixels, answer.airlight, answer.surface, answer.bound)
             self.done = answer.done
         self.told()
 
     def stop(self):
-        self.truth, self.done = None, False
+        self.known, self.done = None, False
 
     def end(self):
         pass
@@ -86,7 +86,7 @@ def opened(scene="sphere-spot", method="shadow-planes", **parameters):
 
 @pytest.fixture
 def view(variant, monkeypatch):
-    monkeypatch.setattr("reports.view.session.TruthInBackground", TruthAtOnce)
+    monkeypatch.setattr("reports.view.session.ReferenceInBackground", ReferenceAtOnce)
     return opened
 
 
@@ -119,10 +119,10 @@ def test_the_commands_on_the_page_show_what_is_shown(view, tmp_path, monkeypatch
         cli.run(commands["view"])
     assert started == [session._state()]
     assert cli.run([*commands["reference"], "-o", str(tmp_path / "truth.exr")]) == 0
-    turns(session, lambda: session.truth.done)
+    turns(session, lambda: session.reference.done)
     # float32 in the file
     np.testing.assert_allclose(
-        session.truth.truth.airlight, read_exr(tmp_path / "truth.exr").layers["airlight"], rtol=1e-6
+        session.reference.known.airlight, read_exr(tmp_path / "truth.exr").layers["airlight"], rtol=1e-6
     )
 
 
@@ -146,9 +146,9 @@ def test_the_error_is_that_of_compare_and_begins_again_when_the_scene_changes(vi
     # Another method has the same truth; another scene has not.
     ask(session, page, kind="choose", parameter="steps", value=21)
     turns(session, lambda: page.last("error")["error"]["relative_rmse"] < 0.5 * error["relative_rmse"])
-    assert session.truth.starts == 1
+    assert session.reference.starts == 1
     ask(session, page, kind="change", changes={"medium.sigma_t": [0.5]})
-    turns(session, lambda: session.truth.starts == 2)
+    turns(session, lambda: session.reference.starts == 2)
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ def pixel_order(width: int, height: int) -> NDArray[np.int64]:
 
 
 @dataclass(frozen=True)
-class KnownTruth:
+class KnownReference:
     """What is known of the reference of an image; what is not is NaN."""
 
     airlight: Array  #: (height, width, 3) [W/(m^2 sr)]
@@ -34,9 +34,9 @@ class KnownTruth:
     bound: Array  #: of the error of the airlight; with lights with extent, and twice its standard error [W/(m^2 sr)]
 
     @staticmethod
-    def of_size(width: int, height: int) -> "KnownTruth":
+    def of_size(width: int, height: int) -> "KnownReference":
         """Return what is known before there is anything."""
-        return KnownTruth(*(np.full((height, width, 3), np.nan) for _ in range(3)))
+        return KnownReference(*(np.full((height, width, 3), np.nan) for _ in range(3)))
 
     @property
     def known(self) -> NDArray[np.bool_]:
@@ -71,20 +71,20 @@ class ViewError:
     pixels: int
 
 
-def view_error(truth: KnownTruth, airlight: Array) -> ViewError | None:
+def view_error(found: KnownReference, airlight: Array) -> ViewError | None:
     """Return the error of the airlight of a frame, (height, width, 3) [W/(m^2 sr)]; None if nothing is known."""
-    known = truth.known
+    known = found.known
     count, pixels = int(known.sum()), known.size
     if count == 0:
         return None
-    reference, test = truth.airlight[known], np.asarray(airlight, dtype=np.float64)[known]
+    reference, test = found.airlight[known], np.asarray(airlight, dtype=np.float64)[known]
     metrics = error_metrics(reference[None], test[None])
     mean = float(reference.mean())
     square = np.mean((test - reference) ** 2, axis=1)
     spread = float(square.std()) / np.sqrt(count) * np.sqrt(1 - count / pixels)
     rmse = float(np.sqrt(square.mean()))
     interval = 1.96 * spread / (2 * rmse) if rmse > 0 else 0.0
-    bound = float(np.sqrt(np.mean(truth.bound[known] ** 2)))
+    bound = float(np.sqrt(np.mean(found.bound[known] ** 2)))
     return ViewError(
         metrics.relative_rmse,
         interval / mean if mean > 0 else np.nan,

@@ -8,12 +8,12 @@ from contextlib import suppress
 from multiprocessing import get_context
 from types import ModuleType
 
-from reports.view.truth_order import KnownTruth
-from reports.view.truth_process import Answer, Task, compute
+from reports.view.reference_order import KnownReference
+from reports.view.reference_process import Answer, Task, compute
 from validation.scenes.changes import Values
 
 
-class TruthInBackground:
+class ReferenceInBackground:
     """A process that computes references, and what it has found for the last task.
 
     `told` is called in a thread of its own whenever more is known.
@@ -23,7 +23,7 @@ class TruthInBackground:
         self._told = told
         self._lock = threading.Lock()
         self._number = 0
-        self.truth: KnownTruth | None = None
+        self.known: KnownReference | None = None
         self.done = False
         self.failure = ""  #: why there is no reference, in one line
         context = get_context("spawn")
@@ -42,14 +42,14 @@ class TruthInBackground:
         """Compute the reference of a scene from now on."""
         with self._lock:
             self._number += 1
-            self.truth, self.done, self.failure = KnownTruth.of_size(*size), False, ""
+            self.known, self.done, self.failure = KnownReference.of_size(*size), False, ""
             self._send(Task(self._number, scene, size, dict(changes)))
 
     def stop(self) -> None:
         """Compute nothing, and forget what was found."""
         with self._lock:
             self._number += 1
-            self.truth, self.done, self.failure = None, False, ""
+            self.known, self.done, self.failure = None, False, ""
             self._send(None)
 
     def end(self) -> None:
@@ -72,9 +72,9 @@ class TruthInBackground:
 
     def _take(self, answer: Answer) -> None:
         with self._lock:
-            if answer.task != self._number or self.truth is None:
+            if answer.task != self._number or self.known is None:
                 return
             if answer.pixels is not None:
-                self.truth.add(answer.pixels, answer.airlight, answer.surface, answer.bound)
+                self.known.add(answer.pixels, answer.airlight, answer.surface, answer.bound)
             self.done, self.failure = answer.done, answer.failure
         self._told()

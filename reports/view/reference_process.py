@@ -54,7 +54,7 @@ def yield_processor() -> None:
 
 def answers(task: Task) -> Iterator[Answer]:
     """Yield the reference of an image, rays after rays."""
-    from reports.view.truth_order import pixel_order
+    from reports.view.reference_order import pixel_order
     from validation.estimates.quadrature import reference_error, truth_of_pixels
     from validation.scenes.loading import load_scene
 
