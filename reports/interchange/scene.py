@@ -185,7 +185,7 @@ def _in_engine(name: str, medium: HeightMedium) -> dict[str, Any]:
         return {"cannot": found}
     numbers = {key: _number(value) for key, value in found.items()}
     engine = ENGINES[name]
-    return {"parameters": numbers, "not_physical": engine.unphysical, "not_checked": engine.unchecked}
+    return {"parameters": numbers, "not_physical": engine["unphysical"], "not_checked": engine["unchecked"]}
 
 
 _PHASES = {

@@ -17,8 +17,6 @@ from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
 from reference.storage.files import ensure_folder
 from reference.storage.kept import fresh_results
-from reports.cluster.connect import Client
-from reports.cluster.references import Picture, bring_references, spread
 from reports.data.claims import claims, growth_claims, unstudied
 from reports.data.own_faults import own_fault
 from reports.data.reader import SCHEMA, report_text
@@ -39,7 +37,10 @@ from validation.study.scene import SceneStudy, open_scene, study_scene
 from validation.study.study import STUDIES, Cell, Study, standard_study
 
 if TYPE_CHECKING:
+    from reports.cluster.connect import Client
+    from reports.cluster.references import Picture
     from validation.engine.images import EngineImage
+    from validation.estimates.monte_carlo import ElsewhereFor
 
 _PAGE_SECONDS = 1.0  # to pack the images of a scene and draw its part of the page
 
@@ -54,7 +55,7 @@ def write_report(
     apart: bool = False,
     progress: Progress | None = None,
     noted: Callable[[Sequence[str]], None] = lambda notes: None,
-    cluster: Client | None = None,
+    cluster: "Client | None" = None,
 ) -> dict[str, Any]:
     """Study scenes and write the report into a folder; return the content of report.json, see docs/formats.md.
 
@@ -89,6 +90,8 @@ def write_report(
         studied, results = [], list[Result]()
         with _timed(seconds, "scenes"):
             if cluster is not None:
+                from reports.cluster.references import bring_references
+
                 bring_references(cluster, [_picture(each, each.size) for each in studies])
             ended = _try_own(studies[0], process) if studies else {}
             for each, parts, span in zip(studies, of_scenes, spans):
@@ -100,7 +103,7 @@ def write_report(
                     apart=process,
                     ended=ended,
                     progress=lambda part, step=step, begins=begins: step(begins[part], part),  # type: ignore[misc]
-                    spread=None if cluster is None else spread(cluster, _picture(each, each.study.checks.size)),
+                    spread=_spread(cluster, each),
                     workers=threads(),
                 )
                 _raise_own_faults(result.rows, process)
@@ -173,8 +176,19 @@ def _timed(seconds: dict[str, float], part: str) -> Iterator[None]:
     seconds[part] = round(seconds[part] + time.monotonic() - start, 2)
 
 
-def _picture(study: SceneStudy, size: tuple[int, int]) -> Picture:
+def _spread(cluster: "Client | None", study: SceneStudy) -> "ElsewhereFor | None":
+    """Return what lets workers trace the batches that check the reference of a scene."""
+    if cluster is None:
+        return None
+    from reports.cluster.references import spread
+
+    return spread(cluster, _picture(study, study.study.checks.size))
+
+
+def _picture(study: SceneStudy, size: tuple[int, int]) -> "Picture":
     """Return a scene as workers load it."""
+    from reports.cluster.references import Picture
+
     name = study.path
     return Picture(name if name in SCENES or is_random(name) else str(Path(name).resolve()), size)
 

@@ -44,8 +44,10 @@ from reference.storage.exr import TOTAL
 from reference.storage.kept import Kept, Spent, is_kept, kept, key_of, load, stopwatch, store
 from reference.storage.scene_digest import scene_digest
 
+Array = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
 
+_ROUNDING = 2.0**-24
 _USUAL: dict[str, Any] = {"checks": 32, "shadow_scale": 1.0, "pixel": "centre"}
 
 
@@ -136,11 +138,6 @@ class _Parts:
 def _as_kept(field: Field, value: Any) -> Any:
     """Return an array, or the number that was stored as an array without dimensions."""
     return field.type(value) if field.type in (int, float) else value
-
-
-Array = NDArray[np.float64]
-
-_ROUNDING = 2.0**-24
 
 
 def reference_layer(truth: TruthImage, layer: str, *, emitted: bool = True) -> Array:

@@ -58,7 +58,7 @@ VARIANTS: Mapping[str, dict[str, Any]] = {
     "16 points": {"points": 16},
     "scale 2": {"scale": 2},
     "hd auto": {"guide": "depth", "hd": "auto", "surfaces": "ray"},
-    "shared points": dict(SHARED_POINTS),
+    "shared points": {**SHARED_POINTS},
 }
 
 

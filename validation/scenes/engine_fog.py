@@ -17,8 +17,9 @@ VolumeRendering.hlsl, and in PlayCanvas' pages.
 """
 
 import math
+import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from pathlib import Path
 
 LN2 = math.log(2.0)
 _UNREAL = 0.1  # of a density by 1000 per cm, per metre
@@ -27,59 +28,18 @@ _LEAST_DIFFERENCE = 0.01  # between HDRP's heights [m]
 Layer = tuple[float, float, float]  # extinction [1/m], base [m], scale height [m]
 
 
-@dataclass(frozen=True)
-class Engine:
-    """An engine's height fog."""
-
-    parameters: Mapping[str, float | None]  #: names with defaults; None: must be given. Heights are in metres
-    unphysical: str  #: what of its fog no medium does
-    unchecked: str  #: what is assumed of it
-
-
-_UNREAL_FOG = {
-    "FogDensity": None,
-    "FogHeightFalloff": None,
-    "FogHeight": 0.0,
-    "SecondFogDensity": 0.0,
-    "SecondFogHeightFalloff": 0.2,
-    "SecondFogHeightOffset": 0.0,
-}
-_RELEASES = "releases newer than the copies of 4.22 and later that were read"
-ENGINES = {
-    "unreal": Engine(
-        _UNREAL_FOG,
-        "its fog has a constant in-scattered colour without light paths and shadows, a directional term that is a "
-        "power of a cosine, FogMaxOpacity, StartDistance and a cut-off distance",
-        _RELEASES,
-    ),
-    "unreal-volumetric": Engine(
-        _UNREAL_FOG | {"ExtinctionScale": 1.0},
-        "its extinction is 4.07 % denser than that of its own analytic fog, since 1/2 stands for (ln 2)^2",
-        _RELEASES + "; whether local lights are attenuated by the fog before a point",
-    ),
-    "hdrp": Engine(
-        {"meanFreePath": None, "baseHeight": 0.0, "maximumHeight": None},
-        "it cuts the cosine of the zenith angle at a small number, and without volumetrics its scattering equals its "
-        "extinction",
-        "whether local lights are attenuated by the fog before a point",
-    ),
-    "playcanvas": Engine(
-        {"density": None, "heightBase": 0.0, "heightFalloff": None},
-        "its `extinction` scales absorption apart from scattering, and its ambient term has no source",
-        "whether it is constant below heightBase (taken not to be), and whether `extinction` scales both ways",
-    ),
-}
+ENGINES = tomllib.loads(Path(__file__).with_name("engine_fog.toml").read_text(encoding="utf-8"))  #: see the file
 
 
 def layers_of(engine: str, given: Mapping[str, float]) -> tuple[tuple[Layer, ...], bool]:
     """Return the layers that an engine's parameters stand for, and whether they are constant below their bases."""
     if engine not in ENGINES:
         raise ValueError(f"heightfog has engine = {engine}; wanted one of {', '.join(ENGINES)}")
-    values = {name: given.get(name, default) for name, default in ENGINES[engine].parameters.items()}
-    missing = [name for name, value in values.items() if value is None]
+    values = {name: given.get(name, default) for name, default in ENGINES[engine]["parameters"].items()}
+    missing = [name for name, value in values.items() if value == "needed"]
     if missing:
         raise ValueError(f"heightfog of engine {engine} has no {missing[0]}; wanted {', '.join(values)}")
-    number = {name: float(value) for name, value in values.items() if value is not None}
+    number = {name: float(value) for name, value in values.items()}
     if engine == "hdrp":
         if not number["meanFreePath"] > 0:
             raise ValueError(f"heightfog has meanFreePath = {number['meanFreePath']:g}; wanted a length above 0 m")

@@ -99,7 +99,7 @@ def _given(props: Any) -> tuple[dict[str, float], bool]:
         given = {name: float(props.get(name, 0.0)) for name in NUMBERS}
         return given, bool(props.get("clamped", False))
     engine = str(props["engine"])
-    names = ENGINES[engine].parameters if engine in ENGINES else ()
+    names = ENGINES[engine]["parameters"] if engine in ENGINES else ()
     layers, clamped = layers_of(engine, {name: float(props[name]) for name in names if name in props})
     given = dict.fromkeys(NUMBERS, 0.0)
     for i, layer in enumerate(layers, 1):

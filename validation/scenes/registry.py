@@ -31,6 +31,7 @@ import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache, partial
+from inspect import isfunction
 from pathlib import Path
 from typing import Any
 
@@ -54,25 +55,8 @@ Table = dict[str, Any]
 _DROPLETS = 20001  # values of a tabulated phase function: glory and fogbow are blurred by less than 0.1 degrees
 _COPYING = ("copies", "first", "step", "of", "sunflower", "colours")
 _PLACING = ("name", "mesh", "waves", "scale", "turn", "at", "polar", "reflectance", "medium")
-_SOLIDS = (
-    *(
-        "arch",
-        "box",
-        "faceted_sphere",
-        "fluted_column",
-        "gable",
-        "gem",
-        "grid",
-        "icosphere",
-        "knot",
-        "lathe",
-        "pierced",
-    ),
-    *("pierced_slab", "profile", "spindle", "statue", "tetrahedron", "torus", "vase"),
-)
 MESHES: dict[str, Callable[..., Mesh]] = {
-    **{name: getattr(meshes, name) for name in _SOLIDS},
-    **{name: getattr(cloud_meshes, name) for name in ("cumulus", "stratocumulus", "two_lobes")},
+    **{name: each for module in (meshes, cloud_meshes) for name, each in vars(module).items() if isfunction(each)},
     "star": lambda inner, outer, points, height: meshes.prism(meshes.star(inner, outer, points), height),
     "triangle": lambda corners: (np.array(corners), np.array([[0, 1, 2]])),
 }

@@ -6,9 +6,11 @@ A kernel is named 'quadrature', 'quadrature-32', or as a user's 'module:function
 
 import sys
 import time
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial, wraps
+from pathlib import Path
 from typing import Any
 
 from analytic.errors import InputError, named_values, nearest
@@ -44,60 +46,20 @@ class Configuration:
         return ":" in self.method or ":" in (self.kernel or "")
 
 
-#: What `soft-shafts` does beyond Ali 2016: the pixels of a tile share sixteen light points and their steps.
-SHARED_POINTS: tuple[tuple[str, int | float | str], ...] = (
-    ("points", 16),
-    ("pattern", "sobol"),
-    ("interleave", True),
-    ("scale", 2),
-    ("steps", 12),
-    ("spacing", "equiangular"),
-    ("map", 128),
-    ("surfaces", "ray"),
-    ("guide", "depth"),
-    ("hd", "auto"),
-    ("hz", 0.02),
-    ("narrow", 16.0),
-)
+_NAMED = tomllib.loads((Path(__file__).parent / "studies" / "methods.toml").read_text(encoding="utf-8"))
 
-#: The configurations that `bench` and `report` measure by default. Those that say their light points are left out where
-#: no light has an extent.
-STANDARD: tuple[Configuration, ...] = (
-    Configuration("unshadowed", "taylor"),
-    Configuration("unshadowed", "quadrature"),
-    Configuration("unshadowed", "exact"),
-    Configuration("ray-march", None, (("steps", 16),)),
-    Configuration("ray-march", None, (("steps", 100),)),
-    Configuration("ray-march", None, (("steps", 100), ("spacing", "uniform"))),
-    Configuration("ray-march", None, (("steps", 100), ("shadow", "map"))),
-    Configuration("ray-march", None, (("steps", 400), ("shadow", "map"), ("map", 1024))),
-    Configuration("shadow-planes", "exact"),
-    Configuration("shadow-planes", "taylor"),
-    Configuration("shadow-planes", "exact", (("order", "paper"),)),
-    Configuration("shadow-planes", "exact", (("order", "none"),)),
-    Configuration("shadow-planes", "exact", (("media", "paper"),)),
-    Configuration("min-max", "exact"),
-    Configuration("light-volumes", "exact"),
-    Configuration("light-volumes", "taylor"),
-    Configuration("light-volumes", "exact", (("map", 2048),)),
-    Configuration("soft-shafts", None, (("points", 5),)),
-    Configuration("soft-shafts", None, (("points", 5), ("scale", 2))),
-    Configuration("soft-shafts", None, SHARED_POINTS),
-    Configuration("froxel-fog", None, (("points", 16),)),
-)
 
-#: The configurations that `report --quick` measures: one of each kind.
-QUICK: tuple[Configuration, ...] = (
-    Configuration("unshadowed", "exact"),
-    Configuration("ray-march", None, (("steps", 100),)),
-    Configuration("ray-march", None, (("steps", 100), ("shadow", "map"))),
-    Configuration("shadow-planes", "exact"),
-    Configuration("shadow-planes", "taylor"),
-    Configuration("min-max", "exact"),
-    Configuration("light-volumes", "exact"),
-    Configuration("soft-shafts", None, (("points", 5),)),
-    Configuration("froxel-fog", None, (("points", 16),)),
-)
+def _named(word: str) -> tuple[Configuration, ...]:
+    found = []
+    for each in _NAMED[word]:
+        given = each.get("parameters", {})
+        parameters = _NAMED[given] if isinstance(given, str) else given
+        found.append(Configuration(each["method"], each.get("kernel"), tuple(parameters.items())))
+    return tuple(found)
+
+
+STANDARD, QUICK = _named("standard"), _named("quick")  #: see `studies/methods.toml`
+SHARED_POINTS: Mapping[str, Any] = _NAMED["shared_points"]  #: parameters of `soft-shafts`, beyond Ali 2016
 
 
 def configuration(

@@ -32,51 +32,8 @@ Ranges = dict[str, Any]
 PREFIX = "random:"
 _SAFE = "/:\\"  # what stands in a path as it is, besides letters, digits, '_', '.', '-' and '~'
 
-#: The coordinates of a point. A new one goes to the end: the others keep their scenes.
-COORDINATES = (
-    "media",
-    "optical_depth",
-    "lights",
-    "casters",
-    "light_kind-1",
-    "phase",
-    "extinctions",
-    "camera_in",
-    "camera_inside",
-    "camera_distance",
-    "camera_elevation",
-    "fov",
-    "g",
-    "grounds",
-    "light_distance-1",
-    "light_elevation-1",
-    "light_azimuth-1",
-    "brightness-1",
-    "light_size-1",
-    "cutoff-1",
-    "scale",
-    "bounds_kind",
-    "bounds",
-    "bounded_media",
-    "light_kind-2",
-    "light_kind-3",
-    "light_kind-4",
-    "albedo",
-    "caster_size",
-    "light_distance-2",
-    "brightness-2",
-    "light_kind-5",
-    "light_kind-6",
-    "light_kind-7",
-    "light_kind-8",
-    "caster_kind-1",
-    "caster_kind-2",
-    "cages",
-    "spheres",
-    "beam-1",
-    "light_material-1",
-    "droplets",
-)
+#: The names of the coordinates of a point.
+COORDINATES: tuple[str, ...] = tuple(tomllib.loads(FILE.read_text(encoding="utf-8"))["coordinates"])
 _SCRAMBLING = 2417
 LARGEST_SEED = 10**9
 
@@ -153,6 +110,7 @@ def point(seed: int) -> Mapping[str, float]:
 def _defaults() -> tuple[Ranges, Mapping[str, tuple[float, float]]]:
     """Return the ranges as they are drawn without a file, and the limits that they may have."""
     ranges = tomllib.loads(FILE.read_text(encoding="utf-8"))
+    del ranges["coordinates"]
     limits = ranges.pop("limits")
     return ranges, limits
 
