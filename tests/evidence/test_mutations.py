@@ -11,7 +11,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from realtime.clouds.slab_orders import moments
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
 from reference.monte_carlo.slab_walk import estimates
 from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein
@@ -23,6 +22,7 @@ from tests.evidence.certified.model import load_fog
 from tests.evidence.injected import Rewrite, injected, replacements, rewritten
 from tests.evidence.mutations import BELOW_THE_MARGIN, MUTATIONS, SHARED
 from validation.certified.files import certified_data
+from validation.slab import moments
 
 #: What the default tier tries beside the faults of the quadrature on its stages: 32 batches and kernels of their own.
 QUICK = ("traced-shadow-epsilon",)
@@ -138,7 +138,7 @@ def test_the_certified_scenes_find_what_all_share(certified, mutation):
 
 TAU, MU0, ALBEDO, DEPTH = 1.5, 0.6, 0.8, 0.5
 SETS = [(1, 1), (2, 2), (3, math.inf)]
-MOMENTS = "realtime.clouds.slab_orders.moments"
+MOMENTS = "validation.slab.moments"
 WALK = "reference.monte_carlo.slab_walk.walk"
 
 FAULTS = {

@@ -20,10 +20,10 @@ from realtime.clouds.canonical.coordinates import SETS, set_name
 from realtime.clouds.canonical.directional_moments import DirectionalMoments
 from realtime.clouds.canonical.fit import fit_on_device, fitted_functions
 from realtime.clouds.canonical.transport_grid import Transport, canonical_transport, on_device
-from realtime.clouds.slab_orders.moments import SlabOrders, order_sets
-from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SlabPhase, droplet_phase
+from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SlabPhase
 from realtime.numerics.array_types import ArrayTypes, array_types
-from validation.slab.phases import phase_pair
+from validation.slab.moments import SlabOrders, order_sets
+from validation.slab.phases import droplet_phase, phase_pair
 
 Array = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from realtime.clouds.slab_orders.slab import Exit, SlabLight, slab_light
 from reference.monte_carlo.slab_walk.estimates import ExitEstimate, SlabEstimate, slab_estimate
 from reference.monte_carlo.slab_walk.walk import Slab
+from validation.slab.exits import Exit, SlabLight, slab_light
 from validation.slab.request import SlabRequest
 
 Progress = Callable[[float, str], None]

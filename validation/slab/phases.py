@@ -16,13 +16,9 @@ from numpy.typing import NDArray
 from analytic.droplets import Droplets, Modified, optics
 from analytic.errors import InputError, nearest
 from analytic.phase import PhaseFunction
-from realtime.clouds.slab_orders.phases import (
-    HenyeyGreensteinPhase,
-    SlabPhase,
-    droplet_phase,
-    hg_draine_phase,
-    tabulated_phase,
-)
+from realtime.clouds.slab_orders.phases import AnglePhase, HenyeyGreensteinPhase, SlabPhase
+from realtime.droplets import CUT, droplet_series
+from realtime.scene.phase import HgDraine
 from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein, Tabulated
 from reference.monte_carlo.slab_walk.walk import Scattering
 
@@ -152,3 +148,42 @@ def _is_number(word: str) -> bool:
         return bool(np.isfinite(float(word)))
     except ValueError:
         return False
+
+
+def tabulated_phase(angles: Array, heights: Array) -> AnglePhase:
+    """Return the phase function that is linear in the angle between values.
+
+    `angles` increase from 0 to pi [rad], (A,); `heights`, (A,), are not negative, in any unit.
+    """
+    return AnglePhase(lambda angle: np.interp(angle, angles, heights), angles)
+
+
+def droplet_phase(radius: float, gamma: float, wavelength: float, *, modified: bool) -> AnglePhase:
+    """Return the phase function of droplets; the numbers are those of `realtime.droplets.droplet_series`.
+
+    If it is `modified`, the peak below `CUT` is cut to zero: lengths are then those of the medium whose density is
+    lowered by the share of the peak.
+    """
+    series, edge = droplet_series(radius, gamma, wavelength), np.deg2rad(CUT)
+    if not modified:
+        return AnglePhase(series.values, np.array([0.0, np.pi]))
+    return AnglePhase(lambda angles: np.where(angles < edge, 0.0, series.values(angles)), np.array([0.0, edge, np.pi]))
+
+
+def hg_draine_phase(diameter: float) -> AnglePhase:
+    """Return `realtime.scene.phase.HgDraine` of droplets of a diameter of 5 to 50 um.
+
+    Its narrow lobe is a few thousandths wide: panels near the peak are as short as their distance from it.
+    """
+    fit = HgDraine(diameter)
+    (share, narrow), (_, wide) = fit.lobes
+    constant, square = fit.rise
+    breaks = np.append(0.0, np.geomspace(1e-4, np.pi, 16))
+    breaks[-1] = np.pi
+
+    def heights(angles: Array) -> Array:
+        down, cosines = np.sin(angles / 2) ** 2, np.cos(angles)
+        lobes = [(1 - g * g) / ((1 - g) ** 2 + 4 * g * down) ** 1.5 for g in (narrow, wide)]
+        return share * lobes[0] + (constant + square * cosines**2) * lobes[1]
+
+    return AnglePhase(heights, breaks)

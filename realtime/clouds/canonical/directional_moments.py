@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Radiance of a slab in any direction by sets of orders, with the moments of its displacement from the entry.
 
-`realtime.clouds.slab_orders.moments` has the equations of one order: with M0 the radiance, D = x + i y the horizontal
+Each order obeys, with M0 the radiance, D = x + i y the horizontal
 displacement, M1 = <D I>, M2 = <|D|^2 I> and w = sin theta exp(i phi),
 
     dM0/ds = -M0 + S[M0'],   dM1/ds = -M1 + S[M1'] + w M0,   dM2/ds = -M2 + S[M2'] + 2 Re(conj(w) M1),

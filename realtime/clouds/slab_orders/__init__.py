@@ -7,11 +7,8 @@ and runs nowhere in a frame. The truth that checks it is a walk of photons, on t
 
 Read in this order:
 
-- `phases.py`: phase functions by values and Legendre moments, water droplets among them;
+- `phases.py`: phase functions by values and Legendre moments;
 - `streams.py`: directions, and scattering between them by mode of the azimuth;
 - `depth_panels.py`: light along straight lines through the slab;
-- `discrete_ordinates.py`: all orders of one mode at once;
-- `moments.py`: order after order, with the moments of the displacement, and the sum of the rest;
-- `radiance.py`: the radiance of all orders in any direction;
-- `slab.py`: what leaves a slab and what is inside, with the error of every number.
+- `discrete_ordinates.py`: all orders of one mode at once.
 """

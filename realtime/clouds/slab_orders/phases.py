@@ -15,9 +15,6 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import ArrayLike, NDArray
 
-from realtime.droplets import CUT, droplet_series
-from realtime.scene.phase import HgDraine
-
 Array = NDArray[np.float64]
 
 _PANEL, _PANEL_NODES = np.deg2rad(0.5), 8  #: of the quadrature over angles: P_l of l = 300 has 1.2 waves in a panel
@@ -97,42 +94,3 @@ class AnglePhase:
         """Return the values."""
         angles = np.arccos(np.clip(np.asarray(cosines, dtype=np.float64), -1.0, 1.0))
         return self.heights(np.atleast_1d(angles)).reshape(angles.shape) / self._mean
-
-
-def tabulated_phase(angles: Array, heights: Array) -> AnglePhase:
-    """Return the phase function that is linear in the angle between values.
-
-    `angles` increase from 0 to pi [rad], (A,); `heights`, (A,), are not negative, in any unit.
-    """
-    return AnglePhase(lambda angle: np.interp(angle, angles, heights), angles)
-
-
-def droplet_phase(radius: float, gamma: float, wavelength: float, *, modified: bool) -> AnglePhase:
-    """Return the phase function of droplets; the numbers are those of `realtime.droplets.droplet_series`.
-
-    If it is `modified`, the peak below `CUT` is cut to zero: lengths are then those of the medium whose density is
-    lowered by the share of the peak.
-    """
-    series, edge = droplet_series(radius, gamma, wavelength), np.deg2rad(CUT)
-    if not modified:
-        return AnglePhase(series.values, np.array([0.0, np.pi]))
-    return AnglePhase(lambda angles: np.where(angles < edge, 0.0, series.values(angles)), np.array([0.0, edge, np.pi]))
-
-
-def hg_draine_phase(diameter: float) -> AnglePhase:
-    """Return `realtime.scene.phase.HgDraine` of droplets of a diameter of 5 to 50 um.
-
-    Its narrow lobe is a few thousandths wide: panels near the peak are as short as their distance from it.
-    """
-    fit = HgDraine(diameter)
-    (share, narrow), (_, wide) = fit.lobes
-    constant, square = fit.rise
-    breaks = np.append(0.0, np.geomspace(1e-4, np.pi, 16))
-    breaks[-1] = np.pi
-
-    def heights(angles: Array) -> Array:
-        down, cosines = np.sin(angles / 2) ** 2, np.cos(angles)
-        lobes = [(1 - g * g) / ((1 - g) ** 2 + 4 * g * down) ** 1.5 for g in (narrow, wide)]
-        return share * lobes[0] + (constant + square * cosines**2) * lobes[1]
-
-    return AnglePhase(heights, breaks)

@@ -12,7 +12,6 @@ import pytest
 import realtime.clouds.canonical.transport_grid as grid
 from realtime.clouds.canonical import coordinates
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
-from realtime.clouds.slab_orders.radiance import slab_radiance
 from realtime.frame.renderer import frame_renderer, render_frame
 from realtime.methods.registry import METHODS
 from realtime.scene.camera import ray_directions
@@ -20,6 +19,7 @@ from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import DROPLETS, cloud
 from validation.scenes.meshes import box, placed
 from validation.scenes.parts import camera
+from validation.slab.radiance import slab_radiance
 
 THICKNESS, EXTINCTION, G, ALBEDO = 110.3, 0.0363, 0.85, 0.99
 AXIS = np.array([0.517, 0.211, -0.829]) / np.linalg.norm([0.517, 0.211, -0.829])

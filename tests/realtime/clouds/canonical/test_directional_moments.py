@@ -11,12 +11,12 @@ from PythonicDISORT.pydisort import pydisort
 
 from realtime.clouds.canonical.coordinates import SETS
 from realtime.clouds.canonical.directional_moments import DirectionalMoments
-from realtime.clouds.slab_orders.moments import SlabOrders, order_sets
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
 from realtime.clouds.slab_orders.streams import double_gauss
 from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein
 from reference.monte_carlo.slab_walk.walk import Slab
 from tests.helpers.slab_directions import direction_estimate
+from validation.slab.moments import SlabOrders, order_sets
 
 HG = HenyeyGreensteinPhase(0.75)
 

@@ -11,7 +11,6 @@ import pytest
 from scipy.stats import chi2, norm, t
 
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
-from realtime.clouds.slab_orders.radiance import slab_radiance
 from reference.monte_carlo.batches import merged
 from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch
 from reference.monte_carlo.cloud_paths.opacity import seen_clouds
@@ -20,6 +19,7 @@ from reference.scene.clouds import read_clouds
 from validation.scenes.loading import load_scene
 from validation.scenes.meshes import grid
 from validation.scenes.parts import camera, mitsuba_mesh, sky, sun
+from validation.slab.radiance import slab_radiance
 
 SETS = [("1", (1, 1)), ("2", (2, 2)), ("3-4", (3, 4)), ("5-inf", (5, math.inf))]
 

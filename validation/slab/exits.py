@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.clouds.slab_orders.moments import Edges, SlabOrders, order_sets
 from realtime.clouds.slab_orders.phases import SlabPhase
-from realtime.clouds.slab_orders.radiance import slab_radiance
+from validation.slab.moments import Edges, SlabOrders, order_sets
+from validation.slab.radiance import slab_radiance
 
 Array = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ import pytest
 from numpy.polynomial.legendre import legval
 from PythonicDISORT.pydisort import pydisort
 
-from realtime.clouds.slab_orders.moments import SlabOrders, order_sets
 from realtime.clouds.slab_orders.phases import AnglePhase, HenyeyGreensteinPhase
-from realtime.clouds.slab_orders.radiance import slab_radiance
-from realtime.clouds.slab_orders.slab import slab_light
+from validation.slab.exits import slab_light
+from validation.slab.moments import SlabOrders, order_sets
+from validation.slab.radiance import slab_radiance
 
 DATA = Path(__file__).parents[2] / "data"
 ALL = [(1, math.inf)]
