@@ -100,17 +100,16 @@ def column_rays(view: View, grid: Grid) -> Rays:
 def _frame_depth(view: View) -> Metres:
     """Return the depth of the farthest surface, or where rays meet none, where too little light comes from to matter.
 
-    Media in clear air end by themselves.
+    Grids, and media in clear air, end by themselves.
     """
     Float, medium, forward = type(view.distance), view.medium, view.camera.forward
     met = dr.isfinite(view.distance)
     depth = view.distance * dr.dot(view.direction, forward)
     surfaces = dr.max(dr.select(met, depth, 0))
+    last = medium.last_depth(view.camera.origin, forward)
+    if last is not None:
+        return dr.maximum(dr.select(dr.all(met), dr.minimum(surfaces, last), last), 1e-3)
     beyond = Float(0)
-    if medium.clear:
-        for body in medium.bounded_media:
-            beyond = dr.maximum(beyond, dr.dot(body.centre - view.camera.origin, forward) + body.radius)
-        return dr.maximum(dr.select(dr.all(met), dr.minimum(surfaces, beyond), beyond), 1e-3)
     for light in view.lights:
         beyond = dr.maximum(beyond, _reach(view, light, medium))
     return dr.maximum(dr.select(dr.all(met), surfaces, dr.maximum(surfaces, beyond)), 1e-3)

@@ -19,7 +19,7 @@ lights their `optical_depth`. It may write, because it knows better,
 - `depth_to_light`: of whole paths from points to a light;
 - `rays`: what of rays is found once, as where they enter and leave its parts, for `Rays.crossed`;
 - `source` and `unit`: what scatters, and what of it is the same everywhere and is left out of integrals;
-- `mean_source`, `part`, `ambient`: of froxels, of steps, of a constant field.
+- `mean_source`, `last_depth`, `part`, `ambient`: of froxels, of steps, of a constant field.
 
 `realtime.scene.read_media` makes it of what Mitsuba loaded. Point, spot and area lights have a `position`; a light at
 infinity (`light.w == 0`) has an `axis`, its rays' direction, and is let in by

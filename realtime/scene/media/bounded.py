@@ -8,6 +8,7 @@ A ray enters and leaves each of them once. What its segments cross follows from 
 """
 
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any
 
 import drjit as dr
@@ -60,6 +61,13 @@ class BoundedMedia(Homogeneous):
             begin, end = dr.maximum(enter, x0), dr.minimum(leave, x1)
             depths = self._with_length(depths, own, dr.select(end > begin, end - begin, 0))
         return tuple(depths)
+
+    def last_depth(self, origin, forward):
+        """Return the depth at which the last medium in clear air ends [m]."""
+        if not self.clear:
+            return None
+        depths = [dr.dot(own.centre - origin, forward) + own.radius for own in self.bounded_media]
+        return reduce(dr.maximum, depths, type(origin.x)(0))
 
     def depth_to_light(self, light, point, r, active=True):
         """Return the optical depth from points [m] to a light, by channel [1]."""

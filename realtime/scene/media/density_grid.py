@@ -97,6 +97,11 @@ class GridMedium(Medium):
         meets = end > begin
         return dr.select(meets, begin, 0), dr.select(meets, end, 0)
 
+    def last_depth(self, origin, forward):
+        """Return the depth of the farthest corner of the box [m]."""
+        nearer, farther = self.low - origin, self.high - origin
+        return dr.maximum(sum(dr.maximum(a * f, b * f) for a, b, f in zip(nearer, farther, forward, strict=True)), 0)
+
     def thicker(self, factor):
         """Return it with the extinction times a factor."""
         thicker = replace(self, largest=self.largest * factor)

@@ -103,6 +103,10 @@ class Medium(ABC):
         """
         return x0, dr.minimum(x1, x0 + self.length_of(OPTICAL_REACH)) if uniform else x1
 
+    def last_depth(self, origin, forward) -> Any:
+        """Return the depth from a camera behind which nothing scatters [m], None for media that do not say."""
+        return None
+
     def ambient(self, rays: Rays, distance) -> Any:
         """Return the light of a constant field of radiance 1 in the medium up to a distance [m], RGB: 1 - exp(-tau)."""
         return self.albedo * (1 - self.transmittance(self.optical_depth(rays, 0, distance)))

@@ -45,7 +45,7 @@ def test_a_ray_march_goes_to_the_reference(scene, light):
 def test_froxels_go_to_the_reference(scene):
     loaded = scene(SUN)
     reference = quadrature_image(read_truth(loaded), checks=0)
-    how = {"slices": 256, "far": 15.0, "shadow": "ray"}
+    how = {"slices": 256, "shadow": "ray"}
     frame = render_frame(frame_renderer(read_scene(loaded), METHODS["froxel-fog"], **how))
     assert relative_rmse(frame.airlight, reference.airlight) < 0.05
 
