@@ -29,6 +29,7 @@ PARTS = {
     "parameters": listed.parameters,
     "light-points": listed.light_points,
     "studies": listed.studies,
+    "report-keys": listed.report_keys,
     "sweep-columns": listed.sweep_columns,
     "kernels": listed.kernels,
     "method": measured.method,

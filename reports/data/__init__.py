@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """report.json: what stands in it, and how it is read and checked.
 
-`schema/report-2.json` is its schema in JSON Schema; docs/formats.md explains every key.
+`schema/report-2.json` is its schema in JSON Schema, which says what each key is.
 
 Read in this order:
 
