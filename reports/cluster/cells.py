@@ -4,7 +4,6 @@
 import io
 import platform
 from collections.abc import Iterable, Iterator
-from contextlib import nullcontext
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import lru_cache
@@ -20,7 +19,6 @@ from realtime.scene.read_scene import Scene, read_scene
 from reports import __version__
 from reports.cluster.run import Group, Outcome, Task, is_alone
 from reports.machine.environment import processor
-from reports.machine.quick_compilation import in_full
 from reports.plotting.pictures import error_map, exposure, tone_mapped
 from validation.properties.properties import scene_properties
 from validation.scenes.loading import LoadedScene
@@ -31,7 +29,6 @@ from validation.study.rows import RowStore
 from validation.study.run import cell_row, render, run
 from validation.study.study import Cell, Study
 
-_LONG = ("ray-march",)  # methods whose one image takes longer than a good compilation of its kernels
 _AGAIN = ("failed", "hung", "aborted")  #: what `--again` computes again
 _QUALITY = 60  # of WebP
 _SMALLER = 320  # pixels: wider images are shown smaller in the rows' pictures
@@ -49,8 +46,7 @@ def row_of(reference: Reference, cell: Cell, key: str) -> dict[str, Any]:
     started = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     loaded, scene = _opened(cell.image)
     properties = _properties(cell.image)
-    with in_full() if cell.chosen.method in _LONG else nullcontext():
-        row, _ = run(cell, scene, reference, whole=loaded.scene, paint=_picture)
+    row, _ = run(cell, scene, reference, whole=loaded.scene, paint=_picture)
     row = replace(row, key=key, properties=properties, origin=replace(_origin(), started=started))
     if row.cost is not None and row.times is not None:
         row = replace(row, cost=replace(row.cost, alone=is_alone(get_worker())))

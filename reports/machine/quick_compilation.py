@@ -22,20 +22,13 @@ import ctypes
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any
-
-from reports.machine.llvm import LLVM_VARIABLE
 
 VARIABLE = "AIRLIGHT_COMPILATION"  #: 'quick' asks for it; unset, or 'full', is as Dr.Jit compiles
 CACHE_VARIABLE = "DRJIT_CACHE_DIR"
 
-_QUICK = (b"-opt-bisect-limit=0", b"-optimize-regalloc=false")
-_FULL = (b"-opt-bisect-limit=2147483647", b"-optimize-regalloc=true")  # as if nothing had been asked for
-_FORGET = "_ZN4llvm2cl25ResetAllOptionOccurrencesEv"  # of C++: options may be given once
+_QUICK = (b"airlight", b"-opt-bisect-limit=0", b"-optimize-regalloc=false")
 _FOLDER = "quick"  # of kernels, in Dr.Jit's folder
 _PASS_ON = """
 import sys
@@ -72,36 +65,13 @@ def compile_quickly(library: str) -> None:
         return  # Dr.Jit has chosen its folder, where the kernels of both kinds would mix
     os.environ.update(settings())
     _leave_out_passes()
-    _give(ctypes.CDLL(library), _QUICK)
-
-
-@contextmanager
-def in_full() -> Iterator[None]:
-    """Compile as Dr.Jit does within the block, for kernels that run long, in a process that compiles quickly."""
-    library = os.environ.get(LLVM_VARIABLE)
-    llvm = ctypes.CDLL(library) if library and _has_settings() else None
-    if llvm is None or not hasattr(llvm, _FORGET):
-        yield
-        return
-    _give(llvm, _FULL)
-    try:
-        yield
-    finally:
-        _give(llvm, _QUICK)
+    parse = ctypes.CDLL(library).LLVMParseCommandLineOptions
+    parse.argtypes, parse.restype = [ctypes.c_int, ctypes.POINTER(ctypes.c_char_p), ctypes.c_char_p], None
+    parse(len(_QUICK), (ctypes.c_char_p * len(_QUICK))(*_QUICK), None)
 
 
 def _has_settings() -> bool:
     return all(os.environ.get(name) == value for name, value in settings().items())
-
-
-def _give(llvm: Any, options: tuple[bytes, ...]) -> None:
-    """Give a libLLVM options, in the place of those before where it can forget them."""
-    if hasattr(llvm, _FORGET):
-        llvm[_FORGET]()
-    words = (b"airlight", *options)
-    llvm.LLVMParseCommandLineOptions.argtypes = [ctypes.c_int, ctypes.POINTER(ctypes.c_char_p), ctypes.c_char_p]
-    llvm.LLVMParseCommandLineOptions.restype = None
-    llvm.LLVMParseCommandLineOptions(len(words), (ctypes.c_char_p * len(words))(*words), None)
 
 
 def _leave_out_passes() -> None:

@@ -9,6 +9,6 @@ Read in this order:
 - `series.py`: Biri's polynomials
 - `estimators.py`: the convergence and the standardised errors of Monte Carlo estimators
 - `transmittance.py`: estimators of transmittance in a density grid
-- `clouds.py`: a slab by order of scattering, tables of canonical transport
+- `clouds.py`: a slab by order of scattering
 - `registry.py`: the studies by name, and `airlight.study`
 """

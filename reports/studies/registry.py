@@ -22,7 +22,6 @@ STUDIES = {
     "z-distribution": "estimators",
     "transmittance": "transmittance",
     "slab": "clouds",
-    "transport": "clouds",
 }
 
 

@@ -54,7 +54,7 @@ MISTAKES = (
     ("study slab --tau 2", "--tau"),
     ("study slab 0 30", "wanted a thickness"),
     ("study slab 2 30 --photons 1000000000000", "AIRLIGHT_FORCE=1"),
-    ("study transport hg:0.5 --albedo 1.2", "albedo"),
+    ("study slab 2 30 --albedo 1.2", "albedo"),
     ("study map-size omni-box --sizes 12", "map: got 12, wanted a power of two"),
     ("study map-size omni-box --set map=64", "got map=64, wanted it in sizes"),
     ("study scaling open-fog --kinds media", "0 bounded media"),
