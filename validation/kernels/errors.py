@@ -77,14 +77,10 @@ def underflow_allowance(cases: Cases, precision: str) -> Array:
         end = np.minimum(cases.x1, beginning + _LARGEST_DEPTH / cases.sigma_t)
         length = np.minimum(end - cases.x0, _FARTHEST)
         nearest = np.hypot(cases.height, np.clip(0.0, cases.x0 - cases.foot, cases.x1 - cases.foot))
-        vacuum = _peaks(cases) * np.minimum(length / nearest**2, np.pi / cases.height)
+        peaks = np.array([_peak(*kind) for kind in zip(cases.phase, cases.g.tolist())])
+        vacuum = peaks * np.minimum(length / nearest**2, np.pi / cases.height)
     vacuum = np.nan_to_num(vacuum, nan=0.0)  # an empty segment at the light
     return np.asarray(_SMALLEST[precision] * (_NODES * length + vacuum + 1.0))
-
-
-def _peaks(cases: Cases) -> Array:
-    """Return the largest value of the phase function of each case, (n,)."""
-    return np.array([_peak(*kind) for kind in zip(cases.phase, cases.g.tolist())])
 
 
 @cache

@@ -154,7 +154,10 @@ def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> tup
         notes.append("not frozen: its Python runs again for every frame")
     shown = renderer if timed_scene is None else prepared(timed_scene, chosen)
     took: list[float] = []
-    again = partial(_timed_frame, shown, took)
+
+    def again() -> None:
+        took.append(1e-3 * timed(lambda: render_frame(shown)).ms)
+
     memory = peak_memory(again)
     if timed_scene is not None and took and took[0] < _RECORDED:
         memory = peak_memory(again)
@@ -183,10 +186,6 @@ def layered_frame(name: str, chosen: Configuration, frame: Frame) -> Image:
 def _unchecked(renderer: FrameRenderer) -> Frame:
     """Render a frame, one that is not finite too: its pixels are counted."""
     return unchecked_frame(renderer, run_stages(renderer, renderer.prepare(renderer.scene)))
-
-
-def _timed_frame(renderer: FrameRenderer, took: list[float]) -> None:
-    took.append(1e-3 * timed(lambda: render_frame(renderer)).ms)
 
 
 def _errors(cell: Cell, frame: Frame, scene: Scene, reference: Reference, whole: Any) -> dict[str, Any]:

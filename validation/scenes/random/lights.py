@@ -95,7 +95,7 @@ def _light(
         share = draws.share(f"beam-{number}")
         beam = cutoff * (1.0 if share > 0.6 else 0.07 + 1.4 * share)
     if kind in AREA_KINDS:
-        strength /= _projected_area(kind, size)
+        strength /= 4 * size[0] * size[1] if kind == "rectangle" else math.pi * size[0] ** 2  # the projected area
     black = draws.pick(ranges["light_materials"], f"light_material-{number}") == "black"
     return Light(f"light-{number}", kind, position, target, strength * colour, brightness, size, cutoff, beam, black)
 
@@ -105,11 +105,6 @@ def _size(draws: Draws, stream: Draws, ranges: Ranges, kind: str, number: int) -
         return ()
     size = draws.logarithmic(*ranges["light_size"], name=f"light_size-{number}")
     return (size, size * stream.between(0.23, 0.97)) if kind == "rectangle" else (size,)
-
-
-def _projected_area(kind: str, size: tuple[float, ...]) -> float:
-    """Return radiance to intensity along the normal [m^2]."""
-    return 4 * size[0] * size[1] if kind == "rectangle" else math.pi * size[0] ** 2
 
 
 def _ahead(media: list[Medium], camera: Array, seen: Ways) -> Array:

@@ -55,18 +55,14 @@ def draw_media(draws: Draws, ranges: Ranges, camera: Array) -> list[Medium]:
     inside = draws.pick(ranges["camera_inside"], "camera_inside") == "yes"
     media = []
     if kind != "bounded":
-        media.append(_endless(draws, ranges, camera))
+        depth = draws.logarithmic(*ranges["optical_depth"], name="optical_depth")
+        filling = _filling(draws, draws.of("endless"), ranges, depth / (float(np.linalg.norm(camera)) + 1))
+        media.append(Medium("endless", "endless", *filling, depth, True))
     if kind != "endless":
         fewest, most = ranges["bounded_media"]
         count = round(draws.between(fewest - 0.49, most + 0.49, name="bounded_media"))
         media += _bounded(draws, ranges, camera, count=count, inside=inside, first=not media)
     return media
-
-
-def _endless(draws: Draws, ranges: Ranges, camera: Array) -> Medium:
-    depth = draws.logarithmic(*ranges["optical_depth"], name="optical_depth")
-    filling = _filling(draws, draws.of("endless"), ranges, depth / (float(np.linalg.norm(camera)) + 1))
-    return Medium("endless", "endless", *filling, depth, True)
 
 
 def _filling(draws: Draws, stream: Draws, ranges: Ranges, mean: float) -> tuple[Array, bool, Array, str]:
