@@ -72,29 +72,21 @@ def error_metrics(reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike | No
         "nonfinite": int(chosen.sum() - finite.sum()),
         "negative": int((chosen & (tst < 0).any(axis=2)).sum()),
     }
-    if not finite.any():
-        nan = float("nan")
-        return Metrics(bias=nan, relative_bias=nan, rmse=nan, relative_rmse=nan, p50=nan, p99=nan, max=nan, **counts)
-    r, d = ref[finite], tst[finite] - ref[finite]
-    mean, bias = float(r.mean()), float(d.mean())
-    largest = float(np.abs(d).max())
-    # Scaled before squaring: the square of a very dim or bright error is out of range.
-    rmse = largest * float(np.sqrt(np.mean((d / largest) ** 2))) if largest > 0 else 0.0
-    if mean > 0:
-        relative = np.abs(d) / np.maximum(r, FLOOR * mean)
-        p50, p99 = (float(q) for q in np.quantile(relative, [0.5, 0.99]))
-        return Metrics(
-            bias=bias,
-            relative_bias=bias / mean,
-            rmse=rmse,
-            relative_rmse=rmse / mean,
-            p50=p50,
-            p99=p99,
-            max=float(relative.max()),
-            **counts,
-        )
-    nan = float("nan")
-    return Metrics(bias=bias, relative_bias=nan, rmse=rmse, relative_rmse=nan, p50=nan, p99=nan, max=nan, **counts)
+    found: dict[str, Any] = dict.fromkeys(
+        ("bias", "relative_bias", "rmse", "relative_rmse", "p50", "p99", "max"), float("nan")
+    )
+    if finite.any():
+        r, d = ref[finite], tst[finite] - ref[finite]
+        mean, largest = float(r.mean()), float(np.abs(d).max())
+        # Scaled before squaring: the square of a very dim or bright error is out of range.
+        rmse = largest * float(np.sqrt(np.mean((d / largest) ** 2))) if largest > 0 else 0.0
+        found |= {"bias": float(d.mean()), "rmse": rmse}
+        if mean > 0:
+            relative = np.abs(d) / np.maximum(r, FLOOR * mean)
+            p50, p99 = (float(q) for q in np.quantile(relative, [0.5, 0.99]))
+            found |= {"relative_bias": found["bias"] / mean, "relative_rmse": rmse / mean}
+            found |= {"p50": p50, "p99": p99, "max": float(relative.max())}
+    return Metrics(**counts, **found)
 
 
 def compared(

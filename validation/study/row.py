@@ -10,14 +10,13 @@ Errors are those of the airlight, by the formulae of `validation.metrics`, as `a
 them. Where the epsilon of a formula is a radiance, `normalised` has the same with the mean of the reference as unit.
 """
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from validation.columns import Column, column, columns_of, values_of
 from validation.metrics.colour import ColourDifference
-from validation.metrics.errors import RADIANCE, Metrics
+from validation.metrics.errors import RADIANCE, Metrics, plain
 from validation.metrics.flip import Flip
 from validation.metrics.other_tools import PublishedErrors
 from validation.study.frame_times import FrameTimes
@@ -154,7 +153,7 @@ def row_values(row: Row) -> dict[str, Any]:
     values = values_of(row)
     own = {each.key: values.get(each.key) for each in COLUMNS}
     own |= {name: value for name, value in values.items() if name.startswith(PROPERTY)}
-    return {name: _finite(value) for name, value in own.items()}
+    return {name: plain(value) for name, value in own.items()}
 
 
 def property_names(rows: Iterable[Mapping[str, Any]]) -> list[str]:
@@ -173,8 +172,3 @@ def arrow_schema(properties: Iterable[str] = ()) -> Any:
             for each in named
         ]
     )
-
-
-def _finite(value: Any) -> Any:
-    value = value.item() if hasattr(value, "item") else value  # a number of NumPy's
-    return None if isinstance(value, float) and not math.isfinite(value) else value

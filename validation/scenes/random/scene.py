@@ -159,10 +159,10 @@ def _draw_view(draws: Draws, ranges: Ranges) -> tuple[Array, Array, float]:
     return origin, 0.37 * stream.in_ball(), draws.between(*ranges["fov"], name="fov")
 
 
-def reach(stage: Stage, occluders: Any, aspect: float = 0.75) -> Reach:
-    """Return what light reaches past the casters, an `mi.Scene`, in an image of such a height over its width."""
+def reach(stage: Stage, occluders: Any) -> Reach:
+    """Return what light reaches past the casters, an `mi.Scene`, in an image of 4 to 3."""
     origin = np.array(stage.place(stage.camera.origin))
-    directions = _directions(stage.camera, aspect)
+    directions = _directions(stage.camera)
     away = stage.scale * float(np.linalg.norm(stage.camera.origin))
     hit = distance(occluders, np.broadcast_to(origin, directions.shape), directions)
     free = np.minimum(hit, away + stage.scale)
@@ -174,14 +174,14 @@ def reach(stage: Stage, occluders: Any, aspect: float = 0.75) -> Reach:
     return Reach(float(lit.mean()), float((free < 0.5 * away).mean()), camera_lit)
 
 
-def _directions(view: Camera, aspect: float) -> Array:
+def _directions(view: Camera) -> Array:
     forward = (view.target - view.origin) / np.linalg.norm(view.target - view.origin)
     left = np.cross([0.0, 0.0, 1.0], forward)
     left /= np.linalg.norm(left)
     up = np.cross(forward, left)
     tangent = np.tan(0.5 * np.deg2rad(view.fov))
     x = tangent * (2 * (np.arange(_ACROSS) + 0.5) / _ACROSS - 1)
-    y = tangent * aspect * (2 * (np.arange(_UP) + 0.5) / _UP - 1)
+    y = 0.75 * tangent * (2 * (np.arange(_UP) + 0.5) / _UP - 1)
     rays = (forward + x[:, None, None] * left + y[None, :, None] * up).reshape(-1, 3)
     return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
