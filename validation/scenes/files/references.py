@@ -15,8 +15,8 @@ import numpy as np
 from analytic.errors import InputError
 from realtime.scene.named_shapes import scene_of
 from validation.scenes.files.nodes import child, kind, of_kind, properties, references
+from validation.scenes.files.shapes import samples
 
-_POINTS = 16  # of a shape, at which its references are held against what is there
 _OFF = 1e-4  # of a shape's size: how far beside it
 _TOUCHES = 1e-5  # of a point's coordinates: how near to a bound it is in it
 _OPEN = ("Rectangle", "Disk", "Cylinder")  # which bound no medium: readers say so
@@ -67,8 +67,7 @@ def touching(scene: Any) -> list[str]:
     if not opaque or not bounds:
         return []
     bodies = scene_of(bounds)
-    samples = [_samples(shape) for shape in opaque]
-    points, normals = (np.concatenate(parts) for parts in zip(*samples, strict=True))
+    points, normals = (np.concatenate(parts) for parts in zip(*map(samples, opaque), strict=True))
     near = _TOUCHES * (1 + np.abs(points).max(axis=1, keepdims=True))
     start, reach = mi.Point3f((points - near * normals).T), mi.Float(2 * near[:, 0])
     hit = bodies.ray_intersect(mi.Ray3f(start, mi.Vector3f(normals.T), reach, 0.0, []))
@@ -79,15 +78,6 @@ def touching(scene: Any) -> list[str]:
         for shape, met in zip(opaque, found, strict=True)
         if met.any()
     ]
-
-
-def _samples(shape: Any) -> tuple[Any, Any]:
-    """Return points of a shape and the normals there, evenly spread, (points, 3) each."""
-    number = np.arange(_POINTS)
-    place = mi.Point2f((number + 0.5) / _POINTS, number * 0.6180339887 % 1)
-    sample = shape.sample_position(0.0, place)
-    points, normals = (np.array(value, dtype=np.float64).reshape(3, -1).T for value in (sample.p, sample.n))
-    return points, np.broadcast_to(normals, points.shape)
 
 
 def _media(shape: Any) -> list[tuple[str, Any, int]]:
@@ -125,7 +115,7 @@ class _Space:
 
     def check(self, shape: Any) -> None:
         """Refuse a shape that references another medium than is there, on either side."""
-        points, normals = _samples(shape)
+        points, normals = samples(shape)
         box = shape.bbox()
         size = float(np.linalg.norm(np.ptp([np.ravel(box.min), np.ravel(box.max)], axis=0)))
         for side, medium, sign in _media(shape):

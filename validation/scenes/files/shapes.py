@@ -24,7 +24,7 @@ _FLAT = 1e-5  # of a quad's size: corners beyond a plane, sides that are no para
 _MOST = 64  # rectangles of a lamp
 _BEYOND = 1e-4  # of a room's size: how far its box of fog reaches beyond the walls
 _SIDES = 256  # of the mesh of a cylinder: it differs from it by 8e-5 of the radius
-_POINTS = 16  # on a lamp, at which its normals are looked at
+_POINTS = 16  # of a shape, at which it is looked at
 
 
 def write_out_instances(state: Any) -> None:
@@ -160,12 +160,18 @@ def _rectangle(corners: Array, pair: list[list[int]], side: float) -> Array | No
     return matrix
 
 
-def _shine_alike(shape: Any, matrices: list[Array]) -> bool:
-    """Return whether points that Mitsuba samples on a lamp lie on rectangles, with the normals of these."""
+def samples(shape: Any) -> tuple[Any, Any]:
+    """Return points of a shape and the normals there, evenly spread, (points, 3) each."""
     number = np.arange(_POINTS)
     place = mi.Point2f((number + 0.5) / _POINTS, number * 0.6180339887 % 1)
     sample = shape.sample_position(0.0, place)
     points, normals = (np.array(value, dtype=np.float64).reshape(3, -1).T for value in (sample.p, sample.n))
+    return points, np.broadcast_to(normals, points.shape)
+
+
+def _shine_alike(shape: Any, matrices: list[Array]) -> bool:
+    """Return whether points that Mitsuba samples on a lamp lie on rectangles, with the normals of these."""
+    points, normals = samples(shape)
     size = max(float(np.linalg.norm(matrix[:3, :2])) for matrix in matrices)
     found = np.zeros(_POINTS, dtype=bool)
     for matrix in matrices:
