@@ -15,7 +15,7 @@ Rooms:
 - `area_lights/`: area lights, and the samples that stand for them;
 - `scene/`: camera, lights, phase functions and meshes, read from Mitsuba; the features of a scene; what moves;
 - `scene/media/`: media; a new one, such as height fog, goes there, and its page says what it must write;
-- `rays/`: the geometry of rays and lights, and the cone of a spot;
+- `rays.py`: the geometry of rays and lights, and the cone of a spot;
 - `shadow_maps/`: shadow maps and the field of inverse depth over them;
 - `image_filters.py`: Gaussian, bilateral and joint bilateral filters of whole images, and up-sampling;
 - `kernels/`: the airlight integral between two distances along a ray in a homogeneous medium;
@@ -34,8 +34,8 @@ Rooms:
    `methods/shadow_planes/silhouettes.py` finds the edges that bound shadows, and
    `methods/shadow_planes/plane_table.py` makes planes of them, in wedges of azimuth about the light.
 5. `frame/surface.py` casts the camera rays and shades what they meet, without shadows.
-6. `methods/interface/view.py` makes the view of these rays; `rays/ray_light.py` and, for a spot, `rays/spot_cone.py`
-   say where each passes the light.
+6. `methods/interface/method.py` makes the view of these rays; `rays.py` says where each passes the
+   light, and a spot's cone.
 7. `methods/shadow_planes/sweep.py` walks along the planes of each ray and finds its lit intervals
    (`intervals.py`).
 8. The medium (`scene/media/homogeneous.py` of the protocol in `scene/media/medium.py`) is asked for the integral over

@@ -36,8 +36,7 @@ from realtime.frame.light_on_ray import check_radiance
 from realtime.frame.sphere_lights import sampled_sphere, sphere_scales
 from realtime.frame.surface import Cast, surface_stages
 from realtime.kernels.table import prepare_kernel, with_tables
-from realtime.methods.interface.method import Layers, Method, Preparation, method_parameters
-from realtime.methods.interface.view import camera_view
+from realtime.methods.interface.method import Layers, Method, Preparation, camera_view, method_parameters
 from realtime.numerics.array_types import PerRay, aligned_array
 from realtime.numerics.recorded import Frozen
 from realtime.scene.camera import TILE, tiled_pixels

@@ -27,8 +27,7 @@ import mitsuba as mi
 from realtime.area_lights.points import LightPoints, place_points
 from realtime.area_lights.shape import AreaLight
 from realtime.kernels.table import with_tables
-from realtime.methods.interface.method import Method
-from realtime.methods.interface.view import View, camera_view
+from realtime.methods.interface.method import Method, View, camera_view
 from realtime.numerics.array_types import aligned_array, types_of
 from realtime.numerics.recorded import Frozen
 from realtime.scene.lights import Facing

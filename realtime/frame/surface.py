@@ -23,7 +23,7 @@ import mitsuba as mi
 
 from realtime.numerics.array_types import Metres, PerRay
 from realtime.numerics.recorded import Frozen
-from realtime.rays.ray_light import profile
+from realtime.rays import profile
 from realtime.scene.camera import ray_directions
 from realtime.scene.lights import Light, sources_of
 from realtime.scene.media.medium import Medium, Rays

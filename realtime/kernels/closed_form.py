@@ -38,7 +38,7 @@ import drjit as dr
 from realtime.errors import InputError
 from realtime.kernels.quadrature import path_over_height
 from realtime.numerics.array_types import is_single, smallest
-from realtime.rays.ray_light import RayGeometry
+from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import PHASES

@@ -80,9 +80,8 @@ import mitsuba as mi
 
 from realtime.kernels.quadrature import path_interval, quadrature
 from realtime.numerics.array_types import is_single
-from realtime.numerics.fast_exp import LOG2_E, exp2_bounded, exp_bounded, sinh_bounded
-from realtime.numerics.gauss_legendre import unit_nodes
-from realtime.rays.ray_light import RayGeometry
+from realtime.numerics.functions import LOG2_E, exp2_bounded, exp_bounded, sinh_bounded, unit_nodes
+from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import Phase, Reach

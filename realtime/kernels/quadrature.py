@@ -32,8 +32,8 @@ import numpy as np
 
 from realtime.errors import InputError
 from realtime.numerics.array_types import is_single, smallest
-from realtime.numerics.fast_exp import exp_bounded
-from realtime.rays.ray_light import RayGeometry
+from realtime.numerics.functions import exp_bounded
+from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.media.medium import optical_reach

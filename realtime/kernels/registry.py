@@ -2,7 +2,7 @@
 """Airlight kernels: J between two distances along a ray, for a whole array of rays.
 
 A kernel is a function ``kernel(geometry, x0, x1, medium, light, **parameters) -> J [1/m]``. `geometry` is a
-`realtime.rays.ray_light.RayGeometry`, ``x0 <= x1`` [m] bound the lit part of the ray (`x1` may be infinite), and the
+`realtime.rays.RayGeometry`, ``x0 <= x1`` [m] bound the lit part of the ray (`x1` may be infinite), and the
 result has one value per ray for a grey medium, a colour for a coloured one. The in-scattered radiance is ``albedo
 sigma_t intensity J / (4 pi)``. `realtime.scene.media.homogeneous` clips the segment to the cone of a spot before it
 calls the kernel; where the intensity falls off inside the cone (``light.varies``), the kernel weighs its integrand by

@@ -17,8 +17,8 @@ import mitsuba as mi
 
 from realtime.errors import InputError
 from realtime.numerics.array_types import smallest
-from realtime.numerics.gauss_legendre import unit_nodes
-from realtime.rays.ray_light import RayGeometry
+from realtime.numerics.functions import unit_nodes
+from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.media.medium import OPTICAL_REACH

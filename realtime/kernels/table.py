@@ -50,7 +50,7 @@ import numpy as np
 
 from realtime.errors import InputError
 from realtime.numerics.array_types import four_numbers
-from realtime.rays.ray_light import RayGeometry
+from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous
 

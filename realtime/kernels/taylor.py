@@ -45,7 +45,7 @@ import numpy as np
 
 from realtime.errors import InputError
 from realtime.numerics.array_types import largest
-from realtime.rays.ray_light import RayGeometry
+from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.media.published_form import ConstantLeg, bounded_by, tangent_series

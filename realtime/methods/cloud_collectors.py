@@ -60,8 +60,7 @@ from realtime.clouds.order_layers import OPACITY, ORDER_LAYERS, order_layer
 from realtime.clouds.single_scattering import Beam, CloudRays, cloud_rays, light_on_surfaces, opacity_of, sky_behind
 from realtime.clouds.uniform_sky import SkyEscapes, beams_of, sky_escapes, sky_light
 from realtime.memory import check_memory
-from realtime.methods.interface.method import Layers, Method, tolerance
-from realtime.methods.interface.view import View
+from realtime.methods.interface.method import Layers, Method, View, tolerance
 from realtime.numerics.array_types import types_of
 from realtime.numerics.recorded import Frozen
 from realtime.parameters import parameter

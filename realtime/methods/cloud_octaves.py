@@ -28,8 +28,7 @@ from realtime.clouds.order_layers import OPACITY, ORDER_LAYERS, order_layer
 from realtime.clouds.single_scattering import Beam, cloud_rays, exact_leg, light_on_surfaces, opacity_of, sky_behind
 from realtime.clouds.uniform_sky import SkyEscapes, beams_of, sky_escapes, sky_light
 from realtime.errors import InputError
-from realtime.methods.interface.method import Layers, Method
-from realtime.methods.interface.view import View
+from realtime.methods.interface.method import Layers, Method, View
 from realtime.parameters import parameter
 from realtime.scene.density import Density
 from realtime.scene.lights import Light

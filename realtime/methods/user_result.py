@@ -9,8 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.errors import InputError
-from realtime.methods.interface.method import Layers
-from realtime.methods.interface.view import View
+from realtime.methods.interface.method import Layers, View
 
 _WANTED = "wanted the radiance of every pixel, an RGB colour or one number: a Dr.Jit array, or NumPy's (pixels, 3)"
 

@@ -3,7 +3,7 @@
 
 A light is a homogeneous position (l, w): a place l with w = 1, or with w = 0 the direction l towards a light at
 infinity. The vector from a point P towards it is l - w P, in metres for w = 1 and of unit length for w = 0. All that
-follows from it alone holds for both: the foot and the height of a ray (`realtime.rays.ray_light`), the projection of
+follows from it alone holds for both: the foot and the height of a ray (`realtime.rays`), the projection of
 its shadow map (`realtime.shadow_maps.projection`), silhouettes and shadow planes, epipolar slices.
 
 What a directional light lights is media with bounds; the middle of the rectangle across it where these end stands for

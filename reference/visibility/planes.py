@@ -23,7 +23,7 @@ the light and the way to the point at theta is
 
 `axial` and `across` the components of the axis along d and along n, the unit vector from the light to the foot point.
 So a cone of half angle b is one interval, |theta - theta_m| <= acos(cos b / m), nothing if m < cos b: no nappes, no
-cases. (`realtime.rays.ray_light` solves a quadratic equation in the distance instead.)
+cases. (`realtime.rays` solves a quadratic equation in the distance instead.)
 """
 
 from dataclasses import dataclass, fields

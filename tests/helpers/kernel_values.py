@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction
 from realtime.numerics.array_types import ArrayTypes, aligned_array, array_types
-from realtime.rays.ray_light import RayGeometry
+from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import Phase, named_phase

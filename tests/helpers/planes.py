@@ -6,7 +6,7 @@ import numpy as np
 from realtime.methods.shadow_planes.plane_table import NUMBER, index_planes, light_basis
 from realtime.methods.shadow_planes.sweep import ray_planes
 from realtime.numerics.array_types import array_types
-from realtime.numerics.diamond_angle import host_diamond_angle
+from realtime.numerics.functions import host_diamond_angle
 from realtime.scene.mesh_adjacency import make_casters
 from tests.helpers.casters import ALL
 

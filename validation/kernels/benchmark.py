@@ -20,7 +20,7 @@ from realtime.kernels.registry import KERNELS
 from realtime.kernels.table import prepare_kernel, with_tables
 from realtime.numerics.array_types import aligned_array
 from realtime.numerics.recorded import Frozen
-from realtime.rays.ray_light import RayGeometry
+from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import named_phase

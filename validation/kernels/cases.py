@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
 from realtime.numerics.array_types import aligned_array, array_types
-from realtime.rays.ray_light import RayGeometry, ray_geometry
+from realtime.rays import RayGeometry, ray_geometry
 from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import named_phase

@@ -43,8 +43,7 @@ from realtime.methods.epipolar.slices import (
     slice_coordinate,
 )
 from realtime.methods.epipolar.walk import sum_lit_intervals
-from realtime.methods.interface.method import Method
-from realtime.methods.interface.view import View
+from realtime.methods.interface.method import Method, View
 from realtime.numerics.array_types import PerMetre, bytes_of
 from realtime.parameters import parameter
 from realtime.scene.camera import Camera

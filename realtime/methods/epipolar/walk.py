@@ -31,7 +31,7 @@ import mitsuba as mi
 
 from realtime.intervals import LitIntervals, add_waiting, close_interval, no_intervals, open_interval
 from realtime.methods.epipolar.min_max_tree import SliceHeights, line_point, node_pair
-from realtime.rays.ray_light import RayGeometry
+from realtime.rays import RayGeometry
 
 
 @dataclass

@@ -30,7 +30,7 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.methods.froxel_fog.grid import Grid, trilinear
-from realtime.methods.interface.view import View
+from realtime.methods.interface.method import View
 from realtime.numerics.array_types import PerRay, four_numbers
 from realtime.scene.camera import row_and_column
 from realtime.scene.media.medium import Rays

@@ -20,7 +20,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.interface.view import View
+from realtime.methods.interface.method import View
 from realtime.numerics.array_types import Metres, PerRay, four_numbers
 from realtime.scene.camera import Camera
 from realtime.scene.lights import Light

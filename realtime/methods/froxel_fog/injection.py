@@ -25,9 +25,9 @@ import mitsuba as mi
 
 from realtime.methods.froxel_fog.grid import Grid
 from realtime.methods.froxel_fog.light_points import LightPointTable
-from realtime.methods.interface.view import View
+from realtime.methods.interface.method import View
 from realtime.numerics.array_types import PerRay
-from realtime.rays.ray_light import profile
+from realtime.rays import profile
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import Rays
 

@@ -23,8 +23,7 @@ from realtime.methods.froxel_fog.grid import column_rays, view_grid
 from realtime.methods.froxel_fog.history import averaged, frame_shift
 from realtime.methods.froxel_fog.injection import Visibility, scattered_light
 from realtime.methods.froxel_fog.light_points import LightPointTable, tabulated
-from realtime.methods.interface.method import Layers, Method
-from realtime.methods.interface.view import View
+from realtime.methods.interface.method import Layers, Method, View
 from realtime.numerics.array_types import bytes_of
 from realtime.parameters import parameter
 from realtime.scene.lights import Light

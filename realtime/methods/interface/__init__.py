@@ -3,7 +3,6 @@
 
 Read in this order:
 
-- `method.py`: a method with its parameters, the layers that it returns, and the formula of a frame.
-- `view.py`: the rays of a frame, the lights and the media, as a method sees them.
+- `method.py`: the view that a method is given, a method with its parameters, and the layers that it returns.
 - `marching.py`: the same integral by midpoint steps: what marchers sum up.
 """

@@ -29,8 +29,7 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.errors import InputError
-from realtime.methods.interface.method import Layers, Method, no_state, tolerance
-from realtime.methods.interface.view import View
+from realtime.methods.interface.method import Layers, Method, View, no_state, tolerance
 from realtime.methods.shadow_planes.plane_table import PlaneIndex, index_planes
 from realtime.methods.shadow_planes.published_crossings import Buffer, reaches, sum_crossings
 from realtime.methods.shadow_planes.published_media import check_vertices, sum_in_media

@@ -50,7 +50,7 @@ Over a wedge of the angle d, c = R cos(phi - phi_0) is at most the larger of its
 that is positive: phi_0 may lie between them. The largest such bound of an entry and all behind it falls along the list;
 where it falls below what a ray asks for, a search by halves says, and there the list ends for the ray.
 
-Azimuths are diamond angles (`realtime.numerics.diamond_angle`), 0 to 4 for a full turn. Two edges that share a vertex
+Azimuths are diamond angles (`realtime.numerics.functions`), 0 to 4 for a full turn. Two edges that share a vertex
 share its azimuth bit by bit, and an edge holds phi if first <= phi < last: no ray slips between two edges of a loop,
 and none is counted twice.
 """
@@ -65,7 +65,7 @@ from numpy.typing import NDArray
 
 from realtime.methods.shadow_planes.silhouettes import NEARNESS, Silhouette, is_outside, ring_edges, silhouette
 from realtime.numerics.array_types import four_numbers, is_single
-from realtime.numerics.diamond_angle import TURN, host_diamond_angle, host_direction
+from realtime.numerics.functions import TURN, host_diamond_angle, host_direction
 from realtime.scene.lights import place_and_weight
 from realtime.scene.mesh_adjacency import Casters
 

@@ -32,12 +32,12 @@ from typing import Any
 import drjit as dr
 
 from realtime.errors import InputError
-from realtime.methods.interface.view import View
+from realtime.methods.interface.method import View
 from realtime.methods.shadow_planes.plane_table import PlaneIndex
 from realtime.methods.shadow_planes.published_crossings import Buffer, Entry, sum_crossings
 from realtime.methods.shadow_planes.published_mesh import mesh_gamma, surface_gamma, visible_triangle
 from realtime.methods.shadow_planes.sweep import RayPlanes
-from realtime.rays.ray_light import ray_geometry
+from realtime.rays import ray_geometry
 from realtime.scene.lights import Light
 from realtime.scene.media.bounded_rays import BoundedRays, Piece, camera_pieces
 from realtime.scene.media.medium import Medium

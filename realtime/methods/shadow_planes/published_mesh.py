@@ -25,10 +25,10 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.interface.view import View
+from realtime.methods.interface.method import View
 from realtime.methods.shadow_planes.plane_table import PlaneIndex
 from realtime.methods.shadow_planes.silhouettes import NEARNESS
-from realtime.rays.ray_light import ray_geometry
+from realtime.rays import ray_geometry
 from realtime.scene.lights import Light
 
 RATIO = 1.5

@@ -46,7 +46,7 @@ from realtime.methods.shadow_planes.plane_table import (
     planes_of_rays,
 )
 from realtime.numerics.array_types import two_numbers
-from realtime.numerics.diamond_angle import diamond_angle
+from realtime.numerics.functions import diamond_angle
 
 FEW, MANY = 2, 8  #: crossings that wait for others which may come before them, or are collected at once
 _DUE = 3  # marks in the last bits of a place where waiting integrals are added

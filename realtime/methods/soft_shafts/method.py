@@ -32,8 +32,7 @@ import mitsuba as mi
 from realtime.errors import InputError
 from realtime.image_filters import Raster, depth_guide, separable, small_pixels, tile_average, upsample
 from realtime.methods.interface.marching import marched_integral
-from realtime.methods.interface.method import Layers
-from realtime.methods.interface.view import View
+from realtime.methods.interface.method import Layers, View
 from realtime.methods.soft_shafts.light_sources import SourceState, frame_at, source_state
 from realtime.methods.soft_shafts.march import Share, integral_of_points
 from realtime.methods.soft_shafts.parameters import AUTO, SoftShaftsParameters

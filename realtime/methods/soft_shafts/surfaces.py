@@ -22,7 +22,7 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.image_filters import Guide, Raster, separable, small_pixels, upsample
-from realtime.methods.interface.view import View
+from realtime.methods.interface.method import View
 from realtime.methods.soft_shafts.light_sources import SourceState, frame_at
 from realtime.methods.soft_shafts.parameters import SoftShaftsParameters
 from realtime.numerics.array_types import two_numbers

@@ -60,8 +60,7 @@ import mitsuba as mi
 
 from realtime.errors import InputError
 from realtime.numerics.array_types import chosen_value, is_single
-from realtime.numerics.fast_exp import exp_bounded
-from realtime.numerics.gauss_legendre import unit_nodes
+from realtime.numerics.functions import exp_bounded, unit_nodes
 from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.media.light_paths import Envelopes, LightPaths, beyond, paths_from

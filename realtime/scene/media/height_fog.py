@@ -33,8 +33,7 @@ import mitsuba as mi
 
 from realtime.errors import InputError
 from realtime.numerics.array_types import is_single
-from realtime.numerics.fast_exp import exp_bounded
-from realtime.numerics.gauss_legendre import unit_nodes
+from realtime.numerics.functions import exp_bounded, unit_nodes
 from realtime.scene.media.medium import LitRays, Medium, optical_reach
 from realtime.scene.phase import Phase
 

@@ -9,8 +9,7 @@ from typing import Any
 import drjit as dr
 
 from realtime.numerics.array_types import is_single
-from realtime.numerics.fast_exp import exp_bounded
-from realtime.numerics.gauss_legendre import unit_nodes
+from realtime.numerics.functions import exp_bounded, unit_nodes
 from realtime.scene.lights import Light
 
 OPTICAL_REACH = 20.0  #: optical depths after which float32 has nothing left of light: e^-20 = 2e-9
@@ -123,7 +122,7 @@ class Medium(ABC):
         rays, light
             From `rays`, and any light.
         geometry
-            Where they pass the light, a `realtime.rays.ray_light.RayGeometry`.
+            Where they pass the light, a `realtime.rays.RayGeometry`.
         kernel, form
             What else decides on the integral, in media that ask: `realtime.kernels`, and the form of
             `realtime.scene.media.bounded_rays`.
@@ -157,8 +156,8 @@ class LitRays:
 
     medium: Any
     light: Light
-    rays: Any  #: `Rays`; of methods the `realtime.methods.interface.view.View`
-    geometry: Any  #: foot, height and cone, `realtime.rays.ray_light.RayGeometry`
+    rays: Any  #: `Rays`; of methods the `realtime.methods.interface.method.View`
+    geometry: Any  #: foot, height and cone, `realtime.rays.RayGeometry`
     kernel: Any = None  #: an airlight kernel, for media that ask it
 
     def nothing(self, width: int) -> Any:

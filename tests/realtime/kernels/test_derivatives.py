@@ -11,7 +11,7 @@ from analytic.phase import PhaseFunction
 from realtime.errors import InputError
 from realtime.kernels.registry import KERNELS
 from realtime.numerics.array_types import aligned_array, array_types
-from realtime.rays.ray_light import RayGeometry
+from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import named_phase

@@ -11,7 +11,7 @@ from analytic.phase import PhaseFunction
 from realtime.kernels.exact import exact
 from realtime.kernels.registry import KERNELS
 from realtime.numerics.array_types import aligned_array, array_types
-from realtime.rays.ray_light import RayGeometry, ray_geometry
+from realtime.rays import RayGeometry, ray_geometry
 from realtime.scene.lights import Light, spot_fields
 from realtime.scene.media.homogeneous import Homogeneous
 from tests.helpers.kernel_values import (

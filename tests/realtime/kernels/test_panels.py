@@ -8,7 +8,7 @@ import pytest
 from realtime.kernels.exact import _double_mean, panels_mean
 from realtime.kernels.quadrature import path_interval
 from realtime.numerics.array_types import aligned_array, array_types
-from realtime.rays.ray_light import RayGeometry
+from realtime.rays import RayGeometry
 from tests.helpers.kernel_values import phase_of
 from tests.realtime.kernels.test_exact import NAMES, g_of, many_rays
 

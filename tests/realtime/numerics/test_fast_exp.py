@@ -2,7 +2,7 @@
 import mitsuba as mi
 import numpy as np
 
-from realtime.numerics.fast_exp import WIDEST, exp2_bounded, exp_bounded, sinh_bounded
+from realtime.numerics.functions import WIDEST, exp2_bounded, exp_bounded, sinh_bounded
 
 
 def test_relative_error_over_the_stated_range(variant):

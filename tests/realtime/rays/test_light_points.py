@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 from realtime.kernels.registry import KERNELS
 from realtime.numerics.array_types import array_types
-from realtime.rays.ray_light import ray_geometry
+from realtime.rays import ray_geometry
 from realtime.scene.lights import Facing, Light
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import HenyeyGreenstein, Isotropic

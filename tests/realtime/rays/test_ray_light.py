@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from realtime.numerics.array_types import array_types
-from realtime.rays.ray_light import ray_geometry
+from realtime.rays import ray_geometry
 from realtime.scene.lights import Light, spot_fields
 from tests.helpers.kernel_values import opaque, vectors
 

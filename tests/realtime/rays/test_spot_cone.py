@@ -7,7 +7,7 @@ import pytest
 from mpmath import mp
 
 from realtime.numerics.array_types import array_types
-from realtime.rays.ray_light import ray_geometry
+from realtime.rays import ray_geometry
 from realtime.scene.lights import Light, spot_fields
 from tests.helpers.kernel_values import opaque, vectors
 
@@ -97,7 +97,7 @@ def test_rays_that_graze_the_cone(variant, degrees, precision):
     assert 0.1 < np.mean(np.isneginf(wanted[1])) < 0.9
     error = largest_error(ends, wanted, foot, height) * np.cos(np.deg2rad(degrees)) ** 2
     if precision == "single":
-        # One rounding of the distances; A and C lose up to 2/cos^2 (see `realtime.rays.spot_cone`). Measured 1.5.
+        # One rounding of the distances; A and C lose up to 2/cos^2 (see `realtime.rays`). Measured 1.5.
         assert np.max(error) < 4 * np.finfo(np.float32).eps
     else:
         # The rounding errors of the test's own directions are not known: a chord loses its share of them.

@@ -13,10 +13,10 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.interface.view import View
+from realtime.methods.interface.method import View
 from realtime.methods.light_volumes.published.mesh import VolumeMesh
 from realtime.methods.light_volumes.published.raster import BATCH, Crossings, signed_crossings
-from realtime.rays.ray_light import RayGeometry
+from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import LitRays
 

@@ -8,7 +8,7 @@ import pytest
 from realtime.methods.epipolar.min_max_tree import slice_heights
 from realtime.methods.epipolar.slices import image_point, image_slices, neighbour, pixel_number, slice_coordinate
 from realtime.methods.epipolar.walk import sum_lit_intervals
-from realtime.rays.ray_light import RayGeometry
+from realtime.rays import RayGeometry
 from realtime.scene.read_scene import read_scene
 from realtime.shadow_maps.shadow_map import cast_shadow_map, inverse_depth
 from tests.helpers.scenes import tiny_scene

@@ -15,7 +15,7 @@ from realtime.kernels.quadrature import quadrature
 from realtime.kernels.taylor import taylor
 from realtime.methods.registry import METHODS
 from realtime.numerics.array_types import array_types
-from realtime.rays.ray_light import ray_geometry
+from realtime.rays import ray_geometry
 from realtime.scene.lights import Light
 from realtime.scene.media.height_fog import HeightFog, Layer, phi
 from realtime.scene.phase import HenyeyGreenstein

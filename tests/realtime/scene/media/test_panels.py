@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realtime.numerics.array_types import aligned_array, array_types
-from realtime.rays.ray_light import ray_geometry
+from realtime.rays import ray_geometry
 from realtime.scene.convex_bounds import mesh_bounds
 from realtime.scene.lights import Light
 from realtime.scene.media.bounded import BoundedMedia

@@ -1,14 +1,60 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Exponentials and a hyperbolic sine for bounded arguments.
+"""Functions that are faster than those of Dr.Jit where their arguments allow it, and nodes as constants.
+
+**The diamond angle: an azimuth without trigonometry.**
+
+
+x/(|x| + |y|) and its like, continued round the square |x| + |y| = 1: 0 to 4 for a full turn, from the x axis over the
+y axis, monotone in the angle and exact to rounding.
+
+**Exponentials and a hyperbolic sine for bounded arguments.**
+
 
 Dr.Jit's exp guards overflow, underflow and NaN, which costs more than the function itself on a processor: 24 of them
 take 3.0 ms for 480 000 lanes on two AVX-512 cores, 24 of these 1.9 ms. The quadrature kernel spends most of its time
 here.
+
+**Gauss-Legendre nodes as Python numbers: constants in the kernels that Dr.Jit records.**
 """
 
+from functools import lru_cache
+
 import drjit as dr
+import numpy as np
 
 from realtime.numerics.array_types import is_single
+
+TURN = 4.0  #: a full turn
+
+
+def diamond_angle(x, y):
+    """Return the azimuth of (x, y), Dr.Jit arrays, in [0, 4) in diamond angles; 0 for the origin."""
+    return _diamond_angle(x, y, dr.select)
+
+
+def host_diamond_angle(x, y):
+    """Return the azimuth of (x, y), float32 NumPy arrays, as `diamond_angle` does."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return _diamond_angle(x, y, np.where)
+
+
+def host_direction(angle):
+    """Return the unit vectors (..., 2) at diamond angles, NumPy, of any turn."""
+    angle = np.asarray(angle, dtype=np.float64) % TURN
+    x = np.where(angle < 2, 1 - angle, angle - 3)
+    y = np.where(angle < 1, angle, np.where(angle < 3, 2 - angle, angle - 4))
+    return np.stack([x, y], axis=-1) / np.hypot(x, y)[..., None]
+
+
+def _diamond_angle(x, y, select):
+    total = abs(x) + abs(y)
+    share = y / total
+    upper = select(x >= 0, share, 2 - share)
+    lower = select(x < 0, 2 - share, 4 + share)
+    angle = select(y >= 0, upper, lower)
+    # 4 + share rounds to 4 just below the axis: that is azimuth 0.
+    return select((total > 0) & (angle < TURN), angle, 0)
+
 
 #: Coefficients of 2^f on [-1/2, 1/2], highest power first: a Remez fit of degree 6 with relative error below 1.5e-8.
 _EXP2 = (
@@ -78,3 +124,10 @@ def _scaled_power(f, n):
         value = dr.fma(value, f, coefficient)
     Int = dr.int32_array_t(Float)
     return dr.reinterpret_array(Float, dr.reinterpret_array(Int, value) + (Int(n) << 23))
+
+
+@lru_cache
+def unit_nodes(count: int) -> tuple[tuple[float, float], ...]:
+    """Return the nodes and weights of the Gauss-Legendre rule on [0, 1]; the weights add up to 1."""
+    xi, weight = np.polynomial.legendre.leggauss(count)
+    return tuple((float(0.5 + 0.5 * x), float(0.5 * w)) for x, w in zip(xi, weight))
