@@ -63,7 +63,7 @@ class Description(Result):
             cut = ", ".join(self.written["tessellated"])
             more = f"; cut into triangles: {cut}" if cut else ""
             lines.append(f"{self.written['path']}: {self.written['triangles']} triangles{more}")
-        return [*lines, f"the height fog as a grid: {self.grid}"] if self.grid else lines
+        return [*lines, f"the fog as a grid: {self.grid}"] if self.grid else lines
 
 
 @dataclass(frozen=True, repr=False)
@@ -105,7 +105,8 @@ def describe(
     size
         Width and height [pixels], or WxH; the scene's own by default.
     output
-        Write the scene as binary glTF 2.0, a .glb file, or its height fog as a grid of Mitsuba, a .vol file.
+        Write the scene as binary glTF 2.0, a .glb file, or its height fog or density grid as a grid of Mitsuba, a .vol
+        file.
     progress
         True prints notes on the scene on the error stream.
 
@@ -144,13 +145,16 @@ def describe(
 
 
 def _write_grid(path: Path, scene: Any) -> str:
+    from reference.scene.density_grid import GridMedium
     from reference.scene.height_fog import HeightMedium
     from reference.scene.read import read_truth
     from reports.interchange.fog_grid import write_fog_grid
 
     medium = read_truth(scene).medium
-    if not isinstance(medium, HeightMedium):
-        raise InputError(f"output: got {path}, and the medium is no height fog; wanted a name that ends in .glb")
+    if not isinstance(medium, HeightMedium | GridMedium):
+        raise InputError(
+            f"output: got {path}, and the medium is no height fog and no grid; wanted a name that ends in .glb"
+        )
     return write_fog_grid(path, medium)
 
 

@@ -13,13 +13,16 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from analytic.phase import PhaseFunction
+from reference.scene.density_grid import GridMedium
 from reference.scene.height_fog import HeightMedium
+
+Array = NDArray[np.float64]
 
 _VOXELS = 20  # of the least scale height
 _MOST = 1 << 20
 
 
-def fog_grid(medium: HeightMedium) -> NDArray[np.float64]:
+def fog_grid(medium: HeightMedium) -> Array:
     """Return the densities of voxels from the floor to the cap, (N,) [1/m], at most a million."""
     least = min((scale for _, _, scale in medium.layers), default=medium.cap - medium.floor)
     count = max(2, int(np.ceil(_VOXELS * (medium.cap - medium.floor) / least)))
@@ -37,19 +40,15 @@ def fog_grid(medium: HeightMedium) -> NDArray[np.float64]:
     return total
 
 
-def write_fog_grid(path: Path, medium: HeightMedium) -> str:
-    """Write the grid as a volume file of Mitsuba, and return the medium that reads it, as XML."""
+def write_fog_grid(path: Path, medium: HeightMedium | GridMedium) -> str:
+    """Write height fog or a grid as a volume file of Mitsuba, and return the medium that reads it, as XML."""
     import mitsuba as mi
 
-    density = fog_grid(medium)
-    axis = int(np.argmax(np.abs(medium.up)))
-    upwards = bool(medium.up[axis] > 0)
-    shape = [1, 1, 1, 1]
-    shape[2 - axis] = len(density)  # the file has z first
-    mi.VolumeGrid((density if upwards else density[::-1]).astype(np.float32).reshape(shape)).write(str(path))
-    low = medium.floor if upwards else -medium.cap
-    size, corner = [2e3 * (medium.cap - medium.floor)] * 3, [-1e3 * (medium.cap - medium.floor)] * 3
-    size[axis], corner[axis] = medium.cap - medium.floor, low
+    if isinstance(medium, GridMedium):
+        values, corner, size = medium.values, medium.low, medium.high - medium.low
+    else:
+        values, corner, size = _whole_grid(medium)
+    mi.VolumeGrid(values[..., None].astype(np.float32)).write(str(path))
     words = [", ".join(f"{value:.9g}" for value in each) for each in (size, corner, medium.albedo)]
     parts = (
         f'<volume type="gridvolume" name="sigma_t"> <string name="filename" value="{path}"/>',
@@ -60,6 +59,18 @@ def write_fog_grid(path: Path, medium: HeightMedium) -> str:
         _phase(medium.phase),
     )
     return f'<medium type="heterogeneous"> {" ".join(parts)} </medium>'
+
+
+def _whole_grid(medium: HeightMedium) -> tuple[Array, Array, Array]:
+    """Return the densities of height fog, (z, y, x) [1/m], and corner and size of their box, (3,) [m]."""
+    density, height = fog_grid(medium), medium.cap - medium.floor
+    axis = int(np.argmax(np.abs(medium.up)))
+    upwards = bool(medium.up[axis] > 0)
+    shape = [1, 1, 1]
+    shape[2 - axis] = len(density)
+    size, corner = np.full(3, 2e3 * height), np.full(3, -1e3 * height)
+    size[axis], corner[axis] = height, medium.floor if upwards else -medium.cap
+    return (density if upwards else density[::-1]).reshape(shape), corner, size
 
 
 def _phase(phase: PhaseFunction) -> str:

@@ -46,5 +46,7 @@ def test_describe_writes_it(variant, tmp_path):
     found = airlight.describe(str(tmp_path / "fog.xml"), output=tmp_path / "fog.vol")
     assert (tmp_path / "fog.vol").exists()
     assert "gridvolume" in found.grid
-    with pytest.raises(airlight.InputError, match="the medium is no height fog"):
+    airlight.describe("smoke", output=tmp_path / "smoke.vol")
+    assert mi.VolumeGrid(str(tmp_path / "smoke.vol")).max() == pytest.approx(4.7)
+    with pytest.raises(airlight.InputError, match="the medium is no height fog and no grid"):
         airlight.describe("open-fog", output=tmp_path / "open.vol")
