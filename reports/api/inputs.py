@@ -90,6 +90,13 @@ def several(things: Any) -> list[Any]:
     return list(things) if isinstance(things, list | tuple) else [things]
 
 
+def only_from(command: str, does: str, beside: Mapping[str, Any]) -> None:
+    """Refuse what is given beside `from`, which measures nothing."""
+    for name, value in beside.items():
+        if value not in (None, False, (), []):
+            raise InputError(f"{command}: got from together with {name}; from {does}, leave that out")
+
+
 def listed(name: str, words: Any) -> list[str]:
     """Return the words of a list, or of a text with commas between them; none may be empty."""
     parts = words.split(",") if isinstance(words, str) else [str(word) for word in words]

@@ -13,7 +13,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from analytic.errors import InputError, nearest
-from reports.api.inputs import File, Kernels, Methods, Progress, Scenes, Values, note, one_error, several, telling
+from reports.api.inputs import (
+    File,
+    Kernels,
+    Methods,
+    Progress,
+    Scenes,
+    Values,
+    note,
+    one_error,
+    only_from,
+    several,
+    telling,
+)
 from reports.tables.drawing import html, sentence_in_text
 from reports.tables.record import Result, block, bullets
 from reports.tables.table import Table
@@ -177,32 +189,16 @@ def report(
     'The reference is confirmed by our own Mitsuba integrator in 1 of 1 comparisons: ...'
     """
     if from_ is not None:
-        measures: dict[str, Any] = {
-            "quick": quick,
-            "full": full,
-            "kernel": kernel,
-            "set": settings,
-            "images": images,
-            "fresh": fresh,
-        }
-        measures |= {"cluster": cluster}
-        if figures is None:
-            measures |= {"a scene": scenes, "method": method}
-        for name, value in measures.items():
-            if value not in (None, False, (), []):
-                raise InputError(f"report: got from together with {name}; from measures nothing, leave that out")
+        beside = {"quick": quick, "full": full, "kernel": kernel, "set": settings, "images": images, "fresh": fresh}
+        shown = {"a scene": scenes, "method": method} if figures is None else {}
+        only_from("report", "measures nothing", {**beside, "cluster": cluster, **shown})
         return _redrawn(Path(from_), output, figures, several(scenes), [str(each) for each in several(method)])
     if quick and full:
         raise InputError("report: got both quick and full; give one of them, or neither for the default")
     effort = "quick" if quick else "full" if full else "default"
     target = Path(FOLDER if output is None else output)
-    how: dict[str, Any] = {
-        "images": images,
-        "fresh": fresh,
-        "cluster": cluster,
-    }
     asked = (several(scenes), several(method), several(kernel), settings)
-    data = _measured(target, effort, *asked, progress=progress, **how)
+    data = _measured(target, effort, *asked, images=images, fresh=fresh, cluster=cluster, progress=progress)
     written = _figures(target, figures, [], []) if figures else ()
     return Report(folder=target, data=data, done=_done(data), figures=written)
 

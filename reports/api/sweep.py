@@ -9,8 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from analytic.errors import InputError
-from reports.api.inputs import File, Progress, one_error, telling
+from reports.api.inputs import File, Progress, one_error, only_from, telling
 from reports.tables.drawing import sentence_in_text
 from reports.tables.record import Result
 from reports.tables.table import Table
@@ -142,10 +141,8 @@ def sweep(
 
     require("pyarrow", "sweep", "a sweep")
     if from_ is not None:
-        given = {"a study": study, "random": random, "cluster": cluster, "again": again or None}
-        for name, value in given.items():
-            if value is not None:
-                raise InputError(f"sweep: got from together with {name}; from computes nothing, leave that out")
+        beside = {"a study": study, "random": random, "cluster": cluster, "again": again}
+        only_from("sweep", "computes nothing", beside)
         from reports.sweep.page import write_sweep
 
         return SweepFindings(*write_sweep(Path(from_), None if output is None else Path(output)))

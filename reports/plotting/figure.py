@@ -24,10 +24,15 @@ ENDINGS = tuple(_METADATA)
 def save_figure(path: Path, draw: Callable[[str], "Figure"], column: str = "double") -> Path:
     """Write a figure for a column, 'single' or 'double', as PDF or PNG, by the ending of the path; return the path."""
     with figure_style(column):
-        buffer = io.BytesIO()
-        draw(column).savefig(buffer, format=path.suffix[1:], metadata=_METADATA[path.suffix])
-    write_bytes(path, buffer.getvalue())
+        write_bytes(path, file_bytes(draw(column), path.suffix))
     return path
+
+
+def file_bytes(figure: "Figure", ending: str, **how: Any) -> bytes:
+    """Return a figure as a file, the same bytes for the same figure."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=ending[1:], metadata=_METADATA[ending], **how)
+    return buffer.getvalue()
 
 
 def new_figure(width: float, height: float) -> "Figure":

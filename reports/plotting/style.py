@@ -120,22 +120,15 @@ def report_styles(scenes: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, An
 
 
 @contextmanager
-def figure_style(column: str = "double", extra: Sequence[str] = ()) -> Iterator[float]:
+def figure_style(column: str = "double") -> Iterator[float]:
     """Use the style sheets for papers for a block; give the width of the column, 'single' or 'double' [inches]."""
     import matplotlib.style
 
     if column not in WIDTHS:
         raise InputError(f"column: got {column!r}, wanted one of {', '.join(WIDTHS)}")
-    sheets = [str(_SHEETS / "airlight.mplstyle"), str(_SHEETS / f"{column}.mplstyle"), *extra]
-    try:
-        context = matplotlib.style.context(sheets, after_reset=True)
-        context.__enter__()
-    except OSError as error:
-        raise InputError(f"style: got {', '.join(extra)}, wanted style sheets of matplotlib: {error}") from error
-    try:
+    sheets = [str(_SHEETS / "airlight.mplstyle"), str(_SHEETS / f"{column}.mplstyle")]
+    with matplotlib.style.context(sheets, after_reset=True):
         yield WIDTHS[column]
-    finally:
-        context.__exit__(None, None, None)
 
 
 def _marker_style(colour: str, marker: str, variant: int) -> dict[str, Any]:

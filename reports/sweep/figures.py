@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reports.plotting.figure import plain_times, short
+from reports.plotting.figure import new_figure, plain_times, short
 from reports.plotting.style import report_styles
 from reports.sweep.claims import TARGETS
 from reports.sweep.read import Numbers
@@ -144,19 +144,10 @@ def drawn(said: Summary, names: Sequence[str] = tuple(FIGURES)) -> Iterator[tupl
             yield name, figure
 
 
-def pdf_bytes(figure: "Figure") -> bytes:
-    """Return a figure as PDF, the same bytes for the same figure."""
-    import io
-
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="pdf", dpi=2 * _DOTS, metadata={"CreationDate": None})
-    return buffer.getvalue()
-
-
 def _figure(height: float) -> "Figure":
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(WIDTH, height), layout="constrained", dpi=_DOTS)
+    figure = new_figure(WIDTH, height)
+    figure.set_dpi(_DOTS)
+    return figure
 
 
 def _panels(count: int, height: float) -> tuple["Figure", "list[Axes]"]:

@@ -19,11 +19,11 @@ from reports.page.chart import svg_text
 from reports.page.filters import percent, unbroken
 from reports.page.render import page_environment, template_text
 from reports.page.tables import drawn, facts
+from reports.plotting.figure import file_bytes
 from reports.sweep import tables
 from reports.sweep.claims import TARGETS
 from reports.sweep.correlations import LEAST, NAMED, SAME, property_words
 from reports.sweep.figures import drawn as drawn_figures
-from reports.sweep.figures import pdf_bytes
 from reports.sweep.read import read_sweep
 from reports.sweep.summary import Summary, goes_with_words, headlines, sound_words, summary_of, to_json
 
@@ -45,7 +45,7 @@ def write_sweep(source: Path, target: Path | None = None) -> tuple[Summary, Path
     for name, figure in drawn_figures(said):
         charts[name] = svg_text(figure, name)
         write_text(folder / FIGURES / f"{name}.svg", charts[name])
-        write_bytes(folder / FIGURES / f"{name}.pdf", pdf_bytes(figure))
+        write_bytes(folder / FIGURES / f"{name}.pdf", file_bytes(figure, ".pdf", dpi=320))
     write_text(folder / CLAIMS, json.dumps(to_json(said), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     write_text(folder / PAGE, render_sweep(said, charts))
     return said, folder / PAGE

@@ -175,11 +175,18 @@ def _badness(status: str, error: float) -> tuple[int, float]:
     return (2 if status in FAULTS else 1 if status == "done" else 0), 0.0 if np.isnan(error) else error
 
 
-def fastest_counts(made: Sequence[Sample], target: float) -> tuple[list[int], int, int]:
-    """Return in how many scenes each configuration is the fastest within an error, and in how many none is within it.
+@dataclass(frozen=True)
+class Fastest:
+    """In how many scenes each configuration is the fastest within an error."""
 
-    The last number is how many scenes were counted: those in which whatever was measured was also timed alone.
-    """
+    target: float
+    counts: tuple[int, ...]  #: by configuration
+    none: int  #: scenes in which no configuration is within the error
+    scenes: int  #: in which whatever was measured was timed with the machine to itself
+
+
+def fastest_within(made: Sequence[Sample], target: float) -> Fastest:
+    """Return in how many scenes each configuration is the fastest within an error."""
     best: dict[str, tuple[float, int]] = {}
     timed: dict[str, bool] = {}
     for place, sample in enumerate(made):
@@ -194,4 +201,4 @@ def fastest_counts(made: Sequence[Sample], target: float) -> tuple[list[int], in
     counts = [0] * len(made)
     for scene, (_, place) in best.items():
         counts[place] += scene in scenes
-    return counts, len(scenes) - sum(counts), len(scenes)
+    return Fastest(target, tuple(counts), len(scenes) - sum(counts), len(scenes))

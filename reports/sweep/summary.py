@@ -12,7 +12,7 @@ from reports.sweep.claims import TARGETS, Claim, best_claims, claims, percent, w
 from reports.sweep.correlations import Correlation, correlations, property_words, sentences, strongest
 from reports.sweep.faults import Check, Fault, Reason, Worst, checks, faults, reasons, worst
 from reports.sweep.read import Numbers, Sweep
-from reports.sweep.samples import FAULTS, Sample, drawn_at_random, fastest_counts, samples
+from reports.sweep.samples import FAULTS, Fastest, Sample, drawn_at_random, fastest_within, samples
 from validation.columns import column
 from validation.metrics.errors import plain
 from validation.statistics.intervals import LEVEL, binomial_interval, quantile_interval
@@ -21,16 +21,6 @@ SCHEMA = "airlight-sweep/1"
 
 #: What made the rows, by column.
 _VERSIONS = ("airlight", "source", "mitsuba", "drjit", "python", "variant")
-
-
-@dataclass(frozen=True)
-class Fastest:
-    """In how many scenes each configuration is the fastest within an error."""
-
-    target: float
-    counts: tuple[int, ...]  #: by configuration
-    none: int  #: scenes in which no configuration is within the error
-    scenes: int  #: in which whatever was measured was timed with the machine to itself
 
 
 @dataclass(frozen=True)
@@ -115,7 +105,7 @@ def summary_of(sweep: Sweep) -> Summary:
             sample.label: tuple(worst(sweep, sample, [each.property for each in goes_with[sample.label]]))
             for sample in made
         },
-        fastest=tuple(_fastest(made, target) for target in TARGETS),
+        fastest=tuple(fastest_within(made, target) for target in TARGETS),
         reasons=tuple(reasons(sweep)),
         checks=tuple(checks(sweep)),
         faults=tuple(faults(sweep)),
@@ -212,6 +202,7 @@ def sound_words(said: Summary) -> str:
 def to_json(said: Summary) -> dict[str, Any]:
     """Return everything as plain data, for `--json`; nothing in it is infinite or NaN."""
     names = {sample.label: sample for sample in said.samples}
+    counts = ("studies", "statuses", "scenes", "named_scenes", "timed_alone")
     lists = ("correlations", "checks", "faults", "references", "properties", "hosts")
     return {
         "schema": SCHEMA,
@@ -220,11 +211,7 @@ def to_json(said: Summary) -> dict[str, Any]:
         "superseded": said.sweep.superseded,
         "drawn_at_random": said.drawn,
         "level": LEVEL,
-        **{
-            name: plain(getattr(said, name))
-            for name in ("studies", "statuses", "scenes", "named_scenes", "timed_alone")
-        },
-        **{name: plain(getattr(said, name)) for name in ("timed_alone", "versions", "started", "worst", *lists)},
+        **{name: plain(getattr(said, name)) for name in (*counts, "versions", "started", "worst", *lists)},
         "headlines": headlines(said),
         "claims": [plain(each) | {"share": each.share, "text": each.text} for each in said.claims],
         "configurations": [_configuration(sample) for sample in said.samples],
@@ -260,11 +247,6 @@ def _configuration(sample: Sample) -> dict[str, Any]:
         "frame_ms": finite_median(sample.times),
         "timed_alone": int(np.isfinite(sample.times).sum()),
     }
-
-
-def _fastest(made: Sequence[Sample], target: float) -> Fastest:
-    counts, none, scenes = fastest_counts(made, target)
-    return Fastest(target, tuple(counts), none, scenes)
 
 
 def _references(sweep: Sweep) -> list[ReferenceErrors]:

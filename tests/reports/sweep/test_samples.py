@@ -8,7 +8,7 @@ import pytest
 
 from analytic.errors import InputError
 from reports.sweep.read import FILE, read_sweep
-from reports.sweep.samples import fastest_counts, samples
+from reports.sweep.samples import Fastest, fastest_within, samples
 from tests.helpers.sweeps import row, rows, write_rows
 
 
@@ -135,4 +135,4 @@ def test_fastest_is_counted_where_all_were_timed_alone(sweep_of):
             *pair("random:4", (1.0, 0.001), (2.0, 0.001), timed_alone=False),
         ]
     )
-    assert fastest_counts(samples(sweep), 0.01) == ([1, 1], 2, 4)
+    assert fastest_within(samples(sweep), 0.01) == Fastest(0.01, (1, 1), 2, 4)
