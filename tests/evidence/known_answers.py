@@ -17,8 +17,7 @@ from reference.monte_carlo.volpath.integrator import volpath_batch
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.replicates import PointPlan
 from reference.scene.read import TruthScene, read_truth
-from tests.evidence.certified.model import FogBox, FogScene, FogScreen, load_fog, mitsuba_dict
-from tests.evidence.certified.scenes import fog_scenes
+from tests.evidence.certified.model import FogBox, FogScene, FogScreen, fog_scenes, load_fog, mitsuba_dict
 
 Scene = dict[str, Any]
 

@@ -20,8 +20,7 @@ from reference.visibility.certificate import LitIntervals
 from reference.visibility.planes import Rays, cone_interval
 from tests.evidence.certified import area_lights
 from tests.evidence.certified.fog import certify_pixel, directions, scene_data
-from tests.evidence.certified.model import FogBox, FogScreen, load_fog, mitsuba_dict
-from tests.evidence.certified.scenes import fog_scenes
+from tests.evidence.certified.model import FogBox, FogScreen, fog_scenes, load_fog, mitsuba_dict
 from tests.evidence.closed_forms import sphere_airlight
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -68,7 +67,7 @@ def truth_of(scene):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_file_holds_the_scenes_of_the_code(certified, name):
+def test_the_files_parts_say_the_same_of_a_scene(certified, name):
     given = {key: value for key, value in certified[name].items() if key != "pixels"}
     assert given == json.loads(json.dumps(scene_data(SCENES[name], directions(SCENES[name]))))
 

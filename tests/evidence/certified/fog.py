@@ -41,8 +41,16 @@ from tests.evidence.certified.intervals import (
     unit,
     vector,
 )
-from tests.evidence.certified.model import SIZE, FogBox, FogLight, FogScene, FogScreen, FogSphere, mitsuba_dict
-from tests.evidence.certified.scenes import fog_scenes
+from tests.evidence.certified.model import (
+    SIZE,
+    FogBox,
+    FogLight,
+    FogScene,
+    FogScreen,
+    FogSphere,
+    fog_scenes,
+    mitsuba_dict,
+)
 from validation.certified.files import FOLDER
 
 SCHEMA = "airlight-certified-fog/1"

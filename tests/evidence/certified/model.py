@@ -1,6 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a certified fog scene consists of, and how Mitsuba reads it."""
+"""What a certified fog scene consists of, how Mitsuba reads it, and the twelve scenes of the file.
 
+Every number is exact in float32, so that renderers in single precision render the very scene that was certified:
+coordinates are multiples of 1/1024 m, which makes the corners of boxes exact as well. What cannot be exact is a
+rotation; the matrices of cameras and spots are those of the file, and count as given. Occluders are black, hence all
+light in an image is airlight.
+"""
+
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,6 +15,8 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
+
+from validation.certified.files import certified_data
 
 Point = tuple[float, ...]  # of 3 numbers
 Matrix = tuple[tuple[float, ...], ...]  # 4 rows of 4
@@ -65,6 +74,40 @@ class FogScene:
     g: float  #: mean cosine of 'hg'
     lights: tuple[FogLight, ...]
     occluders: tuple[FogSphere | FogBox | FogScreen, ...] = ()
+
+
+def fog_scenes() -> tuple[FogScene, ...]:
+    """Return the scenes of the file, each with what it is for."""
+    return tuple(_scene(given) for given in json.loads(certified_data().read_text())["scenes"])
+
+
+def _scene(given: dict[str, Any]) -> FogScene:
+    mitsuba, medium = given["mitsuba"], given["medium"]
+    lights = []
+    for number, light in enumerate(given["lights"]):
+        cone = {}
+        if light["type"] == "spot":
+            matrix = _tuples(mitsuba[f"light{number}"]["to_world"]["matrix"])
+            cone = {"matrix": matrix, "cutoff": light["cutoff"], "beam": light["beam"]}
+        lights.append(FogLight(_tuples(light["position"]), _tuples(light["intensity"]), **cone))
+    kinds = {"sphere": FogSphere, "box": FogBox, "screen": FogScreen}
+    shapes = [{name: _tuples(value) for name, value in shape.items()} for shape in given["occluders"]]
+    return FogScene(
+        given["name"],
+        given["words"],
+        camera=_tuples(mitsuba["sensor"]["to_world"]["matrix"]),
+        fov=mitsuba["sensor"]["fov"],
+        sigma_t=_tuples(medium["sigma_t"]),
+        albedo=_tuples(medium["albedo"]),
+        phase=medium["phase"],
+        g=medium.get("g", 0.0),
+        lights=tuple(lights),
+        occluders=tuple(kinds[shape.pop("type")](**shape) for shape in shapes),
+    )
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
 
 
 def mitsuba_dict(scene: FogScene) -> dict[str, Any]:
