@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reports.sweep.samples import FAULTS, UNTOLD, Sample
-from validation.statistics.intervals import LEVEL, binomial_interval
+from validation.statistics.samples import LEVEL, binomial_interval
 
 TARGETS = (0.1, 0.01, 0.001)  #: relative RMSE of claims, as shares
 

@@ -17,7 +17,7 @@ import numpy as np
 from reports.sweep.read import Numbers, Sweep
 from reports.sweep.samples import Sample
 from validation.properties.properties import PROPERTIES
-from validation.statistics.intervals import LEVEL, rank_correlation
+from validation.statistics.samples import LEVEL, rank_correlation
 
 SAME = 0.8  #: rank correlation of two properties from which on they say nearly the same
 NAMED = 3  #: properties that a sentence names at most

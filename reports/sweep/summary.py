@@ -15,7 +15,7 @@ from reports.sweep.read import Numbers, Sweep
 from reports.sweep.samples import FAULTS, Fastest, Sample, drawn_at_random, fastest_within, samples
 from validation.columns import column
 from validation.metrics.errors import plain
-from validation.statistics.intervals import LEVEL, binomial_interval, quantile_interval
+from validation.statistics.samples import LEVEL, binomial_interval, quantile_interval
 
 SCHEMA = "airlight-sweep/1"
 

@@ -26,7 +26,7 @@ from scipy.special import ndtr
 from scipy.stats import binom, nct
 
 from validation.statistics.comparison import Estimate, Statistics, compare_statistics
-from validation.statistics.p_values import student_quantile, uniformity_p
+from validation.statistics.samples import student_quantile, uniformity_p
 
 Array = NDArray[np.float64]
 Law = Callable[[np.random.Generator, tuple[int, ...]], Array]  #: draws numbers of mean 0 and standard deviation 1

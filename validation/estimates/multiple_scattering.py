@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from reference.monte_carlo.batches import LAYERS
 from validation.estimates.monte_carlo import monte_carlo_batches
-from validation.statistics.p_values import student_quantile
+from validation.statistics.samples import student_quantile
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]

@@ -3,8 +3,7 @@
 
 Read in this order:
 
-- `p_values.py`: p-values, and what to do with many of them;
+- `samples.py`: p-values, what to do with many of them, and intervals of shares, quantiles and rank correlations;
 - `comparison.py`: all tests of one image against another;
-- `noise.py`: how far a number may move before that means something;
-- `intervals.py`: what few samples say of all: shares, quantiles, rank correlations.
+- `noise.py`: how far a number may move before that means something.
 """

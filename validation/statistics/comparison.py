@@ -66,7 +66,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analytic.errors import InputError
 from validation.metrics.errors import compared
-from validation.statistics.p_values import (
+from validation.statistics.samples import (
     binomial_p,
     bonferroni,
     satterthwaite,

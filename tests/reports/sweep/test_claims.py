@@ -10,7 +10,7 @@ from reports.sweep.faults import checks, faults, reasons
 from reports.sweep.read import FILE, read_sweep
 from reports.sweep.samples import samples
 from tests.helpers.sweeps import row, rows, write_rows
-from validation.statistics.intervals import binomial_interval
+from validation.statistics.samples import binomial_interval
 
 
 @pytest.fixture

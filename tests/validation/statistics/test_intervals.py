@@ -7,7 +7,6 @@ from scipy import stats
 
 from tests.helpers.calibration import power
 from tests.helpers.reports import sampled, times
-from validation.statistics.intervals import binomial_interval, quantile_interval, rank_correlation
 from validation.statistics.noise import (
     ERROR_TOLERANCE,
     FLOORS,
@@ -17,7 +16,14 @@ from validation.statistics.noise import (
     slower_stages,
     spread,
 )
-from validation.statistics.p_values import binomial_p, sidak, student_quantile
+from validation.statistics.samples import (
+    binomial_interval,
+    binomial_p,
+    quantile_interval,
+    rank_correlation,
+    sidak,
+    student_quantile,
+)
 
 
 @pytest.mark.parametrize(("successes", "trials"), [(0, 12), (12, 12), (3, 40), (992, 1000), (0, 0)])

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What samples say: p-values and what to do with many of them, intervals of a share, a quantile, a rank correlation.
+
+A sample of an interval is what was drawn independently of the others, such as a scene. What was measured in one scene,
+by pixels or by methods, is one sample however many numbers it has.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtr, ndtri, stdtr, stdtrit
+from scipy.stats import binom, binomtest, kstest, quantile_test, spearmanr
+
+Array = NDArray[np.float64]
+
+LEVEL = 0.95  #: with at least this probability an interval holds what it estimates
+
+
+def satterthwaite(variance: ArrayLike, spread: ArrayLike) -> Array:
+    """Return the degrees of freedom of a sum of variances, each estimated from few batches.
+
+    A variance v from K batch means of normal errors has itself the variance 2 v^2 / (K - 1). A sum V of such v has thus
+    the variance 2 sum v^2 / (K - 1), which is that of one with
+
+        nu = V^2 / sum(v^2 / (K - 1))
+
+    degrees of freedom (Satterthwaite 1946, eq. 17; Welch 1947 for two terms).
+
+    `variance` is V and `spread` the sum, 0 for variances that are known exactly, which gives an infinite nu [1].
+    """
+    v, s = np.asarray(variance, dtype=np.float64), np.asarray(spread, dtype=np.float64)
+    return np.divide(v**2, s, out=np.full(np.broadcast_shapes(v.shape, s.shape), np.inf), where=s > 0)
+
+
+def two_sided_p(z: Array, freedom: Array) -> Array:
+    """Return P(|Z| >= |z|) of Student's law; of the normal law where the degrees of freedom are infinite.
+
+    `z` and `freedom` have one shape, (n,) [1].
+    """
+    tail = -np.abs(z)
+    finite = np.isfinite(freedom)
+    return 2 * np.where(finite, stdtr(np.where(finite, freedom, 1.0), tail), ndtr(tail))
+
+
+def student_quantile(probability: float, freedom: float) -> float:
+    """Return the quantile [1] at a `probability` of Student's law; of the normal law for an infinite `freedom`."""
+    return float(stdtrit(freedom, probability) if np.isfinite(freedom) else ndtri(probability))
+
+
+def sidak(level: float, tests: int) -> float:
+    """Return the level [1] of each of m independent `tests` of which none rejects with probability 1 - `level`.
+
+    1 - (1 - level)^(1/m) (Sidak 1967), without cancellation for large m.
+    """
+    return float(-np.expm1(np.log1p(-level) / max(tests, 1)))
+
+
+def binomial_p(successes: int, trials: int, probability: float) -> float:
+    """Return min(1, 2 min(P(X <= k), P(X >= k))) of the binomial law: too few count as well as too many.
+
+    X is the number of `successes` k in `trials`, each of a `probability` [1].
+    """
+    lower, upper = binom.cdf(successes, trials, probability), binom.sf(successes - 1, trials, probability)
+    return float(min(1.0, 2 * min(lower, upper)))
+
+
+def uniformity_p(p: Array) -> float:
+    """Return the p-value of Kolmogorov and Smirnov's test that p-values `p`, of shape (n,), are uniform in [0, 1]."""
+    return float(kstest(p, "uniform").pvalue)
+
+
+def bonferroni(p: Sequence[float]) -> float:
+    """Return a p-value [1] for the least of several p-values `p` that may depend on one another; NaN for none."""
+    return min(1.0, len(p) * min(p)) if p else float("nan")
+
+
+def binomial_interval(successes: int, trials: int, level: float = LEVEL) -> tuple[float, float]:
+    """Return the interval of a probability from k successes in n independent trials; of no trial, from 0 to 1.
+
+    Clopper and Pearson's: it holds the probability with at least the level, whatever the probability is. Wilson's
+    interval is shorter, and holds it on the average of probabilities alone.
+    """
+    if trials == 0:
+        return 0.0, 1.0
+    interval = binomtest(successes, trials).proportion_ci(level, method="exact")
+    return float(interval.low), float(interval.high)
+
+
+def quantile_interval(
+    values: ArrayLike, probability: float, level: float = LEVEL
+) -> tuple[float, float | None, float | None]:
+    """Return a quantile of a sample and its interval, which is free of any law.
+
+    The quantile at p is the least value that at least the share p of the sample does not exceed. The ends of the
+    interval are order statistics (David and Nagaraja 2003, *Order Statistics*, section 7.1); None where the sample,
+    (n,) with n > 0, is too small for an end. Infinities are values.
+    """
+    sample = np.asarray(values, dtype=np.float64)
+    interval = quantile_test(sample, p=probability).confidence_interval(level)
+    low, high = (None if np.isnan(end) else float(end) for end in interval)
+    return float(np.quantile(sample, probability, method="inverted_cdf")), low, high
+
+
+def rank_correlation(x: ArrayLike, y: ArrayLike, level: float = LEVEL) -> tuple[float, float, float]:
+    """Return Spearman's rank correlation of two properties of a sample, and its interval.
+
+    Equal values have the mean of their ranks. The interval is that of Fisher's z, atanh(r), with the standard error
+    sqrt((1 + r^2/2) / (n - 3)).
+
+    Valid for |correlation| < 0.95 and n >= 10, by the simulations of Bonett and Wright 2000, *Psychometrika* 65, 23-28,
+    whose standard error it is. Of fewer than ten samples, and where all of x or of y are equal, r is 0 and the interval
+    from -1 to 1: nothing is known.
+    """
+    count = np.size(x)
+    if count < 10 or np.ptp(x) == 0 or np.ptp(y) == 0:
+        return 0.0, -1.0, 1.0
+    r = float(spearmanr(x, y).statistic)
+    # Of one order for both the formula would be certain: it is taken as if two neighbours had changed places.
+    most = 1 - 12 / (count * (count**2 - 1))
+    z = np.arctanh(np.clip(r, -most, most))
+    half = float(ndtri((1 + level) / 2)) * np.sqrt((1 + r * r / 2) / (count - 3))
+    low, high = float(np.tanh(z - half)), float(np.tanh(z + half))
+    return float(np.clip(r, -1, 1)), -1.0 if r < -most else low, 1.0 if r > most else high
