@@ -16,12 +16,12 @@ The exposure is in stops. By default it brings the 99th percentile of the refere
 do; it depends on the reference alone, so that all tests against one reference are judged at one exposure.
 
 CIEDE2000: CIE 142-2001; Sharma, Wu and Dalal 2005 for its branches. Delta E ITP: ITU-R BT.2124-0, annex 1; PQ and
-IC_TC_P: ITU-R BT.2100-2. White at 203 cd/m^2: ITU-R BT.2408-7. Both through colour-science.
+IC_TC_P: ITU-R BT.2100-2. White at 203 cd/m^2: ITU-R BT.2408-7. Both through colour-science, whose import
+takes a second.
 """
 
 from dataclasses import dataclass
 
-import colour
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -98,22 +98,30 @@ def auto_exposure(reference: ArrayLike) -> float:
 
 def ciede2000(reference: Array, test: Array) -> Array:
     """Return the CIEDE2000 difference of colours in CIE L*a*b*, (..., 3)."""
+    import colour
+
     return np.asarray(colour.delta_E(reference, test, method="CIE 2000"))
 
 
 def delta_e_itp(reference: Array, test: Array) -> Array:
     """Return Delta E ITP of colours in IC_TC_P, (..., 3): 720 sqrt(dI^2 + (dT/2)^2 + dP^2), BT.2124 annex 1."""
+    import colour
+
     return np.asarray(colour.delta_E(reference, test, method="ITP"))
 
 
 def _lab(linear: Array) -> Array:
     """Return CIE L*a*b* of linear sRGB."""
+    import colour
+
     space = colour.RGB_COLOURSPACES["sRGB"]
     return colour.XYZ_to_Lab(linear @ space.matrix_RGB_to_XYZ.T, space.whitepoint)
 
 
 def _ictcp(luminance: Array) -> Array:
     """Return IC_TC_P, by PQ, of linear light with the primaries of sRGB [cd/m^2]."""
+    import colour
+
     # Both spaces have the white D65, so no chromatic adaptation.
     wide = colour.matrix_RGB_to_RGB("sRGB", "ITU-R BT.2020", chromatic_adaptation_transform=None)
     # The matrices are rounded to four digits, which can leave a colour of the gamut's edge below zero by 1e-4 of it.

@@ -40,7 +40,6 @@ import numpy as np
 
 from validation.scenes import cloud_meshes, meshes
 from validation.scenes.height_fog import register_height_fog
-from validation.scenes.hypertexture import hypertexture
 from validation.scenes.meshes import Mesh, bent, joined, placed, rotation, scaled
 from validation.scenes.parts import camera, fog, height_fog, light, medium_boundary, mitsuba_mesh, phase_function
 from validation.scenes.smoke import smoke
@@ -186,6 +185,8 @@ def _medium(table: Table, shape: str = "") -> dict[str, Any]:
 
 @cache
 def _density(mesh: str, given: str) -> Any:
+    from validation.scenes.hypertexture import hypertexture
+
     return hypertexture(MESHES[mesh](), **json.loads(given))
 
 
