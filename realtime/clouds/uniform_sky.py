@@ -51,6 +51,7 @@ from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes
 from realtime.clouds.slab_orders.phases import SlabPhase
 from realtime.clouds.slab_orders.streams import double_gauss, mode_kernel
 from realtime.numerics.array_types import types_of
+from realtime.numerics.functions import between_entries
 from realtime.scene.lights import Light
 from realtime.scene.media.bounded import Clouds
 from realtime.scene.mesh_adjacency import mesh_triangles
@@ -211,20 +212,5 @@ def _seen_share(light: Light, point: Any, visible: Visible) -> Any:
 
 def _shares(table: Any, medium: Any, thickness: Any, mu: Any) -> list[Any]:
     """Return the shares of all sets, linear in the logarithm of the thickness and in mu."""
-    Float = type(mu)
-    step = np.log(THICKEST / THINNEST) / (THICKNESSES - 1)
-    along = dr.log(dr.clip(thickness, THINNEST, THICKEST) / THINNEST) / step
-    total = [dr.zeros(Float, dr.width(mu)) for _ in range(_SETS)]
-    for row, down in _neighbours(along, THICKNESSES):
-        for column, across in _neighbours(mu * (COSINES - 1), COSINES):
-            first = ((medium * THICKNESSES + row) * COSINES + column) * _SETS
-            weight = down * across
-            total = [dr.fma(weight, dr.gather(Float, table, first + number), sum_) for number, sum_ in enumerate(total)]
-    return total
-
-
-def _neighbours(position: Any, count: int) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
-    """Return both entries beside a position from 0 to `count` - 1, with their weights."""
-    lower = dr.minimum(mi.UInt32(position), count - 2)
-    share = position - type(position)(lower)
-    return (lower, 1 - share), (lower + 1, share)
+    along = dr.log(dr.clip(thickness, THINNEST, THICKEST) / THINNEST) / np.log(THICKEST / THINNEST)
+    return between_entries(table, [(along, THICKNESSES), (mu, COSINES)], _SETS, first=medium)

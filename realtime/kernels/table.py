@@ -50,6 +50,7 @@ import numpy as np
 
 from realtime.errors import InputError
 from realtime.numerics.array_types import four_numbers
+from realtime.numerics.functions import cell_of
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.homogeneous import Homogeneous
@@ -197,16 +198,9 @@ def _tail(geometry: RayGeometry, ends, sigma_t, records, size: int):
 def _read(records, position, size: int, offset):
     """Interpolate bilinearly at `position` in [0, 1]^2 in the table that begins at cell `offset`."""
     Float = type(records)
-    UInt32 = dr.uint32_array_t(Float)
-    cell, weight = [], []
-    for value in position:
-        scaled = dr.clip(value, 0, 1) * (size - 1)
-        cell.append(dr.minimum(UInt32(scaled), size - 2))
-        weight.append(scaled - Float(cell[-1]))
-    corners = dr.gather(four_numbers(Float), records, offset + dr.fma(cell[0], UInt32(size - 1), cell[1]))
-    low = dr.lerp(corners.x, corners.y, weight[1])
-    high = dr.lerp(corners.z, corners.w, weight[1])
-    return dr.lerp(low, high, weight[0])
+    (row, down), (column, along) = (cell_of(value * (size - 1), size) for value in position)
+    corners = dr.gather(four_numbers(Float), records, offset + row * (size - 1) + column)
+    return dr.lerp(dr.lerp(corners.x, corners.y, along), dr.lerp(corners.z, corners.w, along), down)
 
 
 @lru_cache

@@ -120,9 +120,6 @@ class CloudCollectors(Method):
     opacity: str = parameter(
         "corrected", "opacity as derived, or by eq. 2 as printed", choices=("corrected", "printed")
     )
-    legs: str = parameter(
-        "map", "the way of the sun's light to a point by the light map, or by cast rays", choices=("map", "exact")
-    )
     sky: str = parameter(
         "uniform",
         "the light of a sky, the same from everywhere, or a beam from above of pi times its radiance, as printed",
@@ -345,7 +342,7 @@ def _entry(view: View, state: CloudState, rays: CloudRays) -> _Entry:
 
 def _scattered_once(view: View, state: CloudState, thin_rays: CloudRays, parameters: CloudCollectors) -> Any:
     """Return order 1, a colour [W/(m^2 sr)]."""
-    beams = [_beam(view, state, thin_rays.clouds, number, parameters) for number in _suns(view, parameters)]
+    beams = [_beam(view, state, thin_rays.clouds, number) for number in _suns(view, parameters)]
     once = light_once(
         thin_rays, beams, steps=parameters.steps, stride=state.stride, printed=parameters.single == "printed"
     )
@@ -389,7 +386,7 @@ def _without_peak(clouds: Clouds, state: CloudState) -> Clouds:
     return replace(clouds, sigma_t=sigma_t, albedo=type(clouds.albedo)(*albedo))
 
 
-def _beam(view: View, state: CloudState, clouds: Clouds, number: int, parameters: CloudCollectors) -> Beam:
+def _beam(view: View, state: CloudState, clouds: Clouds, number: int) -> Beam:
     """Return a sun as points in clouds see it that scatter once."""
     light, sun = view.lights[number], state.maps[number]
     Float = type(view.distance)
@@ -403,10 +400,7 @@ def _beam(view: View, state: CloudState, clouds: Clouds, number: int, parameters
             depths = [dr.fma(kappa, length, depth) for kappa, depth in zip(kappas, depths)]
         return tuple(depths)
 
-    if parameters.legs == "exact":
-        leg: Callable[..., Any] = leg_through(state.surfaces, clouds, light, stride=state.stride)
-    else:
-        leg = leg_by_depths(clouds, state.depths[number]) if state.depths else by_map
+    leg = leg_by_depths(clouds, state.depths[number]) if state.depths else by_map
     lit = (lambda point, active: view.visible(point, light)) if view.features.shadows else None
     cosine = -dr.dot(view.direction, light.axis)
     return Beam(light.intensity, (Float(1),), (tuple(phase.evaluate(cosine) for phase in clouds.phases),), leg, lit)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Functions that are faster than those of Dr.Jit where their arguments allow it, and nodes as constants.
+"""Functions that are faster than Dr.Jit's where their arguments allow it, look-ups in tables, and nodes as constants.
 
 **The diamond angle: an azimuth without trigonometry.**
 
@@ -17,7 +17,9 @@ here.
 **Gauss-Legendre nodes as Python numbers: constants in the kernels that Dr.Jit records.**
 """
 
+from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
 
 import drjit as dr
 import numpy as np
@@ -131,3 +133,35 @@ def unit_nodes(count: int) -> tuple[tuple[float, float], ...]:
     """Return the nodes and weights of the Gauss-Legendre rule on [0, 1]; the weights add up to 1."""
     xi, weight = np.polynomial.legendre.leggauss(count)
     return tuple((float(0.5 + 0.5 * x), float(0.5 * w)) for x, w in zip(xi, weight))
+
+
+def cell_of(position, count) -> tuple[Any, Any]:
+    """Return the entry before a position, and the share of the way to the next, of `count` entries at whole numbers.
+
+    Positions are clipped to the entries; the last entry begins no cell.
+    """
+    Float = type(position)
+    inside = dr.clip(position, 0, count - 1)
+    entry = dr.minimum(dr.uint32_array_t(Float)(inside), count - 2)
+    return entry, inside - Float(entry)
+
+
+def between_entries(table, places: Sequence[tuple[Any, int]], width: int = 1, first: Any = 0) -> list[Any]:
+    """Return the numbers of a table, `width` an entry, linear between entries along each of some coordinates.
+
+    `places`: by coordinate the place from 0 to 1, and how many entries there are; those of the last lie side by side;
+    `first`: index of the first entry.
+    """
+    Float = type(table)
+    corners: list[tuple[Any, Any]] = [(first, Float(1))]
+    for share, count in places:
+        entry, weight = cell_of(share * (count - 1), count)
+        corners = [
+            (index * count + entry + step, part * (weight if step else 1 - weight))
+            for index, part in corners
+            for step in (0, 1)
+        ]
+    return [
+        sum(part * dr.gather(Float, table, index * width + number) for index, part in corners)
+        for number in range(width)
+    ]

@@ -20,6 +20,7 @@ import numpy as np
 
 from realtime.droplets import CUT, droplet_table, share_cut
 from realtime.errors import InputError
+from realtime.numerics.functions import between_entries, cell_of
 
 
 @dataclass(frozen=True)
@@ -260,14 +261,8 @@ class Tabulated(Phase):
 
     def evaluate(self, cos_scatter) -> Any:
         """Return the value."""
-        c = cos_scatter
-        last = dr.width(self.values) - 1
-        position = dr.clip((c + 1) * (0.5 * last), 0, last)
-        index = dr.minimum(mi.UInt32(position), last - 1)
-        weight = position - type(c)(index)
-        low = dr.gather(type(c), self.values, index)
-        high = dr.gather(type(c), self.values, index + 1)
-        return dr.lerp(low, high, weight)
+        (value,) = between_entries(self.values, [(0.5 * (cos_scatter + 1), dr.width(self.values))])
+        return value
 
 
 @dataclass(frozen=True)
@@ -358,12 +353,10 @@ class Mie(Phase):
     def evaluate_half(self, down, up) -> Any:
         """Return the value from (1 -+ cos)/2, Hermite's cubic between two entries."""
         near, far = dr.sqrt(down), dr.sqrt(up)
-        last = dr.width(self.entries) // 2 - 1
-        position = dr.clip(near / (near + far) * last, 0, last)
-        cell = dr.minimum(mi.UInt32(position), last - 1)
-        t = position - type(position)(cell)
+        count = dr.width(self.entries) // 2
+        cell, t = cell_of(near / (near + far) * (count - 1), count)
         value, slope, next_value, next_slope = (
-            dr.gather(type(position), self.entries, 2 * cell + number) for number in range(4)
+            dr.gather(type(t), self.entries, 2 * cell + number) for number in range(4)
         )
         rise = next_value - value
         cubic = slope + next_slope - 2 * rise

@@ -43,6 +43,7 @@ from numpy.typing import NDArray
 from realtime.clouds.slab_orders.phases import AnglePhase, SlabPhase
 from realtime.droplets import CUT
 from realtime.numerics.array_types import ArrayTypes
+from realtime.numerics.functions import cell_of
 from realtime.scene.phase import Phase
 
 #: First and last order of each set.
@@ -191,11 +192,10 @@ def around(places: tuple[Any, ...], sides: tuple[int, ...], first: Any = 0) -> l
     base: Any = mi.UInt32(first)
     pairs: list[tuple[Any, Any]] = []
     for axis, (place, side) in enumerate(zip(places, sides, strict=True)):
-        position = dr.clip(place, 0, 1) * (side - 1)
-        cell = dr.minimum(mi.UInt32(position), side - 2)
+        cell, share = cell_of(place * (side - 1), side)
         stride = math.prod(sides[axis + 1 :])
         base += cell * stride
-        pairs.append((position - type(position)(cell), mi.UInt32(stride)))
+        pairs.append((share, mi.UInt32(stride)))
     for first, second in _NETWORKS[len(pairs)]:
         (a, p), (b, q) = pairs[first], pairs[second]
         less = a < b

@@ -21,7 +21,6 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
@@ -32,6 +31,7 @@ from realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
 from realtime.clouds.canonical.transport_grid import Transport, logged, transport_digest
 from realtime.clouds.slab_orders.phases import SlabPhase
 from realtime.numerics.array_types import ArrayTypes
+from realtime.numerics.functions import between_entries
 
 Array = NDArray[Any]
 Progress = Callable[[float, str], None]
@@ -333,7 +333,7 @@ class DeviceFit:
 
     def __call__(self, set_number: int, t, d, mu, cos_phi, sin_phi, mu_l):
         """Return T [1/sr], c_x, c_y, sigma [mean free paths]."""
-        Float, table = type(t), self.tables[set_number]
+        table = self.tables[set_number]
         low, high = np.log(np.array([coordinates.THINNEST, coordinates.THICKEST]) + coordinates.THICKNESS_SHIFT)
         low_sun = coordinates.lowest_sun_coordinate()
         t = dr.clip(t, coordinates.THINNEST, coordinates.THICKEST)
@@ -344,12 +344,12 @@ class DeviceFit:
         at_sun = (dr.sqrt(dr.asin(sun) * (2 / np.pi)) - low_sun) / (1 - low_sun)
         at_mu = _direction_share(dr.clip(mu, -1, 1))
         cosine = dr.fma(dr.safe_sqrt((1 - mu * mu) * (1 - sun * sun)), cos_phi, -mu * sun)
-        (p,) = _along(Float, table["p"], [(dr.safe_acos(cosine) / np.pi, _ANGLES)], 1)
+        (p,) = between_entries(table["p"], [(dr.safe_acos(cosine) / np.pi, _ANGLES)], 1)
         direction, height = (at_mu, _DIRECTIONS), (at_sun, _SUNS)
-        log_a, b1, c, shift = _along(Float, table["of_directions"], [(at_t, _THICKNESSES), direction], 4)
-        log_x, b2 = _along(Float, table["of_suns"], [(at_t, _THICKNESSES), height], 2)
-        e, f, g, h, i, j, k, ell, m = _along(Float, table["collector"], [direction], 9)
-        (n,) = _along(Float, table["n"], [direction, height], 1)
+        log_a, b1, c, shift = between_entries(table["of_directions"], [(at_t, _THICKNESSES), direction], 4)
+        log_x, b2 = between_entries(table["of_suns"], [(at_t, _THICKNESSES), height], 2)
+        e, f, g, h, i, j, k, ell, m = between_entries(table["collector"], [direction], 9)
+        (n,) = between_entries(table["n"], [direction, height], 1)
         b = b1 - b2
         ratio = dr.log(d + shift) / dr.log(dr.maximum(b + shift, _LEAST_SUM))
         T = p * mu_l * ratio * dr.exp(dr.clip(log_a + log_x, -200, 50) - 0.5 * dr.square((d - b) / c))
@@ -359,21 +359,3 @@ class DeviceFit:
         o, q, r, s, big_t = self.spreads[set_number]
         sigma = o + q * t * dr.log(1 + r * d) + s * dr.log(1 + big_t * t)
         return dr.select(mu_l > 0, T, 0), c_x, c_y, dr.maximum(sigma, 1e-3)
-
-
-def _along(Float, table, places: list[tuple[Any, int]], width: int) -> list[Any]:
-    """Return the numbers of a table, linear between entries along one or two coordinates from 0 to 1."""
-    corners = [(mi.UInt32(0), Float(1))]
-    for share, count in places:
-        position = dr.clip(share, 0, 1) * (count - 1)
-        cell = dr.minimum(mi.UInt32(position), count - 2)
-        weight = position - Float(cell)
-        corners = [
-            (index * count + cell + step, part * (weight if step else 1 - weight))
-            for index, part in corners
-            for step in (0, 1)
-        ]
-    return [
-        sum(part * dr.gather(Float, table, index * width + number) for index, part in corners)
-        for number in range(width)
-    ]

@@ -46,6 +46,7 @@ from realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
 from realtime.clouds.slab_orders.phases import SlabPhase
 from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes, four_numbers
+from realtime.numerics.functions import between_entries
 
 Array = NDArray[Any]
 Progress = Callable[[float, str], None]
@@ -277,7 +278,9 @@ class TransportGrid:
         sigma = dr.exp(log_sigma)
         cosine = dr.fma(dr.safe_sqrt((1 - mu * mu) * (1 - sun * sun)), cos_phi, -mu * sun)
         dimmed = dr.clip(mu_l / coordinates.LOWEST_SUN, 0, 1) * dr.minimum(t / coordinates.THINNEST, 1)
-        T = _scattered_at(self.angular, number * ENTRIES, cosine) * _passed(t, d, mu) * dr.exp(source) * dimmed
+        angle = dr.safe_acos(cosine) * dr.inv_pi
+        (scattered,) = between_entries(self.angular, [(angle, ENTRIES)], first=number)
+        T = scattered * _passed(t, d, mu) * dr.exp(source) * dimmed
         return T, x * sigma, dr.mulsign(y, sin_phi) * sigma, sigma
 
 
@@ -287,15 +290,6 @@ def _between(kind: Any, table: Any, number: Any, places: Sequence[Any], sides: t
     for index, weight in around(tuple(places), sides, number * math.prod(sides)):
         total = dr.fma(dr.gather(kind, table, index), weight, total)
     return total
-
-
-def _scattered_at(table: Any, first: Any, cosine: Any) -> Any:
-    """Return P_s, linear in the angle; `first` is the index of its first entry in the table."""
-    Float = type(cosine)
-    position = dr.safe_acos(cosine) * ((ENTRIES - 1) * dr.inv_pi)
-    cell = dr.minimum(mi.UInt32(position), ENTRIES - 2)
-    low, high = (dr.gather(Float, table, first + cell + offset) for offset in (0, 1))
-    return dr.lerp(low, high, position - Float(cell))
 
 
 def _passed(t: Any, d: Any, mu: Any) -> Any:

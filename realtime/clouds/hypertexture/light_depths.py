@@ -24,6 +24,7 @@ from realtime.clouds.bounds import CloudSurfaces
 from realtime.clouds.hypertexture.march import march, marched_depths, middle_density, voxel
 from realtime.clouds.single_scattering import exact_leg
 from realtime.numerics.array_types import Metres, bytes_of
+from realtime.numerics.functions import cell_of
 from realtime.scene.lights import Light
 from realtime.scene.media.bounded import Clouds
 from realtime.shadow_maps.projection import Projection, light_projection
@@ -48,25 +49,18 @@ class LightDepths:
         """Return l of points [m]."""
         u, v, height, _ = self.projection.homogeneous(mi.UInt32(0), point - self.position, 1)
         Float = type(height)
-        (column, x), (row, y) = (_cell(dr.fma(0.5 * self.size, place + 1, -0.5), self.size, Float) for place in (u, v))
+        (column, x), (row, y) = (cell_of(dr.fma(0.5 * self.size, place + 1, -0.5), self.size) for place in (u, v))
         total = Float(0)
         for down, weight_down in ((0, 1 - y), (1, y)):
             for along, weight_along in ((0, 1 - x), (1, x)):
                 texel = (row + down) * self.size + column + along
                 front, back = (dr.gather(Float, own, texel, active) for own in (self.front, self.back))
                 share = dr.clip((front - height) / dr.maximum(front - back, 1e-20), 0, 1)
-                layer, between = _cell(dr.sqrt(share) * self.layers, self.layers + 1, Float)
+                layer, between = cell_of(dr.sqrt(share) * self.layers, self.layers + 1)
                 first = texel * (self.layers + 1) + layer
                 near, far = (dr.gather(Float, self.lengths, place, active) for place in (first, first + 1))
                 total = dr.fma(weight_down * weight_along, dr.lerp(near, far, between), total)
         return total
-
-
-def _cell(place, count: int, Float) -> tuple[Any, Any]:
-    """Return the number of the entry before a place, at most the last but one, and the share of the way to the next."""
-    inside = dr.clip(place, 0, count - 1)
-    number = dr.minimum(mi.UInt32(inside), count - 2)
-    return number, inside - Float(number)
 
 
 def light_depths(

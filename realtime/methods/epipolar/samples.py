@@ -17,6 +17,7 @@ import mitsuba as mi
 
 from realtime.methods.epipolar.slices import Slices, neighbour, pixel_number, slice_coordinate
 from realtime.numerics.array_types import four_numbers
+from realtime.numerics.functions import cell_of
 
 WORD = 32  #: samples to a word of bits
 STEPS = (1, 2, 4, 8, 16, 32)
@@ -143,9 +144,7 @@ def _on_slice(samples: Samples, values, number, point, depth):
     i, j = ends.z - ends.x, ends.w - ends.y
     length = dr.maximum(i * i + j * j, 1e-10)
     along = ((point[0] - ends.x) * i + (point[1] - ends.y) * j) * ((samples.count - 1) / length)
-    along = dr.clip(along, 0, samples.count - 1)
-    k = dr.minimum(mi.UInt32(along), samples.count - 2)
-    share = along - type(along)(k)
+    k, share = cell_of(along, samples.count)
     left, right = _marked_about(samples, number, k)
     left_value, right_value = (dr.gather(type(values), values, number * samples.count + at) for at in (left, right))
     has_left, has_right = (_first(value) >= 0 for value in (left_value, right_value))
