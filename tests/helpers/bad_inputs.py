@@ -3,7 +3,7 @@
 
     python -m tests.helpers.bad_inputs [KIND ...]
 
-prints a line for each input, and the counts. Each input has a process of its own, which does all that users do with a
+prints what is wrong. Each input has a process of its own, which does all that users do with a
 scene. A process that ends by a signal, a traceback, and anything that is not finite in a file or in JSON that was
 written with status 0 are faults; so is a refusal without a word on what is wanted.
 """
@@ -257,8 +257,8 @@ def _finite_file(path: Path) -> bool:
     return all(np.isfinite(layer).all() for image in images for layer in image.layers.values())
 
 
-def _fault(order: list[str]) -> tuple[str, str]:
-    """Run a command in this process; return its status in words, and what is wrong with it, if anything."""
+def _fault(order: list[str]) -> str:
+    """Run a command in this process; return what is wrong with it, if anything."""
     from reports.commands.main import run
 
     output, errors = io.StringIO(), io.StringIO()
@@ -272,25 +272,25 @@ def _fault(order: list[str]) -> tuple[str, str]:
         try:
             status = run(order)
         except BaseException:  # a traceback, whatever it is of
-            return "traceback", traceback.format_exc()
+            return traceback.format_exc()
     said = errors.getvalue()
     if told:
-        return str(status), f"warning: {told[0].message}"
+        return f"warning: {told[0].message}"
     if status == 0:
         if "--json" in order:
             try:
                 json.loads(output.getvalue(), parse_constant=lambda word: 1 / 0)
             except ZeroDivisionError:
-                return "0", "JSON is not finite"
+                return "JSON is not finite"
         if written is not None and not _finite_file(written):
-            return "0", f"{written.name} is not finite"
+            return f"{written.name} is not finite"
     elif status == 2 and not any(
         word in said for word in ("wanted", "move", "give", "use ", "reference ", "cannot", "finite", "mend")
     ):
-        return "2", f"says nothing of what is wanted: {said}"
+        return f"says nothing of what is wanted: {said}"
     elif status not in (1, 2):
-        return str(status), said
-    return str(status), ""
+        return f"status {status}: {said}"
+    return ""
 
 
 def _child(kind: str, path: Path, report: Path) -> None:
@@ -307,13 +307,13 @@ def _child(kind: str, path: Path, report: Path) -> None:
     for order in _orders(kind, path):
         if order[0] == "compare" and not all(Path(image).is_file() for image in order[1:3]):
             continue
-        status, fault = _fault(order)
-        with report.open("a") as file:  # what was done before a crash is kept
-            file.write(json.dumps([order[0], " ".join(order[2:]), status, fault]) + "\n")
+        if fault := _fault(order):
+            with report.open("a") as file:  # what was found before a crash is kept
+                file.write(f"{' '.join(order)}: {' '.join(fault.split())}\n")
 
 
-def outcomes(kind: str) -> Iterator[tuple[str, list[list[str]], str]]:
-    """Yield for each input of a kind its name, what the commands did, and how the process ended otherwise than by 0."""
+def faults(kind: str) -> Iterator[str]:
+    """Yield what is wrong with the commands on each input of a kind, and processes that ended otherwise than by 0."""
     with tempfile.TemporaryDirectory() as place:
         for number, (name, text) in enumerate(KINDS[kind](Path(place))):
             folder = Path(place) / f"input-{number}"
@@ -330,27 +330,16 @@ def outcomes(kind: str) -> Iterator[tuple[str, list[list[str]], str]]:
                     os._exit(0)
                 os._exit(70)
             ended = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
-            lines = report.read_text().split("\n") if report.is_file() else []
-            done = [json.loads(line) for line in lines if line]
-            yield name, done, "" if ended == 0 else f"ended by {ended} after {len(done)} commands"
-
-
-def main(kinds: list[str]) -> int:
-    """Print what became of all inputs of some kinds; return 1 if there was a fault."""
-    faults = inputs = commands = refused = 0
-    for kind in kinds or list(KINDS):
-        for name, done, ended in outcomes(kind):
-            wrong = [f"{order[:40]}: {fault}" for order, _, _, fault in done if fault] + ([ended] if ended else [])
-            statuses = "".join(status if len(status) == 1 else "T" for _, _, status, _ in done)
-            inputs, commands, refused = inputs + 1, commands + len(done), refused + statuses.count("2")
-            faults += bool(wrong)
-            print(f"{kind}: {name}: {statuses}{' FAULT ' if wrong else ''}{' | '.join(wrong)}", flush=True)
-    print(f"{inputs} inputs, {commands} commands, {refused} refusals, {faults} inputs with faults")
-    return int(faults > 0)
+            if report.is_file():
+                yield from (f"{name}: {line}" for line in report.read_text().splitlines())
+            if ended:
+                yield f"{name}: ended by {ended}"
 
 
 if __name__ == "__main__":
     import mitsuba  # noqa: F401 - once, before the children
     import scipy.stats  # noqa: F401
 
-    sys.exit(main(sys.argv[1:]))
+    found = [fault for kind in sys.argv[1:] or KINDS for fault in faults(kind)]
+    print(*found, sep="\n")
+    sys.exit(bool(found))
