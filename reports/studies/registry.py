@@ -20,6 +20,7 @@ STUDIES = {
     "polynomials": "series",
     "convergence": "estimators",
     "z-distribution": "estimators",
+    "motion": "motion",
     "transmittance": "transmittance",
     "slab": "clouds",
 }

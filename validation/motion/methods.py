@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Methods under a light that moves: the frames of each against the reference of each frame.
+
+In a sweep the lights circle as in the animation of the scene; in a step they stand for `BEFORE` frames, then jump. A
+method that keeps something of its last frames gets it, as in `airlight render --frames`.
+"""
+
+from collections.abc import Callable, Sequence
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from realtime.scene.read_scene import Scene, read_scene
+from validation.estimates.quadrature import truth_image
+from validation.motion.judge import motion_verdict
+from validation.motion.measures import Measures, measure
+from validation.motion.measures import Sequence as Frames
+from validation.scenes.animation import animate, frame_changes
+from validation.scenes.changes import change_scene
+from validation.scenes.registry import Animation
+from validation.study.configuration import Configuration, prepared
+from validation.study.frame_times import timed_image
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, int, str], None]
+
+USUAL = (
+    Configuration("shadow-planes", "exact"),
+    Configuration("froxel-fog", None),
+    Configuration("froxel-fog", None, (("history", 0.9),)),
+)
+BEFORE = 8  #: frames at rest before a step
+_JUMP = 12  # of a turn, that a step is
+
+
+def method_motion(
+    scene: Any,
+    animation: Animation,
+    configurations: Sequence[Configuration],
+    *,
+    stimulus: str = "sweep",
+    frames: int = 24,
+    turn: int = 120,
+    progress: Progress | None = None,
+) -> list[dict[str, Any]]:
+    """Return a row for each configuration: its name, its measures by name, and the verdict.
+
+    `scene`: the `mi.Scene`, at its own size; `animation`: that of the scene, of which the lights move; `turn`: frames
+    of a whole turn of a sweep. Raises InputError for a scene whose lights do not move, and too few frames.
+    """
+    least = BEFORE + 2 if stimulus == "step" else 3
+    if frames < least:
+        raise InputError(f"frames: got {frames}, wanted at least {least} for a {stimulus}")
+    read = read_scene(scene)
+    moves = Animation(moves=("light",), about=animation.about)
+    places = list(islice(animate(read, moves, turn), frames)) if stimulus == "sweep" else _step(read, moves, frames)
+    changes = [frame_changes(each, moves) for each in places]
+    if any(change is None or not change for change in changes):
+        raise InputError("motion: the scene has lights with extent, which do not circle; wanted a scene without")
+    total = frames * (1 + len(configurations))
+    references: list[Array] = []
+    for number, change in enumerate(changes):
+        if progress is not None:
+            progress(number, total, "references")
+        change_scene(scene, change or {})
+        references.append(truth_image(scene).airlight)
+    change_scene(scene, changes[0] or {})
+    rows = []
+    for number, chosen in enumerate(configurations):
+        if progress is not None:
+            progress(frames * (1 + number), total, chosen.label)
+        found = _measured(read, chosen, places, references)
+        words = "the reference is dark" if found is None else motion_verdict(found).words
+        rows.append({"label": chosen.label, "verdict": words} | ({} if found is None else found.to_json()))
+    return rows
+
+
+def _step(read: Scene, moves: Animation, frames: int) -> list[Scene]:
+    before, after = islice(animate(read, moves, _JUMP), 2)
+    return [before] * BEFORE + [after] * (frames - BEFORE)
+
+
+def _measured(
+    read: Scene, chosen: Configuration, places: Sequence[Scene], references: Sequence[Array]
+) -> Measures | None:
+    renderer, kept, images = prepared(read, chosen), None, []
+    for place, last in zip(places, (None, *places), strict=False):
+        still = {"camera_moved": False, "geometry_moved": False, "light_moved": place is not last}
+        frame, kept, _ = timed_image(renderer, place, kept, **still)
+        images.append(np.asarray(frame.airlight, dtype=np.float64))
+    everywhere = np.ones(references[0].shape[:2], dtype=bool)
+    return measure(Frames(len(images), images.__getitem__, references.__getitem__, lambda n: everywhere))
