@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from reference.scene.density_grid import grid_values
 
 Array = NDArray[np.float64]
 
@@ -66,15 +67,7 @@ def read_cloud_density(shape: Any, name: str) -> CloudDensity:
     for key, what in (("sigma_t.data", "a grid as its extinction"), ("albedo.value.value", "one albedo everywhere")):
         if key not in parameters:
             raise InputError(f"{name} is heterogeneous without {what}; the truth of clouds wants one")
-    values = np.array(parameters["sigma_t.data"], dtype=np.float64)
-    if values.ndim > 3 and values.shape[3] != 1:
-        raise InputError(f"{name} has a grid of {values.shape[3]} channels; wanted a grid of one: grey extinction")
-    scale = float(np.array(parameters["scale"]).ravel()[0])
-    if not np.all(np.isfinite(values)) or values.min() < 0 or not (np.isfinite(scale) and scale >= 0):
-        raise InputError(f"{name} has densities below 0 or not finite; wanted finite ones of 0 or more")
-    if not values.max() * scale > 0:
-        raise InputError(f"{name} has a grid that is 0 everywhere; wanted densities above 0, or no cloud")
-    low, high = _box(medium, shape)
+    values, low, high = grid_values(medium, name)
     box = shape.bbox()
     margin = _BEYOND * (high - low)
     if np.any(np.array(box.min).ravel() < low - margin) or np.any(np.array(box.max).ravel() > high + margin):
@@ -83,23 +76,8 @@ def read_cloud_density(shape: Any, name: str) -> CloudDensity:
             "a to_world of the volume whose unit cube holds the shape"
         )
     voxel = float(((high - low) / values.shape[2::-1]).min())
-    return CloudDensity(medium, float(values.max()) * scale, voxel)
+    return CloudDensity(medium, float(values.max()), voxel)
 
 
 def _words(point: Array) -> str:
     return f"({', '.join(f'{x:.6g}' for x in point)})"
-
-
-def _box(medium: Any, shape: Any) -> tuple[Array, Array]:
-    """Return the corners of the box of the volume of a medium [m], as rays through the shape's middle find it."""
-    box = shape.bbox()
-    low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (box.min, box.max))
-    middle, corners = 0.5 * (low + high), np.empty((2, 3))
-    for axis in range(3):
-        way = mi.Vector3f(*np.eye(3)[axis].tolist())
-        meets, near, far = medium.intersect_aabb(mi.Ray3f(mi.Point3f(*middle.tolist()), way))
-        inside = bool(meets[0])
-        corners[:, axis] = middle[axis] + np.array([float(near[0]), float(far[0])]) if inside else np.nan
-    if not np.all(np.isfinite(corners)):
-        return middle, middle
-    return corners[0], corners[1]

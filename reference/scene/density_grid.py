@@ -65,19 +65,12 @@ def is_grid(medium) -> bool:
 
 
 def read_grid(medium, albedo: Array, phase: PhaseFunction) -> GridMedium:
-    """Read a grid; its albedo, RGB, and its phase function were read.
+    """Read a grid around the camera; its albedo, RGB, and its phase function were read.
 
-    Raises InputError for a grid of several channels, values below 0 or not finite, and one that Mitsuba reads otherwise
-    than `GridMedium`.
+    Raises InputError for what `grid_values` refuses, and for a grid that Mitsuba reads otherwise than `GridMedium`.
     """
-    name, parameters = f"medium '{medium.id()}'", mi.traverse(medium)
-    values = np.array(parameters["sigma_t.data"], dtype=np.float64)
-    if values.ndim > 3 and values.shape[3] != 1:
-        raise InputError(f"{name} has a grid of {values.shape[3]} channels; wanted a grid of one: grey extinction")
-    values = values.reshape(values.shape[:3]) * float(parameters["scale"])
-    if not (np.isfinite(values).all() and values.min() >= 0 and values.max() > 0):
-        raise InputError(f"{name} has a grid with values below 0 or not finite, or 0 alone; wanted extinctions [1/m]")
-    low, high = _box(medium)
+    name = f"medium '{medium.id()}'"
+    values, low, high = grid_values(medium, name)
     largest = np.full(3, values.max())
     grid = GridMedium(values=values, low=low, high=high, albedo=albedo, phase=phase, largest=largest, plugin=medium)
     share = np.random.default_rng(1).random((_PLACES, 3))
@@ -91,6 +84,24 @@ def read_grid(medium, albedo: Array, phase: PhaseFunction) -> GridMedium:
             "'gridvolume' with filter_type 'trilinear', wrap_mode 'clamp' and a to_world that scales and moves alone"
         )
     return grid
+
+
+def grid_values(medium: Any, name: str) -> tuple[Array, Array, Array]:
+    """Return the extinctions of a medium with a grid, (z, y, x) [1/m], and the corners of its box, (3,) [m].
+
+    Messages call it by `name`. Raises InputError for a grid of several channels, and for values that are not finite,
+    below 0, or 0 alone.
+    """
+    parameters = mi.traverse(medium)
+    values = np.array(parameters["sigma_t.data"], dtype=np.float64)
+    if values.ndim > 3 and values.shape[3] != 1:
+        raise InputError(f"{name} has a grid of {values.shape[3]} channels; wanted a grid of one: grey extinction")
+    values = values.reshape(values.shape[:3]) * float(np.array(parameters["scale"]).ravel()[0])
+    if not np.isfinite(values).all() or values.min() < 0:
+        raise InputError(f"{name} has densities below 0 or not finite; wanted finite ones of 0 or more")
+    if not values.max() > 0:
+        raise InputError(f"{name} has a grid that is 0 everywhere; wanted densities above 0 somewhere")
+    return values, *_box(medium)
 
 
 def _box(medium: Any) -> tuple[Array, Array]:
