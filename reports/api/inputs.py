@@ -80,7 +80,8 @@ def one_error(function: Callable[_P, _R]) -> Callable[_P, _R]:
 def scene_names() -> tuple[str, ...]:
     """Return the names of the built-in scenes, without Mitsuba, which their registry imports."""
     files = (Path(__file__).resolve().parents[2] / "validation" / "scenes").glob("*.toml")
-    return tuple(sorted(name for file in files for name in tomllib.loads(file.read_text(encoding="utf-8"))))
+    tables = (item for file in files for item in tomllib.loads(file.read_text(encoding="utf-8")).items())
+    return tuple(sorted(name for name, table in tables if "purpose" in table))  # parameters of engines have none
 
 
 def several(things: Any) -> list[Any]:
