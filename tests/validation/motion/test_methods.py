@@ -24,7 +24,7 @@ def test_froxels_with_history_lag_and_planes_do_not(variant):
 
 
 def test_what_does_not_move_is_refused(variant):
-    loaded = load_scene("windows", (16, 12))
+    loaded = load_scene("penumbra-plane", (16, 12))
     with pytest.raises(InputError, match="lights with extent"):
         method_motion(loaded.scene, loaded.animation, USUAL[:1])
     with pytest.raises(InputError, match="wanted at least 10 for a step"):
