@@ -87,21 +87,9 @@ def read_parameters(
 ) -> Any:
     """Return the parameters of a method from values or words, the others with their defaults.
 
-    Parameters
-    ----------
-    method
-        Its name, for messages.
-    kind
-        The class of its parameters.
-    given
-        Values by name; a word is converted to the type of the default.
-    others
-        Names that are known elsewhere, for messages.
-
-    Raises
-    ------
-    InputError
-        For an unknown name (the nearest is named), a value of the wrong type, and what `Parameters` refuses.
+    `method`: its name, for messages; `kind`: the class of its parameters; `given`: values by name; a word is converted
+    to the type of the default; `others`: names that are known elsewhere, for messages. Raises InputError for an unknown
+    name (the nearest is named), a value of the wrong type, and what `Parameters` refuses.
     """
     known = defaults(kind)
     converted = {}

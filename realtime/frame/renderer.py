@@ -134,26 +134,12 @@ def frame_renderer(
 ) -> FrameRenderer:
     """Prepare the stages of a frame.
 
-    Parameters
-    ----------
-    scene
-        From `realtime.scene.read_scene.read_scene`.
-    method
-        A real-time method.
-    kernel
-        An airlight kernel function; needed where `method.uses_kernel` says so.
-    extra_layers
-        Whether frames have the further layers that the method names; in a scene with area lights they have not. In
-        others all lights are in one group then.
-    parameters
-        Values of the method's parameters, and of `realtime.area_lights.points.LightPoints`; the others have their
-        defaults.
-
-    Raises
-    ------
-    InputError
-        For a parameter that the method does not have, where a kernel is missing, and for what the method refuses of the
-        scene; what it or the kernel refuses of the rays comes with the first frame.
+    `scene`: from `realtime.scene.read_scene.read_scene`; `method`: a real-time method; `kernel`: an airlight kernel
+    function; needed where `method.uses_kernel` says so; `extra_layers`: whether frames have the further layers that the
+    method names; in a scene with area lights they have not. In others all lights are in one group then; `parameters`:
+    values of the method's parameters, and of `realtime.area_lights.points.LightPoints`; the others have their defaults.
+    Raises InputError for a parameter that the method does not have, where a kernel is missing, and for what the method
+    refuses of the scene; what it or the kernel refuses of the rays comes with the first frame.
     """
     chosen, light_points = method_parameters(method, parameters)
     if chosen.uses_kernel and kernel is None:
@@ -284,23 +270,11 @@ def _stages(renderer: FrameRenderer, scene: Scene, kernel: Any, *, alone: bool) 
 def _composed(layers: Layers, by_light: tuple[PerRay, ...], *, alone: bool):
     """Return what a frame makes of layers, by the formula of `realtime.methods.interface.method`.
 
-    Parameters
-    ----------
-    layers
-        Of a method.
-    by_light
-        The radiance of the surfaces by light where the layers have a visibility, otherwise their sum alone.
-    alone
-        Whether there is no other group of lights.
-
-    Returns
-    -------
-    airlight, surface
-        In-scattered radiance, and that from behind it [W/(m^2 sr)]; None where that is the shaded surface as it is.
-    beyond
-        The background through the layers, which is no light's own; None where there is none, or it is in `surface`.
-    extra, carried
-        As the layers have them.
+    `layers`: of a method; `by_light`: the radiance of the surfaces by light where the layers have a visibility,
+    otherwise their sum alone; `alone`: whether there is no other group of lights. Returns `airlight`, `surface`:
+    in-scattered radiance, and that from behind it [W/(m^2 sr)]; None where that is the shaded surface as it is;
+    `beyond`: the background through the layers, which is no light's own; None where there is none, or it is in
+    `surface`; `extra`, `carried`: as the layers have them.
     """
     surface, beyond = None, layers.background
     if layers.visibility is not None:
@@ -406,14 +380,8 @@ def _shaded(renderer: FrameRenderer, group: LightGroup, cast: Cast):
 def run_method(renderer: FrameRenderer, state, cast: Cast, by_light, carried: Any = None) -> Rendered:
     """Run the method for all groups of lights.
 
-    Parameters
-    ----------
-    renderer, state
-        The frame, and what its `prepare` returned.
-    cast, by_light
-        From `run_cast_and_shade`.
-    carried
-        What the method handed on from the last frame; None for the first.
+    `renderer`, `state`: the frame, and what its `prepare` returned; `cast`, `by_light`: from `run_cast_and_shade`;
+    `carried`: what the method handed on from the last frame; None for the first.
     """
     groups, sums, scales = light_groups(renderer), None, dict[int | None, Any]()
     if renderer.sphere_scales is not None:

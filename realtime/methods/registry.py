@@ -40,16 +40,9 @@ FOG_METHODS: dict[str, type[Method]] = {name: method for name, method in METHODS
 def find_method(name: str) -> type[Method]:
     """Return a method.
 
-    Parameters
-    ----------
-    name
-        A name of `METHODS`, or a user's own: 'module:function', 'path/to/file.py:function'
-        (`realtime.methods.user_method`).
-
-    Raises
-    ------
-    InputError
-        For an unknown name (the nearest is named), and for what cannot be imported or is no method.
+    `name`: a name of `METHODS`, or a user's own: 'module:function', 'path/to/file.py:function'
+    (`realtime.methods.user_method`). Raises InputError for an unknown name (the nearest is named), and for what cannot
+    be imported or is no method.
     """
     if name in METHODS:
         return METHODS[name]

@@ -45,10 +45,7 @@ class ShadowMap:
 def check_size(size) -> None:
     """Refuse a resolution that no shadow map can have.
 
-    Raises
-    ------
-    InputError
-        If `size` is not a power of two from 4 to 8192.
+    Raises InputError if `size` is not a power of two from 4 to 8192.
     """
     if not isinstance(size, int) or size < 4 or size > 8192 or size & (size - 1):
         raise InputError(f"map: got {size!r}, wanted a power of two from 4 to 8192")
@@ -74,19 +71,8 @@ def check_maps(lights: Sequence[Light], size: int, needed: int | None = None) ->
 def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
     """Cast the shadow map of one light.
 
-    Parameters
-    ----------
-    scene
-        The Mitsuba scene that holds the occluders.
-    light
-        The light.
-    size
-        Texels on a side, a power of two.
-
-    Raises
-    ------
-    InputError
-        If `size` is not a power of two from 4 to 8192.
+    `scene`: the Mitsuba scene that holds the occluders; `light`: the light; `size`: texels on a side, a power of two.
+    Raises InputError if `size` is not a power of two from 4 to 8192.
     """
     check_size(size)
     Double = mi.Float64
@@ -130,17 +116,8 @@ def tiled_corners(faces: int, side: int):
 def texel_rays(light: Light, size: int) -> tuple[Any, Any, Any]:
     """Return the rays of a directional light through the middles of the texels of its map, in squares of 4 x 4.
 
-    Parameters
-    ----------
-    light
-        A directional light with an extent.
-    size
-        Texels on a side, a multiple of 4.
-
-    Returns
-    -------
-    tuple
-        Where the rays start [m] and their unit direction, in float64, and the numbers of their texels, row by row.
+    `light`: a directional light with an extent; `size`: texels on a side, a multiple of 4. Returns where the rays start
+    [m] and their unit direction, in float64, and the numbers of their texels, row by row.
     """
     _, row, column = tiled_corners(1, size)
     u, v = (dr.fma(mi.Float64(texel), 2.0 / size, 1.0 / size - 1) for texel in (column, row))
@@ -150,16 +127,8 @@ def texel_rays(light: Light, size: int) -> tuple[Any, Any, Any]:
 def cast_map_rays(scene, light: Light, place, active=True):
     """Return the distances to the first surface along rays of a light's map, infinite where there is none [m].
 
-    Parameters
-    ----------
-    scene
-        The Mitsuba scene that holds the occluders.
-    light
-        The light.
-    place
-        The face and u and v there, in float64.
-    active
-        Lanes to cast rays in.
+    `scene`: the Mitsuba scene that holds the occluders; `light`: the light; `place`: the face and u and v there, in
+    float64; `active`: lanes to cast rays in.
     """
     Float = type(light.position.x)
     start, unit = map_ray(light, *place)

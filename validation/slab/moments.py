@@ -78,22 +78,9 @@ class _Fields:
 class SlabOrders:
     """The orders of one slab under one beam.
 
-    Parameters
-    ----------
-    tau
-        Thickness [mean free paths].
-    mu0
-        Cosine of the zenith angle of the beam.
-    phase
-        The phase function.
-    albedo
-        In [0, 1].
-    depths
-        Depths in [0, tau] where moments are wanted besides 0 and tau.
-    streams
-        N, in each hemisphere.
-    nodes
-        Of each panel of depth.
+    `tau`: thickness [mean free paths]; `mu0`: cosine of the zenith angle of the beam; `phase`: the phase function;
+    `albedo`: in [0, 1]; `depths`: depths in [0, tau] where moments are wanted besides 0 and tau; `streams`: N, in each
+    hemisphere; `nodes`: of each panel of depth.
     """
 
     def __init__(

@@ -57,22 +57,10 @@ _B, _A, _C = 0, 1, 3
 class DirectionalMoments:
     """Slabs of one medium, seen from some directions.
 
-    Parameters
-    ----------
-    phase, albedo
-        Of the medium.
-    mu
-        (V,), cosines of the directions, positive upwards, not 0.
-    streams
-        N, in each hemisphere.
-    modes
-        The largest mode of the azimuth.
-    nodes
-        Of each panel of depth.
-    negligible
-        A mode is followed no more where its radiance is below this share of the mean's everywhere.
-    single
-        Whether fields are float32.
+    `phase`, `albedo`: of the medium; `mu`: (V,), cosines of the directions, positive upwards, not 0; `streams`: N, in
+    each hemisphere; `modes`: the largest mode of the azimuth; `nodes`: of each panel of depth; `negligible`: a mode is
+    followed no more where its radiance is below this share of the mean's everywhere; `single`: whether fields are
+    float32.
     """
 
     def __init__(

@@ -51,30 +51,14 @@ _DIM = 1e-3  #: of all sets' light, below which a collector does not count
 
 @dataclass(frozen=True)
 class FittedSet:
-    """The functions of one set.
+    """The functions of one set."""
 
-    Parameters
-    ----------
-    p
-        (angles,), at even scattering angles.
-    of_directions
-        (thicknesses, directions, 4): log A, B1, C, D.
-    of_suns
-        (thicknesses, suns, 2): log X, B2.
-    collector
-        (directions, 9): E to M.
-    n
-        (directions, suns): N.
-    spread
-        (5,): O, Q, R, S, T.
-    """
-
-    p: Array
-    of_directions: Array
-    of_suns: Array
-    collector: Array
-    n: Array
-    spread: Array
+    p: Array  #: (angles,), at even scattering angles
+    of_directions: Array  #: (thicknesses, directions, 4): log A, B1, C, D
+    of_suns: Array  #: (thicknesses, suns, 2): log X, B2
+    collector: Array  #: (directions, 9): E to M
+    n: Array  #: (directions, suns): N
+    spread: Array  #: (5,): O, Q, R, S, T
 
 
 @dataclass(frozen=True)

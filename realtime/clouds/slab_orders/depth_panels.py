@@ -34,18 +34,10 @@ _CONVOLUTION_NODES = 48
 
 @dataclass(frozen=True)
 class DepthPanels:
-    """A grid of depth: panels with Gauss-Legendre nodes.
+    """A grid of depth: panels with Gauss-Legendre nodes."""
 
-    Parameters
-    ----------
-    edges
-        (P + 1,), increasing from 0 to the thickness of the slab [mean free paths].
-    nodes
-        (P, K), depths of the nodes.
-    """
-
-    edges: Array
-    nodes: Array
+    edges: Array  #: (P + 1,), increasing from 0 to the thickness of the slab [mean free paths]
+    nodes: Array  #: (P, K), depths of the nodes
 
     @property
     def depths(self) -> Array:
@@ -85,12 +77,7 @@ def depth_panels(
 class Transport:
     """Light from a source to all depths of a slab, for some directions.
 
-    Parameters
-    ----------
-    panels
-        The grid.
-    mu
-        (J,) cosines, positive upwards, none of them 0.
+    `panels`: the grid; `mu`: (J,) cosines, positive upwards, none of them 0.
     """
 
     def __init__(self, panels: DepthPanels, mu: Array):

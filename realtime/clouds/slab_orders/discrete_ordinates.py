@@ -42,18 +42,8 @@ LARGEST_ALBEDO = 1 - 1e-12
 class Eigenmodes:
     """The discrete-ordinate equations of one mode of the azimuth, decoupled.
 
-    Parameters
-    ----------
-    streams
-        The directions.
-    m
-        The mode.
-    albedo
-        In [0, 1].
-    moments
-        (2 N,), of the phase function less its peak.
-    peak
-        Share of the scattered light that goes on in its direction.
+    `streams`: the directions; `m`: the mode; `albedo`: in [0, 1]; `moments`: (2 N,), of the phase function less its
+    peak; `peak`: share of the scattered light that goes on in its direction.
     """
 
     def __init__(self, streams: Streams, m: int, *, albedo: float, moments: Array, peak: float):

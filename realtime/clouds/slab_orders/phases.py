@@ -49,18 +49,10 @@ class HenyeyGreensteinPhase:
 
 @dataclass(frozen=True, eq=False)
 class AnglePhase:
-    """A function of the scattering angle, divided by its mean.
+    """A function of the scattering angle, divided by its mean."""
 
-    Parameters
-    ----------
-    heights
-        Takes angles [rad], (A,), and returns values that are not negative, in any unit.
-    breaks
-        Angles in [0, pi] where the function has a jump or a kink [rad], the ends among them.
-    """
-
-    heights: Callable[[Array], Array]
-    breaks: Array
+    heights: Callable[[Array], Array]  #: takes angles [rad], (A,); values are not negative, in any unit
+    breaks: Array  #: angles in [0, pi] where the function has a jump or a kink [rad], the ends among them
 
     @cached_property
     def _nodes(self) -> tuple[Array, Array]:

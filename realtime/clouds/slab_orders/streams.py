@@ -27,16 +27,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Streams:
-    """Cosines and weights of a double-Gauss rule.
+    """Cosines and weights of a double-Gauss rule."""
 
-    Parameters
-    ----------
-    mu, weights
-        (2 N,): first upwards (mu > 0), then downwards; the weights of each hemisphere sum to 1.
-    """
-
-    mu: Array
-    weights: Array
+    mu: Array  #: (2 N,), first upwards (mu > 0), then downwards
+    weights: Array  #: (2 N,), those of each hemisphere sum to 1
 
     @property
     def sines(self) -> Array:
