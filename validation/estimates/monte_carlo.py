@@ -178,7 +178,8 @@ def batch_tracer(
         if estimator == "cloud-paths":
             seen = seen_clouds(clouds).meets
             return layers, lambda seed: cloud_paths_batch(clouds, seed, samples, sets=sets, seen=seen)
-    raise ValueError(f"estimator: got {estimator!r}, which has no max_depth {max_depth} and orders {orders}")
+    given = f"estimator: got {estimator!r} with max_depth {max_depth} and orders {orders}"
+    raise ValueError(f"{given}, wanted one of {', '.join(ESTIMATORS)}")
 
 
 def _has(folder: str, seed: int) -> bool:

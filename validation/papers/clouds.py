@@ -90,7 +90,7 @@ def cloud_frames() -> dict[str, Any]:
     return {name: time_frames(read_scene(load_scene(name, (800, 600)).scene))["light_moved"].rate for name in FRAMES}
 
 
-def time_frames(scene: Scene, *, seconds: float = 1.0) -> dict[str, Timing]:
+def time_frames(scene: Scene) -> dict[str, Timing]:
     """Return the times of a frame with the collectors of the last one: `frame`, and that after the `light_moved`."""
     renderer = frame_renderer(scene, METHODS["cloud-collectors"], **WARM)
     cache = first_frame(renderer)
@@ -99,8 +99,8 @@ def time_frames(scene: Scene, *, seconds: float = 1.0) -> dict[str, Timing]:
         cast, by_light = run_cast_and_shade(renderer)
         dr.eval(run_method(renderer, cache.state, cast, by_light, cache.carried))
 
-    maps = time_repeated(lambda: renderer.prepare(scene), seconds=seconds)
-    frame = time_repeated(work, seconds=seconds)
+    maps = time_repeated(lambda: renderer.prepare(scene), seconds=1.0)
+    frame = time_repeated(work, seconds=1.0)
     moved = (maps.median_ms + frame.median_ms, maps.low_ms + frame.low_ms, maps.high_ms + frame.high_ms)
     return {"frame": frame, "light_moved": Timing(*moved, min(maps.repetitions, frame.repetitions))}
 

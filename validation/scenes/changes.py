@@ -114,9 +114,8 @@ def _checked(name: str, values: Sequence[float], known: Mapping[str, Changeable]
     return tuple(float(value) for value in values)
 
 
-def _point(name: str, value: Array, *, unit: str = "m", direction: bool = False) -> Changeable:
-    least, most = -LARGEST_LENGTH, LARGEST_LENGTH
-    return Changeable(name, _values(value), (3,), least, most, "" if direction else unit, direction)
+def _point(name: str, value: Array, *, direction: bool = False) -> Changeable:
+    return Changeable(name, _values(value), (3,), -LARGEST_LENGTH, LARGEST_LENGTH, "" if direction else "m", direction)
 
 
 def _values(value: Any) -> Values:

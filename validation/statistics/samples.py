@@ -87,9 +87,7 @@ def binomial_interval(successes: int, trials: int, level: float = LEVEL) -> tupl
     return float(interval.low), float(interval.high)
 
 
-def quantile_interval(
-    values: ArrayLike, probability: float, level: float = LEVEL
-) -> tuple[float, float | None, float | None]:
+def quantile_interval(values: ArrayLike, probability: float) -> tuple[float, float | None, float | None]:
     """Return a quantile of a sample and its interval, which is free of any law.
 
     The quantile at p is the least value that at least the share p of the sample does not exceed. The ends of the
@@ -97,7 +95,7 @@ def quantile_interval(
     (n,) with n > 0, is too small for an end. Infinities are values.
     """
     sample = np.asarray(values, dtype=np.float64)
-    interval = quantile_test(sample, p=probability).confidence_interval(level)
+    interval = quantile_test(sample, p=probability).confidence_interval(LEVEL)
     low, high = (None if np.isnan(end) else float(end) for end in interval)
     return float(np.quantile(sample, probability, method="inverted_cdf")), low, high
 
