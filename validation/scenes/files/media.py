@@ -8,6 +8,8 @@ Files of Mitsuba 0.5 and 0.6, and of its descendants, give scattering and absorp
 or the name of a material. The scale, which multiplies both, stays as it is.
 """
 
+import tomllib
+from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
@@ -20,21 +22,6 @@ from validation.scenes.files.nodes import kind, of_kind, properties, references
 Array = NDArray[np.float64]
 
 _OLD = ("sigma_s", "sigma_a")
-# Reduced scattering and absorption [1/mm] of Jensen, Marschner, Levoy, Hanrahan 2001, table in figure 5.
-_MATERIALS = {
-    "apple": ((2.29, 2.39, 1.97), (0.0030, 0.0034, 0.046)),
-    "chicken1": ((0.15, 0.21, 0.38), (0.015, 0.077, 0.19)),
-    "chicken2": ((0.19, 0.25, 0.32), (0.018, 0.088, 0.20)),
-    "cream": ((7.38, 5.47, 3.15), (0.0002, 0.0028, 0.0163)),
-    "ketchup": ((0.18, 0.07, 0.03), (0.061, 0.97, 1.45)),
-    "marble": ((2.19, 2.62, 3.00), (0.0021, 0.0041, 0.0071)),
-    "potato": ((0.68, 0.70, 0.55), (0.0024, 0.0090, 0.12)),
-    "skimmilk": ((0.70, 1.22, 1.90), (0.0014, 0.0025, 0.0142)),
-    "skin1": ((0.74, 0.88, 1.01), (0.032, 0.17, 0.48)),
-    "skin2": ((1.09, 1.59, 1.79), (0.013, 0.070, 0.145)),
-    "spectralon": ((11.6, 20.4, 14.9), (0.00, 0.00, 0.00)),
-    "wholemilk": ((2.55, 3.21, 3.77), (0.0011, 0.0024, 0.014)),
-}
 
 
 def give_extinction(state: Any) -> list[str]:
@@ -114,7 +101,8 @@ def _refuse_names(props: Any) -> None:
     if "material" not in props:
         return
     material = str(props["material"])
-    known = _MATERIALS.get(material.lower().replace(" ", "").replace("_", ""))
+    materials = tomllib.loads(Path(__file__).with_name("materials.toml").read_text(encoding="utf-8"))
+    known = materials.get(material.lower().replace(" ", "").replace("_", ""))
     remedy = "its sigma_t [1/m] and albedo in numbers"
     if known is not None:
         scattering, absorption = map(np.array, known)
