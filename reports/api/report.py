@@ -238,15 +238,17 @@ def _measured(
     """Measure and write a report; unusable input is refused before the work begins."""
     import gc
 
-    from reports.cluster.connect import connected, parse_place
     from reports.machine.environment import activate
 
-    place = None if cluster is None else parse_place(cluster)
+    place = None
+    if cluster is not None:
+        from reports.cluster.connect import connected, parse_place
+
+        place = parse_place(cluster)
     activate()
     from reports.api.render import asked_configurations
     from reports.report.asked import scenes_of_images
     from reports.report.measure import write_report
-    from validation.engine.images import images_size
     from validation.study.cost import check_work, frame_work, truth_work
     from validation.study.study import RandomScenes, read_study, standard_study
 
@@ -257,11 +259,13 @@ def _measured(
     chosen, apart = asked_configurations(methods, kernels, settings, usual=study.configurations)
     if methods and all(isinstance(name, str) and ":" in name for name in methods):
         note(progress, ["what --method names is measured alone; --method all adds the built-in methods"])
-    # The sizes of an effort are known to be right; those of images are the user's.
-    sizes = [images_size(tuple(several)) for several in shown.values()]
-    works = [truth_work(size) for size in sizes]
-    works += [frame_work(size, steps=100, frames=8 * len(chosen)) for size in sizes]
-    check_work("report --images", works)
+    if shown:  # the sizes of an effort are known to be right; those of images are the user's
+        from validation.engine.images import images_size
+
+        sizes = [images_size(tuple(several)) for several in shown.values()]
+        works = [truth_work(size) for size in sizes]
+        works += [frame_work(size, steps=100, frames=8 * len(chosen)) for size in sizes]
+        check_work("report --images", works)
     gc.freeze()  # modules live as long as the process: what looks for garbage before each frame need not look there
     typed = shlex.join(["airlight", *sys.argv[1:]])
     command = typed if progress is True else f"airlight.report(output={str(target)!r}, ..)"

@@ -42,7 +42,6 @@ from validation.scenes import cloud_meshes, meshes
 from validation.scenes.height_fog import register_height_fog
 from validation.scenes.meshes import Mesh, bent, joined, placed, rotation, scaled
 from validation.scenes.parts import camera, fog, height_fog, light, medium_boundary, mitsuba_mesh, phase_function
-from validation.scenes.smoke import smoke
 
 MOVES = ("light", "objects", "medium", "colour")
 FILES = tuple(
@@ -171,6 +170,8 @@ def _medium(table: Table, shape: str = "") -> dict[str, Any]:
         return height_fog(table["layers"], table["floor"], table["cap"], albedo=table["albedo"], phase=phase)
     medium = fog(table["sigma_t"], table["albedo"], phase)
     if "smoke" in table:
+        from validation.scenes.smoke import smoke
+
         given = dict(table["smoke"])
         low, high = np.array(given.pop("low")), np.array(given.pop("high"))
         density = smoke(low, high, **given)
