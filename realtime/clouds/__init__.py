@@ -10,6 +10,6 @@ Read in this order:
 - `light_maps.py`: a cloud as its sun sees it, filtered to any width;
 - `uniform_sky.py`: the light of a sky that is the same everywhere;
 - `hypertexture/`: clouds whose density differs from place to place;
-- `collectors/`: where the light of a set of orders enters a cloud, and how much of it comes;
+- `collector_search.py`: where the light of a set of orders enters a cloud, and how much of it comes;
 - `order_layers.py`: the names of the layers of an image by order.
 """

@@ -47,9 +47,8 @@ from realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
 from realtime.clouds.order_layers import FIRST_ORDERS, ORDER_LAYERS
 from realtime.clouds.single_scattering import CloudRays, opacity_of
 from realtime.clouds.slab_orders.depth_panels import Transport, depth_panels
-from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes
+from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, double_gauss, mode_kernel
 from realtime.clouds.slab_orders.phases import SlabPhase
-from realtime.clouds.slab_orders.streams import double_gauss, mode_kernel
 from realtime.numerics.array_types import types_of
 from realtime.numerics.functions import between_entries
 from realtime.scene.lights import Light

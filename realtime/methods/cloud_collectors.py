@@ -3,9 +3,9 @@ r"""Clouds by collectors: light scattered many times, without a walk through the
 
 Where a camera ray meets a cloud, or at the camera if that is within one, light leaves towards the eye. Single
 scattering is integrated along the ray. The light of each set of orders from 2 on is the canonical transport from the
-collector that `realtime.clouds.collectors` finds for it. Each sun has its own maps and searches. A uniform sky has no
-direction and needs no search (`realtime.clouds.uniform_sky`); `sky=beams` makes it one more sun, which shines from
-above (`Light.sky`), as the paper does. What is behind is seen through the transmittance of the ray.
+collector that `realtime.clouds.collector_search` finds for it. Each sun has its own maps and searches. A uniform sky
+has no direction and needs no search (`realtime.clouds.uniform_sky`); `sky=beams` makes it one more sun, which shines
+from above (`Light.sky`), as the paper does. What is behind is seen through the transmittance of the ray.
 
 Other clouds dim the light of all orders on its way to a cloud, and opaque shapes hide it: for order 1 along the ray,
 for the others at the collector, over whose width the shade of other clouds is a mean.
@@ -38,7 +38,7 @@ from realtime.clouds.bounds import CloudSurfaces, cloud_surfaces
 from realtime.clouds.canonical.coordinates import SETS, share_of_peak, slab_phase
 from realtime.clouds.canonical.fit import fit_on_device, fitted_functions
 from realtime.clouds.canonical.transport_grid import canonical_transport, on_device
-from realtime.clouds.collectors.search import Collector, OrdersLight, Search, light_of_orders
+from realtime.clouds.collector_search import Collector, OrdersLight, Search, light_of_orders
 from realtime.clouds.hypertexture.light_depths import (
     LightDepths,
     depths_memory,

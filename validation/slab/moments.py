@@ -38,9 +38,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.clouds.slab_orders.depth_panels import DepthPanels, Transport, depth_panels
-from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes
+from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, Streams, double_gauss, mode_kernel
 from realtime.clouds.slab_orders.phases import SlabPhase
-from realtime.clouds.slab_orders.streams import Streams, double_gauss, mode_kernel
 
 Array = NDArray[np.float64]
 

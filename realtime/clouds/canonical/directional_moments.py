@@ -37,9 +37,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from realtime.clouds.canonical.coordinates import SETS
 from realtime.clouds.slab_orders.depth_panels import DepthPanels, Transport, depth_panels, panel_weights
-from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes
+from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, double_gauss, mode_kernel
 from realtime.clouds.slab_orders.phases import SlabPhase
-from realtime.clouds.slab_orders.streams import double_gauss, mode_kernel
 
 Array = NDArray[Any]  # float32 or float64
 

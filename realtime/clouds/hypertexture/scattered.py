@@ -21,15 +21,12 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.bounds import CloudSurfaces, optical_depths
+from realtime.clouds.bounds import CloudSurfaces, optical_depths, sum_over_stretches
 from realtime.clouds.hypertexture.march import OPAQUE, least, march, marched_depths, middle_density, voxel
 from realtime.clouds.single_scattering import (
     SPREAD,
     Beam,
     CloudRays,
-    add_printed,
-    nothing_printed,
-    printed_opacity,
     scattered,
     step_light,
 )
@@ -55,10 +52,39 @@ def light_once(
 
 
 def opacity_as_printed(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end, *, stride: Any) -> Any:
-    """Return what is printed for the opacity of clouds with or without densities, a colour [m]."""
-    if clouds.density is None:
-        return printed_opacity(surfaces, clouds, origin, direction, end)
-    return marched_printed_opacity(surfaces, clouds, origin, direction, end, stride=stride)
+    """Return what is printed for the opacity of clouds with or without densities, a colour [m]; see `marched_depths`.
+
+    Bouthors, Neyret, Max, Bruneton, Crassin 2008, eq. 2.
+    """
+    Float, Color, lanes = type(direction.x), type(clouds.albedo), dr.width(direction)
+    dense = clouds.density is not None
+
+    def add(total, begin, finish, cloud, inside):
+        first, sums = total
+        rho = middle_density(clouds, origin, direction, begin, finish, cloud, inside) if dense else 1
+        kappas = [dr.gather(Float, sigma_t, cloud, inside) * rho for sigma_t in clouds.sigma_t]
+        first = dr.select(inside & ~dr.isfinite(first), begin, first)
+        near, far = (dr.select(inside, place - first, 0) for place in (begin, finish))
+        terms = [
+            dr.select(inside & (kappa > 0), (dr.exp(-kappa * far) - dr.exp(-kappa * near)) / kappa, 0)
+            for kappa in kappas
+        ]
+        return first, tuple(own + term for own, term in zip(sums, terms))
+
+    nothing = dr.full(Float, dr.inf, lanes), tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
+    if dense:
+        _, sums = march(
+            surfaces,
+            origin,
+            direction,
+            end,
+            nothing,
+            step=lambda total, x, cloud, inside: stride * voxel(clouds, cloud, inside),
+            add=lambda total, begin, finish, cloud, inside: (add(total, begin, finish, cloud, inside), inside),
+        )
+    else:
+        _, sums = sum_over_stretches(surfaces, origin, direction, end, nothing, add)
+    return Color(*(sums * (3 // len(sums))))
 
 
 def marched_light(
@@ -141,20 +167,3 @@ def marched_light(
         tuple(sum_ * beam.irradiance * (0.25 * dr.inv_pi) for sum_ in own)
         for own, beam in zip(sums, beams, strict=True)
     )
-
-
-def marched_printed_opacity(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end, *, stride: Any) -> Any:
-    """Return what is printed for the opacity, a colour [m]; arguments as of `marched_depths`."""
-    Float, Color, lanes = type(direction.x), type(clouds.albedo), dr.width(direction)
-
-    def add(total, begin, finish, cloud, inside):
-        rho = middle_density(clouds, origin, direction, begin, finish, cloud, inside)
-        kappas = [dr.gather(Float, sigma_t, cloud, inside) * rho for sigma_t in clouds.sigma_t]
-        return add_printed(total, begin, finish, kappas, inside), inside
-
-    def step(total, x, cloud, inside):
-        return stride * voxel(clouds, cloud, inside)
-
-    nothing = nothing_printed(clouds, Float, lanes)
-    _, sums = march(surfaces, origin, direction, end, nothing, step=step, add=add)
-    return Color(*(sums * (3 // len(sums))))

@@ -8,7 +8,6 @@ and runs nowhere in a frame. The truth that checks it is a walk of photons, on t
 Read in this order:
 
 - `phases.py`: phase functions by values and Legendre moments;
-- `streams.py`: directions, and scattering between them by mode of the azimuth;
 - `depth_panels.py`: light along straight lines through the slab;
-- `discrete_ordinates.py`: all orders of one mode at once.
+- `discrete_ordinates.py`: directions and scattering between them by mode of the azimuth; all orders of a mode at once.
 """

@@ -6,7 +6,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.clouds.collectors.search import Search, cold_start, collector_light
+from realtime.clouds.collector_search import Search, cold_start, collector_light
 from realtime.clouds.light_maps import light_map
 from realtime.numerics.array_types import aligned_array
 from tests.helpers.frames import read

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from realtime.clouds import bounds
-from realtime.clouds.bounds import cloud_surfaces
-from realtime.clouds.single_scattering import Beam, cloud_rays, exact_leg, opacity, printed_opacity, scattered
+from realtime.clouds.bounds import cloud_surfaces, optical_depths
+from realtime.clouds.hypertexture.scattered import opacity_as_printed
+from realtime.clouds.single_scattering import Beam, cloud_rays, exact_leg, opacity_of, scattered
 from realtime.numerics.array_types import aligned_array
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import SUN, cloud, crossings, length_inside, loaded, ring
@@ -114,6 +115,10 @@ def test_stretches_that_are_not_kept_are_found_again(monkeypatch):
     np.testing.assert_array_equal(*images)
 
 
+def opacity(surfaces, clouds, *rays):
+    return opacity_of(optical_depths(surfaces, clouds, *rays), type(clouds.albedo))
+
+
 @pytest.mark.claim("cloud-opacity", tolerance="0.1 %")
 def test_opacity_is_one_less_the_transmittance():
     origin, direction = rays(300)
@@ -136,7 +141,7 @@ def test_equations_as_printed_have_the_wrong_sign(few):
     read = read_scene(scene)
     path = device(origin), device(direction), mi.Float(dr.inf)
     surfaces = cloud_surfaces(read)
-    length = np.array(printed_opacity(surfaces, read.medium.clouds, *path)).T
+    length = np.array(opacity_as_printed(surfaces, read.medium.clouds, *path, stride=None)).T
     one_stretch = [len(crossings(ring(), *ray)[0]) <= 2 for ray in zip(origin, direction)]
     share = np.array(opacity(surfaces, read.medium.clouds, *path)).T
     assert length[one_stretch] == pytest.approx(-share[one_stretch] / SIGMA, rel=1e-4, abs=1e-4)

@@ -7,8 +7,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.clouds import collector_search as search
 from realtime.clouds.canonical.coordinates import share_of_peak
-from realtime.clouds.collectors import search
 from realtime.frame.incremental import next_frame
 from realtime.frame.renderer import frame_renderer, image_frame, render_frame
 from realtime.methods.registry import METHODS

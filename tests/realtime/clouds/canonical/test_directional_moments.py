@@ -11,8 +11,8 @@ from PythonicDISORT.pydisort import pydisort
 
 from realtime.clouds.canonical.coordinates import SETS
 from realtime.clouds.canonical.directional_moments import DirectionalMoments
+from realtime.clouds.slab_orders.discrete_ordinates import double_gauss
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
-from realtime.clouds.slab_orders.streams import double_gauss
 from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein
 from reference.monte_carlo.slab_walk.walk import Slab
 from tests.helpers.slab_directions import direction_estimate

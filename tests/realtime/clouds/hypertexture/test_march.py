@@ -13,7 +13,7 @@ import pytest
 
 import realtime.methods.cloud_collectors as method
 from realtime.clouds.bounds import cloud_surfaces
-from realtime.clouds.collectors.search import Search
+from realtime.clouds.collector_search import Search
 from realtime.clouds.hypertexture.light_depths import light_depths, marched_leg
 from realtime.clouds.hypertexture.lit_surface import dense_surface
 from realtime.clouds.hypertexture.march import marched_depths

@@ -301,7 +301,7 @@ def light_of_orders(
     """Search the collectors of all sets of orders, and return their light.
 
     `light_map`, `transport`, `point`, `toward`, `extinction`, `behind`, `search`, `active`: see
-    `realtime.clouds.collectors.search.collector_light`; `sets`: how many sets there are, numbers from 0 on; `last`: the
+    `realtime.clouds.collector_search.collector_light`; `sets`: how many sets there are, numbers from 0 on; `last`: the
     `OrdersLight.collectors` of the last frame; None where a search starts with nothing.
     """
     cold = cold_start(light_map, point)
