@@ -166,10 +166,14 @@ class HeightFog:
         )
         endless = np.isinf(length)
         finite = self.optical_depth(start, np.where(endless, start, end), np.where(endless, 0.0, length))
+        return np.where(endless, self.endless(start, rise), finite)
+
+    def endless(self, z: ArrayLike, rise: ArrayLike) -> Array:
+        """Return the optical depth of rays without end from heights [m]; `rise`: vertical, of unit directions."""
+        z, rise = np.broadcast_arrays(np.asarray(z, dtype=np.float64), np.asarray(rise, dtype=np.float64))
         with np.errstate(divide="ignore", invalid="ignore"):
-            sloped = np.where(rise > 0, self.column(start), self._below(start)) / np.abs(rise)
-        level = np.where(self.log_density(start) > -np.inf, np.inf, 0.0)
-        return np.where(endless, np.where(rise == 0, level, sloped), finite)
+            sloped = np.where(rise > 0, self.column(z), self._below(z)) / np.abs(rise)
+        return np.where(rise == 0, np.where(self.log_density(z) > -np.inf, np.inf, 0.0), sloped)
 
     def _below(self, z: Array) -> Array:
         """Return the optical depth straight down from heights [m]; infinite without a floor."""
@@ -223,16 +227,16 @@ def height_fog_sun(
 
     `fog`: the medium; `origin`, `rise`: height of the origin of each ray [m], and vertical component of its unit
     direction, (n,); `x0`, `x1`: ends of the intervals along the rays [m], x0 <= x1; x1 may be infinite; `sun`: vertical
-    component of the unit direction towards the sun, above 0; `phase`: value of the phase function along each ray, (n,).
-    Raises InputError for a sun at or below the horizon, and a constant part without a cap: every light path is
-    infinitely deep.
+    component of the unit direction towards the sun, above 0, or below 0 where the fog has a floor: the same holds with
+    the column below; `phase`: value of the phase function along each ray, (n,). Raises InputError for a sun at the
+    horizon, one below it without a floor, and a constant part without a cap: every light path is infinitely deep.
     """
-    if not 0 < sun <= 1:
+    if not -1 <= sun <= 1 or sun == 0 or (sun < 0 and np.isinf(fog.floor)):
         raise InputError(
             f"the sun's direction has the vertical component {sun:g}: at or below the horizon each of its light paths "
-            "through fog of any height is infinitely deep; wanted a sun above the horizon"
+            "through fog without a floor is infinitely deep; wanted a sun above the horizon"
         )
-    if fog.constant > 0 and np.isinf(fog.cap):
+    if fog.constant > 0 and sun > 0 and np.isinf(fog.cap):
         raise InputError(
             "height fog with a constant part has no cap: each light path of the sun is infinitely deep; wanted a cap, "
             "or no constant part"
@@ -252,8 +256,8 @@ def height_fog_sun(
         b = np.where(np.isinf(a), a, b)
         za, zb = (origin + np.where(level, 0.0, rise * x) for x in (a, b))
         tau = np.where(b > a, fog.along(za, zb, b - a, rise), 0.0)
-        first = fog.optical_depth(origin, za, a) + fog.column(za) / sun
-        last = fog.along(origin, zb, b, rise) + np.where(np.isinf(zb) & (rise > 0), 0.0, fog.column(zb) / sun)
+        first = fog.optical_depth(origin, za, a) + fog.endless(za, sun)
+        last = fog.along(origin, zb, b, rise) + np.where(np.isinf(zb) & (rise > 0), 0.0, fog.endless(zb, sun))
         bend = 1 - rise / sun
         q = bend * tau
         from_first = np.exp(-first) * np.where(

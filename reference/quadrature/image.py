@@ -75,7 +75,7 @@ def quadrature_image(
         raise InputError(f"pixel is '{pixel}'; wanted 'centre' or 'area'")
     values = ray_values(truth, progress=progress, plan=plan, keep=keep, **how)
     layers = np.concatenate([values.airlight, values.surface, values.emitted.reshape(len(values.airlight), -1)], axis=1)
-    return _image(truth, values, layers, values.bound, values.replicates if truth.area else None)
+    return _image(truth, values, layers, values.bound, values.replicates if truth.is_sampled else None)
 
 
 def _image(truth: TruthScene, centre: RayValues, layers: Array, bound: Array, replicates: Array | None) -> TruthImage:
@@ -113,7 +113,7 @@ def _means(
     lights = PointPlan(error=0.0, first=_OF_LIGHTS, most=_OF_LIGHTS)
     bounds, checks = np.zeros((len(corner), 3)), list[RandomChecks]()
     # Replicates are looked at together, but under area lights each has samples of them of its own.
-    groups = [[replicate] for replicate in range(REPLICATES)] if truth.area else [list(range(REPLICATES))]
+    groups = [[replicate] for replicate in range(REPLICATES)] if truth.is_sampled else [list(range(REPLICATES))]
     rounds, done = 2 * _POSITIONS.rounds * len(groups), 0
 
     def sums(part: str, chosen: PointPlan, active: Index, numbers: tuple[int, int]) -> Array:

@@ -12,8 +12,8 @@ For each light and each ray, in float64:
 4. a light reaches the surface where its last interval does (`reference.quadrature.surface`).
 
 The bound of a ray adds the estimates, what the rounding of each edge between light and shadow is worth, and what the
-shadow rays left in doubt. Area lights come last (`reference.quadrature.area_lights`), with standard errors of their
-own.
+shadow rays left in doubt. Area lights come last (`reference.quadrature.area_lights`), and the sky
+(`reference.quadrature.sky`), with standard errors of their own.
 """
 
 from collections.abc import Callable
@@ -28,6 +28,7 @@ from reference.quadrature.area_lights import area_airlight, area_surface, beams_
 from reference.quadrature.emission import emitted_light
 from reference.quadrature.light_airlight import directional_airlight, light_airlight
 from reference.quadrature.replicates import Keep, PointPlan
+from reference.quadrature.sky import sky_light
 from reference.quadrature.surface import lit_surface, surface_hits
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import TruthLight, TruthScene
@@ -57,7 +58,7 @@ class TruthImage:
     refined: int = 0  #: contradictions that were settled, by mending the intervals or by a float64 test
     left: int = 0  #: contradictions that were not: their worth is in the bound
     emitted: Array | None = None  #: lights with extent, or the background, seen directly [W/(m^2 sr)]; None without any
-    airlight_se: Array | None = None  #: standard error of the airlight of such lights [W/(m^2 sr)]
+    airlight_se: Array | None = None  #: standard error of the airlight of such lights, or of a sky [W/(m^2 sr)]
     surface_se: Array | None = None  #: of the surface that they light [W/(m^2 sr)]
     #: means over the image of what area lights add to airlight and surface, by replicate of their points, which all
     #: pixels share, (2, replicates, 3) [W/(m^2 sr)]
@@ -76,8 +77,8 @@ class RayValues:
     intervals: NDArray[np.int64]  #: how many lit intervals a ray has, those of all lights together, (rays,)
     transitions: int  #: edges between light and shadow
     random_checks: RandomChecks  #: of the lit intervals
-    #: of scenes that have lights with extent: these seen directly, (rays, 3), and for each replicate of their points
-    #: and lines airlight and surface, (rays, 6, replicates) [W/(m^2 sr)]; else without columns
+    #: of scenes that have lights with extent or a sky: these seen directly, (rays, 3), and for each replicate of their
+    #: samples airlight and surface, (rays, 6, replicates) [W/(m^2 sr)]; else without columns
     emitted: Array = field(default_factory=lambda: np.empty((0, 0)))
     replicates: Array = field(default_factory=lambda: np.empty((0, 0, 0)))
 
@@ -108,7 +109,8 @@ def ray_values(
     intervals, transitions, found = np.zeros(count, np.int64), 0, list[RandomChecks]()
     reached: list[NDArray[np.bool_]] = []
     how = {"checks": checks, "shapes": shapes}
-    total = len(truth.lights) + len(truth.directional) + 2 * _STEPS * bool(truth.area)
+    wide_parts = 2 * bool(truth.area) + (truth.sky is not None)
+    total = len(truth.lights) + len(truth.directional) + _STEPS * wide_parts
     lights: list[TruthLight | DirectionalLight] = [*truth.lights, *truth.directional]
     for number, light in enumerate(lights):
         if isinstance(light, DirectionalLight):
@@ -132,8 +134,9 @@ def ray_values(
     wide: dict[str, Any] = {}
     if truth.area or truth.background is not None:
         wide = {"emitted": emitted_light(truth, hits.distance)}
+    plan = plan or PointPlan()
     if truth.area:
-        plan, done = plan or PointPlan(), total - 2 * _STEPS
+        done = total - _STEPS * wide_parts
         tell = partial(_tell, progress, total)
         how_kept: dict[str, Any] = {"plan": plan, "shadow_scale": shadow_scale} | ({"keep": keep} if keep else {})
         beams = beams_of(truth, hits.distance)
@@ -141,12 +144,17 @@ def ray_values(
         lit = np.zeros_like(scattered.replicates)
         if plan.surfaces:
             lit = area_surface(truth, hits, beams, surface, tell=partial(tell, done + _STEPS), **how_kept)
-        tell(total, 0.0)
+        tell(done + 2 * _STEPS, 0.0)
         replicates = np.concatenate([scattered.replicates, lit], axis=1)
         mean = replicates.mean(axis=2)
         airlight, surface, bound = airlight + mean[:, :3], surface + mean[:, 3:], bound + scattered.bound
         found.append(scattered.random_checks)
         wide["replicates"] = replicates
+    if truth.sky is not None:
+        sky = sky_light(truth, hits, shapes=shapes, plan=plan, tell=partial(_tell, progress, total, total - _STEPS))
+        mean = sky.replicates.mean(axis=2)
+        airlight, surface, bound = airlight + mean[:, :3], surface + mean[:, 3:], bound + sky.bound
+        wide["replicates"] = wide.get("replicates", 0.0) + sky.replicates
     checked = RandomChecks.of_all(found)
     return RayValues(airlight, bound, surface, cast, light_angle, intervals, transitions, checked, **wide)
 

@@ -26,7 +26,7 @@ from reference.scene.read import TruthLight, TruthScene
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_ENDLESS = float(np.finfo(float).max)  # how far the shadow segment of a directional light goes [m]
+ENDLESS = float(np.finfo(float).max)  #: how far the shadow segment of a directional light goes [m]
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def lit_surface(
         reflected = interaction.bsdf().eval(mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing)
         radiance = as_rows(reflected * arriving)
         if isinstance(light, DirectionalLight):
-            way, r = np.broadcast_to(-light.direction, point.shape), np.full(len(point), _ENDLESS)
+            way, r = np.broadcast_to(-light.direction, point.shape), np.full(len(point), ENDLESS)
         else:
             way = light.position - point
             r = np.linalg.norm(way, axis=1)

@@ -93,7 +93,15 @@ class TruthScene:
     media: tuple[BoundedMedium, ...] = ()  #: the media with bounds, disjoint
     directional: tuple[DirectionalLight, ...] = ()  #: directional lights; all media then have bounds, or a cap
     area: tuple[TruthAreaLight, ...] = ()  #: lights with extent
-    background: Any = None  #: Mitsuba's emitter around the scene, seen behind it and lighting nothing; not in `scene`
+    background: Any = None  #: Mitsuba's emitter around the scene, seen behind it; not in `scene`
+    #: radiance of a uniform background, RGB [W/(m^2 sr)], which lights media and surfaces; None where none arrives:
+    #: through an unbounded homogeneous medium
+    sky: Array | None = None
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether samples stand for some of the light, so that it has a standard error."""
+        return bool(self.area) or self.sky is not None
 
 
 def read_truth(scene) -> TruthScene:
@@ -110,7 +118,7 @@ def read_truth(scene) -> TruthScene:
     far = tuple(emitter for emitter in emitters if is_directional(emitter))
     wide = tuple(emitter for emitter in emitters if is_area(emitter))
     near = tuple(emitter for emitter in emitters if not is_directional(emitter) and not is_area(emitter))
-    if not far + near + wide:
+    if not far + near + wide and background is None:
         raise InputError(
             "the scene has no light; wanted at least one emitter of type 'point', 'spot', 'directional' or 'area'"
         )
@@ -127,6 +135,9 @@ def read_truth(scene) -> TruthScene:
             raise InputError(endless_medium(emitter))
         if isinstance(medium, HeightMedium) and not -sun.direction @ medium.up > 0:
             raise InputError(sun_below(emitter))
+    sky = _sky(background, medium)
+    if not far + near + wide and sky is None:
+        raise InputError(sky_too_far(background))
     return TruthScene(
         scene=scene if background is None else _without(scene, background),
         occluders=scene_of(opaque, scene),
@@ -140,6 +151,7 @@ def read_truth(scene) -> TruthScene:
         directional=suns,
         area=area,
         background=background,
+        sky=sky,
     )
 
 
@@ -154,21 +166,45 @@ def homogeneous_around(truth: TruthScene) -> TruthMedium:
 
 
 def _background(scene):
-    """Return the emitter around a scene that is its background alone, since there are lights in it; None without one.
-
-    A constant one beside directional lights alone lights clouds: it is no background.
-    """
+    """Return the emitter around a scene, a sky or the background of lights in it; None without one."""
     around = [emitter for emitter in scene.emitters() if emitter.class_name() in _AROUND]
     lights = {emitter.class_name() for emitter in scene.emitters()} - set(_AROUND)
-    if not around or not lights or (around[0].class_name() == _AROUND[0] and lights == {"DirectionalEmitter"}):
+    return around[0] if around and (lights or around[0].class_name() == _AROUND[0]) else None
+
+
+def _sky(background, medium: TruthMedium | VaryingMedium) -> Array | None:
+    """Return the radiance of a uniform sky whose light arrives in the media of a scene."""
+    if background is None or background.class_name() != _AROUND[0]:
         return None
-    return around[0]
+    if isinstance(medium, TruthMedium) and np.any(medium.sigma_t > 0):
+        if not np.all(medium.sigma_t > 0):
+            raise InputError("a sky shines through a medium without bounds in some channels; wanted bounds")
+        return None
+    return _rgb(background.eval(dr.zeros(mi.SurfaceInteraction3f)))
+
+
+def sky_too_far(background) -> str:
+    """Return why a sky alone is refused in an unbounded medium."""
+    return (
+        f"light '{background.id()}' is a sky, infinitely far: nothing of it arrives through a medium without bounds; "
+        "give the medium bounds, or add a light"
+    )
 
 
 def _without(scene, background):
     """Return a scene without its background; all parts keep their names."""
-    emitters = [each for each in scene.emitters() if not is_area(each) and each != background]
-    parts = [*scene.sensors(), *emitters, *scene.shapes()]
+    return _rebuilt(scene, [each for each in scene.emitters() if each != background])
+
+
+def whole_scene(truth: TruthScene):
+    """Return Mitsuba's scene with the sky, if it has one."""
+    if truth.sky is None:
+        return truth.scene
+    return _rebuilt(truth.scene, [*truth.scene.emitters(), truth.background])
+
+
+def _rebuilt(scene, emitters: list[Any]):
+    parts = [*scene.sensors(), *(each for each in emitters if not is_area(each)), *scene.shapes()]
     names = [part.id() for part in parts]
     built = mi.load_dict({"type": "scene"} | {f"part{number}": part for number, part in enumerate(parts)})
     for part, name in zip(parts, names, strict=True):
@@ -313,9 +349,8 @@ def _read_light(emitter) -> TruthLight:
     if name not in ("PointLight", "SpotLight"):
         word = {"ConstantBackgroundEmitter": "constant", "EnvironmentMapEmitter": "envmap"}.get(name, name)
         raise InputError(
-            f"light '{emitter.id()}' of type '{word}' is the scene's only light beside the sun, if any; wanted lights "
-            "of type 'point', 'spot', 'directional' or 'area'; for clouds before a constant sky take the estimator "
-            "cloud-paths"
+            f"light '{emitter.id()}' of type '{word}' is the scene's only light; wanted lights of type 'point', "
+            "'spot', 'directional', 'area' or 'constant'"
         )
     parameters = mi.traverse(emitter)
     matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)

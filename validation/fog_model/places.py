@@ -258,6 +258,8 @@ def _by_height(truth: TruthScene, stretches: tuple[Index, Array, Array]) -> Piec
     """Cut lit stretches where rays cross heights at which the density of height fog has kinks."""
     medium = truth.medium
     assert isinstance(medium, HeightMedium)
+    if not len(stretches[0]):
+        return whole(stretches)
     with np.errstate(divide="ignore", invalid="ignore"):
         x = (np.array(fog_of(medium).kinks)[:, None] - truth.origin @ medium.up) / (truth.direction @ medium.up)
     number, ray = np.nonzero(np.isfinite(x) & (x > 0))

@@ -24,6 +24,7 @@ Each batch has its own seed and at most 256 samples a pixel on the average; what
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -36,7 +37,7 @@ from analytic.errors import InputError
 from reference.monte_carlo.batches import Batches, check_samples, single_batch
 from reference.scene.density_grid import GridMedium
 from reference.scene.height_fog import HeightMedium
-from reference.scene.read import TruthMedium, TruthScene
+from reference.scene.read import TruthMedium, TruthScene, whole_scene
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.integer]
@@ -69,7 +70,8 @@ def volpath_batch(
     if truth.directional and not truth.scene.bbox().valid():  # of rectangles alone, merged, in Mitsuba 3.9.1
         raise InputError("volpath: the scene's bounding box is not valid, so its directional lights start within it")
     _check_sun(truth)
-    hidden = {"hide_emitters": True} if truth.area else {}
+    hidden = {"hide_emitters": True} if truth.is_sampled else {}
+    truth = replace(truth, scene=whole_scene(truth))
     integrator = mi.load_dict({"type": "volpath", "max_depth": max_depth, "rr_depth": 1000} | hidden)
     with black_surfaces(truth.occluders):
         airlight = trace(truth, integrator, 2 * seed, in_air)

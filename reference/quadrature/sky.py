@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""The light of a uniform sky: a sum of suns, each exact in the media and behind what stands in it.
+
+A sky of the radiance Ls shines from all directions w'. Along a camera ray w
+
+    L = int_0^d  exp(-tau(o, x)) sigma_s(x)  1/(4 pi) int p(w . w') V(x, w') exp(-tau(x, w')) Ls dw'  dx
+      = int  K(w')  Ls dw',
+
+where K(w') is what the ray receives of a directional light of irradiance 1 from w': the integrals change places, and
+every K is exact (`reference.quadrature.light_airlight`): lit intervals by geometry, height fog in closed form, pieces
+of bounded media to an error that is added up. So are surfaces, with f cos in the place of the phase function. What is
+left is one integral over the sphere of directions. It is taken by a lattice of directions, even in the solid angle, in
+eight replicates whose spread is its standard error (`reference.quadrature.replicates`). K is smooth in w' where nothing
+stands in the light and bounds have no edges; an edge costs digits, and no pixel is without an error.
+
+What follows at once:
+
+- In an unbounded medium of extinction above 0 the sky is infinitely far, tau(x, w') is infinite, and nothing of it
+  arrives: the scattered light is 0, as is the sky seen through it. Such a scene has no sky (`TruthScene.sky`).
+- In height fog the paths from directions at and below the horizon end at the floor of the fog. Without a floor they
+  would be infinitely deep. Under an isotropic phase function the light scattered at a height z, with the column C above
+  and B below it, is Ls (E_2(C) + E_2(B))/2, E_2 the exponential integral: it checks the sum.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.quadrature.fields import optical_depth
+from reference.quadrature.light_airlight import directional_airlight
+from reference.quadrature.replicates import REPLICATES, PointPlan, square_points
+from reference.quadrature.surface import ENDLESS, Reflection, SurfaceHits
+from reference.scene.directional_light import DirectionalLight
+from reference.scene.read import TruthScene
+from reference.scene.shapes import Shapes
+
+Array = NDArray[np.float64]
+Share = Callable[[float], None]
+
+_MOST = 64  # directions of a replicate
+_NUMBER = 1 << 20  # of the sky among lights: its lattices are not those of others
+
+
+@dataclass(frozen=True)
+class SkyLight:
+    """The light of a sky, by replicate."""
+
+    replicates: Array  #: airlight and surface, (rays, 6, replicates) [W/(m^2 sr)]
+    bound: Array  #: of the error of its suns, not of their number, (rays, 3) [W/(m^2 sr)]
+
+
+def sky_light(
+    truth: TruthScene, hits: SurfaceHits, *, shapes: Shapes, plan: PointPlan, tell: Share = lambda share: None
+) -> SkyLight:
+    """Compute what a uniform sky adds to airlight and surfaces along every ray.
+
+    `truth`: the scene, which has a sky; `hits`: what its rays hit; `shapes`: what can stand in the light; `plan`: the
+    most directions of a replicate, its seed, and whether surfaces get the light; `tell`: called with the share of the
+    work that is done.
+    """
+    assert truth.sky is not None
+    count, most = len(hits.distance), min(plan.most, _MOST)
+    replicates, bound = np.zeros((count, 6, REPLICATES)), np.zeros((count, 3))
+    visible = np.flatnonzero(np.isfinite(hits.distance)) if plan.surfaces else np.empty(0, np.int64)
+    point = truth.origin + hits.distance[visible, None] * truth.direction[visible]
+    start = np.zeros(len(visible))
+    left = np.exp(-optical_depth(truth, truth.origin, truth.direction[visible], start, hits.distance[visible]))
+    reflection = Reflection(hits.interaction)
+    for replicate in range(REPLICATES):
+        square = square_points(PointPlan(most=most, seed=plan.seed), _NUMBER, replicate, "sphere")
+        for number, direction in enumerate(_directions(square)):
+            sun = DirectionalLight(direction, truth.sky * 4 * np.pi / most, None)
+            received = directional_airlight(truth, sun, hits.distance, shapes=shapes, checks=0)
+            replicates[:, :3, replicate] += received.radiance
+            bound += received.bound / REPLICATES
+            lit = received.reached[visible]
+            row, towards = visible[lit], np.broadcast_to(-direction, (int(lit.sum()), 3))
+            if len(row):
+                through = optical_depth(truth, point[lit], towards, start[lit], np.full(len(row), ENDLESS))
+                radiance = reflection(row, towards) * np.exp(-through) * left[lit] * sun.irradiance
+                replicates[row, 3:, replicate] += radiance
+            tell((replicate + (number + 1) / most) / REPLICATES)
+    return SkyLight(replicates, bound)
+
+
+def _directions(square: Array) -> Array:
+    """Return the directions in which the suns shine, unit vectors, even in the solid angle, (n, 3)."""
+    height, azimuth = 1 - 2 * square[:, 0], 2 * np.pi * square[:, 1]
+    across = np.sqrt(np.maximum(1 - height**2, 0.0))
+    return np.stack([across * np.cos(azimuth), across * np.sin(azimuth), height], axis=1)
