@@ -80,7 +80,7 @@ def grid_light(task: Any, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
 
         found, sampler = _sum(task, sampler, ray, medium, lies, sample)
         airlight += found
-    for emitter in task.directional:
+    for emitter in task.far:
         lies = active & meets & (ends[1] > ends[0])
 
         def sample_sun(u, emitter=emitter):
@@ -92,7 +92,7 @@ def grid_light(task: Any, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
         found, sampler = _sum(task, sampler, ray, medium, lies, sample_sun)
         airlight += found
     if hit is not None:
-        for emitter in (*(light.emitter for light in task.lights), *task.directional):
+        for emitter in (*(light.emitter for light in task.lights), *task.far):
             surface += _surface(task, emitter, sampler, ray, medium, hit, active & hit.is_valid())
     return airlight, surface
 

@@ -32,7 +32,7 @@ from reference.monte_carlo.single_scatter.boundary_walk import (
     transmittance,
 )
 from reference.monte_carlo.single_scatter.density_grid import grid_light
-from reference.monte_carlo.single_scatter.directional_sampling import sample_stretch
+from reference.monte_carlo.single_scatter.directional_sampling import drawn, mean_over_directions, sample_stretch
 from reference.monte_carlo.single_scatter.distance_sampling import (
     Span,
     closest_approach,
@@ -117,7 +117,7 @@ def _airlight(task: Task, sampler, ray: Ray, stretch: Stretch, active):
     active = active & (dr.max(stretch.sigma_s) > 0)
     for number in range(len(task.lights)):
         total += _light_airlight(task, number, sampler, ray, stretch, active)
-    for emitter in task.directional:
+    for emitter in task.far:
         total += _directional_airlight(task, emitter, sampler, ray, stretch, active)
     for extended in task.area:
         total += area_airlight(task, extended, sampler, ray, stretch, active)
@@ -157,7 +157,7 @@ def _light_airlight(task: Task, number: int, sampler, ray: Ray, stretch: Stretch
 
 
 def _directional_airlight(task: Task, emitter, sampler, ray: Ray, stretch: Stretch, active):
-    """Estimate what a directional light sends from a stretch of the ray, likewise."""
+    """Estimate what a directional light or a sky sends from a stretch of the ray, likewise."""
     length = stretch.end - stretch.start
     active = active & (length > 0) & (length < dr.inf)
     length = dr.select(active, length, 1)
@@ -168,7 +168,7 @@ def _directional_airlight(task: Task, emitter, sampler, ray: Ray, stretch: Stret
         cell, width = cell_of(index, shift, task.samples)
         y, density = sample_stretch(cell + width * sampler.next_1d(active), length, rates)
         point = point_on(ray, ray.origin + ray.direction * (stretch.start + y))
-        arriving, towards = _arriving(task, emitter, point, active)
+        arriving, towards = _arriving(task, emitter, point, drawn(emitter, sampler, active), active)
         phase, _ = stretch.medium.phase_function().eval_pdf(mi.PhaseFunctionContext(), point, towards, active)
         value = stretch.sigma_s * phase * arriving * dr.exp(-stretch.depth - stretch.sigma_t * y) * (width / density)
         return index + 1, total + dr.select(active, value, 0), sampler
@@ -177,12 +177,12 @@ def _directional_airlight(task: Task, emitter, sampler, ray: Ray, stretch: Stret
     return dr.while_loop(state, lambda index, *_: index < task.samples, add_sample, label="plain distances")[1]
 
 
-def _arriving(task: Task, emitter, interaction, active) -> tuple[Any, Any]:
-    """Return the irradiance of a directional light that reaches points, and the direction towards it.
+def _arriving(task: Task, emitter, interaction, numbers, active) -> tuple[Any, Any]:
+    """Return the irradiance of a light from infinity that reaches points, and the direction that its numbers choose.
 
     The emitter names a point of the light's way that lies beyond everything: the leg begins there, in clear air.
     """
-    sample, irradiance = emitter.sample_direction(interaction, mi.Point2f(0.5), active)
+    sample, irradiance = emitter.sample_direction(interaction, numbers, active)
     media = Leg(dr.zeros(mi.MediumPtr), dr.zeros(mi.Spectrum, dr.width(active)))
     leg = transmittance(task.around, sample.p, -sample.d, sample.dist, media=media, active=active)
     return irradiance * leg, sample.d
@@ -214,10 +214,14 @@ def _surface(task: Task, sampler, ray: Ray, hit, stretch: Stretch, active):
         leg = transmittance(task.around, position, from_light, r, media=media, active=active)
         sent = material * _intensity(light, hit, active) * leg / (r * r)
         total += dr.select(active, sent * dr.exp(-camera_leg), 0)
-    for emitter in task.directional:
-        arriving, towards = _arriving(task, emitter, hit, active)
-        material = hit.bsdf().eval(mi.BSDFContext(), hit, hit.to_local(towards), active)
-        total += dr.select(active, material * arriving * dr.exp(-camera_leg), 0)
+    for emitter in task.far:
+
+        def sent_by(numbers, emitter=emitter):
+            arriving, towards = _arriving(task, emitter, hit, numbers, active)
+            return arriving * hit.bsdf().eval(mi.BSDFContext(), hit, hit.to_local(towards), active)
+
+        sent = mean_over_directions(emitter, sampler, task.samples, active, sent_by)
+        total += dr.select(active, sent * dr.exp(-camera_leg), 0)
     for extended in task.area:
         total += area_surface(task, extended, sampler, hit, stretch, ray=ray, active=active)
     return total

@@ -3,7 +3,7 @@ r"""Single scattering in height fog, sampled: Mitsuba's plugin says the density,
 
 With an antiderivative G of the density over the height, constant beyond floor and cap, the optical depth of a segment
 of length l between two heights is l (G(z_1) - G(z_0))/(z_1 - z_0), and that up to a sun at the height mu
-(G(cap) - G(z))/mu. Of a layer
+(G(cap) - G(z))/mu; of a sky, which shines from below too, (G(z) - G(floor))/|mu|. Of a layer
 
     G(z) = -sigma_i H_i exp(-(z - z_i)/H_i),     clamped below z_i:  sigma_i (z - z_i - H_i).
 
@@ -23,6 +23,7 @@ import mitsuba as mi
 import numpy as np
 
 from reference.monte_carlo.single_scatter.boundary_walk import Leg, Surroundings, transmittance
+from reference.monte_carlo.single_scatter.directional_sampling import drawn, mean_over_directions
 from reference.monte_carlo.single_scatter.distance_sampling import (
     Span,
     closest_approach,
@@ -62,9 +63,11 @@ class HeightDensity:
         there = dr.select(inside, length * self._density(middle), 0)
         return dr.select(level, there, length * (self.antiderivative(z1) - self.antiderivative(z0)) / rise)
 
-    def above(self, z):
-        """Return the optical depth straight up from heights [m]."""
-        return self.antiderivative(mi.Float64(self.cap)) - self.antiderivative(z)
+    def beyond(self, z, rise):
+        """Return the optical depth from heights [m] out of the fog; `rise`: vertical, of unit directions."""
+        there = self.antiderivative(z)
+        above, below = (self.antiderivative(mi.Float64(end)) for end in (self.cap, self.floor))
+        return dr.select(rise > 0, above - there, there - below) / dr.maximum(dr.abs(rise), 1e-30)
 
     def antiderivative(self, z):
         """Return G at heights [m]."""
@@ -136,10 +139,10 @@ def height_fog_light(task: Any, sampler, ray: Ray, medium, active) -> tuple[Any,
     way = _Way(ray, start, rise, first, last)
     for light in task.lights:
         airlight += _light_airlight(task, light, sampler, way, medium, active)
-    for emitter in task.directional:
+    for emitter in task.far:
         airlight += _sun_airlight(task, emitter, sampler, way, medium, active)
     if hit is not None:
-        surface += _surface(task, way, hit, active & hit.is_valid())
+        surface += _surface(task, sampler, way, hit, active & hit.is_valid())
     return airlight, surface
 
 
@@ -168,10 +171,10 @@ def _sun_airlight(task: Any, emitter, sampler, way: _Way, medium, active):
         cell, width = cell_of(index, shift, task.samples)
         x, arrived = _flight(fog, way, cell + width * sampler.next_1d(active), way.first, way.last)
         point = point_on(way.ray, way.ray.origin + way.ray.direction * mi.Float(x))
-        sample, irradiance = emitter.sample_direction(point, mi.Point2f(0.5), active)
+        sample, irradiance = emitter.sample_direction(point, drawn(emitter, sampler, active), active)
         phase, _ = medium.phase_function().eval_pdf(mi.PhaseFunctionContext(), point, sample.d, active)
-        depth = fog.above(way.start + way.rise * x) / fog.height(sample.d)
-        seen = lit(task.around, sample.p, -sample.d, sample.dist, active)
+        depth = fog.beyond(way.start + way.rise * x, fog.height(sample.d))
+        seen = lit(task.around, point.p, sample.d, sample.dist, active)
         value = _albedo(medium, point, active) * phase * irradiance * seen * mi.Float(arrived * dr.exp(-depth)) * width
         return index + 1, total + dr.select(active, value, 0), sampler
 
@@ -220,7 +223,7 @@ def _light_airlight(task: Any, light, sampler, way: _Way, medium, active):
     return dr.while_loop(state, lambda index, *_: index < task.samples, add_sample, label="distances")[1]
 
 
-def _surface(task: Any, way: _Way, hit, active):
+def _surface(task: Any, sampler, way: _Way, hit, active):
     fog, total = task.fog, dr.zeros(mi.Spectrum, dr.width(active))
     at_hit, camera = fog.height(hit.p), way.depth(fog, mi.Float64(hit.t))
     for light in task.lights:
@@ -232,12 +235,18 @@ def _surface(task: Any, way: _Way, hit, active):
         depth = camera + fog.depth(at_hit, fog.height(light.position), mi.Float64(r))
         sent = material * intensity(light, hit, active) / (r * r) * lit(task.around, position, from_light, r, active)
         total += dr.select(active, sent * mi.Float(dr.exp(-depth)), 0)
-    for emitter in task.directional:
-        sample, irradiance = emitter.sample_direction(hit, mi.Point2f(0.5), active)
-        material = hit.bsdf().eval(mi.BSDFContext(), hit, hit.to_local(sample.d), active)
-        depth = camera + fog.above(at_hit) / fog.height(sample.d)
-        sent = material * irradiance * lit(task.around, sample.p, -sample.d, sample.dist, active)
-        total += dr.select(active, sent * mi.Float(dr.exp(-depth)), 0)
+    for emitter in task.far:
+
+        def sent_by(numbers, emitter=emitter):
+            sample, irradiance = emitter.sample_direction(hit, numbers, active)
+            material = hit.bsdf().eval(mi.BSDFContext(), hit, hit.to_local(sample.d), active)
+            depth = camera + fog.beyond(at_hit, fog.height(sample.d))
+            # Rays from afar lose digits: a ball of 1 m, met from 200 m away, would shadow a third of itself.
+            start = hit.spawn_ray(sample.d).o
+            seen = lit(task.around, start, sample.d, sample.dist, active)
+            return material * irradiance * seen * mi.Float(dr.exp(-depth))
+
+        total += dr.select(active, mean_over_directions(emitter, sampler, task.samples, active, sent_by), 0)
     return total
 
 
@@ -247,7 +256,7 @@ def _albedo(medium, point, active):
 
 
 def lit(around: Surroundings, start, direction, distance, active):
-    """Return 1 where nothing stands between a light and points, 0 elsewhere."""
+    """Return 1 where nothing stands within a distance, 0 elsewhere."""
     nothing = Leg(dr.zeros(mi.MediumPtr), dr.zeros(mi.Spectrum, dr.width(active)))
     return transmittance(around, start, direction, distance, media=nothing, active=active)
 

@@ -22,7 +22,7 @@ from reference.monte_carlo.batches import Batches, check_samples, single_batch
 from reference.monte_carlo.single_scatter.estimator import ray_light
 from reference.monte_carlo.single_scatter.scene_data import read_task
 from reference.monte_carlo.single_scatter.stretches import double_ray
-from reference.scene.read import TruthScene
+from reference.scene.read import TruthScene, whole_scene
 
 _RAYS = 1 << 20  # camera rays in one kernel
 
@@ -32,12 +32,12 @@ def single_scatter_batch(truth: TruthScene, seed: int, samples: int) -> Batches:
 
     `truth`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`: distances sampled for
     each ray, light and medium, each from a point of its own of a light with extent, at most 256. Returns Batches:
-    airlight and surface of every pixel [W/(m^2 sr)]. The surface needs no sampling but under lights with extent:
-    without these all batches agree on it.
+    airlight and surface of every pixel [W/(m^2 sr)]. The surface needs no sampling but under lights with extent
+    and a sky: without these all batches agree on it.
     """
     check_samples(samples)
     medium = truth.scene.sensors()[0].get_medium()
-    task = read_task(truth.scene, medium, samples)
+    task = read_task(whole_scene(truth), medium, samples)
     sampler = mi.load_dict({"type": "independent"})
     pixels = truth.width * truth.height
     chunks = -(-pixels // _RAYS)

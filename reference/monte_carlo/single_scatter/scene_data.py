@@ -22,6 +22,7 @@ from reference.monte_carlo.single_scatter.boundary_walk import (
     require_homogeneous,
 )
 from reference.monte_carlo.single_scatter.density_grid import read_majorant
+from reference.monte_carlo.single_scatter.directional_sampling import is_sky
 from reference.monte_carlo.single_scatter.height_fog import HeightDensity, read_height_density
 
 
@@ -41,7 +42,7 @@ class Task:
 
     around: Surroundings  #: what rays can meet
     lights: tuple[Light, ...]  #: point and spot lights
-    directional: tuple[Any, ...]  #: Mitsuba's directional emitters
+    far: tuple[Any, ...]  #: Mitsuba's emitters from infinity: suns, and a uniform sky
     samples: int  #: distances for each ray, light and medium
     grey: bool  #: no medium's extinction depends on the channel
     area: tuple[AreaLight, ...] = ()  #: lights with extent
@@ -56,11 +57,9 @@ def read_task(scene, medium, samples: int) -> Task:
     vacuum; `samples`: distances for each ray, light and medium. Raises InputError for an emitter, a medium or a
     material that it has no answer for.
     """
-    directional = tuple(emitter for emitter in scene.emitters() if _is_directional(emitter))
+    far = tuple(emitter for emitter in scene.emitters() if _is_far(emitter))
     area = tuple(read_area(emitter) for emitter in scene.emitters() if is_area(emitter))
-    lights = tuple(
-        _read_light(emitter) for emitter in scene.emitters() if not (_is_directional(emitter) or is_area(emitter))
-    )
+    lights = tuple(_read_light(emitter) for emitter in scene.emitters() if not (_is_far(emitter) or is_area(emitter)))
     around, media = read_surroundings(scene)
     own = medium if isinstance(medium, mi.Medium) else None
     fog, majorant = read_height_density(own) if own else None, read_majorant(own) if own else 0.0
@@ -70,14 +69,19 @@ def read_task(scene, medium, samples: int) -> Task:
                 "single-scatter: the scene has area lights in height fog or a density grid; wanted point, spot and "
                 "directional lights: take the estimator volpath"
             )
-        return Task(around, lights, directional, samples, grey=True, fog=fog, majorant=majorant)
+        if majorant and any(map(is_sky, far)):
+            raise InputError(
+                "single-scatter: the scene has a sky around a density grid; wanted point, spot and directional lights: "
+                "take the estimator volpath"
+            )
+        return Task(around, lights, far, samples, grey=True, fog=fog, majorant=majorant)
     if isinstance(medium, mi.Medium):
         require_homogeneous(medium)
         media = [*media, medium]
-    if directional:
-        _refuse_endless(scene, medium, directional[0])
+    if far:
+        _refuse_endless(scene, medium, far[0])
     known = medium is None or isinstance(medium, mi.Medium)
-    return Task(around, lights, directional, samples, grey=known and all(_is_grey(each) for each in media), area=area)
+    return Task(around, lights, far, samples, grey=known and all(_is_grey(each) for each in media), area=area)
 
 
 def _refuse_endless(scene, medium, emitter) -> None:
@@ -92,14 +96,14 @@ def _refuse_endless(scene, medium, emitter) -> None:
         _, sigma_t = coefficients(mi.MediumPtr(outside), mi.Bool(True))
         if max(float(np.ravel(channel)[0]) for channel in sigma_t):
             raise InputError(
-                f"single-scatter: light '{emitter.id()}' is directional: nothing of it arrives through a medium "
+                f"single-scatter: light '{emitter.id()}' is infinitely far: nothing of it arrives through a medium "
                 "without bounds; give the medium bounds, a closed shape of material 'null' with the medium as its "
                 "interior"
             )
 
 
-def _is_directional(emitter) -> bool:
-    return str(emitter.class_name()) == "DirectionalEmitter"
+def _is_far(emitter) -> bool:
+    return is_sky(emitter) or str(emitter.class_name()) == "DirectionalEmitter"
 
 
 def _is_grey(medium) -> bool:
@@ -112,8 +116,8 @@ def _read_light(emitter) -> Light:
     name = emitter.class_name()
     if name not in ("PointLight", "SpotLight"):
         raise InputError(
-            f"single-scatter: the scene has an emitter of class {name}; wanted 'point', 'spot', 'directional' or "
-            "'area' only"
+            f"single-scatter: the scene has an emitter of class {name}; wanted 'point', 'spot', 'directional', "
+            "'area' or 'constant' only"
         )
     sample, _ = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
     position = mi.Point3d(sample.p)
