@@ -30,24 +30,25 @@ class SceneFeatures:
     notes: tuple[str, ...] = ()  #: what the user should know of this scene
 
 
-def backgrounds(scene) -> list[Any]:
+def backgrounds(scene, *, clouds: bool = True) -> list[Any]:
     """Return what is seen behind a scene that lights in it light: an environment, or a sky that is no light of clouds.
 
-    A constant emitter beside directional lights alone lights clouds (`realtime.scene.read_scene`).
+    A constant emitter beside directional lights alone lights clouds (`realtime.scene.read_scene`), if there may be any.
     """
     around = {"EnvironmentMapEmitter", "ConstantBackgroundEmitter"}
     lights = {emitter.class_name() for emitter in scene.emitters()} - around
-    around -= {"ConstantBackgroundEmitter"} if lights <= {"DirectionalEmitter"} else set()
+    around -= {"ConstantBackgroundEmitter"} if clouds and lights <= {"DirectionalEmitter"} else set()
     return [emitter for emitter in scene.emitters() if lights and emitter.class_name() in around]
 
 
-def scene_notes(scene) -> list[str]:
+def scene_notes(scene, *, clouds: bool = True) -> list[str]:
     """Return what the user should know of the cameras and the lights of a Mitsuba scene, a line each."""
     cameras = len(scene.sensors())
     notes = [f"the scene has {cameras} cameras: the first is used, the others are left out"] if cameras > 1 else []
     notes += [
         f"light '{emitter.id()}' around the scene is seen behind it; light of it that is scattered is left out"
-        for emitter in backgrounds(scene)
+        + (" by methods: references have it" if emitter.class_name() == "ConstantBackgroundEmitter" else "")
+        for emitter in backgrounds(scene, clouds=clouds)
     ]
     return notes
 

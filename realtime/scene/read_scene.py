@@ -102,7 +102,7 @@ def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
             "the scene has no light; wanted at least one emitter of type 'point', 'spot', 'directional' or 'area'"
         )
     bodies = _Bodies(medium, meshes, opaque)
-    behind = backgrounds(scene)
+    behind = backgrounds(scene, clouds=medium.clouds is not None)
     lights = tuple(
         _read_directional(emitter, bodies, types)
         if emitter.class_name() == "DirectionalEmitter"
@@ -278,7 +278,7 @@ def _scene_features(
     scene, bodies: _Bodies, lights: tuple[Light, ...], area_lights: tuple[AreaLight, ...]
 ) -> SceneFeatures:
     medium, opaque = bodies.medium, bodies.opaque
-    notes = scene_notes(scene)
+    notes = scene_notes(scene, clouds=bodies.medium.clouds is not None)
     for shape in opaque:
         flags = shape.bsdf().flags()
         if flags & ~int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide) & 0x3FF:

@@ -186,7 +186,7 @@ def _sky(background, medium: TruthMedium | VaryingMedium) -> Array | None:
 def sky_too_far(background) -> str:
     """Return why a sky alone is refused in an unbounded medium."""
     return (
-        f"light '{background.id()}' is a sky, infinitely far: nothing of it arrives through a medium without bounds; "
+        f"light '{background.id()}' is a sky: nothing of it arrives through a medium without bounds; "
         "give the medium bounds, or add a light"
     )
 

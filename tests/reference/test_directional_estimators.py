@@ -112,6 +112,6 @@ def test_medium_without_bounds_is_refused(variant, estimator, bounded):
     scene = mi.load_dict(tiny_scene(lamp=None, sun=sun(), **body))
     medium = scene.sensors()[0].get_medium()
     read = {"quadrature": lambda: read_truth(scene), "single-scatter": lambda: read_task(scene, medium, 4)}[estimator]
-    with pytest.raises(InputError, match=r"light 'sun' is infinitely far: .* give the medium bounds") as refusal:
+    with pytest.raises(InputError, match=r"light 'sun' is directional: .* give the medium bounds") as refusal:
         read()
     assert "\n" not in str(refusal.value)

@@ -105,6 +105,11 @@ def seen_image(
             f"the mask is {shape} pixels, the image {judged.size[0]} x {judged.size[1]}; wanted one of the image's size"
         )
     truth = read_truth(scene)
+    if truth.sky is not None:
+        raise InputError(
+            f"light '{truth.background.id()}' is a sky, whose light fits and diagnoses do not know; wanted lights of "
+            "type 'point', 'spot', 'directional' or 'area'"
+        )
     values = np.asarray(judged.values, dtype=np.float64)
     values = np.broadcast_to(values.reshape(-1, values.shape[-1]), (judged.size[0] * judged.size[1], 3)).copy()
     finite: Bools = np.asarray(np.isfinite(values).all(axis=1))

@@ -94,9 +94,10 @@ def _refuse_endless(scene, medium, emitter) -> None:
         if outside is None:
             continue
         _, sigma_t = coefficients(mi.MediumPtr(outside), mi.Bool(True))
+        kind = "a sky" if is_sky(emitter) else "directional"
         if max(float(np.ravel(channel)[0]) for channel in sigma_t):
             raise InputError(
-                f"single-scatter: light '{emitter.id()}' is infinitely far: nothing of it arrives through a medium "
+                f"single-scatter: light '{emitter.id()}' is {kind}: nothing of it arrives through a medium "
                 "without bounds; give the medium bounds, a closed shape of material 'null' with the medium as its "
                 "interior"
             )

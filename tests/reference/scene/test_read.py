@@ -42,7 +42,10 @@ def test_rays_are_those_of_mitsuba(variant):
 @pytest.mark.claim("scenes-refused-by-name")
 @pytest.mark.parametrize(
     ("changes", "message"),
-    [({"lamp": None}, "no light"), ({"lamp": None, "sky": {"type": "constant"}}, "light 'sky' of type 'constant'")],
+    [
+        ({"lamp": None}, "no light"),
+        ({"lamp": None, "sky": {"type": "constant"}}, "light 'sky' is a sky: nothing of it arrives"),
+    ],
 )
 def test_refusals(variant, changes, message):
     with pytest.raises(InputError, match=message):

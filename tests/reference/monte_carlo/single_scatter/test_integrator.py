@@ -217,10 +217,6 @@ def test_enclosed_light_gives_exactly_zero(variant):
     ("changes", "words"),
     [
         (
-            {"sky": {"type": "constant"}},
-            "emitter of class ConstantBackgroundEmitter; wanted 'point'",
-        ),
-        (
             {"ball": {"type": "sphere", "id": "ball", "bsdf": {"type": "mask", "nested": {"type": "diffuse"}}}},
             "shape 'ball' has a material that is transparent in part",
         ),
