@@ -20,6 +20,7 @@ Read in this order:
 - `light_samples.py`: samples of area lights for a ray or a surface point;
 - `light_points.py`: even points on them, for sums that all rays share;
 - `area_lights.py`: the airlight of area lights, and the surfaces that they light;
+- `sky.py`: the light of a uniform sky;
 - `emission.py`: these lights seen directly;
 - `ray_values.py`: all of this along every ray;
 - `image.py`: the image, by pixel centres or by means over pixels.
