@@ -17,9 +17,9 @@ is clamped: where the largest code would not fit, k is made smaller for that pla
 bits of each float32, rounded: 16 binary digits, to 2^-16 = 1.5e-5 relative at most. `d` is taken against the rounded
 reference in the denominator and against the exact one in the difference, so that the errors do not see that rounding.
 
-A plane of codes is then predicted (from nothing, from the left, from the gradient left + up - left-up), the second and
-third channel also from the first; what remains, zigzag coded (0, -1, 1, -2, ...), goes byte by byte, low bytes first,
-into zlib. All arithmetic is modulo 2^bits, so decoding is exact. `templates/codec.js` is the decoder of the page.
+A code is then predicted from the left, in the second and third channel from the first too; what remains, zigzag coded
+(0, -1, 1, -2, ...), goes byte by byte, low bytes first, into zlib. All arithmetic is modulo 2^bits, so decoding is
+exact. `templates/codec.js` is the decoder of the page.
 """
 
 import zlib
@@ -31,12 +31,9 @@ from numpy.typing import NDArray
 Codes = NDArray[np.int32]
 Array = NDArray[np.float64]
 
-NONE, LEFT, GRADIENT = range(3)  #: predictors
 REFERENCE_BITS, DIFFERENCE_BITS, FLIP_BITS = 24, 16, 8
 LARGEST = 32766  #: code of the largest finite difference
 NAN, INFINITE = -32768, 32767  #: codes of values that are not finite; minus infinity is -INFINITE
-
-_BAND = 48  # rows on which a predictor is chosen
 
 
 @dataclass(frozen=True)
@@ -59,14 +56,6 @@ class Precision:
 
 #: From fine to coarse.
 PRECISIONS = (Precision(1000, 5e-5), Precision(250, 1e-4), Precision(100, 1e-4))
-
-
-@dataclass(frozen=True)
-class Packed:
-    """Planes of one image, compressed."""
-
-    data: bytes  #: a zlib stream
-    planes: tuple[tuple[int, int], ...]  #: whether each is the difference from the first (0 or 1), its predictor
 
 
 def reference_codes(radiance: NDArray[np.floating]) -> Codes:
@@ -96,43 +85,13 @@ def difference_codes(difference: Array, precision: Precision) -> tuple[Codes, fl
     return np.where(np.isnan(difference), NAN, codes).astype(np.int32), k
 
 
-def pack_planes(codes: Codes, bits: int) -> Packed:
+def pack_planes(codes: Codes, bits: int) -> bytes:
     """Compress planes of codes, (height, width, planes), taken modulo 2^bits; bits are 8, 16 or 24."""
     parts: list[bytes] = []
-    planes = []
     for number in range(codes.shape[-1]):
-        own = codes[..., number]
-        choices = [(0, own)] + ([(1, own - codes[..., 0])] if number else [])
-        tried = [
-            (_cost(_residual(band, predictor, bits)), relative, predictor)
-            for relative, plane in choices
-            for band in (_band(plane),)
-            for predictor in (NONE, LEFT, GRADIENT)
-        ]
-        _, relative, predictor = min(tried)
-        planes.append((relative, predictor))
-        residual = _residual(choices[relative][1], predictor, bits)
-        parts += [(residual >> shift).astype(np.uint8).tobytes() for shift in range(0, bits, 8)]
-    return Packed(zlib.compress(b"".join(parts), 6), tuple(planes))
-
-
-def _residual(plane: Codes, predictor: int, bits: int) -> Codes:
-    """Return what a predictor leaves, zigzag coded. Outside the image everything is 0."""
-    rest = plane.astype(np.int32)
-    if predictor != NONE:
-        rest = np.diff(rest, axis=1, prepend=np.int32(0))
-    if predictor == GRADIENT:
-        rest = np.diff(rest, axis=0, prepend=np.int32(0))
-    spare = 32 - bits
-    signed = (rest << spare) >> spare  # modulo 2^bits, with its sign
-    return ((signed << 1) ^ (signed >> 31)) & ((1 << bits) - 1)
-
-
-def _band(plane: Codes) -> Codes:
-    start = max(0, (len(plane) - _BAND) // 2)
-    return plane[start : start + _BAND]
-
-
-def _cost(residual: Codes) -> float:
-    """Return about how many bits a value of a residual takes."""
-    return float(np.log2(1.0 + residual).mean()) if residual.size else 0.0
+        plane = codes[..., number].astype(np.int32) - (codes[..., 0] if number else 0)
+        rest = np.diff(plane, axis=1, prepend=np.int32(0)) << (32 - bits)
+        signed = rest >> (32 - bits)  # modulo 2^bits, with its sign
+        zigzag = ((signed << 1) ^ (signed >> 31)) & ((1 << bits) - 1)
+        parts += [(zigzag >> shift).astype(np.uint8).tobytes() for shift in range(0, bits, 8)]
+    return zlib.compress(b"".join(parts), 6)

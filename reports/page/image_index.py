@@ -24,7 +24,6 @@ from reports.page.image_codec import (
     FLIP_BITS,
     PRECISIONS,
     REFERENCE_BITS,
-    Packed,
     Precision,
     difference_codes,
     pack_planes,
@@ -123,7 +122,7 @@ def packed_scene(scene: Mapping[str, Any], images: StoredImages, precision: Prec
     rounded[TOTAL] = rounded["airlight"] + rounded["surface"]
     shown = [entry for entry in scene["methods"] if entry["files"]]
 
-    def packed(number: int) -> dict[str, tuple[Packed, float]]:
+    def packed(number: int) -> dict[str, tuple[bytes, float]]:
         """Return the packed layers of a method, each with its k."""
         packed_layers = {}
         for name, layer in thin(images.methods[number]).items():
@@ -160,7 +159,7 @@ def packed_scene(scene: Mapping[str, Any], images: StoredImages, precision: Prec
             for entry, layers in zip(shown, methods)
         ],
     }
-    return SceneImages(index, base64.b64encode(store.bytes()).decode("ascii"))
+    return SceneImages(index, base64.b64encode(store.whole()).decode("ascii"))
 
 
 def relative_difference(exact: Array, rounded: Array, test: Array, floor: float) -> Array:
@@ -190,12 +189,12 @@ class _Store:
         self._parts: dict[bytes, int] = {}
         self._length = 0
 
-    def add(self, packed: Packed) -> dict[str, Any]:
-        """Put planes into the store; return where they lie and how they are coded."""
-        if packed.data not in self._parts:
-            self._parts[packed.data] = self._length
-            self._length += len(packed.data)
-        return {"at": self._parts[packed.data], "bytes": len(packed.data), "planes": [list(p) for p in packed.planes]}
+    def add(self, data: bytes) -> dict[str, int]:
+        """Put planes into the store; return where they lie."""
+        if data not in self._parts:
+            self._parts[data] = self._length
+            self._length += len(data)
+        return {"at": self._parts[data], "bytes": len(data)}
 
-    def bytes(self) -> bytes:
+    def whole(self) -> bytes:
         return b"".join(self._parts)

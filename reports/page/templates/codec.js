@@ -16,11 +16,10 @@ async function inflated(bytes) {
 }
 
 // Returns one Int32Array of codes for each plane, modulo 2^bits.
-function decodedPlanes(raw, planes, width, height, bits) {
+function decodedPlanes(raw, width, height, bits) {
   const count = width * height, bytes = bits / 8, mask = (1 << bits) - 1;
   const decoded = [];
-  planes.forEach(([relative, predictor], number) => {
-    const start = number * bytes * count;
+  for (let start = 0; start < raw.length; start += bytes * count) {
     const codes = new Int32Array(count);
     for (let y = 0, i = 0; y < height; y++) {
       let left = 0;
@@ -28,15 +27,12 @@ function decodedPlanes(raw, planes, width, height, bits) {
         let zigzag = raw[start + i];
         if (bytes > 1) zigzag |= raw[start + count + i] << 8;
         if (bytes > 2) zigzag |= raw[start + 2 * count + i] << 16;
-        let value = (zigzag >>> 1) ^ -(zigzag & 1);
-        if (predictor > 0) { left = (left + value) | 0; value = left; }
-        if (predictor > 1 && y > 0) value = (value + codes[i - width]) | 0;
-        codes[i] = value;
+        left = (left + ((zigzag >>> 1) ^ -(zigzag & 1))) | 0;
+        codes[i] = (left + (start ? decoded[0][i] : 0)) & mask;
       }
     }
-    for (let i = 0; i < count; i++) codes[i] = (codes[i] + (relative ? decoded[0][i] : 0)) & mask;
     decoded.push(codes);
-  });
+  }
   return decoded;
 }
 

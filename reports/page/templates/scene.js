@@ -22,7 +22,7 @@ class SceneImages {
   async planes(entry, bits) {
     this.bytes ??= bytesOfBase64(this.element.textContent.trim());
     const raw = await inflated(this.bytes.subarray(entry.at, entry.at + entry.bytes));
-    return decodedPlanes(raw, entry.planes, this.width, this.height, bits);
+    return decodedPlanes(raw, this.width, this.height, bits);
   }
 
   // Do some work once, however often it is asked for.

@@ -7,21 +7,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
 from reports.page.image_codec import (
     DIFFERENCE_BITS,
-    GRADIENT,
     INFINITE,
-    LEFT,
     NAN,
     PRECISIONS,
     REFERENCE_BITS,
     Array,
     Codes,
-    Packed,
     difference_codes,
     pack_planes,
     reference_codes,
@@ -38,21 +34,14 @@ def difference_values(codes: Codes, k: float, s: float) -> Array:
     return np.where(codes == NAN, np.nan, values)
 
 
-def decode_planes(packed: Packed, size: tuple[int, int], bits: int) -> Codes:
+def decode_planes(packed: bytes, size: tuple[int, int], bits: int) -> Codes:
     """Return the codes, (height, width, planes); those of 16 bits with their sign."""
-    width, height = size
-    raw = np.frombuffer(zlib.decompress(packed.data), np.uint8).astype(np.int64)
-    decoded: list[NDArray[np.int64]] = []
-    for part, (relative, predictor) in zip(np.split(raw, len(packed.planes)), packed.planes):
-        zigzag = sum(byte << 8 * place for place, byte in enumerate(np.split(part, bits // 8)))
-        residual = np.where(zigzag & 1, -(zigzag + 1) // 2, zigzag // 2).reshape(height, width)
-        if predictor == LEFT:
-            residual = np.cumsum(residual, axis=1)
-        elif predictor == GRADIENT:
-            residual = np.cumsum(np.cumsum(residual, axis=1), axis=0)
-        codes = residual + decoded[0] if relative else residual
-        decoded.append(np.asarray(codes % (1 << bits), dtype=np.int64))
-    planes = np.stack(decoded, axis=-1)
+    raw = np.frombuffer(zlib.decompress(packed), np.uint8).astype(np.int64)
+    raw = raw.reshape(-1, bits // 8, size[1], size[0])
+    zigzag = sum(raw[:, place] << 8 * place for place in range(bits // 8))
+    planes = np.cumsum(np.where(zigzag & 1, -(zigzag + 1) // 2, zigzag // 2), axis=2)
+    planes[1:] += planes[0]
+    planes = np.moveaxis(planes % (1 << bits), 0, -1)
     if bits == DIFFERENCE_BITS:
         planes = np.where(planes >> (bits - 1), planes - (1 << bits), planes)
     return planes.astype(np.int32)
