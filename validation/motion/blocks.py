@@ -71,31 +71,21 @@ def regression(sums: Array) -> tuple[Estimate, ...]:
     return estimates(found, np.linalg.solve(left[:, :-1, :-1], left[:, :-1, -1:])[..., 0])
 
 
-def relative_mean(sums: Array, value: int, *, to: int, counted: int = 0) -> Estimate:
-    """Return the mean of a column over that of another; column `counted` is one where a value counts, else zero."""
-    several = _left_out(sums)
-    lower = several[:, counted, to]
-    return _relative(several[:, counted, value], lower)
-
-
 def relative_root(sums: Array, value: int, *, to: int, counted: int = 0, values: int = 0) -> Estimate:
     """Return the root mean square of a column, counted by column `values`, over the mean of another."""
     several = _left_out(sums)
     square = several[:, value, value] / np.maximum(several[:, values, values], 1e-300)
-    return _relative(np.sqrt(square) * several[:, counted, counted], several[:, counted, to])
+    lower = several[:, counted, to]
+    if not (lower > 0).all():
+        return UNKNOWN
+    found = np.sqrt(square) * several[:, counted, counted] / lower
+    return estimates(found[:1], found[1:, None])[0]
 
 
 def _left_out(sums: Array) -> Array:
     """Return the products of all pixels, then those without each group."""
     total = sums.sum(axis=0)
     return np.concatenate([total[None], total - sums])
-
-
-def _relative(upper: Array, lower: Array) -> Estimate:
-    if not (lower > 0).all():
-        return UNKNOWN
-    values = upper / lower
-    return estimates(values[:1], values[1:, None])[0]
 
 
 def estimates(found: Array, left_out: Array) -> tuple[Estimate, ...]:
