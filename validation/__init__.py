@@ -3,7 +3,8 @@
 
 Read in this order:
 
-- `scenes/`: the built-in scenes, animations, and the loading of scenes;
+- `scenes/`: the built-in scenes, animations, random scenes, and the loading of scenes;
+- `properties/`: numbers that say what a scene holds;
 - `metrics/`: errors of one image against another;
 - `statistics/`: tests for images with random errors, and the noise of errors and times;
 - `columns.py`: records that know their columns: heading, unit, meaning;
@@ -11,11 +12,14 @@ Read in this order:
 - `estimates/`: the truth of a scene by each estimator, budgets, and the agreement of the estimators;
 - `study/`: scenes x sizes x changes x configurations: what each combination costs and how wrong it is;
 - `certified/`: files of certified values: twelve scenes of fog, and airlight integrals;
-- `kernels/`: errors, cost, convergence and stability of airlight kernels;
+- `kernels/`: errors, cost and stability of airlight kernels;
 - `papers/`: the claims of papers as data, and the experiments that decide them;
 - `slab/`: a slab by order of scattering, on both sides;
-- `comparison/`: images from files and engines against the truth;
+- `comparison/`: two image files against each other;
+- `engine/`: images of other renderers: whether they are right, and what is wrong with them;
+- `fog_model/`: the single scattering of an image as a function of what describes the fog;
+- `fit/`: which parameters of the fog explain an image;
 - `motion/`: independent renders and sequences of frames: bias apart from noise, flicker, lag, ghosts.
 
-`baselines/` holds what `bench --scaling` measured once.
+`baselines/` holds what `airlight study scaling` measured once.
 """
