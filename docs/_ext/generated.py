@@ -53,13 +53,7 @@ _PAGES = {"../DESIGN.md": "conventions.md"}
 
 
 def fill(text: str) -> str:
-    """Return the source of a page with its generated parts in place.
-
-    Raises
-    ------
-    ExtensionError
-        If a mark names no part.
-    """
+    """Return the source of a page with its generated parts in place."""
     return _MARK.sub(_part, text)
 
 

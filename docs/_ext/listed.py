@@ -5,7 +5,7 @@ import inspect
 import json
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -101,22 +101,21 @@ def _named(shown: Table, address: Callable[[str], str] = lambda name: "") -> Tab
 
 def parameters(method: str) -> str:
     """Return a table of a method's parameters: values, the default first, and what they do."""
-    from dataclasses import fields
-
     from realtime.methods.registry import METHODS
 
-    rows = [(f"`{item.name}`", *_parameter(item)) for item in fields(METHODS[method])]
-    return table(("`--set`", "values", "what it does"), rows, 3) if rows else "The method has no parameters."
+    return _fields(METHODS[method])
 
 
 def light_points() -> str:
-    """Return a table of the parameters that all methods have for lights with extent."""
-    from dataclasses import fields
-
+    """Return a table of the parameters that all methods have for area lights."""
     from realtime.area_lights.points import LightPoints
 
-    rows = [(f"`{item.name}`", *_parameter(item)) for item in fields(LightPoints)]
-    return table(("`--set`", "values", "what it does"), rows, 3)
+    return _fields(LightPoints)
+
+
+def _fields(record: Any) -> str:
+    rows = [(f"`{item.name}`", *_parameter(item)) for item in fields(record)]
+    return table(("`--set`", "values", "what it does"), rows, 3) if rows else "The method has no parameters."
 
 
 def _parameter(item: Any) -> tuple[str, str]:

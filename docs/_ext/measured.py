@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from listed import table
 from shown import scene_picture
 
 from reports.tables.checks import left_out_table
@@ -139,43 +140,37 @@ def _scene(record: Any, kept: dict[str, Any] | None) -> str:
 def cycles() -> str:
     """Return the faults that were set in Blender's Cycles, and what the diagnosis said of each."""
     record = json.loads((DATA / "cycles-faults.json").read_text(encoding="utf-8"))
-    rows = record["rows"]
-    faults = [row for row in rows if row["planted"] != "right"]
-    right = [row for row in rows if row["planted"] == "right"]
-    lines = [
+    faults = [row for row in record["rows"] if row["planted"] != "right"]
+    right = [row for row in record["rows"] if row["planted"] == "right"]
+    said = (
         f"{sum(row['right'] for row in faults)} of {len(faults)} faults are named first; "
         f"{sum(row['right'] for row in right)} of {len(right)} right images are called right ({record['measured']}, "
-        f"Blender {record['blender']}, 160 x 120 pixels).",
-        "",
-        "| scene | injected fault | expected name | named first | words | error | left |",
-        "| --- | --- | --- | --- | --- | ---: | ---: |",
-    ]
-    return "\n".join([*lines, *(f"| {row['scene']} {_diagnosed(row)}" for row in rows), ""])
-
-
-def _diagnosed(row: dict[str, Any]) -> str:
-    """Return the cells of an injected fault and of what the diagnosis said."""
-    first = f"`{row['first']}`" if row["right"] else f"**`{row['first']}`**"
-    says = row["says"] + (f" (with {' and '.join(row['together'])})" if row["together"] else "")
-    cells = [
-        row["words"],
-        f"`{row['planted']}`",
-        first,
-        says,
-        *(f"{100 * row[key]:.2g} %" for key in ("residual", "left")),
-    ]
-    return f"| {' | '.join(cells)} |"
+        f"Blender {record['blender']}, 160 x 120 pixels)."
+    )
+    return _faults(said, record["rows"])
 
 
 def numpy_faults() -> str:
     """Return the faults that were set in a renderer in NumPy, and what the diagnosis said of each."""
     record = json.loads((DATA / "numpy-faults.json").read_text(encoding="utf-8"))
     rows = record["rows"]
-    lines = [
+    said = (
         f"{sum(row['right'] for row in rows)} of {len(rows)} images are called what they are ({record['measured']}, "
-        f"64 x 48 pixels, {100 * record['noise']:g} % of noise, the kind of pixel not told).",
-        "",
-        "| injected fault | expected name | named first | words | error | left |",
-        "| --- | --- | --- | --- | ---: | ---: |",
-    ]
-    return "\n".join([*lines, *map(_diagnosed, rows), ""])
+        f"64 x 48 pixels, {100 * record['noise']:g} % of noise, the kind of pixel not told)."
+    )
+    return _faults(said, rows)
+
+
+def _faults(said: str, rows: list[dict[str, Any]]) -> str:
+    head = ("injected fault", "expected name", "named first", "words", "error", "left")
+    several = "scene" in rows[0]
+    cells = [[*([row["scene"]] if several else []), *_diagnosed(row)] for row in rows]
+    return f"{said}\n\n" + table([*(["scene"] if several else []), *head], cells, 4 + several)
+
+
+def _diagnosed(row: dict[str, Any]) -> list[str]:
+    """Return the cells of an injected fault and of what the diagnosis said."""
+    first = f"`{row['first']}`" if row["right"] else f"**`{row['first']}`**"
+    says = row["says"] + (f" (with {' and '.join(row['together'])})" if row["together"] else "")
+    errors = (f"{100 * row[key]:.2g} %" for key in ("residual", "left"))
+    return [row["words"], f"`{row['planted']}`", first, says, *errors]

@@ -15,10 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 def claims() -> str:
     """Return the claims of `docs/claims.toml` by topic, each with its tests, their tier and what they allow.
 
-    Raises
-    ------
-    ExtensionError
-        If a claim has no test, or a test names a claim that is not listed.
+    A claim without a test, or a test of a claim that is not listed, ends the build.
     """
     topics = tomllib.loads((ROOT / "docs/claims.toml").read_text(encoding="utf-8"))
     tests: dict[str, list[str]] = {}
