@@ -149,14 +149,6 @@ def scattered(
     clouds, Float, Color = rays.clouds, type(rays.direction.x), type(rays.clouds.albedo)
     channels, lanes = len(clouds.sigma_t), dr.width(rays.direction)
     mean_depth = sum(rays.depths) / channels
-    several = len(clouds.phases) > 1
-
-    def legs_at(point, active):
-        legs = tuple(beam.leg(point, active) for beam in beams)
-        shares = tuple(
-            Float(1) if beam.lit is None else dr.select(beam.lit(point, active), Float(1), 0) for beam in beams
-        )
-        return legs, shares
 
     share = node_share(mean_depth, steps)
 
@@ -175,28 +167,11 @@ def scattered(
             target = dr.select(opens, begin, dr.select(to_edge, edge, x + reach))
             length = dr.select(opens, 0, target - x)
             after = tuple(dr.fma(sigma, length, depth) for sigma, depth in zip(sigma_t, depths))
-            new_legs, new_shares = legs_at(rays.origin + rays.direction * target, going)
-            albedo = dr.gather(Color, clouds.albedo, cloud, going)
-            phase = dr.gather(mi.UInt32, clouds.phase, cloud, going) if several else None
-            own_depths = [sigma * length for sigma in sigma_t]
-            sums = tuple(
-                tuple(
-                    total + dr.select(steps_on, term * factor, 0)
-                    for total, term, factor in zip(
-                        own,
-                        step_light(beam, own_depths, (depths, after), (was, now), printed=printed),
-                        [albedo * lit * (chosen_value(values, phase) if several else 1) for values in beam.phases],
-                        strict=True,
-                    )
-                )
-                for beam, own, was, now, lit in zip(
-                    beams,
-                    sums,
-                    legs,
-                    new_legs,
-                    [0.5 * (old + new) for old, new in zip(shares, new_shares)],
-                    strict=True,
-                )
+            new_legs, new_shares = reaching(rays, beams, target, going)
+            own = tuple(sigma * length for sigma in sigma_t)
+            lit = tuple(0.5 * (old + new) for old, new in zip(shares, new_shares))
+            sums = with_step(
+                clouds, beams, sums, own, (depths, after), (legs, new_legs), lit, cloud, steps_on, printed=printed
             )
             closes = steps_on & to_edge
             number = dr.select(steps_on & ~to_edge, number + 1, number)
@@ -228,12 +203,50 @@ def scattered(
         (mean_depth > 0) & (rays.stretches.count > 0),
     )
     *_, sums, _ = dr.while_loop(state=state, cond=lambda *state: state[-1], body=more)
+    return finished(clouds, beams, sums)
+
+
+def reaching(rays: CloudRays, beams: Sequence[Beam], x, active) -> tuple[Any, Any]:
+    """Return by beam the depths of the legs to rays at a distance [m], and 1 where no surface is in the way."""
+    Float = type(x)
+    point = rays.origin + rays.direction * dr.select(dr.isfinite(x), x, 0)
+    legs = tuple(beam.leg(point, active) for beam in beams)
+    return legs, tuple(
+        Float(1) if beam.lit is None else dr.select(beam.lit(point, active), Float(1), 0) for beam in beams
+    )
+
+
+def with_step(
+    clouds: Clouds, beams: Sequence[Beam], sums, own, depths, legs, lit, cloud, inside, *, printed: bool
+) -> tuple[tuple[Any, ...], ...]:
+    """Return sums by beam and octave with the light of a step in a cloud of some number, in lanes `inside`.
+
+    `own`, `depths`: as of `step_light`; `legs`: at both ends, by beam and channel [1]; `lit`: by beam, what no surface
+    hides [1].
+    """
+    albedo = dr.gather(type(clouds.albedo), clouds.albedo, cloud, inside)
+    several = len(clouds.phases) > 1
+    phase = dr.gather(mi.UInt32, clouds.phase, cloud, inside) if several else None
+    return tuple(
+        tuple(
+            total + dr.select(inside, term * (albedo * shown * (chosen_value(values, phase) if several else 1)), 0)
+            for total, term, values in zip(
+                totals, step_light(beam, own, depths, (was, now), printed=printed), beam.phases, strict=True
+            )
+        )
+        for beam, totals, was, now, shown in zip(beams, sums, *legs, lit, strict=True)
+    )
+
+
+def finished(clouds: Clouds, beams: Sequence[Beam], sums) -> tuple[tuple[Any, ...], ...]:
+    """Return the radiance of sums over all steps, by beam and octave [W/(m^2 sr)]."""
+    several = len(clouds.phases) > 1
     return tuple(
         tuple(
             total * beam.irradiance * (0.25 * dr.inv_pi * (1 if several else values[0]))
-            for total, values in zip(own, beam.phases, strict=True)
+            for total, values in zip(totals, beam.phases, strict=True)
         )
-        for own, beam in zip(sums, beams, strict=True)
+        for totals, beam in zip(sums, beams, strict=True)
     )
 
 

@@ -19,7 +19,6 @@ from dataclasses import replace
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
 
 from realtime.clouds.bounds import CloudSurfaces, optical_depths, sum_over_stretches
 from realtime.clouds.hypertexture.march import OPAQUE, least, march, marched_depths, middle_density, voxel
@@ -27,10 +26,11 @@ from realtime.clouds.single_scattering import (
     SPREAD,
     Beam,
     CloudRays,
+    finished,
+    reaching,
     scattered,
-    step_light,
+    with_step,
 )
-from realtime.numerics.array_types import chosen_value
 from realtime.scene.media.bounded import Clouds
 
 
@@ -102,12 +102,6 @@ def marched_light(
     bound = optical_depths(rays.surfaces, clouds, rays.origin, rays.direction, rays.end)
     share = (1 - dr.exp(-sum(bound) / (channels * SPREAD))) / steps
 
-    def legs_at(x, active):
-        point = rays.origin + rays.direction * dr.select(dr.isfinite(x), x, 0)
-        legs = tuple(beam.leg(point, active) for beam in beams)
-        lit = tuple(Float(1) if beam.lit is None else dr.select(beam.lit(point, active), Float(1), 0) for beam in beams)
-        return legs, lit
-
     def step(total, x, cloud, inside):
         _, depths, *_ = total
         tau = sum(depths) / channels
@@ -120,40 +114,26 @@ def marched_light(
     def add(total, begin, end, cloud, inside):
         last, depths, legs, lit, sums = total
         # Where a stretch begins, so do the legs.
-        first_legs, first_lit = legs_at(begin, inside & (begin != last))
+        first_legs, first_lit = reaching(rays, beams, begin, inside & (begin != last))
         fresh = begin != last
         legs = tuple(
             tuple(dr.select(fresh, new, old) for new, old in zip(*pair)) for pair in zip(first_legs, legs, strict=True)
         )
         lit = tuple(dr.select(fresh, new, old) for new, old in zip(first_lit, lit, strict=True))
-        next_legs, next_lit = legs_at(end, inside)
+        next_legs, next_lit = reaching(rays, beams, end, inside)
         rho = middle_density(clouds, rays.origin, rays.direction, begin, end, cloud, inside)
         length = dr.select(inside, rho * (end - begin), 0)
         own = tuple(dr.gather(Float, sigma_t, cloud, inside) * length for sigma_t in clouds.sigma_t)
         after = tuple(depth + part for depth, part in zip(depths, own))
-        albedo = dr.gather(Color, clouds.albedo, cloud, inside)
-        phase = dr.gather(mi.UInt32, clouds.phase, cloud, inside)
-        new_sums = []
-        for beam, was, leg, next_leg, shown, next_shown in zip(
-            beams, sums, legs, next_legs, lit, next_lit, strict=True
-        ):
-            new_sums.append(
-                tuple(
-                    sum_
-                    + dr.select(inside, term, 0) * (albedo * (0.5 * (shown + next_shown) * chosen_value(values, phase)))
-                    for sum_, term, values in zip(
-                        was,
-                        step_light(beam, own, (depths, after), (leg, next_leg), printed=printed),
-                        beam.phases,
-                        strict=True,
-                    )
-                )
-            )
+        shown = tuple(0.5 * (old + new) for old, new in zip(lit, next_lit))
+        sums = with_step(
+            clouds, beams, sums, own, (depths, after), (legs, next_legs), shown, cloud, inside, printed=printed
+        )
         legs = tuple(
             tuple(dr.select(inside, new, old) for new, old in zip(*pair)) for pair in zip(next_legs, legs, strict=True)
         )
         lit = tuple(dr.select(inside, new, old) for new, old in zip(next_lit, lit, strict=True))
-        return (dr.select(inside, end, last), after, legs, lit, tuple(new_sums)), least(after) < OPAQUE
+        return (dr.select(inside, end, last), after, legs, lit, sums), least(after) < OPAQUE
 
     total = (
         dr.full(Float, -1, lanes),
@@ -163,7 +143,4 @@ def marched_light(
         tuple(tuple(dr.zeros(Color, lanes) for _ in beam.scales) for beam in beams),
     )
     *_, sums = march(rays.surfaces, rays.origin, rays.direction, rays.end, total, step=step, add=add)
-    return tuple(
-        tuple(sum_ * beam.irradiance * (0.25 * dr.inv_pi) for sum_ in own)
-        for own, beam in zip(sums, beams, strict=True)
-    )
+    return finished(clouds, beams, sums)
