@@ -10,7 +10,7 @@ from typing import Any
 from listed import table
 from shown import scene_picture
 
-from reports.tables.checks import left_out_table
+from reports.tables.agreement import left_out_table
 from reports.tables.drawing import markdown
 from reports.tables.kernels import cost_table
 from reports.tables.methods import COLUMNS, fastest_table, method_row

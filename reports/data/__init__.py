@@ -5,7 +5,6 @@
 
 Read in this order:
 
-- `json_files.py`: JSON files that a user names
 - `own_faults.py`: what user methods did wrong
 - `claims.py`: the sentences at the top, from the numbers
 - `reader.py`: reads a report back, checks it, draws its page again

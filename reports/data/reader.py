@@ -7,7 +7,6 @@ from pathlib import Path, PureWindowsPath
 from typing import Any
 
 from analytic.errors import InputError
-from reports.data.json_files import read_json
 
 SCHEMA = "airlight-report/2"
 SCHEMA_FILE = Path(__file__).parent / "schema" / "report-2.json"
@@ -39,6 +38,16 @@ def load_report(path: Path | str) -> tuple[dict[str, Any], Path]:
         if not (file.parent / name).is_file():
             raise InputError(f"{file} names {name}, which is not beside it; move a report with its whole folder")
     return data, file.parent
+
+
+def read_json(path: Path, wanted: str) -> Any:
+    """Return what is in a JSON file; `wanted` says in words what it should be."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror}; wanted {wanted}") from error
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path} is not valid JSON ({error}); wanted {wanted}") from error
 
 
 def _report_file(path: Path | str) -> Path:

@@ -15,8 +15,7 @@ from analytic.errors import InputError, nearest
 from reference.storage.exr import layer as image_layer
 from reference.storage.exr import read_exr
 from reference.storage.files import write_text
-from reports.data.json_files import read_json
-from reports.data.reader import load_report
+from reports.data.reader import load_report, read_json
 from reports.plotting.figure import ENDINGS, new_figure, save_figure, show_picture, speed_panel
 from reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure, tone_mapped
 from reports.plotting.style import COLOURS, WIDTHS, report_styles

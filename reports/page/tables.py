@@ -6,8 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from reports.page.filters import MARKS, words
-from reports.tables.agreement import agreement_table, trust_table, verdict
-from reports.tables.checks import left_out_table
+from reports.tables.agreement import agreement_table, left_out_table, trust_table, verdict
 from reports.tables.drawing import html
 from reports.tables.kernels import stability_summary
 from reports.tables.methods import fastest_table, method_row, methods_table

@@ -16,5 +16,4 @@ Read in this order:
 - `agreement.py`: the reference against Monte Carlo, the verdict, and the table of trust
 - `kernels.py`: costs, levels and orders of kernels
 - `scaling.py`: what methods cost as their work grows, and exponents
-- `checks.py`: the light that single scattering leaves out
 """

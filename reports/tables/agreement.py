@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The reference against Monte Carlo: whether a comparison confirms it, all comparisons as a table."""
+"""The reference against Monte Carlo, as a table, and the light that single scattering leaves out."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from reports.tables.table import Column, Interval, Row, Table, Value, Verdict, numbers, table, words
+from reports.tables.table import Column, Interval, Name, Row, Table, Value, Verdict, numbers, table, words
 
 _UNCORRECTED = "the bias without the shadow-ray epsilon"
 _DETECTABLE = "the least bias that is found in nine runs of ten"
@@ -132,3 +132,33 @@ def _values(name: str, comparison: Mapping[str, Any]) -> Mapping[str, Any]:
         "effort": f"{width} x {height} pixels, {batches} x {samples} spp",
         "agrees": Verdict(verdict(comparison)),
     }
+
+
+# Multiple scattering
+
+
+def left_out_table(scenes: Iterable[Mapping[str, Any]], *, code: bool = False) -> Table:
+    """Return for every scene of a report the shares of light that single scattering leaves out."""
+    share = {"percent": True}
+    columns = (
+        *words("scene"),
+        *numbers(medium="of the airlight", medium_interval="95 % interval", how=share),
+        *numbers(everything="of all light", everything_interval="95 % interval", how=share),
+        *numbers(max_depth="max. edges"),
+    )
+    explanation = (
+        "Shares of all light that paths of up to max. edges bring, with 95 % intervals; the second adds surfaces that "
+        "light one another."
+    )
+    rows = (_left_out(scene, Name(scene["name"]) if code else scene["name"]) for scene in scenes)
+    return table("Multiple scattering", columns, rows, explanation=explanation)
+
+
+def _left_out(scene: Mapping[str, Any], name: Value) -> Row:
+    multiple = scene["multiple"]
+    if not multiple:
+        return Row({"scene": name}, "not measured")
+    values: dict[str, Value] = {"scene": name, "max_depth": multiple.get("max_depth")}
+    for key in ("medium", "everything"):
+        values |= {key: multiple[key]["value"], f"{key}_interval": Interval.of(multiple[key]["interval"])}
+    return Row(values)
