@@ -12,6 +12,7 @@ A change goes into Mitsuba's own scene, so the methods and the truth read the sa
 | `light.direction` | in which a spot or directional light shines |
 | `light.intensity`, `light.irradiance`, `light.radiance` | of a point or spot, a directional, an area light: RGB |
 | `medium.sigma_t` | extinction [1/m]: one number, or RGB where the scene gives RGB |
+| `medium.sigma_1`, `medium.z_1`, `medium.H_1`, ... | of height fog, a number of its file: 1/m before `scale`, or m |
 | `medium.albedo` | single-scattering albedo: RGB |
 | `medium.g` | mean cosine of an isotropic or a Henyey-Greenstein phase function |
 
@@ -28,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError, named_values, nearest
+from validation.scenes.height_fog import NUMBERS
 from validation.scenes.numbers import LARGEST_LENGTH, LARGEST_LIGHT
 
 Array = NDArray[np.float64]
@@ -213,16 +215,19 @@ def _media(scene) -> list[Any]:
     media: list[Any] = []
     around = [sensor.get_medium() for sensor in scene.sensors()[:1]]
     for medium in around + [shape.interior_medium() for shape in scene.shapes()]:
-        if medium is not None and medium.is_homogeneous() and medium not in media:
+        if medium is not None and (medium.is_homogeneous() or _is_height_fog(medium)) and medium not in media:
             media.append(medium)
     return media
 
 
 def _of_medium(prefix: str, medium) -> Iterable[Changeable]:
     parameters = mi.traverse(medium)
-    sigma_t = np.array(parameters["sigma_t.value.value"], dtype=np.float64).ravel() * float(parameters["scale"])
-    sizes = (1, 3) if len(sigma_t) == 3 else (1,)
-    yield Changeable(f"{prefix}.sigma_t", _values(sigma_t), sizes, 0, LARGEST_LENGTH, "1/m")
+    if _is_height_fog(medium):
+        yield from _of_layers(prefix, {name: _values(parameters[f"sigma_t.{name}"]) for name in NUMBERS})
+    else:
+        sigma_t = np.array(parameters["sigma_t.value.value"], dtype=np.float64).ravel() * float(parameters["scale"])
+        sizes = (1, 3) if len(sigma_t) == 3 else (1,)
+        yield Changeable(f"{prefix}.sigma_t", _values(sigma_t), sizes, 0, LARGEST_LENGTH, "1/m")
     albedo = _values(parameters["albedo.value.value"])
     yield Changeable(f"{prefix}.albedo", albedo, (1, 3) if len(albedo) == 3 else (1,), 0, 1)
     if "phase_function.g" in parameters or _is_isotropic(medium):
@@ -230,18 +235,37 @@ def _of_medium(prefix: str, medium) -> Iterable[Changeable]:
         yield Changeable(f"{prefix}.g", g, (1,), -0.99, 0.99)
 
 
+def _is_height_fog(medium) -> bool:
+    return "sigma_t.H_1" in mi.traverse(medium)
+
+
+def _of_layers(prefix: str, numbers: Mapping[str, Values]) -> Iterable[Changeable]:
+    """Yield the numbers of layers that are there, and the constant part."""
+    for name, value in numbers.items():
+        part, layer = name.split("_")
+        if layer == "0" or numbers[f"sigma_{layer}"] > (0.0,):
+            least = {"sigma": 0.0, "z": -LARGEST_LENGTH, "H": 1e-6}[part]
+            yield Changeable(f"{prefix}.{name}", value, (1,), least, LARGEST_LENGTH, "1/m" if part == "sigma" else "m")
+
+
 def _change_medium(medium, changed: Mapping[str, Values]) -> None:
     parameters = mi.traverse(medium)
     if "sigma_t" in changed:
         parameters["scale"] = 1.0
         _set_colour(parameters, "sigma_t.value.value", changed["sigma_t"])
+    for name in NUMBERS:
+        if name in changed:
+            parameters[f"sigma_t.{name}"] = changed[name][0]
     if "albedo" in changed:
         _set_colour(parameters, "albedo.value.value", changed["albedo"])
     if "g" in changed and "phase_function.g" in parameters:
         parameters["phase_function.g"] = changed["g"][0]
     elif changed.get("g", (0.0,)) != (0.0,):
         raise InputError(f"medium '{medium.id()}' is isotropic here; wanted its g when the scene is loaded")
-    parameters.update()
+    try:
+        parameters.update()
+    except (ValueError, RuntimeError) as error:  # of height fog, whose density has no bound then
+        raise InputError(f"--change: {error}") from error
 
 
 def _is_isotropic(medium) -> bool:

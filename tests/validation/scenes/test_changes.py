@@ -38,6 +38,7 @@ CHANGES = {
     "sphere-spot": {"light.position": (0.41, 0.3, 4.5), "light.direction": (0.1, 0.05, -1.0), "camera.fov": (31.0,)},
     "three-media": {"medium-3.g": (0.23,), "medium-2.sigma_t": (0.61,), "medium.albedo": (0.5,)},
     "soft-hall": {"light.radiance": (211.0, 307.0, 401.0)},
+    "valley": {"medium.H_1": (3.1,), "medium.sigma_2": (0.031,), "medium.z_2": (0.7,)},
 }
 
 
