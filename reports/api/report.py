@@ -461,5 +461,5 @@ def paper(
         from reports.figures.papers import write_figures
 
         with telling(progress, "figures") as tell:
-            written = write_figures(Path(figures), name, rows, quick=quick, progress=tell)
+            written = write_figures(Path(figures), name, quick=quick, progress=tell)
     return PaperClaims(tuple(rows), len(chosen) - len(rows), name is not None, describe_environment(), written)

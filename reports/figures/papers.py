@@ -17,10 +17,8 @@ from reports.machine.progress import Progress, part_of
 from reports.plotting.figure import ENDINGS, new_figure, picture_grid, save_figure
 from reports.plotting.pictures import exposure, tone_mapped
 from reports.plotting.style import COLOURS, WIDTHS
-from reports.tables.drawing import csv, latex
-from reports.tables.table import Column, Measured, numbers, table, words
-
-_UNITS = ("frames/s", "ms", "%")
+from reports.tables.drawing import csv
+from reports.tables.table import Column, table
 
 
 @dataclass(frozen=True)
@@ -30,25 +28,15 @@ class PaperFigure:
     draw: Callable[[str], Any]  #: returns it for a column
     images: Mapping[str, Any] = field(default_factory=dict)  #: radiance by the name of its file
     rows: Sequence[Mapping[str, Any]] = ()
-    tex: str = ""
 
 
-def write_figures(
-    folder: Path, paper: str | None, rows: Sequence[Mapping[str, Any]], *, quick: bool, progress: Progress
-) -> tuple[str, ...]:
-    """Draw the figures of a paper, or of all, into a folder; return the names of the files.
-
-    `rows` are claims with their verdicts (`validation.papers.claims.judged`); `quick` draws smaller images of fewer
-    samples.
-    """
+def write_figures(folder: Path, paper: str | None, *, quick: bool, progress: Progress) -> tuple[str, ...]:
+    """Draw the figures of a paper, or of all, into a folder, `quick` ones smaller; return the names of the files."""
     target = ensure_folder(folder)
     chosen = {name: make for name, (of, make) in _FIGURES.items() if paper is None or paper in of}
-    shown = [row for row in rows if row["published"] is not None and row["measured"] and row["unit"] in _UNITS]
-    made = {"published": _published(shown)} if shown else {}
     written: list[Path] = []
     for at, (name, make) in enumerate(chosen.items()):
-        made[name] = make(quick, part_of(progress, at / len(chosen), (at + 1) / len(chosen), before=f"{name}, "))
-    for name, figure in made.items():
+        figure = make(quick, part_of(progress, at / len(chosen), (at + 1) / len(chosen), before=f"{name}, "))
         written += [save_figure(target / f"{name}{ending}", figure.draw) for ending in ENDINGS]
         for file, radiance in figure.images.items():
             written.append(target / f"{name}-{file}.exr")
@@ -56,9 +44,6 @@ def write_figures(
         if figure.rows:
             written.append(target / f"{name}.csv")
             write_text(written[-1], csv(table("", [Column(key, key) for key in figure.rows[0]], figure.rows)))
-        if figure.tex:
-            written.append(target / f"{name}.tex")
-            write_text(written[-1], figure.tex)
     return tuple(map(str, written))
 
 
@@ -179,48 +164,6 @@ def _cloud_transport(quick: bool, progress: Progress) -> PaperFigure:
         return figure
 
     return PaperFigure(draw, rows=rows)
-
-
-def _published(rows: Sequence[Mapping[str, Any]]) -> PaperFigure:
-    """Return the numbers that papers print of times and fractions beside ours, a panel for each unit.
-
-    The machines are not the same: what can be compared are ratios within a paper.
-    """
-    panels: dict[str, list[Mapping[str, Any]]] = {}
-    for row in rows:
-        panels.setdefault(f"{row['paper']} [{row['unit']}]", []).append(row)
-
-    def draw(column: str) -> Any:
-        lines = [len(several) for several in panels.values()]
-        figure = new_figure(WIDTHS[column], 0.17 * sum(lines) + 0.5 * len(panels) + 0.3)
-        axes = figure.subplots(len(panels), 1, squeeze=False, height_ratios=lines)[:, 0]
-        for panel, (title, several) in zip(axes, panels.items()):
-            places = range(len(several))
-            printed, middle, low, high = (
-                [row[key] for row in several] for key in ("published", "measured", "low", "high")
-            )
-            panel.plot(printed, places, "|", color="black", markersize=8, markeredgewidth=1.4, label="published")
-            spread = [[m - a for m, a in zip(middle, low)], [b - m for m, b in zip(middle, high)]]
-            panel.errorbar(middle, places, xerr=spread, fmt="o", markersize=3, color=COLOURS["blue"], label="measured")
-            panel.set_yticks(places, [row["item"] for row in several])
-            panel.set(xscale="log", ylim=(len(several) - 0.5, -0.5), title=title)
-            panel.grid(False, axis="y")
-        figure.axes[0].legend(loc="best")
-        return figure
-
-    columns = (*words(item=""), *numbers("published", "measured"), *numbers("ratio", how={"digits": 2}))
-    tables = []
-    for title, several in panels.items():
-        cells = []
-        for row in several:
-            printed = row["published"]
-            shown = int(printed) if printed == int(printed) else printed  # the digits that were printed
-            ours = Measured(row["measured"], row["low"], row["high"])
-            cells.append((row["item"], shown, ours, row["measured"] / printed))
-        tables.append(table(title, columns, cells))
-    keys = ("paper", "item", "unit", "published", "measured", "low", "high", "why")
-    kept = [{key: row[key] for key in keys} for row in rows]
-    return PaperFigure(draw, rows=kept, tex=latex(tables, comment=("Medians with the distances to the quartiles.",)))
 
 
 #: Figures by name: of which papers, and what makes them.
