@@ -126,28 +126,27 @@ def filled(key: float, places: int, Float, width: int, *, gains: bool = True) ->
     )
 
 
-def insert(queue: Crossings, key, gain=None, *, larger_is_nearer: bool):
-    """Put a crossing in its place.
+def insert(queue: Crossings, key, gain):
+    """Put a crossing in its place: the larger its key, the nearer it is.
 
     Returns `queue`: the nearest, as many as before; `key`, `gain`: of the crossing that is left without a place, the
     farthest of all.
     """
-    nearer, farther = (dr.maximum, dr.minimum) if larger_is_nearer else (dr.minimum, dr.maximum)
     keys, gains, new = [], [], key
     for place, held in enumerate(queue.key):
-        keys.append(nearer(held, key))
-        key = farther(held, key)
+        keys.append(dr.maximum(held, key))
+        key = dr.minimum(held, key)
         if queue.gain:
             # Compare with the new key, not with the one that it displaced: equal keys must keep their order.
-            before = new > held if larger_is_nearer else new < held
+            before = new > held
             gains.append(dr.select(before, gain, queue.gain[place]))
             gain = dr.select(before, queue.gain[place], gain)
     return Crossings(keys, gains), key, gain
 
 
-def exchange(queue: Crossings, key, gain, *, larger_is_nearer: bool):
+def exchange(queue: Crossings, key, gain):
     """Put a crossing in its place and take out the nearest of all: the queue, and the key and gain of that."""
-    queue, last, last_gain = insert(queue, key, gain, larger_is_nearer=larger_is_nearer)
+    queue, last, last_gain = insert(queue, key, gain)
     return Crossings([*queue.key[1:], last], [*queue.gain[1:], last_gain]), queue.key[0], queue.gain[0]
 
 

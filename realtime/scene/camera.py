@@ -128,7 +128,7 @@ def resized_camera(camera: Camera, width: int, height: int) -> Camera:
     return replace(camera, width=width, height=height, axes=(forward, left, up), grid=pixel_grid(width, height))
 
 
-def tiled_pixels(width: int, height: int, tile: int = SIDE):
+def tiled_pixels(width: int, height: int):
     """Return the pixel numbers (row times width + column) in square tiles, (width times height,), uint32.
 
     A packet of 16 lanes then covers 4 x 4 pixels, which Embree's coherent traversal rewards; 16 packets cover 16 x 16
@@ -136,7 +136,7 @@ def tiled_pixels(width: int, height: int, tile: int = SIDE):
     """
     row, column = np.divmod(np.arange(width * height, dtype=np.uint32), width)
     keys: list[np.ndarray] = [column, row]
-    for side in (tile, 4 * tile, 16 * tile):
+    for side in (SIDE, 4 * SIDE, 16 * SIDE):
         keys += [column // side, row // side]
     return np.lexsort(keys).astype(np.uint32)
 

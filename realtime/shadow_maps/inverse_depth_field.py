@@ -87,10 +87,10 @@ def inverse_depth_field(shadow_map: ShadowMap) -> InverseDepthField:
     return replace(field, bounds=bounds)
 
 
-def node_bounds(heights: InverseDepthField, face, level, i, j, active=True):
+def node_bounds(heights: InverseDepthField, face, level, i, j):
     """Return the least and largest height over the node in column `i` and row `j` of a level of a face [1/m]."""
     node = face * heights.nodes + _before(level) + (j << level) + i
-    pair = dr.gather(two_numbers(type(heights.bounds)), heights.bounds, node, active)
+    pair = dr.gather(two_numbers(type(heights.bounds)), heights.bounds, node)
     return pair.x, pair.y
 
 

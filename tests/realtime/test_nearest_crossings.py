@@ -15,12 +15,11 @@ from realtime.numerics.array_types import aligned_array
 RAYS, COUNT, PLACES = 16, 9, 4
 # Few values, so that many are equal; 0 and infinity stand for no crossing.
 KEYS = arrays(np.float32, (RAYS, COUNT), elements=st.sampled_from([0.0, 0.25, 1.5, 1.75, 2.0, 1e30, np.inf]))
-LARGER = pytest.mark.parametrize("larger", [True, False])
 
 
-def in_order(keys, *, larger):
+def in_order(keys):
     """Places of the keys of every ray, nearest first, those of one key as they came."""
-    return np.argsort(-keys if larger else keys, axis=1, kind="stable")
+    return np.argsort(-keys, axis=1, kind="stable")
 
 
 def columns(keys):
@@ -33,17 +32,16 @@ def rows(values):
 
 
 @pytest.mark.claim("nearest-crossings-in-order", tolerance="none: the same bits")
-@LARGER
 @settings(deadline=None, max_examples=50)
 @given(keys=KEYS)
-def test_the_nearest_are_kept_in_order_and_the_others_come_out(variant, larger, keys):
-    none = 0.0 if larger else np.inf
+def test_the_nearest_are_kept_in_order_and_the_others_come_out(variant, keys):
+    none = 0.0
     queue, out = filled(none, PLACES, mi.Float, RAYS), []
     for number, key in enumerate(columns(keys)):
-        queue, *left = insert(queue, key, mi.Float(number + 1), larger_is_nearer=larger)
+        queue, *left = insert(queue, key, mi.Float(number + 1))
         out.append(left)
     dr.eval(queue, out)
-    order = in_order(keys, larger=larger)
+    order = in_order(keys)
     wanted = np.take_along_axis(keys, order, axis=1)
     kept, gains = rows(queue.key), rows(queue.gain)
     np.testing.assert_array_equal(kept, wanted[:, :PLACES])
@@ -56,18 +54,17 @@ def test_the_nearest_are_kept_in_order_and_the_others_come_out(variant, larger, 
 
 
 @pytest.mark.claim("nearest-crossings-in-order", tolerance="none: the same bits")
-@LARGER
 @settings(deadline=None, max_examples=50)
 @given(keys=KEYS, shift=arrays(np.int64, (RAYS, COUNT), elements=st.integers(0, PLACES)))
-def test_exchange_mends_an_order_that_is_wrong_by_no_more_than_its_places(variant, larger, keys, shift):
-    keys = np.take_along_axis(keys, in_order(keys, larger=larger), axis=1)
+def test_exchange_mends_an_order_that_is_wrong_by_no_more_than_its_places(variant, keys, shift):
+    keys = np.take_along_axis(keys, in_order(keys), axis=1)
     # Each comes at most PLACES later than in order, so none waits for more than these.
     late = np.argsort(np.arange(COUNT) + shift, axis=1, kind="stable")
     assume((late != np.arange(COUNT)).any())
-    first, last = (np.inf, 0.0) if larger else (0.0, np.inf)
+    first, last = np.inf, 0.0
     queue, out = filled(first, PLACES, mi.Float, RAYS), []
     for key in columns(np.take_along_axis(keys, late, axis=1)) + [mi.Float(last)] * PLACES:
-        queue, nearest, _ = exchange(queue, key, mi.Float(0), larger_is_nearer=larger)
+        queue, nearest, _ = exchange(queue, key, mi.Float(0))
         out.append(nearest)
     dr.eval(out)
     np.testing.assert_array_equal(rows(out[PLACES:]), keys)

@@ -65,6 +65,7 @@ COMPUTED, FINER = (1, 2, 1), (4, 4, 3)
 #: Streams of slabs thinner than so much: in thin ones most light goes within their thickness of the horizon.
 _STREAMS = (0.3, 48), (10.0, 32), (np.inf, 24)
 _MODES, _NODES, _NEGLIGIBLE = 31, 4, 1e-4
+_WORKERS = 2  #: threads
 _DIMMEST = 1e-30  #: radiance [1/sr] below which there is no light
 _DARK = -60.0  #: logarithm of what is left where there is no light
 _LARGEST_SHIFT = 8.0  #: of c over sigma, where there is hardly any light
@@ -98,7 +99,7 @@ def canonical_transport(phase: SlabPhase, albedo: float, *, progress: Progress |
     digest, medium = transport_digest(), medium_numbers(phase, albedo)
     arrays = load_kept(digest, medium)
     if arrays is None:
-        made = computed_transport(phase, albedo, progress=progress or logged("grid of clouds"))
+        made = computed_transport(phase, albedo, progress or logged("grid of clouds"))
         keep(digest, medium, {**vars(made), "seconds": np.float64(made.seconds)})
         return made
     return CanonicalTransport(arrays["entries"], arrays["sources"], arrays["angular"], float(arrays["seconds"]))
@@ -128,11 +129,9 @@ def transport_digest() -> str:
     return hashlib.blake2b(repr(made).encode(), digest_size=8).hexdigest()
 
 
-def computed_transport(
-    phase: SlabPhase, albedo: float, *, progress: Progress | None = None, workers: int = 2
-) -> CanonicalTransport:
-    """Compute the transport; parameters as above, with the number of threads."""
-    tell, began = progress or (lambda share, what: None), time.perf_counter()
+def computed_transport(phase: SlabPhase, albedo: float, progress: Progress) -> CanonicalTransport:
+    """Compute the transport; parameters as above."""
+    began = time.perf_counter()
     angular = repeated_scattering(phase)
     thicknesses = coordinates.thicknesses(SIDES[0])
     mu = np.sin(np.pi * (np.linspace(0, 1, SIDES[3]) - 0.5))
@@ -147,11 +146,11 @@ def computed_transport(
         return _entries(fitting, angular, t)
 
     entries, levels = [], []
-    with ThreadPoolExecutor(workers) as pool:
+    with ThreadPoolExecutor(_WORKERS) as pool:
         for t, (packets, level) in zip(thicknesses, pool.map(of_slab, map(float, thicknesses)), strict=True):
             entries.append(packets)
             levels.append(level)
-            tell(len(entries) / len(thicknesses), f"thickness {t:.3g}")
+            progress(len(entries) / len(thicknesses), f"thickness {t:.3g}")
     sources = np.stack([_finer_sources(number, np.stack(level)) for number, level in enumerate(zip(*levels))])
     packets = np.stack([_filled(np.stack(of_set)) for of_set in zip(*entries)])
     return CanonicalTransport(

@@ -37,8 +37,6 @@ SIZE, LAYERS = 256, 64  #: texels on a side, layers of each
 class LightDepths:
     """What lies between one sun and the points of one cloud; row by row, the layers of a texel one after the other."""
 
-    size: int
-    layers: int
     lengths: Any  #: l at the K + 1 heights of each texel [m]
     front: Any  #: by texel [m]
     back: Any  #: by texel [m]
@@ -49,15 +47,15 @@ class LightDepths:
         """Return l of points [m]."""
         u, v, height, _ = self.projection.homogeneous(mi.UInt32(0), point - self.position, 1)
         Float = type(height)
-        (column, x), (row, y) = (cell_of(dr.fma(0.5 * self.size, place + 1, -0.5), self.size) for place in (u, v))
+        (column, x), (row, y) = (cell_of(dr.fma(0.5 * SIZE, place + 1, -0.5), SIZE) for place in (u, v))
         total = Float(0)
         for down, weight_down in ((0, 1 - y), (1, y)):
             for along, weight_along in ((0, 1 - x), (1, x)):
-                texel = (row + down) * self.size + column + along
+                texel = (row + down) * SIZE + column + along
                 front, back = (dr.gather(Float, own, texel, active) for own in (self.front, self.back))
                 share = dr.clip((front - height) / dr.maximum(front - back, 1e-20), 0, 1)
-                layer, between = cell_of(dr.sqrt(share) * self.layers, self.layers + 1)
-                first = texel * (self.layers + 1) + layer
+                layer, between = cell_of(dr.sqrt(share) * LAYERS, LAYERS + 1)
+                first = texel * (LAYERS + 1) + layer
                 near, far = (dr.gather(Float, self.lengths, place, active) for place in (first, first + 1))
                 total = dr.fma(weight_down * weight_along, dr.lerp(near, far, between), total)
         return total
@@ -70,22 +68,19 @@ def light_depths(
     *,
     cloud: int,
     stride: Any,
-    size: int = SIZE,
-    layers: int = LAYERS,
 ) -> LightDepths:
     """Return what lies between a sun and all points of a cloud.
 
     `surfaces`, `clouds`: the boundaries, and what fills them, with a density; `light`: a directional light, with an
-    extent that holds the clouds; `cloud`: the number of the cloud; how long the steps are at most [voxels]; `size`,
-    `layers`: texels on a side; layers of each.
+    extent that holds the clouds; `cloud`: the number of the cloud; `stride`: how long the steps are at most [voxels].
     """
     Float = type(light.position.x)
-    start, axis, texel = texel_rays(light, size)
+    start, axis, texel = texel_rays(light, SIZE)
     Vector = type(light.position)
-    origin, direction = Vector(start), Vector(axis) + dr.zeros(Vector, size * size)
+    origin, direction = Vector(start), Vector(axis) + dr.zeros(Vector, SIZE * SIZE)
     top = Float(light.extent.depth)
     dr.eval(origin, direction, texel)
-    nothing = dr.full(Float, dr.inf, size * size), dr.zeros(Float, size * size)
+    nothing = dr.full(Float, dr.inf, SIZE * SIZE), dr.zeros(Float, SIZE * SIZE)
 
     def full_step(total, x, number, inside):
         return stride * voxel(clouds, number, inside)
@@ -100,11 +95,11 @@ def light_depths(
     there = dr.isfinite(first)
     first, last = dr.select(there, first, 0), dr.select(there, last, 0)
     dr.eval(first, last)
-    lengths = dr.zeros(Float, size * size * (layers + 1))
+    lengths = dr.zeros(Float, SIZE * SIZE * (LAYERS + 1))
 
     def to_layer(total, x, number, inside):
         layer, *_ = total
-        ahead = first + (last - first) * dr.square(Float(layer + 1) / layers) - x
+        ahead = first + (last - first) * dr.square(Float(layer + 1) / LAYERS) - x
         return dr.minimum(dr.maximum(ahead, 0), full_step(total, x, number, inside))
 
     def add(total, begin, end, number, inside):
@@ -114,24 +109,24 @@ def light_depths(
         length = dr.select(own, dr.fma(rho, end - begin, length), length)
         # A step ends at a layer's end at the latest, or a rounding of the distance behind it.
         share = dr.clip((end - first) / dr.maximum(last - first, 1e-20), 0, 1)
-        reached = dr.minimum(mi.UInt32(dr.fma(dr.sqrt(share), layers, 1e-3)), layers)
+        reached = dr.minimum(mi.UInt32(dr.fma(dr.sqrt(share), LAYERS, 1e-3)), LAYERS)
         # What the next layer has if the ray leaves the cloud before it; a later step writes over it.
-        dr.scatter(lengths, length, texel * (layers + 1) + dr.minimum(reached + 1, layers), own)
-        dr.scatter(lengths, length, texel * (layers + 1) + reached, own & (reached > layer))
+        dr.scatter(lengths, length, texel * (LAYERS + 1) + dr.minimum(reached + 1, LAYERS), own)
+        dr.scatter(lengths, length, texel * (LAYERS + 1) + reached, own & (reached > layer))
         return (dr.select(inside, dr.maximum(layer, reached), layer), length), inside & (end < last)
 
-    nothing = dr.zeros(mi.UInt32, size * size), dr.zeros(Float, size * size)
+    nothing = dr.zeros(mi.UInt32, SIZE * SIZE), dr.zeros(Float, SIZE * SIZE)
     march(surfaces, origin, direction, last, nothing, step=to_layer, add=add, active=there)
     # Layers in clear air, where no step ends, have what the one before them has.
-    lengths = dr.block_prefix_reduce(dr.ReduceOp.Max, lengths, layers + 1, exclusive=False)
+    lengths = dr.block_prefix_reduce(dr.ReduceOp.Max, lengths, LAYERS + 1, exclusive=False)
     arrays = []
     for distance in (first, last):
-        heights = dr.zeros(Float, size * size)
+        heights = dr.zeros(Float, SIZE * SIZE)
         dr.scatter(heights, dr.select(there, top - distance, 0), texel)
         arrays.append(heights)
     dr.eval(lengths, arrays)
     front, back = arrays
-    return LightDepths(size, layers, lengths, front, back, light.position, light_projection(light))
+    return LightDepths(lengths, front, back, light.position, light_projection(light))
 
 
 def sun_depths(

@@ -200,7 +200,7 @@ def _walk(sweep: _Sweep, active, *, places: int):
         # plane those that wait come out.
         moves = crossed | ~reads
         key, gain = dr.select(moves, quotient, dr.inf), dr.select(moves, gain, 0)
-        waiting, nearest, gained = exchange(waiting, key, gain, larger_is_nearer=True)
+        waiting, nearest, gained = exchange(waiting, key, gain)
         crosses = moves & (nearest > 0)
         lost |= crosses & (nearest > passed.quotient)
         due = (place & _DUE) == _DUE
@@ -234,7 +234,7 @@ def _collect(sweep: _Sweep):
         tie = crossed & (quotient == passed.quotient)
         beyond = crossed & ((quotient < passed.quotient) | (tie & (seen >= ties)))
         seen += dr.select(tie, mi.UInt32(1), 0)
-        nearest, left_out, _ = insert(nearest, dr.select(beyond, quotient, 0), gain, larger_is_nearer=True)
+        nearest, left_out, _ = insert(nearest, dr.select(beyond, quotient, 0), gain)
         more |= left_out > 0
         nearest, at, gained = pop(nearest, 0, ~reads)
         crosses = ~reads & (at > 0)
