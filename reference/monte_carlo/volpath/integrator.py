@@ -67,9 +67,10 @@ def volpath_batch(
     if counts is not None and max_depth != 2:
         raise ValueError("counts: got some with multiple scattering, whose layers are traced along the same paths")
     in_air, on_surface = np.full((2, truth.width * truth.height), samples) if counts is None else counts
-    if truth.directional and not truth.scene.bbox().valid():  # of rectangles alone, merged, in Mitsuba 3.9.1
-        raise InputError("volpath: the scene's bounding box is not valid, so its directional lights start within it")
-    _check_sun(truth)
+    far = truth.directional or truth.sky is not None
+    if far and not truth.scene.bbox().valid():  # of rectangles alone, merged, in Mitsuba 3.9.1
+        raise InputError("volpath: the scene's bounding box is not valid, so lights from infinity start within it")
+    _check_far(truth)
     hidden = {"hide_emitters": True} if truth.is_sampled else {}
     truth = replace(truth, scene=whole_scene(truth))
     integrator = mi.load_dict({"type": "volpath", "max_depth": max_depth, "rr_depth": 1000} | hidden)
@@ -84,20 +85,25 @@ def volpath_batch(
     return single_batch(seed, samples, np.stack([airlight, surface]))
 
 
-def _check_sun(truth: TruthScene) -> None:
-    """Refuse fog whose light paths to a sun Mitsuba would cut: they are twice the radius of all shapes long."""
+def _check_far(truth: TruthScene) -> None:
+    """Refuse fog whose light paths from infinity Mitsuba would cut: they are twice the radius of all shapes long.
+
+    Those of a sky come from all directions: 60 degrees from the zenith they must leave height fog, and lower ones that
+    are cut miss its thin upper part.
+    """
     medium, radius = truth.medium, float(truth.scene.bbox().bounding_sphere().radius)
-    for sun in truth.directional:
-        needed = 0.0
-        if isinstance(medium, HeightMedium):
-            needed = 0.5 * (medium.cap - medium.floor) / float(-sun.direction @ medium.up)
-        if isinstance(medium, GridMedium):
-            needed = 0.5 * float(np.linalg.norm(medium.high - medium.low))
-        if radius < needed:
-            raise InputError(
-                f"volpath: the light paths of a sun end within the fog, since the shapes of the scene have a radius of "
-                f"{radius:.4g} m; wanted {needed:.4g} m: add ground, or lower the cap of height fog"
-            )
+    rises = [float(-sun.direction @ medium.up) for sun in truth.directional] if isinstance(medium, HeightMedium) else []
+    needed = 0.0
+    if isinstance(medium, HeightMedium):
+        slowest = min(rises + [0.5] * (truth.sky is not None), default=np.inf)
+        needed = 0.5 * (medium.cap - medium.floor) / slowest
+    if isinstance(medium, GridMedium) and (truth.directional or truth.sky is not None):
+        needed = 0.5 * float(np.linalg.norm(medium.high - medium.low))
+    if radius < needed:
+        raise InputError(
+            f"volpath: the light paths of a sun or a sky end within the fog, since the shapes of the scene have a "
+            f"radius of {radius:.4g} m; wanted {needed:.4g} m: add ground, or lower the cap of height fog"
+        )
 
 
 @contextmanager
