@@ -5,7 +5,7 @@ So the bytes of a file do not depend on where its numbers were computed. What wo
 them, is computed here.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -45,22 +45,23 @@ class Picture:
         return load_scene(self.scene, self.size, dict(self.changes)).scene
 
 
-def bring_references(
-    cluster: Client,
-    pictures: Sequence[Picture],
-    *,
-    pixel: str = "centre",
-) -> None:
+def bring_references(cluster: Client, pictures: Sequence[Picture], *, pixel: str = "centre") -> None:
     """Let workers compute the quadrature references of scenes that are not in the cache, and keep them here."""
     lacking = [picture for picture in pictures if not has_truth(picture.load(), pixel=pixel)]
     named = {f"reference {number}": picture for number, picture in enumerate(lacking)}
     given = pixel, fresh_since()
     groups = [Group((Task(name, _truth, (picture, *given), _LIMIT),)) for name, picture in named.items()]
+    for name, value in _done(cluster, groups):
+        keep_truth(named[name].load(), *value, pixel=pixel)
+
+
+def _done(cluster: Client, groups: Iterable[Group]) -> Iterator[tuple[str, Any]]:
+    """Yield the names and values of tasks that were done; the first that was refused ends the run."""
     for outcome in run_groups(cluster, groups, made=facts()):
         if outcome.status == "refused":
             raise InputError(outcome.reason or "")
         if outcome.status == "done":
-            keep_truth(named[outcome.task.name].load(), *outcome.value, pixel=pixel)
+            yield outcome.task.name, outcome.value
 
 
 def tracing(
@@ -83,11 +84,7 @@ def tracing(
     def bring(seeds: list[int]) -> Iterator[tuple[Batches, Spent]]:
         # One task in a group: what is sent at once then depends on the workers alone.
         groups = (Group((Task(f"batch {seed}", _batch, (kind, seed), _LIMIT),)) for seed in seeds)
-        for outcome in run_groups(cluster, groups, made=facts()):
-            if outcome.status == "refused":
-                raise InputError(outcome.reason or "")
-            if outcome.status == "done":
-                yield outcome.value
+        return (value for _, value in _done(cluster, groups))
 
     workers = len(cluster.scheduler_info(n_workers=-1)["workers"])
     return Elsewhere(bring, batches or _WAVE * max(1, workers))

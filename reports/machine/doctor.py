@@ -10,7 +10,6 @@ prints what is missing, for the launcher: Debian's names of the packages, and wh
 """
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -21,9 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from reports.machine.environment import (
-    VARIANT_VARIABLE,
     MissingError,
     atomic_problem,
+    child_environment,
     install_line,
     missing_packages,
     prepare,
@@ -191,9 +190,7 @@ def diagnose() -> dict[str, Any]:
 
 def try_kernel(variant: str, patience: float = _PATIENCE) -> dict[str, Any]:
     """Run a kernel in a process of its own and return what it found, or its ``problem``."""
-    root = str(Path(__file__).resolve().parents[2])
-    paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
-    environment = os.environ | {VARIANT_VARIABLE: variant, "PYTHONPATH": paths}
+    environment = child_environment(variant)
     command = [sys.executable, "-m", "reports.machine.doctor", "--probe"]
     try:
         ran = subprocess.run(command, capture_output=True, text=True, timeout=patience, env=environment, cwd="/")

@@ -129,6 +129,15 @@ def require(package: str, extra: str, what: str) -> None:
         ) from None
 
 
+def child_environment(variant: str | None = None) -> dict[str, str]:
+    """Return the environment of a child process: our modules, those of PYTHONPATH, and a variant, else the current."""
+    paths = [str(Path(__file__).resolve().parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])]
+    mitsuba = sys.modules.get("mitsuba")
+    current = variant or (mitsuba.variant() if mitsuba else None)
+    chosen = {VARIANT_VARIABLE: current} if current else {}
+    return os.environ | {"PYTHONPATH": os.pathsep.join(paths)} | chosen
+
+
 def check_variant(variant: str) -> None:
     """Raise InputError for a variant that is not one of `VARIANTS`."""
     from analytic.errors import InputError

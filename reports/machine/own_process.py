@@ -18,12 +18,11 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 from analytic.errors import InputError
 from reports.machine import quick_compilation
-from reports.machine.environment import VARIANT_VARIABLE
+from reports.machine.environment import child_environment
 
 _POSIX = os.name == "posix"
 _LIMIT, _LIMIT_VARIABLE = 300.0, "AIRLIGHT_METHOD_LIMIT"  # that a user's method may take for one scene or command [s]
@@ -54,7 +53,7 @@ def in_own_process(
         [sys.executable, "-P", "-m", "reports.machine.own_process", str(os.getpid())],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        env=_environment() | (quick_compilation.settings() if quick else {}),
+        env=child_environment() | (quick_compilation.settings() if quick else {}),
         start_new_session=_POSIX,
     ) as process:
         try:
@@ -86,16 +85,6 @@ def method_limit() -> float:
         if 0 < float(given) < math.inf:
             return float(given)
     raise InputError(f"{_LIMIT_VARIABLE}: got {given!r}, wanted a time above 0, such as 300 [s]")
-
-
-def _environment() -> dict[str, str]:
-    """Return the environment of the process: our modules, those of PYTHONPATH, the variant as it is."""
-    root = str(Path(__file__).resolve().parents[2])
-    paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
-    mitsuba = sys.modules.get("mitsuba")
-    current = mitsuba.variant() if mitsuba else None
-    chosen = {VARIANT_VARIABLE: current} if current else {}
-    return os.environ | {"PYTHONPATH": os.pathsep.join(paths)} | chosen
 
 
 def _end(process: subprocess.Popen) -> None:

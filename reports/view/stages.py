@@ -22,15 +22,12 @@ WORDS = {
 def timed_stages(renderer: FrameRenderer) -> tuple[FrameRenderer, dict[str, float]]:
     """Return a renderer that does the same, and a dictionary that its next frame fills with the time of stages [ms]."""
     times: dict[str, float] = {}
-    return _timed(renderer, times), times
 
-
-def _timed(renderer: FrameRenderer, times: dict[str, float]) -> FrameRenderer:
     def clocked(stages: Stages) -> Stages:
         timed: dict[str, Any] = {name: _clocked(name, getattr(stages, name), times) for name in WORDS}
         return replace(stages, **timed)
 
-    return replace(renderer, structures={key: clocked(stages) for key, stages in renderer.structures.items()})
+    return replace(renderer, structures={key: clocked(stages) for key, stages in renderer.structures.items()}), times
 
 
 def _clocked(name: str, stage: Callable[..., Any], times: dict[str, float]) -> Callable[..., Any]:
