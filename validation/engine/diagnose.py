@@ -44,7 +44,10 @@ RIGHT, UNEXPLAINED = "right", "unexplained"
 
 _REFINED = 5  # faults whose numbers are found to all digits: those that leave least after a coarse search
 _MOVED = 0.02  # fraction by which the error changes where a search left the unchanged scene
-_FAR, _FAR_OF_PATHS = 10.0, 3.0  # errors over the least one that more digits do not bring down to it
+# Errors over the least one that more digits do not bring down to it; the last where that one leaves noise.
+_FAR, _FAR_OF_PATHS, _FAR_FROM_NOISE = 10.0, 3.0, 1.5
+_MANY_TRIANGLES = 20_000  # of which paths cost much
+_LESS = 0.9  # of the error that few paths leave, what a fault must where it begins if its paths cost much
 _PARTNERS = 12  # faults, those that leave least, with which all others are tried as pairs
 _PAIRS = 12  # pairs that are followed, those that leave least where they begin
 _BETTER = 0.7  # what a pair must leave of the error of one alone: with more numbers anything fits a little better
@@ -275,9 +278,21 @@ class _Attempt:
         tried = []
         for number, fault in enumerate(own):
             self._tell(_PARTS[costly], number / len(own), fault.name)
+            if costly > 1 and not self._may_help(fault):
+                continue
             tried.append(explain(self.predictor, (fault,), fine=False))
         least = min((each.error for each in self.singles), default=1.0)
-        self.singles += self._refined(tried, least)
+        # A sphere in the place of a light costs as much as all others: to all digits only where it explains most.
+        self.singles += (
+            tried if costly > 1 and all(each.error > least for each in tried) else self._refined(tried, least)
+        )
+
+    def _may_help(self, fault: Fault) -> bool:
+        """Return whether paths are cheap, or few of a fault's, where its search begins, leave less than the best do."""
+        few = self.predictor.coarse
+        if sum(shape.primitive_count() for shape in few.truth.occluders.shapes()) < _MANY_TRIANGLES:
+            return True
+        return begin(few, (fault,))[0] < _LESS * float(np.abs(few.errors(self._with_pairs().guess)).mean())
 
     def _settled(self, explanation: Explanation) -> bool:
         """Return whether nothing is left that another fault could explain."""
@@ -306,9 +321,12 @@ class _Attempt:
         """
         least = max(LEAST_EFFECT, min([least, *(each.error for each in explanations)]))
         moved = [each for each in explanations if abs(each.error - self.right.error) > _MOVED * self.right.error]
-        better = sorted((each for each in moved if each.error < _far(each) * least), key=lambda each: each.error)
-        best = [each for each in better[:_REFINED] if each.parameters]
-        finer = {id(each): explain(self.predictor, each.faults, each.values) for each in best}
+        finer: dict[int, Explanation] = {}
+        for each in sorted(moved, key=lambda each: each.error):
+            far = min(_far(each), _FAR_FROM_NOISE if any(map(self._settled, finer.values())) else _FAR)
+            if len(finer) < _REFINED and each.parameters and each.error < far * least:
+                finer[id(each)] = explain(self.predictor, each.faults, each.values)
+                least = max(LEAST_EFFECT, min(least, finer[id(each)].error))
         return [finer.get(id(each), each) for each in explanations]
 
     def _best(self, explanations: Sequence[Explanation]) -> Explanation:

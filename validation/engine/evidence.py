@@ -26,7 +26,7 @@ Index = NDArray[np.int64]
 _LEAST_EVIDENCE = 20.0  # e^20 to one: what nobody doubts
 LEAST_EFFECT = 0.002  #: mean relative change of the image: less is no fault
 _LEAST_EXACT, _EXACT = 0.0005, 0.2  # the same of a fault without a number that leaves this fraction of the error
-_FOUND = 0.7  # fraction of the error that an explanation leaves at most if anything was found
+_FOUND = 0.5  # fraction of the error that an explanation leaves at most if anything was found
 _LEFT, _LEFT_OF_AREA = 0.004, 0.01  # mean relative error that is no fault
 _GAIN = 10.0  # what an explanation that leaves nothing makes of the error
 # Correlation of neighbours; that of noise is 0 +- 1/sqrt(pairs), 0.04 in an image of 32 x 24 pixels. Of noise alone no

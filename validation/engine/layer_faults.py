@@ -24,7 +24,7 @@ from validation.engine.fault import (
     shows_fog,
 )
 from validation.engine.image_faults import SHIFT, best_corner, shifted
-from validation.engine.light_faults import PLACE, at_position
+from validation.engine.light_faults import PLACE, at_position, position_held
 from validation.engine.prediction import Guess, Layers, Predictor
 
 
@@ -86,6 +86,10 @@ def _ambient_colour(predictor: Predictor, guess: Guess) -> Sequence[Values]:
     more = predictor.shown(guess) - predictor.predicted(guess)
     safe = np.maximum(fog, 1e-6)
     return [tuple(max(_weighted_median(m / f, f), 0.0) for m, f in zip(more.T, safe.T, strict=True))]
+
+
+def _fog_held(predictor: Predictor, guess: Guess, p: Values, at: Values) -> Guess:
+    return replace(position_held(predictor, guess, p, at), surfaces=guess.surfaces or guess.scenery)
 
 
 FOG_AND_SURFACES = (
@@ -170,13 +174,14 @@ FOG_AND_SURFACES = (
             f"the first light is off by ({{0:.3g}}, {{1:.3g}}, {{2:.3g}}) m for {words}: one of them lags",
             alone(at_position),
             PLACE,
+            held=held,
             costly=1,
             single=True,
             applies=all_of(shows_both, has_near_lights),
         )
-        for words, alone in (
-            ("the fog, not for surfaces", of_fog_alone),
-            ("surfaces, not for the fog", of_surfaces_alone),
+        for words, alone, held in (
+            ("the fog, not for surfaces", of_fog_alone, _fog_held),
+            ("surfaces, not for the fog", of_surfaces_alone, None),
         )
     ),
 )

@@ -47,7 +47,7 @@ def at_position(predictor: Predictor, guess: Guess, p: Values) -> Guess:
     return replace(guess, scenery=replace(guess.scenery, moved=(x, y, z)))
 
 
-def _position_held(predictor: Predictor, guess: Guess, p: Values, at: Values) -> Guess:
+def position_held(predictor: Predictor, guess: Guess, p: Values, at: Values) -> Guess:
     """Return a guess with the light at p, and shadows as they are where it is at another place.
 
     The edge of a spot's cone moves more of the fog than all else: there nothing is held.
@@ -156,7 +156,7 @@ LIGHTS = (
         "the first light is off by ({0:.3g}, {1:.3g}, {2:.3g}) m",
         at_position,
         PLACE,
-        held=_position_held,
+        held=position_held,
         costly=1,
         applies=has_near_lights,
     ),

@@ -24,7 +24,7 @@ Layers = Callable[[Array, Array], tuple[Array, Array]]  #: of airlight and surfa
 
 APART = 2  #: pixels between those whose errors are compared: a filter that is wider than a pixel joins neighbours
 _FEW_RAYS = 800  # with which faults that move paths are told apart
-_SPHERE_SAMPLES = 32  # of a sphere in the place of a point light: its rays pass by close
+_SPHERE_SAMPLES, _SPHERE_FEW = 32, 8  # of a sphere in the place of a point light; few where rays are
 _BATCHES, _PATHS = 4, 16  # batches of paths a pixel for the light of multiple scattering
 _SMOOTH = 40  # of the width of an image: the width of the filter for that light
 _FLOOR = 0.01  # of the mean of an image: below it values count relative to this
@@ -69,7 +69,7 @@ class Scenery:
 
     def model(self, seen: Seen, view: View, layer: int) -> FogModel:
         """Return the paths of a layer of an image, 0: airlight, 1: surfaces."""
-        ends = None
+        ends, sphere = None, _SPHERE_FEW if seen.rays <= _FEW_RAYS else _SPHERE_SAMPLES
         if self.near > 0 or np.isfinite(self.far):
             ends = view.ends((self.near, self.far), self.spherical)
         if self.planar:
@@ -83,7 +83,7 @@ class Scenery:
             blend=self.blend,
             airlight=layer == 0,
             surface=layer == 1,
-            samples=max(_SPHERE_SAMPLES if self.radius else 0, seen.samples),
+            samples=max(sphere if self.radius else 0, seen.samples),
         )
 
 
@@ -215,7 +215,9 @@ class Predictor:
         parts = []
         for layer, scenery in enumerate((guess.scenery, guess.surfaces or guess.scenery)):
             held = self.seen.holds != ("surface", "airlight")[layer]
-            parts.append(self.light.radiance(self.seen, scenery, guess.fog, layer) if held else None)
+            # Where surfaces have scenery of their own, a light that moves with its paths held moves for the fog alone.
+            fog = replace(guess.fog, moved=self.fog.moved) if layer == 1 and guess.surfaces else guess.fog
+            parts.append(self.light.radiance(self.seen, scenery, fog, layer) if held else None)
         airlight, surface = (np.zeros((len(self.pixels), 3)) if part is None else part for part in parts)
         for change in guess.layers:
             airlight, surface = change(airlight, surface)

@@ -26,9 +26,10 @@ _COARSE = 0.02  # on a line, of a logarithm or in units of the parameter: enough
 # Starts that are followed where no paths move, on a line and by steps: the best one may lead to a lesser minimum. Half
 # of the starts of fog that thins with height lead to even fog.
 _BEGUN, _BEGUN_BY_STEPS = 2, 3
-_TURNS, _TURNS_COARSE = 8, 4  # steps of Gauss and Newton at most
+_TURNS, _TURNS_COARSE, _TURNS_LAST = 8, 4, 3  # steps of Gauss and Newton at most; the last with all paths
 _LITTLE = 0.9  # fraction of the loss that a step leaves which gains little
 _SMALL = 0.02  # of the step of differences: a change that is none
+_NEAR = 3  # steps of differences: how far few paths are off at most
 _STEP = 1e-4  # of differences, of a logarithm or in units of the parameter, where no paths move
 
 
@@ -68,12 +69,13 @@ def explain(
     fine
         Whether the values are looked for to all digits, or to some per cent, which a fault that is wrong needs.
     """
-    # To tell apart what moves paths, which are found again for each value, few of them are enough.
-    few = not fine and any(parameter.step for fault in faults for parameter in fault.parameters)
-    sought = predictor.coarse if few else predictor
-    search = _Search(sought, tuple(faults))
+    # Of what moves paths, which are found again for each value, few come first; to tell faults apart they are enough.
+    moves = any(parameter.step for fault in faults for parameter in fault.parameters)
+    sought = [predictor.coarse if moves else predictor, *[predictor] * fine]
+    searches = [_Search(each, tuple(faults)) for each in sought]
+    search = searches[0]
     parameters = search.parameters
-    starts = [tuple(value for part in near for value in part)] if near else _starts(sought, faults)
+    starts = [tuple(value for part in near for value in part)] if near else _starts(sought[0], faults)
     best = starts[0]
     if all(fault.solved or not fault.parameters for fault in faults):
         parameters = ()
@@ -84,12 +86,14 @@ def explain(
         moves = any(parameter.step for parameter in parameters)
         followed = 1 if moves else _BEGUN if on_a_line else _BEGUN_BY_STEPS
         places = [search.inward(start) for start in starts[:followed]]
-        for turn in range(2 if fine else 1):
+        for turn, search in enumerate(searches):
             scale = scale if turn == 0 else search.scale(search.outward(places[0]), fine)
-            improve = search.on_line if on_a_line else search.by_steps
-            places = [improve(place, scale, fine) for place in places]
+            if on_a_line:
+                places = [search.on_line(place, scale, fine, moves and turn > 0) for place in places]
+            else:
+                places = [search.by_steps(place, scale, fine, moves and turn > 0) for place in places]
         best = min((search.outward(place) for place in places), key=lambda values: search.loss(values, scale))
-    search = _Search(predictor, tuple(faults)) if few else search
+    search = _Search(predictor, tuple(faults)) if search.predictor is not predictor else search
     errors, guess = search.errors(best), search.guess(best)
     error = float(np.abs(errors).mean())
     return Explanation(tuple(faults), _parted(faults, best), guess, errors, predictor.lit(guess), error)
@@ -146,8 +150,8 @@ class _Search:
         pairs = zip(self.parameters, place, strict=True)
         return tuple(math.exp(value) if parameter.logarithmic else float(value) for parameter, value in pairs)
 
-    def on_line(self, place: Array, scale: float, fine: bool) -> Array:
-        """Return the best value of one parameter."""
+    def on_line(self, place: Array, scale: float, fine: bool, near: bool = False) -> Array:
+        """Return the best value of one parameter; `near`: it is known but for a few steps of differences."""
         (parameter,) = self.parameters
         low, high = (float(self.inward((end,))[0]) for end in (parameter.low, parameter.high))
 
@@ -156,16 +160,18 @@ class _Search:
 
         place = np.clip(place, low, high)  # an image that is nearly black may begin beyond an end
         ends = _between(parameter, float(place[0]), low, high)
+        if near:
+            ends = max(ends[0], place[0] - _NEAR * parameter.step), min(ends[1], place[0] + _NEAR * parameter.step)
         enough = (_SMALL * parameter.step or 1e-7) if fine else _COARSE
         solved = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": enough})
         return np.array([solved.x]) if solved.fun <= loss(float(place[0])) else place
 
-    def by_steps(self, place: Array, scale: float, fine: bool) -> Array:
+    def by_steps(self, place: Array, scale: float, fine: bool, near: bool = False) -> Array:
         """Return the end of a few steps of Gauss and Newton with Cauchy's weights, halved while they make it worse."""
         low, high = (self.inward(tuple(getattr(p, end) for p in self.parameters)) for end in ("low", "high"))
         steps = np.array([parameter.step or _STEP for parameter in self.parameters])
         least = self.loss(self.outward(place), scale)
-        for _ in range(_TURNS if fine else _TURNS_COARSE):
+        for _ in range(_TURNS_LAST if near else _TURNS if fine else _TURNS_COARSE):
             left = self.errors(self.outward(place)).ravel()
             slopes = self._slopes(place, left, steps)
             weights = 1 / (1 + (left / scale) ** 2)
