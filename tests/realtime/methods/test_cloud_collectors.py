@@ -7,7 +7,6 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.clouds import collector_search as search
 from realtime.clouds.canonical.coordinates import share_of_peak
 from realtime.frame.incremental import next_frame
 from realtime.frame.renderer import frame_renderer, image_frame, render_frame
@@ -17,7 +16,7 @@ from realtime.scene.camera import ray_directions
 from realtime.scene.phase import HenyeyGreenstein
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import DROPLETS, cloud, cloud_scene, ring
-from tests.helpers.transport_formula import WEIGHTS, Formula, use_formula
+from tests.helpers.transport_formula import WEIGHTS, Formula, slabs_as_they_are, use_formula
 from validation.scenes.meshes import box, placed, rotation
 from validation.scenes.parts import camera
 
@@ -151,9 +150,7 @@ def test_a_camera_in_the_cloud_is_its_point(variant):
 @pytest.mark.claim("collector-frames", tolerance="2e-3 of the mean")
 def test_the_last_frame_s_collectors_go_on(variant, monkeypatch):
     """Three steps a frame end where forty end."""
-    # Light of the formula does not fade where there is no slab behind a point: slabs are taken as they are.
-    monkeypatch.setattr(search, "_reaching_behind", lambda slab, behind: slab)
-    monkeypatch.setattr(search, "_way", lambda slab: slab.thickness + np.inf)
+    slabs_as_they_are(monkeypatch)
     scene = cloud_scene((64, 48), origin=(30.83, -400.91, 57.03), sun=_sun(ALONG), ring=cloud("ring", ring()))
     whole = _airlight(scene, iterations=40, tolerance=0.0)
     options = {"peak": "full", "tolerance": 0.0, "extra_layers": True}

@@ -157,7 +157,7 @@ def setup(scene):
 @pytest.mark.claim("exact-shadows")
 def test_other_shapes_are_refused(variant):
     pipe = {"type": "cylinder", "p0": [0.7, -0.2, 0.1], "p1": [0.8, 0.1, 1.3], "radius": 0.1}
-    with pytest.raises(InputError, match="'pipe' is a Cylinder; wanted meshes, rectangles, spheres and disks"):
+    with pytest.raises(InputError, match="'pipe' is a cylinder; wanted meshes, rectangles, spheres and disks"):
         setup(tiny_scene(pipe=pipe))
 
 

@@ -22,6 +22,7 @@ from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import SUN, TURN, cloud, cloud_scene, crossings, dense, linear_between, ring
 from tests.helpers.frames import render
+from tests.helpers.transport_formula import slabs_as_they_are
 from validation.scenes.meshes import box, placed
 
 pytestmark = pytest.mark.usefixtures("variant")
@@ -139,10 +140,9 @@ def test_an_even_grid_is_a_homogeneous_cloud(name, precision, monkeypatch):
 
 @pytest.mark.claim("hypertexture-converges", tolerance="none: errors that shrink at least by half")
 @pytest.mark.parametrize("name", ["cloud-octaves", pytest.param("cloud-collectors", marks=pytest.mark.slow)])
-def test_finer_grids_of_a_smooth_field_converge(name):
-    # Light of the formula does not fade where there is no slab behind a point, which `way=ray` divides by.
-    whole = {"way": "printed"} if name == "cloud-collectors" else {}
-    images = [np.array(rendered(uneven(waves(n)), name, **whole).airlight) for n in (12, 24, 48, 96)]
+def test_finer_grids_of_a_smooth_field_converge(name, monkeypatch):
+    slabs_as_they_are(monkeypatch)
+    images = [np.array(rendered(uneven(waves(n)), name).airlight) for n in (12, 24, 48, 96)]
     steps = [np.sqrt(np.mean((a - b) ** 2)) / images[-1].mean() for a, b in pairwise(images)]
     assert steps[1] < 0.6 * steps[0]
     assert steps[2] < 0.6 * steps[1]
