@@ -282,15 +282,21 @@ class _Attempt:
                 continue
             tried.append(explain(self.predictor, (fault,), fine=False))
         least = min((each.error for each in self.singles), default=1.0)
-        # A sphere in the place of a light costs as much as all others: to all digits only where it explains most.
-        self.singles += (
-            tried if costly > 1 and all(each.error > least for each in tried) else self._refined(tried, least)
-        )
+        # A sphere in the place of a light costs as much as all others: to all digits only where it explains most, and
+        # by far among many triangles, where these digits take minutes.
+        enough = least * (_BETTER if self._many_triangles else 1.0)
+        coarse = costly > 1 and all(each.error > enough for each in tried)
+        self.singles += tried if coarse else self._refined(tried, least)
+
+    @property
+    def _many_triangles(self) -> bool:
+        shapes = self.predictor.truth.occluders.shapes()
+        return sum(shape.primitive_count() for shape in shapes) >= _MANY_TRIANGLES
 
     def _may_help(self, fault: Fault) -> bool:
         """Return whether paths are cheap, or few of a fault's, where its search begins, leave less than the best do."""
         few = self.predictor.coarse
-        if sum(shape.primitive_count() for shape in few.truth.occluders.shapes()) < _MANY_TRIANGLES:
+        if not self._many_triangles:
             return True
         return begin(few, (fault,))[0] < _LESS * float(np.abs(few.errors(self._with_pairs().guess)).mean())
 
