@@ -134,9 +134,8 @@ def compare(
         others = [name for name, value in single.items() if value is not None and name != "margin"]
         if others:
             raise InputError(f"{', '.join(others)}: is about one image; leave it out for several files")
-        return _frames(
-            str(scene), test, frames, layer=layer, holds=holds, pixel=pixel, margin=margin, progress=progress
-        )
+        how: dict[str, Any] = {"layer": layer, "holds": holds, "pixel": pixel, "margin": margin}
+        return _several(str(scene), test, frames, progress=progress, **how)
     if (diagnose or fit is not None) and given:
         asked = "fit" if fit is not None else "diagnose"
         raise InputError(f"{asked}: {', '.join(given)} is about a comparison; leave one out")
@@ -175,32 +174,20 @@ def _are_several(test: Any) -> bool:
     return isinstance(test, str | os.PathLike) and "#" in str(test) and not Path(test).exists()
 
 
-def _frames(scene: str, test: Any, frames: Any, *, progress: Any, **how: Any) -> "FramesComparison":
+def _several(scene: str, test: Any, frames: Any, *, progress: Any, **how: Any) -> "FramesComparison":
+    """Compare frames that `frames` tells of, or independent renders."""
     if not isinstance(test, str | os.PathLike):
         raise InputError("frames: wanted the files of all frames, such as 'frames/####.exr'; save the images first")
-    if frames is None:
-        return _runs(scene, test, progress=progress, **how)
     from reports.api.comparisons import FramesComparison
     from reports.machine.environment import activate
-    from validation.motion.frames_file import frame_paths, read_frames
-
-    frame_paths(test, read_frames(frames), str(frames))  # what is missing is refused before Mitsuba starts
-    activate()
     from validation.motion.judge import compare_frames
+    from validation.motion.noise import compare_runs
 
-    with telling(progress, "frames") as tell:
-        return FramesComparison(compare_frames(scene, test, frames, progress=tell, **how))
-
-
-def _runs(scene: str, test: Any, *, progress: Any, **how: Any) -> "FramesComparison":
-    from reports.api.comparisons import FramesComparison
-    from reports.machine.environment import activate
-    from validation.motion.noise import compare_runs, run_paths
-
-    run_paths(test)  # what is missing is refused before Mitsuba starts
     activate()
-    with telling(progress, "the reference") as tell:
-        return FramesComparison(compare_runs(scene, test, progress=tell, **how))
+    with telling(progress, "the files") as tell:
+        how["progress"] = tell
+        compared = compare_runs(scene, test, **how) if frames is None else compare_frames(scene, test, frames, **how)
+    return FramesComparison(compared)
 
 
 def _is_scene(word: Any) -> bool:

@@ -45,6 +45,7 @@ from validation.estimates.agreement import pixel_angle
 from validation.estimates.quadrature import reference_error, reference_layer, truth_image
 from validation.metrics.errors import FLOOR, plain
 from validation.scenes.loading import LoadedScene
+from validation.statistics.comparison import block_sums
 
 Array = NDArray[np.float64]
 TruthOf = Callable[[str], TruthImage]  #: returns the reference for 'centre' or 'area'
@@ -435,7 +436,7 @@ def _block_errors(truth: Array, image: Array, side: int) -> tuple[float, float]:
     wanted, got = np.where(finite, truth, 0.0), np.where(finite, image, 0.0)
     difference = got - wanted
     count, light, seen, offset, square = (
-        _block_sums(values, side) for values in (finite.astype(float), wanted, got, difference, difference**2)
+        block_sums(values, side) for values in (finite.astype(float), wanted, got, difference, difference**2)
     )
     floor = _DIM * float(wanted.mean())
     lit = (count > 0) & (np.maximum(light, seen) > floor * count)
@@ -446,9 +447,3 @@ def _block_errors(truth: Array, image: Array, side: int) -> tuple[float, float]:
     scatter = np.maximum(square - offset**2 / np.maximum(count, 1), 0.0)[lit]
     kept = np.argsort(error)[: len(error) - int(OUTLIERS * len(error))]  # of few blocks none may be wrong
     return math.sqrt(float(np.mean(error[kept] ** 2))), math.sqrt(float(np.mean((scatter / scale**2)[kept])))
-
-
-def _block_sums(values: Array, side: int) -> Array:
-    """Return the sums over square blocks, those at the ends smaller, channel by channel."""
-    rows, columns = (np.arange(0, length, side) for length in values.shape[:2])
-    return np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1)

@@ -15,7 +15,6 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.quadrature.ray_values import TruthImage
-from reference.scene.read import read_truth
+from reference.scene.read import TruthScene, read_truth
 from reference.storage.exr import NOTE, read_exr
+from reference.storage.files import temporary_folder
 from validation.engine.judge import lamp_distance, relative_bound
 from validation.engine.judged_layer import JudgedLayer, expected_layer, judged_layer
 from validation.engine.seen import PIXELS, Progress, pixel_kinds, scene_of_size
@@ -47,7 +46,6 @@ _HIDDEN = 0.95  # of the distance of a point: what stood before it by less hid i
 _POP = 3.0  # times the median change of the error
 _RECENT = 8  # frames since a point was disoccluded
 _BESIDE = 1.0  # of a lamp [pixels]
-_BESIDE_LAMP = "beside a lamp"
 
 
 @dataclass(frozen=True)
@@ -181,128 +179,122 @@ def compare_frames(
     first = read_exr(paths[0])
     judged = judged_layer(first, paths[0], name=layer or record.layer, holds=holds)
     kinds = pixel_kinds(first, pixel or record.pixel)
-    kind = kinds[0]
     scene_of_size(scene, judged.size, paths[0])
-    frames = _Frames(scene, paths, record, judged, kind)
-    for frame in range(record.frames):
+    with temporary_folder() as folder:
+        frames = _Frames(folder, scene, record, judged, kinds[0])
+        for n, path in enumerate(paths):
+            frames.take(n, path)
+        for n in range(record.frames):
+            if progress is not None:
+                progress(0.8 * n / record.frames, f"the reference of frame {n}")
+            frames.expect(n)
         if progress is not None:
-            progress(0.8 * frame / record.frames, f"the reference of frame {frame}")
-        frames.check(frame)
-    if progress is not None:
-        progress(0.8, "measures")
-    masks = {name: measured for name in frames.masks if (measured := measure(frames.sequence(name))) is not None}
+            progress(0.8, "measures")
+        masks = {name: measured for name in frames.masks if (measured := measure(frames.sequence(name))) is not None}
+        if "all" not in masks:
+            raise InputError(f"{pattern}: the reference of every frame is dark: nothing is relative to it")
+        shifts = _shifts(frames.sequence("all"))
     notes: tuple[str, ...] = ()
-    if "all" not in masks:
-        raise InputError(f"{pattern}: the reference of every frame is dark: nothing is relative to it")
     if len(kinds) > 1:
         notes += (f'judged at pixel centres: the files do not say; wanted "pixel": {" or ".join(PIXELS)}',)
-    note = str(first.attributes.get(NOTE, ""))
-    repeated = masks["all"].repeated
-    if repeated:
+    if repeated := masks["all"].repeated:
         notes += (f"frames {_listed(repeated)} repeat the frame before them, though the reference changed",)
+    if NOTE in first.attributes:
+        notes += (f"{paths[0]}: {first.attributes[NOTE]}",)
     return MotionComparison(
         scene=scene,
         pattern=str(pattern),
         size=judged.size,
         record=record,
         layer=judged,
-        pixel=kind,
+        pixel=kinds[0],
         reference_error=frames.reference_error,
         masks=masks,
         verdict=motion_verdict(masks["all"], frames.reference_error),
-        shifts=_shifts(frames.sequence("all")),
+        shifts=shifts,
         margin=margin,
-        notes=(*notes, *([f"{paths[0]}: {note}"] if note else [])),
+        notes=notes,
     )
 
 
 class _Frames:
-    """The frames of a renderer and their references, each read when it is asked for."""
+    """The frames of a renderer and their references, as arrays in a folder, and which pixels are in which mask."""
 
-    def __init__(
-        self, scene: str, paths: tuple[Path, ...], record: FramesRecord, judged: JudgedLayer, pixel: str
-    ) -> None:
-        self._scene, self._paths, self._record, self._judged, self._pixel = scene, paths, record, judged, pixel
+    def __init__(self, folder: Path, scene: str, record: FramesRecord, judged: JudgedLayer, pixel: str) -> None:
+        self._folder, self._scene, self._record, self._judged, self._pixel = folder, scene, record, judged, pixel
         self.reference_error = 0.0
-        self._ages: dict[int, Array] = {}
-        self._image = lru_cache(maxsize=3)(self._image_of)  # by changes: frames at rest are one
-        self._expected = lru_cache(maxsize=20)(lambda key: expected_layer(self._image(key), judged))
-        self._lamps = False
+        shape = (record.frames, *judged.values.shape[:2])
+        self._uncovered, self._beside = np.zeros((2, *shape), dtype=bool)
+        self._ages = np.full(shape[1:], math.inf)  # of the last frame, since a point was disoccluded
+        self._seen: TruthScene | None = None  # in the last frame
+        self._distance = np.zeros(shape[1:])
+        self._shown: list[int] = []  # the frame that has the same reference first
 
-    def check(self, frame: int) -> None:
-        """Compute the reference of a frame; refuse changes that the scene does not have, by the number of the frame."""
-        try:
-            image = self._image(self._key(frame))
-        except InputError as error:
-            raise InputError(f"frame {frame}: {error}") from error
-        self.reference_error = max(self.reference_error, relative_bound(image))
-        self._lamps |= bool(self._selected(frame, _BESIDE_LAMP).any())
-        self._aged(frame)
+    def take(self, n: int, path: Path) -> None:
+        """Keep a frame, which must have the size of the first."""
+        values = judged_layer(read_exr(path), path, name=self._judged.name, holds=self._judged.holds).values
+        if values.shape != self._judged.values.shape:
+            sizes = [" x ".join(str(side) for side in each.shape[1::-1]) for each in (values, self._judged.values)]
+            raise InputError(f"frame {n}: {path} has {sizes[0]} pixels, the first frame {sizes[1]}")
+        np.save(self._folder / f"frame-{n}.npy", values.astype(np.float64) / 2 ** self._record.stops(n))
+
+    def expect(self, n: int) -> None:
+        """Keep the reference and the masks of a frame; refuse changes that the scene does not have, by its number."""
+        changes = self._record.changes_of(n)
+        if n and changes == self._record.changes_of(n - 1):
+            self._shown.append(self._shown[-1])
+            self._ages = self._ages + 1
+            self._beside[n] = self._beside[n - 1]
+        else:
+            try:
+                loaded = load_scene(self._scene, self._judged.size, changes)
+                image = truth_image(loaded.scene, pixel=self._pixel)
+            except InputError as error:
+                raise InputError(f"frame {n}: {error}") from error
+            self._shown.append(n)
+            self.reference_error = max(self.reference_error, relative_bound(image))
+            np.save(self._folder / f"reference-{n}.npy", expected_layer(image, self._judged))
+            self._beside[n] = lamp_distance(loaded, image) <= _BESIDE
+            self._uncover(image.distance, read_truth(loaded.scene))
+        self._uncovered[n] = self._ages <= _RECENT
 
     @property
     def masks(self) -> tuple[str, ...]:
         """Return the masks that some pixel of some frame is in."""
-        moved = any((ages <= _RECENT).any() for ages in self._ages.values())
-        return ("all", *(("disoccluded", "rest") if moved else ()), *((_BESIDE_LAMP,) if self._lamps else ()))
+        moved, lamps = self._uncovered.any(), self._beside.any()
+        return ("all", *(("disoccluded", "rest") if moved else ()), *(("beside a lamp",) if lamps else ()))
 
     def sequence(self, mask: str) -> Sequence:
         """Return the sequence with the pixels of a mask."""
+        everywhere = np.ones_like(self._beside[0])
+        chosen = {
+            "all": lambda n: everywhere,
+            "disoccluded": lambda n: self._uncovered[n],
+            "rest": lambda n: ~self._uncovered[n],
+            "beside a lamp": lambda n: self._beside[n],
+        }
         return Sequence(
             self._record.frames,
-            lru_cache(maxsize=2)(self.frame),
-            lambda n: self._expected(self._key(n)),
-            lambda n: self._selected(n, mask),
+            lambda n: np.load(self._folder / f"frame-{n}.npy"),
+            lambda n: np.load(self._folder / f"reference-{self._shown[n]}.npy"),
+            chosen[mask],
             self._record.resets,
         )
 
-    def frame(self, n: int) -> Array:
-        """Return the layer of a frame that is judged."""
-        image = read_exr(self._paths[n])
-        values = judged_layer(image, self._paths[n], name=self._judged.name, holds=self._judged.holds).values
-        if values.shape != self._judged.values.shape:
-            sizes = [" x ".join(str(side) for side in each.shape[1::-1]) for each in (values, self._judged.values)]
-            raise InputError(f"frame {n}: {self._paths[n]} has {sizes[0]} pixels, the first frame {sizes[1]}")
-        return np.asarray(values, dtype=np.float64) / 2 ** self._record.stops(n)
-
-    def _key(self, frame: int) -> tuple:
-        return tuple(sorted(self._record.changes_of(frame).items()))
-
-    def _loaded(self, key: tuple):
-        return load_scene(self._scene, self._judged.size, dict(key))
-
-    def _image_of(self, key: tuple) -> TruthImage:
-        return truth_image(self._loaded(key).scene, pixel=self._pixel)
-
-    def _selected(self, n: int, mask: str) -> Bools:
-        image = self._image(self._key(n))
-        if mask == _BESIDE_LAMP:
-            return np.asarray(lamp_distance(self._loaded(self._key(n)), image) <= _BESIDE)
-        if mask == "all":
-            return np.ones(image.distance.shape, dtype=bool)
-        recent = self._ages[n] <= _RECENT
-        return np.asarray(recent if mask == "disoccluded" else ~recent)
-
-    def _aged(self, n: int) -> None:
-        """Tell how many frames ago each pixel was disoccluded, infinite for never."""
-        distance = self._image(self._key(n)).distance
-        self._ages[n] = np.full(distance.shape, math.inf, dtype=np.float32)
-        if n == 0 or not any(name.startswith("camera.") for name in self._record.changes):
+    def _uncover(self, distance: Array, here: TruthScene) -> None:
+        """Tell how many frames ago the point of each pixel was disoccluded; this frame differs from the one before."""
+        before, self._seen = self._seen, here
+        there, self._distance = self._distance, distance
+        if before is None or not any(name.startswith("camera.") for name in self._record.changes):
             return
-        if self._key(n) == self._key(n - 1):
-            self._ages[n] = self._ages[n - 1] + 1
-            return
-        here, before = (read_truth(self._loaded(self._key(each)).scene) for each in (n, n - 1))
-        there = self._image(self._key(n - 1)).distance
         far = 1e6 * (1.0 + float(np.abs(here.origin).max()))
         points = here.origin + np.where(np.isfinite(distance), distance, far).reshape(-1, 1) * here.direction
         row, column, inside = _pixel_of(before, points)
-        length = np.linalg.norm(points - before.origin, axis=1)
-        hidden = there[row, column] < _HIDDEN * length
-        age = np.where(~inside | hidden, 0.0, self._ages[n - 1][row, column] + 1)
-        self._ages[n] = age.reshape(distance.shape).astype(np.float32)
+        hidden = there[row, column] < _HIDDEN * np.linalg.norm(points - before.origin, axis=1)
+        self._ages = np.where(~inside | hidden, 0.0, self._ages[row, column] + 1).reshape(distance.shape)
 
 
-def _pixel_of(truth, points: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Bools]:
+def _pixel_of(truth: TruthScene, points: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Bools]:
     """Return row and column of the pixels that show points, and whether these lie in the image.
 
     Rays through pixel centres are affine in row and column before they are scaled: three of them give the map.

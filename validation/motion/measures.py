@@ -23,12 +23,14 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from validation.motion.blocks import UNKNOWN, Estimate, products, regression, relative_root
 from validation.motion.lag import CELL, DARK, Cells, Lag, filtered_frames, fit_lag
+from validation.statistics.comparison import block_sums
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -50,7 +52,7 @@ class Sequence:
     selected: Callable[[int], Bools]  #: (height, width)
     resets: tuple[int, ...] = (0,)
 
-    @property
+    @cached_property
     def start(self) -> tuple[int, ...]:
         """The frame with which the history of each frame begins."""
         return tuple(max(r for r in (0, *self.resets) if r <= n) for n in range(self.frames))
@@ -247,10 +249,7 @@ def _second_pass(sequence: Sequence, first: _FirstPass, lag: Lag) -> Measures:
 
 def _cell_means(values: Array) -> Array:
     """Return means over cells of pixels, those at the ends smaller."""
-    rows, columns = (np.arange(0, side, CELL) for side in values.shape[:2])
-    height, width = (np.diff(np.r_[starts, side]) for starts, side in zip((rows, columns), values.shape, strict=False))
-    sums = np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1)
-    return np.asarray(sums / (height[:, None] * width)[..., None])
+    return block_sums(values, CELL) / block_sums(np.ones((*values.shape[:2], 1)), CELL)
 
 
 def _bias(by_frame: Array) -> Estimate:

@@ -232,18 +232,18 @@ def _largest(difference: Array, mean: float) -> float:
 
 def _block_tests(expected: _Side, tested: _Side, family_level: float) -> dict[str, Any]:
     """Test the sums over blocks of pixels."""
-    difference = _block_sums(np.where(np.hypot(expected.error, tested.error) > 0, tested.mean - expected.mean, 0.0))
-    variance = _block_sums(expected.error**2 + tested.error**2)
-    spread = _block_sums(expected.spread(expected.error**2) + tested.spread(tested.error**2))
+    difference = block_sums(np.where(np.hypot(expected.error, tested.error) > 0, tested.mean - expected.mean, 0.0))
+    variance = block_sums(expected.error**2 + tested.error**2)
+    spread = block_sums(expected.spread(expected.error**2) + tested.spread(tested.error**2))
     random = variance > 0
     z = difference[random] / np.sqrt(variance[random])
     p = two_sided_p(z, satterthwaite(variance, spread)[random])
     return {"blocks": z.size, "rejected_blocks": int((p < sidak(family_level, z.size)).sum())}
 
 
-def _block_sums(values: Array) -> Array:
-    """Return the sums over blocks, smaller ones at the far edges: (rows, columns, channels)."""
-    rows, columns = (np.arange(0, size, BLOCK) for size in values.shape[:2])
+def block_sums(values: Array, side: int = BLOCK) -> Array:
+    """Return the sums over square blocks, smaller ones at the far edges: (rows, columns, channels)."""
+    rows, columns = (np.arange(0, length, side) for length in values.shape[:2])
     return np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1)
 
 
