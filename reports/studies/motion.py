@@ -50,7 +50,7 @@ def motion(
     activate()
     from reports.api.render import asked_configurations
     from reports.api.scenes import opened
-    from validation.motion.methods import USUAL, method_motion
+    from validation.study.motion import USUAL, method_motion
 
     chosen, _ = asked_configurations(method, kernel, settings, usual=USUAL)
     loaded = opened(scene, pixels_of(size))

@@ -8,6 +8,5 @@ Read in this order:
 - `blocks.py`: regressions whose errors come from blocks of pixels that are left out in turn;
 - `lag.py`: which filter in time makes the frames from the references;
 - `measures.py`: every measure of a sequence, by mask;
-- `judge.py`: the references of a scene's frames, the masks, and the sentence that is said;
-- `methods.py`: the same of our methods, under a light that moves.
+- `judge.py`: the references of a scene's frames, the masks, and the sentence that is said.
 """

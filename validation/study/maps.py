@@ -31,7 +31,6 @@ the error of a frame and falls as 1/N.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from itertools import islice
 from typing import Any
 
@@ -40,14 +39,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import linregress
 
 from analytic.errors import InputError
-from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
-from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_truth
-from validation.scenes.animation import animate, frame_changes
-from validation.scenes.changes import change_scene
+from validation.scenes.animation import animate
 from validation.scenes.registry import Animation
-from validation.study.configuration import Configuration, prepared
+from validation.study.configuration import Configuration
+from validation.study.motion import light_references, method_frames
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
@@ -93,26 +89,17 @@ def map_flicker(
     if not 0 < step < 1:
         raise InputError(f"step: got {step:g}, wanted an angle above 0 and below 1 [rad]")
     turn = round(2 * np.pi / step)
-    read, animation = read_scene(scene), Animation(moves=("light",), about=about)
-    moved = list(islice(animate(read, animation, turn), frames))
-    changes = [frame_changes(each, animation) for each in moved]
+    read, moves = read_scene(scene), Animation(moves=("light",), about=about)
+    places = list(islice(animate(read, moves, turn), frames))
     total = 1 + len(configurations)
     if progress is not None:
         progress(0, total, "quadrature")
-    truths: list[Array] = []
-    for change in [*changes, changes[0]]:  # in the end the scene is as it was
-        if change is None:
-            raise InputError("flicker: the scene has lights with extent, which do not circle; wanted a scene without")
-        change_scene(scene, change)
-        if len(truths) < frames:
-            truths.append(quadrature_image(read_truth(scene)).airlight)
-    truth = np.stack(truths)
+    truth = np.stack(light_references(scene, places, moves))
     images = []
     for number, chosen in enumerate(configurations):
         if progress is not None:
             progress(1 + number, total, f"{chosen.label}, moving light")
-        renderer = prepared(read, chosen)
-        images.append(np.array([render_frame(replace(renderer, scene=each)).airlight for each in moved], np.float64))
+        images.append(np.stack(method_frames(read, chosen, places)))
     finite = np.isfinite(np.stack([truth, *images])).all(axis=(0, 1, 4))
     truth = truth[:, finite]
     errors = [image[:, finite] - truth for image in images]

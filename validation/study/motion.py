@@ -16,8 +16,8 @@ from analytic.errors import InputError
 from realtime.scene.read_scene import Scene, read_scene
 from validation.estimates.quadrature import truth_image
 from validation.motion.judge import motion_verdict
-from validation.motion.measures import Measures, measure
 from validation.motion.measures import Sequence as Frames
+from validation.motion.measures import measure
 from validation.scenes.animation import animate, frame_changes
 from validation.scenes.changes import change_scene
 from validation.scenes.registry import Animation
@@ -57,39 +57,52 @@ def method_motion(
     read = read_scene(scene)
     moves = Animation(moves=("light",), about=animation.about)
     places = list(islice(animate(read, moves, turn), frames)) if stimulus == "sweep" else _step(read, moves, frames)
-    changes = [frame_changes(each, moves) for each in places]
-    if any(change is None or not change for change in changes):
-        raise InputError("motion: the scene has lights with extent, which do not circle; wanted a scene without")
     total = frames * (1 + len(configurations))
-    references: list[Array] = []
-    for number, change in enumerate(changes):
-        if progress is not None:
-            progress(number, total, "references")
-        change_scene(scene, change or {})
-        references.append(truth_image(scene).airlight)
-    change_scene(scene, changes[0] or {})
+    tell = None if progress is None else lambda number, what: progress(number, total, what)
+    references = light_references(scene, places, moves, tell)
+    everywhere = np.ones(references[0].shape[:2], dtype=bool)
     rows = []
     for number, chosen in enumerate(configurations):
         if progress is not None:
             progress(frames * (1 + number), total, chosen.label)
-        found = _measured(read, chosen, places, references)
+        images = method_frames(read, chosen, places)
+        found = measure(Frames(frames, images.__getitem__, references.__getitem__, lambda n: everywhere))
         words = "the reference is dark" if found is None else motion_verdict(found).words
         rows.append({"label": chosen.label, "verdict": words} | ({} if found is None else found.to_json()))
     return rows
 
 
+def light_references(
+    scene: Any, places: Sequence[Scene], moves: Animation, progress: Callable[[int, str], None] | None = None
+) -> list[Array]:
+    """Return the airlight of the reference of each frame, (height, width, 3); in the end the scene is as it was.
+
+    `scene`: the `mi.Scene`; `places`: the scene of each frame, of which `moves` says what moves, the first as it is
+    now; `progress`: called with the number of a frame and what. Raises InputError for lights with extent.
+    """
+    changes = [frame_changes(each, moves) for each in places]
+    references: list[Array] = []
+    for number, change in enumerate([*changes, changes[0]]):
+        if not change:
+            raise InputError("the scene has lights with extent, which do not circle; wanted a scene without")
+        change_scene(scene, change)
+        if number < len(places):
+            if progress is not None:
+                progress(number, "references")
+            references.append(truth_image(scene).airlight)
+    return references
+
+
+def method_frames(read: Scene, chosen: Configuration, places: Sequence[Scene]) -> list[Array]:
+    """Return the airlight of a method in each frame, which gets what the frame before leaves, (height, width, 3)."""
+    renderer, kept, images = prepared(read, chosen), None, []
+    for place, last in zip(places, (None, *places), strict=False):
+        moved = {"camera_moved": False, "geometry_moved": False, "light_moved": place is not last}
+        frame, kept, _ = timed_image(renderer, place, kept, **moved)
+        images.append(np.asarray(frame.airlight, dtype=np.float64))
+    return images
+
+
 def _step(read: Scene, moves: Animation, frames: int) -> list[Scene]:
     before, after = islice(animate(read, moves, _JUMP), 2)
     return [before] * BEFORE + [after] * (frames - BEFORE)
-
-
-def _measured(
-    read: Scene, chosen: Configuration, places: Sequence[Scene], references: Sequence[Array]
-) -> Measures | None:
-    renderer, kept, images = prepared(read, chosen), None, []
-    for place, last in zip(places, (None, *places), strict=False):
-        still = {"camera_moved": False, "geometry_moved": False, "light_moved": place is not last}
-        frame, kept, _ = timed_image(renderer, place, kept, **still)
-        images.append(np.asarray(frame.airlight, dtype=np.float64))
-    everywhere = np.ones(references[0].shape[:2], dtype=bool)
-    return measure(Frames(len(images), images.__getitem__, references.__getitem__, lambda n: everywhere))

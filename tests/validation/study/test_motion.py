@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from validation.motion.methods import USUAL, method_motion
 from validation.scenes.loading import load_scene
+from validation.study.motion import USUAL, method_motion
 
 
 def test_froxels_with_history_lag_and_planes_do_not(variant):
