@@ -8,6 +8,7 @@ Read in this order:
 - `metrics/`: errors of one image against another;
 - `statistics/`: tests for images with random errors, and the noise of errors and times;
 - `columns.py`: records that know their columns: heading, unit, meaning;
+- `readers.py`: values in files of users;
 - `clock.py`: times and memory of any work;
 - `estimates/`: the truth of a scene by each estimator, budgets, and the agreement of the estimators;
 - `study/`: scenes x sizes x changes x configurations: what each combination costs and how wrong it is;

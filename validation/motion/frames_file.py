@@ -13,15 +13,18 @@
 import json
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from analytic.errors import InputError, nearest
+from validation.readers import Reader, by_name, read_list, read_number, read_word
 
 SCHEMA = "airlight-frames/1"
 _MARK = "#"
+_MOST = 1_000_000_000
 
 
 @dataclass(frozen=True)
@@ -126,55 +129,26 @@ def _positive(what: str, value: Any) -> float:
     return float(value)
 
 
-def _whole(what: str, value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise InputError(f"{what}: got {value!r}, wanted a whole number from 0 on")
-    return value
-
-
-def _count(what: str, value: Any) -> int:
-    if _whole(what, value) < 2:
-        raise InputError(f"{what}: got {value!r}, wanted at least 2")
-    return int(value)
-
-
-def _word(what: str, value: Any) -> str:
-    if not isinstance(value, str):
-        raise InputError(f"{what}: got {value!r}, wanted a word")
-    return value
-
-
-def _several(kind: Callable[[str, Any], Any]) -> Callable[[str, Any], tuple]:
-    def read(what: str, value: Any) -> tuple:
-        if not isinstance(value, list):
-            raise InputError(f"{what}: got {value!r}, wanted a list")
-        return tuple(kind(f"{what}[{place}]", each) for place, each in enumerate(value))
-
-    return read
+def _by_frame(read: Reader) -> Reader:
+    return lambda what, value: tuple(read(f"{what}[{n}]", each) for n, each in enumerate(read_list(what, value, 0)))
 
 
 def _stops(what: str, value: Any) -> float | tuple[float, ...]:
-    return _several(_number)(what, value) if isinstance(value, list) else _number(what, value)
+    return _by_frame(_number)(what, value) if isinstance(value, list) else _number(what, value)
 
 
 def _values(what: str, value: Any) -> tuple[float, ...]:
-    return _several(_number)(what, value) if isinstance(value, list) else (_number(what, value),)
+    return _by_frame(_number)(what, value) if isinstance(value, list) else (_number(what, value),)
 
 
-def _changes(what: str, value: Any) -> dict[str, tuple[tuple[float, ...], ...]]:
-    if not isinstance(value, dict):
-        raise InputError(f"{what}: got {value!r}, wanted names with a list by frame each")
-    return {name: _several(_values)(f"{what}: {name}", values) for name, values in value.items()}
-
-
-_KINDS: dict[str, Callable[[str, Any], Any]] = {
-    "frames": _count,
-    "scene": _word,
-    "first": _whole,
+_KINDS: dict[str, Reader] = {
+    "frames": partial(read_number, least=2, most=_MOST),
+    "scene": read_word,
+    "first": partial(read_number, least=0, most=_MOST),
     "fps": _positive,
     "exposure": _stops,
-    "layer": _word,
-    "pixel": _word,
-    "resets": _several(_whole),
-    "changes": _changes,
+    "layer": read_word,
+    "pixel": read_word,
+    "resets": _by_frame(partial(read_number, least=0, most=_MOST)),
+    "changes": by_name(_by_frame(_values)),
 }

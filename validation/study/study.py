@@ -28,7 +28,7 @@ before any work. What a report measures is a study too (`validation/study/studie
 
 import itertools
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
@@ -37,6 +37,18 @@ from typing import Any
 from analytic.errors import InputError, nearest
 from realtime.methods.registry import FOG_METHODS, METHODS
 from realtime.parameters import defaults
+from validation.readers import (
+    Reader,
+    by_name,
+    each_once,
+    read_list,
+    read_named,
+    read_number,
+    read_one_of,
+    read_table,
+    read_word,
+    several,
+)
 from validation.scenes.changes import change_words
 from validation.scenes.loading import parse_size
 from validation.scenes.random.design import PREFIX, is_random, random_name, ranges_from, read_ranges
@@ -54,7 +66,6 @@ STUDIES = ("quick", "default", "full")
 GROWTH = ("size", "triangles", "lights", "media", "map")
 
 _FOLDER = Path(__file__).parent / "studies"
-Reader = Callable[[str, Any], Any]  # of a value, from what it is and what the file has
 
 _METHOD_SETS = ("all", "quick", "standard")
 _LONGEST = 86400.0
@@ -212,7 +223,7 @@ def default_configurations() -> tuple[Configuration, ...]:
 
 def default_study(count: int) -> Study:
     """Return the study without a file: so many random scenes, every method once, 160 x 120 pixels."""
-    _number("--random", count, 1, _MOST_SCENES)
+    read_number("--random", count, 1, _MOST_SCENES)
     return Study(f"random-{count}", random=RandomScenes(count), configurations=default_configurations())
 
 
@@ -231,7 +242,7 @@ def read_study(path: Path, *, count: int | None = None) -> Study:
     try:
         study = parse_study(data, folder=path.parent, name=path.stem)
         if count is not None:
-            study = replace(study, random=replace(study.random, count=_number("--random", count, 1, _MOST_SCENES)))
+            study = replace(study, random=replace(study.random, count=read_number("--random", count, 1, _MOST_SCENES)))
         if not study.scene_count:
             raise InputError("it has no scene; give scenes = [...], or count in [random], or --random N")
     except InputError as error:
@@ -242,7 +253,7 @@ def read_study(path: Path, *, count: int | None = None) -> Study:
 def parse_study(data: Mapping[str, Any], *, folder: Path = Path(), name: str = "sweep") -> Study:
     """Return the study that a table describes, as `tomllib` reads it; paths of scenes begin at `folder`."""
     others = ("scenes", "random", "methods", "kernels", "maps", "parameters")
-    given, measure = _read("", data, _STUDY, *_MEASURE, *others), _read("", data, _MEASURE, *_STUDY, *others)
+    given, measure = read_named("", data, _STUDY, *_MEASURE, *others), read_named("", data, _MEASURE, *_STUDY, *others)
     times = measure.get("times", "with")
     if "timed" in given and times != "alone":
         raise InputError(f'timed: it is of times = "alone", got times = "{times}"; leave one of them out')
@@ -250,7 +261,7 @@ def parse_study(data: Mapping[str, Any], *, folder: Path = Path(), name: str = "
     one = partial(_scene, folder=folder)
     return Study(
         **{"name": name, **given},
-        scenes=tuple(FOG_SCENES) if scenes == "all" else _several(one, 0)("scenes", scenes),
+        scenes=tuple(FOG_SCENES) if scenes == "all" else several(one, 0)("scenes", scenes),
         random=_random(data.get("random", {}), folder),
         configurations=_configurations(data),
         measure=Measure(**{_FIELDS.get(name, name): value for name, value in measure.items()}),
@@ -265,33 +276,35 @@ def standard_study(name: str) -> Study:
 
 def _configurations(data: Mapping[str, Any]) -> tuple[Configuration, ...]:
     """Return the combinations of methods, kernels, maps and parameters."""
-    parameters = _table("parameters", data.get("parameters", {}))
+    parameters = read_table("parameters", data.get("parameters", {}))
     asked = data.get("methods", "all")
     if isinstance(asked, str):
-        _one_of("methods", asked, names=_METHOD_SETS)
+        read_one_of("methods", asked, names=_METHOD_SETS)
         sets = {"quick": lambda: QUICK, "standard": lambda: chosen_configurations(list(FOG_METHODS))}
         standard = sets.get(asked, default_configurations)()
         if not (parameters or "kernels" in data or "maps" in data):
             return standard
         names = list(dict.fromkeys(each.method for each in standard))
     else:
-        names = list(_once("methods", tuple(_word("methods", word) for word in _list("methods", asked))))
+        names = list(each_once("methods", tuple(read_word("methods", word) for word in read_list("methods", asked))))
     for method in names:
         configuration(method)  # refuses unknown names
     stray = [method for method in parameters if method not in names]
     if stray:
         raise InputError(f"parameters.{stray[0]}: the study has no method of that name{nearest(stray[0], names)}")
-    kernels = [_word("kernels", word) for word in _list("kernels", data["kernels"])] if "kernels" in data else [None]
+    kernels = (
+        [read_word("kernels", word) for word in read_list("kernels", data["kernels"])] if "kernels" in data else [None]
+    )
     for kernel in kernels:
         if kernel is not None:
             find_kernel(kernel)
-    sides = _list("maps", data["maps"]) if "maps" in data else [None]
+    sides = read_list("maps", data["maps"]) if "maps" in data else [None]
     for side in sides:
-        _number("maps", 1 if side is None else side, 1, 16384)
+        read_number("maps", 1 if side is None else side, 1, 16384)
     chosen = [
         each
         for method in names
-        for each in _of_method(method, kernels, sides, _table(f"parameters.{method}", parameters.get(method, {})))
+        for each in _of_method(method, kernels, sides, read_table(f"parameters.{method}", parameters.get(method, {})))
     ]
     if "kernels" in data and not any(each.kernel for each in chosen):
         raise InputError("kernels: none of the methods calls one; leave them out")
@@ -307,8 +320,8 @@ def _of_method(
     if "map" in parameters and sides != [None]:
         raise InputError(f"parameters.{method}.map: `maps` says it too; give one of them")
     lists = {name: value if isinstance(value, list) else [value] for name, value in parameters.items()}
-    for name, several in lists.items():
-        if not several:
+    for name, values in lists.items():
+        if not values:
             raise InputError(f"parameters.{method}.{name}: got no value; leave it out for the default")
     has_map = "map" in defaults(METHODS[method]) if method in METHODS else False
     if has_map and sides != [None]:
@@ -338,7 +351,7 @@ def map_side(chosen: Configuration) -> int | None:
 
 
 def _scene(what: str, item: Any, *, folder: Path) -> str:
-    word = _word(what, item)
+    word = read_word(what, item)
     if word in SCENES:
         if SCENES[word].clouds:
             raise InputError(f"scenes: {word} scatters light many times; a sweep is of single scattering, leave it out")
@@ -357,7 +370,7 @@ def _scene(what: str, item: Any, *, folder: Path) -> str:
 
 
 def _random(table: Any, folder: Path) -> RandomScenes:
-    given = _read("random.", _table("random", table), _RANDOM)
+    given = read_named("random.", read_table("random", table), _RANDOM)
     given |= {name: (folder / given[name]).resolve() for name in ("meshes", "ranges") if name in given}
     drawn = RandomScenes(**given)
     if drawn.ranges is not None:
@@ -369,7 +382,7 @@ def _random(table: Any, folder: Path) -> RandomScenes:
 
 def _medium(what: str, item: Any) -> tuple[str, ...]:
     changes: dict[str, tuple[float, ...]] = {}
-    for name, value in _table(what, item).items():
+    for name, value in read_table(what, item).items():
         if not name.partition(".")[0].startswith("medium"):
             raise InputError(f"media: got {name!r}, wanted medium.sigma_t, medium.albedo or medium.g; quote the name")
         numbers = value if isinstance(value, list) else [value]
@@ -379,62 +392,8 @@ def _medium(what: str, item: Any) -> tuple[str, ...]:
     return tuple(change_words(changes))
 
 
-def _table(what: str, value: Any) -> Mapping[str, Any]:
-    if not isinstance(value, dict):
-        raise InputError(f"{what}: got {value!r}, wanted a table of names and values")
-    return value
-
-
-def _list(what: str, value: Any, least: int = 1) -> list[Any]:
-    if not isinstance(value, list) or len(value) < least:
-        raise InputError(f"{what}: got {value!r}, wanted a list" + (f" with at least {least} entries" if least else ""))
-    return value
-
-
-def _word(what: str, value: Any) -> str:
-    if not isinstance(value, str) or not value.strip():
-        raise InputError(f"{what}: got {value!r}, wanted a word")
-    return value
-
-
-def _one_of(what: str, value: Any, *, names: Sequence[str]) -> str:
-    if value not in names:
-        raise InputError(f"{what}: got {value!r}, wanted one of {', '.join(names)}")
-    return value
-
-
-def _number(what: str, value: Any, least: float, most: float, whole: bool = True) -> Any:
-    if type(value) not in ((int,) if whole else (int, float)) or not least <= value <= most:
-        kind = "a whole number" if whole else "a number"
-        raise InputError(f"{what}: got {value!r}, wanted {kind} from {least:g} to {most:g}")
-    return value
-
-
-def _once(what: str, items: tuple[Any, ...]) -> tuple[Any, ...]:
-    for number, item in enumerate(items):
-        if item in items[:number]:
-            raise InputError(f"{what}: {item!r} is there twice; leave one out")
-    return items
-
-
-def _read(prefix: str, data: Mapping[str, Any], readers: Mapping[str, Reader], *others: str) -> dict[str, Any]:
-    """Return the values that a table has of some names; it may have some others, and no more."""
-    for name in data:
-        if name not in (names := (*readers, *others)):
-            raise InputError(f"got {prefix}{name}, wanted one of {', '.join(names)}{nearest(name, names)}")
-    return {name: read(prefix + name, data[name]) for name, read in readers.items() if name in data}
-
-
-def _several(read: Reader, least: int = 1) -> Reader:
-    return lambda what, value: _once(what, tuple(read(what, item) for item in _list(what, value, least)))
-
-
-def _by_name(read: Reader) -> Reader:
-    return lambda what, value: {name: read(f"{what}.{name}", each) for name, each in _table(what, value).items()}
-
-
 def _size(what: str, value: Any) -> tuple[int, int]:
-    size = parse_size(_word(what, value))
+    size = parse_size(read_word(what, value))
     if not all(1 <= side <= 16384 for side in size):
         raise InputError(f"{what}: got {size[0]}x{size[1]}, wanted at least 1x1 and at most 16384 pixels on a side")
     return size
@@ -448,52 +407,52 @@ def _flip(what: str, value: Any) -> str:
 
 
 def _pair(what: str, value: Any) -> tuple[int, ...]:
-    return tuple(_number(what, each, 1, 1 << 16) for each in _list(what, value, 2)[:2])
+    return tuple(read_number(what, each, 1, 1 << 16) for each in read_list(what, value, 2)[:2])
 
 
 def _checks(what: str, value: Any) -> Checks:
-    checks = Checks(**_read(f"{what}.", _table(what, value), _CHECKS))
+    checks = Checks(**read_named(f"{what}.", read_table(what, value), _CHECKS))
     if checks.margins.keys() != checks.samples.keys():
         raise InputError(f"{what}: margins and samples name other estimators; name the same in both")
     return checks
 
 
-_seconds = partial(_number, least=0, most=_LONGEST, whole=False)
-_count = partial(_number, least=0, most=_MOST_SCENES)
+_seconds = partial(read_number, least=0, most=_LONGEST, whole=False)
+_count = partial(read_number, least=0, most=_MOST_SCENES)
 
 #: What reads the values of a study file, of what is measured in it, and of how its references are checked.
 _STUDY: Mapping[str, Reader] = {
-    "name": _word,
-    "half": _several(_word, 0),
-    "sizes": _several(_size),
-    "media": _several(_medium),
+    "name": read_word,
+    "half": several(read_word, 0),
+    "sizes": several(_size),
+    "media": several(_medium),
     "flip": _flip,
-    "timed": partial(_number, least=1, most=_MOST_SCENES),
-    "limit": partial(_number, least=1e-3, most=_LONGEST, whole=False),
-    "retries": partial(_number, least=0, most=_MOST_RETRIES),
+    "timed": partial(read_number, least=1, most=_MOST_SCENES),
+    "limit": partial(read_number, least=1e-3, most=_LONGEST, whole=False),
+    "retries": partial(read_number, least=0, most=_MOST_RETRIES),
     "checks": _checks,
     "stability": _count,
-    "growth": _several(partial(_one_of, names=GROWTH), 0),
+    "growth": several(partial(read_one_of, names=GROWTH), 0),
 }
 _MEASURE: Mapping[str, Reader] = {
-    "times": partial(_one_of, names=TIMES),
+    "times": partial(read_one_of, names=TIMES),
     "timed_size": _size,
     "seconds": _seconds,
     "slow": _seconds,
     "frame_limit": _seconds,
-    "metrics": lambda what, value: _one_of(what, value, names=("usual", "all")) == "all",
+    "metrics": lambda what, value: read_one_of(what, value, names=("usual", "all")) == "all",
 }
 _RANDOM: Mapping[str, Reader] = {
     "count": _count,
-    "first": partial(_number, least=0, most=2**62),
-    "meshes": _word,
-    "ranges": _word,
+    "first": partial(read_number, least=0, most=2**62),
+    "meshes": read_word,
+    "ranges": read_word,
 }
 _CHECKS: Mapping[str, Reader] = {
     "size": _size,
-    "margins": _by_name(partial(_number, least=0, most=1, whole=False)),
-    "samples": _by_name(partial(_number, least=1, most=256)),
-    "batches": partial(_number, least=2, most=1 << 16),
+    "margins": by_name(partial(read_number, least=0, most=1, whole=False)),
+    "samples": by_name(partial(read_number, least=1, most=256)),
+    "batches": partial(read_number, least=2, most=1 << 16),
     "multiple": _pair,
     "patience": _seconds,
 }

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Readers of values in files of users, TOML and JSON: each takes what a value is, for messages, and the value.
+
+A reader returns the value, or raises InputError with what was given and what is wanted.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from analytic.errors import InputError, nearest
+
+Reader = Callable[[str, Any], Any]
+
+
+def read_table(what: str, value: Any) -> Mapping[str, Any]:
+    """Return names and values."""
+    if not isinstance(value, dict):
+        raise InputError(f"{what}: got {value!r}, wanted a table of names and values")
+    return value
+
+
+def read_list(what: str, value: Any, least: int = 1) -> list[Any]:
+    """Return a list of at least so many entries."""
+    if not isinstance(value, list) or len(value) < least:
+        raise InputError(f"{what}: got {value!r}, wanted a list" + (f" with at least {least} entries" if least else ""))
+    return value
+
+
+def read_word(what: str, value: Any) -> str:
+    """Return a word that is not empty."""
+    if not isinstance(value, str) or not value.strip():
+        raise InputError(f"{what}: got {value!r}, wanted a word")
+    return value
+
+
+def read_one_of(what: str, value: Any, *, names: Sequence[str]) -> str:
+    """Return one of some names."""
+    if value not in names:
+        raise InputError(f"{what}: got {value!r}, wanted one of {', '.join(names)}")
+    return value
+
+
+def read_number(what: str, value: Any, least: float, most: float, whole: bool = True) -> Any:
+    """Return a number within bounds, `whole` or not."""
+    if type(value) not in ((int,) if whole else (int, float)) or not least <= value <= most:
+        kind = "a whole number" if whole else "a number"
+        raise InputError(f"{what}: got {value!r}, wanted {kind} from {least:g} to {most:g}")
+    return value
+
+
+def each_once(what: str, items: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Return items of which none is there twice."""
+    for number, item in enumerate(items):
+        if item in items[:number]:
+            raise InputError(f"{what}: {item!r} is there twice; leave one out")
+    return items
+
+
+def read_named(prefix: str, data: Mapping[str, Any], readers: Mapping[str, Reader], *others: str) -> dict[str, Any]:
+    """Return the values that a table has of some names; it may have some others, and no more."""
+    for name in data:
+        if name not in (names := (*readers, *others)):
+            raise InputError(f"got {prefix}{name}, wanted one of {', '.join(names)}{nearest(name, names)}")
+    return {name: read(prefix + name, data[name]) for name, read in readers.items() if name in data}
+
+
+def several(read: Reader, least: int = 1) -> Reader:
+    """Return a reader of a list, in which nothing is there twice."""
+    return lambda what, value: each_once(what, tuple(read(what, item) for item in read_list(what, value, least)))
+
+
+def by_name(read: Reader) -> Reader:
+    """Return a reader of a table whose values are alike."""
+    return lambda what, value: {name: read(f"{what}.{name}", each) for name, each in read_table(what, value).items()}
