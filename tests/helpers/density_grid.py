@@ -9,16 +9,12 @@ import numpy as np
 LOW, HIGH = np.array([-2.5, -2.0, 0.3]), np.array([2.5, 2.0, 3.8])
 ROUGH = np.random.default_rng(3).random((5, 6, 7)).astype(np.float32)
 SCALE = 0.8
-LAMP = """<emitter type="point" id="lamp"><point name="position" x="0.4" y="0.9" z="4.7"/>
-    <rgb name="intensity" value="37, 31, 23"/></emitter>"""
 INSIDE = """<emitter type="point" id="lamp"><point name="position" x="0.4" y="0.3" z="2.2"/>
     <rgb name="intensity" value="37, 31, 23"/></emitter>"""
 SPOT = """<emitter type="spot" id="spot">
     <transform name="to_world"><lookat origin="-3.1, 3.3, 6.2" target="-0.7, 0.2, 1.2" up="0, 1, 0"/></transform>
     <rgb name="intensity" value="61, 71, 97"/>
     <float name="cutoff_angle" value="27"/><float name="beam_width" value="17"/></emitter>"""
-SUN = """<emitter type="directional" id="sun"><vector name="direction" x="0.5" y="0.3" z="-0.45"/>
-    <rgb name="irradiance" value="3, 2.6, 2.1"/></emitter>"""
 #: A ball in the grid and ground below.
 SHAPES = """<shape type="rectangle" id="ground"><transform name="to_world"><scale value="20"/></transform></shape>
     <shape type="sphere" id="ball">

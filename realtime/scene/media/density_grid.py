@@ -13,7 +13,7 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.scene.density import Density
-from realtime.scene.media.medium import Medium
+from realtime.scene.media.medium import VaryingMedium
 from realtime.scene.phase import Phase
 
 _GAUSS = 12**-0.5  # half of the distance of the two nodes over the length
@@ -21,7 +21,7 @@ _LEAST = 1e-3  # of a voxel: a walk goes at least so far, over the next face
 
 
 @dataclass(frozen=True)
-class GridMedium(Medium):
+class GridMedium(VaryingMedium):
     """An extinction on a grid; grey."""
 
     density: Density  #: of one cloud: the grid over its largest value
@@ -30,16 +30,6 @@ class GridMedium(Medium):
     high: Any  #: the opposite corner [m]
     albedo: Any
     phase: Phase
-
-    @property
-    def channels(self):
-        """One."""
-        return 1
-
-    @property
-    def vacuum(self):
-        """No: rays leave the box, but `part` says where steps end."""
-        return False
 
     def rays(self, origin, direction, aim=None):
         """Return rays with the distances at which they enter and leave the box [m]."""
@@ -86,10 +76,6 @@ class GridMedium(Medium):
         zero = dr.zeros(type(length), dr.width(length))
         _, total = dr.while_loop((zero, zero), lambda x, _: x < length, walk, labels=("x", "total"))
         return (self.largest * total,)
-
-    def length_of(self, depth):
-        """Return infinity: beside the box it has any length."""
-        return type(self.largest)(dr.inf)
 
     def part(self, rays, x0, x1, *, uniform):
         """Return the part of a segment in the box [m]."""

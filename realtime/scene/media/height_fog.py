@@ -34,7 +34,7 @@ import mitsuba as mi
 from realtime.errors import InputError
 from realtime.numerics.array_types import is_single
 from realtime.numerics.functions import exp_bounded, unit_nodes
-from realtime.scene.media.medium import LitRays, Medium, optical_reach
+from realtime.scene.media.medium import LitRays, VaryingMedium, optical_reach
 from realtime.scene.phase import Phase
 
 _NODES, _NODES_DOUBLE = 8, 12
@@ -53,7 +53,7 @@ class Layer:
 
 
 @dataclass(frozen=True)
-class HeightFog(Medium):
+class HeightFog(VaryingMedium):
     """Exponential layers and a constant between a floor and a cap; grey."""
 
     layers: tuple[Layer, ...]
@@ -64,16 +64,6 @@ class HeightFog(Medium):
     up: Any  #: unit vector
     albedo: Any
     phase: Phase
-
-    @property
-    def channels(self):
-        """One."""
-        return 1
-
-    @property
-    def vacuum(self):
-        """No: rays leave the fog, but `part` says where steps end."""
-        return False
 
     def rays(self, origin, direction, aim=None):
         """Return rays with the distances between which they are in the fog [m], and their heights and rise."""
@@ -107,10 +97,6 @@ class HeightFog(Medium):
         if not getattr(light, "w", 1):
             return (self._column(z) / -dr.dot(light.axis, self.up),)
         return (self._between(z, dr.dot(light.position, self.up), r),)
-
-    def length_of(self, depth):
-        """Return infinity: high up the fog has any length."""
-        return type(self.cap)(dr.inf)
 
     def length_from(self, rays, x, depth: float):
         """Return a length after x [m] in which the optical depth grows by `depth` or more; infinite: it does not."""

@@ -150,6 +150,24 @@ class Medium(ABC):
         return light.intensity * (self.unit * (integral * (0.25 * dr.inv_pi)))
 
 
+class VaryingMedium(Medium):
+    """A grey medium whose extinction is another at each place, and which ends somewhere."""
+
+    @property
+    def channels(self) -> int:
+        """One."""
+        return 1
+
+    @property
+    def vacuum(self) -> bool:
+        """No: rays leave the medium, but `part` says where steps end."""
+        return False
+
+    def length_of(self, depth: float) -> Any:
+        """Return infinity: outside the medium it has any length."""
+        return type(self.albedo.x)(dr.inf)
+
+
 @dataclass(frozen=True)
 class LitRays:
     """Rays with one light: what methods ask of the medium. Integrals are in parts of `Medium.unit`."""

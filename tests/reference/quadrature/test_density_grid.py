@@ -17,20 +17,8 @@ from reference.scene.shadow_epsilon import measure_shadow_epsilon
 from tests.evidence.injected import Wrap, injected
 from tests.helpers.biases import biases
 from tests.helpers.clouds import linear_between
-from tests.helpers.density_grid import (
-    ALBEDO,
-    HIGH,
-    INSIDE,
-    LAMP,
-    LOW,
-    ROUGH,
-    SCALE,
-    SHAPES,
-    SPOT,
-    SUN,
-    grid_xml,
-    volume,
-)
+from tests.helpers.density_grid import ALBEDO, HIGH, INSIDE, LOW, ROUGH, SCALE, SHAPES, SPOT, grid_xml, volume
+from tests.helpers.height_fog import LAMP, SUN
 from validation.scenes.loading import load_scene
 
 BATCHES = 40

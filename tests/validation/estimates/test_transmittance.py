@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from reference.scene.read import read_truth
-from tests.helpers.density_grid import LAMP, ROUGH, grid_xml, volume
+from tests.helpers.density_grid import ROUGH, grid_xml, volume
+from tests.helpers.height_fog import LAMP
 from validation.estimates.transmittance import (
     jackknife,
     marches,

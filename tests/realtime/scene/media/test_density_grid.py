@@ -11,8 +11,9 @@ from realtime.methods.registry import FOG_METHODS, METHODS
 from realtime.scene.read_scene import read_scene
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_truth
-from tests.helpers.density_grid import INSIDE, LAMP, ROUGH, SPOT, SUN, grid_xml, volume
+from tests.helpers.density_grid import INSIDE, ROUGH, SPOT, grid_xml, volume
 from tests.helpers.frames import relative_rmse
+from tests.helpers.height_fog import LAMP, SUN
 from validation.scenes.loading import load_scene
 
 
