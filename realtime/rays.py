@@ -48,7 +48,7 @@ factor of d is one of h and across both.
     enter = (-B + cos sqrt(D)) / A,     leave = (-B - cos sqrt(D)) / A.
 
 Where A is close to 0 one of them cancels, which then is C/q, q = -B - sign(B) cos sqrt(D) the numerator of the other.
-But C cancels in turn, by up to axial^2 where the ray is tangent. So the first form serves for A < -cos^2/2, that is
+But C cancels too, by up to axial^2 where the ray is tangent. So the first form serves for A < -cos^2/2, that is
 axial^2 < cos^2/2, and C/q elsewhere: neither loses more than 2/cos^2. A itself cancels for rays along lines on the
 cone. From h^2 A = D - offset^2 it has all digits where the ray is tangent, and keeps those that axial^2 - cos^2 loses
 of rays along a narrow beam, where axial and cos are both close to 1.

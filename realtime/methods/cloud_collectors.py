@@ -5,7 +5,7 @@ Where a camera ray meets a cloud, or at the camera if that is within one, light 
 scattering is integrated along the ray. The light of each set of orders from 2 on is the canonical transport from the
 collector that `realtime.clouds.collector_search` finds for it. Each sun has its own maps and searches. A uniform sky
 has no direction and needs no search (`realtime.clouds.uniform_sky`); `sky=beams` makes it one more sun, which shines
-from above (`Light.sky`), as the paper does. What is behind is seen through the transmittance of the ray.
+from above (`Light.sky`), as the paper does. The ray dims the surface behind the clouds by its transmittance.
 
 Other clouds dim the light of all orders on its way to a cloud, and opaque shapes hide it: for order 1 along the ray,
 for the others at the collector, over whose width the shade of other clouds is a mean.

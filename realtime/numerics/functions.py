@@ -81,7 +81,7 @@ def exp_bounded(x):
     """Return exp(x) for float32 lanes on a processor, `drjit.exp` elsewhere.
 
     Valid for x <= 88; below -87 the result stays at 1.2e-38 instead of falling to zero. Relative error below 2e-7.
-    NaN stays NaN. What is put together from bits has no derivative: where one is asked for, it is `drjit.exp` too.
+    NaN stays NaN. A number that is made of bits has no derivative: where one is asked for, `drjit.exp` is taken.
     """
     Float = type(x)
     if not is_single(Float) or dr.backend_v(Float) != dr.JitBackend.LLVM or dr.grad_enabled(x):

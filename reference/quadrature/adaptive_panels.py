@@ -55,7 +55,7 @@ class Integrand(Protocol):
 
     @property
     def factor(self) -> Array:
-        """What multiplies the values, such as albedo sigma_t where that is constant, (pieces, 3) [1/m]."""
+        """The factor of the values, such as albedo sigma_t where that is constant, (pieces, 3) [1/m]."""
 
     @property
     def extinction(self) -> Array:

@@ -2,8 +2,8 @@
 """The airlight of lit stretches in a density grid: exact optical depths by cells, nodes between the faces of cells.
 
 Along a camera ray the extinction has kinks at the faces of cells, so stretches are cut there. The depth of the path to
-the light is smooth in the distance but where that path sweeps over an edge of the grid; its second derivative jumps
-there. So the error of a pixel is stated, as the difference of the two rules, and not bounded.
+the light is smooth in the distance, except where that path sweeps over an edge of the grid: its second derivative jumps
+there. So a pixel has an estimate of its error, the difference of the two rules, and no bound.
 """
 
 from dataclasses import dataclass, field, replace

@@ -34,8 +34,8 @@ that is continuous where the visibility of points is not: its error falls as N^-
 before a rectangle, 64 points in each of eight replicates leave 4.9e-3 of a penumbra; 64 sections leave 1.3e-3, 256
 sections 2e-4, as root mean squares over eight seeds. Sections across an edge of the shadow would leave next to nothing,
 but those along it are seen as a whole or not and leave 1/N: with axes along the sides of that rectangle 64 sections
-leave 2.3e-3. So axes are turned. A sphere fills a cone of directions, where sections would be arcs: there each is so
-short that it is seen or not.
+leave 2.3e-3. So the axes are turned. A sphere fills a cone of directions, where sections would be arcs: there each is
+so short that it is seen or not.
 
 **On a mesh** one coordinate of the square chooses a triangle (`reference.quadrature.mesh_choice`), and what is left of
 it serves within the triangle: along rays as above in one that is near, evenly over its area in others. For surface

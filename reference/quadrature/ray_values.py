@@ -77,8 +77,8 @@ class RayValues:
     intervals: NDArray[np.int64]  #: how many lit intervals a ray has, those of all lights together, (rays,)
     transitions: int  #: edges between light and shadow
     random_checks: RandomChecks  #: of the lit intervals
-    #: of scenes that have lights with extent or a sky: these seen directly, (rays, 3), and for each replicate of their
-    #: samples airlight and surface, (rays, 6, replicates) [W/(m^2 sr)]; else without columns
+    #: lights with extent or a sky, seen directly, (rays, 3), and for each replicate of their samples airlight and
+    #: surface, (rays, 6, replicates) [W/(m^2 sr)]; in other scenes without columns
     emitted: Array = field(default_factory=lambda: np.empty((0, 0)))
     replicates: Array = field(default_factory=lambda: np.empty((0, 0, 0)))
 

@@ -8,12 +8,12 @@ A sky of the radiance Ls shines from all directions w'. Along a camera ray w
 
 where K(w') is what the ray receives of a directional light of irradiance 1 from w': the integrals change places, and
 every K is exact (`reference.quadrature.light_airlight`): lit intervals by geometry, height fog in closed form, pieces
-of bounded media to an error that is added up. So are surfaces, with f cos in the place of the phase function. What is
-left is one integral over the sphere of directions. It is taken by a lattice of directions, even in the solid angle, in
+of bounded media with an error that is added up. Surfaces have f cos in the place of the phase function. One integral
+remains, over the sphere of directions. It is taken by a lattice of directions, even in the solid angle, in
 eight replicates whose spread is its standard error (`reference.quadrature.replicates`). K is smooth in w' where nothing
 stands in the light and bounds have no edges; an edge costs digits, and no pixel is without an error.
 
-What follows at once:
+It follows at once:
 
 - In an unbounded medium of extinction above 0 the sky is infinitely far, tau(x, w') is infinite, and nothing of it
   arrives: the scattered light is 0, as is the sky seen through it. Such a scene has no sky (`TruthScene.sky`).

@@ -118,7 +118,7 @@ def run_groups(client: Client, groups: Iterable[Group], *, made: Any = None, ret
                     words = f"stopped after {guilty.limit:g} s" if hung else "its process ended {} times while it ran"
                     reason = f"{guilty.name}: {words}" if in_first else words
                     yield from _all(group, "hung" if hung else "aborted", reason.format(attempts), attempts)
-            except Exception as error:
+            except Exception as error:  # what a task or the scheduler raises ends a row, not the run
                 if client.status != "running":
                     yield from _all(group, "lost", "the scheduler went away", attempts)
                     continue

@@ -6,7 +6,7 @@ With the Legendre moments chi_l of the phase function (mean 1 over the sphere, c
     P(cos Theta) = sum_m exp(i m (phi - phi')) K_m(mu, mu'),
     K_m(mu, mu') = sum_{l >= |m|} (2 l + 1) chi_l L_l^m(mu) L_l^m(mu'),    L_l^m = sqrt((l - m)!/(l + m)!) P_l^m.
 
-N cosines in each hemisphere integrate polynomials of degree 2 N - 1, so only l < 2 N can be kept. What is left out is
+N cosines in each hemisphere integrate polynomials of degree 2 N - 1, so only l < 2 N can be kept. The rest is
 close to forward and becomes an exact peak (delta-M, Wiscombe 1977): with f = chi_{2N}
 
     P = 2 f delta(1 - cos Theta) + (1 - f) P',    (1 - f) chi'_l = chi_l - f.

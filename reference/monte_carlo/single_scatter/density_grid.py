@@ -4,7 +4,7 @@
 Transmittances are unbiased estimates by ratio tracking with Mitsuba's own majorant m (Novak, Selle, Jarosz 2014): the
 product of 1 - sigma_t/m over the points of a Poisson process of the density m. No cell of the grid and no optical depth
 is known here. Distances are equi-angular about lights at places and even under suns, between the ends of the box. Both
-integrands are bounded: that of a place by the angle, sigma_t T_1 T_2 p height, that of a sun by sigma_t T_1 T_2 p.
+integrands are bounded. Over the angle at a place it is sigma_t T_1 T_2 p height, under a sun sigma_t T_1 T_2 p.
 """
 
 from typing import Any

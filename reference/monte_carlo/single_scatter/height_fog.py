@@ -3,7 +3,7 @@ r"""Single scattering in height fog, sampled: Mitsuba's plugin says the density,
 
 With an antiderivative G of the density over the height, constant beyond floor and cap, the optical depth of a segment
 of length l between two heights is l (G(z_1) - G(z_0))/(z_1 - z_0), and that up to a sun at the height mu
-(G(cap) - G(z))/mu; of a sky, which shines from below too, (G(z) - G(floor))/|mu|. Of a layer
+(G(cap) - G(z))/mu. A sky shines from below too: then it is (G(z) - G(floor))/|mu|. For a layer
 
     G(z) = -sigma_i H_i exp(-(z - z_i)/H_i),     clamped below z_i:  sigma_i (z - z_i - H_i).
 

@@ -32,8 +32,8 @@ def single_scatter_batch(truth: TruthScene, seed: int, samples: int) -> Batches:
 
     `truth`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`: distances sampled for
     each ray, light and medium, each from a point of its own of a light with extent, at most 256. Returns Batches:
-    airlight and surface of every pixel [W/(m^2 sr)]. The surface needs no sampling but under lights with extent
-    and a sky: without these all batches agree on it.
+    airlight and surface of every pixel [W/(m^2 sr)]. The surface is sampled under lights with extent and a sky
+    alone: without these all batches agree on it.
     """
     check_samples(samples)
     medium = truth.scene.sensors()[0].get_medium()

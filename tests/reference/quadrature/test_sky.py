@@ -80,8 +80,12 @@ def test_in_a_ball_of_fog_it_is_a_mean_over_chords(variant, tmp_path):
         if half <= 0:
             return 0.0
         half = np.sqrt(half)
-        radius = lambda x: np.sqrt(min(RADIUS**2 - half**2 + x * x, RADIUS**2))  # noqa: E731 - of two lines
-        return quad(lambda x: SIGMA_T * np.exp(-SIGMA_T * (x + half)) * arriving(radius(x)), -half, half)[0]
+
+        def scattered(x):
+            radius = np.sqrt(min(RADIUS**2 - half**2 + x * x, RADIUS**2))
+            return SIGMA_T * np.exp(-SIGMA_T * (x + half)) * arriving(radius)
+
+        return quad(scattered, -half, half)[0]
 
     wanted = ALBEDO * RADIANCE[0] * np.array([airlight(direction) for direction in truth.direction])
     assert (wanted > 0).sum() > 8
