@@ -37,6 +37,7 @@ class FrameCache:
     state: Any  #: lights and geometry, shadow planes also the camera: `Method.prepared_from`
     carried: Any = None  #: what the method handed on from the last frame
     extra: Any = None  #: further layers of the last frame by their names; no frame needs them
+    frames: int = 1  #: how many frames there were
 
 
 def next_frame(
@@ -50,12 +51,13 @@ def next_frame(
 ) -> tuple[tuple[Any, Any, Any], FrameCache]:
     """Render a scene, and reuse what the last frame left.
 
-    `renderer`: the stages of the frame. `scene`: the scene as it is now: that of the renderer but for camera,
-    positions, lights, colours and medium. `cache`: what the last frame left; None for the first, for which everything
-    is made. If nothing is said to move in it, it is shaded by the function that the next ones will use: then these
-    record nothing. `camera_moved`, `geometry_moved`, `light_moved`: what is elsewhere than in the last frame, or
-    turned: the camera, shapes or the bounds of media, a light. The medium and the colours of lights may have changed in
-    any case. Returns `stages`: as from `realtime.frame.renderer.run_stages`: bit by bit what it returns for this scene;
+    `renderer`: the stages of the frame, with the number of the first one. `scene`: the scene as it is now: that of the
+    renderer but for camera, positions, lights, colours and medium. `cache`: what the last frame left; None for the
+    first, for which everything is made. If nothing is said to move in it, it is shaded by the function that the next
+    ones will use: then these record nothing. `camera_moved`, `geometry_moved`, `light_moved`: what is elsewhere than in
+    the last frame, or turned: the camera, shapes or the bounds of media, a light. The medium and the colours of lights
+    may have changed in any case. Returns `stages`: as from `realtime.frame.renderer.run_stages`: bit by bit what it
+    returns for this scene;
     `cache`: for the next frame.
     """
     moved = {"camera_moved": camera_moved, "geometry_moved": geometry_moved, "light_moved": light_moved}
@@ -106,8 +108,10 @@ def _next_of(
         by_light = run_shade(renderer, cast)
     if finish is not None:
         state = finish()
+    frames = cache.frames if cache else 0
+    renderer = replace(renderer, frame=renderer.frame + frames)
     rendered = run_method(renderer, state, cast, by_light, cache.carried if cache else None)
-    return evaluated(cast, rendered), FrameCache(cast, state, rendered.carried, rendered.extra)
+    return evaluated(cast, rendered), FrameCache(cast, state, rendered.carried, rendered.extra, frames + 1)
 
 
 def _started(renderer: FrameRenderer) -> Callable[[], Any]:

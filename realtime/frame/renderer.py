@@ -38,6 +38,7 @@ from realtime.frame.surface import Cast, surface_stages
 from realtime.kernels.table import prepare_kernel, with_tables
 from realtime.methods.interface.method import Layers, Method, Preparation, camera_view, method_parameters
 from realtime.numerics.array_types import PerRay, aligned_array
+from realtime.numerics.noise import Noise
 from realtime.numerics.recorded import Frozen
 from realtime.scene.camera import TILE, tiled_pixels
 from realtime.scene.light_points import with_light_points
@@ -89,6 +90,8 @@ class FrameRenderer:
     corners: Corners | None  #: how the tiles of the image lie; None where every pixel is computed
     extra_layers: bool  #: whether frames have the further layers that the method names
     sphere_scales: Frozen | None  #: by what samples of sphere lights are scaled
+    run: int = 0  #: number of the run: a noisy method draws other random numbers in each, below 2^32
+    frame: int = 0  #: number of the frame in its run, below 2^32
 
     @property
     def by_rays(self) -> bool:
@@ -251,10 +254,10 @@ def _stages(renderer: FrameRenderer, scene: Scene, kernel: Any, *, alone: bool) 
         through_media=not method.renders_clouds,
     )
 
-    def run(geometry, pixel, camera, medium, lights, state, distance, by_light, tables, last=None):
+    def run(geometry, pixel, camera, medium, lights, state, distance, by_light, tables, last=None, noise=None):
         shown = {"features": features, "scene": geometry, "medium": medium, "lights": lights}
         view = camera_view(camera, pixel, distance, **shown)
-        view = replace(view, carried=last, extra_layers=extra_layers)
+        view = replace(view, carried=last, noise=noise, extra_layers=extra_layers)
         if method.provides_visibility and not interpolates:
             view = replace(view, surfaces=by_light)
         with refusals():
@@ -384,12 +387,15 @@ def run_method(renderer: FrameRenderer, state, cast: Cast, by_light, carried: An
     `carried`: what the method handed on from the last frame; None for the first.
     """
     groups, sums, scales = light_groups(renderer), None, dict[int | None, Any]()
+    noise = None
+    if renderer.method.noisy:
+        noise = Noise(dr.opaque(mi.UInt32, renderer.run), dr.opaque(mi.UInt32, renderer.frame))
     if renderer.sphere_scales is not None:
         scales = _sphere_scales(renderer, groups, cast)
     for number, group in enumerate(groups):
         shaded = by_light[number] if by_light[number] is not None else _shaded(renderer, group, cast)
         own = state[number] if state[number] is not None else group.stages.prepare(group.scene)
-        rendered, beyond = _run_group(renderer, group, own, cast, shaded, carried)
+        rendered, beyond = _run_group(renderer, group, own, cast, shaded, last=carried, noise=noise)
         if (scale := scales.get(group.scene.lights[0].source)) is not None:
             rendered = replace(rendered, airlight=rendered.airlight * scale)
         if sums is None:
@@ -419,7 +425,7 @@ def _sphere_scales(renderer: FrameRenderer, groups: tuple[LightGroup, ...], cast
 
 
 def _run_group(
-    renderer: FrameRenderer, group: LightGroup, state, cast: Cast, by_light, last
+    renderer: FrameRenderer, group: LightGroup, state, cast: Cast, by_light, *, last, noise
 ) -> tuple[Rendered, PerRay | None]:
     """Run the method for one group of lights; return what is seen behind all media, of no light, too."""
     scene, method = renderer.scene, renderer.method
@@ -427,6 +433,8 @@ def _run_group(
 
     def render(pixel, distance, last):
         shown = geometry, pixel, scene.camera, scene.medium, group.lights, state, distance, by_light, renderer.tables
+        if method.noisy:
+            return group.stages.render(*shown, last, noise)
         return group.stages.render(*shown, last) if method.carries else group.stages.render(*shown)
 
     if renderer.corners is None:

@@ -44,7 +44,8 @@ def render_samples(renderer: FrameRenderer, samples: int, progress: Callable[[fl
     camera, frame = renderer.scene.camera, None
     for number, (right, down) in enumerate(pixel_offsets(samples), 1):
         beside = shifted_camera(camera, right, down) if right or down else camera
-        last = render_frame(replace(renderer, scene=replace(renderer.scene, camera=beside)))
+        numbered = replace(renderer, frame=renderer.frame + number - 1)  # each sample has its own random numbers
+        last = render_frame(replace(numbered, scene=replace(renderer.scene, camera=beside)))
         airlight, surface = (np.asarray(layer, dtype=np.float64) / samples for layer in (last.airlight, last.surface))
         if samples == 1:
             return last

@@ -99,6 +99,7 @@ def _of_function(function: Any, name: str) -> type[Method]:
         "frozen": bool(getattr(function, "frozen", False)),
         "by_rays": by_rays,
         "shadows": bool(getattr(function, "shadows", True)),
+        "noisy": bool(getattr(function, "noisy", False)),
         "preparation": preparation,
         "render": render,
     }

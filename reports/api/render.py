@@ -85,6 +85,8 @@ def render(
     samples: int = 1,
     frames: int | None = None,
     animate: str | None = None,
+    run: int = 0,
+    frame: int = 0,
     output: Files = (),
     plan: bool = False,
     timed: bool = False,
@@ -118,6 +120,10 @@ def render(
         `compare --frames`, where lights, colours or a homogeneous medium do.
     animate
         What moves: light, objects, medium, colour, or several with commas; the scene's animation by default.
+    run
+        Number of the run: a noisy method draws other random numbers in each, the same in each repetition.
+    frame
+        Number of the frame in its run, of an animation that of the first.
     output
         A file to write: .exr for all layers, .png for a tone-mapped picture; may be given several times.
     plan
@@ -145,12 +151,15 @@ def render(
     """
     files = [Path(path) for path in several(output)]
     _check(files, samples=samples, frames=frames, animate=animate, plan=plan, timed=timed)
+    for name, number in (("run", run), ("frame", frame)):
+        if not 0 <= number < 2**31:
+            raise InputError(f"{name}: got {number}, wanted a whole number from 0 up to, but not, {2**31}")
     from reports.machine.environment import activate
 
     activate()  # a user's module may need a variant when it is imported
     named = checked_configuration(method, kernel, parameters)
     chosen, apart = named
-    asked = _Asked(scene, pixels_of(size), changes_of(change), precision, chosen)
+    asked = _Asked(scene, pixels_of(size), changes_of(change), precision, chosen, run, frame)
     shown = progress if isinstance(progress, bool) else None
     call: Any = operator.call
     if apart and isinstance(scene, str):
@@ -176,6 +185,8 @@ class _Asked:
     changes: Mapping[str, tuple[float, ...]]
     precision: str
     chosen: "Configuration"
+    run: int
+    frame: int
 
     def read(self) -> tuple[Any, Any]:
         """Return the scene, loaded, and as methods read it."""
@@ -243,7 +254,8 @@ def _ready(asked: _Asked, frames: int, layers: bool, progress: Progress) -> tupl
     _check_work(loaded.name, read, asked.chosen, frames)
     note(progress, read.features.notes)
     layered = layers and bool(find_method(asked.chosen.method).layers)
-    return loaded, read, prepared(read, asked.chosen, extra_layers=layered), layered
+    made = prepared(read, asked.chosen, extra_layers=layered)
+    return loaded, read, replace(made, run=asked.run, frame=asked.frame), layered
 
 
 def _frame(asked: _Asked, samples: int, timed: bool, progress: Progress) -> "Rendering":
@@ -265,9 +277,10 @@ def _frame(asked: _Asked, samples: int, timed: bool, progress: Progress) -> "Ren
     with telling(progress, f"{loaded.name}: {samples} rays a pixel") as tell:
         frame = render_samples(renderer, samples, lambda done: tell(done, "the picture"))
     image = layered_frame(loaded.name, chosen, frame)
-    if samples > 1:
-        made = {"airlight:pixel": "area", "airlight:samples": str(samples)}
-        image = replace(image, attributes=dict(image.attributes) | made)
+    made = {"airlight:pixel": "area", "airlight:samples": str(samples)} if samples > 1 else {}
+    if renderer.method.noisy:
+        made |= {"airlight:run": str(asked.run), "airlight:frame": str(asked.frame)}
+    image = replace(image, attributes=dict(image.attributes) | made)
     return Rendering(
         scene=loaded.name,
         image=sealed(image),

@@ -126,7 +126,7 @@ class LiveScene:
         cache, moved = self._cache, dict(self._moved)
         if self._other_method and cache is not None:
             keeps = not moved["camera_moved"]
-            cache = FrameCache(cache.cast, None) if keeps else None
+            cache = FrameCache(cache.cast, None, frames=cache.frames) if keeps else None
             moved["light_moved"] = True
         stages, self._cache = next_frame(renderer, self.scene, cache, geometry_moved=False, **moved)
         dr.sync_thread()

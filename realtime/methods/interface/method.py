@@ -24,6 +24,7 @@ from typing import Any, ClassVar
 from realtime.area_lights.points import LightPoints
 from realtime.errors import InputError
 from realtime.numerics.array_types import Metres, PerRay
+from realtime.numerics.noise import Noise
 from realtime.parameters import Parameters, defaults, parameter, read_parameters, values
 from realtime.rays import RayGeometry, ray_geometry
 from realtime.scene.camera import Camera, ray_directions
@@ -48,6 +49,42 @@ class View(Rays):
     prepared: Any = ()  #: for a user's plain function: what its `prepare` made
     extra_layers: bool = False  #: whether the image is to have `Layers.extra`
     carried: Any = None  #: the `Layers.carried` of the last frame; None in the first
+    noise: Noise | None = None  #: what draws random numbers; None for a method that does not say that it is `noisy`
+
+    @property
+    def run(self) -> Any:
+        """The number of the run, an opaque `mi.UInt32`: images of two runs are independent.
+
+        Raises
+        ------
+        InputError
+            For a method that does not say that it is noisy.
+        """
+        return self._noise.run
+
+    @property
+    def frame(self) -> Any:
+        """The number of the frame in its run, an opaque `mi.UInt32`, so that a frozen method draws anew in each."""
+        return self._noise.frame
+
+    def uniform(self, stream: int = 0) -> tuple[Any, Any, Any, Any]:
+        """Return four independent numbers for each ray, evenly distributed in [0, 1), other ones in each frame and run.
+
+        Numbers of two streams are independent.
+
+        Raises
+        ------
+        InputError
+            For a method that does not say that it is noisy.
+        """
+        first, second, third, fourth = map(type(self.distance), self._noise.uniform(self.pixel, stream))
+        return first, second, third, fourth
+
+    @property
+    def _noise(self) -> Noise:
+        if self.noise is None:
+            raise InputError("noise: the method draws random numbers and does not say so; wanted `noisy` = True")
+        return self.noise
 
     def visible(self, point, light: Any, asked=True):
         """Return whether a light, or what else has a `shadow_ray`, reaches points [m], by rays where they are `asked`.
@@ -147,6 +184,7 @@ class Method(Parameters):
     at_once: ClassVar[bool] = False  #: whether it is given all lights and light samples of a frame at once
     by_source: ClassVar[bool] = False  #: whether its visibility has one entry for all samples of an area light
     carries: ClassVar[bool] = False  #: whether it hands arrays on to the next frame, as `Layers.carried`
+    noisy: ClassVar[bool] = False  #: whether its image depends on the number of the run, as `View.run`
 
     def check(self, scene: Scene) -> None:
         """Refuse a scene, by `InputError`, that the method with these parameters cannot render."""
