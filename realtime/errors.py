@@ -13,6 +13,10 @@ class InputError(ValueError):
     """Input that cannot be used. The message says in one line what was given, what is wanted and what to do."""
 
 
+class NoDriverError(RuntimeError):
+    """There is no OpenGL that can draw shaders. The message says why; what to install is the command line's to say."""
+
+
 @contextmanager
 def refusals() -> Iterator[None]:
     """Raise an `InputError` as it was: Dr.Jit wraps what is raised in the body of a loop or a branch."""

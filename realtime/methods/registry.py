@@ -13,6 +13,8 @@ from realtime.methods.froxel_fog.method import FroxelFog
 from realtime.methods.interface.method import Method
 from realtime.methods.light_volumes.method import LightVolumes
 from realtime.methods.ray_march import RayMarch
+from realtime.methods.shader.method import shader_method
+from realtime.methods.shader.source import is_shader
 from realtime.methods.shadow_planes.method import ShadowPlanes
 from realtime.methods.soft_shafts.method import SoftShafts
 from realtime.methods.unshadowed import Unshadowed
@@ -41,14 +43,16 @@ def find_method(name: str) -> type[Method]:
     """Return a method.
 
     `name`: a name of `METHODS`, or a user's own: 'module:function', 'path/to/file.py:function'
-    (`realtime.methods.user_method`). Raises InputError for an unknown name (the nearest is named), and for what cannot
-    be imported or is no method.
+    (`realtime.methods.user_method`), 'path/to/file.glsl' (`realtime.methods.shader`). Raises InputError for an unknown
+    name (the nearest is named), and for what cannot be imported or is no method.
     """
     if name in METHODS:
         return METHODS[name]
+    if is_shader(name):
+        return shader_method(name)
     if ":" in name:
         return user_method(name)
     raise InputError(
-        f"method: got {name!r}, wanted one of {', '.join(METHODS)}, or your own 'module:function'"
+        f"method: got {name!r}, wanted one of {', '.join(METHODS)}, your own 'module:function', or a shader, 'fog.glsl'"
         f"{nearest(name, METHODS)}"
     )

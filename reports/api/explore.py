@@ -184,7 +184,7 @@ def view(
     scene
         A built-in scene, random:SEED or a Mitsuba XML file.
     method
-        A method of `airlight list methods`, or a user method as MODULE:FUNCTION or FILE.py:FUNCTION.
+        A method of `airlight list methods`, or a user's as MODULE:FUNCTION, FILE.py:FUNCTION or FILE.glsl.
     kernel
         Airlight kernel, see `airlight list kernels`.
     change

@@ -60,17 +60,22 @@ _R = TypeVar("_R")
 
 
 def one_error(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Let a function raise `airlight.InputError` in place of the InputError of `realtime`."""
+    """Let a function raise our own exceptions in place of those of `realtime`: `airlight.InputError`, MissingError."""
 
     @functools.wraps(function)
     def wrapped(*arguments: _P.args, **named: _P.kwargs) -> _R:
         try:
             return function(*arguments, **named)
-        except Exception as error:  # only InputError is changed; naming it here would import `realtime` at each start
+        except Exception as error:  # only these two are changed; naming them here would import `realtime` at each start
             from realtime.errors import InputError as RealtimeInputError
+            from realtime.errors import NoDriverError
 
             if isinstance(error, RealtimeInputError):
                 raise InputError(str(error)) from error
+            if isinstance(error, NoDriverError):
+                from reports.machine.opengl import missing
+
+                raise missing(str(error)) from error
             raise
 
     return wrapped

@@ -103,8 +103,8 @@ def render(
     scene
         A built-in scene, random:SEED or a Mitsuba XML file; from Python also what `load_scene` takes or returns.
     method
-        A method of `airlight list methods`, or a user method as MODULE:FUNCTION or FILE.py:FUNCTION; from Python also
-        such a function itself, ``method(view, *, kernel=None, **parameters)``, from a module or a notebook.
+        A method of `airlight list methods`, or a user's as MODULE:FUNCTION, FILE.py:FUNCTION or FILE.glsl; from Python
+        also a function itself, ``method(view, *, kernel=None, **parameters)``, from a module or a notebook.
     kernel
         Airlight kernel, see `airlight list kernels`; 'exact' for a method that calls one.
     change
@@ -263,12 +263,13 @@ def _frame(asked: _Asked, samples: int, timed: bool, progress: Progress) -> "Ren
     import drjit as dr
 
     from realtime.frame.samples import render_samples
+    from realtime.methods.shader.source import is_shader
     from realtime.scene.features import describe
     from reports.api.results import Rendering, sealed
     from reports.machine.environment import activate
     from validation.study.configuration import prepared
     from validation.study.cost import TIMED
-    from validation.study.frame_times import time_frame
+    from validation.study.frame_times import shader_times, time_frame
     from validation.study.run import layered_frame
 
     variant, chosen = activate(), asked.chosen
@@ -281,6 +282,11 @@ def _frame(asked: _Asked, samples: int, timed: bool, progress: Progress) -> "Ren
     if renderer.method.noisy:
         made |= {"airlight:run": str(asked.run), "airlight:frame": str(asked.frame)}
     image = replace(image, attributes=dict(image.attributes) | made)
+    times, device = None, f"{variant}, {dr.thread_count()} threads"
+    if timed and is_shader(chosen.method):
+        device, times = shader_times(renderer, 0.6)
+    elif timed:  # the further layers of a method do not belong to what a frame costs
+        times = time_frame(prepared(read, chosen) if layered else renderer)
     return Rendering(
         scene=loaded.name,
         image=sealed(image),
@@ -291,10 +297,9 @@ def _frame(asked: _Asked, samples: int, timed: bool, progress: Progress) -> "Ren
         precision=asked.precision,
         plan=describe(read.features),
         notes=(*read.features.notes, *warnings),
-        # The further layers of a method do not belong to what a frame costs.
-        times=time_frame(prepared(read, chosen) if layered else renderer) if timed else None,
+        times=times,
         samples=samples,
-        device=f"{variant}, {dr.thread_count()} threads",
+        device=device,
     )
 
 
@@ -437,6 +442,7 @@ def asked_configurations(
     with each kernel and with all settings, given by name or as NAME=VALUE.
     """
     from realtime.methods.registry import FOG_METHODS
+    from realtime.methods.shader.source import is_users
     from validation.study.configuration import Configuration, chosen_configurations, configuration, parse_settings
 
     given = dict(settings) if isinstance(settings, Mapping) else parse_settings(several(settings))
@@ -454,7 +460,7 @@ def asked_configurations(
         elif not isinstance(method, str):
             chosen += [configuration(method, kernel_name(kernel), given) for kernel in named_kernels or (None,)]
             apart = False
-        elif option or ":" in method:
+        elif option or is_users(method):
             chosen += [checked_configuration(method, k, given)[0] for k in named_kernels or (None,)]
         else:
             chosen += chosen_configurations([method])

@@ -153,7 +153,7 @@ def report(
     full
         Large images, many samples and all tables, in about an hour.
     method
-        A method of `airlight list methods`, a user method as MODULE:FUNCTION or FILE.py:FUNCTION, or 'all', the
+        A method of `airlight list methods`, a user's as MODULE:FUNCTION, FILE.py:FUNCTION or FILE.glsl, or 'all', the
         default; may be given several times. From Python also functions and `airlight.configuration(...)`.
     kernel
         Airlight kernel of the methods; may be given several times.
@@ -246,6 +246,7 @@ def _measured(
 
         place = parse_place(cluster)
     activate()
+    from realtime.methods.shader.source import is_users
     from reports.api.render import asked_configurations
     from reports.report.asked import scenes_of_images
     from reports.report.measure import write_report
@@ -257,7 +258,7 @@ def _measured(
         study, asked = read_study(Path(asked[0])), []
     names, shown = scenes_of_images(asked or None, images, tuple(study.scene_names()))
     chosen, apart = asked_configurations(methods, kernels, settings, usual=study.configurations)
-    if methods and all(isinstance(name, str) and ":" in name for name in methods):
+    if methods and all(isinstance(name, str) and is_users(name) for name in methods):
         note(progress, ["what --method names is measured alone; --method all adds the built-in methods"])
     if shown:  # the sizes of an effort are known to be right; those of images are the user's
         from validation.engine.images import images_size

@@ -204,7 +204,9 @@ class Rendering(LayeredImage):
         data: dict[str, Any] = {"scene": self.scene, "method": self.label, "size": list(self.size)}
         if self.times is not None:
             times = self.times.medians
-            data["stages"] = [{"name": name, "ms": times.pop(name)} for name in ("surface", "airlight")]
+            data["stages"] = [
+                {"name": name, "ms": times.pop(name)} for name in ("surface", "airlight") if name in times
+            ]
             data |= {f"{name}_ms": time for name, time in times.items()} | {"fps": 1000 / times["frame"]}
         curve = self._curve().words if any(name.lower().endswith(".png") for name in self.files) else None
         made = {"samples": self.samples, "tone_curve": curve, "files": list(self.files), "device": self.device}
@@ -219,14 +221,18 @@ class Rendering(LayeredImage):
         lines = [f"{self.title}" + ("" if self.times else "; --timed measures what a frame costs")]
         if self.times is not None:
             ms = {name: f"{time:.3g} ms" for name, time in self.times.medians.items()}
-            lines += [
-                f"  {ms['frame']} a frame ({rate_words(self.times.frame.median_ms)}): surface {ms['surface']}, "
-                f"airlight {ms['airlight']}",
-                f"  {ms['light_moved']} after the light moved, {ms['objects_moved']} after objects moved",
-                f"  camera rays cached: {ms['light_moved_camera_cached']} after the light moved, "
-                f"{ms['colours_changed']} after only medium or colours changed",
-                f"  {self.device}",
-            ]
+            whole = f"  {ms['frame']} a frame ({rate_words(self.times.frame.median_ms)})"
+            lines += (
+                [f"{whole}: all passes of the shader", f"  {self.device}"]
+                if self.times.surface is None
+                else [
+                    f"{whole}: surface {ms['surface']}, airlight {ms['airlight']}",
+                    f"  {ms['light_moved']} after the light moved, {ms['objects_moved']} after objects moved",
+                    f"  camera rays cached: {ms['light_moved_camera_cached']} after the light moved, "
+                    f"{ms['colours_changed']} after only medium or colours changed",
+                    f"  {self.device}",
+                ]
+            )
         data = self.to_dict()
         lines += [f"  picture: {data['tone_curve']}"] if data["tone_curve"] else []
         if self.samples > 1:

@@ -4,14 +4,16 @@
 from collections.abc import Mapping
 from typing import Any
 
+from realtime.methods.shader.source import is_users
+
 
 def own_fault(method: str, refused: str | None) -> str | None:
     """Return what a user method did wrong: what it refuses by name is a result, its faults are not.
 
-    They are in the words of `realtime.methods.user_method` and `reports.machine.own_process`, which begin with the name
-    of the method.
+    They begin with the name of the method (`realtime.methods.user_method`, `realtime.methods.shader`,
+    `reports.machine.own_process`).
     """
-    return refused if ":" in method and refused and refused.startswith(f"method {method}: ") else None
+    return refused if is_users(method) and refused and refused.startswith(f"method {method}: ") else None
 
 
 def own_faults(data: Mapping[str, Any]) -> list[str]:

@@ -95,10 +95,14 @@ def _pairs(old: Report, new: Report) -> tuple[dict[Key, tuple[Times, Times]], li
 
 
 def _timed(report: Report) -> dict[Key, tuple[Any, str | None, Times]]:
-    """Return the size of the frames that were timed, the note on how, and the times, by scene and label."""
+    """Return the size of the frames that were timed, the device or the note on how, and times, by scene and label."""
     usual = report["settings"].get("timed")
     return {
-        (scene["name"], entry["label"]): (scene.get("timed", usual), entry.get("note"), entry["times"])
+        (scene["name"], entry["label"]): (
+            scene.get("timed", usual),
+            entry.get("device") or entry.get("note"),
+            entry["times"],
+        )
         for scene in report["scenes"]
         for entry in scene["methods"]
         if entry.get("times") and "frame" in entry["times"]

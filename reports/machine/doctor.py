@@ -32,6 +32,7 @@ from reports.machine.environment import (
 )
 from reports.machine.gpu import cuda_status, optix_status
 from reports.machine.llvm import find_llvm
+from reports.machine.opengl import opengl_status
 from reports.tables.record import Result
 from reports.tables.table import Table, table, words
 
@@ -90,8 +91,8 @@ class Doctor(Result):
 def doctor(*, clear_cache: bool = False) -> Doctor:
     """Show what works on this machine, and how to fix what does not.
 
-    That is Python and its packages, LLVM, CUDA, OptiX, a test kernel in a process of its own, and the cache: finished
-    references and results lie in `~/.cache/airlight` (`$XDG_CACHE_HOME/airlight` where that is set).
+    That is Python and its packages, LLVM, CUDA, OptiX, OpenGL for shaders, a test kernel in a process of its own, and
+    the cache: finished references and results lie in `~/.cache/airlight` (or in `$XDG_CACHE_HOME/airlight`).
     `AIRLIGHT_CACHE_DIR` names another folder, `AIRLIGHT_CACHE_SIZE` another limit than 4 GiB (500MB, 20GiB; 0 keeps
     nothing): above it the files that were used longest ago are removed.
 
@@ -153,7 +154,7 @@ def diagnose() -> dict[str, Any]:
     import platform
 
     libraries = find_llvm()
-    cuda, optix, atomic = cuda_status(), optix_status(), atomic_problem()
+    cuda, optix, atomic, opengl = cuda_status(), optix_status(), atomic_problem(), opengl_status()
     variant, used, problem, kernel = None, None, None, None
     try:
         prepared = prepare()
@@ -183,6 +184,7 @@ def diagnose() -> dict[str, Any]:
         "libatomic": {"works": not atomic, "reason": atomic or "can be loaded"},
         "cuda": {"works": cuda.works, "reason": cuda.reason},
         "optix": {"works": optix.works, "reason": optix.reason},
+        "opengl": {"works": opengl.works, "reason": f"{opengl.device}, {opengl.reason}".lstrip(", ")},
         "variant": variant,
         "kernel": kernel,
     }
@@ -221,7 +223,7 @@ def _rows(diagnosis: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         rows.append((f"LLVM {llvm['version'] or '?'}", _yes(llvm["works"]), f"{llvm['path']}: {llvm['reason']}{used}"))
     if not diagnosis["llvm"]:
         rows.append(("LLVM", "no", "none found"))
-    for key, name in {"libatomic": "libatomic.so.1", "cuda": "CUDA", "optix": "OptiX"}.items():
+    for key, name in {"libatomic": "libatomic.so.1", "cuda": "CUDA", "optix": "OptiX", "opengl": "OpenGL"}.items():
         rows.append((name, _yes(diagnosis[key]["works"]), diagnosis[key]["reason"]))
     rows.append(("variant", _yes(diagnosis["variant"] is not None), diagnosis["variant"] or "none works"))
     if "epsilon" in kernel:

@@ -21,11 +21,11 @@ from contextlib import suppress
 from typing import Any
 
 from analytic.errors import InputError
+from realtime.methods.shader.client import LIMIT_VARIABLE, method_limit
 from reports.machine import quick_compilation
 from reports.machine.environment import child_environment
 
 _POSIX = os.name == "posix"
-_LIMIT, _LIMIT_VARIABLE = 300.0, "AIRLIGHT_METHOD_LIMIT"  # that a user's method may take for one scene or command [s]
 
 
 class EndedError(InputError):
@@ -61,7 +61,7 @@ def in_own_process(
                 pickle.dumps((sys.argv, function, arguments)), None if seconds == math.inf else seconds
             )
         except subprocess.TimeoutExpired:
-            hint = f"did not end within {seconds:g} s and was stopped; {_LIMIT_VARIABLE}={2 * seconds:g} allows more"
+            hint = f"did not end within {seconds:g} s and was stopped; {LIMIT_VARIABLE}={2 * seconds:g} allows more"
             raise EndedError(f"{what} {name}: {hint}") from None
         finally:
             _end(process)
@@ -76,15 +76,6 @@ def in_own_process(
 
         add_spent(loaded)
     return value
-
-
-def method_limit() -> float:
-    """Return how long a user's method may take for one scene, or one command [s]."""
-    given = os.environ.get(_LIMIT_VARIABLE) or str(_LIMIT)
-    with suppress(ValueError):
-        if 0 < float(given) < math.inf:
-            return float(given)
-    raise InputError(f"{_LIMIT_VARIABLE}: got {given!r}, wanted a time above 0, such as 300 [s]")
 
 
 def _end(process: subprocess.Popen) -> None:
@@ -118,6 +109,7 @@ def main() -> None:
 
     activate()
     from realtime.errors import InputError as MethodError
+    from realtime.errors import NoDriverError
     from reference.storage.kept import loaded_spent
 
     # The user's module sees the command line of the command.
@@ -125,7 +117,7 @@ def main() -> None:
     answer: tuple[bool, Any, Any]
     try:
         answer = True, function(*arguments), loaded_spent()
-    except (InputError, MethodError, MissingError) as error:
+    except (InputError, MethodError, MissingError, NoDriverError) as error:
         answer = False, type(error)(str(error)), None  # its cause may not be one that can be sent
     sys.stdout.flush()
     output.write(pickle.dumps(answer))

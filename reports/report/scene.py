@@ -25,8 +25,8 @@ _REFERENCE = "reference"  # the stem of the reference's files
 
 #: What report.json has of a row.
 _ENTRY = (
-    *("label", "kind", "layer", "pixel", "method", "kernel", "knows_shadows", "status", "note", "times", "memory"),
-    *("cost", "error", "surface_error", "flip"),
+    *("label", "kind", "layer", "pixel", "method", "kernel", "knows_shadows", "status", "note", "device", "times"),
+    *("memory", "cost", "error", "surface_error", "flip"),
 )
 
 

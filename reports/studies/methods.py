@@ -83,7 +83,7 @@ def methods(
     scenes
         Built-in scenes, random:SEED and Mitsuba XML files; all built-in scenes for fog by default.
     method
-        A method of `airlight list methods`, a user method as MODULE:FUNCTION or FILE.py:FUNCTION, or 'all', the
+        A method of `airlight list methods`, a user's as MODULE:FUNCTION, FILE.py:FUNCTION or FILE.glsl, or 'all', the
         default; may be given several times. A name stands for its standard configurations.
     kernel
         Airlight kernel of the methods; may be given several times.

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
+from realtime.methods.shader.source import is_shader
 from reports.tables.table import (
     Column,
     Measured,
@@ -31,6 +32,7 @@ _RELATIVE = (
 )
 _MEANINGS = {
     "frame": "a whole frame while nothing moves: median and quartiles",
+    "device": "that draws a shader and times it, by OpenGL; all others are timed on the device of the report",
     "airlight": "the airlight alone, with the lists of tiles",
     "surface": "camera rays and the lit surface",
     "light_moved": "a frame after the light moved, with shadow maps or planes again",
@@ -51,6 +53,7 @@ COLUMNS = {
     for column in (
         *words(label="method"),
         *numbers("frame", how={**_MS, "spread": "quartiles"}),
+        *words(device="device"),
         *numbers(frame_rate="frames/s", how=_RATE),
         *numbers(airlight_rate="airlight/s", how=_RATE | _MINOR),
         *numbers("airlight", surface="rays + surface", how=_MS | _MINOR),
@@ -77,16 +80,20 @@ BENCH = (
 def methods_table(title: str, methods: Iterable[Entry | Row], *keys: str, explanation: str = "") -> Table:
     """Return the table of the `methods` of a scene of report.json, or of rows that have some of `COLUMNS`.
 
-    `keys` are those of `COLUMNS`; `BENCH` by default.
+    `keys` are those of `COLUMNS`; `BENCH` by default. Where a shader was timed, its device stands beside its time.
     """
     rows = tuple(entry if isinstance(entry, Row) else method_row(entry) for entry in methods)
-    return Table(title, tuple(COLUMNS.values()), rows, explanation).only(*(keys or BENCH))
+    shown = list(keys or BENCH)
+    if any(row.values.get("device") for row in rows):
+        shown.insert(shown.index("frame") + 1, "device")
+    return Table(title, tuple(COLUMNS.values()), rows, explanation).only(*shown)
 
 
 def method_row(entry: Entry, *, shadows: bool = False) -> Row:
     """Return what a method costs and how wrong it is as a row; with `shadows` a method that knows none is marked."""
     kind, layer = entry.get("kind"), entry.get("layer")
-    remarks = [f"image, {layer}"] if kind == "image" else ["user's function"] if kind == "function" else []
+    users = "user's shader" if is_shader(entry.get("method", "")) else "user's function"
+    remarks = [f"image, {layer}"] if kind == "image" else [users] if kind == "function" else []
     if shadows and kind != "image" and not entry["knows_shadows"]:
         remarks.append("no shadows")
     remarks += [entry["note"]] if entry.get("note") else []
@@ -98,6 +105,7 @@ def method_row(entry: Entry, *, shadows: bool = False) -> Row:
     values |= {name: measured(times.get(name)) for name in TIMES}
     values |= {f"{name}_rate": per_second(measured(times.get(name))) for name in ("frame", "airlight")}
     values |= {name: error.get(name) for name in ERRORS}
+    values["device"] = entry.get("device")
     values["memory"] = entry.get("memory")
     values["flip"] = (entry.get("flip") or {}).get("value")
     return Row(values, remarks=tuple(remarks))
@@ -116,13 +124,15 @@ def rate_words(milliseconds: float) -> str:
 def fastest_within(error: float, entries: Iterable[Entry]) -> Entry | None:
     """Return the method of the fastest frame among those with at most a relative RMSE; None where there is none.
 
-    Pixels that are not finite are left out of the RMSE: a method that has any must not win by it.
+    Shaders run on another device, and are in no race with others. Pixels that are not finite are left out of the RMSE:
+    a method that has any must not win by it.
     """
 
     def reaches(entry: Entry) -> bool:
         errors = entry.get("error") or {}
         rmse = errors.get("relative_rmse")
-        return bool(entry.get("times")) and rmse is not None and rmse <= error and not errors.get("nonfinite")
+        timed = bool(entry.get("times")) and not entry.get("device")
+        return timed and rmse is not None and rmse <= error and not errors.get("nonfinite")
 
     return min(filter(reaches, entries), key=lambda entry: entry["times"]["frame"]["median_ms"], default=None)
 

@@ -4,6 +4,7 @@
 A kernel is named 'quadrature', 'quadrature-32', or as a user's 'module:function' or 'file.py:function'.
 """
 
+import hashlib
 import sys
 import time
 import tomllib
@@ -19,6 +20,7 @@ from realtime.frame.renderer import FrameRenderer, frame_renderer
 from realtime.kernels.registry import KERNELS, Kernel
 from realtime.methods.interface.method import method_parameters
 from realtime.methods.registry import find_method
+from realtime.methods.shader.source import is_shader, is_users, read_shader
 from realtime.methods.user_method import method_file, user_errors, user_object
 from realtime.parameters import values
 from realtime.scene.read_scene import Scene
@@ -29,7 +31,7 @@ from reference.storage.kept import code_digest
 class Configuration:
     """A method, its kernel (None if it calls none) and the parameters that differ from their defaults."""
 
-    method: str  #: name in the registry, or one's own as 'module:function'
+    method: str  #: name in the registry, or one's own as 'module:function' or 'fog.glsl'
     kernel: str | None = None  #: see `find_kernel`
     parameters: tuple[tuple[str, int | float | str], ...] = ()  #: names and values
 
@@ -42,8 +44,8 @@ class Configuration:
 
     @property
     def own(self) -> bool:
-        """Whether the method or its kernel is the user's, named 'module:function'."""
-        return ":" in self.method or ":" in (self.kernel or "")
+        """Whether the method or its kernel is the user's, named 'module:function' or 'fog.glsl'."""
+        return is_users(self.method) or is_users(self.kernel or "")
 
 
 _NAMED = tomllib.loads((Path(__file__).parent / "studies" / "methods.toml").read_text(encoding="utf-8"))
@@ -70,8 +72,8 @@ def configuration(
     Parameters
     ----------
     method
-        A name of `realtime.methods.registry.METHODS`, one's own as 'module:function' or 'path/to/file.py:function', or
-        such a function itself.
+        A name of `realtime.methods.registry.METHODS`, one's own as 'module:function', 'path/to/file.py:function' or
+        'path/to/file.glsl', or a function itself.
     kernel
         See `find_kernel`; 'exact' by default for methods that call a kernel.
     parameters
@@ -133,7 +135,7 @@ def rendered_lights(scene: Scene, chosen: Configuration) -> int:
 
     A user's module is not imported for it: its method counts as one that has the points of others.
     """
-    method = find_method("unshadowed" if ":" in chosen.method else chosen.method)
+    method = find_method("unshadowed" if is_users(chosen.method) else chosen.method)
     points = dict(chosen.parameters).get("points", method.light_points.points)
     return len(scene.lights) + int(points) * len(scene.area_lights)
 
@@ -205,10 +207,15 @@ def _imported(name: str) -> Callable[..., Any]:
 
 def user_code(chosen: Configuration) -> list[str]:
     """Return digests of the user's code in a configuration, with the modules of its folder that it imports."""
-    return [_user_digest(name) for name in (chosen.method, chosen.kernel) if name is not None and ":" in name]
+    return [_user_digest(name) for name in (chosen.method, chosen.kernel) if name is not None and is_users(name)]
 
 
 def _user_digest(name: str) -> str:
+    if is_shader(name):
+        digest = hashlib.sha256()
+        for each in read_shader(Path(name)).files:
+            digest.update(each.read_bytes() + bytes(1))
+        return digest.hexdigest()
     file = method_file(name)
     # A function typed into a notebook has no file, so its results cannot be kept.
     return code_digest([file]) if file is not None and file.is_file() else f"no file, {time.time_ns()}"

@@ -22,6 +22,7 @@ from realtime.frame.renderer import (
     run_stages,
 )
 from realtime.frame.surface import cast_rays
+from realtime.methods.shader.method import drawn_again
 from realtime.numerics.recorded import Frozen
 from realtime.scene.animate import Objects, read_objects, turned_objects
 from realtime.scene.camera import ray_directions
@@ -182,6 +183,18 @@ def brief_times(renderer: FrameRenderer) -> tuple[FrameTimes, float]:
         return evaluated(cast, run_method(renderer, state, cast, by_light))
 
     return FrameTimes(frame, _brief(airlight)), preparation.ms
+
+
+def shader_times(renderer: FrameRenderer, seconds: float | None = None) -> tuple[str, FrameTimes]:
+    """Return the device that draws a shader, and the times of all its passes there for so many seconds, by default few.
+
+    What the host hands over and brings back is left out: an engine has its rays and its maps.
+    """
+    state = renderer.prepare(renderer.scene)
+    run_stages(renderer, state)
+    device, times = drawn_again(state[0], _BRIEF if seconds is None else seconds)
+    timing = timing_of(times)
+    return device, FrameTimes(timing, timing)
 
 
 def _brief(work: Callable[[], Any]) -> Timing:

@@ -108,6 +108,9 @@ class Row:
     layer: str = column(meaning="what `error` is of: 'airlight', 'surface' or 'total'", default="airlight")
     pixel: str = column(meaning="a pixel of the reference: 'centre' or mean over its 'area'", default="centre")
     knows_shadows: bool = column("shadows", meaning="whether it renders volumetric shadows", default=True)
+    device: str | None = column(
+        meaning="that OpenGL draws a shader on, of which its times are; null for methods of Dr.Jit", default=None
+    )
     map: int | None = column(unit="texels", meaning="side of the shadow map; null without one", default=None)
     seed: int | None = column(meaning="of a random scene; null for others", default=None)
     medium: str | None = column(

@@ -21,6 +21,7 @@ from analytic.errors import InputError as ReferenceInputError
 from realtime.errors import InputError
 from realtime.frame.renderer import Frame, FrameRenderer, light_groups, render_frame, run_stages, unchecked_frame
 from realtime.methods.registry import find_method
+from realtime.methods.shader.source import is_shader
 from realtime.numerics.recorded import Frozen
 from realtime.scene.read_scene import Scene, read_scene
 from reference.storage.exr import Image
@@ -30,7 +31,7 @@ from validation.metrics.errors import FLOOR, error_metrics
 from validation.metrics.flip import flip_hdr
 from validation.metrics.other_tools import published_errors
 from validation.study.configuration import Configuration, prepared, rendered_lights
-from validation.study.frame_times import brief_times, time_frame
+from validation.study.frame_times import brief_times, shader_times, time_frame
 from validation.study.reference import Reference, load_cell
 from validation.study.row import Cost, Row, StatedError
 from validation.study.stated_errors import stated_bound, worth_of_ends
@@ -141,6 +142,11 @@ def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> tup
     backend = dr.JitBackend.CUDA if (mi.variant() or "").startswith("cuda") else dr.JitBackend.LLVM
     watermark = int(dr.detail.malloc_watermark(backend))
     cost = Cost(making + first, None, after[0] - before[0], after[2] - before[2], watermark)
+    if is_shader(chosen.method):
+        shown = renderer if timed_scene is None or wanted.times == "with" else prepared(timed_scene, chosen)
+        seconds = wanted.seconds if wanted.times == "stages" else None
+        device, times = (None, None) if wanted.times == "none" else shader_times(shown, seconds)
+        return row_of(times=times, device=device, cost=cost), frame
     if wanted.times == "with":
         times, prepare = brief_times(renderer)
         return row_of(times=times, cost=replace(cost, prepare_ms=prepare)), frame
@@ -150,7 +156,7 @@ def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> tup
     if timed_scene is not None and first > 1e3 * _LONG:
         timed_scene = None
         notes.append(f"timed at {scene.camera.width} x {scene.camera.height}: larger frames take minutes")
-    if chosen.own and not isinstance(renderer.stages.render, Frozen):
+    if chosen.own and not is_shader(chosen.method) and not isinstance(renderer.stages.render, Frozen):
         notes.append("not frozen: its Python runs again for every frame")
     shown = renderer if timed_scene is None else prepared(timed_scene, chosen)
     took: list[float] = []

@@ -154,6 +154,17 @@ def test_what_has_other_sizes_is_not_compared_and_said():
         compare_reports(report(), new)
 
 
+def test_times_of_two_devices_are_never_compared():
+    old, new = report(), report()
+    method(old)["device"], method(new)["device"] = "llvmpipe (LLVM 15.0.6, 256 bits)", "NVIDIA A100"
+    slow_down(method(new), 9.0)
+    difference = compare_reports(old, new)
+    assert words(difference) == []
+    assert (
+        "times not compared: llvmpipe (LLVM 15.0.6, 256 bits) before, NVIDIA A100 now" in words(difference, "note")[0]
+    )
+
+
 def claimed(verdict, measured, *, unit="", published=None, item="eq. 1"):
     """Return a report with one verdict on a paper."""
     row = {"paper": "biri", "item": item, "words": "words", "verdict": verdict, "published": published}

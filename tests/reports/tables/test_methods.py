@@ -40,6 +40,15 @@ def test_each_time_stands_under_its_own_heading(name):
     assert dict(zip(keys, values))[name] == median
 
 
+def test_a_shader_has_its_device_beside_its_time_and_is_in_no_race_with_others():
+    shader = entry("fog.glsl", frame=0.1, device="llvmpipe", kind="function", method="fog.glsl")
+    table = methods_table("t", [entry(), shader])
+    assert [column.key for column in table.columns][:3] == ["label", "frame", "device"]
+    assert [row.values["device"] for row in table.rows] == [None, "llvmpipe"]
+    assert "device" not in [column.key for column in methods_table("t", [entry()]).columns]
+    assert fastest_of(entry("a", frame=9.0), shader)[1] == "a: 9 ms, 111 frames/s"
+
+
 def fastest_of(*methods):
     """The cells of the table of the fastest methods for a scene."""
     (row,) = fastest_table([{"name": "fog", "methods": methods}]).rows

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The process in which OpenGL draws: run by its path, it imports nothing of ours.
+
+It is asked on the standard input and answers on the standard output. A message is its length in eight bytes and a NumPy
+archive, whose entry `message` is JSON:
+
+    open    stages, each with name, text, kind ('picture', '2d', '3d'), size, format, and the words that it uses
+    frame   arrays, and how many frames to draw, after forgetting the last ones if `reset`
+    again   draws the same for some seconds, and answers with the time of each frame
+
+A time is the wall clock's from the first call to the end of `finish()` where the processor draws: the timer queries of
+llvmpipe are wrong. On a GPU it is that of a query.
+"""
+
+import io
+import json
+import os
+import signal
+import struct
+import sys
+import time
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+_SOFTWARE = ("llvmpipe", "softpipe", "SwiftShader")
+_TARGETS = {"rgba16f": (4, "f2"), "rgba32f": (4, "f4"), "r32f": (1, "f4")}
+_VERTICES = """#version 430 core
+void main() { gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0); }
+"""
+
+
+class Host:
+    """A context, the programs of a shader, and what they read and write."""
+
+    def __init__(self) -> None:
+        import moderngl
+
+        self.error = moderngl.Error
+        options = {"libegl": "libEGL.so.1", "libgl": "libGL.so.1"} if sys.platform == "linux" else {}
+        backend = {"backend": "egl"} if sys.platform == "linux" else {}
+        self.context = moderngl.create_context(standalone=True, require=430, **backend, **options)
+        name = self.context.info["GL_RENDERER"]
+        self.device = {"device": name, "version": self.context.info["GL_VERSION"]}
+        self.query = None if any(word in name for word in _SOFTWARE) else self.context.query(time=True)
+        self.stages: list[Any] = []
+        self.programs: list[Any] = []
+        self.targets: list[Any] = []  # by stage an image and its framebuffer; of a pass, those of the last frame too
+        self.textures: dict[str, Any] = {}
+        self.uniforms: dict[str, Any] = {}
+        self.frame = 0
+
+    def open(self, message, arrays):
+        """Compile all stages and make their images."""
+        self.stages = message["stages"]
+        for stage in self.stages:
+            try:
+                if stage["kind"] == "3d":
+                    self.programs.append((self.context.compute_shader(stage["text"]), None))
+                else:
+                    program = self.context.program(vertex_shader=_VERTICES, fragment_shader=stage["text"])
+                    self.programs.append((program, self.context.vertex_array(program, [])))
+            except self.error as error:
+                return {"log": str(error)}, {}
+            self.targets.append([self._image(stage) for _ in range(1 if stage["kind"] == "picture" else 2)])
+        return self.device, {}
+
+    def _image(self, stage):
+        """Return a black image, and the framebuffer that draws into it."""
+        channels, kind = _TARGETS[stage["format"]]
+        size = tuple(stage["size"])
+        zeros = np.zeros((*size[::-1], channels), dtype=kind).tobytes()
+        if stage["kind"] == "3d":
+            image, buffer = self.context.texture3d(size, channels, zeros, dtype=kind), None
+        else:
+            image = self.context.texture(size, channels, zeros, dtype=kind)
+            buffer = self.context.framebuffer([image])
+        for axis in "xyz"[: len(size)]:
+            setattr(image, f"repeat_{axis}", False)
+        return image, buffer
+
+    def take(self, arrays):
+        """Bring arrays to the device: textures, buffers, and the rest as uniforms."""
+        for name, array in arrays.items():
+            if name.startswith("buffer"):
+                # The binding may not be empty: a light or a table that is not there has one of zeros.
+                self.context.buffer(array.tobytes() or bytes(128)).bind_to_storage_buffer(int(name[-1]))
+            else:
+                kind, own = name.split()
+                if own in self.textures:
+                    self.textures.pop(own).release()
+                if kind == "layers":
+                    texture = self.context.texture_array(array.shape[::-1], 1, array.tobytes(), dtype="f4")
+                else:
+                    texture = self.context.texture(array.shape[1::-1], 4, array.tobytes(), dtype="f4")
+                texture.filter = (0x2600, 0x2600)  # nearest: what lies between two surfaces is nothing
+                self.textures[own] = texture
+
+    def draw(self, uniforms):
+        """Draw one frame, and return the time that it took [ms]."""
+        self.context.finish()
+        begin = time.perf_counter()
+        if self.query is None:
+            self._stages(uniforms)
+        else:
+            with self.query:
+                self._stages(uniforms)
+        self.context.finish()
+        took = 1e3 * (time.perf_counter() - begin) if self.query is None else 1e-6 * self.query.elapsed
+        self.frame += 1
+        return took
+
+    def _stages(self, uniforms):
+        now, last = self.frame & 1, 1 - (self.frame & 1)
+        for number, (stage, (program, triangle)) in enumerate(zip(self.stages, self.programs, strict=True)):
+            textures = dict(self.textures)
+            for other, made in enumerate(self.stages[:-1]):
+                # What is not drawn yet in this frame is that of the last one.
+                textures[f"{made['name']}_image"] = self.targets[other][now if other < number else last][0]
+                textures[f"{made['name']}_last"] = self.targets[other][last][0]
+            unit = 0
+            for name, texture in textures.items():
+                if name in program:
+                    texture.use(unit)
+                    program[name].value = unit
+                    unit += 1
+            size = (*stage["size"], 1)[:3]
+            for name, value in {**uniforms, "frame": self.frame, "al_size": size}.items():
+                if name in program:
+                    program[name].value = tuple(value) if isinstance(value, list) else value
+            image, buffer = self.targets[number][0 if stage["kind"] == "picture" else now]
+            if buffer is None:
+                image.bind_to_image(0, read=False, write=True)
+                program.run(*(-(-side // 4) for side in size))
+                self.context.memory_barrier()
+            else:
+                buffer.use()
+                triangle.render(vertices=3)
+
+    def draw_frames(self, message, arrays):
+        """Draw frames and return the last."""
+        self.take(arrays)
+        self.uniforms = message["uniforms"]
+        if message["reset"]:
+            self.frame = 0
+            for stage, targets in zip(self.stages[:-1], self.targets[:-1], strict=True):
+                for image, _ in targets:
+                    channels, kind = _TARGETS[stage["format"]]
+                    image.write(np.zeros((*stage["size"][::-1], channels), dtype=kind).tobytes())
+        times = [self.draw(self.uniforms) for _ in range(message["frames"])]
+        image, _ = self.targets[-1][0]
+        width, height = self.stages[-1]["size"]
+        pixels = np.frombuffer(image.read(), dtype=np.float32).reshape(height, width, 4)
+        return {"ms": times}, {"image": pixels[..., :3]}
+
+    def again(self, message, arrays):
+        """Draw the same for some seconds, at least three times."""
+        end, times = time.perf_counter() + message["seconds"], list[float]()
+        while len(times) < 3 or time.perf_counter() < end:
+            times.append(self.draw(self.uniforms))
+        return {"ms": times}, {}
+
+
+def main():
+    """Answer until nobody asks."""
+    output = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what a driver prints
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    limit = float(sys.argv[1])
+    host = None
+    try:
+        host = Host()
+    except Exception as error:  # whatever a driver, or its absence, raises
+        missing = " ".join(str(error).split()) or type(error).__name__
+    while True:
+        head = sys.stdin.buffer.read(8)
+        if len(head) < 8:
+            return
+        with np.load(io.BytesIO(sys.stdin.buffer.read(*struct.unpack("<Q", head)))) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        message = json.loads(str(arrays.pop("message")))
+        if hasattr(signal, "alarm"):
+            signal.alarm(int(limit) + 2)  # ends a driver that never returns, though its caller may be gone
+        if host is None:
+            answer, made = {"missing": missing}, {}
+        else:
+            work = {"open": host.open, "frame": host.draw_frames, "again": host.again}[message["kind"]]
+            answer, made = work(message, arrays)
+        if hasattr(signal, "alarm"):
+            signal.alarm(0)
+        packed = io.BytesIO()
+        np.savez(packed, message=np.array(json.dumps(answer)), **made)
+        with suppress(BrokenPipeError):
+            output.write(struct.pack("<Q", packed.tell()) + packed.getvalue())
+            output.flush()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A user's shader as a method, named by its file: 'fog.glsl' (`realtime.methods.shader`).
+
+It is the same to frames, reports and the view as a method in Python. Its time is that of the device that OpenGL draws
+on, which has a name, and no part of it is Dr.Jit's.
+"""
+
+from dataclasses import dataclass, make_dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import mitsuba as mi
+import numpy as np
+
+from realtime.errors import InputError
+from realtime.methods.interface.method import Layers, Method
+from realtime.methods.shader.client import ShaderHost
+from realtime.methods.shader.prelude import phase_text, stage_text
+from realtime.methods.shader.scene_arrays import check_scene, light_array, map_array, phase_table, ray_arrays, uniforms
+from realtime.methods.shader.source import ShaderSource, read_shader
+from realtime.methods.user_result import checked_radiance
+from realtime.parameters import parameter, values
+from realtime.shadow_maps.shadow_map import cast_shadow_map, check_maps, map_size
+
+
+@dataclass(frozen=True)
+class Shader(Method):
+    """A user's shader."""
+
+    shader: ClassVar[ShaderSource]
+    map: int = map_size(512, "texels on a side of a face of a shadow map")
+
+    summary = "a user's shader"
+    uses_kernel = False
+    casts_rays = True
+    frozen = False
+    at_once = True
+    prepared_from = frozenset({"geometry", "light"})
+
+    @property
+    def carries(self):
+        """Whether it reads images of the last frame, or counts frames."""
+        history = {"frame", *(f"{each.name}_last" for each in self.shader.passes)}
+        return self.shader.frames > 1 or bool(history & self.shader.words)
+
+    @property
+    def _maps(self) -> bool:
+        return self.shadows and bool({"visible", "shadow_maps"} & self.shader.words)
+
+    def check(self, scene):
+        """Refuse what no shader is given."""
+        check_scene(scene, self.shader.path.name)
+        if self._maps and scene.features.shadows:
+            check_maps(scene.lights, self.map)
+
+    def preparation(self, scene):
+        """Start the driver and compile the shader; return what casts shadow maps before a frame."""
+        self.check(scene)
+        host, size = ShaderHost(self.name), (scene.camera.width, scene.camera.height)
+        phase = phase_text(scene.medium.phase)
+        stages = [
+            {
+                "name": "airlight" if each is None else each.name,
+                "text": stage_text(self.shader, phase, values(self), each),
+                "kind": "picture" if each is None else f"{len(each.size)}d",
+                "size": size if each is None else each.pixels(*size),
+                "format": "rgba32f" if each is None else each.format,
+            }
+            for each in (*self.shader.passes, None)
+        ]
+        said, _ = host.ask("open", stages=stages)
+        if "log" in said:
+            raise InputError(f"method {self.name}: {self.shader.mistake(said['log'])}")
+        host.device = said["device"]
+
+        def run(now):
+            maps = []
+            if self._maps and now.features.shadows:
+                maps = [cast_shadow_map(now.geometry, light, self.map) for light in now.lights]
+            return host, tuple(maps)
+
+        return run
+
+    def render(self, view, state, kernel):
+        """Return what the shader draws; what is not finite is refused."""
+        host, maps = state
+        arrays: dict[str, Any] = ray_arrays(view, surfaces=bool({"g_normal", "g_albedo"} & self.shader.words))
+        arrays["layers shadow_maps"] = map_array(maps)
+        arrays |= {"buffer 0": light_array(view.lights, maps), "buffer 1": phase_table(view.medium.phase)}
+        own = {each.name: getattr(self, each.name) for each in self.shader.parameters if each.uniform}
+        first = not self.carries or view.carried is None
+        asked = {"reset": first, "frames": self.shader.frames if first else 1, "uniforms": uniforms(view) | own}
+        _, image = host.ask("frame", arrays, **asked)
+        wrong = ~np.isfinite(image[::-1]).all(axis=2)
+        if wrong.any():
+            row, column = np.argwhere(wrong)[0]
+            seen = arrays["texture al_rays"][::-1][row, column]
+            raise InputError(
+                f"method {self.name}: {int(wrong.sum())} of {wrong.size} pixels are not finite, the first in column "
+                f"{column} of row {row}, ray.direction = ({seen[0]:.6g}, {seen[1]:.6g}, {seen[2]:.6g}), ray.distance = "
+                f"{abs(seen[3]):.6g}"
+            )
+        lanes = image[::-1].reshape(-1, 3)[np.array(view.pixel)]
+        return Layers(checked_radiance(lanes, view, self.name), carried=mi.UInt32(1) if self.carries else None)
+
+
+def shader_method(name: str) -> type[Method]:
+    """Return a shader as a method; `name` is the path of its file.
+
+    Raises
+    ------
+    InputError
+        As `realtime.methods.shader.source.read_shader`.
+    """
+    source = read_shader(Path(name))
+    fields: list[Any] = [
+        (each.name, type(each.default), parameter(each.default, each.help)) for each in source.parameters
+    ]
+    clash = {each.name for each in source.parameters} & {*dir(Shader), "points", "pattern"}
+    if clash:
+        raise InputError(f"method {name}: a parameter cannot be called {min(clash)}; rename it")
+    what = {"name": name, "source": str(source.path), "shader": source, "shadows": source.shadows}
+    return make_dataclass("UserShader", fields, bases=(Shader,), frozen=True, namespace=what)
+
+
+def drawn_again(state: Any, seconds: float) -> tuple[str, list[float]]:
+    """Return the name of the device that draws, and times of the same frame there again [ms].
+
+    `state`: that of a shader, which has drawn a frame; `seconds`: how long to draw.
+    """
+    host, _ = state
+    said, _ = host.ask("again", seconds=seconds)
+    return host.device, said["ms"]

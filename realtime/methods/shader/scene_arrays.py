@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a shader is given of a view: arrays in the order of OpenGL's images, their first row the lowest.
+
+A ray that meets nothing ends all the same: at the foot of the farthest light and 20/sigma_t behind it, where e^-20 =
+2e-9 of its light is left. Its distance is negative in the array, and `Ray.hit` false.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.errors import InputError
+from realtime.methods.interface.method import View
+from realtime.numerics.array_types import host_numbers
+from realtime.scene.camera import read_camera
+from realtime.scene.lights import Light
+from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.medium import OPTICAL_REACH
+from realtime.scene.phase import HenyeyGreenstein, Tabulated
+from realtime.scene.read_scene import Scene
+from realtime.shadow_maps.shadow_map import ShadowMap
+
+Array = NDArray[np.float32]
+
+_LAYERS = 2048  # of a texture, which every OpenGL has
+_FAR = 1e18  # in a map where there is no surface: its square is finite [m]
+_LIGHT = np.dtype(
+    [
+        *[("position", "f4", 3), ("kind", "i4"), ("axis", "f4", 3), ("cos_cutoff", "f4")],
+        *[("intensity", "f4", 3), ("cos_beam", "f4"), ("across", "f4", 3), ("map", "i4")],
+        *[("up", "f4", 3), ("sin_cutoff", "f4"), ("transition", "f4"), ("room", "f4", 3)],
+    ]
+)  # as `Light` of the prelude lies in a buffer of std430
+
+
+def check_scene(scene: Scene, name: str) -> None:
+    """Refuse a scene that no shader is given, by `InputError`: what is in the way stands first."""
+    medium = scene.medium
+    wanted = f"{name} renders point and spot lights in one homogeneous medium without bounds"
+    if medium.bounded_media or not isinstance(medium, Homogeneous):
+        what = "is height fog" if scene.features.height_fog else "is a grid" if scene.features.grid else "has bounds"
+        raise InputError(f"the medium {what}: {wanted}; use ray-march, or write the method in Python")
+    if medium.vacuum:
+        raise InputError(f"nothing is extinguished in a channel, so that rays have no end: {wanted} of sigma_t above 0")
+    if scene.area_lights:
+        raise InputError(f"the scene has area lights: {wanted}; use soft-shafts, or write the method in Python")
+    layers = sum(1 if light.axis is not None else 6 for light in scene.lights)
+    if layers > _LAYERS:
+        raise InputError(f"the scene has {len(scene.lights)} lights, whose maps have {layers} faces: wanted {_LAYERS}")
+
+
+def ray_arrays(view: View, *, surfaces: bool) -> dict[str, Array]:
+    """Return the textures of rays, and where asked for of the visible surfaces."""
+    height, width = view.camera.height, view.camera.width
+    pixel = np.array(view.pixel)
+
+    def image(values: Any) -> Array:
+        lanes = np.zeros((height * width, 4), dtype=np.float32)
+        for channel, each in enumerate(values):
+            lanes[pixel, channel] = np.array(each, dtype=np.float32)
+        return np.ascontiguousarray(lanes.reshape(height, width, 4)[::-1])
+
+    medium: Any = view.medium
+    reach = dr.full(type(view.distance), 0, len(pixel))
+    for light in view.lights:
+        reach = dr.maximum(reach, dr.dot(light.position - view.origin, view.direction))
+    end = reach + OPTICAL_REACH / medium.least_extinction()
+    arrays = {"texture al_rays": image([*view.direction, dr.select(dr.isfinite(view.distance), view.distance, -end)])}
+    if surfaces:
+        normal, albedo = _surfaces(view, len(pixel))
+        arrays |= {"texture g_normal": image(normal), "texture g_albedo": image(albedo)}
+    return arrays
+
+
+def _surfaces(view: View, lanes: int) -> tuple[Any, Any]:
+    """Return the unit normals of the visible surfaces, towards the camera, and what they reflect diffusely."""
+    if not view.features.surfaces:
+        return dr.zeros(mi.Vector3f, lanes), dr.zeros(mi.Color3f, lanes)
+    ray = mi.Ray3f(mi.Point3f(view.origin), mi.Vector3f(view.direction))
+    met = view.scene.ray_intersect(ray)
+    normal = mi.Vector3f(met.sh_frame.n)
+    normal = dr.select(dr.dot(normal, ray.d) > 0, -normal, normal)
+    seen = met.is_valid()
+    albedo = mi.Color3f(met.bsdf().eval_diffuse_reflectance(met))
+    return dr.select(seen, normal, 0), dr.select(seen, albedo, 0)
+
+
+def map_array(maps: Sequence[ShadowMap]) -> Array:
+    """Return the shadow maps of all lights, face by face, as layers of one texture; there is one without maps too."""
+    layers = [
+        np.minimum(np.array(each.distance, dtype=np.float32), _FAR).reshape(-1, each.size + 1, each.size + 1)
+        for each in maps
+    ]
+    return np.concatenate(layers or [np.zeros((1, 1, 1), dtype=np.float32)])
+
+
+def light_array(lights: Sequence[Light], maps: Sequence[ShadowMap]) -> NDArray[Any]:
+    """Return lights as a shader has them."""
+    table, layer = np.zeros(len(lights), dtype=_LIGHT), 0
+    for number, (row, light) in enumerate(zip(table, lights, strict=True)):
+        row["position"], row["intensity"] = host_numbers(light.position, light.intensity)
+        row["kind"], row["map"] = light.cone is not None, -1
+        if light.cone is not None:
+            row["axis"], cos, square = (each if n == 0 else each[0] for n, each in enumerate(
+                host_numbers(light.exact_axis, light.cone.cos, light.cone.square_sin)))  # fmt: skip
+            row["cos_cutoff"], row["sin_cutoff"], row["cos_beam"] = cos, np.sqrt(square), cos
+        if light.beam is not None:
+            row["cos_beam"], row["transition"] = (
+                each[0] for each in host_numbers(light.beam.cos, light.inverse_transition)
+            )
+        if maps:
+            own = maps[number]
+            row["map"] = layer
+            layer += own.faces
+            if own.projection.basis is not None:
+                across, up, _ = host_numbers(*own.projection.basis)
+                row["across"], row["up"] = across / (across @ across), up / (up @ up)
+    return table
+
+
+def uniforms(view: View) -> dict[str, Any]:
+    """Return the rest of what every shader is given, by the names of the prelude."""
+    camera, medium, phase = read_camera(view.camera), view.medium, view.medium.phase
+    sigma_t, albedo = host_numbers(medium.colour(medium.sigma_t), medium.albedo)  # type: ignore[attr-defined]
+    sigma_t = np.broadcast_to(sigma_t, 3)
+    g = 0.0
+    if isinstance(phase, HenyeyGreenstein):
+        g = float(host_numbers(phase.g)[0][0])
+    elif isinstance(phase, Tabulated):
+        p, c = phase_table(phase), np.linspace(-1, 1, dr.width(phase.values))
+        # c p is a parabola in each cell, of which Simpson's rule is exact: four times the middle is (c0 + c1)(p0 + p1).
+        g = float(np.mean((c * p)[:-1] + (c * p)[1:] + (c[:-1] + c[1:]) * (p[:-1] + p[1:])) / 6)
+    return {
+        "resolution": [camera.width, camera.height],
+        "medium.sigma_t": sigma_t.tolist(),
+        "medium.sigma_s": (sigma_t * albedo).tolist(),
+        "medium.g": g,
+        "al_origin": camera.origin.tolist(),
+        "al_forward": camera.forward.tolist(),
+        "al_right": (-camera.left).tolist(),
+        "al_up": camera.up.tolist(),
+    }
+
+
+def phase_table(phase: Any) -> Array:
+    """Return the values of a phase function that is a table, nothing of another."""
+    return np.array(phase.values, dtype=np.float32) if isinstance(phase, Tabulated) else np.zeros(0, np.float32)

@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""The shader of a user: GLSL with lines `#pragma airlight`, which other compilers ignore.
+
+    #pragma airlight set NAME DEFAULT "help"        a parameter, a #define before the text: another value compiles again
+    #pragma airlight uniform NAME DEFAULT "help"    a parameter that is a uniform
+    #pragma airlight pass NAME size=AxB[xC] format=rgba16f|rgba32f|r32f
+    #pragma airlight shadows none                   it knows no shadows
+    #pragma airlight frames N                       frames that a history needs before the image counts
+
+A size is made of numbers, W, H, W/n and H/n, rounded up. A pass in 2D is a function ``vec4 NAME(Ray ray)``, one in 3D
+``vec4 NAME(ivec3 cell, ivec3 cells)``. Lines ``#include "file"`` are resolved beside the file that has them.
+
+Drivers differ in what they make of the second number of `#line` (Mesa 22.3 forgets it), so every text has lines of its
+own: the user's file from 1, an included one from a million of its own.
+"""
+
+import keyword
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from realtime.errors import InputError
+
+SUFFIX = ".glsl"
+OWN_LINES = 1_000_000  #: of the texts before and behind the user's
+_BLOCK = 1_000_000  # lines of a text
+_FORMATS = ("rgba16f", "rgba32f", "r32f")
+_DIRECTIVE = re.compile(r"^[ \t]*#[ \t]*(\w+)[ \t]*(.*?)[ \t]*$")
+_PARAMETER = re.compile(r'(\w+)\s+([^\s"]+)(?:\s+"([^"]*)")?$')
+_PASS = re.compile(r"(\w+)\s+size=([\w/]+)(?:\s+format=(\w+))?$")
+_TERM = re.compile(r"(?:(\d+)|([WH])(?:/(\d+))?)$")
+# Mesa '0:14(12): error: ..', NVIDIA '0(14) : error C1008: ..', others 'ERROR: 0:14: ..'
+_ERRORS = (
+    re.compile(r"^\d+:(\d+)\(\d+\): (?:preprocessor )?error: (.*)$", re.MULTILINE),
+    re.compile(r"^\d+\((\d+)\) : error \w+: (.*)$", re.MULTILINE),
+    re.compile(r"^ERROR: \d+:(\d+): (.*)$", re.MULTILINE),
+)
+_WAYS_OUT = {"texture2D": "add `#define texture2D texture`", "texture3D": "add `#define texture3D texture`"}
+
+
+@dataclass(frozen=True)
+class Pass:
+    """An image that a function of the user's makes before the picture."""
+
+    name: str
+    size: tuple[str, ...]  #: two or three terms
+    format: str
+
+    def pixels(self, width: int, height: int) -> tuple[int, ...]:
+        """Return the size for a picture of that size [pixels]."""
+        return tuple(_evaluated(term, width, height) for term in self.size)
+
+
+@dataclass(frozen=True)
+class ShaderParameter:
+    """A parameter of a shader."""
+
+    name: str
+    default: bool | int | float
+    help: str
+    uniform: bool
+
+
+@dataclass(frozen=True)
+class ShaderSource:
+    """A shader as it was read."""
+
+    path: Path
+    text: str  #: of the file, included ones in their places
+    files: tuple[Path, ...]  #: that it was read from, its own first
+    lines: tuple[tuple[str, ...], ...]  #: of these files
+    extensions: tuple[str, ...] = ()
+    parameters: tuple[ShaderParameter, ...] = ()
+    passes: tuple[Pass, ...] = ()
+    shadows: bool = True
+    frames: int = 1
+    words: frozenset[str] = field(default=frozenset(), repr=False)  #: all names in its code
+
+    def mistake(self, log: str) -> str:
+        """Return what the driver says of the text, by the file and line of the user, and the line itself."""
+        for pattern in _ERRORS:
+            found = pattern.search(log)
+            if found:
+                number, words = int(found[1]), " ".join(found[2].split())
+                words += "".join(f"; {way}" for name, way in _WAYS_OUT.items() if name in words)
+                place, line = divmod(number, _BLOCK)
+                if place == 0 or 2 <= place <= len(self.files):
+                    chosen = max(place - 1, 0)
+                    lines = self.lines[chosen]
+                    shown = lines[line - 1].strip() if 0 < line <= len(lines) else ""
+                    return f"{self.files[chosen].name}, line {line}: {words}" + (f": {shown}" if shown else "")
+                return f"{self.path.name}: {words}"
+        lines_of_log = [line.strip() for line in log.splitlines() if "error" in line.lower()]
+        return f"{self.path.name}: {lines_of_log[0] if lines_of_log else ' '.join(log.split())}"
+
+
+def is_shader(name: str) -> bool:
+    """Return whether the name of a method is that of a shader's file."""
+    return name.endswith(SUFFIX)
+
+
+def is_users(name: str) -> bool:
+    """Return whether the name of a method, or of a kernel, is that of a user's code."""
+    return ":" in name or is_shader(name)
+
+
+def read_shader(path: Path) -> ShaderSource:
+    """Read a shader and what it includes.
+
+    Raises
+    ------
+    InputError
+        For a file that cannot be read, a line of ours that means nothing, and a function that is not there.
+    """
+    reader = _Reader(f"method {path}")
+    text = reader.read(path, ())
+    source = ShaderSource(
+        path, text, tuple(reader.files), tuple(reader.lines), tuple(reader.extensions), tuple(reader.parameters),
+        tuple(reader.passes), reader.shadows, reader.frames, frozenset(re.findall(r"[A-Za-z_]\w*", text)),
+    )  # fmt: skip
+    wanted = [("vec3", "airlight", "Ray ray")]
+    for each in source.passes:
+        wanted.append(("vec4", each.name, "Ray ray" if len(each.size) == 2 else "ivec3 cell, ivec3 cells"))
+    for kind, name, arguments in wanted:
+        if not re.search(rf"\b{kind}\s+{name}\s*\([^()]*\)\s*\{{", text):
+            raise InputError(f"method {path}: {path.name}: no function {kind} {name}({arguments})")
+    return source
+
+
+class _Reader:
+    """What is found in the files of a shader."""
+
+    def __init__(self, what: str) -> None:
+        self.what = what
+        self.files: list[Path] = []
+        self.lines: list[tuple[str, ...]] = []
+        self.extensions: list[str] = []
+        self.parameters: list[ShaderParameter] = []
+        self.passes: list[Pass] = []
+        self.shadows, self.frames = True, 1
+
+    def read(self, path: Path, within: tuple[Path, ...]) -> str:
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            words = error.strerror if isinstance(error, OSError) and error.strerror else "it is no text in UTF-8"
+            raise InputError(f"{self.what}: {path} cannot be read: {words}") from error
+        self.files.append(path)
+        self.lines.append(tuple(text.splitlines()))
+        first = 0 if not within else len(self.files) * _BLOCK
+        out = [f"#line {first + 1}"]
+        for number, code in enumerate(_without_comments(text).splitlines(), 1):  # Mesa miscounts lines of comments
+            found = _DIRECTIVE.match(code)
+            word, rest = (found[1], found[2]) if found else ("", "")
+            place = f"{self.what}: {path.name}, line {number}"
+            if word == "include":
+                name = re.fullmatch(r'"([^"]+)"', rest)
+                if name is None:
+                    raise InputError(f'{place}: got `#include {rest}`, wanted `#include "file"`')
+                other = path.parent / name[1]
+                if other.resolve() in (each.resolve() for each in (*within, path)):
+                    raise InputError(f"{place}: {name[1]} includes itself")
+                if not other.is_file():
+                    raise InputError(f"{place}: there is no file {other}")
+                out += [self.read(other, (*within, path)), f"#line {first + number + 1}"]
+                continue
+            if word == "extension":
+                self.extensions.append(f"#extension {rest}")
+            elif word == "pragma" and rest.split(None, 1)[:1] == ["airlight"]:
+                self._pragma(rest.removeprefix("airlight").strip(), place)
+            out.append("" if word in ("version", "extension") else code)
+        return "\n".join(out)
+
+    def _pragma(self, text: str, place: str) -> None:
+        word, _, rest = text.partition(" ")
+        rest = rest.strip()
+        if word in ("set", "uniform"):
+            self.parameters.append(_parameter(rest, place, uniform=word == "uniform"))
+            if len({each.name for each in self.parameters}) < len(self.parameters):
+                raise InputError(f"{place}: two parameters are called {self.parameters[-1].name}; rename one")
+        elif word == "pass":
+            self.passes.append(_pass(rest, place))
+        elif word == "shadows" and rest == "none":
+            self.shadows = False
+        elif word == "frames" and rest.isdecimal() and 0 < int(rest) <= 1000:
+            self.frames = int(rest)
+        else:
+            raise InputError(
+                f"{place}: got `#pragma airlight {text}`, wanted set, uniform, pass, `shadows none` or `frames N` with "
+                "N from 1 to 1000"
+            )
+
+
+def _parameter(text: str, place: str, *, uniform: bool) -> ShaderParameter:
+    found, word = _PARAMETER.match(text), "uniform" if uniform else "set"
+    value: bool | int | float | None = None
+    if found and found[1].isidentifier() and not keyword.iskeyword(found[1]):
+        value = {"true": True, "false": False}.get(found[2])
+        for kind in (int, float) if value is None else ():
+            try:
+                value = kind(found[2])
+                break
+            except ValueError:
+                continue
+    if found is None or value is None:
+        raise InputError(
+            f'{place}: got `{word} {text}`, wanted `{word} NAME DEFAULT "help"`, such as `{word} STEPS 16`'
+        )
+    return ShaderParameter(found[1], value, found[3] or "", uniform)
+
+
+def _pass(text: str, place: str) -> Pass:
+    found = _PASS.match(text)
+    terms = tuple(found[2].split("x")) if found else ()
+    if found is None or len(terms) not in (2, 3) or not all(map(_TERM.match, terms)):
+        raise InputError(f"{place}: got `pass {text}`, wanted `pass NAME size=W/2xH/2` or `pass NAME size=80x60x64`")
+    if (found[3] or _FORMATS[0]) not in _FORMATS:
+        raise InputError(f"{place}: got the format {found[3]}, wanted one of {', '.join(_FORMATS)}")
+    return Pass(found[1], terms, found[3] or _FORMATS[0])
+
+
+def _evaluated(term: str, width: int, height: int) -> int:
+    found = _TERM.match(term)
+    assert found is not None
+    if found[1]:
+        return max(int(found[1]), 1)
+    return -(-(width if found[2] == "W" else height) // max(int(found[3] or 1), 1))
+
+
+def _without_comments(text: str) -> str:
+    """Return the text with spaces for comments, line by line as it was."""
+
+    def blank(found: re.Match[str]) -> str:
+        return re.sub(r"[^\n]", " ", found[0])
+
+    return re.sub(r"//[^\n]*|/\*.*?(?:\*/|\Z)", blank, text, flags=re.DOTALL)

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A shader on the command line: what it costs has its device, a fault has its line, and a missing driver its status."""
+
+import json
+
+import pytest
+
+from reports.commands import main as cli
+from reports.data.own_faults import own_fault
+from tests.helpers.shaders import EXAMPLES, need_opengl
+
+MARCHER = str(EXAMPLES / "marcher.glsl")
+
+
+def test_a_frame_is_timed_on_the_device_that_drew_it(variant, capfd):
+    need_opengl()
+    assert cli.run(["render", "omni-box", "--method", MARCHER, "--size", "8x6", "--timed", "--json"]) == 0
+    said = json.loads(capfd.readouterr().out)
+    assert said["frame_ms"] > 0
+    assert "threads" not in said["device"]  # of Dr.Jit
+
+
+def test_a_mistake_is_one_line_and_a_missing_driver_says_what_to_install(variant, tmp_path, capfd, monkeypatch):
+    need_opengl()
+    shader = tmp_path / "fog.glsl"
+    shader.write_text("vec3 airlight(Ray ray) {\n    return vec3(x);\n}\n")
+    asked = ["render", "open-fog", "--method", str(shader), "--size", "8x6"]
+    assert cli.run(asked) == 2
+    found = capfd.readouterr().err
+    assert found == f"airlight: error: method {shader}: fog.glsl, line 2: `x' undeclared: return vec3(x);\n"
+    assert own_fault(str(shader), found.removeprefix("airlight: error: ")) is not None
+    assert own_fault(str(shader), "the medium has bounds: fog.glsl renders") is None
+    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_DIRS", str(tmp_path))
+    assert cli.run(asked) == 3
+    assert "libegl1 libgl1 libgl1-mesa-dri" in capfd.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_fault_is_a_row_of_a_study_with_the_rows_of_others(variant, tmp_path, capfd):
+    need_opengl()
+    shader = tmp_path / "fog.glsl"
+    shader.write_text("vec3 airlight(Ray ray) {\n    return vec3(x);\n}\n")
+    output = tmp_path / "study.json"
+    asked = ["study", "methods", "omni-box", "--size", "16x12", "--seconds", "0.01", "-o", str(output)]
+    assert cli.run([*asked, "--method", str(shader), "--method", MARCHER]) == 1
+    rows = {row["method"]: row for row in json.loads(output.read_text())["scenes"][0]["methods"]}
+    assert "line 2: `x' undeclared" in rows[str(shader)]["refused"]
+    assert rows[MARCHER]["error"]["relative_rmse"] < 0.02
+    assert rows[MARCHER]["device"]
