@@ -8,6 +8,7 @@ Read in this order:
 - `kernels.py`: kernels timed, where they break, integrals of a file
 - `series.py`: Biri's polynomials
 - `estimators.py`: the convergence and the standardised errors of Monte Carlo estimators
+- `noise.py`: bias apart from noise, by independent runs
 - `motion.py`: flicker, lag and ghosts under a light that moves
 - `transmittance.py`: estimators of transmittance in a density grid
 - `clouds.py`: a slab by order of scattering

@@ -20,6 +20,7 @@ STUDIES = {
     "polynomials": "series",
     "convergence": "estimators",
     "z-distribution": "estimators",
+    "noise": "noise",
     "motion": "motion",
     "transmittance": "transmittance",
     "slab": "clouds",

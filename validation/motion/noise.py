@@ -76,6 +76,11 @@ class Noise:
         return math.sqrt(value) if value is not None and self.squared_bias.above(2) else None
 
     @property
+    def doubtful(self) -> bool:
+        """Whether a single value has so much of the variance that it may not exist."""
+        return self.largest_share > _DOUBTFUL
+
+    @property
     def efficiency(self) -> float | None:
         """1/(V T), which does not change where samples and time are both doubled [1/s]."""
         variance = self.variance.value
@@ -85,10 +90,12 @@ class Noise:
         """Return the time until averaged runs have an error [s]; infinite where the bias is larger."""
         if self.seconds is None or self.variance.value is None:
             return None
+        if self.runs == 1:  # nothing to average
+            return self.seconds if self.relative_rmse <= error else math.inf
         bias = (self.root_bias or 0.0) ** 2
         return self.variance.value * self.seconds / (error**2 - bias) if error**2 > bias else math.inf
 
-    def after(self, runs: int) -> float:
+    def after(self, runs: float) -> float:
         """Return the error of so many averaged runs."""
         return math.sqrt(max((self.squared_bias.value or 0.0) + (self.variance.value or 0.0) / runs, 0.0))
 
@@ -119,24 +126,21 @@ def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None
     if (errors[1:] == errors[0]).all():
         raise InputError("runs: all are the same, bit by bit; wanted renders with a seed of their own each")
     flat = errors.reshape(count, -1)
-    squared_bias, variance = _parts(flat @ flat.T / flat.shape[1])
-    biases = flat.mean(axis=1)
-    error = float(biases.std(ddof=1)) / math.sqrt(count)
-    bias = float(biases.mean())
-    half = float(t.ppf(0.975, count - 1)) * error
+    squared_bias, variance = parts_of_error(flat @ flat.T / flat.shape[1])
+    bias, interval = bias_interval(flat.mean(axis=1))
     noise = (errors - errors.mean(axis=0)) * math.sqrt(count / (count - 1))
     square = float(np.mean(noise**2))
     spectrum, low = _spectrum(noise)
-    blurred = [np.array([gaussian_filter(each, (blur, blur, 0), mode="wrap") for each in errors]) for blur in BLURS]
+    blurred = [_blurred(errors, blur) for blur in BLURS]
     gains = []
     for blur, values in zip(BLURS, blurred, strict=True):
         apart = (values - values.mean(axis=0)) * math.sqrt(count / (count - 1))
         gains.append(math.sqrt(float(np.mean(apart**2)) / square) * 2 * math.sqrt(math.pi) * blur)
     return Noise(
         runs=count,
-        bias=Estimate(bias, error),
-        bias_ci=(bias - half, bias + half),
-        detectable_bias=detectable(count) * error * math.sqrt(count),
+        bias=bias,
+        bias_ci=interval,
+        detectable_bias=detectable(count) * (bias.error or 0.0) * math.sqrt(count),
         squared_bias=squared_bias,
         variance=variance,
         relative_rmse=math.sqrt(float(np.mean(errors**2))),
@@ -147,6 +151,45 @@ def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None
         blur_gain=tuple(gains),
         seconds=seconds,
     )
+
+
+def measure_error(reference: Array, image: Array, seconds: float | None = None) -> Noise:
+    """Return the same of a renderer that makes one image only: all of its error is bias.
+
+    Raises InputError for a dark reference.
+    """
+    mean = float(reference.mean())
+    if not mean > 0:
+        raise InputError("runs: the reference is dark: nothing is relative to it")
+    error = (image - reference)[None] / mean
+    bias, square = float(error.mean()), float(np.mean(error**2))
+    return Noise(
+        runs=1,
+        bias=Estimate(bias, 0.0),
+        bias_ci=(bias, bias),
+        detectable_bias=0.0,
+        squared_bias=Estimate(square, 0.0),
+        variance=Estimate(0.0, 0.0),
+        relative_rmse=math.sqrt(square),
+        largest_share=0.0,
+        spectrum=(),
+        low_share=math.nan,
+        blurred_rmse=tuple(math.sqrt(float(np.mean(_blurred(error, blur) ** 2))) for blur in BLURS),
+        blur_gain=(),
+        seconds=seconds,
+    )
+
+
+def _blurred(errors: Array, deviation: float) -> Array:
+    return np.array([gaussian_filter(each, (deviation, deviation, 0), mode="wrap") for each in errors])
+
+
+def bias_interval(biases: Array) -> tuple[Estimate, tuple[float, float]]:
+    """Return the mean of the biases of runs, and Student's interval of 95 %."""
+    count, mean = len(biases), float(biases.mean())
+    error = float(biases.std(ddof=1)) / math.sqrt(count)
+    half = float(t.ppf(1 - _LEVEL / 2, count - 1)) * error
+    return Estimate(mean, error), (mean - half, mean + half)
 
 
 def detectable(runs: int) -> float:
@@ -161,7 +204,7 @@ def detectable(runs: int) -> float:
     return float(brentq(lacking, 0.0, 10 * limit / root))
 
 
-def _parts(products: Array) -> tuple[Estimate, Estimate]:
+def parts_of_error(products: Array) -> tuple[Estimate, Estimate]:
     """Return squared bias and variance from the mean products of errors of pairs of runs."""
     count = len(products)
 
@@ -256,9 +299,9 @@ class NoiseComparison:
             ),
         ]
         if noise.seconds is not None:
-            times = ", ".join(f"{100 * goal:g} %: {_seconds(noise.seconds_to(goal))}" for goal in GOALS)
+            times = ", ".join(f"{100 * goal:g} %: {time_words(noise.seconds_to(goal))}" for goal in GOALS)
             lines.append(f"time             {1000 * noise.seconds:.4g} ms a run {self.device}; to an error of {times}")
-        if noise.largest_share > _DOUBTFUL:
+        if noise.doubtful:
             lines.append(
                 f"doubtful         one value has {100 * noise.largest_share:.3g} % of the variance: it may be infinite"
             )
@@ -328,5 +371,6 @@ def run_paths(pattern: str | os.PathLike[str]) -> list[Path]:
     return paths
 
 
-def _seconds(value: float | None) -> str:
+def time_words(value: float | None) -> str:
+    """Return a time in words, 'never' for an infinite one."""
     return "unknown" if value is None else "never" if math.isinf(value) else f"{value:.3g} s"

@@ -18,6 +18,7 @@ Read in this order:
 - `rows.py`: finished rows on disk, and their Parquet;
 - `cost.py`: what a command will take, and the question before it starts;
 - `decompose.py`: the error of an image by its causes, which add up to it;
+- `noise.py`: independent runs of methods that draw random numbers;
 - `motion.py`: methods under a light that moves, frame by frame;
 - `maps.py`: error against the size of the shadow map, and the flicker of a light that moves;
 - `ladders.py`: a scene with less and more of one kind of work, meshes with four times the triangles among it;

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Methods that draw random numbers: independent runs of one frame against its reference, bias apart from noise.
+
+Methods that draw none are rendered once, and stand beside them: all of their error is bias.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from realtime.frame.renderer import render_frame
+from realtime.scene.read_scene import read_scene
+from validation.estimates.quadrature import truth_image
+from validation.motion.noise import Noise, measure_error, measure_noise
+from validation.study.configuration import Configuration, prepared
+from validation.study.frame_times import brief_times
+
+Array = NDArray[np.float64]
+
+USUAL = (Configuration("shadow-planes", "exact"), Configuration("ray-march", None))
+_SURE = 2.0  # standard errors, below which the mean of the runs is not told from the reference
+
+
+@dataclass(frozen=True)
+class MethodNoise:
+    """What independent renders by a method are like."""
+
+    label: str
+    noise: Noise
+    reference: Array  #: (height, width, 3) [W/(m^2 sr)]
+    mean: Array  #: of the runs; the reference where it is within two standard errors, (height, width, 3)
+    deviation: Array  #: of a run, (height, width, 3) [W/(m^2 sr)]
+
+
+def method_noise(
+    scene: Any,
+    configurations: Sequence[Configuration],
+    *,
+    runs: int = 16,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> list[MethodNoise]:
+    """Return what the airlight of each configuration is like.
+
+    `scene`: the `mi.Scene`, at its own size; `runs`: of a method that draws random numbers, at least two. The time of a
+    frame is a median while nothing moves. Raises InputError for fewer runs and a dark reference.
+    """
+    if runs < 2:
+        raise InputError(f"runs: got {runs}, wanted at least two")
+    read, reference = read_scene(scene), truth_image(scene).airlight
+    found = []
+    for number, chosen in enumerate(configurations):
+        renderer = prepared(read, chosen)
+        count = runs if renderer.method.noisy else 1
+        images = []
+        for run in range(count):
+            if progress is not None:
+                progress(number * runs + run, len(configurations) * runs, chosen.label)
+            images.append(np.asarray(render_frame(replace(renderer, run=run)).airlight, dtype=np.float64))
+        seconds = brief_times(renderer)[0].frame.median_ms / 1e3
+        if count == 1:
+            noise, deviation = measure_error(reference, images[0], seconds), np.zeros_like(reference)
+        else:
+            noise, deviation = measure_noise(reference, images, seconds), np.std(images, axis=0, ddof=1)
+        mean = np.mean(images, axis=0)
+        told = np.abs(mean - reference) > _SURE / math.sqrt(count) * deviation
+        found.append(MethodNoise(chosen.label, noise, reference, np.where(told, mean, reference), deviation))
+    return found
