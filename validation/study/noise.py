@@ -62,7 +62,7 @@ def method_noise(
                 progress(number * runs + run, len(configurations) * runs, chosen.label)
             images.append(np.asarray(render_frame(replace(renderer, run=run)).airlight, dtype=np.float64))
         seconds = brief_times(renderer)[0].frame.median_ms / 1e3
-        if count == 1:
+        if all(np.array_equal(each, images[0]) for each in images[1:]):
             noise, deviation = measure_error(reference, images[0], seconds), np.zeros_like(reference)
         else:
             noise, deviation = measure_noise(reference, images, seconds), np.std(images, axis=0, ddof=1)

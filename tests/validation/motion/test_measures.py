@@ -73,7 +73,8 @@ def test_the_order_of_channels_and_pixels_changes_nothing():
     places = np.random.default_rng(0).permutation(HEIGHT * WIDTH)
     shuffled = [each.reshape(FRAMES, -1, 3)[:, places].reshape(LIGHT.shape) for each in (frames, LIGHT)]
     one, other, moved = measured(frames), measured(frames[..., ::-1], LIGHT[..., ::-1]), measured(*shuffled)
-    for name, tolerance in {"lag": 1e-6, "ghost": 1e-9, "flicker_beside_lag": 1e-9, "relative_rmse": 1e-9}.items():
+    # Sums for ghosts are of float32 numbers.
+    for name, tolerance in {"lag": 1e-6, "ghost": 1e-6, "flicker_beside_lag": 1e-9, "relative_rmse": 1e-9}.items():
         assert other.to_json()[name] == pytest.approx(one.to_json()[name], rel=tolerance)
     for name in ("relative_rmse", "bias", "flicker", "pop", "reference_change"):
         assert moved.to_json()[name] == pytest.approx(one.to_json()[name], rel=1e-9)

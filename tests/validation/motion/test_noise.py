@@ -73,6 +73,7 @@ def test_a_bias_of_a_thousandth_is_found():
     assert one.detectable_bias == pytest.approx(bias, rel=0.8)  # by the deviation of 14 runs, +- 19 %
 
 
+@pytest.mark.claim("noise-bias")
 @pytest.mark.parametrize("runs", [2, 5])
 def test_the_squared_bias_is_unbiased(runs):
     """Its mean of 300 repeats is within three errors of the square that was planted, also from two runs."""
