@@ -7,7 +7,6 @@ Read in this order:
 - `methods.py`: methods timed and compared, errors by cause, growth with the work, sizes of shadow maps
 - `kernels.py`: kernels timed, where they break, integrals of a file
 - `series.py`: Biri's polynomials
-- `estimators.py`: the convergence and the standardised errors of Monte Carlo estimators
 - `noise.py`: bias apart from noise, by independent runs
 - `motion.py`: flicker, lag and ghosts under a light that moves
 - `transmittance.py`: estimators of transmittance in a density grid

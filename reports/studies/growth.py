@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Studies of growth: times and memory with the work, errors with the size of the shadow map."""
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from analytic.errors import InputError
@@ -29,10 +27,7 @@ from reports.api.inputs import (
 )
 from reports.machine.progress import counted, part_of
 from reports.studies.result import FRACTION, Study, with_environment
-from reports.tables.table import number, numbers, table
-
-_BASELINES = Path(__file__).resolve().parents[2] / "validation/baselines/scaling"
-_FRAMES, _TURN = 9, 1e-3  # of the light that circles; by how much it turns from frame to frame [rad]
+from reports.tables.table import numbers, table
 
 
 @one_error
@@ -49,7 +44,7 @@ def scaling(
     """Time methods as their work grows.
 
     The result has times, memory and exponents by pixels, triangles, lights, bounded media or texels of the map. The
-    exit status is 1 if a time jumps, or grows with a higher power of the work than the baseline of the scene.
+    exit status is 1 if a time jumps.
 
     Parameters
     ----------
@@ -75,13 +70,12 @@ def scaling(
         if kind not in KINDS:
             raise InputError(f"kinds: got {kind!r}, wanted some of {','.join(KINDS)}")
     names = [str(name) for name in several(scenes)]
-    earlier = _earlier(names)
     from reports.machine.environment import activate
 
     activate()
     from reports.api.render import asked_configurations
     from reports.report.others import scaling_data
-    from reports.tables.scaling import cliffs, grown, scaling_tables
+    from reports.tables.scaling import cliffs, scaling_tables
     from validation.study.growth import METHODS, study_scaling
 
     chosen, _ = asked_configurations(method, kernel, settings, usual=METHODS)
@@ -99,15 +93,9 @@ def scaling(
         name="scaling",
         data=with_environment(scaling=records),
         drawn=tuple(scaling_tables(records)),
-        wrong=(*cliffs(records), *grown(earlier, records)),
+        wrong=tuple(cliffs(records)),
         draw=partial(_draw_scaling, records),
     )
-
-
-def _earlier(names: list[str]) -> list[dict[str, Any]]:
-    """Return the records of the baselines of built-in scenes, which `airlight study scaling SCENE -o` wrote once."""
-    files = [path for name in names if (path := _BASELINES / f"{name}.json").is_file()]
-    return [record for path in files for record in json.loads(path.read_text())["scaling"]]
 
 
 def _draw_scaling(records: list[dict[str, Any]], column: str) -> Any:
@@ -142,11 +130,6 @@ def _draw_scaling(records: list[dict[str, Any]], column: str) -> Any:
 # The size of the shadow map
 
 _SHARES = numbers(relative_rmse="rel. RMSE", relative_bias="rel. bias", p50="", p99="", max="", how=FRACTION)
-_FLICKER = (
-    *numbers("map"),
-    *numbers(texels="texels a frame", how={"digits": 2}),
-    *numbers("flicker", relative_rmse="rel. RMSE", how=FRACTION),
-)
 
 
 @one_error
@@ -158,13 +141,11 @@ def map_size(
     settings: Values = (),
     sizes: Words = "32,64,128,256,512,1024,2048,4096",
     size: Size = (160, 120),
-    flicker: bool = False,
     progress: Progress = None,
 ) -> Study:
-    """Measure error and flicker against the size of the shadow map.
+    """Measure the error against the size of the shadow map.
 
-    Also returns the slope of the relative RMSE, fitted to the logarithms. With `--flicker` the light circles slowly,
-    and the change of the image from frame to frame is measured, less that of the reference.
+    Also returns the slope of the relative RMSE, fitted to the logarithms.
 
     Parameters
     ----------
@@ -181,8 +162,6 @@ def map_size(
         Sizes of the shadow map [texels], with commas.
     size
         Width and height of the image [pixels], or WxH.
-    flicker
-        Also move the light and measure how it flickers.
     progress
         Called with (fraction done, what); True shows a bar.
     """
@@ -204,7 +183,6 @@ def map_size(
 
     largest, apart = checked_configuration(method, kernel, parameters | {"map": texels[-1]})
     activate()
-    moves = {"frames": _FRAMES, "step": _TURN} if flicker else None
     call: Any = _map_study
     if apart:
         from reports.machine.own_process import in_own_process
@@ -214,7 +192,7 @@ def map_size(
     from validation.scenes.registry import FOG_SCENES
 
     names = several(scenes) or list(FOG_SCENES)
-    studied = call(names, pixels, texels, method, name, parameters, moves, progress)
+    studied = call(names, pixels, texels, method, name, parameters, progress)
     shared = tuple(each for each in largest.parameters if each[0] != "map")
     return _map_result(studied, pixels, texels, replace(largest, parameters=shared).label)
 
@@ -226,24 +204,21 @@ def _map_study(
     method: Any,
     kernel: str | None,
     parameters: dict[str, Any],
-    moves: dict[str, Any] | None,
     progress: Progress,
-) -> list[tuple[str, Any, Any]]:
-    """Return of every scene its name, the errors, and the flicker where the light moves."""
+) -> list[tuple[str, Any]]:
+    """Return of every scene its name and the errors by size."""
     from realtime.scene.read_scene import read_scene
     from reports.api.scenes import opened
     from validation.estimates.quadrature import truth_image
     from validation.study.configuration import configuration, prepared
     from validation.study.cost import check_work, frame_work, truth_work
-    from validation.study.maps import map_flicker
     from validation.study.reference import of_image
     from validation.study.run import run
     from validation.study.study import Cell, Measure
 
     loaded = [opened(name, pixels) for name in names]
-    images = 1 + (moves["frames"] if moves else 0)
-    works = [truth_work(pixels, lights=len(each.scene.emitters()), images=images) for each in loaded]
-    works += [frame_work(pixels, frames=images * len(texels)) for _ in loaded]
+    works = [truth_work(pixels, lights=len(each.scene.emitters())) for each in loaded]
+    works += [frame_work(pixels, frames=len(texels)) for _ in loaded]
     check_work(f"map-size, {pixels[0]} x {pixels[1]}", works)
     by_size = [configuration(method, kernel, parameters | {"map": size}) for size in texels]
     for each in loaded:  # refuse unusable scenes, and maps that exceed the memory, before any work
@@ -261,33 +236,24 @@ def _map_study(
                 if row.error is None:
                     raise InputError(f"{each.name}, {chosen.label}: {row.reason}")
                 errors.append(row.error)
-            how: dict[str, Any] = {"about": each.animation.about, "progress": part}
-            moving = map_flicker(each.scene, by_size, **how, **moves) if moves else None
-            studied.append((each.name, errors, moving))
+            studied.append((each.name, errors))
     return studied
 
 
-def _map_result(studied: list[tuple[str, Any, Any]], pixels: Any, texels: list[int], label: str) -> Study:
+def _map_result(studied: list[tuple[str, Any]], pixels: Any, texels: list[int], label: str) -> Study:
     from validation.metrics.errors import plain
     from validation.study.maps import fitted_slope
 
     tables, said, rows, data, drawn = [], [], [], [], []
-    for name, errors, moving in studied:
+    for name, errors in studied:
         title = f"{name}, {pixels[0]} x {pixels[1]}, {label}"
         of_scene = [{"map": size, **vars(metrics)} for size, metrics in zip(texels, errors, strict=True)]
         rows += [{"scene": name, "label": label, **row} for row in of_scene]
         tables.append(table(f"{title}: error", (*numbers("map"), *_SHARES), of_scene))
         order = fitted_slope(texels, [row["relative_rmse"] for row in of_scene])
         said.append(f"{name}: the relative RMSE {_trend(*order)}.")
-        data.append({"name": name, "method": label, "errors": plain(of_scene), "order": plain(order), "flicker": None})
+        data.append({"name": name, "method": label, "errors": plain(of_scene), "order": plain(order)})
         drawn.append((name, [row["relative_rmse"] for row in of_scene], *order))
-        if moving is not None:
-            columns = (moving["texels"], moving["flicker"], moving["relative_rmse"])
-            tables.append(table(f"{title}: flicker of a moving light", _FLICKER, zip(texels, *columns, strict=True)))
-            order = fitted_slope(texels, moving["flicker"])
-            change = number(moving["reference_change"], 2)
-            said.append(f"{name}: the flicker {_trend(*order)}; the reference itself changes by {change}.")
-            data[-1]["flicker"] = plain({**moving, "order": order})
     return Study(
         name="map-size",
         data=with_environment(size=list(pixels), maps=texels, scenes=data),

@@ -18,8 +18,6 @@ STUDIES = {
     "stability": "kernels",
     "integrals": "kernels",
     "polynomials": "series",
-    "convergence": "estimators",
-    "z-distribution": "estimators",
     "noise": "noise",
     "motion": "motion",
     "transmittance": "transmittance",
@@ -49,7 +47,7 @@ def summary(name: str) -> str:
 
 
 def study(name: str, *arguments: Any, **named: Any) -> Any:
-    """Run a study: measurements of methods, kernels and estimators, with tables and a figure.
+    """Run a study: measurements of methods and kernels, with tables and a figure.
 
     `airlight study NAME --help` says what a study takes. It returns rows, tables
     and data; `save`, or -o, writes tables (.csv, .tex, .md), data (.json) or the figure (.pdf, .png).

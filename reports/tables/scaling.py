@@ -5,7 +5,6 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from reports.tables.table import Column, Row, Table, measured, numbers, table, words
-from validation.statistics.noise import other_power
 
 Record = Mapping[str, Any]  #: a result of `airlight study scaling --json`
 
@@ -60,17 +59,6 @@ def same_records(old: Iterable[Record], new: Iterable[Record]) -> list[tuple[Rec
 
     known = {place(record): record for record in old}
     return [(known[place(record)], record) for record in new if place(record) in known]
-
-
-def grown(old: Iterable[Record], new: Iterable[Record]) -> list[str]:
-    """Return a sentence for every time that grows with a higher power of the work than it did."""
-    return [
-        f"{after['scene']}, {after['label']}: {TIMES[name]} grows with the power {own['exponent']:.2g} of the "
-        f"{WORK[after['kind']]}, and did with {before['growth'][name]['exponent']:.2g}"
-        for before, after in same_records(old, new)
-        for name, own in after["growth"].items()
-        if other_power(before["growth"][name], own) > 0
-    ]
 
 
 def _costs(scene: str, kind: str, records: list[Record]) -> Table:

@@ -30,23 +30,10 @@ the error of a frame and falls as 1/N.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from itertools import islice
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import linregress
-
-from analytic.errors import InputError
-from realtime.scene.read_scene import read_scene
-from validation.scenes.animation import animate
-from validation.scenes.registry import Animation
-from validation.study.configuration import Configuration
-from validation.study.motion import light_references, method_frames
-
-Array = NDArray[np.float64]
-Progress = Callable[[int, int, str], None]
 
 
 def fitted_slope(sizes: ArrayLike, errors: ArrayLike) -> tuple[float, float]:
@@ -61,57 +48,3 @@ def fitted_slope(sizes: ArrayLike, errors: ArrayLike) -> tuple[float, float]:
         return math.nan, math.nan
     line = linregress(np.log(n[counts]), np.log(e[counts]))
     return -float(line.slope), float(line.stderr) if counts.sum() > 2 else math.nan
-
-
-def map_flicker(
-    scene,
-    configurations: Sequence[Configuration],
-    *,
-    frames: int = 9,
-    step: float = 1e-3,
-    about: tuple[float, float, float] | None = None,
-    progress: Progress | None = None,
-) -> dict[str, Any]:
-    """Measure the flicker of the airlight under a slowly circling light, for each size of the shadow map.
-
-    The configurations are of one method, each with its parameter `map`, the scene is an `mi.Scene` at its own size.
-    There are at least two frames. From one to the next the light turns by a `step` [rad], rounded to a whole fraction
-    of a turn, on a circle whose axis passes through `about`, (3,) [m], or the middle of the scene. As seen from the
-    light, what stands in the middle of its circle moves by this angle: by `texels` of 2 / size each.
-
-    Returned are `reference_change`, the root mean square of the change of the reference from frame to frame over its
-    mean; `nonfinite`, pixels that are left out because some image has NaN or infinity there; and lists, by
-    configuration: `texels`, by how many a shadow moves from frame to frame, `flicker`, the root mean square of the
-    change of the image less that of the reference, and `relative_rmse` of all frames, both over that mean.
-    """
-    if frames < 2:
-        raise InputError(f"frames: got {frames}, wanted at least 2: flicker is the difference between frames")
-    if not 0 < step < 1:
-        raise InputError(f"step: got {step:g}, wanted an angle above 0 and below 1 [rad]")
-    turn = round(2 * np.pi / step)
-    read, moves = read_scene(scene), Animation(moves=("light",), about=about)
-    places = list(islice(animate(read, moves, turn), frames))
-    total = 1 + len(configurations)
-    if progress is not None:
-        progress(0, total, "quadrature")
-    truth = np.stack(light_references(scene, places, moves))
-    images = []
-    for number, chosen in enumerate(configurations):
-        if progress is not None:
-            progress(1 + number, total, f"{chosen.label}, moving light")
-        images.append(np.stack(method_frames(read, chosen, places)))
-    finite = np.isfinite(np.stack([truth, *images])).all(axis=(0, 1, 4))
-    truth = truth[:, finite]
-    errors = [image[:, finite] - truth for image in images]
-    mean = float(truth.mean())
-    return {
-        "reference_change": _rms(np.diff(truth, axis=0)) / mean,
-        "nonfinite": int(np.sum(~finite)),
-        "texels": [np.pi / turn * float(dict(chosen.parameters)["map"]) for chosen in configurations],
-        "flicker": [_rms(np.diff(error, axis=0)) / mean for error in errors],
-        "relative_rmse": [_rms(error) / mean for error in errors],
-    }
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))

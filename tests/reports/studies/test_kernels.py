@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Studies of kernels, formulas, slabs and estimators: their numbers, their files, what ends with the status 1."""
+"""Studies of kernels, formulas and slabs: their numbers, their files, what ends with the status 1."""
 
 import csv
 import doctest
@@ -154,7 +154,6 @@ QUICK = {
     "polynomials": {},
     "map-size": {"scenes": "omni-box", "size": (16, 12), "sizes": "32,64"},
     "kernels": {"kernel": "taylor", "phase": "isotropic"},
-    "convergence": {},
     "slab": {"tau": 2, "sun": 30, "orders": "1,2", "photons": 50},
 }
 
@@ -165,7 +164,6 @@ QUICK = {
 def test_a_figure_is_drawn_twice_to_the_same_bytes(name, variant, tmp_path, monkeypatch):
     """What is embedded are TrueType fonts, no date."""
     monkeypatch.setattr("validation.kernels.benchmark.RAYS", 3000)
-    monkeypatch.setattr("reports.studies.estimators._SIZE", (32, 24))
     found = airlight.study(name, **QUICK[name])
     first = found.save(tmp_path / "first.pdf", "single").read_bytes()
     assert found.save(tmp_path / "again.pdf", "single").read_bytes() == first
@@ -173,19 +171,3 @@ def test_a_figure_is_drawn_twice_to_the_same_bytes(name, variant, tmp_path, monk
     assert b"/FontFile2" in first
     assert b"/Type3" not in first
     assert b"CreationDate" not in first
-
-
-@pytest.mark.statistical
-def test_z_follows_its_law(variant, monkeypatch):
-    """Counts in bins against Student's law: chi-square; the seeds are fixed, the level is 1 in 10 000."""
-    from scipy.stats import chi2
-
-    monkeypatch.setattr("reports.studies.estimators._Z_SIZE", (32, 24))
-    found = airlight.study("z-distribution")
-    rows = [row for row in found if row["estimator"] == "single-scatter"]
-    count, expected = (np.array([row[name] for row in rows]) for name in ("count", "expected"))
-    assert count.sum() == found.data["estimators"][0]["pixels"]
-    assert expected.sum() == pytest.approx(count.sum(), rel=1e-6)
-    large = expected >= 5
-    count, expected = (np.append(counts[large], counts[~large].sum()) for counts in (count, expected))
-    assert np.sum((count - expected) ** 2 / expected) < chi2.isf(1e-4, len(count) - 1)

@@ -69,25 +69,20 @@ def test_errors_by_cause_are_printed_and_drawn(variant, capfd, tmp_path):
     assert (tmp_path / "parts.png").stat().st_size > 10_000
 
 
-def test_scaling_that_grows_more_steeply_than_before_ends_with_1(variant, capfd, monkeypatch, tmp_path):
-    monkeypatch.setattr("validation.study.growth.study_scaling", lambda *given, **options: [growth_record()])
+def test_scaling_that_jumps_ends_with_1(variant, capfd, monkeypatch):
     monkeypatch.setattr("reports.report.others.scaling_data", lambda name, size, found: found)
-    monkeypatch.setattr("reports.studies.growth._BASELINES", tmp_path)
-    before = tmp_path / "sphere-spot.json"
     arguments = ["scaling", "sphere-spot", "--kinds", "size", "--method", "unshadowed"]
-    for exponent, status in ((0.47, 0), (0.1, 1)):
-        before.write_text(json.dumps({"scaling": [growth_record(exponent=exponent)]}))
-        assert printed(capfd, *arguments, status=status)["scaling"] == [growth_record()]
+    for jump, status in ((False, 0), (True, 1)):
+        found = growth_record(cliff=jump)
+        monkeypatch.setattr("validation.study.growth.study_scaling", lambda *given, found=found, **options: [found])
+        assert printed(capfd, *arguments, status=status)["scaling"] == [found]
 
 
-def test_maps_print_errors_and_flicker_by_size(variant, capfd, monkeypatch):
-    monkeypatch.setattr("reports.studies.growth._FRAMES", 2)
-    arguments = ["map-size", "omni-box", "--size", "16x12", "--sizes", "32,16", "--flicker"]
+def test_maps_print_errors_by_size(variant, capfd):
+    arguments = ["map-size", "omni-box", "--size", "16x12", "--sizes", "32,16"]
     march = ["--method", "ray-march", "--set", "shadow=map", "--set", "steps=16"]
     data = printed(capfd, *arguments, *march)
     (scene,) = data["scenes"]
     assert (scene["name"], scene["method"]) == ("omni-box", "ray-march (shadow=map, steps=16)")
     assert data["maps"] == [metrics["map"] for metrics in scene["errors"]] == [16, 32]
     assert all(metrics["relative_rmse"] > 0 for metrics in scene["errors"])
-    assert all(value > 0 for value in scene["flicker"]["flicker"])
-    assert scene["flicker"]["reference_change"] > 0

@@ -4,7 +4,7 @@
 import pytest
 
 from reports.tables.agreement import verdict
-from reports.tables.scaling import cliffs, grown, scaling_tables
+from reports.tables.scaling import cliffs, scaling_tables
 from tests.helpers.reports import agreement, growth_record
 
 
@@ -23,13 +23,9 @@ def test_a_truth_is_confirmed_refused_or_not_decided(equivalent, interval, finis
     assert verdict(compared) is good
 
 
-def test_jumps_and_higher_powers_than_before_are_found():
+def test_jumps_are_found():
     calm, jump = growth_record(), growth_record(cliff=True)
     assert len(cliffs([jump, calm])) == 1
-    assert grown([calm], [growth_record(exponent=0.66)]) == []
-    assert len(grown([calm], [growth_record(exponent=0.69)])) == 3  # one for each time
-    assert grown([calm], [growth_record(exponent=0.1)]) == []  # that is better
-    assert grown([calm], [growth_record(exponent=0.9, size=(160, 120))]) == []  # another image
     costs, exponents = scaling_tables([growth_record(works=(), refused="method x: no")])
     assert costs.rows[0].reason == "refused: method x: no"
     assert exponents.rows == ()

@@ -7,15 +7,16 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
 from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import spot, tiny_scene
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import error_metrics
+from validation.scenes.registry import Animation
 from validation.study.configuration import configuration, prepared
 from validation.study.decompose import decompose
-from validation.study.maps import fitted_slope, map_flicker
+from validation.study.maps import fitted_slope
+from validation.study.motion import method_motion
 
 # Steps enough that halving them changes no error below by more than 2 %.
 MARCH = {"steps": 1000, "shadow": "map"}
@@ -57,19 +58,10 @@ def test_flicker_of_fractions_of_a_texel_is_of_order_one_half(variant, lamp):
     """A share of the edges jumps a frame: the fits of three steps and two lights scatter by 0.06 about 0.5."""
     scene = small_scene(**({"lamp": spot()} if lamp == "spot" else {}))
     sizes = (32, 64, 128, 256)
-    found = map_flicker(scene, marches(*sizes), frames=17, step=2e-3)
-    assert found["texels"] == pytest.approx([2e-3 * size / 2 for size in sizes], rel=1e-3)
-    assert max(found["texels"]) < 0.3
-    assert fitted_slope(sizes, found["flicker"])[0] == pytest.approx(0.5, abs=0.2)
-    assert found["nonfinite"] == 0
-
-
-def test_what_cannot_be_studied_is_refused(variant):
-    scene = small_scene()
-    with pytest.raises(InputError, match="frames: got 1, wanted at least 2"):
-        map_flicker(scene, marches(32), frames=1)
-    with pytest.raises(InputError, match="step: got 0, wanted an angle above 0"):
-        map_flicker(scene, marches(32), step=0.0)
+    turn = round(2 * np.pi / 2e-3)  # so that a shadow moves by 0.03 to 0.26 texels a frame
+    found = method_motion(scene, Animation(), marches(*sizes), frames=17, turn=turn)
+    assert fitted_slope(sizes, [row["flicker"] for row in found])[0] == pytest.approx(0.5, abs=0.2)
+    assert all(row["nonfinite"] == 0 for row in found)
 
 
 def split(method, kernel=None, *, size=(24, 20), render=None, **parameters):
