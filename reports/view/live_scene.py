@@ -18,11 +18,14 @@ from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
 from realtime.frame.incremental import FrameCache, next_frame
 from realtime.frame.renderer import Frame, FrameRenderer, image_frame
+from realtime.methods.registry import find_method
+from realtime.methods.shader.method import Shader
+from realtime.parameters import defaults
 from realtime.scene.read_scene import read_again, read_scene
 from reports.view.stages import timed_stages
 from validation.scenes.changes import Values, change_scene, changeable, isotropic_media
 from validation.scenes.loading import load_scene
-from validation.study.configuration import Configuration, prepared
+from validation.study.configuration import Configuration, configuration, prepared
 
 _KEPT = 6  # configurations of which the recorded functions are kept
 
@@ -88,6 +91,22 @@ class LiveScene:
         self._other_method |= renderer is not self.renderer
         self.renderer = renderer
         return 1e3 * (time.perf_counter() - begin)
+
+    def shader_stamp(self) -> tuple[Any, ...]:
+        """Return what tells the files of the shader that is shown from what they were; nothing of another method."""
+        files = self.renderer.method.shader.files if isinstance(self.renderer.method, Shader) else ()
+        return tuple((str(file), file.stat().st_mtime_ns) for file in files if file.is_file())
+
+    def read_shader(self) -> None:
+        """Render by the shader as it is in its file now; if that is at fault, all is as it was."""
+        known = defaults(find_method(self.chosen.method))
+        given = {name: value for name, value in self.chosen.parameters if name in known}
+        chosen = configuration(self.chosen.method, None, given)
+        made = prepared(self.scene, chosen)
+        self.chosen, self.renderer, self._other_method = chosen, made, True
+        for key in [key for key in self._renderers if key[0].method == chosen.method]:
+            del self._renderers[key]
+        self._renderers[chosen, self.scene.features] = made
 
     def change(self, changes: Mapping[str, Values]) -> None:
         """Change the scene; names that are not given are as they were. If scene or method refuse, all is as it was."""

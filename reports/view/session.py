@@ -44,6 +44,7 @@ _STILL = 0.4  # after so long the reference is begun [s]
 _NEWS = 0.4  # between two pictures of what is known of the reference [s]
 _BY_STAGE = 8  # of so many frames one is timed by stage
 _STOPS = 20.0  # of exposure, brighter or darker
+_LOOKS = 0.3  # between two looks at the files of a shader [s]
 _GOES_ON = 64  # frames drawn of a still scene where each builds on the last
 
 
@@ -69,6 +70,7 @@ class Session:
         self._told = self._news_at = 0.0
         self._reference_of: Any = None
         self._news = False
+        self._shader = self.live.shader_stamp()
 
     # What the server's threads call -----------------------------------------------------------------------------------
 
@@ -120,6 +122,7 @@ class Session:
                 self.reference.stop()
             return
         self._take(page, said)
+        self._follow_shader(page)
         if self._can_draw():
             self._draw(page)
         self._after(page)
@@ -133,7 +136,7 @@ class Session:
         if self._page is None:
             return 60.0
         now = time.perf_counter()
-        waits = [60.0]
+        waits = [_LOOKS if self._shader else 60.0]
         if self._told < self._changed_at:
             waits.append(self._changed_at + _QUIET - now)
         # Without a frame no reference begins, and without a reference there is no news to wait for.
@@ -177,6 +180,14 @@ class Session:
                 self.reference.stop()
             self._news = True
         self._touch()
+
+    def _follow_shader(self, page: Page) -> None:
+        """Read the shader that is shown again where one of its files has changed; a mistake leaves the picture."""
+        now = self.live.shader_stamp()
+        changed, self._shader = bool(now) and bool(self._shader) and now != self._shader, now or self._shader
+        if changed:
+            self._try(page, self.live.read_shader, of_scene=False)
+            self._tell_state(page)
 
     def _touch(self) -> None:
         self._changed_at = time.perf_counter()

@@ -18,6 +18,7 @@ from reports.view.reference_order import KnownReference
 from reports.view.reference_process import Task, answers
 from reports.view.session import Session
 from reports.view.state import ViewState
+from tests.helpers.shaders import need_opengl
 from validation.study.configuration import configuration
 
 SIZE = (20, 15)
@@ -198,6 +199,27 @@ def test_a_page_chooses_no_code_to_run(view, tmp_path, monkeypatch):
         turns(session, lambda: any(said["kind"] == "mistake" and said["message"] for said in page.said))
         assert not (tmp_path / "ran").exists()
     assert session._state().chosen == configuration("unshadowed")
+
+
+def test_a_shader_is_read_again_when_its_file_changes_and_a_mistake_leaves_the_picture(view, tmp_path):
+    need_opengl()
+    shader = tmp_path / "fog.glsl"
+    text = "#pragma airlight set GAIN 2.0\nvec3 airlight(Ray ray) { return vec3(GAIN * 0.1 * BRIGHT); }\n"
+    shader.write_text(text.replace("BRIGHT", "1.0"))
+    session, page = opened(method=str(shader), GAIN=3.0)
+
+    def write(bright):
+        page.said.clear()
+        drawn = len(page.frames)
+        shader.write_text(text.replace("BRIGHT", bright))
+        turns(session, lambda: any(said["kind"] == "mistake" for said in page.said) and len(page.frames) > drawn, 60)
+        return page.last("mistake")["message"], session.live.on_host(session._shown).airlight[0, 0, 0]
+
+    assert write("nowhere") == (
+        f"method {shader}: fog.glsl, line 2: `nowhere' undeclared: {text.splitlines()[1]}".replace("BRIGHT", "nowhere"),
+        pytest.approx(0.3),
+    )
+    assert write("2.0") == ("", pytest.approx(0.6))
 
 
 def test_another_tab_takes_over_and_the_first_is_told(view):
