@@ -6,6 +6,7 @@ import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import types
@@ -17,6 +18,7 @@ import pytest
 
 from reports.commands.main import run
 from tests.helpers.scenes import tiny_scene
+from tests.helpers.shaders import need_opengl
 from validation.study.configuration import configuration
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -73,6 +75,8 @@ def test_a_method_and_an_image_are_validated_as_the_page_says(variant, tmp_path,
     def methods_of(folder):
         return json.loads((tmp_path / folder / "report.json").read_text(encoding="utf-8"))["scenes"][0]["methods"]
 
+    need_opengl()
+    shutil.copy(DOCS / "examples" / "marcher.glsl", tmp_path / "fog.glsl")
     (tmp_path / "fog.py").write_text(blocks(page, "python")[0], encoding="utf-8")
     run_commands(page, capfd)
     assert (tmp_path / "validation/frame-speed.pdf").stat().st_size > 1000
@@ -80,6 +84,9 @@ def test_a_method_and_an_image_are_validated_as_the_page_says(variant, tmp_path,
     (marched,) = (entry for entry in methods_of("validation") if entry["label"].startswith("fog.py:marched"))
     assert marched["times"]["frame"]["median_ms"] > 0
     assert marched["error"]["relative_rmse"] > 0
+    (shader,) = (entry for entry in methods_of("shader") if entry["method"] == "fog.glsl")
+    assert shader["device"]
+    assert shader["error"]["relative_rmse"] < 0.05
     measured = methods_of("engine")
     (image,) = (entry for entry in measured if entry["kind"] == "image")
     assert image["error"]["relative_rmse"] > 0
