@@ -22,7 +22,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from reference.monte_carlo.single_scatter.area_estimate import area_airlight, area_surface
+from reference.monte_carlo.single_scatter.area_estimate import area_airlight, area_leg, area_surface
 from reference.monte_carlo.single_scatter.boundary_walk import (
     Leg,
     coefficients,
@@ -222,8 +222,12 @@ def _surface(task: Task, sampler, ray: Ray, hit, stretch: Stretch, active):
 
         sent = mean_over_directions(emitter, sampler, task.samples, active, sent_by)
         total += dr.select(active, sent * dr.exp(-camera_leg), 0)
+
+    def left(begin, from_light, r):
+        return area_leg(task, ray, begin, from_light, r, stretch=stretch, active=active) * dr.exp(-camera_leg)
+
     for extended in task.area:
-        total += area_surface(task, extended, sampler, hit, stretch, ray=ray, active=active)
+        total += area_surface(extended, sampler, task.samples, hit, left=left, active=active)
     return total
 
 

@@ -12,9 +12,11 @@ and (1 - e^-u)/u.)
 
 A free flight has the density sigma exp(-tau)/(1 - exp(-tau_end)): tau is inverted by bisection. Under a sun every
 distance is one: the estimate is the transmittance of its path, and bounded. Under a light at a place one half of the
-samples are equi-angular (`reference.monte_carlo.single_scatter.distance_sampling`).
+samples are equi-angular (`reference.monte_carlo.single_scatter.distance_sampling`). A light with extent has a point of
+its own for each sample (`reference.monte_carlo.single_scatter.area_sampling`).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +24,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from reference.monte_carlo.single_scatter.area_estimate import area_surface, before_plane, path_begin, place_of
+from reference.monte_carlo.single_scatter.area_sampling import AreaLight, sample_point
 from reference.monte_carlo.single_scatter.boundary_walk import Leg, Surroundings, transmittance
 from reference.monte_carlo.single_scatter.directional_sampling import drawn, mean_over_directions
 from reference.monte_carlo.single_scatter.distance_sampling import (
@@ -138,7 +142,10 @@ def height_fog_light(task: Any, sampler, ray: Ray, medium, active) -> tuple[Any,
         last = dr.select(hit.is_valid(), dr.minimum(last, mi.Float64(hit.t)), last)
     way = _Way(ray, start, rise, first, last)
     for light in task.lights:
-        airlight += _light_airlight(task, light, sampler, way, medium, active)
+        airlight += _local_airlight(task, sampler, way, medium, active, _of_light(light, ray.direction_double))
+    for light in task.area:
+        source = _of_area(light, ray, sampler.next_2d(active))
+        airlight += _local_airlight(task, sampler, way, medium, active, source)
     for emitter in task.far:
         airlight += _sun_airlight(task, emitter, sampler, way, medium, active)
     if hit is not None:
@@ -182,42 +189,84 @@ def _sun_airlight(task: Any, emitter, sampler, way: _Way, medium, active):
     return dr.while_loop(state, lambda index, *_: index < task.samples, add_sample, label="distances")[1]
 
 
-def _light_airlight(task: Any, light, sampler, way: _Way, medium, active):
+@dataclass(frozen=True)
+class _Source:
+    """A light at a place, or a point of a light with extent."""
+
+    position: Any  #: of double precision [m]
+    begin: Any  #: where its paths begin [m]
+    ends: tuple[Any, Any]  #: of the part of the line that it could light, from the foot [m]
+    sent: Callable[[Any, Any], Any]  #: to points, in directions from it: its intensity, over the density of the point
+    counts: Any = True  #: where it was sampled
+
+
+def _of_light(light, direction) -> Callable[[Any, Any], _Source]:
+    """Return the source of a point or spot light."""
+
+    def source(index, approach_to):
+        ends = -dr.inf, dr.inf
+        if light.axis is not None:
+            ends = cone_ends(approach_to(light.position), direction, axis=light.axis, cutoff=light.cutoff)
+        return _Source(light.position, mi.Point3f(light.position), ends, lambda at, _: intensity(light, at, True))
+
+    return source
+
+
+def _of_area(light: AreaLight, ray: Ray, start) -> Callable[[Any, Any], _Source]:
+    """Return the sources of a light with extent, a point for each sample."""
+
+    def source(index, approach_to):
+        point = sample_point(*place_of(index, start), light, origin=ray.origin_double, direction=ray.direction_double)
+
+        def sent(at, from_light):
+            cosine = dr.maximum(dr.dot(mi.Vector3f(point.normal), from_light), 0)
+            return light.radiance * (cosine / mi.Float(point.density))
+
+        ends = before_plane(point, ray, approach_to(point.position).foot)
+        return _Source(point.position, path_begin(point), ends, sent, point.density > 0)
+
+    return source
+
+
+def _local_airlight(task: Any, sampler, way: _Way, medium, active, source: Callable[[Any, Any], _Source]):
+    """Estimate what lights at places send."""
     fog, ray = task.fog, way.ray
-    approach = closest_approach(ray.origin_double, ray.direction_double, light.position)
-    low, high = way.first, way.last
-    if light.axis is not None:
-        cone = cone_ends(approach, ray.direction_double, axis=light.axis, cutoff=light.cutoff)
-        low, high = dr.maximum(low, approach.foot + cone[0]), dr.minimum(high, approach.foot + cone[1])
-    active = active & (high > low)
-    low, high = dr.select(active, low, 0), dr.select(active, high, 1)
-    span = Span(approach.height, low - approach.foot, high - low)
-    angle = equi_angular_range(span)
-    height, normal = mi.Float(approach.height), mi.Vector3f(approach.normal)
-    position, at_light = mi.Point3f(light.position), fog.height(light.position)
     shift = sampler.next_1d(active)
+
+    def approach_to(position):
+        return closest_approach(ray.origin_double, ray.direction_double, position)
 
     def add_sample(index, total, sampler):
         cell, width = cell_of(index, shift, task.samples)
         u = cell + width * sampler.next_1d(active)
         own, flies = dr.select(u < 0.5, 2 * u, 2 * u - 1), u >= 0.5
+        lamp = source(index, approach_to)
+        approach = approach_to(lamp.position)
+        low, high = (approach.foot + end for end in lamp.ends)
+        low, high = dr.maximum(way.first, low), dr.minimum(way.last, high)
+        used = active & (high > low) & lamp.counts
+        low, high = dr.select(used, low, 0), dr.select(used, high, 1)
+        span = Span(approach.height, low - approach.foot, high - low)
         flown, arrived = _flight(fog, way, own, low, high)
         x = dr.select(flies, flown, low + equi_angular(mi.Float64(own), span))
         s = x - approach.foot
         square = approach.height * approach.height + s * s
         kept = dr.exp(-way.depth(fog, x))
         r = dr.sqrt(square)
-        from_light = (normal * height + ray.direction * mi.Float(s)) / mi.Float(r)
-        point = point_on(ray, position + from_light * mi.Float(r))
-        sigma_s, _, sigma_t = medium.get_scattering_coefficients(point, active)
+        from_light = (
+            mi.Vector3f(approach.normal) * mi.Float(approach.height) + ray.direction * mi.Float(s)
+        ) / mi.Float(r)
+        point = point_on(ray, mi.Point3f(lamp.position) + from_light * mi.Float(r))
+        sigma_s, _, sigma_t = medium.get_scattering_coefficients(point, used)
         flights = dr.select(arrived > 0, mi.Float64(sigma_t[0]) * kept / arrived, 0)
-        density = 0.5 * (flights + approach.height / (angle * square))
-        phase, _ = medium.phase_function().eval_pdf(mi.PhaseFunctionContext(), point, -from_light, active)
-        depth = fog.depth(way.start + way.rise * x, at_light, r)
-        seen = lit(task.around, position, from_light, mi.Float(r), active)
-        value = sigma_s * phase * intensity(light, point, active) * seen
+        density = 0.5 * (flights + approach.height / (equi_angular_range(span) * square))
+        phase, _ = medium.phase_function().eval_pdf(mi.PhaseFunctionContext(), point, -from_light, used)
+        depth = fog.depth(way.start + way.rise * x, fog.height(lamp.position), r)
+        path = point.p - lamp.begin
+        seen = lit(task.around, lamp.begin, dr.normalize(path), dr.norm(path), used)
+        value = sigma_s * phase * lamp.sent(point, from_light) * seen
         value *= mi.Float(kept * dr.exp(-depth) / (square * density)) * width
-        return index + 1, total + dr.select(active & (density > 0), value, 0), sampler
+        return index + 1, total + dr.select(used & (density > 0), value, 0), sampler
 
     state = (mi.UInt32(0), dr.zeros(mi.Spectrum, dr.width(active)), sampler)
     return dr.while_loop(state, lambda index, *_: index < task.samples, add_sample, label="distances")[1]
@@ -247,6 +296,13 @@ def _surface(task: Any, sampler, way: _Way, hit, active):
             return material * irradiance * seen * mi.Float(dr.exp(-depth))
 
         total += dr.select(active, mean_over_directions(emitter, sampler, task.samples, active, sent_by), 0)
+
+    def left(begin, from_light, r):
+        depth = camera + fog.depth(at_hit, fog.height(begin), mi.Float64(r))
+        return lit(task.around, begin, from_light, r, active) * mi.Float(dr.exp(-depth))
+
+    for light in task.area:
+        total += area_surface(light, sampler, task.samples, hit, left=left, active=active)
     return total
 
 

@@ -64,17 +64,7 @@ def read_task(scene, medium, samples: int) -> Task:
     own = medium if isinstance(medium, mi.Medium) else None
     fog, majorant = read_height_density(own) if own else None, read_majorant(own) if own else 0.0
     if fog is not None or majorant:
-        if area:
-            raise InputError(
-                "single-scatter: the scene has area lights in height fog or a density grid; wanted point, spot and "
-                "directional lights: take the estimator volpath"
-            )
-        if majorant and any(map(is_sky, far)):
-            raise InputError(
-                "single-scatter: the scene has a sky around a density grid; wanted point, spot and directional lights: "
-                "take the estimator volpath"
-            )
-        return Task(around, lights, far, samples, grey=True, fog=fog, majorant=majorant)
+        return Task(around, lights, far, samples, grey=True, area=area, fog=fog, majorant=majorant)
     if isinstance(medium, mi.Medium):
         require_homogeneous(medium)
         media = [*media, medium]
