@@ -47,7 +47,7 @@ def scene_notes(scene, *, clouds: bool = True) -> list[str]:
     notes = [f"the scene has {cameras} cameras: the first is used, the others are left out"] if cameras > 1 else []
     notes += [
         f"light '{emitter.id()}' around the scene is seen behind it; light of it that is scattered is left out"
-        + (" by methods: references have it" if emitter.class_name() == "ConstantBackgroundEmitter" else "")
+        + " by methods: references and fog colours have it" * (emitter.class_name() == "ConstantBackgroundEmitter")
         for emitter in backgrounds(scene, clouds=clouds)
     ]
     return notes

@@ -49,6 +49,7 @@ class Scene:
     facets: Facets | None = None  #: the triangles, where a table says all that shading needs
     positions: Mapping[str, Any] = field(default_factory=dict)  #: vertices of shapes that moved, by name [m]
     area_lights: tuple[AreaLight, ...] = ()  #: those with extent, of which methods render points
+    sky: Any = None  #: radiance of a uniform sky behind fog, RGB [W/(m^2 sr)]: closed forms of shading show its light
     boundaries: tuple[Any, ...] = ()  #: Mitsuba's shapes around bounded media, in the order of `Medium.clouds`
 
 
@@ -120,6 +121,7 @@ def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
         "lights": lights,
         "features": _scene_features(scene, bodies, lights, area_lights),
         "area_lights": area_lights,
+        "sky": _sky_behind(behind, types),
         "boundaries": tuple(boundaries),
     }
     return parts, opaque
@@ -233,6 +235,15 @@ def _read_sky(emitter, bodies: _Bodies, up: NDArray[np.float64], types: ArrayTyp
     arrays |= bodies.beam(-up, types)
     dr.make_opaque(*arrays.values())
     return Light(**arrays)
+
+
+def _sky_behind(behind: list[Any], types: ArrayTypes):
+    """Return the radiance of a uniform sky that lights no clouds, 0 without one."""
+    skies = [mi.traverse(emitter) for emitter in behind if emitter.class_name() == "ConstantBackgroundEmitter"]
+    given = skies[0]["radiance.value"] if skies and "radiance.value" in skies[0] else 0.0
+    radiance = types.color(*(float(c) for c in _read_colour(given, "the constant emitter's radiance", "W/(m^2 sr)")))
+    dr.make_opaque(radiance)
+    return radiance
 
 
 def _upwards(scene, camera: Camera) -> NDArray[np.float64]:
