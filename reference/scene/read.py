@@ -19,7 +19,7 @@ from analytic.phase import PhaseFunction
 from reference.scene.area_light import TruthAreaLight, is_area, read_area_light
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from reference.scene.convex_bounds import Bounds, holds, in_surface, overlap, read_bounds
-from reference.scene.density_grid import is_grid, read_grid
+from reference.scene.density_grid import GridMedium, is_grid, read_grid
 from reference.scene.directional_light import (
     DirectionalLight,
     endless_medium,
@@ -32,6 +32,7 @@ from reference.scene.varying import NO_EXTINCTION, VaryingMedium
 
 Array = NDArray[np.float64]
 
+_SHAPE_MARGIN = 1e-5  # of the side of a grid, by which a shape around it may be rounded
 _AROUND = ("ConstantBackgroundEmitter", "EnvironmentMapEmitter")
 
 
@@ -126,9 +127,10 @@ def read_truth(scene) -> TruthScene:
     origin = camera_matrix(sensor)[:3, 3]
     area = tuple(read_area_light(emitter, origin) for emitter in wide)
     opaque, boundaries = sorted_shapes(scene)
-    media = tuple(_read_bounded(shape) for shape in boundaries)
+    grid = _grid_in_a_shape(sensor, boundaries, origin)
+    media = () if grid else tuple(_read_bounded(shape) for shape in boundaries)
     _check_disjoint(media)
-    medium = _read_ambient(sensor, origin, media, boundaries)
+    medium = grid or _read_ambient(sensor, origin, media, boundaries)
     suns = tuple(read_directional(emitter) for emitter in far)
     for emitter, sun in zip(far, suns, strict=True):
         if isinstance(medium, TruthMedium) and np.any(medium.sigma_t > 0):
@@ -296,6 +298,29 @@ def _read_ambient(
     return CLEAR_AIR
 
 
+def _grid_in_a_shape(sensor, boundaries: list[Any], origin: Array) -> GridMedium | None:
+    """Return a density grid in clear air whose only boundary holds its whole box, which then bounds nothing."""
+    shape = boundaries[0] if len(boundaries) == 1 else None
+    if shape is None or shape.exterior_medium() is not None or not is_grid(shape.interior_medium()):
+        return None
+    own, inside = sensor.get_medium(), shape.interior_medium()
+    grid = read_grid(inside, *read_scattering(inside))
+    low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (shape.bbox().min, shape.bbox().max))
+    margin = _SHAPE_MARGIN * (grid.high - grid.low)
+    if np.any(low > grid.low + margin) or np.any(high < grid.high - margin):
+        return None
+    bounds, middle = read_bounds(shape), 0.5 * (grid.low + grid.high)
+    corners = np.array(np.meshgrid(*zip(grid.low, grid.high, strict=True))).reshape(3, 8).T
+    if not all(holds(bounds, middle + (1 - 2 * _SHAPE_MARGIN) * (corner - middle)) for corner in corners):
+        return None
+    if own not in ((inside,) if holds(bounds, origin) else (None, inside)):
+        raise InputError(
+            f"the camera references another medium than that of shape '{shape.id()}', a density grid, or is in the "
+            "shape and references none; wanted that medium"
+        )
+    return grid
+
+
 def _read_bounded(shape) -> BoundedMedium:
     inside = read_medium(shape.interior_medium(), f"the medium of shape '{shape.id()}'")
     return BoundedMedium(
@@ -309,8 +334,8 @@ def read_medium(medium, name: str) -> TruthMedium:
         raise InputError(f"{name} is height fog, which has no sides; wanted it in the sensor, and no shape around it")
     if not medium.is_homogeneous():
         raise InputError(
-            f"{name} is heterogeneous; wanted a medium of type 'homogeneous', or a density grid in the sensor, and no "
-            "shape around it"
+            f"{name} is heterogeneous; wanted a medium of type 'homogeneous', or a density grid in the sensor, or one "
+            "in clear air in a convex shape that holds its whole box"
         )
     parameters = mi.traverse(medium)
     _require_constant(parameters, "sigma_t", name)

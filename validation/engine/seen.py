@@ -13,6 +13,7 @@ from scipy.ndimage import binary_dilation
 from analytic.errors import InputError
 from reference.quadrature.emission import emitted_light
 from reference.quadrature.surface import surface_hits
+from reference.scene.density_grid import GridMedium
 from reference.scene.read import TruthLight, TruthScene, read_truth
 from reference.storage.exr import TOTAL, Image
 from validation.engine.judged_layer import AIRLIGHT, SURFACE, JudgedLayer, judged_layer
@@ -105,6 +106,11 @@ def seen_image(
             f"the mask is {shape} pixels, the image {judged.size[0]} x {judged.size[1]}; wanted one of the image's size"
         )
     truth = read_truth(scene)
+    if isinstance(truth.medium, GridMedium):
+        raise InputError(
+            "the medium is a density grid, whose images fits and diagnoses do not predict; wanted homogeneous media or "
+            "height fog: compare with the reference alone, without --fit and --diagnose"
+        )
     if truth.sky is not None:
         raise InputError(
             f"light '{truth.background.id()}' is a sky, whose light fits and diagnoses do not know; wanted lights of "

@@ -116,6 +116,27 @@ def test_a_constant_grid_is_homogeneous_fog(truth, tmp_path):
         np.testing.assert_allclose(found, known, rtol=1e-5, atol=1e-6 * known.mean())
 
 
+@pytest.mark.claim("density-grid-reference", tolerance="none: the same numbers")
+@pytest.mark.parametrize("size", [1.0, 1.3])
+def test_a_shape_that_holds_the_box_bounds_nothing(truth, tmp_path, size):
+    plain = truth(LAMP, SUN)
+    half, corner = (", ".join(map(str, each)) for each in (0.5 * size * (HIGH - LOW), 0.5 * (HIGH + LOW)))
+    cube = f"""<shape type="cube" id="box"><bsdf type="null"/><ref name="interior" id="smoke"/>
+        <transform name="to_world"><scale value="{half}"/><translate value="{corner}"/></transform></shape></scene>"""
+    path = tmp_path / "grid.xml"
+    text = path.read_text().replace('<ref id="smoke" name="medium"/>', "")
+    path.write_text(text.replace("</scene>", cube))
+    held = read_truth(load_scene(str(path)).scene)
+    np.testing.assert_array_equal(held.medium.values, plain.medium.values)
+    np.testing.assert_array_equal(held.medium.low, plain.medium.low)
+    assert not held.media
+    assert len(held.occluders.shapes()) == len(plain.occluders.shapes())
+    small = cube.replace(half, ", ".join(map(str, 0.4 * (HIGH - LOW))))
+    path.write_text(text.replace("</scene>", small))
+    with pytest.raises(InputError, match="a convex shape that holds its whole box"):
+        read_truth(load_scene(str(path)).scene)
+
+
 @pytest.mark.claim("density-grid-reference", tolerance="1e-12 relative: rounding")
 def test_a_linear_function_of_height_has_no_error_of_interpolation(truth):
     count = 8
