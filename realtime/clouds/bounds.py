@@ -28,8 +28,7 @@ import numpy as np
 from realtime.numerics.array_types import Metres, PerRay, aligned_array, chosen_value, four_numbers
 from realtime.scene.closed_mesh import shape_number
 from realtime.scene.media.bounded import Clouds
-from realtime.scene.mesh_adjacency import mesh_triangles
-from realtime.scene.named_shapes import scene_of
+from realtime.scene.mesh_adjacency import mesh_triangles, scene_of
 from realtime.scene.read_scene import Scene
 
 

@@ -65,7 +65,7 @@ from realtime.numerics.array_types import types_of
 from realtime.numerics.recorded import Frozen
 from realtime.parameters import parameter
 from realtime.scene.media.bounded import Clouds
-from realtime.scene.named_shapes import scene_of
+from realtime.scene.mesh_adjacency import scene_of
 from realtime.scene.read_scene import Scene
 from realtime.shadow_maps.shadow_map import map_size
 

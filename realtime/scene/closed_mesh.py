@@ -22,7 +22,7 @@ from scipy.sparse.csgraph import connected_components
 
 from realtime.errors import InputError
 from realtime.numerics.array_types import aligned_array
-from realtime.scene.named_shapes import scene_of
+from realtime.scene.mesh_adjacency import scene_of
 
 Array = NDArray[np.float64]
 

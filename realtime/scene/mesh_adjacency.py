@@ -277,3 +277,13 @@ def _connected_components(triangles, edges, entries):
     closed = np.ones(components, dtype=bool)
     closed[component[left[~both | same_way]]] = False
     return component, closed
+
+
+def scene_of(shapes: Sequence[Any], others: dict[str, Any] | None = None) -> Any:
+    """Return a Mitsuba scene of shapes, all of which keep their names; `others` is what else is in its dictionary."""
+    names = [shape.id() for shape in shapes]
+    parts = {f"shape-{number}": shape for number, shape in enumerate(shapes)}
+    scene = mi.load_dict({"type": "scene"} | (others or {}) | parts)
+    for shape, name in zip(shapes, names, strict=True):
+        shape.set_id(name)
+    return scene

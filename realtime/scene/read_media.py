@@ -34,7 +34,7 @@ from realtime.scene.media.height_fog import HeightFog, Layer
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.media.light_paths import BoundedMedium
 from realtime.scene.media.medium import Medium
-from realtime.scene.named_shapes import scene_of
+from realtime.scene.mesh_adjacency import scene_of
 from realtime.scene.phase import HenyeyGreenstein, Isotropic, Phase, named_phase, tabulated
 
 _PHASES = {

@@ -14,7 +14,6 @@ Read in this order:
 - `fields.py`: what every medium answers, the door for new ones;
 - `light_airlight.py`: the airlight of one point, spot or directional light;
 - `surface.py`: the lit surface behind the medium;
-- `ahead.py`: work that threads do ahead of what needs it;
 - `replicates.py`: how many samples a ray needs, and means whose intervals hold;
 - `mesh_choice.py`: which triangles of a mesh of light samples lie on;
 - `light_samples.py`: samples of area lights for a ray or a surface point;

@@ -17,15 +17,18 @@ f cos_s by Mitsuba's `BSDF.eval`. Of a flat light V is exact along sections, fro
 gets: eight independent scramblings each give a mean, and their spread the standard error.
 """
 
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from itertools import islice
+from typing import Any, TypeVar
 
 import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.ahead import done_ahead
 from reference.quadrature.fields import field_of, optical_depth
 from reference.quadrature.light_airlight import worth_of_doubt
 from reference.quadrature.light_samples import Sections, samples_for_rays, sections_for_points
@@ -281,3 +284,29 @@ def seen_samples(
     lit = lit_intervals(rays, (0 * length, length), known, of=of, checks=0)
     of_length = length[lit.ray]
     return sections.drawn(replace(lit, low=lit.low / of_length, high=lit.high / of_length), uniform)
+
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+
+def done_ahead(work: Callable[[Task], Result], tasks: Iterable[Task], *, workers: int) -> Iterator[Result]:
+    """Yield the results of some work in the order of its tasks, while threads do those that follow.
+
+    NumPy works on one processor, and lets go of Python's lock while it does. What calls Dr.Jit stays with the caller:
+    that has threads of its own.
+
+    `work`: a function of one task that calls NumPy alone; `tasks`: in order; they are made by the caller's thread;
+    `workers`: threads; as many results and one more are kept at once. Raises what the work raises, when its
+    result is due; the tasks behind it are not begun.
+    """
+    remaining = iter(tasks)
+    with ThreadPoolExecutor(max(1, workers)) as pool:
+        waiting: deque[Future[Any]] = deque(pool.submit(work, task) for task in islice(remaining, workers + 1))
+        try:
+            while waiting:
+                result = waiting.popleft().result()
+                waiting.extend(pool.submit(work, task) for task in islice(remaining, 1))
+                yield result
+        finally:  # also where the caller stops, or is stopped
+            pool.shutdown(wait=False, cancel_futures=True)

@@ -3,8 +3,7 @@
 
 import sys
 
-from reports.machine.signals import default_signals
-from reports.machine.streams import usable_streams
+from reports.machine.process_start import default_signals, usable_streams
 
 
 def main() -> None:

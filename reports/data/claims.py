@@ -18,7 +18,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from reports.tables.agreement import verdict, worst_interval
-from reports.tables.peers import published_as
+from reports.tables.methods import published_as
 from reports.tables.scaling import WORK, cliffs
 
 Claim = dict[str, Any]

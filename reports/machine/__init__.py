@@ -3,8 +3,7 @@
 
 Read in this order:
 
-- `signals.py`: Ctrl-C and SIGTERM end a process at once
-- `streams.py`: standard streams that can be written
+- `process_start.py`: Ctrl-C and SIGTERM end a process at once; its standard streams can be written
 - `progress.py`: progress bars with the time left
 - `llvm.py`: finds a libLLVM that works
 - `quick_compilation.py`: a hack, kernels that compile quickly and run slowly

@@ -25,8 +25,6 @@ from realtime.methods.shader.client import LIMIT_VARIABLE, method_limit
 from reports.machine import quick_compilation
 from reports.machine.environment import child_environment
 
-_POSIX = os.name == "posix"
-
 
 class EndedError(InputError):
     """The process ended without an answer, or not in time."""
@@ -54,7 +52,7 @@ def in_own_process(
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         env=child_environment() | (quick_compilation.settings() if quick else {}),
-        start_new_session=_POSIX,
+        start_new_session=True,
     ) as process:
         try:
             answer, _ = process.communicate(
@@ -81,10 +79,8 @@ def in_own_process(
 def _end(process: subprocess.Popen) -> None:
     """End a process and all that it started."""
     process.kill()
-    if _POSIX:
-        # macOS denies it for a group of which only a zombie is left.
-        with suppress(ProcessLookupError, PermissionError):
-            os.killpg(process.pid, signal.SIGKILL)
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
     process.wait()
 
 
@@ -100,8 +96,7 @@ def _how(status: int) -> str:
 
 def main() -> None:
     """Do the task that the input holds, and write the answer to the output."""
-    if _POSIX:
-        threading.Thread(target=_follow, args=(int(sys.argv[1]),), daemon=True).start()
+    threading.Thread(target=_follow, args=(int(sys.argv[1]),), daemon=True).start()
     output = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what is printed
     task = sys.stdin.buffer.read()
@@ -126,9 +121,7 @@ def main() -> None:
 
 
 def _end_group() -> None:
-    if _POSIX:
-        os.killpg(0, signal.SIGKILL)
-    os._exit(0)
+    os.killpg(0, signal.SIGKILL)
 
 
 def _follow(parent: int) -> None:

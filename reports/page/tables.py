@@ -9,9 +9,8 @@ from reports.page.filters import MARKS, words
 from reports.tables.agreement import agreement_table, left_out_table, trust_table, verdict
 from reports.tables.drawing import html
 from reports.tables.kernels import stability_summary
-from reports.tables.methods import fastest_table, method_row, methods_table
+from reports.tables.methods import fastest_table, method_row, methods_table, published_as
 from reports.tables.papers import paper_tables
-from reports.tables.peers import published_as
 from reports.tables.scaling import scaling_tables
 from reports.tables.table import Column, Row, Table, table
 

@@ -4,8 +4,7 @@
 Read in this order:
 
 - `asked.py`: the scenes and images that a report is asked for
-- `staging.py`: a folder out of sight until it is whole
 - `scene.py`: what report.json says of a scene, and its files
 - `others.py`: what belongs to no scene: stability, growth, claims of papers
-- `measure.py`: all of these, report.json and the page
+- `measure.py`: all of these, report.json and the page, in a folder out of sight until it is whole
 """

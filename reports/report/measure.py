@@ -5,7 +5,10 @@ Every result is kept on disk as soon as it is there (`validation.study.scene`): 
 it stopped, and one in which nothing changed measures nothing. The files of a report appear when it is whole.
 """
 
+import os
+import shutil
 import sys
+import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
-from reference.storage.files import ensure_folder
+from reference.storage.files import NO_SPACE, ensure_folder
 from reference.storage.kept import fresh_results
 from reports.data.claims import claims, growth_claims, unstudied
 from reports.data.own_faults import own_fault
@@ -26,7 +29,6 @@ from reports.machine.progress import Progress, part_of
 from reports.page.render import render_page
 from reports.report.others import other_parts, paper_rows, shares
 from reports.report.scene import folder_of, write_scene
-from reports.report.staging import staged
 from validation.scenes.loading import scene_stem
 from validation.scenes.random.design import is_random
 from validation.scenes.registry import FOG_SCENES, SCENES
@@ -237,3 +239,35 @@ def _refuse_twins(scenes: Sequence[str]) -> None:
     for name, count in Counter(folder_of(scene) for scene in scenes).items():
         if count > 1:
             raise InputError(f"scenes: two scenes are called {name}; give each once, or rename one of the files")
+
+
+# A folder out of sight until it is whole ------------------------------------------------------------------------------
+
+_PREFIX = ".airlight-report-"
+_STALE = 86400.0  # seconds after which the remains of a killed run are removed
+
+
+@contextmanager
+def staged(target: Path) -> Iterator[Path]:
+    """Give a hidden folder in `target` whose files move there when the block ends without an exception.
+
+    Files of the same name are replaced one by one, the page and its data last; others stay. Any exception, a
+    KeyboardInterrupt too, leaves the target as it was; that of a full disk names the target.
+    """
+    for left in target.glob(f"{_PREFIX}*"):
+        if time.time() - left.stat().st_mtime > _STALE:
+            shutil.rmtree(left, ignore_errors=True)
+    hidden = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=target))
+    try:
+        yield hidden
+        files = [path for path in hidden.rglob("*") if path.is_file()]
+        for path in sorted(files, key=lambda file: (file.parent == hidden, file)):
+            place = target / path.relative_to(hidden)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(path, place)
+    except OSError as error:
+        if error.errno in NO_SPACE:  # what was being written is a name that nobody knows
+            raise OSError(error.errno, error.strerror, str(target)) from error
+        raise
+    finally:
+        shutil.rmtree(hidden, ignore_errors=True)

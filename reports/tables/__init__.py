@@ -10,9 +10,8 @@ Read in this order:
 - `drawing.py`: the five ways to draw it
 - `record.py`: what every result of a public function knows: tables, words, data
 - `terminal.py`: how commands print tables and JSON
-- `methods.py`: what methods cost and how wrong they are; the fastest within an error
+- `methods.py`: what methods cost and how wrong they are; the fastest within an error; which are a paper as published
 - `papers.py`: verdicts on the claims of papers, and their numbers beside ours
-- `peers.py`: which configurations are a paper as published, errors included
 - `agreement.py`: the reference against Monte Carlo, the verdict, and the table of trust
 - `kernels.py`: costs, levels and orders of kernels
 - `scaling.py`: what methods cost as their work grows, and exponents

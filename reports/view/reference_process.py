@@ -82,7 +82,7 @@ def compute(pipe: Connection, variant: str) -> None:
     """Answer the tasks of a pipe, the newest first and alone; None for nothing to do."""
     from analytic.errors import InputError
     from reports.machine.environment import activate
-    from reports.machine.signals import default_signals
+    from reports.machine.process_start import default_signals
 
     default_signals()
     with suppress(OSError, AttributeError):

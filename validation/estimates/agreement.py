@@ -227,15 +227,3 @@ def pixel_angle(truth: TruthScene) -> float:
     middle = (truth.height // 2) * truth.width + truth.width // 2
     beside = middle - 1 if truth.width > 1 else middle
     return float(np.arccos(np.clip(truth.direction[middle] @ truth.direction[beside], -1, 1)))
-
-
-def estimator_truth(scene, estimator: str) -> tuple[Array, Mask]:
-    """Return the airlight that an estimator of a Mitsuba scene converges to, and the pixels that can be compared.
-
-    The airlight is that of these pixels, (pixels, 3) [W/(m^2 sr)]; their mask, (height, width), is that of
-    `layer_masks`. For volpath it is the integral over the shadow ray that ends a little before the light.
-    """
-    epsilon = measure_shadow_epsilon() if estimator == "volpath" else 0.0
-    truth = truth_image(scene, shadow_scale=1 - epsilon)
-    mask = layer_masks(read_truth(scene), truth)["airlight"]
-    return truth.airlight[mask], mask

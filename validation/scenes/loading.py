@@ -21,7 +21,7 @@ from validation.scenes.changes import change_scene, isotropic_media, scene_with_
 from validation.scenes.height_fog import register_height_fog
 from validation.scenes.numbers import check_numbers
 from validation.scenes.random.design import FILE as RANGES
-from validation.scenes.random.design import PREFIX, is_random, random_parts
+from validation.scenes.random.design import PREFIX, is_random, random_parts, read_ranges
 from validation.scenes.registry import SCENES, Animation, SceneRecord
 
 _LARGEST = 16384
@@ -106,11 +106,11 @@ def scene_identity(scene: str) -> str:
     if scene in SCENES:
         return f"{scene} {SCENES[scene].digest}"
     if is_random(scene):
-        seed, given = random_parts(scene)
-        places = [RANGES, *(place for _, place in sorted(given.items()))]
-        files = [path for place in places for path in (sorted(place.iterdir()) if place.is_dir() else [place])]
+        seed, ranges = random_parts(scene)
+        meshes = read_ranges(ranges)["meshes"] if ranges else ""
+        files = [RANGES, *([ranges] if ranges else []), *(sorted(Path(meshes).iterdir()) if meshes else [])]
         stamps = tuple((path, path.stat().st_mtime_ns, path.stat().st_size) for path in files if path.is_file())
-        return f"{PREFIX}{seed} {sorted(given)} {_files_digest(stamps)}"
+        return f"{PREFIX}{seed} {ranges is not None} {_files_digest(stamps)}"
     return scene_digest(load_scene(scene).scene)
 
 

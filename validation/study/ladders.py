@@ -34,8 +34,7 @@ from analytic.errors import InputError
 from realtime.area_lights.shape import is_area_light
 from realtime.scene.animate import turned_light
 from realtime.scene.lights import Light
-from realtime.scene.mesh_adjacency import mesh_triangles
-from realtime.scene.named_shapes import scene_of
+from realtime.scene.mesh_adjacency import mesh_triangles, scene_of
 from realtime.scene.read_media import sort_shapes
 from realtime.scene.read_scene import Scene, read_scene
 from validation.scenes.loading import load_scene

@@ -2,8 +2,7 @@
 """Rows on disk: a database to which finished rows are added, and the Parquet that is made of it.
 
 `rows.sqlite` has each row once, by its key: a row whose key is there already replaces it. A row that was added is on
-disk: a run that is killed, or whose disk is full, loses nothing that was finished. One run at a time writes. Where
-there is a Parquet alone, it is as good: a run begins with its rows.
+disk: a run that is killed, or whose disk is full, loses nothing that was finished. One run at a time writes.
 """
 
 import heapq
@@ -41,8 +40,6 @@ class RowStore:
             self._rows.execute("BEGIN EXCLUSIVE")
             self._rows.execute(_TABLE)
             self._rows.execute("COMMIT")
-            if not len(self):
-                self._take_over()
         except sqlite3.OperationalError as error:
             self.close()
             if "locked" in str(error):
@@ -125,25 +122,6 @@ class RowStore:
     def _one(self, question: str, key: object) -> tuple[Any, ...] | None:
         found: tuple[Any, ...] | None = self._rows.execute(question, (key,)).fetchone()
         return found
-
-    def _take_over(self) -> None:
-        """Begin with the rows of a Parquet that somebody brought here without the file that it was made of."""
-        source = self.folder / PARQUET
-        if not source.is_file():
-            return
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        try:
-            with pq.ParquetFile(source) as file:
-                for batch in file.iter_batches(batch_size=_BATCH):
-                    for row in batch.to_pylist():
-                        self.add(row)
-        except (pa.ArrowException, KeyError) as error:
-            words = " ".join(str(error).split())
-            raise InputError(
-                f"{source}: it cannot be read ({words}); remove it, or name another folder by -o"
-            ) from None
 
 
 def worst_rows(rows: Iterator[Mapping[str, Any]]) -> set[str]:

@@ -51,7 +51,7 @@ from validation.readers import (
 )
 from validation.scenes.changes import change_words
 from validation.scenes.loading import parse_size
-from validation.scenes.random.design import PREFIX, is_random, random_name, ranges_from, read_ranges
+from validation.scenes.random.design import PREFIX, is_random, random_name, read_ranges
 from validation.scenes.registry import FOG_SCENES, SCENES
 from validation.study.configuration import QUICK, Configuration, chosen_configurations, configuration, find_kernel
 
@@ -108,7 +108,6 @@ class RandomScenes:
 
     count: int = 0
     first: int = 0  #: seed of the first
-    meshes: Path | None = None  #: folder of meshes that take part
     ranges: Path | None = None  #: TOML file of what is drawn
 
 
@@ -191,7 +190,7 @@ class Study:
     @cached_property
     def _options(self) -> str:
         """What follows the seed in the names of its random scenes."""
-        return random_name(PREFIX, self.random.meshes, self.random.ranges).removeprefix(PREFIX)
+        return random_name("", self.random.ranges).removeprefix(PREFIX)
 
     def _drawn(self, name: str) -> bool:
         seed = seed_of(name)
@@ -371,13 +370,10 @@ def _scene(what: str, item: Any, *, folder: Path) -> str:
 
 def _random(table: Any, folder: Path) -> RandomScenes:
     given = read_named("random.", read_table("random", table), _RANDOM)
-    given |= {name: (folder / given[name]).resolve() for name in ("meshes", "ranges") if name in given}
-    drawn = RandomScenes(**given)
-    if drawn.ranges is not None:
-        read_ranges(drawn.ranges)  # refuses what cannot be drawn
-    if drawn.meshes is not None:
-        ranges_from({"meshes": str(drawn.meshes)}, "random")
-    return drawn
+    if "ranges" in given:
+        given["ranges"] = (folder / given["ranges"]).resolve()
+        read_ranges(given["ranges"])  # refuses what cannot be drawn
+    return RandomScenes(**given)
 
 
 def _medium(what: str, item: Any) -> tuple[str, ...]:
@@ -445,7 +441,6 @@ _MEASURE: Mapping[str, Reader] = {
 _RANDOM: Mapping[str, Reader] = {
     "count": _count,
     "first": partial(read_number, least=0, most=2**62),
-    "meshes": read_word,
     "ranges": read_word,
 }
 _CHECKS: Mapping[str, Reader] = {

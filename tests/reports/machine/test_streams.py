@@ -33,14 +33,14 @@ def test_closed_and_full_streams_are_no_fault(line, status):
 
 
 def test_a_file_does_not_take_the_place_of_a_closed_output(tmp_path):
-    code = "from reports.machine.streams import usable_streams; usable_streams()\n"
+    code = "from reports.machine.process_start import usable_streams; usable_streams()\n"
     code += f"file = open({str(tmp_path / 'a')!r}, 'w'); print('printed'); import os; os.write(1, b'said')"
     assert run(f'cd {ROOT}; {sys.executable} -c "{code}" >&-').returncode == 0
     assert (tmp_path / "a").read_bytes() == b""
 
 
 def test_json_loses_nothing_in_ascii():
-    code = "from reports.machine.streams import usable_streams; usable_streams()\n"
+    code = "from reports.machine.process_start import usable_streams; usable_streams()\n"
     code += "print('\\u2500')\n"
     code += "from reports.tables.terminal import print_json; print_json({'name': '\\u2500 \\udcff'})"
     ran = run(f'cd {ROOT}; {sys.executable} -c "{code}"', PYTHONIOENCODING="ascii")

@@ -207,7 +207,8 @@ def test_a_random_scene_with_meshes_on_any_path_has_a_safe_folder(written, varia
     folder = tmp_path / "C:my, 5% meshes"
     folder.mkdir()
     mi.load_dict({"type": "cube"}).write_ply(str(folder / "a.ply"))
-    name = random_name("random:1", meshes=folder)
+    (folder / "ranges.toml").write_text('meshes = "."')
+    name = random_name(1, folder / "ranges.toml")
     data = again(written, tmp_path, scenes=(name,), configurations=CHOSEN[1:2])
     assert data["scenes"][0]["name"] == name
     files = named_files(data)

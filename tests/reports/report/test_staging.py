@@ -2,7 +2,7 @@
 
 import pytest
 
-from reports.report.staging import staged
+from reports.report.measure import staged
 
 
 def content(folder):

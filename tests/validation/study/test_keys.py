@@ -76,8 +76,9 @@ def test_a_random_scene_is_its_seed_and_the_content_of_its_files(tmp_path):
     folder = tmp_path / "C:my, 5% meshes"
     folder.mkdir()
     (folder / "a.ply").write_bytes(b"1")
-    name = random_name("random:7", meshes=folder)
-    assert random_parts(name) == (7, {"meshes": folder})
+    (folder / "ranges.toml").write_text('meshes = "."')
+    name = random_name(7, folder / "ranges.toml")
+    assert random_parts(name) == (7, folder / "ranges.toml")
     cells = [replace(CELL, scene=scene) for scene in ("random:7", "random:8", name)]
     keys = [cell_key(cell, MADE) for cell in cells]
     (folder / "a.ply").write_bytes(b"22")

@@ -80,24 +80,6 @@ def test_one_run_at_a_time_writes(tmp_path):
     assert keys(tmp_path) == []
 
 
-def test_a_parquet_alone_is_gone_on_from(tmp_path):
-    there, here = tmp_path / "there", tmp_path / "here"
-    with RowStore(there) as store:
-        store.add(row("a", p99=0.5, **{"properties.lights": 3}))
-        store.add(row("b", "refused", reason="it is too dark"))
-        source = store.write_parquet()
-        known = list(store.rows())
-    here.mkdir()
-    source.rename(here / source.name)
-    with RowStore(here) as store:
-        taken = list(store.rows())
-        store.add(row("c"))
-    assert [{name: value for name, value in each.items() if value is not None} for each in taken] == [
-        {name: value for name, value in each.items() if value is not None} for each in known
-    ]
-    assert keys(here) == ["a", "b", "c"]
-
-
 def test_the_parquet_has_every_row_once_and_the_worst_pictures(tmp_path):
     import pyarrow.parquet as pq
 

@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 
 from analytic.errors import InputError
-from realtime.scene.named_shapes import scene_of
+from realtime.scene.mesh_adjacency import scene_of
 from validation.scenes.files.nodes import child, kind, of_kind, properties, references
 from validation.scenes.files.shapes import samples
 

@@ -116,13 +116,15 @@ def _defaults() -> tuple[Ranges, Mapping[str, tuple[float, float]]]:
 
 
 def read_ranges(path: Path) -> Ranges:
-    """Read ranges from a TOML file."""
+    """Read ranges from a TOML file, whose folder of meshes lies beside it."""
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"ranges: cannot read {path}: {error}") from error
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"ranges: {path} is no TOML: {error}") from error
+    if isinstance(table.get("meshes"), str) and table["meshes"]:
+        table["meshes"] = str(path.parent / table["meshes"])
     return ranges_from(table, str(path))
 
 
@@ -179,28 +181,17 @@ def is_random(name: str) -> bool:
     return name.startswith(PREFIX)
 
 
-def random_name(name: str, meshes: Path | None = None, ranges: Path | None = None) -> str:
-    """Return the name of a scene with a folder of meshes and a file of ranges, which random ones alone can have."""
-    given = {"meshes": meshes, "ranges": ranges}
-    words = [f"{option}={quote(str(path.resolve()), safe=_SAFE)}" for option, path in given.items() if path is not None]
-    if words and not is_random(name):
-        option = words[0].partition("=")[0]
-        given_scene = f"{name} is no random scene" if name else "got no scene"
-        raise InputError(f"--{option}: {given_scene}; wanted a scene such as {PREFIX}7, or no --{option}")
-    return ",".join([name, *words])
+def random_name(seed: int | str, ranges: Path | None = None) -> str:
+    """Return the name of a random scene, which may be drawn from a file of ranges."""
+    return f"{PREFIX}{seed}" + (f",ranges={quote(str(ranges.resolve()), safe=_SAFE)}" if ranges else "")
 
 
-def random_parts(name: str) -> tuple[int, dict[str, Path]]:
-    """Return the seed in a name, and the paths of `meshes` and `ranges` that it goes on with."""
-    seed, *options = name.removeprefix(PREFIX).split(",")
+def random_parts(name: str) -> tuple[int, Path | None]:
+    """Return the seed in a name, and the file of ranges that it goes on with."""
+    seed, comma, option = name.removeprefix(PREFIX).partition(",")
     if not (seed.isascii() and seed.isdecimal()):
         raise InputError(f"scene: got {name!r}, wanted {PREFIX}SEED, a whole number, for example {PREFIX}7")
-    given: dict[str, Path] = {}
-    for option in options:
-        key, _, value = option.partition("=")
-        if key not in ("meshes", "ranges") or not value or key in given:
-            raise InputError(
-                f"scene: got {option!r} in {name!r}, wanted meshes=FOLDER or ranges=FILE.toml after the seed, each once"
-            )
-        given[key] = Path(unquote(value))
-    return int(seed), given
+    key, _, value = option.partition("=")
+    if comma and (key != "ranges" or not value or "," in value):
+        raise InputError(f"scene: got {option!r} in {name!r}, wanted ranges=FILE.toml after the seed")
+    return int(seed), Path(unquote(value)) if comma else None

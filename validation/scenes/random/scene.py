@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scenes drawn from a seed, under the name `random:SEED`.
 
-A name may go on: `random:7,meshes=FOLDER` takes .obj and .ply files as casters too, `random:7,ranges=FILE.toml` draws
-from other ranges; commas and per cent signs of a path are written as in a URL. What is drawn where too little light
-reaches what the camera sees is drawn again.
+A name may go on: `random:7,ranges=FILE.toml` draws from other ranges, and takes the .obj and .ply files of a folder
+that they name as casters too; commas and per cent signs of a path are written as in a URL. What is drawn where too
+little light reaches what the camera sees is drawn again.
 
 All is drawn in radii of a stage about the origin. Where Mitsuba's parts are made it is scaled and moved to an arbitrary
 place.
@@ -102,11 +102,8 @@ def _plain(value: Any) -> Any:
 
 
 def _parse(name: str) -> tuple[int, Ranges]:
-    seed, given = random_parts(name)
-    ranges = read_ranges(given["ranges"]) if "ranges" in given else ranges_from({})
-    if "meshes" in given:
-        ranges |= {"meshes": ranges_from({"meshes": str(given["meshes"])}, name)["meshes"]}
-    return seed, ranges
+    seed, file = random_parts(name)
+    return seed, read_ranges(file) if file else ranges_from({})
 
 
 # Drawing --------------------------------------------------------------------------------------------------------------
