@@ -93,7 +93,8 @@ def grid_light(task: Any, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
     for extended in task.area:
 
         def sample_area(u, numbers, light=extended):
-            point = sample_point(*numbers, light, origin=ray.origin_double, direction=ray.direction_double)
+            one, other = numbers
+            point = sample_point(one, other, light, origin=ray.origin_double, direction=ray.direction_double)
             x, way, r, value = equi_angular_sample(
                 u, point.position, lambda approach: before_plane(point, ray, approach.foot)
             )
