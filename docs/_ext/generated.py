@@ -28,6 +28,7 @@ PARTS = {
     "methods": listed.methods,
     "parameters": listed.parameters,
     "light-points": listed.light_points,
+    "history": listed.history,
     "studies": listed.studies,
     "report-keys": listed.report_keys,
     "sweep-columns": listed.sweep_columns,

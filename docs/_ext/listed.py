@@ -113,6 +113,13 @@ def light_points() -> str:
     return _fields(LightPoints)
 
 
+def history() -> str:
+    """Return a table of the parameters of a history."""
+    from realtime.methods.history import History
+
+    return _fields(History)
+
+
 def _fields(record: Any) -> str:
     rows = [(f"`{item.name}`", *_parameter(item)) for item in fields(record)]
     return table(("`--set`", "values", "what it does"), rows, 3) if rows else "The method has no parameters."

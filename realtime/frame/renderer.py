@@ -19,7 +19,7 @@ twenty images on theirs.
 """
 
 import gc
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass, replace
 from functools import reduce
 from operator import add
@@ -32,14 +32,16 @@ import numpy as np
 from realtime.area_lights.points import LightPoints
 from realtime.errors import InputError, refusals
 from realtime.frame.adaptive_sampling import Corners, adaptive_layers, tile_corners
+from realtime.frame.history import HistoryPass
 from realtime.frame.light_on_ray import check_radiance
 from realtime.frame.sphere_lights import sampled_sphere, sphere_scales
 from realtime.frame.surface import Cast, surface_stages
 from realtime.kernels.table import prepare_kernel, with_tables
 from realtime.methods.interface.method import Layers, Method, Preparation, camera_view, method_parameters
 from realtime.numerics.array_types import PerRay, aligned_array
-from realtime.numerics.noise import Noise
+from realtime.numerics.noise import Noise, blue_mask
 from realtime.numerics.recorded import Frozen
+from realtime.parameters import values
 from realtime.scene.camera import TILE, tiled_pixels
 from realtime.scene.light_points import with_light_points
 from realtime.scene.lights import Light
@@ -90,13 +92,22 @@ class FrameRenderer:
     corners: Corners | None  #: how the tiles of the image lie; None where every pixel is computed
     extra_layers: bool  #: whether frames have the further layers that the method names
     sphere_scales: Frozen | None  #: by what samples of sphere lights are scaled
+    history: HistoryPass | None  #: takes the mean with the frames before
+    mask: Any = None  #: of blue noise, for a noisy method
     run: int = 0  #: number of the run: a noisy method draws other random numbers in each, below 2^32
     frame: int = 0  #: number of the frame in its run, below 2^32
 
     @property
     def by_rays(self) -> bool:
         """Whether any part of the image can be rendered alone."""
-        return self.method.by_rays and not self.method.carries and self.corners is None
+        alone = not self.method.carries and self.history is None
+        return self.method.by_rays and alone and self.corners is None
+
+    @property
+    def shades_apart(self) -> bool:
+        """Whether surfaces are shaded light after light for a method that takes many at once."""
+        method = self.method
+        return method.at_once and not method.provides_visibility and len(self.scene.lights) > _FEW
 
     @property
     def stages(self) -> Stages:
@@ -160,17 +171,25 @@ def frame_renderer(
         corners=None,
         extra_layers=extra_layers and not scene.area_lights,
         sphere_scales=sphere_scales(scene, chosen, kernel),
+        history=HistoryPass(**values(chosen.history), Float=type(scene.camera.origin.x)) if chosen.history else None,
+        mask=blue_mask() if chosen.noisy else None,
     )
     groups = _lights_by_group(made)
     if chosen.interpolated:
         most = max(map(len, groups))
         made = replace(made, corners=tile_corners(pixel, scene.camera, by_rays=chosen.by_rays, lights=most))
     structures: dict[Any, Stages] = {}
+    if made.shades_apart:
+        for lights in _lights_by_group(replace(made, method=_ONE_BY_ONE)):
+            structures[_structure(lights)] = _stages(made, replace(scene, lights=lights), kernel, alone=False)
     for lights in groups:
         key = _structure(lights)
         if key not in structures:
             structures[key] = _stages(made, replace(scene, lights=lights), kernel, alone=len(groups) == 1)
     return replace(made, structures=structures)
+
+
+_ONE_BY_ONE = Method()  # a method that is given lights by groups
 
 
 def _check_clouds(scene: Scene, method: Method) -> None:
@@ -232,6 +251,11 @@ def _lights_by_group(renderer: FrameRenderer) -> list[tuple[Light, ...]]:
     if len(scene.lights) > (1 if scene.features.bounded else _FEW):
         groups = [(light,) for light in scene.lights]
     return groups + [(sample,) for sample in lit.lights[len(scene.lights) :]]
+
+
+def surface_groups(renderer: FrameRenderer) -> tuple[LightGroup, ...]:
+    """Return the groups of lights by which surfaces are shaded: one light each where the method takes many at once."""
+    return light_groups(replace(renderer, method=_ONE_BY_ONE) if renderer.shades_apart else renderer)
 
 
 def light_groups(renderer: FrameRenderer) -> tuple[LightGroup, ...]:
@@ -355,10 +379,12 @@ def evaluated(cast: Cast, rendered: Rendered):
 
 def run_cast_and_shade(renderer: FrameRenderer) -> tuple[Cast, tuple[Any, ...]]:
     """Run the stage of camera rays and lit surface; return what the rays meet, and what `run_shade` returns for it."""
-    first, *others = light_groups(renderer)
+    first, *others = surface_groups(renderer)
     scene = renderer.scene
     shown = scene.geometry, scene.facets, renderer.pixel, scene.camera, scene.medium, first.lights
     cast, by_light = first.stages.surface(*shown)
+    if renderer.shades_apart:
+        return cast, (_added(renderer, others, cast, by_light),)
     kept = others[: _MOST_KEPT - 1]
     shaded = [_shaded(renderer, group, cast) for group in kept] + [None] * (len(others) - len(kept))
     return cast, (by_light, *shaded)
@@ -369,8 +395,19 @@ def run_shade(renderer: FrameRenderer, cast: Cast) -> tuple[Any, ...]:
 
     It is None for those that are not kept.
     """
-    groups = light_groups(renderer)
+    groups = surface_groups(renderer)
+    if renderer.shades_apart:
+        return (_added(renderer, groups[1:], cast, _shaded(renderer, groups[0], cast)),)
     return tuple(_shaded(renderer, group, cast) if k < _MOST_KEPT else None for k, group in enumerate(groups))
+
+
+def _added(renderer: FrameRenderer, groups: Sequence[LightGroup], cast: Cast, by_light: tuple[PerRay, ...]):
+    """Return the light of surfaces with that of further groups."""
+    total = _sum(by_light)
+    for group in groups:
+        total = total + _sum(_shaded(renderer, group, cast))
+        dr.eval(total)
+    return (total,)
 
 
 def _shaded(renderer: FrameRenderer, group: LightGroup, cast: Cast):
@@ -387,9 +424,12 @@ def run_method(renderer: FrameRenderer, state, cast: Cast, by_light, carried: An
     `carried`: what the method handed on from the last frame; None for the first.
     """
     groups, sums, scales = light_groups(renderer), None, dict[int | None, Any]()
+    past = None
+    if renderer.history is not None and carried is not None:
+        carried, past = carried
     noise = None
     if renderer.method.noisy:
-        noise = Noise(dr.opaque(mi.UInt32, renderer.run), dr.opaque(mi.UInt32, renderer.frame))
+        noise = Noise(dr.opaque(mi.UInt32, renderer.run), dr.opaque(mi.UInt32, renderer.frame), renderer.mask)
     if renderer.sphere_scales is not None:
         scales = _sphere_scales(renderer, groups, cast)
     for number, group in enumerate(groups):
@@ -407,7 +447,10 @@ def run_method(renderer: FrameRenderer, state, cast: Cast, by_light, carried: An
         if len(groups) > 1:
             dr.eval(sums.airlight, sums.surface)
     assert sums is not None
-    return sums
+    if renderer.history is None:
+        return sums
+    airlight, past = renderer.history(sums.airlight, renderer.pixel, cast.distance, renderer.scene.camera, past)
+    return replace(sums, airlight=airlight, carried=(sums.carried, past))
 
 
 def _sphere_scales(renderer: FrameRenderer, groups: tuple[LightGroup, ...], cast: Cast) -> dict[int | None, Any]:

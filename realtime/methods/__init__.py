@@ -8,6 +8,8 @@ Read in this order:
 
 - `unshadowed.py`: one integral a ray and light, the shortest method there is.
 - `ray_march.py`: the baseline, steps with a visibility test each.
+- `equi_angular.py`: random samples, each of one light chosen by its power.
+- `history.py`: any method with a mean over the frames before.
 - `cloud_octaves.py`: clouds as engines render them.
 - `cloud_collectors.py`: light of many orders in clouds, from where it enters them.
 - `registry.py`: the methods by name, and how a name becomes a method.

@@ -33,7 +33,7 @@ import mitsuba as mi
 from realtime.errors import InputError
 from realtime.intervals import add_waiting, close_interval, no_intervals, sum_at_end
 from realtime.methods.interface.marching import marched_integral, marched_steps
-from realtime.methods.interface.method import Method, tolerance
+from realtime.methods.interface.method import Method, animate, jitter, tolerance
 from realtime.parameters import parameter
 from realtime.scene.media.medium import LitRays
 from realtime.shadow_maps.shadow_map import cast_shadow_map, check_maps, lit_in_map, map_size
@@ -75,8 +75,24 @@ class RayMarch(Method):
         "have it",
         choices=("exact", "running"),
     )
+    jitter: str = jitter()
+    animate: str = animate()
     map: int = map_size(512, "texels on a side of a face of the map, with `shadow=map`")
     tolerance: float = tolerance()
+
+    def _check_together(self) -> None:
+        if self.jitter != "none" and (self.sum == "transitions" or self.tolerance):
+            raise InputError(
+                f"jitter: got {self.jitter} with sum={self.sum} and tolerance={self.tolerance:g}, wanted "
+                "sum=steps and tolerance=0: a mean of runs is no integral, or neighbours are not alike"
+            )
+        if self.jitter == "none" and self.animate != "none":
+            raise InputError(f"animate: got {self.animate} without jitter, wanted jitter=white, blue or ign with it")
+
+    @property
+    def noisy(self):
+        """Shifts of steps are random."""
+        return self.jitter != "none"
 
     @property
     def uses_kernel(self):
@@ -119,6 +135,8 @@ class RayMarch(Method):
                 "lit": lit,
                 "running": self.depth == "running",
             }
+            if self.noisy:
+                how["shift"] = view.pattern(self.jitter, golden=self.animate == "golden")
             integral = marched_integral(airlight, view.distance, **how)
         return airlight.radiance(integral)
 

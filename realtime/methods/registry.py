@@ -9,7 +9,9 @@ from realtime.errors import InputError
 from realtime.methods.cloud_collectors import CloudCollectors
 from realtime.methods.cloud_octaves import CloudOctaves
 from realtime.methods.epipolar.method import MinMax
+from realtime.methods.equi_angular import EquiAngular
 from realtime.methods.froxel_fog.method import FroxelFog
+from realtime.methods.history import ENDING, with_history
 from realtime.methods.interface.method import Method
 from realtime.methods.light_volumes.method import LightVolumes
 from realtime.methods.ray_march import RayMarch
@@ -24,6 +26,7 @@ from realtime.parameters import nearest
 _ALL = (
     Unshadowed,
     RayMarch,
+    EquiAngular,
     ShadowPlanes,
     LightVolumes,
     MinMax,
@@ -35,17 +38,24 @@ _ALL = (
 
 METHODS: dict[str, type[Method]] = {method.name: method for method in _ALL}
 
-#: Those of light that is scattered once, in any scene; the others are for clouds.
-FOG_METHODS: dict[str, type[Method]] = {name: method for name, method in METHODS.items() if not method.renders_clouds}
+#: Those of light that is scattered once, in any scene, without random numbers by default; the others are for clouds.
+FOG_METHODS: dict[str, type[Method]] = {
+    name: method for name, method in METHODS.items() if not (method.renders_clouds or method().noisy)
+}
 
 
 def find_method(name: str) -> type[Method]:
     """Return a method.
 
     `name`: a name of `METHODS`, or a user's own: 'module:function', 'path/to/file.py:function'
-    (`realtime.methods.user_method`), 'path/to/file.glsl' (`realtime.methods.shader`). Raises InputError for an unknown
-    name (the nearest is named), and for what cannot be imported or is no method.
+    (`realtime.methods.user_method`), 'path/to/file.glsl' (`realtime.methods.shader`); with '+history' behind it,
+    averaged over frames. Raises InputError for an unknown name (the nearest is named), and for what cannot be imported
+    or is no method.
     """
+    if name.endswith(ENDING):
+        if is_shader(own := name.removesuffix(ENDING)):
+            raise InputError(f"method {name}: a shader keeps its own frames; wanted its name without '{ENDING}'")
+        return with_history(find_method(own))
     if name in METHODS:
         return METHODS[name]
     if is_shader(name):

@@ -17,5 +17,6 @@ Read in this order:
 - `read_media.py`: reads the media of a Mitsuba scene;
 - `read_scene.py`: reads a Mitsuba scene;
 - `light_points.py`: lights with extent as light points;
+- `light_table.py`: lights of one structure as a table, from which rays take them by chance;
 - `animate.py`: the scene after lights, the medium or objects moved.
 """

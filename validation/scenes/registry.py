@@ -11,7 +11,8 @@ Each scene is a table with these keys; lengths are in metres, angles in degrees,
 * `fog`: the medium around all, with `sigma_t` (one number or RGB) [1/m], `albedo`, and `phase` in words of
   `analytic.phase.phase_from_words`; or with `layers`; or with `smoke`, whose densities `sigma_t` multiplies;
 * `camera`: `origin`, `target` and the horizontal `fov`;
-* `lights`: each with `name`, `type`, `colour` (intensity, irradiance or radiance) and what `parts.light` takes;
+* `lights`: each with `name`, `type`, `colour` (intensity, irradiance or radiance) and what `parts.light` takes; one
+  with a `swarm` stands for many at random places of a box, with powers whose logarithm is normal with that `spread`;
 * `shapes`: each with `name` and either `reflectance` or the `medium` that it bounds, which may have a `density`;
 * `kinds`: meshes by name that its shapes use.
 
@@ -45,7 +46,7 @@ from validation.scenes.parts import camera, fog, height_fog, light, medium_bound
 
 MOVES = ("light", "objects", "medium", "colour")
 FILES = tuple(
-    Path(__file__).with_name(name) for name in ("fog.toml", "height_fog.toml", "density_grid.toml", "clouds.toml")
+    Path(__file__).with_name(f"{name}.toml") for name in ("fog", "many_lights", "height_fog", "density_grid", "clouds")
 )
 
 Table = dict[str, Any]
@@ -81,6 +82,7 @@ class SceneRecord:
     varying: bool = False  #: whether its fog is height fog or a grid, which have no one extinction
     clouds: bool = False  #: whether light is scattered many times: then `cloud-paths` is its truth, and few methods fit
     digest: str = ""  #: of its description
+    many: bool = False  #: whether it has many lights, of which methods are to choose
 
 
 def read_scenes(path: Path) -> dict[str, SceneRecord]:
@@ -94,7 +96,10 @@ def _record(name: str, table: Table) -> SceneRecord:
     digest = hashlib.sha256(json.dumps(table).encode()).hexdigest()
     words = table["purpose"], table["published"]
     varying = bool({"layers", "smoke"} & set(table.get("fog", {})))
-    return SceneRecord(name, partial(_build, table), *words, animation, varying, table.get("clouds", False), digest)
+    many = any("swarm" in each for each in table["lights"])
+    return SceneRecord(
+        name, partial(_build, table), *words, animation, varying, table.get("clouds", False), digest, many
+    )
 
 
 def _build(table: Table) -> dict[str, Any]:
@@ -102,7 +107,7 @@ def _build(table: Table) -> dict[str, Any]:
     if "fog" in table:
         scene["fog"] = _medium(table["fog"])
     scene["sensor"] = camera(**table["camera"], size=(800, 600), in_fog="fog" in table)
-    for each in table["lights"]:
+    for each in _lights(table["lights"]):
         scene[each["name"]] = light(**{key: value for key, value in each.items() if key != "name"})
     kinds = table.get("kinds", {})
     for shape in copies(table.get("shapes", [])):
@@ -112,6 +117,21 @@ def _build(table: Table) -> dict[str, Any]:
         else:
             scene[name] = mitsuba_mesh(name, mesh, shape["reflectance"])
     return scene
+
+
+def _lights(entries: Iterable[Table]) -> Iterator[Table]:
+    """Yield lights one by one, those of a swarm by their numbers."""
+    for entry in entries:
+        if "swarm" not in entry:
+            yield entry
+            continue
+        own = dict(entry)
+        swarm = own.pop("swarm")
+        rng = np.random.default_rng(swarm["seed"])
+        places = rng.uniform(swarm["low"], swarm["high"], (swarm["count"], 3))
+        colours = np.exp(swarm["spread"] * rng.standard_normal((swarm["count"], 1))) * own["colour"]
+        for number, (place, colour) in enumerate(zip(places.tolist(), colours.tolist(), strict=True)):
+            yield own | {"name": f"{own['name']}-{number}", "position": place, "colour": colour}
 
 
 def copies(entries: Iterable[Table]) -> Iterator[Table]:
@@ -191,6 +211,6 @@ def _density(mesh: str, given: str) -> Any:
     return hypertexture(MESHES[mesh](), **json.loads(given))
 
 
-#: The built-in scenes by name, and those of homogeneous fog.
+#: The built-in scenes by name, and those of homogeneous fog with few lights.
 SCENES = {name: record for path in FILES for name, record in read_scenes(path).items()}
-FOG_SCENES = {name: record for name, record in SCENES.items() if not (record.clouds or record.varying)}
+FOG_SCENES = {name: record for name, record in SCENES.items() if not (record.clouds or record.varying or record.many)}

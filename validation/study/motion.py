@@ -30,7 +30,7 @@ Progress = Callable[[int, int, str], None]
 USUAL = (
     Configuration("shadow-planes", "exact"),
     Configuration("froxel-fog", None),
-    Configuration("froxel-fog", None, (("history", 0.9),)),
+    Configuration("froxel-fog+history", None, (("alpha", 0.1),)),
 )
 BEFORE = 8  #: frames at rest before a step
 _JUMP = 12  # of a turn, that a step is

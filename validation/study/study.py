@@ -216,7 +216,7 @@ def default_configurations() -> tuple[Configuration, ...]:
     """Return what a study without methods measures: the kinds of the quick report, lights with extent as by default."""
     kinds = [each for each in QUICK if "points" not in dict(each.parameters)]
     known = {each.method for each in kinds}
-    others = [name for name, record in METHODS.items() if name not in known and not record.renders_clouds]
+    others = [name for name in FOG_METHODS if name not in known]
     return (*kinds, *(configuration(name) for name in others))
 
 

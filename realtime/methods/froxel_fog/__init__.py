@@ -7,7 +7,6 @@ Read in this order:
 - `media.py`: which share of a froxel each medium fills;
 - `light_points.py`: the points of lights with extent in tables;
 - `injection.py`: the light that reaches the middle of each froxel and is scattered there to the camera;
-- `history.py`: the shift of the samples from frame to frame, and the mean with what the last frame left;
 - `accumulation.py`: the airlight from the camera to the end of each slice, by the integral within a slice;
 - `method.py`: the parameters, and the stages of a frame.
 """

@@ -14,6 +14,14 @@ About a light 1/r^2 has no bound, though its mean over a froxel has. With a half
 
 So b^2 = a^2/3: a froxel with the light in it has about its mean, those away from the light are as they are, and b
 vanishes with the size of the froxels.
+
+With `jitter=frames` frame n samples at the middle of a froxel plus a place from -1/2 to 1/2 on each of three sides, n
+times the additive recurrence of Roberts in three dimensions, 1/g, 1/g^2, 1/g^3 with g^4 = g + 1, from a random place of
+the run on, modulo 1.
+
+References
+----------
+Roberts 2018, *The unreasonable effectiveness of quasirandom sequences*.
 """
 
 from collections.abc import Callable
@@ -34,6 +42,8 @@ from realtime.scene.media.medium import Rays
 #: (point, light, its number among all lights) -> whether it is lit.
 Visibility = Callable[[Any, Light, int], Any]
 
+_GROWTH = 1.2207440846057596  # g^4 = g + 1
+_STEPS = tuple(round(2**32 / _GROWTH**power) % 2**32 for power in (1, 2, 3))
 _UNROLLED = 4  # lights in one kernel where media have bounds: no loop can write down how a light sees them
 
 
@@ -46,6 +56,16 @@ class FroxelPoints:
     least: Any  #: b^2 [m^2]
     rays: Rays  #: the middle ray of the column
     ends: tuple[Any, Any]  #: where it enters and leaves the froxel [m]
+
+
+def frame_shift(view: View) -> tuple[Any, Any, Any]:
+    """Return by how much the samples of a frame are moved from the middles of froxels, in parts of a froxel."""
+    Float, begin = type(view.distance), view.random.of_run()
+    across, down, deep = (
+        Float(mi.Int32(word + view.frame * mi.UInt32(step))) * 2.0**-32
+        for word, step in zip(begin, _STEPS, strict=False)
+    )
+    return across, down, deep
 
 
 def scattered_light(

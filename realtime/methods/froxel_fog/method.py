@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Froxel fog as a method: what engines ship for volumetric light, by the parameters that they have.
 
-A frame injects the scattered light into a grid along the view, averages it with what the frames before found, sums it
-front to back, and looks the sum up at the depth of every pixel. Three kernels: over froxels, columns and pixels. The
+A frame injects the scattered light into a grid along the view, sums it front to back, and looks the sum up at the depth
+of every pixel. Three kernels: over froxels, columns and pixels. The
 cost of the first two does not depend on the image.
 
 References
@@ -20,8 +20,7 @@ from realtime.errors import InputError
 from realtime.memory import check_memory
 from realtime.methods.froxel_fog.accumulation import accumulated, airlight_at_pixels
 from realtime.methods.froxel_fog.grid import column_rays, view_grid
-from realtime.methods.froxel_fog.history import averaged, frame_shift
-from realtime.methods.froxel_fog.injection import Visibility, scattered_light
+from realtime.methods.froxel_fog.injection import Visibility, frame_shift, scattered_light
 from realtime.methods.froxel_fog.light_points import LightPointTable, tabulated
 from realtime.methods.interface.method import Layers, Method, View
 from realtime.numerics.array_types import bytes_of
@@ -30,7 +29,7 @@ from realtime.scene.lights import Light
 from realtime.shadow_maps.hemisphere_map import maps_memory
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, check_maps, lit_in_map, map_memory, map_size
 
-_NUMBERS = 16  # of a froxel: scattered light, airlight, history, four each, and as much on the way
+_NUMBERS = 12  # of a froxel: scattered light and airlight, four each, and as much on the way
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,6 @@ class FroxelFog(Method):
     jitter: str = parameter(
         "none", "samples in the middle of froxels, or moved from frame to frame", choices=("none", "frames")
     )
-    history: float = parameter(0.0, "weight of the frames before; 0: each frame for itself", least=0, below=1)
     shadow: str = parameter("map", "a look-up in a shadow map a froxel, or a shadow ray", choices=("map", "ray"))
     map: int = map_size(
         512,
@@ -98,9 +96,9 @@ class FroxelFog(Method):
         return self.shadow == "ray"
 
     @property
-    def carries(self):
-        """Frames hand on what they held, or their number."""
-        return self.history > 0 or self.jitter != "none"
+    def noisy(self):
+        """Samples of a run begin at a random place in their froxels."""
+        return self.jitter != "none"
 
     def check(self, scene):
         """Refuse a grid and maps that need more memory than the machine has."""
@@ -132,17 +130,13 @@ class FroxelFog(Method):
 
     def render(self, view, state, kernel):
         """Return the airlight of every ray by froxels [W/(m^2 sr)]."""
-        last = view.carried
         grid = view_grid(view, size=self.grid_size, near=self.near, far=self.far, distribution=self.distribution)
         dr.eval(grid.far, grid.near)
-        shift = frame_shift(last if self.jitter == "frames" else None, type(view.distance))
+        shift = frame_shift(view) if self.noisy else (0, 0, 0)
         visible, rays = _visibility(view, state, self.shadow), column_rays(view, grid)
         scattered = scattered_light(view, grid, rays, shift=shift, tables=state.tables, visible=visible)
-        carried = None
-        if self.carries:
-            scattered, carried = averaged(scattered, grid, last, weight=self.history)
-        dr.eval(scattered, carried)
-        return Layers(airlight_at_pixels(view, grid, accumulated(view, grid, rays, scattered)), carried=carried)
+        dr.eval(scattered)
+        return Layers(airlight_at_pixels(view, grid, accumulated(view, grid, rays, scattered)))
 
     def error_causes(self, size):
         """Return the causes of its errors, see `Method.error_causes`.

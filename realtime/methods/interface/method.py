@@ -24,10 +24,10 @@ from typing import Any, ClassVar
 from realtime.area_lights.points import LightPoints
 from realtime.errors import InputError
 from realtime.numerics.array_types import Metres, PerRay
-from realtime.numerics.noise import Noise
+from realtime.numerics.noise import PATTERNS, Noise
 from realtime.parameters import Parameters, defaults, parameter, read_parameters, values
 from realtime.rays import RayGeometry, ray_geometry
-from realtime.scene.camera import Camera, ray_directions
+from realtime.scene.camera import Camera, ray_directions, row_and_column
 from realtime.scene.features import SceneFeatures
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import LitRays, Medium, Rays
@@ -60,12 +60,12 @@ class View(Rays):
         InputError
             For a method that does not say that it is noisy.
         """
-        return self._noise.run
+        return self.random.run
 
     @property
     def frame(self) -> Any:
         """The number of the frame in its run, an opaque `mi.UInt32`, so that a frozen method draws anew in each."""
-        return self._noise.frame
+        return self.random.frame
 
     def uniform(self, stream: int = 0) -> tuple[Any, Any, Any, Any]:
         """Return four independent numbers for each ray, evenly distributed in [0, 1), other ones in each frame and run.
@@ -77,11 +77,33 @@ class View(Rays):
         InputError
             For a method that does not say that it is noisy.
         """
-        first, second, third, fourth = map(type(self.distance), self._noise.uniform(self.pixel, stream))
+        first, second, third, fourth = map(type(self.distance), self.random.uniform(self.pixel, stream))
         return first, second, third, fourth
 
+    def pattern(self, kind: str, *, golden: bool = False, stream: int = 0) -> PerRay:
+        """Return a number from 0 to 1 for each ray by which samples are shifted, evenly distributed over the runs.
+
+        Parameters
+        ----------
+        kind
+            'white', 'blue' or 'ign', see `realtime.numerics.noise`.
+        golden
+            Whether frames differ by the golden ratio, in place of the pattern's own change.
+        stream
+            Patterns of two streams are independent over the runs.
+
+        Raises
+        ------
+        InputError
+            For a method that does not say that it is noisy.
+        """
+        place = row_and_column(self.camera, self.pixel)
+        shown = {"golden": golden, "pixel": self.pixel, "place": place, "stream": stream}
+        return type(self.distance)(self.random.pattern(kind, **shown))
+
     @property
-    def _noise(self) -> Noise:
+    def random(self) -> Noise:
+        """What draws random numbers for this frame of this run."""
         if self.noise is None:
             raise InputError("noise: the method draws random numbers and does not say so; wanted `noisy` = True")
         return self.noise
@@ -184,6 +206,7 @@ class Method(Parameters):
     at_once: ClassVar[bool] = False  #: whether it is given all lights and light samples of a frame at once
     by_source: ClassVar[bool] = False  #: whether its visibility has one entry for all samples of an area light
     carries: ClassVar[bool] = False  #: whether it hands arrays on to the next frame, as `Layers.carried`
+    history: ClassVar[Any] = None  #: how frames are averaged (`realtime.methods.history.History`); None: not at all
     noisy: ClassVar[bool] = False  #: whether its image depends on the number of the run, as `View.run`
 
     def check(self, scene: Scene) -> None:
@@ -246,6 +269,24 @@ class Method(Parameters):
 def no_state(scene: Scene) -> tuple[()]:
     """Return the state of a method that makes none."""
     return ()
+
+
+def jitter() -> Any:
+    """Return the field of the parameter by which the samples of rays are shifted."""
+    return parameter(
+        "none",
+        "what shifts the samples of a ray: nothing, white noise, a mask of blue noise, or interleaved gradient noise",
+        choices=("none", *PATTERNS),
+    )
+
+
+def animate() -> Any:
+    """Return the field of the parameter by which the pattern of `jitter` changes from frame to frame."""
+    return parameter(
+        "none",
+        "frames with patterns of their own, or that of frame 0 plus the frame's number times the golden ratio",
+        choices=("none", "golden"),
+    )
 
 
 def tolerance() -> Any:

@@ -14,7 +14,7 @@ from realtime.errors import InputError
 from realtime.frame.incremental import next_frame
 from realtime.frame.renderer import frame_renderer, image_frame, render_frame
 from realtime.methods.interface.method import Layers, Method
-from realtime.numerics.noise import pcg4d
+from realtime.numerics.noise import PATTERNS, Noise, blue_mask, pcg4d
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
 
@@ -92,3 +92,38 @@ def test_numbers_of_pixels_frames_runs_and_streams_are_even_and_independent(vari
             assert kstest(values, "uniform").pvalue > 1e-4
             assert abs(np.corrcoef(values[1:], values[:-1])[0, 1]) < 3.9 / np.sqrt(count)
         assert np.max(np.abs(np.corrcoef(numbers) - np.eye(4))) < 3.9 / np.sqrt(count)
+
+
+def pattern(kind, *, run=0, frame=0, golden=False, size=64):
+    """Return a pattern of size x size pixels, or of one pixel in many runs."""
+    many = not isinstance(run, int)
+    pixel = dr.full(mi.UInt32, 7, len(run)) if many else dr.arange(mi.UInt32, size * size)
+    noise = Noise(mi.UInt32(run), mi.UInt32(frame), blue_mask())
+    found = np.array(noise.pattern(kind, golden=golden, pixel=pixel, place=(pixel // size, pixel % size)), dtype=float)
+    return found if many else found.reshape(size, size)
+
+
+def low_share(values):
+    """Return the mean of the spectrum below an eighth of a cycle per pixel; 1 for white noise."""
+    power = np.abs(np.fft.fft2(values - values.mean())) ** 2 / values.size / values.var()
+    frequency = np.hypot(*np.meshgrid(*(np.fft.fftfreq(side) for side in values.shape), indexing="ij"))
+    return power[(frequency > 0) & (frequency < 1 / 8)].mean()
+
+
+@pytest.mark.claim(
+    "noise-patterns", tolerance="Kolmogorov and Smirnov at 1e-4; low share of the spectrum below 0.1 if blue"
+)
+def test_patterns_are_even_over_the_runs_and_in_the_image(variant):
+    for kind in PATTERNS:
+        assert kstest(pattern(kind, run=np.arange(4096, dtype=np.uint32)), "uniform").pvalue > 1e-4
+        one, other, later = pattern(kind), pattern(kind, run=1), pattern(kind, frame=1)
+        assert np.mean(one != other) > 0.99
+        assert np.mean(one != later) > 0.99
+        moved = pattern(kind, frame=3, golden=True) - one
+        np.testing.assert_allclose(moved % 1, 3 * (np.sqrt(5) - 1) / 2 % 1, atol=2**-22)
+    assert low_share(pattern("white")) > 0.8
+    assert low_share(pattern("blue")) < 0.1
+    nine = np.array([np.roll(pattern("ign"), (i, j), (0, 1)) for i in range(3) for j in range(3)])[:, 2:, 2:]
+    # The nine of any 3 x 3 pixels lie about evenly: the widest gap between white ones is 0.31 in the mean.
+    gaps = np.diff(np.sort(nine, axis=0), axis=0, append=np.sort(nine, axis=0)[:1] + 1)
+    assert np.mean(gaps.max(0)) < 0.2

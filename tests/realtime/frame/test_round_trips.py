@@ -47,6 +47,7 @@ WAITS: dict[str, tuple[tuple[str, ...], str, dict[str, int]]] = {
         SIDES,
         {"lamp": 2, "spot": 2, "sun": 2, "area": 2 * POINTS, "box": 2},
     ),
+    "equi-angular": (tuple(MOVES), READ, {"lamp": 1, "spot": 1, "area": 1, "box": 1}),
     "froxel-fog": (("light", "objects"), READ, {"area": 1}),
     "soft-shafts": (("light", "objects"), READ, {"area": 1}),
 }

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Equi-angular sampling: a few random samples a ray, each of one light chosen by its power.
+
+With N lights of the airlight L_i along a ray, a share q_i of the power and an even random angle theta between those of
+the ends of the ray at light i, x = foot + h tan theta,
+
+    L = sum_i L_i = E[ (theta_1 - theta_0) / q_i  dx/dtheta  f_i(x) ],        f_i the integrand with the visibility,
+
+is the mean of one sample: dx/dtheta / r^2 = 1/h leaves the product of exponential, phase and visibility, which is
+bounded (Kulla and Fajardo 2012, section 4). Sample k of S takes the share (k + c)/S of the power, c the shift of the
+pattern, and another place for each k, by the step of Roberts' sequence in one dimension of two; the mean of all stays
+the integral, since each sample alone is right in the mean.
+
+Lights of different structure (points, spots, samples of area lights) are in tables of their own, and one of each is
+sampled. Lights at infinity have one sample each, even in the distance.
+
+References
+----------
+Kulla, Fajardo 2012, *Importance sampling techniques for path tracing in participating media* (CGF 31:4).
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from realtime.methods.interface.marching import marched_steps
+from realtime.methods.interface.method import Layers, Method, View, animate
+from realtime.numerics.noise import PATTERNS
+from realtime.parameters import parameter
+from realtime.scene.light_table import light_tables
+from realtime.scene.lights import Light
+
+_STEP = 0.7548776662466927  # 1/g with g^3 = g + 1
+
+
+@dataclass(frozen=True)
+class EquiAngular(Method):
+    """Airlight by random samples along each ray.
+
+    References
+    ----------
+    Kulla, Fajardo 2012, section 4.
+    """
+
+    name = "equi-angular"
+    summary = "a few random samples a ray, each of one light chosen by its power: noisy, and right in the mean"
+    source = "Kulla and Fajardo 2012"
+    prepared_from = frozenset({"light", "look"})
+    uses_kernel = False
+    casts_rays = True
+    by_rays = True
+    at_once = True
+    noisy = True
+
+    samples: int = parameter(1, "samples of every ray", least=1)
+    jitter: str = parameter(
+        "white", "what draws them: white noise, a mask of blue noise, or interleaved gradient noise", choices=PATTERNS
+    )
+    animate: str = animate()
+
+    def preparation(self, scene):
+        """Return what makes tables of the lights."""
+        return lambda now: light_tables(now.lights)
+
+    def render(self, view, state, kernel):
+        """Return the airlight of every ray by chance [W/(m^2 sr)]."""
+        golden = self.animate == "golden"
+        place, choice = (view.pattern(self.jitter, golden=golden, stream=stream) for stream in (0, 1))
+        total = dr.zeros(type(view.medium.albedo), dr.width(view.pixel))
+        for light in view.lights:
+            if not light.w:
+                total += self._mean(lambda at, _, light=light: _sample(view, light, at), place, choice, total)
+        for table in state:
+
+            def picked(at: Any, share: Any, table: Any = table) -> Any:
+                number, probability = table.pick(share)
+                return _sample(view, table.light(number, view.lights[table.first]), at) / probability
+
+            total += self._mean(picked, place, choice, total)
+        return Layers(total)
+
+    def _mean(self, sample: Any, place: Any, choice: Any, like: Any) -> Any:
+        """Return the mean of samples, each a function of where it lies and of which light it takes, from 0 to 1."""
+        if self.samples == 1:
+            return sample(place, choice)
+        Float = type(place)
+
+        def step(number, total):
+            at = dr.fma(Float(number), _STEP, place)
+            return number + 1, total + sample(at - dr.floor(at), (Float(number) + choice) / self.samples)
+
+        _, total = dr.while_loop(
+            state=(mi.UInt32(0), dr.zeros(type(like), dr.width(place))),
+            cond=lambda number, total: number < self.samples,
+            body=step,
+            labels=("number", "total"),
+        )
+        return total / self.samples
+
+
+def _sample(view: View, light: Light, at: Any) -> Any:
+    """Return the radiance of one sample of a light, at a share of the angle at it [W/(m^2 sr)]."""
+    rays = view.lit_by(light)
+    span = marched_steps(rays, view.distance, 1, "equiangular")
+    x = span.place(dr.fma(at, span.width, span.begin))
+    lit = span.width > 0
+    if view.features.shadows:
+        lit &= view.visible(view.at(x), light)
+    return rays.radiance(dr.select(lit, rays.source(x) * (span.stretch(x) * span.width), 0))

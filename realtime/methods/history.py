@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`NAME+history`: any method with a mean over the frames before, which `realtime.frame.history` takes."""
+
+from dataclasses import dataclass, field, fields, make_dataclass
+
+from realtime.errors import InputError
+from realtime.methods.interface.method import Method
+from realtime.parameters import Parameters, defaults, parameter
+
+ENDING = "+history"
+
+
+@dataclass(frozen=True)
+class History(Parameters):
+    """How frames are averaged."""
+
+    alpha: float = parameter(0.1, "weight of the newest frame", above=0, most=1)
+    reproject: str = parameter(
+        "none",
+        "what the last frame showed in the same pixel, or where it saw the surface of the pixel",
+        choices=("none", "surface"),
+    )
+    clamp: str = parameter(
+        "none",
+        "values of the last frames as they are, in the range of the 3 x 3 pixels of the newest, or within one standard "
+        "deviation of their mean",
+        choices=("none", "range", "variance"),
+    )
+
+
+def with_history(method: type[Method]) -> type[Method]:
+    """Return a method that averages the airlight of its frames, with the parameters of `History` beside its own.
+
+    Raises InputError for a method that has parameters of these names.
+    """
+    own = [item.name for item in fields(History)]
+    taken = sorted(set(own) & set(defaults(method)))
+    if taken:
+        raise InputError(f"method {method.name}{ENDING}: the method has a parameter {taken[0]!r} of its own; rename it")
+
+    def history(self) -> History:
+        return History(*(getattr(self, name) for name in own))
+
+    what = {
+        "name": method.name + ENDING,
+        "summary": f"{method.summary}; averaged over the frames before",
+        "history": property(history),
+    }
+    added = [(item.name, item.type, field(default=item.default, metadata=item.metadata)) for item in fields(History)]
+    return make_dataclass("WithHistory", added, bases=(method,), frozen=True, namespace=what)
