@@ -5,6 +5,7 @@ What counts as noise is derived in `validation.statistics.noise`. A finding is w
 makes the comparison fail, and so does what disappeared: a method that is no longer measured is no longer guarded.
 """
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -116,7 +117,9 @@ def _methods(old: Report, new: Report, *, tolerance: float, gone: str) -> tuple[
             findings.append(Finding("note", name, label, "errors not compared: they are of different layers"))
         elif reason is None:
             for layer, key in (("", "error"), ("surface ", "surface_error")):
-                changes, count = _errors(old_entry.get(key), new_entry.get(key), tolerance, prefix=layer)
+                noisy = key == "error" and bool(old_entry.get("noise") and new_entry.get("noise"))
+                was, is_now = (_of_runs(each) if noisy else each.get(key) for each in (old_entry, new_entry))
+                changes, count = _errors(was, is_now, tolerance, prefix=layer)
                 findings += [Finding(v, name, label, what, a, b) for v, what, a, b in changes]
                 compared += count
             changes, count = _flip(old_entry, new_entry, tolerance)
@@ -146,8 +149,15 @@ def _incomparable(old: Report, new: Report) -> Finding | None:
 Change = tuple[str, str, float | None, float | None]  # verdict, what, old, new
 
 
+def _of_runs(entry: Report) -> Report:
+    """Return the errors of a method that draws random numbers: those of its runs, without quantiles of a single one."""
+    noise, error = entry["noise"], {name: entry["error"][name] for name in ("pixels", "nonfinite", "negative")}
+    of_runs = {f"relative_{name}": noise[name] for name in ("rmse", "bias", "rmse_within", "bias_within")}
+    return {**error, **of_runs}
+
+
 def _errors(old: Report | None, new: Report | None, tolerance: float, *, prefix: str) -> tuple[list[Change], int]:
-    """Compare the errors of a configuration in one layer."""
+    """Compare the errors of a configuration in one layer; what has an interval may differ by it too."""
     if old is None or new is None:
         return ([("worse", f"{prefix}error is gone", None, None)] if old else []), 0
     changes: list[Change] = []
@@ -159,6 +169,7 @@ def _errors(old: Report | None, new: Report | None, tolerance: float, *, prefix:
                 changes.append(("worse" if after is None else "better", what, before, after))
             continue
         band = error_band(name, before, tolerance=tolerance, pixels=old["pixels"], rmse=old.get("relative_rmse") or 0.0)
+        band += math.hypot(*(each.get(f"{name}_within", 0.0) for each in (old, new)))
         grown = abs(after) - abs(before)
         if abs(grown) > band:
             changes.append(("worse" if grown > 0 else "better", what, before, after))

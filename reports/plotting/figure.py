@@ -79,7 +79,10 @@ def show_picture(panel: "Axes", picture: Any, title: str = "", size: float = 6) 
 def speed_panel(
     panel: "Axes", title: str, entries: Iterable[Mapping[str, Any]], styles: Mapping[str, Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """Draw times of frames, with quartiles, against errors of methods that have both; return their points by label."""
+    """Draw times of frames, with quartiles, against errors of methods that have both; return their points by label.
+
+    Of a method that draws random numbers a bar goes down from its error to its bias, or to the most that it may be.
+    """
     points = {}
     for entry in entries:
         frame, error = (entry["times"] or {}).get("frame"), (entry["error"] or {}).get("relative_rmse")
@@ -87,6 +90,10 @@ def speed_panel(
             middle = frame["median_ms"]
             spread = [[middle - frame["low_ms"]], [frame["high_ms"] - middle]]
             style = {**styles[entry["label"]], "linestyle": "none"}
+            if noise := entry.get("noise"):
+                error = noise["rmse"]
+                bias = noise["most_bias"] if noise["root_bias"] is None else noise["root_bias"]
+                style["yerr"] = [[max(error - bias, 0.0)], [0.0]]
             points[entry["label"]] = panel.errorbar([middle], [error], xerr=spread, **style).lines[0]
     panel.set(xscale="log", yscale="log", xlabel="time of a frame [ms]")
     panel.set_title(title, parse_math=False)  # a dollar in a file name must not begin a formula

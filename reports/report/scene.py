@@ -26,7 +26,7 @@ _REFERENCE = "reference"  # the stem of the reference's files
 #: What report.json has of a row.
 _ENTRY = (
     *("label", "kind", "layer", "pixel", "method", "kernel", "knows_shadows", "status", "note", "device", "times"),
-    *("memory", "cost", "error", "surface_error", "flip"),
+    *("memory", "cost", "error", "noise", "surface_error", "flip"),
 )
 
 

@@ -67,7 +67,8 @@ def regression(sums: Array) -> tuple[Estimate, ...]:
     if not _told_apart(total[:-1, :-1]):
         return (UNKNOWN,) * unknowns
     found = np.linalg.solve(total[:-1, :-1], total[:-1, -1])
-    left = total - sums[[_told_apart(each) for each in (total - sums)[:, :-1, :-1]]]
+    left = total - held(sums)
+    left = left[[_told_apart(each) for each in left[:, :-1, :-1]]]
     return estimates(found, np.linalg.solve(left[:, :-1, :-1], left[:, :-1, -1:])[..., 0])
 
 
@@ -85,7 +86,16 @@ def relative_root(sums: Array, value: int, *, to: int, counted: int = 0, values:
 def _left_out(sums: Array) -> Array:
     """Return the products of all pixels, then those without each group."""
     total = sums.sum(axis=0)
-    return np.concatenate([total[None], total - sums])
+    return np.concatenate([total[None], total - held(sums)])
+
+
+def held(sums: Array) -> Array:
+    """Return the groups that hold something, to be left out in turn; none where one of them holds all.
+
+    The first column of a pixel that counts is not zero.
+    """
+    some = sums[sums[:, 0, 0] > 0]
+    return some if len(some) > 1 else some[:0]
 
 
 def estimates(found: Array, left_out: Array) -> tuple[Estimate, ...]:

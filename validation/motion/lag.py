@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear, minimize_scalar
 
-from validation.motion.blocks import BLOCK, UNKNOWN, Estimate, estimates, products
+from validation.motion.blocks import BLOCK, UNKNOWN, Estimate, estimates, held, products
 
 Array = NDArray[np.float64]
 
@@ -93,9 +93,9 @@ def filtered_frames(
 
 def fit_lag(cells: Cells) -> Lag:
     """Return the filter that makes the frames from their references, with errors from blocks that are left out."""
-    if not np.any(cells.weight):
-        return Lag()
     few = _few(cells)
+    if not np.any(few.weight):
+        return Lag()
     tried = [_best_persistence(few, delay) for delay in DELAYS]
     left = np.array([_left(few, persistence, delay) for persistence, delay in zip(tried, DELAYS, strict=True)])
     best = int(np.argmin(left.sum(axis=1)))
@@ -112,18 +112,16 @@ def fit_lag(cells: Cells) -> Lag:
 
 
 def _few(cells: Cells) -> Cells:
-    """Return some of the values of all frames, as a picture of one row, without the last frames.
+    """Return some of the values of all frames that count, as a picture of one row, without the last frames.
 
     Delays below zero look ahead: all delays are judged by the same frames.
     """
     frames = len(cells.test)
-    values = cells.test[0].size
-    chosen = np.random.default_rng(0).permutation(values)[:_SEARCHED]
+    counted = np.flatnonzero(cells.weight.any(axis=0))  # few are beside a lamp: of values by chance perhaps none
+    chosen = np.sort(np.random.default_rng(0).permutation(counted)[:_SEARCHED])
     reference, test, weight = (
-        each.reshape(frames, 1, values, 1)[:, :, np.sort(chosen)]
-        for each in (cells.reference, cells.test, cells.weight)
+        each.reshape(frames, 1, -1, 1)[:, :, chosen] for each in (cells.reference, cells.test, cells.weight)
     )
-    weight = weight.copy()
     weight[max(frames + min(DELAYS), 1) :] = 0.0
     return Cells(reference, test, weight, cells.mean, cells.start)
 
@@ -203,8 +201,9 @@ def _jackknife(sums: Array, persistence: float) -> tuple[Estimate, Estimate, Est
     unknowns = 3 if moves else 2
     found = np.array([*linear, persistence])[:unknowns]
     scale = np.array([1.0, 1.0, linear[1]])[:unknowns]
-    gradient = scale * (sums[:, :unknowns, 3] - sums[:, :unknowns, :2] @ linear)  # by group; their sum is zero
-    matrix = (total - sums)[:, :unknowns, :unknowns] * np.outer(scale, scale)
+    groups = held(sums)
+    gradient = scale * (groups[:, :unknowns, 3] - groups[:, :unknowns, :2] @ linear)  # by group; their sum is zero
+    matrix = (total - groups)[:, :unknowns, :unknowns] * np.outer(scale, scale)
     told = estimates(found, found - np.einsum("gij,gj->gi", np.linalg.pinv(matrix, hermitian=True), gradient))
     return told[0], told[1], told[2] if moves else UNKNOWN
 
@@ -224,7 +223,7 @@ def _impulse_response(cells: Cells, left: float) -> tuple[tuple[Estimate, ...], 
     still = total[np.ix_([0, 1, -1], [0, 1, -1])]
     none = float(still[2, 2] - still[:2, 2] @ np.linalg.lstsq(still[:2, :2], still[:2, 2], rcond=None)[0])
     described = min((none - left) / (none - least), 1.0) if none - least > _MOVES * total[-1, -1] else None
-    without = np.array([_positive_response(total - each)[0] for each in sums])
+    without = np.array([_positive_response(total - each)[0] for each in held(sums)])
     return estimates(found, without), described
 
 

@@ -191,7 +191,7 @@ def _second_pass(sequence: Sequence, first: _FirstPass, lag: Lag) -> Measures:
         if n == sequence.start[n]:
             window.clear()
         reference, frame = sequence.reference(n), sequence.frame(n)
-        window.append(reference)
+        window.append(reference.astype(np.float32))  # what ghosts are sums of: half of the memory and time
         frame = np.where(np.isfinite(frame), frame, reference)
         before, left = left, frame - offset - gain * light
         if not sequence.counts(n):
@@ -199,15 +199,14 @@ def _second_pass(sequence: Sequence, first: _FirstPass, lag: Lag) -> Measures:
         one = np.where(sequence.selected(n)[..., None], 1.0, 0.0) + np.zeros(3)
         if sequence.pair_counts(n):
             beside = beside + products(np.stack([one, (left - before) * one, reference * one]))
-        past = list(window)[::-1]
-        gone = [np.maximum(past[min(age, len(past) - 1)] - reference, 0.0) for age in range(1, AGES + 1)]
-        most = np.maximum.reduce(gone)
-        error = frame - reference
-        weight = one * scale
-        columns = [
-            (each * weight).astype(np.float32) for each in (np.full_like(error, mean), reference, most, *gone, error)
-        ]
-        ghosts = ghosts + products(np.stack(columns)).astype(np.float64)
+        error, here, count = frame - reference, window[-1], len(window)
+        columns = np.empty((AGES + 4, *here.shape), np.float32)
+        columns[0], columns[1], columns[-1] = mean, here, error
+        for age in range(1, AGES + 1):
+            columns[2 + age] = np.maximum(window[max(count - 1 - age, 0)] - here, 0)
+        most = columns[2] = columns[3:-1].max(axis=0)
+        columns *= one * scale
+        ghosts = ghosts + products(columns).astype(np.float64)
         there = one * (most > _TRAIL * mean)
         trail += [there.sum(), (there * error).sum(), (there * error**2).sum()]
     total = first.sums.sum(axis=0)

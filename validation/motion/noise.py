@@ -127,7 +127,9 @@ def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None
         raise InputError("runs: all are the same, bit by bit; wanted renders with a seed of their own each")
     flat = errors.reshape(count, -1)
     squared_bias, variance = parts_of_error(flat @ flat.T / flat.shape[1])
-    bias, interval = bias_interval(flat.mean(axis=1))
+    biases = flat.mean(axis=1)
+    bias, half = student(biases)
+    deviation = float(biases.std(ddof=1))
     noise = (errors - errors.mean(axis=0)) * math.sqrt(count / (count - 1))
     square = float(np.mean(noise**2))
     spectrum, low = _spectrum(noise)
@@ -138,9 +140,9 @@ def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None
         gains.append(math.sqrt(float(np.mean(apart**2)) / square) * 2 * math.sqrt(math.pi) * blur)
     return Noise(
         runs=count,
-        bias=bias,
-        bias_ci=interval,
-        detectable_bias=detectable(count) * (bias.error or 0.0) * math.sqrt(count),
+        bias=Estimate(bias, deviation / math.sqrt(count)),
+        bias_ci=(bias - half, bias + half),
+        detectable_bias=detectable(count) * deviation,
         squared_bias=squared_bias,
         variance=variance,
         relative_rmse=math.sqrt(float(np.mean(errors**2))),
@@ -184,12 +186,11 @@ def _blurred(errors: Array, deviation: float) -> Array:
     return np.array([gaussian_filter(each, (deviation, deviation, 0), mode="wrap") for each in errors])
 
 
-def bias_interval(biases: Array) -> tuple[Estimate, tuple[float, float]]:
-    """Return the mean of the biases of runs, and Student's interval of 95 %."""
-    count, mean = len(biases), float(biases.mean())
-    error = float(biases.std(ddof=1)) / math.sqrt(count)
-    half = float(t.ppf(1 - _LEVEL / 2, count - 1)) * error
-    return Estimate(mean, error), (mean - half, mean + half)
+def student(values: Array) -> tuple[float, float]:
+    """Return the mean of the values of runs, and half of its interval of 95 % by Student."""
+    count = len(values)
+    error = float(values.std(ddof=1)) / math.sqrt(count)
+    return float(values.mean()), float(t.ppf(1 - _LEVEL / 2, count - 1)) * error
 
 
 def detectable(runs: int) -> float:

@@ -57,6 +57,19 @@ class StatedError:
 
 
 @dataclass(frozen=True)
+class RunsError:
+    """Bias and error of a method that draws random numbers, from independent runs, relative to the reference's mean."""
+
+    runs: int = column("runs", "1", "independent renders of the frame")
+    bias: float = column("bias", "1", "mean over the runs")
+    bias_within: float = column("bias within", "1", "half of the 95 % interval of the bias")
+    rmse: float = column("rel. RMSE", "1", "of one run, mean over the runs")
+    rmse_within: float = column("RMSE within", "1", "half of the 95 % interval of that mean")
+    root_bias: float | None = column("bias by pixel", "1", "root of the squared bias, where two of its errors above 0")
+    most_bias: float = column("at most", "1", "root of the squared bias and two of its errors")
+
+
+@dataclass(frozen=True)
 class Cost:
     """What a cell cost beside the times of its frames."""
 
@@ -117,6 +130,7 @@ class Row:
         meaning="changes of the medium, 'medium.sigma_t=0.1' and so on; null for the scene's own", default=None
     )
     error: Metrics | None = None
+    noise: RunsError | None = None
     surface_error: Metrics | None = column("surface", meaning="of the lit surfaces", default=None)
     published: PublishedErrors | None = None
     normalised: PublishedErrors | None = column(

@@ -6,6 +6,7 @@ exceptions are the caller's: they are faults. Nothing here knows where it runs.
 """
 
 import json
+import math
 import shlex
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError as ReferenceInputError
 from realtime.errors import InputError
 from realtime.frame.renderer import Frame, FrameRenderer, light_groups, render_frame, run_stages, unchecked_frame
+from realtime.methods.interface.method import method_parameters
 from realtime.methods.registry import find_method
 from realtime.methods.shader.source import is_shader
 from realtime.numerics.recorded import Frozen
@@ -30,10 +32,11 @@ from validation.metrics.colour import colour_difference
 from validation.metrics.errors import FLOOR, error_metrics
 from validation.metrics.flip import flip_hdr
 from validation.metrics.other_tools import published_errors
+from validation.motion.noise import parts_of_error, student
 from validation.study.configuration import Configuration, prepared, rendered_lights
 from validation.study.frame_times import brief_times, shader_times, time_frame
 from validation.study.reference import Reference, load_cell
-from validation.study.row import Cost, Row, StatedError
+from validation.study.row import Cost, Row, RunsError, StatedError
 from validation.study.stated_errors import stated_bound, worth_of_ends
 from validation.study.study import Cell, map_side, seed_of
 
@@ -44,6 +47,7 @@ Apart = Callable[..., Any]
 Paint = Callable[[Array, Array], bytes | None]
 
 REFUSALS = (InputError, ReferenceInputError)  #: what methods and readers of scenes raise for what they cannot do
+RUNS = 8  #: of a method that draws random numbers
 PROBE = (64, 48)  #: size of the frame from which the time of a full-size frame is estimated [pixels]
 _DOUBTFUL = 0.5  # fraction of the limit: after a longer preparation, the time of a frame is estimated before it begins
 _RECORDED = 1.0  # in a first frame that takes less, its recording takes a part of time and memory that counts [s]
@@ -68,17 +72,21 @@ def run(
     lacks what only the caller knows: key, study, origin.
     """
     took = stopwatch()
-    if apart is not None and cell.chosen.own:
-        try:
-            row, frame = apart(render_cell, cell, name=cell.chosen.method)
-        except REFUSALS as error:
-            row, frame = cell_row(cell, status="refused", reason=str(error)), None
-    else:
-        row, frame = render(scene, cell, timed_scene=timed_scene)
+    runs: list[Array] = []
+    try:
+        if apart is not None and cell.chosen.own:
+            row, frame, runs = apart(render_cell, cell, name=cell.chosen.method)
+        else:
+            row, frame = render(scene, cell, timed_scene=timed_scene)
+            runs = [] if frame is None else _other_runs(scene, cell)
+    except REFUSALS as error:
+        row, frame = cell_row(cell, status="refused", reason=str(error)), None
     row = replace(row, reference=reference.own_error)
     if frame is None:
         return row, None
     row = replace(row, **_errors(cell, frame, scene, reference, whole))
+    if runs:
+        row = replace(row, noise=_runs_error(reference, [np.asarray(frame.airlight, dtype=np.float64), *runs]))
     if paint is not None:
         shown = np.asarray(frame.airlight, dtype=np.float64)
         # Pixels without a reference are shown as if they were right.
@@ -114,13 +122,15 @@ def cell_row(cell: Cell, **outcome: Any) -> Row:
     )
 
 
-def render_cell(cell: Cell) -> tuple[Row, Frame | None]:
-    """Render and time a cell in a process that has loaded nothing."""
+def render_cell(cell: Cell) -> tuple[Row, Frame | None, list[Array]]:
+    """Render and time a cell in a process that has loaded nothing; return the airlight of its other runs too."""
     larger = cell.measure.timed_size
     timed_scene = None
     if larger is not None and larger != cell.size:
         timed_scene = read_scene(load_cell(replace(cell, size=larger)).scene)
-    return render(read_scene(load_cell(cell).scene), cell, timed_scene=timed_scene)
+    scene = read_scene(load_cell(cell).scene)
+    row, frame = render(scene, cell, timed_scene=timed_scene)
+    return row, frame, [] if frame is None else _other_runs(scene, cell)
 
 
 def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> tuple[Row, Frame | None]:
@@ -169,6 +179,39 @@ def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> tup
         memory = peak_memory(again)
     times = time_frame(shown, seconds=wanted.seconds, slow=wanted.slow, took=took[-1] if took else None)
     return row_of(cost=cost, times=times, memory=memory, note="; ".join(notes) or None), frame
+
+
+def _other_runs(scene: Scene, cell: Cell) -> list[Array]:
+    """Return the airlight of further runs of a method that draws random numbers, (height, width, 3); of others none."""
+    parameters: dict[str, Any] = dict(cell.chosen.parameters)
+    if not method_parameters(find_method(cell.chosen.method), parameters)[0].noisy:
+        return []
+    renderer, rendered = prepared(scene, cell.chosen), render_frame if cell.measure.times == "stages" else _unchecked
+    frames = (rendered(replace(renderer, run=run)) for run in range(1, RUNS))
+    return [np.asarray(frame.airlight, dtype=np.float64) for frame in frames]
+
+
+def _runs_error(reference: Reference, runs: list[Array]) -> RunsError | None:
+    """Return bias and error of runs; None where they are the same, or nothing is relative to the reference."""
+    counts = np.isfinite(runs).all(axis=(0, 3))
+    counts &= True if reference.mask is None else reference.mask
+    expected = reference.airlight[counts]
+    mean = float(expected.mean()) if expected.size else 0.0
+    errors = np.array([(run[counts] - expected).ravel() for run in runs])
+    if not mean > 0 or (errors[1:] == errors[0]).all():
+        return None
+    errors /= mean
+    products = errors @ errors.T / errors.shape[1]
+    squared, _ = parts_of_error(products)
+    bias, rmse = (student(each) for each in (errors.mean(axis=1), np.sqrt(np.diag(products))))
+    root = max(squared.value or 0.0, 0.0)
+    return RunsError(
+        len(runs),
+        *bias,
+        *rmse,
+        math.sqrt(root) if squared.above(2) else None,
+        math.sqrt(root + 2 * (squared.error or 0.0)),
+    )
 
 
 def frame_of(cell: Cell) -> Frame:

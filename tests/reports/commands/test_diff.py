@@ -46,6 +46,19 @@ def test_the_status_and_the_json_say_what_is_worse(files, capsys):
     assert "wanted a mesh [obj] in [0, 1]" in capsys.readouterr().out  # brackets are words
 
 
+def test_errors_of_noisy_methods_are_compared_by_their_intervals():
+    """Two runs of eight differ by their intervals; a single run, and its quantiles, say nothing."""
+    runs = {"runs": 8, "rmse": 0.2, "rmse_within": 0.01, "bias": 1e-3, "bias_within": 2e-3}
+    reports = []
+    for rmse, single in ((0.2, 0.2), (0.21, 0.3), (0.25, 0.2)):
+        data = report()
+        method(data).update(noise=runs | {"rmse": rmse}, error=errors(single))
+        reports.append(data)
+    old, by_chance, other = reports
+    assert words(compare_reports(old, by_chance)) == []
+    assert [what.rpartition(" ")[2] for what in words(compare_reports(old, other))] == ["relative_rmse"]
+
+
 def test_options_choose_what_counts(files, capsys):
     gone = report()
     gone["scenes"] = gone["scenes"][:2]

@@ -3,11 +3,13 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from reports.page.chart import speed_error_chart
 from reports.page.filters import DASH
 from reports.page.render import SCRIPTS, render_page
+from reports.plotting.figure import speed_panel
 from reports.tables.methods import fastest_table
 from tests.helpers.page import DATA, Page, engine_image, report_data, write_files
 from tests.helpers.reports import growth_record, refused
@@ -125,6 +127,18 @@ def test_missing_values_are_dashes_and_failures_are_marked(data, folder):
         assert words in page.text
     marked = [tag for tag, attributes in page.tags if "bad" in (attributes.get("class") or "").split()]
     assert {"li", "td"} <= set(marked)
+
+
+def test_bars_of_noisy_methods_go_down_to_their_bias():
+    from matplotlib.figure import Figure
+
+    noise = {"rmse": 0.2, "root_bias": None, "most_bias": 0.05}
+    entries = [report_data()["scenes"][0]["methods"][0] | {"label": str(n)} for n in range(2)]
+    entries[1]["noise"] = noise
+    panel = Figure().subplots()
+    speed_panel(panel, "scene", entries, {"0": {}, "1": {}})
+    bars = [bar.get_segments() for bar in panel.collections if np.ptp(bar.get_segments()[0][:, 1])]
+    np.testing.assert_allclose(np.ravel([bar[0][:, 1] for bar in bars]), [0.05, 0.2])
 
 
 def test_the_chart_has_a_panel_for_each_scene_whatever_it_is_called():

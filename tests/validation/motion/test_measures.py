@@ -177,6 +177,20 @@ def test_histories_begin_at_resets():
     assert late.values == LIGHT[16:].size
 
 
+@pytest.mark.parametrize("counts", [range(FRAMES), range(FRAMES - 2, FRAMES)])
+def test_few_pixels_of_a_large_image_have_a_lag_where_it_can_be_told(counts):
+    """A mask beside a lamp has few pixels, perhaps in the last frames alone."""
+    light = np.tile(LIGHT[:, :, :, :1], (1, 10, 12, 1))[:, :240, :384] * np.ones(3)
+    frames = averaged(light)
+    beside, nowhere = np.zeros((2, 240, 384), dtype=bool)
+    beside[4:6, 20:22] = True
+    selected = lambda n: beside if n in counts else nowhere  # noqa: E731 - a mask by frame
+    found = measure(Sequence(FRAMES, frames.__getitem__, light.__getitem__, selected))
+    assert found.values == 12 * len(counts)
+    told = found.lag.persistence.value
+    assert told is None if len(counts) == 2 else told == pytest.approx(1 - WEIGHT, abs=1e-6)
+
+
 def test_values_that_are_not_finite_are_counted_and_left_out():
     frames = LIGHT.copy()
     frames[3, 5, 6, 0], frames[4, 1, 1] = np.nan, np.inf

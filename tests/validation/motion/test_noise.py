@@ -10,7 +10,7 @@ import pytest
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
 from validation.estimates.quadrature import truth_image
-from validation.motion.noise import bias_interval, compare_runs, detectable, measure_noise, parts_of_error
+from validation.motion.noise import compare_runs, detectable, measure_noise, parts_of_error, student
 from validation.scenes.loading import load_scene
 
 REFERENCE = np.linspace(0.5, 1.5, 24 * 32 * 3).reshape(24, 32, 3)
@@ -61,7 +61,8 @@ def test_a_bias_of_a_thousandth_is_found():
     random = np.random.default_rng(7)
     noise = sigma * random.normal(size=(trials, runs, *reference.shape))
     errors = noise.mean(axis=(2, 3, 4)) / reference.mean()  # of runs without a bias
-    intervals = [np.array([bias_interval(each + own)[1] for each in errors]) for own in (bias, 0.0)]
+    middle, half = np.array([student(each) for each in errors]).T
+    intervals = [np.stack([own + middle - half, own + middle + half], axis=1) for own in (bias, 0.0)]
     held = np.mean((intervals[0][:, 0] <= bias) & (bias <= intervals[0][:, 1]))
     found, false = (np.mean(np.prod(np.sign(ends), axis=1) > 0) for ends in intervals)
     assert 0.93 <= held <= 0.97  # 0.95 +- 0.007

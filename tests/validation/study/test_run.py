@@ -11,6 +11,7 @@ from scipy import stats
 
 from analytic.errors import InputError
 from realtime.memory import Memory
+from realtime.methods.unshadowed import unshadowed
 from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import read_scene
 from reports.commands.main import run as run_command
@@ -101,6 +102,28 @@ def test_times_are_left_out_where_nobody_asks():
     assert (row.status, row.times, row.medium) == ("done", None, "medium.sigma_t=0.3")
     assert row.stated.outside == 0  # nothing casts a shadow there, so the kernel's claim holds for whole rays
     assert row_of("windows", configuration("unshadowed"), Measure("none"))[0].stated is None
+
+
+def speckled(view, *, kernel=None):
+    """All of the airlight, times a random number of each ray from 0 to 2."""
+    return 2 * view.uniform()[0] * unshadowed(view, kernel=kernel)
+
+
+speckled.noisy = True
+
+
+@pytest.mark.usefixtures("variant")
+def test_a_row_of_a_noisy_method_has_the_errors_of_its_runs():
+    row, _ = row_of("open-fog", configuration(speckled), UNTIMED)
+    reference = cell_reference(load_cell(Cell("open-fog", SIZE, (), configuration("unshadowed")))).airlight
+    # A number even in [0, 2] has the variance 1/3.
+    rmse = np.sqrt(np.mean(reference**2) / 3) / reference.mean()
+    assert row.noise.runs == module.RUNS
+    assert abs(row.noise.rmse - rmse) < 2 * row.noise.rmse_within
+    assert abs(row.noise.bias) < 2 * row.noise.bias_within
+    assert row.noise.root_bias is None
+    assert row.noise.most_bias < 0.5 * rmse
+    assert row_of("open-fog", configuration("unshadowed"), UNTIMED)[0].noise is None
 
 
 @pytest.mark.claim("refusals-stand-in-the-report")
