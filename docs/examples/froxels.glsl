@@ -1,4 +1,4 @@
-// Froxels in three passes: what each cell scatters, blended with the last frame; its sum from the camera; a look-up.
+// Froxels in three passes: what each cell scatters, its sum from the camera on, a look-up.
 #pragma airlight set FAR 40.0 "depth of the last cell [m]"
 #pragma airlight pass scattered size=W/4xH/4x64 format=rgba16f
 #pragma airlight pass summed size=W/4xH/4x64 format=rgba32f

@@ -229,6 +229,8 @@ def checked_configuration(method: Any, kernel: Any = None, parameters: Any = Non
 
     Such code is imported in a process of its own, never here.
     """
+    from realtime.methods.shader.source import is_shader
+    from reports.machine.opengl import require_opengl
     from validation.study.configuration import Configuration, configuration
 
     if isinstance(method, Configuration):
@@ -236,6 +238,8 @@ def checked_configuration(method: Any, kernel: Any = None, parameters: Any = Non
         if given:
             raise InputError(f"{' and '.join(given)}: a configuration has its own; leave that out")
         return method, method.own
+    if isinstance(method, str) and is_shader(method):
+        require_opengl()
     name = kernel_name(kernel)
     apart = (isinstance(method, str) and ":" in method) or (isinstance(kernel, str) and ":" in kernel)
     if not apart:

@@ -154,7 +154,7 @@ def diagnose() -> dict[str, Any]:
     import platform
 
     libraries = find_llvm()
-    cuda, optix, atomic, opengl = cuda_status(), optix_status(), atomic_problem(), opengl_status()
+    cuda, optix, atomic = cuda_status(), optix_status(), atomic_problem()
     variant, used, problem, kernel = None, None, None, None
     try:
         prepared = prepare()
@@ -163,6 +163,7 @@ def diagnose() -> dict[str, Any]:
         problem = kernel.pop("problem", None)
     except MissingError as error:
         problem = str(error)
+    opengl = opengl_status(judged=problem is None)
     return {
         "works": problem is None,
         "problem": problem,
@@ -184,7 +185,7 @@ def diagnose() -> dict[str, Any]:
         "libatomic": {"works": not atomic, "reason": atomic or "can be loaded"},
         "cuda": {"works": cuda.works, "reason": cuda.reason},
         "optix": {"works": optix.works, "reason": optix.reason},
-        "opengl": {"works": opengl.works, "reason": f"{opengl.device}, {opengl.reason}".lstrip(", ")},
+        "opengl": {"works": opengl.works, "reason": opengl.reason},
         "variant": variant,
         "kernel": kernel,
     }

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""OpenGL, which draws the shaders of users: whether it is there, and what to install."""
+"""OpenGL, which draws the shaders of users: whether it is there, whether it is right, and what to install."""
 
 from dataclasses import dataclass
+from functools import cache
 
 from realtime.errors import NoDriverError
 from realtime.methods.shader.client import ShaderHost
@@ -15,20 +16,42 @@ class OpenGl:
     """What draws shaders here."""
 
     works: bool
-    device: str  #: its name; empty where there is none
-    reason: str  #: its version, or why there is none and what to do
+    reason: str  #: device, version and its error on certified integrals, or why there is none and what to do
 
 
-def opengl_status() -> OpenGl:
-    """Start OpenGL in a process of its own."""
+def opengl_status(*, judged: bool = True) -> OpenGl:
+    """Start OpenGL in a process of its own, and judge it the first time that it is met.
+
+    Not `judged` is for machines on which Mitsuba cannot be imported.
+    """
     host = ShaderHost("OpenGL")
     try:
         said, _ = host.ask("open", stages=[])
+        device = f"{said['device']}, {said['version']}"
+        if not judged:
+            return OpenGl(True, device)
+        from reference.storage.kept import kept, key_of
+        from reports.machine.driver_check import LARGEST, driver_error
+
+        key = key_of("shader-driver", "reports.machine.driver_check", device=device)
+        wrong = float(kept(key, lambda: {"error": driver_error(host)}).arrays["error"])
     except NoDriverError as error:
-        return OpenGl(False, "", str(missing(str(error))))
+        return OpenGl(False, str(missing(str(error))))
     finally:
         host.end()
-    return OpenGl(True, said["device"], said["version"])
+    words = f"{device}: the kernel `exact` errs by {wrong:.1e} at most on certified integrals"
+    if not wrong <= LARGEST:
+        return OpenGl(False, f"{words}, more than {LARGEST:g}; LIBGL_ALWAYS_SOFTWARE=1 draws on the processor")
+    return OpenGl(True, words)
+
+
+@cache
+def require_opengl() -> str:
+    """Return what draws shaders here, with its error; raise MissingError where nothing does, or wrongly."""
+    status = opengl_status()
+    if not status.works:
+        raise MissingError(status.reason)
+    return status.reason
 
 
 def missing(why: str) -> MissingError:

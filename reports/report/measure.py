@@ -18,12 +18,14 @@ from typing import TYPE_CHECKING, Any
 
 from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
+from realtime.methods.shader.source import is_shader
 from reference.storage.files import NO_SPACE, ensure_folder
 from reference.storage.kept import fresh_results
 from reports.data.claims import claims, growth_claims, unstudied
 from reports.data.own_faults import own_fault
 from reports.data.reader import SCHEMA, report_text
 from reports.machine.environment import describe_environment, machine, threads
+from reports.machine.opengl import require_opengl
 from reports.machine.own_process import EndedError, in_own_process
 from reports.machine.progress import Progress, part_of
 from reports.page.render import render_page
@@ -77,6 +79,8 @@ def write_report(
 
         sizes = {name: images_size(tuple(several)) for name, several in shown.items()}
     environment, start = describe_environment(), time.monotonic()
+    if any(is_shader(chosen.method) for chosen in study.configurations):
+        environment["opengl"] = require_opengl()
     process = in_own_process if apart else None
     seconds = dict.fromkeys(("scenes", "stability", "scaling", "papers"), 0.0)
     with _timed(seconds, "scenes"):

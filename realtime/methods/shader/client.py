@@ -15,8 +15,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from realtime.errors import InputError, NoDriverError
 
 _LIMIT, LIMIT_VARIABLE = 300.0, "AIRLIGHT_METHOD_LIMIT"  # that a user's method may take for one scene or command [s]
@@ -53,6 +51,8 @@ class ShaderHost:
         InputError
             If it ended, or did not answer in time.
         """
+        import numpy as np  # here: whoever prints help has this module too
+
         packed = io.BytesIO()
         words = np.array(json.dumps(message | {"kind": kind}))
         np.savez(packed, message=words, **(arrays or {}))
