@@ -19,7 +19,6 @@ from validation.metrics.flip import Flip, flip_hdr
 from validation.metrics.other_tools import PublishedErrors, published_errors
 from validation.statistics.comparison import Estimate, Statistics, compare_statistics
 
-STOPS = 200.0  #: the largest exposure, more than float32 images can need
 _ORDER = re.compile(r"airlight_\d+(_(\d+|inf))?")
 BATCHES = "airlight:batches"  #: header attribute: how many batch means gave the standard errors
 
@@ -95,7 +94,6 @@ def compare_images(
     margin: float | None = None,
     all_metrics: bool = False,
     flip: bool = False,
-    exposure: float | None = None,
     names: tuple[str, str] = ("the reference", "the test image"),
 ) -> Comparison:
     """Compare a layer of two images whose errors are independent, `total` for the plain channels.
@@ -105,13 +103,9 @@ def compare_images(
 
     The mask says which pixels to compare, (height, width) of truth values. The `margin` is the largest relative bias
     that counts as agreement; it wants standard errors. `all_metrics` adds the errors by the formulae of other tools and
-    the colour differences, `flip` HDR-FLIP, what goes wrong with which is a note. The exposure of these two [stops] is
-    chosen from the reference by default. Messages call the images by their `names`.
+    the colour differences, `flip` HDR-FLIP, what goes wrong with which is a note. Messages call the images by their
+    `names`.
     """
-    if exposure is not None and not (all_metrics or flip):
-        raise InputError("an exposure is for the colour differences and FLIP; ask for all metrics or for FLIP too")
-    if exposure is not None and not abs(exposure) <= STOPS:
-        raise InputError(f"exposure: got {exposure:g} stops, wanted -{STOPS:g} to {STOPS:g}")
     expected, tested = (_estimate(path, image, layer) for path, image in zip(names, (reference, test)))
     metrics = error_metrics(expected.mean, tested.mean, mask=mask)
     statistics = None
@@ -137,8 +131,8 @@ def compare_images(
         masked=0 if mask is None else int((~np.asarray(mask)).sum()),
         errors=published_errors(*images, mask=mask) if all_metrics else None,
         errors_normalised=published_errors(*images, mask=mask, unit=None) if all_metrics else None,
-        colour=colour_difference(*images, mask=mask, exposure=exposure) if all_metrics else None,
-        flip=flip_hdr(*images, mask=mask, exposure=exposure)[0] if flip else None,
+        colour=colour_difference(*images, mask=mask) if all_metrics else None,
+        flip=flip_hdr(*images, mask=mask)[0] if flip else None,
     )
 
 

@@ -201,7 +201,6 @@ def compare_scene(
     margin: float | None = None,
     all_metrics: bool = False,
     flip: bool = False,
-    exposure: float | None = None,
     progress: Progress | None = None,
 ) -> EngineComparison:
     """Compare an EXR file with the truth of a scene at the file's size.
@@ -215,7 +214,7 @@ def compare_scene(
     pixel
         'centre' or 'area', see `reference.quadrature.image.quadrature_image`; by default what the image says of itself,
         or what fits.
-    mask, all_metrics, flip, exposure
+    mask, all_metrics, flip
         See `validation.comparison.images.compare_files`.
     margin
         Largest relative bias [1] that counts as agreement; with standard errors, what they can show counts.
@@ -235,7 +234,6 @@ def compare_scene(
         margin=margin,
         all_metrics=all_metrics,
         flip=flip,
-        exposure=exposure,
     )
 
 

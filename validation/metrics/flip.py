@@ -7,7 +7,6 @@ no answer for, so it runs in a child process with a time limit, and what it woul
     NaN, infinities, negative values   no FLIP, a note: it takes them in silence
     a black reference                  no FLIP, a note: it ends the process that asks
     one channel                        three equal ones: it takes one against three and returns some number
-    one exposure                       given as twice the same: for a single one it returns 0
 
 A missing package, a crash, a time-out or nonsense for an answer is a note too. FLIP is a number beside others, never a
 reason to call a comparison failed.
@@ -72,7 +71,7 @@ class Flip:
 
 
 def flip_hdr(
-    reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike | None = None, exposure: float | None = None
+    reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike | None = None
 ) -> tuple[Flip, NDArray[np.float32] | None]:
     """Return HDR-FLIP of two images, through `flip-evaluator` in a child process (see the module), and its map.
 
@@ -80,11 +79,8 @@ def flip_hdr(
 
     Radiances [W/(m^2 sr)] are (height, width) or (height, width, 1) for grey, or (height, width, 3) in linear sRGB.
     Pixels that the mask leaves out, (height, width), show the reference in both images, black where that cannot be
-    shown, so that they add nothing to their neighbours either. An `exposure` [stops] takes the place of the range of
-    `exposure_range`.
+    shown, so that they add nothing to their neighbours either.
     """
-    if exposure is not None and not np.isfinite(exposure):
-        raise InputError(f"exposure: got {exposure}, wanted a number of stops such as -2, or none to choose a range")
     ref, tst, chosen = compared(reference, test, mask)
     ref, tst = colours(ref), colours(tst)
     note = _unanswerable(ref[chosen], tst[chosen])
@@ -98,7 +94,8 @@ def flip_hdr(
         scaled_reference, scaled_test = (np.ldexp(image, -shift).astype(np.float32) for image in (ref, tst))
     if not np.isfinite(scaled_test).all():
         return Flip(None, "the test image is brighter than the reference by more than float32 holds"), None
-    start, stop = exposure_range(scaled_reference[chosen]) if exposure is None else (exposure + shift,) * 2
+    start, stop = exposure_range(scaled_reference[chosen])
+    # Of a single exposure it returns 0.
     count = max(2, int(np.ceil(stop - start)))
     inputs = {"start": start, "stop": stop, "count": count, "ppd": PIXELS_PER_DEGREE}
     answer = _in_child(inputs | {"reference": scaled_reference, "test": scaled_test})
