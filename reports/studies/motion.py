@@ -17,6 +17,7 @@ def motion(
     stimulus: Literal["sweep", "step"] = "sweep",
     frames: int = 24,
     turn: int = 120,
+    runs: int = 4,
     method: Methods = (),
     kernel: Kernels = (),
     settings: Values = (),
@@ -38,8 +39,10 @@ def motion(
         How many are rendered.
     turn
         Frames of a whole turn in a sweep.
+    runs
+        Of a method that draws random numbers.
     method, kernel, settings
-        As in `airlight study methods`; planes, and froxels with and without history, by default.
+        As in `airlight study methods`; planes, froxels with and without history, a noisy march with it, by default.
     size
         Width and height [pixels], or WxH.
     progress
@@ -62,6 +65,7 @@ def motion(
             stimulus=stimulus,
             frames=frames,
             turn=turn,
+            runs=runs,
             progress=counted(tell),
         )
     columns = (
@@ -71,7 +75,7 @@ def motion(
         *words("verdict"),
     )
     title = f"{loaded.name}, {frames} frames of a {stimulus}: errors relative to the mean of the references"
-    data = with_environment(scene=loaded.name, stimulus=stimulus, frames=frames, turn=turn, rows=rows)
+    data = with_environment(scene=loaded.name, stimulus=stimulus, frames=frames, turn=turn, runs=runs, rows=rows)
     return Study(
         name="motion", data=data, drawn=(table(title, columns, rows),), rows=tuple(rows), draw=partial(_draw, rows)
     )

@@ -30,7 +30,7 @@ from validation.engine.judged_layer import JudgedLayer, expected_layer, judged_l
 from validation.engine.seen import PIXELS, Progress, pixel_kinds, scene_of_size
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import plain
-from validation.motion.blocks import told
+from validation.motion.blocks import BLOCK, told
 from validation.motion.frames_file import FramesRecord, frame_paths, read_frames
 from validation.motion.measures import AGES, Measures, Sequence, measure
 from validation.scenes.loading import load_scene
@@ -266,18 +266,20 @@ class _Frames:
 
     def sequence(self, mask: str) -> Sequence:
         """Return the sequence with the pixels of a mask."""
-        everywhere = np.ones_like(self._beside[0])
-        chosen = {
-            "all": lambda n: everywhere,
-            "disoccluded": lambda n: self._uncovered[n],
-            "rest": lambda n: ~self._uncovered[n],
-            "beside a lamp": lambda n: self._beside[n],
-        }
+        everywhere = np.ones_like(self._beside)
+        masks = {"all": everywhere, "disoccluded": self._uncovered, "rest": ~self._uncovered}
+        selected = masks.get(mask, self._beside)
+        # The pixels beside a lamp are few: of the files only the blocks that have some are read.
+        rows, columns = (_blocks(selected.any(axis=axes)) for axes in ((0, 2), (0, 1)))
+
+        def read(name: str) -> Array:
+            return np.array(np.load(self._folder / name, mmap_mode="r")[rows, columns])
+
         return Sequence(
             self._record.frames,
-            lambda n: np.load(self._folder / f"frame-{n}.npy"),
-            lambda n: np.load(self._folder / f"reference-{self._shown[n]}.npy"),
-            chosen[mask],
+            lambda n: read(f"frame-{n}.npy"),
+            lambda n: read(f"reference-{self._shown[n]}.npy"),
+            lambda n: selected[n, rows, columns],
             self._record.resets,
         )
 
@@ -292,6 +294,12 @@ class _Frames:
         row, column, inside = _pixel_of(before, points)
         hidden = there[row, column] < _HIDDEN * np.linalg.norm(points - before.origin, axis=1)
         self._ages = np.where(~inside | hidden, 0.0, self._ages[row, column] + 1).reshape(distance.shape)
+
+
+def _blocks(some: Bools) -> slice:
+    """Return the rows, or columns, from the first of the blocks that have some to the last."""
+    places = np.flatnonzero(some) if some.any() else np.zeros(1, dtype=int)
+    return slice(places[0] // BLOCK * BLOCK, (places[-1] // BLOCK + 1) * BLOCK)
 
 
 def _pixel_of(truth: TruthScene, points: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Bools]:

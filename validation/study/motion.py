@@ -2,10 +2,13 @@
 """Methods under a light that moves: the frames of each against the reference of each frame.
 
 In a sweep the lights circle as in the animation of the scene; in a step they stand for `BEFORE` frames, then jump. A
-method that keeps something of its last frames gets it, as in `airlight render --frames`.
+method that keeps something of its last frames gets it, as in `airlight render --frames`. Methods that draw random
+numbers are rendered in several runs: their numbers are means over these, with errors from the spread of the runs.
 """
 
+import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import islice
 from typing import Any
 
@@ -13,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from realtime.frame.renderer import FrameRenderer
 from realtime.scene.read_scene import Scene, read_scene
 from validation.estimates.quadrature import truth_image
 from validation.motion.judge import motion_verdict
@@ -31,6 +35,7 @@ USUAL = (
     Configuration("shadow-planes", "exact"),
     Configuration("froxel-fog", None),
     Configuration("froxel-fog+history", None, (("alpha", 0.1),)),
+    Configuration("ray-march+history", None, (("steps", 16), ("jitter", "white"), ("alpha", 0.1))),
 )
 BEFORE = 8  #: frames at rest before a step
 _JUMP = 12  # of a turn, that a step is
@@ -44,13 +49,17 @@ def method_motion(
     stimulus: str = "sweep",
     frames: int = 24,
     turn: int = 120,
+    runs: int = 4,
     progress: Progress | None = None,
 ) -> list[dict[str, Any]]:
     """Return a row for each configuration: its name, its measures by name, and the verdict.
 
     `scene`: the `mi.Scene`, at its own size; `animation`: that of the scene, of which the lights move; `turn`: frames
-    of a whole turn of a sweep. Raises InputError for a scene whose lights do not move, and too few frames.
+    of a whole turn of a sweep; `runs`: of a method that draws random numbers. Raises InputError for a scene whose
+    lights do not move, and too few frames or runs.
     """
+    if runs < 2:
+        raise InputError(f"runs: got {runs}, wanted at least two")
     least = BEFORE + 2 if stimulus == "step" else 3
     if frames < least:
         raise InputError(f"frames: got {frames}, wanted at least {least} for a {stimulus}")
@@ -65,11 +74,27 @@ def method_motion(
     for number, chosen in enumerate(configurations):
         if progress is not None:
             progress(frames * (1 + number), total, chosen.label)
-        images = method_frames(read, chosen, places)
-        found = measure(Frames(frames, images.__getitem__, references.__getitem__, lambda n: everywhere))
-        words = "the reference is dark" if found is None else motion_verdict(found).words
-        rows.append({"label": chosen.label, "verdict": words} | ({} if found is None else found.to_json()))
+        renderer = prepared(read, chosen)
+        several = []
+        for run in range(runs if renderer.method.noisy else 1):
+            images = method_frames(replace(renderer, run=run), places)
+            several.append(measure(Frames(frames, images.__getitem__, references.__getitem__, lambda n: everywhere)))
+        found = [each for each in several if each is not None]
+        words = motion_verdict(found[0]).words if found else "the reference is dark"
+        rows.append(
+            {"label": chosen.label, "verdict": words} | (_mean([each.to_json() for each in found]) if found else {})
+        )
     return rows
+
+
+def _mean(runs: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the means over runs of what has an error, with errors from their spread; the rest is that of the first."""
+    found = dict(runs[0])
+    for name in [name for name in found if f"{name}_se" in found] if len(runs) > 1 else []:
+        values = [each[name] for each in runs]
+        if None not in values and not isinstance(values[0], list):
+            found |= {name: float(np.mean(values)), f"{name}_se": float(np.std(values, ddof=1) / math.sqrt(len(runs)))}
+    return found
 
 
 def light_references(
@@ -93,9 +118,9 @@ def light_references(
     return references
 
 
-def method_frames(read: Scene, chosen: Configuration, places: Sequence[Scene]) -> list[Array]:
+def method_frames(renderer: FrameRenderer, places: Sequence[Scene]) -> list[Array]:
     """Return the airlight of a method in each frame, which gets what the frame before leaves, (height, width, 3)."""
-    renderer, kept, images = prepared(read, chosen), None, []
+    kept, images = None, []
     for place, last in zip(places, (None, *places), strict=False):
         moved = {"camera_moved": False, "geometry_moved": False, "light_moved": place is not last}
         frame, kept, _ = timed_image(renderer, place, kept, **moved)

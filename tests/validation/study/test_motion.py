@@ -25,6 +25,14 @@ def test_a_history_lags_by_its_weight_and_planes_do_not(variant):
     np.testing.assert_array_equal(np.array(loaded.scene.emitters()[0].world_transform().matrix), before)
 
 
+def test_a_noisy_march_with_history_is_measured_in_several_runs(variant):
+    loaded = load_scene("open-fog", (32, 24))
+    (row,) = method_motion(loaded.scene, loaded.animation, [USUAL[3]], frames=16, turn=240, runs=3)
+    # Of 0.1 for the newest frame 9 frames are expected; errors are those of three runs, Student's 2 degrees.
+    assert abs(row["lag"] - 9) < 0.5 + 10 * row["lag_se"]
+    assert 0 < row["bias_se"] < row["relative_rmse"]
+
+
 def test_what_does_not_move_is_refused(variant):
     loaded = load_scene("penumbra-plane", (16, 12))
     with pytest.raises(InputError, match="lights with extent"):
