@@ -6,15 +6,14 @@ import copy
 import pytest
 
 from tests.evidence import baselines
-from tests.evidence.baselines import FOLDER, compare_baseline, measure_baseline, read_baseline, updated
-from validation.scenes.registry import FOG_SCENES
+from tests.evidence.baselines import FOLDER, SCATTER_ONCE, compare_baseline, measure_baseline, read_baseline, updated
 
 QUICK = ("open-fog", "sphere-spot")  # every method and every kernel; the other scenes take longer
 
 
 @pytest.mark.claim("baselines", tolerance="the band of each number in its baseline")
 @pytest.mark.parametrize(
-    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in FOG_SCENES]
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in SCATTER_ONCE]
 )
 def test_errors_are_those_of_the_baseline(name, variant):
     moves = compare_baseline(read_baseline(name), measure_baseline(name))
@@ -43,8 +42,8 @@ def test_a_fault_of_a_thousandth_is_found(monkeypatch, variant):
 
 
 def test_every_scene_has_a_baseline_and_every_baseline_its_scene():
-    assert {path.stem for path in FOLDER.glob("*.json")} == set(FOG_SCENES)
-    for name in FOG_SCENES:
+    assert {path.stem for path in FOLDER.glob("*.json")} == set(SCATTER_ONCE)
+    for name in SCATTER_ONCE:
         data = read_baseline(name)
         assert data["scene"] == name
         assert data["because"]
