@@ -59,6 +59,7 @@ class LiveScene:
         self._cache: FrameCache | None = None
         self._other_method = False
         self._moved = {"camera_moved": False, "light_moved": False}
+        self.begin_mean()
         self._renderers.clear()
         self._surfaces.clear()
 
@@ -73,8 +74,18 @@ class LiveScene:
 
     @property
     def goes_on(self) -> bool:
-        """Whether a frame builds on the last one, so that frames differ while nothing moves."""
-        return self.renderer.method.carries
+        """Whether frames differ while nothing moves: they build on the last one, or draw random numbers."""
+        return self.renderer.method.carries or self.renderer.method.noisy
+
+    def begin_mean(self) -> None:
+        """Forget the mean of the frames of a method that draws random numbers: from now on they show another thing."""
+        self._sum: Any = None
+        self.summed = 0  # frames
+
+    def mean(self, shown: Shown) -> Shown:
+        """Return the last frame with the mean airlight of the frames of a noisy method since something changed."""
+        distance, surface, airlight = shown.stages
+        return replace(shown, stages=(distance, surface, self._sum / self.summed if self.summed else airlight))
 
     def choose(self, chosen: Configuration) -> float:
         """Render by another configuration from now on; return what its preparation takes [ms].
@@ -151,7 +162,11 @@ class LiveScene:
         dr.sync_thread()
         self._other_method = False
         self._moved = dict.fromkeys(self._moved, False)
-        return Shown(stages, 1e3 * (time.perf_counter() - begin), times)
+        shown = Shown(stages, 1e3 * (time.perf_counter() - begin), times)
+        if self.renderer.method.noisy:
+            self._sum, self.summed = stages[2] + (0 if self._sum is None else self._sum), self.summed + 1
+            dr.eval(self._sum)
+        return shown
 
     def on_host(self, shown: Shown) -> Frame:
         """Bring a frame to the host in the order of the image."""

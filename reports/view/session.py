@@ -191,6 +191,7 @@ class Session:
 
     def _touch(self) -> None:
         self._changed_at = time.perf_counter()
+        self.live.begin_mean()
         self._wanted = _GOES_ON if self.live.goes_on else 1
 
     def _do(self, page: Page, message: Mapping[str, Any]) -> None:
@@ -283,6 +284,7 @@ class Session:
             self._wanted, self._show["run"], self._asked_at = 0, False, None
             return
         self._shown, self._wanted = shown, max(self._wanted - 1, 0)
+        self._news |= self.live.summed > 0
         if by_stage:
             self._stages = shown.stages_ms
         begin = time.perf_counter()
@@ -324,12 +326,19 @@ class Session:
             page.tell("error", failure=self.reference.failure)
             return
         try:
-            frame = self.live.on_host(shown)
+            frame, mean = (self.live.on_host(each) for each in (shown, self.live.mean(shown)))
         except (InputError, MethodError) as mistake:
             page.tell("error", failure=" ".join(str(mistake).split()))
             return
-        error = view_error(found, frame.airlight)
-        page.tell("error", failure="", error=plain(asdict(error)) if error else None, done=self.reference.done)
+        error, left = (view_error(found, each.airlight) for each in (frame, mean))
+        page.tell(
+            "error",
+            failure="",
+            error=plain(asdict(error)) if error else None,
+            done=self.reference.done,
+            frames=self.live.summed,  # that the mean is of; 0 for a method whose frames are all the same
+            mean=plain(left.relative_rmse) if left else None,
+        )
         if error is None or self._show["other"] == "none":
             return
         if self._show["other"] == "error":

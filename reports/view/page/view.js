@@ -107,7 +107,7 @@ const tellTimes = (said) => {
 
 const percent = (share) => `${(100 * share).toPrecision(3)} %`;
 const small = (share) => `${(100 * share).toExponential(1)} %`;
-hear.error = ({failure, error, done}) => {
+hear.error = ({failure, error, done, frames, mean}) => {
   const words = $("#error");
   document.documentElement.dataset.reference = failure ? "failed" : done ? "done" : error ? "known" : "none";
   if (failure) words.textContent = `No reference: ${failure}`;
@@ -117,7 +117,8 @@ hear.error = ({failure, error, done}) => {
     const interval = error.known === error.pixels ? "" : ` ± ${percent(error.interval)}`;
     words.textContent = `Error of the airlight against the reference: RMSE ${percent(error.relative_rmse)}${interval}, ` +
       `bias ${percent(error.relative_bias)} of the mean; 99 % of pixels within ${percent(error.p99)}; ${part}; ` +
-      `the reference's own bound ${small(error.bound)}.`;
+      `the reference's own bound ${small(error.bound)}.` +
+      (frames ? ` Mean of ${frames} frames at rest: RMSE ${percent(mean)}.` : "");
     document.documentElement.dataset.rmse = error.relative_rmse;
   }
   $("#known").value = error ? error.known / error.pixels : 0;
