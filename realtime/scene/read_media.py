@@ -295,7 +295,7 @@ def _require_constant(medium, *coefficients: str) -> None:
 
 def _check_albedo(albedo) -> None:
     if np.any(albedo > 1 + 1e-6):
-        raise InputError(f"the medium's albedo is {albedo.tolist()}; wanted values from 0 to 1")
+        raise InputError(f"the medium's albedo is {np.round(albedo, 6).tolist()}; wanted values from 0 to 1")
 
 
 def _is_height_fog(medium) -> bool:

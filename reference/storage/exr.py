@@ -112,7 +112,8 @@ def layer_names(image: Image) -> str:
     if image.layers:
         return ", ".join(sorted(image.layers))
     note = str(image.attributes.get(NOTE, ""))
-    return "no layer of colours at all" + (f" ({note}); write it in half or float" if _INTEGERS in note else "")
+    why = f" ({note})" if note else ""
+    return f"no layer of colours at all{why}" + ("; write it in half or float" if _INTEGERS in note else "")
 
 
 def write_exr(path: str | os.PathLike[str], image: Image, *, finite: bool = True) -> None:
@@ -378,8 +379,8 @@ def _image(channels: dict[str, NDArray[Any]], header: dict[str, Any], window: Wi
         colours = {_COLOURS[suffix.lower()]: key for suffix, key in group.items() if suffix.lower() in _COLOURS} | group
         if {"R", "G", "B"} <= colours.keys():
             keys = [colours[suffix] for suffix in "RGB"]
-        elif "Y" in group and group.keys() <= {"Y", "A", "Z"}:
-            keys = [group["Y"]] * 3
+        elif (grey_key := group.get("Y", group.get("y"))) and group.keys() <= {"Y", "y", "A", "Z"}:
+            keys = [grey_key] * 3
             grey.append(name or TOTAL)
         else:
             continue

@@ -117,6 +117,18 @@ def test_layer_names_what_is_there_and_the_nearest(image):
         layer(Image({}), "airlight")
 
 
+@pytest.mark.parametrize(("name", "read"), [("Y", True), ("y", True), ("luminance", False), ("R", False)])
+def test_a_lone_channel_is_grey_or_named_in_what_is_refused(tmp_path, name, read):
+    pixels = np.full((3, 4), 0.7, np.float32)
+    write_raw(tmp_path / "a.exr", {name: pixels})
+    image = read_exr(tmp_path / "a.exr")
+    if read:
+        np.testing.assert_array_equal(image.layers["total"], np.stack([pixels] * 3, axis=-1))
+    else:
+        with pytest.raises(InputError, match=rf"no layer of colours at all \(channels left out: {name}\)"):
+            layer(image, "")
+
+
 def test_reads_plain_half_images_and_says_so(tmp_path):
     # Thirds are not half floats; the file holds their roundings.
     thirds = (np.arange(12, dtype=np.float32).reshape(3, 4) / 3).astype(np.float16)

@@ -197,6 +197,12 @@ REFUSED: dict[str, tuple[Any, ...]] = {
         {"media": medium('<string name="material" value="skimmilk"/>')},
     ),
     "medium 'fog' has a density.*sigma_t": ({"media": medium('<float name="density" value="2"/>')},),
+    'remove it: <rgb name="sigma_t" value="0.62"/>': (
+        {"media": medium('<float name="density" value="2"/><float name="sigma_t" value="0.31"/>')},
+    ),
+    "'skimmilk' of Mitsuba 0.6 and a density.*1.4028, 2.445, 3.8284.* in their place": (
+        {"media": medium('<string name="material" value="skimmilk"/><float name="density" value="2"/>')},
+    ),
     "light 'slide' is of type 'projector'": ({}, '<emitter type="projector" id="slide"/>'),
     "light 'gobo', of type 'spot', has a texture": (
         {},

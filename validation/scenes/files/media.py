@@ -92,15 +92,18 @@ def pass_where_no_material(state: Any) -> None:
 
 
 def _refuse_names(props: Any) -> None:
-    name = f"medium '{props.id()}'"
-    if "density" in props:
+    """Refuse the name of a material, and a density, with the numbers to write where these are known."""
+    name, material, density = f"medium '{props.id()}'", str(props.get("material", "")), _numbers(props, "density")
+    times = np.ones(3) if density is None else density
+    if not material and density is not None:
+        extinction = _numbers(props, "sigma_t")
+        product = "" if extinction is None else f': <rgb name="sigma_t" value="{_words(extinction * times)}"/>'
         raise InputError(
             f"{name} has a density, which a homogeneous medium has not; wanted sigma_t [1/m] and albedo: multiply "
-            "sigma_t by the density and remove it"
+            f"sigma_t by the density and remove it{product}"
         )
-    if "material" not in props:
+    if not material:
         return
-    material = str(props["material"])
     materials = tomllib.loads(Path(__file__).with_name("materials.toml").read_text(encoding="utf-8"))
     known = materials.get(material.lower().replace(" ", "").replace("_", ""))
     remedy = "its sigma_t [1/m] and albedo in numbers"
@@ -108,10 +111,11 @@ def _refuse_names(props: Any) -> None:
         scattering, absorption = map(np.array, known)
         sigma_t = scattering + absorption
         remedy = (
-            f'<rgb name="sigma_t" value="{_words(sigma_t)}"/> and <rgb name="albedo" '
+            f'<rgb name="sigma_t" value="{_words(sigma_t * times)}"/> and <rgb name="albedo" '
             f'value="{_words(scattering / sigma_t)}"/> (per mm; the scale multiplies it)'
         )
-    raise InputError(f"{name} names the material '{material}' of Mitsuba 0.6; wanted {remedy} in its place")
+    named = f"the material '{material}' of Mitsuba 0.6" + ("" if density is None else " and a density")
+    raise InputError(f"{name} names {named}; wanted {remedy} in {'its' if density is None else 'their'} place")
 
 
 def _extinction(props: Any) -> tuple[Array, Array]:
