@@ -202,7 +202,7 @@ def test_values_that_are_not_finite_are_counted_and_left_out():
 @pytest.mark.slow
 @pytest.mark.claim("sequence-intervals")
 def test_intervals_hold_the_truth():
-    """Of 100 repeats 95 % intervals hold it in 88 to 100, which a right interval leaves once in a thousand."""
+    """Of 100 repeats 95 % intervals hold it in 90 to 99, and numbers scatter as their errors say."""
     frames, held = ghosted(0.0, 6), np.zeros(4)
     scores = []
     for seed in range(100):
@@ -214,6 +214,6 @@ def test_intervals_hold_the_truth():
         errors += [still.ghost.error, still.bias.error or np.inf]
         scores.append(np.array(apart) / errors)
         held += np.abs(scores[-1]) < 1.98
-    assert ((held >= 88) & (held <= 100)).all(), held
+    assert ((held >= 90) & (held <= 99)).all(), held
     spread = np.std(scores, axis=0)
-    assert ((spread > 0.75) & (spread < 1.3)).all(), spread
+    assert ((spread > 0.8) & (spread < 1.25)).all(), spread
