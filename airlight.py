@@ -38,6 +38,7 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from reports.api.compare import compare as compare
     from reports.api.explore import describe as describe
     from reports.api.explore import view as view
+    from reports.api.export import export as export
     from reports.api.reference import reference as reference
     from reports.api.render import load_scene as load_scene
     from reports.api.render import render as render
@@ -74,6 +75,7 @@ _API = {
     "reference": "reports.api.reference",
     "compare": "reports.api.compare",
     "describe": "reports.api.explore",
+    "export": "reports.api.export",
     "paper": "reports.api.report",
     # scenes, what can be measured, and what the commands are made of
     "load_scene": "reports.api.render",

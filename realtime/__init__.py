@@ -19,6 +19,7 @@ Rooms:
 - `shadow_maps/`: shadow maps and the field of inverse depth over them;
 - `image_filters.py`: Gaussian, bilateral and joint bilateral filters of whole images, and up-sampling;
 - `kernels/`: the airlight integral between two distances along a ray in a homogeneous medium;
+- `export/`: kernels as shader code;
 - `intervals.py`: the lit intervals of rays and their sum;
 - `clouds/`: light scattered more than once;
 - `methods/`: the methods, and in `methods/interface/` what all of them share with frames;

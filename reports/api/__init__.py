@@ -12,4 +12,5 @@ Read in this order:
 - `report.py`: `report`, `diff`, `paper`
 - `sweep.py`: `sweep`
 - `explore.py`: `describe`, `view`
+- `export.py`: `export`, a kernel as shader code
 """

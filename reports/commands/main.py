@@ -25,6 +25,7 @@ from cyclopts import App, Group, Parameter
 from reports import __version__
 from reports.api.compare import compare
 from reports.api.explore import describe, view
+from reports.api.export import export
 from reports.api.inputs import Files
 from reports.api.reference import reference
 from reports.api.render import render
@@ -52,7 +53,7 @@ DONE, FAILED, WRONG_INPUT, MISSING = 0, 1, 2, 3
 _PANELS: Mapping[str, tuple[Callable[..., Any], ...]] = {
     "Start": (doctor, list_, render, view),
     "Measure": (report, diff, sweep, run_study),
-    "Images": (reference, compare, describe),
+    "Images": (reference, compare, describe, export),
     "Papers": (paper,),
     "Develop": (run_tests,),
 }

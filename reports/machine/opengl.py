@@ -34,7 +34,7 @@ def opengl_status(*, judged: bool = True) -> OpenGl:
         from reports.machine.driver_check import LARGEST, driver_error
 
         key = key_of("shader-driver", "reports.machine.driver_check", device=device)
-        wrong = float(kept(key, lambda: {"error": driver_error(host)}).arrays["error"])
+        wrong = float(kept(key, lambda: {"error": driver_error(host)[0]}).arrays["error"])
     except NoDriverError as error:
         return OpenGl(False, str(missing(str(error))))
     finally:

@@ -1,0 +1,337 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The kernels `exact` and `quadrature-N` as shader code: one template, and the constants of the Python kernels in it.
+
+The pages of `realtime.kernels.exact` and `realtime.kernels.quadrature` derive what the text computes. `exact` has all
+segments by panels in v, without the rules for short ones.
+
+**Elementary functions are our own.** Those of drivers are allowed to be, and are, wrong where it matters: on llvmpipe
+`asinh` and `sinh` by 6 % below 1e-5, `log` by 73 % at 1 - 6e-8, `exp` by 4e-6 at -87. `al_exp` reduces its argument as
+Cody and Waite do, x - n hi - n lo, where hi has so few bits that n hi is exact without a fused operation. `al_asinh` is
+2 atanh(x/(1 + sqrt(1 + x^2))), without cancellation, and a logarithm by the bits of its argument for large x.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from realtime.errors import InputError
+from realtime.export.languages import LANGUAGES
+from realtime.kernels.exact import _DEEPEST, _DEPTH, _MOST, _NODES
+from realtime.kernels.quadrature import _positive_nodes
+from realtime.numerics.functions import _EXP2, _SINH, LOG2_E, unit_nodes
+from realtime.scene.media.medium import OPTICAL_REACH
+from realtime.scene.phase import Hazy, HenyeyGreenstein, HgDraine, Isotropic, Murky, Phase, Rayleigh
+
+_LN2_HIGH = 355 / 512  # nine bits of ln 2
+_ROOT_HALF = 0x3F3504F3  # bits of the float32 sqrt(1/2)
+_ENDLESS = 1e30  # x1 [m] beyond which a ray has no end
+
+#: Built-in functions that a text may call: those that IEEE rounds, or that take no rounding.
+BUILT_IN: tuple[str, ...] = (
+    *("abs", "ceil", "cross", "dot", "float", "floatBitsToInt", "floor", "int", "intBitsToFloat", "length", "max"),
+    *("min", "sqrt", "vec2", "vec3"),
+)
+
+
+def kernel_nodes(kernel: str) -> int | None:
+    """Return the nodes of 'quadrature-N', None for 'exact'; raise InputError for any other kernel."""
+    if kernel == "exact":
+        return None
+    name, _, words = kernel.partition("-")
+    if name == "quadrature" and words.isdecimal() and 2 <= int(words) <= 64 and int(words) % 2 == 0:
+        return int(words)
+    raise InputError(f"kernel: got {kernel!r}, wanted 'exact' or 'quadrature-N' with an even N from 2 to 64")
+
+
+def kernel_text(kernel: str, phase: Phase, language: str, rows: Sequence[Sequence[float]] = ()) -> str:
+    """Return the functions of a kernel in a language, without a header.
+
+    `rows`: foot, height, x0, x1, sigma_t, g and J of rays for `al_test`, the largest relative error over them. Raises
+    InputError for a kernel, a phase function or a language that cannot be exported.
+    """
+    if language not in LANGUAGES:
+        raise InputError(f"language: got {language!r}, wanted one of {', '.join(LANGUAGES)}")
+    nodes = kernel_nodes(kernel)
+    parts = [_elementary(), _phase(phase), _exact(phase) if nodes is None else _quadrature(phase, nodes), _RAY]
+    if rows:
+        parts.append(_test(rows))
+    return LANGUAGES[language]("\n".join(parts))
+
+
+def _number(value: float) -> str:
+    """Return the shortest literal that float32 reads as the nearest to a number."""
+    return str(np.float32(value))
+
+
+def _array(name: str, values: Iterable[float]) -> str:
+    words = [_number(value) for value in values]
+    return f"float {name}[{len(words)}] = ({', '.join(words)});"
+
+
+def _polynomial(coefficients: Sequence[float], variable: str) -> str:
+    """Return Horner's scheme, the highest power first."""
+    text = _number(coefficients[0])
+    for coefficient in coefficients[1:]:
+        text = f"({text}) * {variable} + {_number(coefficient)}"
+    return text
+
+
+def _elementary() -> str:
+    atanh = _polynomial([2 / odd for odd in range(11, 0, -2)], "q")
+    return f"""// e^x, -87 <= x <= 88; relative error 2e-7.
+float al_exp(float x) {{
+    float y = min(max(x, -87.0), 88.0);
+    float n = floor(y * {_number(LOG2_E)} + 0.5);
+    AL_PRECISE float r = y - n * {_number(_LN2_HIGH)};
+    AL_PRECISE float s = r - n * {_number(math.log(2) - _LN2_HIGH)};
+    float f = s * {_number(LOG2_E)};
+    float p = {_polynomial(_EXP2, "f")};
+    return p * intBitsToFloat((int(n) + 127) * 8388608);
+}}
+
+// sinh y, |y| <= 1.65.
+float al_sinh(float y) {{
+    float q = y * y;
+    return y * ({_polynomial(_SINH, "q")});
+}}
+
+// 2 atanh t, |t| <= 0.24.
+float al_atanh2(float t) {{
+    float q = t * t;
+    return t * ({atanh});
+}}
+
+// asinh x, 0 <= x <= 1e38.
+float al_asinh(float x) {{
+    if (x < 0.5) {{
+        return al_atanh2(x / (1.0 + sqrt(1.0 + x * x)));
+    }}
+    float u = 2.0 * x;
+    if (x < 10000.0) {{
+        u = x + sqrt(x * x + 1.0);
+    }}
+    int bits = floatBitsToInt(u);
+    int n = (bits - {_ROOT_HALF}) / 8388608;
+    float f = intBitsToFloat(bits - n * 8388608);
+    return al_atanh2((f - 1.0) / (f + 1.0)) + float(n) * {_number(math.log(2))};
+}}
+
+// (s + r)/h without cancellation.
+float al_path(float s, float r, float h) {{
+    if (s >= 0.0) {{
+        return (s + r) / h;
+    }}
+    return h / (r - s);
+}}
+"""
+
+
+_HG = """    float sharp = abs(g);
+    float side = down;
+    if (g < 0.0) {
+        side = up;
+    }
+    float base = 4.0 * sharp * side + (1.0 - sharp) * (1.0 - sharp);
+    return (1.0 - g) * (1.0 + g) / (base * sqrt(base));
+}
+"""
+_LOBE = """float al_lobe(float down, float a, float b, float c) {
+    float base = a * down + b;
+    return c / (base * sqrt(base));
+}
+
+"""
+
+
+def _lobe(share: float, g: float) -> str:
+    """Return a lobe of Henyey and Greenstein's: 1 - g in float32 would have lost the digits of a sharp one."""
+    numbers = (4 * g, (1 - g) ** 2, share * (1 - g) * (1 + g))
+    return f"al_lobe(down, {', '.join(map(_number, numbers))})"
+
+
+def _phase(phase: Phase) -> str:
+    """Return `al_phase` of sin^2 and cos^2 of half the scattering angle, of mean 1."""
+    start = "// The phase function, of mean 1 over the sphere; down, up = (1 -+ cos)/2.\n"
+    signature = "float al_phase(float down, float up, float g) {\n"
+    if isinstance(phase, HenyeyGreenstein):
+        return start + signature + _HG
+    if isinstance(phase, HgDraine):
+        (share, narrow), (_, wide) = phase.lobes
+        constant, square = map(_number, phase.rise)
+        more = f"({constant} + {square} * (up - down) * (up - down)) * {_lobe(1.0, wide)}"
+        return f"{_LOBE}{start}{signature}    return {_lobe(share, narrow)} + {more};\n}}\n"
+    if isinstance(phase, Hazy | Murky):
+        first, last = _number(phase.polynomial[0]), _number(phase.polynomial[-1])
+        lines = "".join("    power = power * power;\n" for _ in range(phase.doublings))
+        return f"{start}{signature}    float power = up;\n{lines}    return {first} + {last} * power;\n}}\n"
+    if isinstance(phase, Isotropic | Rayleigh):
+        return f"{start}{signature}    return {_polynomial(phase.polynomial[::-1], 'up')};\n}}\n"
+    raise InputError(
+        f"phase: {phase.name!r} reads a table, which cannot be exported; wanted isotropic, rayleigh, hazy, murky, hg "
+        "or hg-draine:D"
+    )
+
+
+_TAKES = """// The airlight integral J [1/m] of a point light from x0 to x1 [m] along a ray; x1 > 1e30 is endless.
+// foot, height [m]: al_ray; sigma_t [1/m]; g: mean cosine in (-1, 1), positive forward, of Henyey and Greenstein's
+// phase function; others ignore it.
+"""
+
+
+def _interval(tail: str) -> str:
+    """Return the lines that find E = q/h at both ends, and their difference without cancellation."""
+    return f"""    float s0 = x0 - foot;
+    float h = max(height, 1e-9 * (abs(s0) + 1e-28));
+    float r0 = sqrt(s0 * s0 + h * h);
+    float e0 = al_path(s0, r0, h);
+    float reach = min({_number(OPTICAL_REACH)} / max(sigma_t * h, 1e-37), 1e7 * ({tail} + e0));
+    float e1 = e0 + reach;
+    float difference = reach;
+    if (x1 <= {_ENDLESS:g}) {{
+        float s1 = x1 - foot;
+        float r1 = sqrt(s1 * s1 + h * h);
+        float end = al_path(s1, r1, h);
+        if (end <= e1) {{
+            e1 = end;
+            difference = (x1 - x0) * (e0 + end) / max(r0 + r1, 1e-37);
+        }}
+    }}
+"""
+
+
+def _exact(phase: Phase) -> str:
+    if isinstance(phase, HenyeyGreenstein):
+        forward, backward = map(_number, phase.panels)
+        lobe = f"""    float forward = max(g, 0.0);
+    float backward = max(-g, 0.0);
+    float scale = (1.0 - forward) / (1.0 + forward);
+    float tail = (1.0 + backward) / (1.0 - backward);
+    float widest = {forward};
+    if (g < 0.0) {{
+        widest = {backward};
+    }}
+"""
+    else:
+        scale = phase.lobe_scales(float)[0]
+        lobe = f"""    float scale = {_number(scale)};
+    float tail = 1.0;
+    float widest = {_number(phase.reach.panel)};
+"""
+    places, weights = zip(*unit_nodes(_NODES), strict=True)
+    return f"""{_array("AL_X", places)}
+{_array("AL_W", weights)}
+
+{_TAKES}float al_integral(float foot, float height, float x0, float x1, float sigma_t, float g) {{
+{lobe}{_interval("tail")}    float f = e0 / scale;
+    float f1 = e1 / scale;
+    float c = sqrt(f * f + 1.0);
+    float c1 = sqrt(f1 * f1 + 1.0);
+    float width = al_asinh((difference / scale) * ((f + f1) / (f1 * c + f * c1)));
+    float rate = sigma_t * h * scale;
+    float count = ceil(max(width / widest, rate * c * width / {_number(_DEPTH)}));
+    int panels = int(min(max(count, 1.0), {_number(_MOST)}));
+    float part = width / float(panels);
+    float sinhs[{_NODES}];
+    float lesses[{_NODES}];
+    for (int i = 0; i < {_NODES}; i += 1) {{
+        float y = al_sinh(0.5 * part * AL_X[i]);
+        sinhs[i] = 2.0 * y * sqrt(y * y + 1.0);
+        lesses[i] = 2.0 * y * y;
+    }}
+    float y1 = al_sinh(0.5 * part);
+    float sinh1 = 2.0 * y1 * sqrt(y1 * y1 + 1.0);
+    float less1 = 2.0 * y1 * y1;
+    float depth = 0.0;
+    float total = 0.0;
+    for (int k = 0; k < panels; k += 1) {{
+        for (int i = 0; i < {_NODES}; i += 1) {{
+            float more = f * lesses[i] + c * sinhs[i];
+            float e = scale * (f + more);
+            float up = 1.0 / (e * e + 1.0);
+            float value = (c + (f * sinhs[i] + c * lesses[i])) * up * al_phase(e * e * up, up, g);
+            total = total + AL_W[i] * value * al_exp(max(-depth - rate * more, -{_number(_DEEPEST / LOG2_E)}));
+        }}
+        float step = f * less1 + c * sinh1;
+        c = c + (f * sinh1 + c * less1);
+        f = f + step;
+        depth = depth + rate * step;
+    }}
+    return total / float(panels) * width * scale * (2.0 / h) * al_exp(-sigma_t * (x0 + r0));
+}}
+"""
+
+
+def _quadrature(phase: Phase, nodes: int) -> str:
+    places, weights = zip(*_positive_nodes(nodes), strict=True)
+    half = len(places)
+    arguments = "height, {}, {}, sigma_t, g"
+    whole = "al_panel(foot, " + arguments.format("x0", "x1") + ")"
+    split = "    float between = min(max(foot, x0), x1);\n"
+    both = " + ".join(f"al_panel(foot, {arguments.format(*ends)})" for ends in (("x0", "between"), ("between", "x1")))
+    body = f"    return {whole};\n" if phase.constant else f"{split}    return {both};\n"
+    return f"""{_array("AL_X", places)}
+{_array("AL_W", weights)}
+
+float al_panel(float foot, float height, float x0, float x1, float sigma_t, float g) {{
+{_interval("1.0")}    float c0 = sqrt(e0 * e0 + 1.0);
+    float c1 = sqrt(e1 * e1 + 1.0);
+    float width = 0.5 * al_asinh(difference * ((e0 + e1) / (e1 * c0 + e0 * c1)));
+    float root = al_exp(0.5 * width);
+    float sinh_half = 0.5 * (root - 1.0 / root);
+    float cosh_half = 0.5 * (root + 1.0 / root);
+    float sinh_mid = 2.0 * sinh_half * cosh_half;
+    float less_mid = 2.0 * sinh_half * sinh_half;
+    float step = e0 * less_mid + c0 * sinh_mid;
+    float e = e0 + step;
+    float c = c0 + (e0 * sinh_mid + c0 * less_mid);
+    float rate = sigma_t * h;
+    float total = 0.0;
+    for (int i = 0; i < {half}; i += 1) {{
+        float grown = al_exp(width * AL_X[i]);
+        float sh = 0.5 * (grown - 1.0 / grown);
+        float ch = 0.5 * (grown + 1.0 / grown);
+        float even = -rate * e * (ch - 1.0);
+        float odd = -rate * c * sh;
+        float after = 1.0 / (c * ch + e * sh);
+        float before = 1.0 / (after * (ch * ch + e * e));
+        float up1 = min(after * after, 1.0);
+        float up2 = min(before * before, 1.0);
+        float value1 = al_exp(even + odd) * after * al_phase(1.0 - up1, up1, g);
+        float value2 = al_exp(even - odd) * before * al_phase(1.0 - up2, up2, g);
+        total = total + AL_W[i] * (value1 + value2);
+    }}
+    return total * width * (2.0 / h) * al_exp(-sigma_t * (x0 + r0 + h * step));
+}}
+
+{_TAKES}float al_integral(float foot, float height, float x0, float x1, float sigma_t, float g) {{
+{body}}}
+"""
+
+
+_TAKEN = (
+    "vec3 origin, vec3 direction, vec3 light, vec3 intensity, float x0, float x1, float sigma_t, vec3 albedo, float g"
+)
+_RAY = f"""// foot and height [m] of a light over a ray; direction has unit length.
+vec2 al_ray(vec3 origin, vec3 direction, vec3 light) {{
+    vec3 to = light - origin;
+    return vec2(dot(to, direction), length(cross(to, direction)));
+}}
+
+// The airlight [W/(m^2 sr)] between x0 and x1 [m] of a ray in the light of a point light of intensity [W/sr].
+vec3 al_airlight({_TAKEN}) {{
+    vec2 ray = al_ray(origin, direction, light);
+    return albedo * intensity * (sigma_t * {_number(0.25 / math.pi)} * al_integral(ray.x, ray.y, x0, x1, sigma_t, g));
+}}
+"""
+
+
+def _test(rows: Sequence[Sequence[float]]) -> str:
+    lines = []
+    for *given, value in rows:
+        numbers = ", ".join(_number(min(number, 3e38)) for number in given)
+        lines.append(f"    worst = max(worst, abs(al_integral({numbers}) / {_number(value)} - 1.0));\n")
+    return (
+        "// The largest relative error over rays whose integral is known.\n"
+        f"float al_test() {{\n    float worst = 0.0;\n{''.join(lines)}    return worst;\n}}\n"
+    )

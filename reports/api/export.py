@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight.export`: an airlight kernel as shader code."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from analytic.errors import InputError
+from reports import __version__
+from reports.api.inputs import Files, one_error, several
+from reports.tables.record import Result
+
+#: The largest errors, as `python -m tests.helpers.exported` measured them.
+MEASURED = Path(__file__).parents[1] / "data" / "exported.json"
+
+#: Kinds of certified rays that a test of an exported text has one of each.
+_KINDS = ("generic", "near_light", "behind", "beyond", "far", "infinite", "thick", "vacuum")
+
+
+@dataclass(frozen=True, repr=False)
+class Exported(Result):
+    """An airlight kernel as shader code."""
+
+    kernel: str
+    language: str
+    phase: str
+    code: str  #: the whole text
+    error: float | None  #: largest relative error on certified rays; None where it was not measured
+    written: tuple[str, ...] = ()
+
+    @property
+    def title(self) -> str:
+        """The kernel, the phase function and the language."""
+        return f"{self.kernel}, {self.phase}, {self.language}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `airlight export --json` prints."""
+        return {name: getattr(self, name) for name in ("kernel", "language", "phase", "error", "code")}
+
+    @property
+    def lines(self) -> list[str]:
+        """The text, or where it was written."""
+        return [f"wrote {path}" for path in self.written] or [self.code.rstrip("\n")]
+
+
+@one_error
+def export(
+    kernel: str = "exact",
+    *,
+    language: Literal["glsl", "hlsl", "wgsl", "slang"] = "glsl",
+    phase: str = "isotropic",
+    test: bool = False,
+    output: Files = (),
+) -> Exported:
+    """Print an airlight kernel as shader code, to paste into an engine.
+
+    The functions are `al_integral`, the airlight integral J [1/m]; `al_ray`, foot and height of a light over a ray; and
+    `al_airlight`, the radiance. The head of the text says what they take, and the largest error and where it was
+    measured. The text may be used without a notice (MIT-0). GLSL is for 4.30 and ES 3.00 with `precision highp float`
+    and `precision highp int`.
+
+    Parameters
+    ----------
+    kernel
+        'exact', or 'quadrature-N' with N nodes, whose cost is fixed.
+    language
+        glsl, hlsl, wgsl or slang.
+    phase
+        isotropic, rayleigh, hazy, murky, hg (g is an argument) or hg-draine:D, D the diameter of droplets [um].
+    test
+        Add `al_test`, the largest relative error over eight rays whose integral is known.
+    output
+        Write the text to this file.
+
+    Raises
+    ------
+    InputError
+        For a kernel, language or phase function that cannot be exported.
+
+    Examples
+    --------
+    >>> import airlight
+    >>> "float al_integral(" in airlight.export("exact", phase="hg").code
+    True
+    """
+    from realtime.export.text import kernel_text
+    from realtime.scene.phase import named_phase
+    from reference.storage.files import ensure_writable, write_text
+
+    if phase.startswith(("hg:", "tabulated", "mie")):
+        raise InputError(
+            f"phase: got {phase!r}, wanted isotropic, rayleigh, hazy, murky, hg (g is an argument) or hg-draine:D"
+        )
+    files = [Path(path) for path in several(output)]
+    for path in files:
+        ensure_writable(path)
+    rows = _rows(phase) if test else ()
+    code = kernel_text(kernel, named_phase(phase), language, rows)
+    error, words = _measured(kernel, phase)
+    text = _head(kernel, language, phase, words) + code
+    for path in files:
+        write_text(path, text)
+    return Exported(kernel, language, phase, text, error, tuple(map(str, files)))
+
+
+def _head(kernel: str, language: str, phase: str, measured: str) -> str:
+    return f"""// The airlight of a point light in homogeneous fog: kernel {kernel}, phase function {phase}, {language}.
+// Written by airlight {__version__} (airlight export {kernel} --language {language} --phase {phase}).
+// SPDX-License-Identifier: MIT-0. Copy, change and sell it without a notice; there is no warranty.
+// Lengths in m, extinction in 1/m, intensity in W/sr, radiance in W/(m^2 sr).
+// Range: 0 <= x0 <= x1, sigma_t >= 0, -1 < g < 1. A ray that meets the light gives a large number.
+// {measured}
+// al_ray has the height to 6e-8 of the light's distance: where it is a thousandth of it, J has four digits.
+
+"""
+
+
+def _measured(kernel: str, phase: str) -> tuple[float | None, str]:
+    """Return the largest error of a kernel that was measured, and a sentence."""
+    data = json.loads(MEASURED.read_text(encoding="utf-8"))
+    entry = data["errors"].get(kernel, {}).get(phase)
+    if entry is None:
+        return None, "Largest relative error of J: not measured for this kernel and phase function; see al_test."
+    error, count = entry["error"], entry["rays"]
+    return error, f"Largest relative error of J: {error:.1e} on {count} certified rays, GLSL on {data['device']}."
+
+
+def _rows(phase: str) -> list[tuple[float, ...]]:
+    """Return eight certified rays; of a phase function without any, rays with the integral to 1e-10."""
+    import numpy as np
+
+    from analytic.panels import airlight_segments
+    from analytic.phase import phase_from_words
+    from validation.certified.files import certified_data
+    from validation.kernels.case_files import read_cases
+
+    cases = read_cases(certified_data("airlight_integral.csv"))
+    assert cases.tag is not None
+    assert cases.value is not None
+    own = phase if phase in cases.phase else "isotropic"
+    # Values that float32 holds well: those beyond 60 optical depths are close to its smallest number.
+    picked = np.array(cases.phase) == own
+    picked &= cases.value > 1e-20
+    at = [np.flatnonzero(picked & (np.array(cases.tag) == kind))[0] for kind in _KINDS]
+    foot, height, x0, x1, sigma_t, g, values = (
+        getattr(cases, name)[at] for name in ("foot", "height", "x0", "x1", "sigma_t", "g", "value")
+    )
+    if own != phase:
+        values, _ = airlight_segments(foot, height, x0, x1, sigma_t, phase_from_words(phase))
+    return list(zip(*(column.tolist() for column in (foot, height, x0, x1, sigma_t, g, values)), strict=True))
