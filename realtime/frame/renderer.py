@@ -180,16 +180,13 @@ def frame_renderer(
         made = replace(made, corners=tile_corners(pixel, scene.camera, by_rays=chosen.by_rays, lights=most))
     structures: dict[Any, Stages] = {}
     if made.shades_apart:
-        for lights in _lights_by_group(replace(made, method=_ONE_BY_ONE)):
+        for lights in _few_lights(made):
             structures[_structure(lights)] = _stages(made, replace(scene, lights=lights), kernel, alone=False)
     for lights in groups:
         key = _structure(lights)
         if key not in structures:
             structures[key] = _stages(made, replace(scene, lights=lights), kernel, alone=len(groups) == 1)
     return replace(made, structures=structures)
-
-
-_ONE_BY_ONE = Method()  # a method that is given lights by groups
 
 
 def _check_clouds(scene: Scene, method: Method) -> None:
@@ -254,8 +251,22 @@ def _lights_by_group(renderer: FrameRenderer) -> list[tuple[Light, ...]]:
 
 
 def surface_groups(renderer: FrameRenderer) -> tuple[LightGroup, ...]:
-    """Return the groups of lights by which surfaces are shaded: one light each where the method takes many at once."""
-    return light_groups(replace(renderer, method=_ONE_BY_ONE) if renderer.shades_apart else renderer)
+    """Return the groups of lights by which surfaces are shaded: few each where the method takes many at once."""
+    if not renderer.shades_apart:
+        return light_groups(renderer)
+    return tuple(
+        LightGroup(replace(renderer.scene, lights=lights), renderer.structures[_structure(lights)])
+        for lights in _few_lights(renderer)
+    )
+
+
+def _few_lights(renderer: FrameRenderer) -> list[tuple[Light, ...]]:
+    """Return the lights of a scene, few of one structure together: a call goes through the whole Mitsuba scene."""
+    most = 1 if renderer.scene.features.bounded else _FEW
+    alike: dict[Any, list[Light]] = {}
+    for light in (light for lights in _lights_by_group(replace(renderer, method=Method())) for light in lights):
+        alike.setdefault(_structure((light,)), []).append(light)
+    return [tuple(own[first : first + most]) for own in alike.values() for first in range(0, len(own), most)]
 
 
 def light_groups(renderer: FrameRenderer) -> tuple[LightGroup, ...]:

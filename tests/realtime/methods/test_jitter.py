@@ -95,3 +95,10 @@ def test_golden_frames_add_the_golden_ratio_and_jitter_without_steps_is_refused(
     ):
         with pytest.raises(InputError, match=words):
             renderer(scene, "ray-march", **parameters)
+
+
+def test_surfaces_are_lit_by_many_lights_as_they_are_by_each(variant):
+    """A method that is given all lights at once has the surfaces of one that is given one after the other."""
+    many, each = (render_frame(renderer(lamps(), method)).surface for method in ("equi-angular", "ray-march"))
+    assert np.max(each) > 0
+    np.testing.assert_allclose(many, each, rtol=1e-5, atol=1e-7)
