@@ -20,7 +20,7 @@ BULB = """<shape type="sphere" id="bulb"><float name="radius" value="0.5"/><poin
     <emitter type="area"><rgb name="radiance" value="5, 4, 3"/></emitter></shape>"""
 BALL = """<shape type="sphere" id="drop"><float name="radius" value="1.7"/><bsdf type="null"/>
     <ref name="interior" id="fog"/></shape>"""
-EVEN = '<float name="sigma_t" value="0.41"/>'
+STONE = '<shape type="cube" id="stone"><transform name="to_world"><scale value="0.4"/></transform></shape>'
 
 
 def scene_file(medium, light, path):
@@ -28,8 +28,12 @@ def scene_file(medium, light, path):
         return fog_xml(light, size=(8, 6))
     if medium == "grid":
         return grid_xml(volume(path.with_suffix(".vol"), ROUGH), light, size=(8, 6))
-    even = fog_xml(light, BALL, size=(8, 6), fog=EVEN).replace("heterogeneous", "homogeneous")
-    return even.replace('<ref id="fog" name="medium"/>', "")
+    return f"""<scene version="3.0.0"><medium type="homogeneous" id="fog"><float name="sigma_t" value="0.41"/>
+    <float name="albedo" value="0.83"/><phase type="hg"><float name="g" value="0.4"/></phase></medium>
+    <sensor type="perspective"><float name="fov" value="61"/>
+        <transform name="to_world"><lookat origin="-3.1, -2.3, 1.1" target="0.1, 0.2, 0.3" up="0, 0, 1"/></transform>
+        <film type="hdrfilm"><integer name="width" value="6"/><integer name="height" value="4"/></film></sensor>
+    {light}{BALL}{STONE}</scene>"""
 
 
 SAMPLED = (single_scatter_batch, 100, 5e-3)
