@@ -33,7 +33,7 @@ from validation.engine.fault import KINDS, Fault
 from validation.engine.faults import faults_of
 from validation.engine.judged_layer import JudgedLayer, judged_layer
 from validation.engine.prediction import Predictor, SceneLight
-from validation.engine.search import Explanation, begin, explain
+from validation.engine.search import Explanation, begin, explain, explained_by
 from validation.engine.seen import Progress, best_kind, layers_of, pixel_kinds, scene_of_size, seen_image
 from validation.metrics.errors import plain
 from validation.scenes.loading import LoadedScene
@@ -275,17 +275,16 @@ class _Attempt:
     def try_faults(self, costly: int) -> None:
         """Try all faults of a cost, each alone."""
         own = [fault for fault in self.faults if fault.costly == costly]
-        tried = []
+        many = costly > 0 and self._many_triangles
+        few, tried = many and costly > 1, list[Explanation]()
         for number, fault in enumerate(own):
+            if many and any(gains(each, self.right) for each in tried):
+                break  # paths cost much there, and of two faults that move them one leaves a tenth at most
             self._tell(_PARTS[costly], number / len(own), fault.name)
-            if costly > 1 and not self._may_help(fault):
-                continue
-            tried.append(explain(self.predictor, (fault,), fine=False))
+            tried += self._by_few(fault) if few else [explain(self.predictor, (fault,), fine=False)]
         least = min((each.error for each in self.singles), default=1.0)
-        # A sphere in the place of a light costs as much as all others: to all digits only where it explains most, and
-        # by far among many triangles, where these digits take minutes.
-        enough = least * (_BETTER if self._many_triangles else 1.0)
-        coarse = costly > 1 and all(each.error > enough for each in tried)
+        # A sphere in the place of a light costs as much as all others: to all digits only where it explains most.
+        coarse = few or (costly > 1 and all(each.error > least for each in tried))
         self.singles += tried if coarse else self._refined(tried, least)
 
     @property
@@ -293,12 +292,17 @@ class _Attempt:
         shapes = self.predictor.truth.occluders.shapes()
         return sum(shape.primitive_count() for shape in shapes) >= _MANY_TRIANGLES
 
-    def _may_help(self, fault: Fault) -> bool:
-        """Return whether paths are cheap, or few of a fault's, where its search begins, leave less than the best do."""
-        few = self.predictor.coarse
-        if not self._many_triangles:
-            return True
-        return begin(few, (fault,))[0] < _LESS * float(np.abs(few.errors(self._with_pairs().guess)).mean())
+    def _by_few(self, fault: Fault) -> list[Explanation]:
+        """Return what a fault explains whose paths cost much, if few of them leave far less than the best does.
+
+        Its numbers are those of few paths: all of them, which cost minutes, only say what it leaves.
+        """
+        few, best = self.predictor.coarse, self._with_pairs()
+        least = explained_by(few, best.faults, best.values).error
+        if begin(few, (fault,))[0] > _LESS * least:
+            return []
+        found = explain(few, (fault,), fine=False)
+        return [explained_by(self.predictor, found.faults, found.values)] if found.error < _BETTER * least else []
 
     def _settled(self, explanation: Explanation) -> bool:
         """Return whether nothing is left that another fault could explain."""

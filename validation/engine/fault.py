@@ -43,6 +43,7 @@ class Parameter:
     step: float = (
         0.0  #: of differences, for what moves paths: each guess costs new ones, and few must do; 0: it does not
     )
+    stride: float = 0.0  #: of the first search along the axes, for what moves shadows; 0: there is none
 
 
 @dataclass(frozen=True)

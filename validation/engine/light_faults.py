@@ -59,7 +59,7 @@ def position_held(predictor: Predictor, guess: Guess, p: Values, at: Values) -> 
     return replace(held, fog=held.fog.with_entry("moved", 0, (x, y, z)))
 
 
-PLACE = tuple(Parameter(-1e3, 1e3, (0.0,), step=0.003) for _ in range(3))
+PLACE = tuple(Parameter(-1e3, 1e3, (0.0,), step=0.003, stride=0.1) for _ in range(3))
 
 LIGHTS = (
     Fault("no-shadow", "light", "nothing casts a shadow", with_scenery(shadows=False), applies=has_shapes),

@@ -3,8 +3,10 @@
 
 The measure is the mean of log(1 + (e/s)^2) over all values, e the relative errors and s a scale: pixels that disagree
 cannot decide (Cauchy's loss). One parameter is looked for on the line, since there may be several minima; several by
-steps of Gauss and Newton with Cauchy's weights. The scale begins at what the unchanged scene leaves and ends at what
-the search leaves.
+steps of Gauss and Newton with Cauchy's weights. A light that is off moves shadows, whose pixels are off by all of their
+light whatever a small step does, so that there are no slopes to follow: it is looked for along the axes first, by steps
+as long as its shadows are wide (Hooke and Jeeves 1961, J. ACM 8, 212). The scale begins at what the unchanged scene
+leaves and ends at what the search leaves.
 """
 
 import math
@@ -27,6 +29,8 @@ _COARSE = 0.02  # on a line, of a logarithm or in units of the parameter: enough
 # of the starts of fog that thins with height lead to even fog.
 _BEGUN, _BEGUN_BY_STEPS = 2, 3
 _TURNS, _TURNS_COARSE, _TURNS_LAST = 8, 4, 3  # steps of Gauss and Newton at most; the last with all paths
+_STRIDES = 10  # rounds of steps along the axes at most
+_DONE = 0.02  # fraction of the loss at which slopes find what is left
 _LITTLE = 0.9  # fraction of the loss that a step leaves which gains little
 _SMALL = 0.02  # of the step of differences: a change that is none
 _NEAR = 3  # steps of differences: how far few paths are off at most
@@ -86,6 +90,8 @@ def explain(
         moves = any(parameter.step for parameter in parameters)
         followed = 1 if moves else _BEGUN if on_a_line else _BEGUN_BY_STEPS
         places = [search.inward(start) for start in starts[:followed]]
+        if any(parameter.stride for parameter in parameters) and not near:
+            places = [search.along_axes(place, scale) for place in places]
         for turn, search in enumerate(searches):
             scale = scale if turn == 0 else search.scale(search.outward(places[0]), fine)
             if on_a_line:
@@ -93,10 +99,15 @@ def explain(
             else:
                 places = [search.by_steps(place, scale, fine, moves and turn > 0) for place in places]
         best = min((search.outward(place) for place in places), key=lambda values: search.loss(values, scale))
-    search = _Search(predictor, tuple(faults)) if search.predictor is not predictor else search
-    errors, guess = search.errors(best), search.guess(best)
+    return explained_by(predictor, faults, _parted(faults, best))
+
+
+def explained_by(predictor: Predictor, faults: Sequence[Fault], values: Sequence[Values]) -> Explanation:
+    """Return what faults explain with these values."""
+    guess = guess_of(predictor, faults, tuple(value for part in values for value in part))
+    errors = predictor.errors(guess)
     error = float(np.abs(errors).mean())
-    return Explanation(tuple(faults), _parted(faults, best), guess, errors, predictor.lit(guess), error)
+    return Explanation(tuple(faults), tuple(values), guess, errors, predictor.lit(guess), error)
 
 
 def begin(predictor: Predictor, faults: Sequence[Fault]) -> tuple[float, tuple[Values, ...]]:
@@ -165,6 +176,34 @@ class _Search:
         enough = (_SMALL * parameter.step or 1e-7) if fine else _COARSE
         solved = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": enough})
         return np.array([solved.x]) if solved.fun <= loss(float(place[0])) else place
+
+    def along_axes(self, place: Array, scale: float) -> Array:
+        """Return the end of steps along the axes, halved where none of them gains; none if two sizes gain nothing.
+
+        Where they have gained, diagonals are tried too: a shadow stays where a light moves towards what casts it.
+        """
+        longest = strides = np.array([parameter.stride for parameter in self.parameters])
+        least = begun = self.loss(self.outward(place), scale)
+        axes = np.eye(len(place))
+        diagonals = [a + sign * b for n, a in enumerate(axes) for b in axes[n + 1 :] for sign in (1, -1)]
+        for _ in range(_STRIDES):
+            before = least
+            if least < _DONE * begun:
+                break
+            for moves in (axes, diagonals) if least < _LITTLE * begun else (axes,):
+                for move in strides * moves:
+                    for trial in (place + move, place - move):
+                        reached = self.loss(self.outward(trial), scale)
+                        if reached < least:
+                            place, least = trial, reached
+                            break
+                if least < _LITTLE * before:
+                    break
+            else:
+                strides = 0.5 * strides
+                if least > _LITTLE * begun and np.all(strides < 0.5 * longest):
+                    break
+        return place
 
     def by_steps(self, place: Array, scale: float, fine: bool, near: bool = False) -> Array:
         """Return the end of a few steps of Gauss and Newton with Cauchy's weights, halved while they make it worse."""

@@ -67,7 +67,19 @@ def test_a_planted_fault_comes_first_in_noise_and_pixels_of_a_kind_that_nobody_t
 
 
 @pytest.mark.slow
-def test_a_light_with_a_radius_is_named(variant, tmp_path):
+def test_a_light_that_is_off_is_named_among_many_triangles(truth, monkeypatch):
+    """There less is tried, since paths cost much."""
+    monkeypatch.setattr("validation.engine.diagnose._MANY_TRIANGLES", 0)
+    (planted,) = (each for each in PLANTED if each.name == "light-position")
+    diagnosis = diagnosed(planted.image(truth))
+    assert diagnosis.first == "light-position"
+    assert diagnosis.explained
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("many", [20_000, 0])
+def test_a_light_with_a_radius_is_named(variant, tmp_path, monkeypatch, many):
+    monkeypatch.setattr("validation.engine.diagnose._MANY_TRIANGLES", many)
     path = tmp_path / "fog.xml"
     path.write_text(
         """<scene version="3.0.0"><medium type="homogeneous" id="fog"><float name="sigma_t" value="0.31"/>
