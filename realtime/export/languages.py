@@ -30,6 +30,11 @@ def _hlsl(text: str) -> str:
     return re.sub(r"\bvec([23])\b", r"float\1", text).replace("AL_PRECISE", "precise")
 
 
+def _slang(text: str) -> str:
+    # Slang 2026.5.2 hands the word on to WGSL, which has none.
+    return _hlsl(text.replace("AL_PRECISE ", ""))
+
+
 def _wgsl(text: str) -> str:
     def function(match: re.Match[str]) -> str:
         parameters = re.sub(_TYPE + r" (\w+)", lambda m: f"{m[2]}: {_WGSL_TYPES[m[1]]}", match[3])
@@ -47,4 +52,4 @@ def _wgsl(text: str) -> str:
 
 
 #: By name, what makes of the template a text of the language.
-LANGUAGES: dict[str, Callable[[str], str]] = {"glsl": _glsl, "hlsl": _hlsl, "wgsl": _wgsl, "slang": _hlsl}
+LANGUAGES: dict[str, Callable[[str], str]] = {"glsl": _glsl, "hlsl": _hlsl, "wgsl": _wgsl, "slang": _slang}
