@@ -295,7 +295,8 @@ class _Attempt:
     def _by_few(self, fault: Fault) -> list[Explanation]:
         """Return what a fault explains whose paths cost much, if few of them leave far less than the best does.
 
-        Its numbers are those of few paths: all of them, which cost minutes, only say what it leaves.
+        Its numbers are those of few paths: all of them, which cost minutes, only say what it leaves. A sphere of which
+        another fault leaves less than a per cent is missed, since eight samples leave as much.
         """
         few, best = self.predictor.coarse, self._with_pairs()
         least = explained_by(few, best.faults, best.values).error
