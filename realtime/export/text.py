@@ -27,6 +27,10 @@ _LN2_HIGH = 355 / 512  # nine bits of ln 2
 _ROOT_HALF = 0x3F3504F3  # bits of the float32 sqrt(1/2)
 _ENDLESS = 1e30  # x1 [m] beyond which a ray has no end
 
+#: The largest relative error of `exact` on any device that keeps the bounds of Vulkan; a test runs the text with every
+#: operation as wrong as they permit.
+CONFORMING = 3e-5
+
 #: Built-in functions that a text may call: those that IEEE rounds, or that take no rounding.
 BUILT_IN: tuple[str, ...] = (
     *("abs", "ceil", "cross", "dot", "float", "floatBitsToInt", "floor", "int", "intBitsToFloat", "length", "max"),

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A driver of OpenGL is judged before its images are: the exported kernel `exact` over the certified integrals.
 
-A driver whose every operation is as wrong as Vulkan permits was simulated in float64 with a prototype: 1.8e-5.
-One beyond `LARGEST` computes other fog than its shader says.
+A driver beyond `realtime.export.text.CONFORMING` computes other fog than its shader says.
 """
 
 import math
@@ -17,9 +16,6 @@ from realtime.methods.shader.client import ShaderHost
 from realtime.scene.phase import named_phase
 from validation.certified.files import certified_data
 from validation.kernels.case_files import read_cases
-
-#: The largest relative error of a driver that conforms.
-LARGEST = 3e-5
 
 _MAIN = """
 uniform sampler2D rows;
@@ -54,11 +50,16 @@ def driver_error(host: ShaderHost, kernel: str = "exact", phase: str = "hg") -> 
 
     `host` must be a new one. `phase` is in words, see `realtime.scene.phase.named_phase`.
     """
+    columns, expected = certified_rays(phase)
+    error = np.abs(exported_values(host, kernel_text(kernel, named_phase(phase), "glsl"), columns) / expected - 1)
+    return float(error.max()) if np.isfinite(error).all() else math.inf, len(expected)
+
+
+def certified_rays(phase: str) -> tuple[list[NDArray[np.float64]], NDArray[np.float64]]:
+    """Return the columns that `exported_values` takes of the certified rays of a phase function, and their J [1/m]."""
     cases = read_cases(certified_data(f"airlight_integral{'_droplets' if phase.startswith('hg-draine') else ''}.csv"))
     assert cases.value is not None
     # With g = 0 Henyey and Greenstein's function is the isotropic one.
     own = np.isin(cases.phase, ("isotropic", "hg") if phase == "hg" else (phase,))
     columns = [getattr(cases, name)[own] for name in ("foot", "height", "x0", "x1", "sigma_t", "g")]
-    values = exported_values(host, kernel_text(kernel, named_phase(phase), "glsl"), columns)
-    error = np.abs(values / cases.value[own] - 1)
-    return float(error.max()) if np.isfinite(error).all() else math.inf, int(own.sum())
+    return columns, cases.value[own]

@@ -30,8 +30,9 @@ def opengl_status(*, judged: bool = True) -> OpenGl:
         device = f"{said['device']}, {said['version']}"
         if not judged:
             return OpenGl(True, device)
+        from realtime.export.text import CONFORMING
         from reference.storage.kept import kept, key_of
-        from reports.machine.driver_check import LARGEST, driver_error
+        from reports.machine.driver_check import driver_error
 
         key = key_of("shader-driver", "reports.machine.driver_check", device=device)
         wrong = float(kept(key, lambda: {"error": driver_error(host)[0]}).arrays["error"])
@@ -40,8 +41,8 @@ def opengl_status(*, judged: bool = True) -> OpenGl:
     finally:
         host.end()
     words = f"{device}: the kernel `exact` errs by {wrong:.1e} at most on certified integrals"
-    if not wrong <= LARGEST:
-        return OpenGl(False, f"{words}, more than {LARGEST:g}; LIBGL_ALWAYS_SOFTWARE=1 draws on the processor")
+    if not wrong <= CONFORMING:
+        return OpenGl(False, f"{words}, more than {CONFORMING:g}; LIBGL_ALWAYS_SOFTWARE=1 draws on the processor")
     return OpenGl(True, words)
 
 

@@ -2,6 +2,7 @@
 """Claim: an exported kernel has the certified values, in the languages whose tools are here, and states its error."""
 
 import json
+import random
 import re
 import shutil
 import subprocess
@@ -10,16 +11,17 @@ import numpy as np
 import pytest
 
 import airlight
-from realtime.export.text import BUILT_IN, kernel_text
+from realtime.export.text import BUILT_IN, CONFORMING, kernel_text
 from realtime.kernels.exact import _DEPTH, exact
 from realtime.kernels.quadrature import quadrature
 from realtime.methods.shader.client import ShaderHost
 from realtime.numerics.functions import unit_nodes
 from realtime.scene.phase import HenyeyGreenstein, named_phase
 from reports.api.export import MEASURED
-from reports.machine.driver_check import exported_values
+from reports.machine.driver_check import certified_rays, exported_values
 from tests.helpers.exported import KERNELS, PHASES, measured
 from tests.helpers.kernel_values import kernel_values, true_values
+from tests.helpers.loose_device import on_loose_device
 from tests.helpers.shaders import need_opengl
 from tests.realtime.kernels.test_exact import g_of, many_rays
 
@@ -41,6 +43,20 @@ def test_certified_rays_and_the_stated_error(kernel, phase):
     result = airlight.export(kernel, phase=phase)
     assert result.error == stated
     assert f"{stated:.1e} on" in result.code
+
+
+# `low` and `high` err in one direction: their errors add up; `chance` is the largest that was found.
+@pytest.mark.claim("exported-kernels", tolerance="3e-5, stated, with every operation as wrong as Vulkan permits")
+@pytest.mark.parametrize("way", ["low", "high", "chance"])
+@pytest.mark.parametrize("phase", ["hg", *(pytest.param(name, marks=pytest.mark.slow) for name in PHASES[:4])])
+def test_any_device_within_the_bounds_of_vulkan(phase, way):
+    rng = random.Random(1)
+    signs = {"low": lambda: -1.0, "high": lambda: 1.0, "chance": lambda: rng.choice((-1.0, 1.0))}[way]
+    airlight_integral = on_loose_device(kernel_text("exact", named_phase(phase), "glsl"), iter(signs, None))
+    columns, expected = certified_rays(phase)
+    every = 1 if way == "chance" else 4
+    values = [airlight_integral(*ray) for ray in np.minimum(columns, 3e38).T[::every]]
+    assert np.abs(values / expected[::every] - 1).max() < CONFORMING
 
 
 # Both round their exponents, to 6e-8 of depths of up to 80, in their own ways; those of quadrature-16 are sums of two
