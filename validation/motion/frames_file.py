@@ -7,7 +7,8 @@
 ```
 
 `first`: number of the file that shows frame 0; `exposure`: stops, one number or a list: values are divided by
-2^stops; `resets`: frames with which a history begins; `changes`: a list by frame for each name of `--change`.
+2^stops; `resets`: frames with which a history begins; `changes`: a list by frame for each name of `--change`;
+`objects`: for each shape that moves a list by frame of matrices, 4 x 4, that take it from its place in the scene [m].
 """
 
 import json
@@ -18,6 +19,8 @@ from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from analytic.errors import InputError, nearest
 from validation.readers import Reader, by_name, read_list, read_number, read_word
@@ -40,6 +43,7 @@ class FramesRecord:
     pixel: str | None = None
     resets: tuple[int, ...] = (0,)
     changes: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
+    objects: Mapping[str, tuple[tuple[tuple[float, ...], ...], ...]] = field(default_factory=dict)
 
     def stops(self, frame: int) -> float:
         """Return the exposure of a frame [stops]."""
@@ -48,6 +52,10 @@ class FramesRecord:
     def changes_of(self, frame: int) -> dict[str, tuple[float, ...]]:
         """Return the changes of the scene in a frame, by name."""
         return {name: values[frame] for name, values in self.changes.items()}
+
+    def moves_of(self, frame: int) -> dict[str, tuple[tuple[float, ...], ...]]:
+        """Return the matrices of the shapes that move in a frame, by name."""
+        return {name: matrices[frame] for name, matrices in self.objects.items()}
 
     def text(self) -> str:
         """Return the file."""
@@ -70,19 +78,15 @@ def read_frames(path: str | os.PathLike[str]) -> FramesRecord:
         raise InputError(f"{path}: cannot be read as JSON: {reason}; see docs/your-engine.md for an example") from error
     if not isinstance(given, dict) or given.pop("schema", SCHEMA) != SCHEMA:
         raise InputError(f'{path}: wanted an object with "schema": "{SCHEMA}"')
-    for name in ("jitter", "objects"):
-        if given.pop(name, None):
-            raise InputError(
-                f"{path}: {name} is not followed; wanted frames without it"
-                + (', or averaged frames with "pixel": "area"' if name == "jitter" else "")
-            )
+    if given.pop("jitter", None):
+        raise InputError(f'{path}: jitter is not followed; wanted frames without it, or averaged with "pixel": "area"')
     for name in given.keys() - _KINDS.keys():
         raise InputError(f"{path}: got {name!r}, wanted some of {', '.join(_KINDS)}{nearest(name, _KINDS)}")
     if "frames" not in given:
         raise InputError(f'{path}: the number of frames is missing; wanted such as "frames": 60')
     read = {name: _KINDS[name](f"{path}: {name}", value) for name, value in given.items() if value is not None}
     record = FramesRecord(**read)
-    lists: dict[str, Any] = dict(record.changes)
+    lists: dict[str, Any] = {**record.changes, **record.objects}
     lists |= {"exposure": record.exposure} if isinstance(record.exposure, tuple) else {}
     for name, values in lists.items():
         if len(values) != record.frames:
@@ -141,6 +145,19 @@ def _values(what: str, value: Any) -> tuple[float, ...]:
     return _by_frame(_number)(what, value) if isinstance(value, list) else (_number(what, value),)
 
 
+def _matrix(what: str, value: Any) -> tuple[tuple[float, ...], ...]:
+    wanted = "a 4 x 4 matrix by rows: a rotation times a scale, a shift, and 0 0 0 1"
+    rows = [[_number(what, each) for each in read_list(what, row, 0)] for row in read_list(what, value, 0)]
+    if [len(row) for row in rows] != [4] * 4 or rows[3] != [0, 0, 0, 1]:
+        raise InputError(f"{what}: got {value!r}, wanted {wanted}")
+    turn = np.array(rows)[:3, :3]
+    # A scale by axis would make other shapes of spheres, a mirror would turn them inside out.
+    scale = np.cbrt(np.linalg.det(turn))
+    if scale <= 0 or not np.allclose(turn @ turn.T, scale**2 * np.eye(3), atol=1e-5 * scale**2, rtol=0):
+        raise InputError(f"{what}: got axes that are not a rotation times a scale, wanted {wanted}")
+    return tuple(map(tuple, rows))
+
+
 _KINDS: dict[str, Reader] = {
     "frames": partial(read_number, least=2, most=_MOST),
     "scene": read_word,
@@ -151,4 +168,5 @@ _KINDS: dict[str, Reader] = {
     "pixel": read_word,
     "resets": _by_frame(partial(read_number, least=0, most=_MOST)),
     "changes": by_name(_by_frame(_values)),
+    "objects": by_name(_by_frame(_matrix)),
 }

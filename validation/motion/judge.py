@@ -33,6 +33,7 @@ from validation.metrics.errors import plain
 from validation.motion.blocks import BLOCK, told
 from validation.motion.frames_file import FramesRecord, frame_paths, read_frames
 from validation.motion.measures import AGES, Measures, Sequence, measure
+from validation.scenes.changes import move_shapes
 from validation.scenes.loading import load_scene
 
 Array = NDArray[np.float64]
@@ -240,14 +241,15 @@ class _Frames:
 
     def expect(self, n: int) -> None:
         """Keep the reference and the masks of a frame; refuse changes that the scene does not have, by its number."""
-        changes = self._record.changes_of(n)
-        if n and changes == self._record.changes_of(n - 1):
+        changes, moves = self._record.changes_of(n), self._record.moves_of(n)
+        if n and (changes, moves) == (self._record.changes_of(n - 1), self._record.moves_of(n - 1)):
             self._shown.append(self._shown[-1])
             self._ages = self._ages + 1
             self._beside[n] = self._beside[n - 1]
         else:
             try:
                 loaded = load_scene(self._scene, self._judged.size, changes)
+                move_shapes(loaded.scene, moves)
                 image = truth_image(loaded.scene, pixel=self._pixel)
             except InputError as error:
                 raise InputError(f"frame {n}: {error}") from error
@@ -287,7 +289,8 @@ class _Frames:
         """Tell how many frames ago the point of each pixel was disoccluded; this frame differs from the one before."""
         before, self._seen = self._seen, here
         there, self._distance = self._distance, distance
-        if before is None or not any(name.startswith("camera.") for name in self._record.changes):
+        moving = self._record.objects or any(name.startswith("camera.") for name in self._record.changes)
+        if before is None or not moving:
             return
         far = 1e6 * (1.0 + float(np.abs(here.origin).max()))
         points = here.origin + np.where(np.isfinite(distance), distance, far).reshape(-1, 1) * here.direction

@@ -89,6 +89,38 @@ def change_scene(scene, changes: Mapping[str, Sequence[float]]) -> None:
                 change(part, own)
 
 
+def move_shapes(scene, matrices: Mapping[str, Sequence[Sequence[float]]]) -> None:
+    """Move shapes of an `mi.Scene` in place, by their ids: from where they are, by matrices of shape (4, 4) [m].
+
+    Raises InputError for a shape that the scene does not have, or whose place Mitsuba does not let change.
+    """
+    if not matrices:
+        return
+    parameters = mi.traverse(scene)
+    shapes = [shape.id() for shape in scene.shapes()]
+    for name, rows in matrices.items():
+        if name not in shapes:
+            known = (
+                f"wanted some of {', '.join(shapes)}{nearest(name, shapes)}" if shapes else "the scene has no shapes"
+            )
+            raise InputError(f"objects: got {name!r}, {known}")
+        matrix = np.array(rows, dtype=np.float64)
+        place, vertices, normals = (f"{name}.{each}" for each in ("to_world", "vertex_positions", "vertex_normals"))
+        if vertices in parameters:
+            points = np.reshape(parameters[vertices], (-1, 3)) @ matrix[:3, :3].T + matrix[:3, 3]
+            parameters[vertices] = type(parameters[vertices])(points.ravel())
+            if normals in parameters and len(parameters[normals]):
+                # Of unit length whatever the scale: the matrix is a rotation times a number.
+                turned = np.reshape(parameters[normals], (-1, 3)) @ matrix[:3, :3].T / np.cbrt(np.linalg.det(matrix))
+                parameters[normals] = type(parameters[normals])(turned.ravel())
+        elif place in parameters:
+            moved = matrix @ np.array(parameters[place].matrix, dtype=np.float64).reshape(4, 4)
+            parameters[place] = type(parameters[place])(moved)
+        else:
+            raise InputError(f"objects: shape '{name}' cannot be moved; wanted a mesh, rectangle, disk or sphere")
+    parameters.update()
+
+
 def _numbered(kind: str, number: int) -> str:
     return kind if number == 1 else f"{kind}-{number}"
 

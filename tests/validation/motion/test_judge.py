@@ -67,6 +67,40 @@ def test_what_a_camera_uncovers_has_a_row_of_its_own(variant, tmp_path):
     assert 0 < parts[0] < 0.5 * sum(parts)
 
 
+SCENE = """<scene version="3.0.0"><integrator type="volpath"/>
+<medium type="homogeneous" id="fog"><rgb name="sigma_t" value="0.2"/></medium>
+<sensor type="perspective"><float name="fov" value="60"/><ref id="fog" name="medium"/>
+ <transform name="to_world"><lookat origin="0, -5, 1" target="0, 0, 1" up="0, 0, 1"/></transform>
+ <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="24"/></film></sensor>
+<emitter type="point"><point name="position" x="0.3" y="0.5" z="2.6"/><rgb name="intensity" value="9"/></emitter>
+<shape type="sphere" id="ball"><float name="radius" value="0.4"/><transform name="to_world">%s
+ <translate z="1.5"/></transform></shape>
+<shape type="rectangle" id="wall"><transform name="to_world"><scale value="3"/><rotate x="1" angle="90"/>
+ <translate y="3" z="1"/>%s</transform></shape></scene>"""
+
+
+def test_objects_that_move_are_where_a_scene_file_has_them(variant, tmp_path):
+    ball, wall, images = [], [], []
+    for n in range(3):
+        x, scale, angle = 0.3 * n, 1 + 0.2 * n, 0.1 * n
+        moved = SCENE % (
+            f'<scale value="{scale}"/><translate x="{x}"/>',
+            f'<rotate z="1" angle="{np.degrees(angle)}"/>',
+        )
+        (tmp_path / "moved.xml").write_text(moved)
+        images.append(truth_image(load_scene(str(tmp_path / "moved.xml")).scene).airlight)
+        ball.append([[scale, 0, 0, x], [0, scale, 0, 0], [0, 0, scale, 1.5 - 1.5 * scale], [0, 0, 0, 1]])
+        cos, sin = np.cos(angle), np.sin(angle)
+        wall.append([[cos, -sin, 0, 0], [sin, cos, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    (tmp_path / "scene.xml").write_text(SCENE % ("", ""))
+    scene = str(tmp_path / "scene.xml")
+    found = compare_frames(scene, *written(tmp_path, images, objects={"ball": ball, "wall": wall}, pixel="centre"))
+    assert found.verdict.kind == "exact"
+    assert found.measures.reference_change > 0.01
+    # The ball leaves half of where it stood.
+    assert 0 < found.masks["disoccluded"].values < 0.3 * found.measures.values
+
+
 @pytest.mark.parametrize(
     ("about", "words"),
     [
@@ -79,7 +113,14 @@ def test_what_a_camera_uncovers_has_a_row_of_its_own(variant, tmp_path):
         ({"resets": [8]}, "resets has 8, wanted frames from 0 to 7"),
         ({"fps": 0}, "fps: got 0, wanted a number above 0"),
         ({"frame": 8}, "got 'frame'"),
-        ({"objects": {"box": []}, "jitter": [[0, 0]]}, "jitter is not followed"),
+        ({"jitter": [[0, 0]]}, "jitter is not followed"),
+        ({"objects": {"ground": [np.eye(4).tolist()]}}, "ground has 1 values, wanted one for each of 8"),
+        ({"objects": {"ground": [np.eye(3).tolist()] * FRAMES}}, "objects.ground[0]: got [[1.0"),
+        ({"objects": {"ground": [np.diag([1, 1, 2, 1]).tolist()] * FRAMES}}, "not a rotation times a scale"),
+        (
+            {"objects": {"grund": [np.eye(4).tolist()] * FRAMES}},
+            "frame 0: objects: got 'grund', the scene has no shapes",
+        ),
         ({"schema": "airlight-frames/2"}, 'wanted an object with "schema"'),
     ],
 )
