@@ -316,7 +316,7 @@ def _animation(asked: _Asked, files: list[Path], frames: int, moves: str | None,
     from reports.api.results import Animation, write_image
     from reports.machine.environment import activate
     from reports.plotting.pictures import tone_curve
-    from validation.scenes.animation import animate, frame_changes, moved_parts, parse_moves
+    from validation.scenes.animation import animate, frame_changes, frame_objects, moved_parts, parse_moves
     from validation.study.frame_times import timed_image
     from validation.study.run import layered_frame
 
@@ -329,6 +329,7 @@ def _animation(asked: _Asked, files: list[Path], frames: int, moves: str | None,
     costs: list[tuple[float, float]] = []
     changes_by_frame: list[dict[str, tuple[float, ...]] | None] = []
     kept = curve = None  # all frames share the tone curve of the first, so that a light that fades looks it
+    shapes = frame_objects(renderer.scene, animation, frames)
     start = time.perf_counter()
     with telling(progress, f"{loaded.name}: {frames} frames") as tell:
         for number, moved in enumerate(animate(renderer.scene, animation, frames), 1):
@@ -346,7 +347,7 @@ def _animation(asked: _Asked, files: list[Path], frames: int, moves: str | None,
         written
         for path in files
         if path.suffix.lower() == ".exr"
-        for written in _write_frames(path, loaded.name, frames, changes_by_frame)
+        for written in _write_frames(path, loaded.name, changes_by_frame, shapes)
     ]
     moving, rendering = (float(value) for value in np.median(np.array(costs[1:] or costs), axis=0))
     return Animation(
@@ -364,17 +365,17 @@ def _animation(asked: _Asked, files: list[Path], frames: int, moves: str | None,
 
 
 def _write_frames(
-    path: Path, scene: str, frames: int, changes: list[dict[str, tuple[float, ...]] | None]
+    path: Path, scene: str, changes: list[dict[str, tuple[float, ...]] | None], objects: dict[str, Any]
 ) -> tuple[str, ...]:
     """Write NAME.json beside the frames NAME-0001.exr, which `compare --frames` reads, where changes have names."""
     from reference.storage.files import write_text
     from validation.motion.frames_file import FramesRecord
 
     named = [each for each in changes if each is not None]
-    if len(named) < max(frames, 2):
+    if len(named) < max(len(changes), 2):
         return ()
     by_name = {name: tuple(each[name] for each in named) for name in named[0]}
-    record = FramesRecord(frames, scene=scene, pixel="centre", layer="airlight", changes=by_name)
+    record = FramesRecord(len(named), scene=scene, pixel="centre", layer="airlight", changes=by_name, objects=objects)
     write_text(path.with_suffix(".json"), record.text() + "\n")
     return (str(path.with_suffix(".json")),)
 

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from realtime.area_lights.shape import turned_area_light
 from realtime.scene.animate import (
+    Objects,
     closed_shapes,
     coloured_area_light,
     coloured_light,
@@ -75,11 +76,11 @@ def animate(scene: Scene, animation: Animation, frames: int) -> Iterator[Scene]:
 def frame_changes(moved: Scene, animation: Animation) -> dict[str, tuple[float, ...]] | None:
     """Return what a frame changes in its scene, by the names of `validation.scenes.changes`.
 
-    None where these names cannot say it: objects that turn, lights with extent, media that are not the same everywhere.
+    None where these names cannot say it: lights with extent, media that are not the same everywhere.
     """
     moves = set(animation.moves)
     homogeneous = moved.medium if isinstance(moved.medium, Homogeneous) else None
-    if "objects" in moves or moved.area_lights or ("medium" in moves and homogeneous is None):
+    if moved.area_lights or ("medium" in moves and homogeneous is None):
         return None
     changes: dict[str, Any] = {}
     for number, light in enumerate(moved.lights, 1):
@@ -94,21 +95,41 @@ def frame_changes(moved: Scene, animation: Animation) -> dict[str, tuple[float, 
     return {name: tuple(np.array(value, dtype=np.float64).ravel().tolist()) for name, value in changes.items()}
 
 
+def frame_objects(scene: Scene, animation: Animation, frames: int) -> dict[str, tuple[Any, ...]]:
+    """Return by shape the matrices, (4, 4) [m], that take it from its place in the scene to that in each frame."""
+    objects = _objects(scene, animation)
+    matrices: dict[str, tuple[Any, ...]] = {}
+    for name, about in {} if objects is None else objects.middles.items():
+        own = np.tile(np.eye(4), (frames, 1, 1))
+        own[:, :3, :3] = [_turn(scene, number / frames) for number in range(frames)]
+        own[:, :3, 3] = about - own[:, :3, :3] @ about
+        matrices[name] = tuple(tuple(map(tuple, matrix)) for matrix in own.tolist())
+    return matrices
+
+
+def _objects(scene: Scene, animation: Animation) -> Objects | None:
+    if "objects" not in animation.moves:
+        return None
+    lamps = {light.name for light in scene.area_lights}
+    closed = closed_shapes(read_casters(scene.geometry, scene.area_lights))
+    names = animation.objects or tuple(name for name in closed if name not in lamps)
+    if not names:
+        raise InputError("--animate objects: the scene has no closed mesh that could turn; animate the light")
+    return read_objects(scene, names)
+
+
+def _turn(scene: Scene, share: float) -> Array:
+    """Return the rotation about the vertical by a share of a turn, (3, 3)."""
+    return rotation(vertical(scene).tolist(), 360 * share) if share else np.eye(3)
+
+
 def _step(scene: Scene, animation: Animation) -> Callable[[float], Scene]:
     """Return a function from a share of the turn, 0 to 1, to the scene after it."""
-    up = vertical(scene)
     about = np.array(animation.about) if animation.about else middle(scene)
-    objects = None
-    if "objects" in animation.moves:
-        lamps = {light.name for light in scene.area_lights}
-        closed = closed_shapes(read_casters(scene.geometry, scene.area_lights))
-        names = animation.objects or tuple(name for name in closed if name not in lamps)
-        if not names:
-            raise InputError("--animate objects: the scene has no closed mesh that could turn; animate the light")
-        objects = read_objects(scene, names)
+    objects = _objects(scene, animation)
 
     def after(share: float) -> Scene:
-        turn = rotation(up.tolist(), 360 * share) if share else np.eye(3)
+        turn = _turn(scene, share)
         lights, area_lights, medium = scene.lights, scene.area_lights, scene.medium
         if "light" in animation.moves:
             lights = tuple(turned_light(light, about, turn) for light in lights)

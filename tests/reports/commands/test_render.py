@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+import airlight
 import validation.study.frame_times
 from reference.storage.exr import read_exr
 from reports.commands import main as cli
@@ -33,6 +34,13 @@ def test_frames_are_numbered_files_that_differ_and_begin_as_the_scene_stands(var
     np.testing.assert_array_equal(images[0], read_exr(tmp_path / "still" / "one.exr").layers["airlight"])
     assert not np.array_equal(images[0], images[1])
     assert not np.array_equal(images[1], images[2])
+
+
+def test_frames_of_objects_that_turn_are_judged_by_the_file_that_was_written_beside_them(variant, tmp_path):
+    moves = ("--method", "shadow-planes", "--frames", "3", "--animate", "objects")
+    run("sphere-spot", *SMALL, *moves, "-o", str(tmp_path / "a.exr"))
+    found = airlight.compare("sphere-spot", str(tmp_path / "a-####.exr"), frames=tmp_path / "a.json")
+    assert found.compared.verdict.kind == "exact"
 
 
 @pytest.mark.claim("render-says-what-it-wrote")
