@@ -513,10 +513,10 @@ _TRACED_WIDE = _all(
             "phase_.eval_pdf(context_, point_, light_, on_)",
         ),
         "traced-area-surface-without-cosine": Rewrite(
-            _EXTENDED, "cosine / (r_ * r_ * p_ * count_)", "1 / (r_ * r_ * p_ * count_)"
+            _EXTENDED, "cosine / (r_ * r_ * density_)", "1 / (r_ * r_ * density_)"
         ),
         "traced-area-surface-wrong-count": Rewrite(
-            _EXTENDED, "cosine / (r_ * r_ * p_ * count_)", "cosine / (r_ * r_ * p_ * (count_ - 1))"
+            _EXTENDED, "value * left_(p_, w_, r_) / samples", "value * left_(p_, w_, r_) / (samples - 1)"
         ),
     },
 )
