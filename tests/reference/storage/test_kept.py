@@ -33,6 +33,7 @@ from reference.storage.kept import (
     stopwatch,
     store,
 )
+from reports.machine.driver_check import driver_error
 from validation.estimates.multiple_scattering import multiple_scattering_fraction
 from validation.kernels.rays import _truth
 from validation.kernels.stability import stability
@@ -206,6 +207,7 @@ def functions():
         "flip": (flip_hdr, "validation.metrics.errors"),
         "report-stability": (stability, "realtime.kernels.exact"),
         "report-scaling": (study_scaling, "realtime.methods.ray_march"),
+        "shader-driver": (driver_error, "realtime.export.text"),
     }
 
 
