@@ -65,7 +65,9 @@ def kernel_text(kernel: str, phase: Phase, language: str, rows: Sequence[Sequenc
 
 def _number(value: float) -> str:
     """Return the shortest literal that float32 reads as the nearest to a number."""
-    return str(np.float32(value))
+    single = np.float32(value)  # whose `str` has fewer digits once colour-science is imported
+    plain = value == 0 or 1e-4 <= abs(value) < 1e16
+    return np.format_float_positional(single, trim="0") if plain else np.format_float_scientific(single, trim="0")
 
 
 def _array(name: str, values: Iterable[float]) -> str:
