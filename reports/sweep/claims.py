@@ -26,7 +26,6 @@ class Claim:
     """A share of scenes and its interval."""
 
     label: str  #: of the configuration
-    name: str  #: its short name
     target: float  #: relative RMSE [1]
     tries: int  #: scenes that count
     within: int  #: of these, within the error for sure
@@ -56,7 +55,7 @@ class Claim:
     def text(self) -> str:
         """The claim as a sentence."""
         within = f"within {written(self.target)} {self.share_words}" if self.tries else "no scene was tried"
-        return f"{self.name}: {within}."
+        return f"{self.label}: {within}."
 
 
 def claim(sample: Sample, target: float, level: float = LEVEL) -> Claim:
@@ -69,7 +68,6 @@ def claim(sample: Sample, target: float, level: float = LEVEL) -> Claim:
     within, at_most = int(surely.sum()), int(possibly.sum())
     return Claim(
         label=sample.label,
-        name=sample.name,
         target=target,
         tries=tries,
         within=within,

@@ -29,7 +29,6 @@ class Correlation:
     """Of a property with the error of a configuration, over scenes."""
 
     label: str  #: of the configuration
-    name: str  #: its short name
     property: str
     scenes: int
     r: float  #: Spearman's rank correlation
@@ -52,10 +51,7 @@ def correlations(sweep: Sweep, made: Sequence[Sample], level: float = LEVEL) -> 
             if len(x) >= LEAST and np.ptp(x) > 0 and len(np.unique(y)) > 1:
                 pairs.append((sample, name, x, y))
     each = 1 - (1 - level) / max(len(pairs), 1)
-    return [
-        Correlation(sample.label, sample.name, name, len(x), *rank_correlation(x, y, each))
-        for sample, name, x, y in pairs
-    ]
+    return [Correlation(sample.label, name, len(x), *rank_correlation(x, y, each)) for sample, name, x, y in pairs]
 
 
 def sure(found: Correlation) -> bool:
@@ -89,7 +85,7 @@ def _of(sweep: Sweep, sample: Sample, name: str) -> Numbers:
 def sentences(strongest_of: Mapping[str, Sequence[Correlation]]) -> list[str]:
     """Return in plain words what goes with the error of each configuration, and last of which nothing does.
 
-    `strongest_of` has what `strongest` returns by the short names of configurations.
+    `strongest_of` has what `strongest` returns by the labels of configurations.
     """
     made = [sentence(name, chosen) for name, chosen in strongest_of.items() if chosen]
     without = [name for name, chosen in strongest_of.items() if not chosen]

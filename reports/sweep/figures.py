@@ -2,7 +2,7 @@
 """The figures of a sweep: for the page as SVG, for papers as PDF.
 
 A sweep has a thousand scenes and a dozen configurations or more. No panel tells a dozen colours apart, so that every
-configuration has a line or a panel of its own, with all others in grey behind it.
+configuration has a line of its own.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -18,12 +18,9 @@ from reports.sweep.samples import Sample
 from reports.sweep.summary import Summary
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 WIDTH = 10.2  #: of a figure [inches]; the page scales it
-_COLUMNS = 4  #: of small panels
-_GREY = "#b9bcc2"
 _EXACT = 1e-8  #: errors below are drawn here: float32 cannot tell them from none
 _WRONG = 1e3  #: errors above are drawn here: a series that left its range has 1e22, and no other point could be told
 _DOTS = 160  #: dots per inch of what is drawn as pixels, thousands of points that would be megabytes as shapes
@@ -62,48 +59,6 @@ def distribution(said: Summary) -> "Figure | None":
     return figure
 
 
-def shares(said: Summary) -> "Figure | None":
-    """Return in what fraction of the scenes each configuration is within an error, over the error: a panel a method.
-
-    None if nothing was measured.
-    """
-    shown = [sample for sample in said.samples if _errors(sample).size]
-    methods = list(dict.fromkeys(sample.method for sample in shown))
-    if not methods:
-        return None
-    most = max(sum(sample.method == method for sample in shown) for method in methods)
-    figure, panels = _panels(len(methods), 1.9 + 0.13 * most)
-    styles = _styles(said)
-    low = min(float(_errors(sample).min()) for sample in shown)
-    high = max(float(_errors(sample).max()) for sample in shown)
-    for panel, method in zip(panels, methods):
-        own = [sample for sample in shown if sample.method == method]
-        for sample in shown:
-            if sample not in own:
-                panel.plot(*_steps(sample, low, high), color=_GREY, linewidth=0.6, zorder=0, rasterized=True)
-        for sample, line in zip(own, ("-", "--", ":", "-.", (0, (6, 1, 1, 1, 1, 1)), (0, (1, 3))) * 4):
-            panel.plot(
-                *_steps(sample, low, high), color=styles[sample.label]["color"], linestyle=line, label=_own(sample)
-            )
-        panel.set(xscale="log", ylim=(0, 1.02))
-        panel.set_title(_cut(method), fontsize=9, parse_math=False)
-        panel.set_yticks((0, 0.5, 1), ("0", "50 %", "100 %"))
-        panel.grid(True, which="major", linewidth=0.4, alpha=0.5)
-        if len(own) > 1:
-            # Below: within the panel it would lie on the lines.
-            panel.legend(
-                fontsize=7,
-                frameon=False,
-                labelspacing=0.2,
-                handlelength=2.6,
-                loc="upper center",
-                bbox_to_anchor=(0.5, -0.16),
-            )
-    figure.supxlabel(ERROR, fontsize=9)
-    figure.supylabel("fraction of the scenes within the error", fontsize=9)
-    return figure
-
-
 def medians(said: Summary) -> "Figure | None":
     """Return speed against error, each configuration as its median and its quartiles over the scenes.
 
@@ -123,7 +78,7 @@ def medians(said: Summary) -> "Figure | None":
     panel.set(xscale="log", yscale="log", xlabel=TIME, ylabel=ERROR)
     plain_times(panel)
     panel.grid(True, which="major", linewidth=0.4, alpha=0.5)
-    handles = [panel.plot([], [], label=_cut(s.name), **(styles[s.label] | {"linestyle": "none"}))[0] for s in shown]
+    handles = [panel.plot([], [], label=_cut(s.label), **(styles[s.label] | {"linestyle": "none"}))[0] for s in shown]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
     return figure
 
@@ -131,7 +86,6 @@ def medians(said: Summary) -> "Figure | None":
 #: Every figure by its name: what draws it, and what its files and its place on the page are called.
 FIGURES: Mapping[str, Callable[[Summary], "Figure | None"]] = {
     "sweep-errors": distribution,
-    "sweep-shares": shares,
     "sweep-medians": medians,
 }
 
@@ -148,20 +102,6 @@ def _figure(height: float) -> "Figure":
     figure = new_figure(WIDTH, height)
     figure.set_dpi(_DOTS)
     return figure
-
-
-def _panels(count: int, height: float) -> tuple["Figure", "list[Axes]"]:
-    """Return small panels with the same axes, and nothing in the places that are left over."""
-    columns = min(_COLUMNS, count)
-    rows = -(-count // columns)
-    figure = _figure(height * rows + 0.4)
-    grid = figure.subplots(rows, columns, squeeze=False)
-    for panel in list(grid.flat)[count:]:
-        panel.set_visible(False)
-    panels = list(grid.flat)[:count]
-    for panel in panels:
-        panel.tick_params(labelsize=7)
-    return figure, panels
 
 
 def _styles(said: Summary) -> dict[str, dict[str, Any]]:
@@ -184,27 +124,11 @@ def _points(sample: Sample) -> tuple[Numbers, Numbers]:
     return sample.times[both], _within(sample.errors[both])
 
 
-def _steps(sample: Sample, low: float, high: float) -> tuple[Numbers, Numbers]:
-    """Return the fraction of the measured scenes within an error; what has no finite error is never within."""
-    errors = np.sort(_errors(sample))
-    total = len(errors) + np.isinf(sample.errors).sum()
-    # More steps than the panel has dots make the file larger and the line no truer.
-    shown = np.unique(np.linspace(1, len(errors), min(len(errors), 240)).round().astype(int))
-    x = np.concatenate([[low], np.repeat(errors[shown - 1], 2), [high]])
-    y = np.repeat(np.concatenate([[0], shown]), 2) / total
-    return x, y
-
-
 def _with_count(sample: Sample) -> str:
     """Return the name of a configuration, and how many of its scenes have no place in the figure."""
     away = {"refused": sample.count("refused"), "infinite": int(np.isinf(sample.errors).sum())}
     words = ", ".join(f"{count} {what}" for what, count in away.items() if count)
-    return f"{_cut(sample.name)}{f' [{words}]' if words else ''}"
-
-
-def _own(sample: Sample) -> str:
-    """Return what tells a configuration from the others of its method."""
-    return _cut(sample.name.removeprefix(sample.method).strip(" ()") or sample.name)
+    return f"{_cut(sample.label)}{f' [{words}]' if words else ''}"
 
 
 def _cut(name: str) -> str:

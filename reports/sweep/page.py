@@ -30,7 +30,7 @@ from reports.sweep.summary import Summary, goes_with_words, headlines, sound_wor
 PAGE, CLAIMS, FIGURES = "sweep.html", "sweep.json", "figures"  #: in the folder of a sweep
 PAGE_LIMIT = 20_000_000  #: bytes of a page
 
-_TABLES = ("errors", "speed", "refusals", "checks", "faults", "references", "properties", "hosts")
+_TABLES = ("errors", "speed", "refusals", "checks", "faults", "references", "hosts")
 
 
 def write_sweep(source: Path, target: Path | None = None) -> tuple[Summary, Path]:

@@ -26,7 +26,6 @@ class Sample:
     """One configuration over the scenes, one entry a scene."""
 
     label: str  #: as tables name it in full
-    name: str  #: short, unlike that of every other configuration of the sweep
     method: str
     scenes: tuple[str, ...]
     rows: tuple[int, ...]  #: of the sweep: where each scene's cell with the largest error stands
@@ -67,16 +66,14 @@ def samples(sweep: Sweep) -> list[Sample]:
     groups = dict(sorted(groups.items(), key=lambda item: tuple(map(natural, (item[0][1], item[0][0], item[0][2])))))
     several = Counter((label, method) for label, method, _ in groups)
     full = [f"{label}{size}" if several[label, method] > 1 else label for label, method, size in groups]
-    names = short_names([method for _, method, _ in groups], full)
     badness = [_badness(status, error) for status, error in zip(statuses, errors.tolist())]
     made = []
-    for (_, method, _), whole, name, group in zip(groups, full, names, groups.values()):
+    for (_, method, _), whole, group in zip(groups, full, groups.values()):
         worst = tuple(max(rows, key=badness.__getitem__) for rows in group.values())
         places = list(worst)
         made.append(
             Sample(
                 label=whole,
-                name=name,
                 method=method,
                 scenes=tuple(group),
                 rows=worst,
@@ -113,49 +110,6 @@ def errors_of(sweep: Sweep) -> Numbers:
     relative, absolute = sweep.numbers("error.relative_rmse"), sweep.numbers("error.rmse")
     unknown = np.where(absolute == 0, 0.0, np.inf)
     return np.where(done, np.where(np.isfinite(relative), relative, unknown), np.nan)
-
-
-def short_names(methods: Sequence[str], labels: Sequence[str], most: int = 34) -> list[str]:
-    """Return short names for labels such as 'ray-march (steps=16, map=512)', all different.
-
-    A name holds the words in parentheses in which the configurations of one method differ, as many as there is room
-    for in `most` letters; the method alone where it has one configuration.
-    """
-    inside = [_words(label) for label in labels]
-    names = []
-    for method, words, label in zip(methods, inside, labels):
-        others = [each for other, each in zip(methods, inside) if other == method]
-        own = [word for word in words if any(word not in each for each in others)]
-        shown = own or words  # what differs from others in nothing of its own is named in full
-        kept = list(shown)
-        while kept and len(_joined(method, kept, cut=len(kept) < len(shown))) > most:
-            kept.pop()
-        inside_words = _joined(method, kept, cut=len(kept) < len(shown)) if shown else method
-        name = method if len(others) == 1 else inside_words + _suffix(label)
-        names.append(name)
-    counts = Counter(names)
-    seen: Counter[str] = Counter()
-    unlike = []
-    for name in names:
-        seen[name] += 1
-        unlike.append(f"{name} #{seen[name]}" if counts[name] > 1 else name)
-    return unlike
-
-
-def _joined(method: str, words: Sequence[str], *, cut: bool) -> str:
-    return f"{method} ({', '.join([*words, '..'] if cut else words)})"
-
-
-def _words(label: str) -> list[str]:
-    """Return what stands in the parentheses of a label."""
-    if " (" not in label:
-        return []
-    return label[label.index(" (") + 2 : label.rindex(")")].split(", ")
-
-
-def _suffix(label: str) -> str:
-    """Return the size of the image behind a label, if it is there."""
-    return label[label.index(" at ") :] if " at " in label else ""
 
 
 def _size(sweep: Sweep, row: int) -> str:

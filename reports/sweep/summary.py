@@ -45,17 +45,6 @@ class Host:
 
 
 @dataclass(frozen=True)
-class Property:
-    """What the scenes hold of a property."""
-
-    property: str
-    least: float
-    median: float
-    largest: float
-    scenes: int
-
-
-@dataclass(frozen=True)
 class Summary:
     """What a sweep says."""
 
@@ -72,7 +61,6 @@ class Summary:
     faults: tuple[Fault, ...]
     references: tuple[ReferenceErrors, ...]
     hosts: tuple[Host, ...]
-    properties: tuple[Property, ...]
     versions: Mapping[str, tuple[str, ...]]
     statuses: Mapping[str, int]  #: rows that ended so
     scenes: int  #: that claims are about
@@ -111,7 +99,6 @@ def summary_of(sweep: Sweep) -> Summary:
         faults=tuple(faults(sweep)),
         references=tuple(_references(sweep)),
         hosts=tuple(_hosts(sweep)),
-        properties=tuple(_properties(sweep)),
         versions={name: tuple(sorted(set(sweep.texts(f"origin.{name}")) - {None})) for name in _VERSIONS},
         statuses=dict(Counter(sweep.texts("status").tolist()).most_common()),
         scenes=len(set(names[random] if drawn else names)),
@@ -139,7 +126,7 @@ def headlines(said: Summary) -> list[dict[str, Any]]:
         best = best_claims(said.claims, target)
         if best:
             others = f" and {len(best) - 1} more" if best[1:] else ""
-            add(f"Most often within {written(target)}", f"{best[0].name}{others}, {best[0].share_words}.")
+            add(f"Most often within {written(target)}", f"{best[0].label}{others}, {best[0].share_words}.")
     for each in said.fastest:
         if each.scenes and sum(each.counts):
             place = int(np.argmax(each.counts))
@@ -147,7 +134,7 @@ def headlines(said: Summary) -> list[dict[str, Any]]:
             share = percent(each.counts[place] / each.scenes, each.scenes)
             add(
                 f"Fastest within {written(each.target)}",
-                f"{said.samples[place].name}, in {share} % of {each.scenes} scenes{none}.",
+                f"{said.samples[place].label}, in {share} % of {each.scenes} scenes{none}.",
             )
     leading = Counter(chosen[0].property for chosen in said.strongest.values() if chosen)
     if leading:
@@ -176,7 +163,7 @@ def headlines(said: Summary) -> list[dict[str, Any]]:
 
 def goes_with_words(said: Summary) -> list[str]:
     """Return in sentences which properties go with the error of each configuration."""
-    return sentences({sample.name: said.strongest[sample.label] for sample in said.samples})
+    return sentences({sample.label: said.strongest[sample.label] for sample in said.samples})
 
 
 def check_words(check: Check) -> str:
@@ -203,7 +190,7 @@ def to_json(said: Summary) -> dict[str, Any]:
     """Return everything as plain data, for `--json`; nothing in it is infinite or NaN."""
     names = {sample.label: sample for sample in said.samples}
     counts = ("studies", "statuses", "scenes", "named_scenes", "timed_alone")
-    lists = ("correlations", "checks", "faults", "references", "properties", "hosts")
+    lists = ("correlations", "checks", "faults", "references", "hosts")
     return {
         "schema": SCHEMA,
         "source": str(said.sweep.path),
@@ -239,7 +226,6 @@ def quantiles(errors: Numbers, probabilities: Sequence[float] = (0.5, 0.95)) -> 
 def _configuration(sample: Sample) -> dict[str, Any]:
     return {
         "label": sample.label,
-        "name": sample.name,
         "method": sample.method,
         "scenes": len(sample.scenes),
         "statuses": dict(Counter(sample.statuses)),
@@ -274,17 +260,6 @@ def _hosts(sweep: Sweep) -> list[Host]:
         for (host, device, threads), rows in places.most_common()
         if host is not None
     ]
-
-
-def _properties(sweep: Sweep) -> list[Property]:
-    _, first = np.unique(sweep.texts("scene").astype(str), return_index=True)
-    made = []
-    for name in sweep.properties:
-        values = sweep.property(name)[first]
-        values = values[np.isfinite(values)]
-        if len(values):
-            made.append(Property(name, float(values.min()), float(np.median(values)), float(values.max()), len(values)))
-    return made
 
 
 def _span(sweep: Sweep) -> tuple[str, str] | None:

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from reports.sweep.claims import TARGETS, written
-from reports.sweep.correlations import property_words
 from reports.sweep.faults import Check, Fault
 from reports.sweep.samples import FAULTS, UNTOLD
-from reports.sweep.summary import Host, Property, ReferenceErrors, Summary, quantiles
+from reports.sweep.summary import Host, ReferenceErrors, Summary, quantiles
 from reports.tables.table import Column, Measured, Name, Table, numbers, table, words
 from validation.columns import columns_of
 
@@ -21,7 +20,7 @@ _SHARE = {"digits": 2, "share": True}
 def errors_table(said: Summary) -> Table:
     """Return how wrong each configuration is, and in what fraction of the scenes it keeps an error."""
     columns = (
-        *words(name="method"),
+        *words(label="method"),
         *(
             Column(f"within_{target:g}", f"within {written(target)}", percent=True, spread="95 %", places=1)
             for target in reversed(TARGETS)
@@ -34,7 +33,7 @@ def errors_table(said: Summary) -> Table:
     for sample in said.samples:
         values = quantiles(sample.errors)
         row = {
-            "name": sample.name,
+            "label": sample.label,
             "scenes": len(sample.scenes),
             "refused": sample.count("refused"),
             "untold": sample.count(UNTOLD),
@@ -63,7 +62,7 @@ def errors_table(said: Summary) -> Table:
 def speed_table(said: Summary) -> Table:
     """Return what each configuration costs, and in how many scenes it is the fastest within an error."""
     columns = (
-        *words(name="method"),
+        *words(label="method"),
         *numbers(timed="scenes timed"),
         Column("frame", "frame", "ms", spread="quartiles over scenes"),
         *(
@@ -74,7 +73,7 @@ def speed_table(said: Summary) -> Table:
     rows = []
     for place, sample in enumerate(said.samples):
         known = sample.times[np.isfinite(sample.times)]
-        row = {"name": sample.name, "timed": len(known)}
+        row = {"label": sample.label, "timed": len(known)}
         if len(known):
             first, middle, third = np.quantile(known, (0.25, 0.5, 0.75)).tolist()
             row["frame"] = Measured(middle, first, third)
@@ -95,11 +94,9 @@ def refusals_table(said: Summary) -> Table:
         *words(reason="reason", how={"long": True}),
         *words(status="outcome", methods="methods", how={"minor": True}),
     )
-    name_of = {sample.label: sample.name for sample in said.samples}
     rows = []
     for each in said.reasons:
-        names = list(dict.fromkeys(name_of.get(label, label) for label in each.labels))
-        shown = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if names[3:] else "")
+        shown = ", ".join(each.labels[:3]) + (f" and {len(each.labels) - 3} more" if each.labels[3:] else "")
         rows.append(
             {
                 "reason": each.reason,
@@ -140,12 +137,6 @@ def references_table(said: Summary) -> Table:
     return _table_of(
         "Errors of the reference itself", ReferenceErrors, said.references, explanation=explanation, how=how
     )
-
-
-def properties_table(said: Summary) -> Table:
-    """Return what the scenes hold."""
-    rows = [vars(each) | {"property": property_words(each.property)} for each in said.properties]
-    return _table_of("What the scenes hold", Property, rows)
 
 
 def hosts_table(said: Summary) -> Table:
