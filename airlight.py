@@ -18,13 +18,15 @@ if __name__ == "__main__":  # before all that takes time: what a signal meets du
 
     start()
 
+import ast
 import importlib
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from reports import __version__
 
-if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says the same at run time
+if TYPE_CHECKING:  # the public names: editors complete them from here, and at run time `_exported` reads them
     from analytic.errors import InputError as InputError
     from realtime.frame.renderer import frame_renderer as frame_renderer
     from realtime.frame.renderer import render_frame as render_frame
@@ -61,55 +63,27 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from validation.study.configuration import configuration as configuration
     from validation.study.frame_times import time_frame as time_frame
 
-# name -> module, and the function there where it cannot have the name; what is missing here is not part of the API
-_API = {
-    # the commands
-    "doctor": "reports.machine.doctor",
-    "list": "reports.commands.list:list_",
-    "render": "reports.api.render",
-    "view": "reports.api.explore",
-    "report": "reports.api.report",
-    "diff": "reports.api.report",
-    "sweep": "reports.api.sweep",
-    "study": "reports.studies.registry",
-    "reference": "reports.api.reference",
-    "compare": "reports.api.compare",
-    "describe": "reports.api.explore",
-    "export": "reports.api.export",
-    "paper": "reports.api.report",
-    # scenes, what can be measured, and what the commands are made of
-    "load_scene": "reports.api.render",
-    "InputError": "analytic.errors",
-    "MissingError": "reports.machine.environment",
-    "activate": "reports.machine.environment",
-    "versions": "reports.machine.environment",
-    "SCENES": "validation.scenes.registry",
-    "METHODS": "realtime.methods.registry",
-    "Method": "realtime.methods.interface.method",
-    "find_method": "realtime.methods.registry",
-    "KERNELS": "realtime.kernels.registry",
-    "STUDIES": "reports.studies.registry",
-    "configuration": "validation.study.configuration",
-    "read_scene": "realtime.scene.read_scene",
-    "frame_renderer": "realtime.frame.renderer",
-    "render_frame": "realtime.frame.renderer",
-    "time_frame": "validation.study.frame_times",
-    "error_metrics": "validation.metrics.errors",
-    "Budget": "validation.estimates.images",
-    "multiple_scattering_fraction": "validation.estimates.multiple_scattering",
-    "certified_data": "validation.certified.files",
-    "read_exr": "reference.storage.exr",
-    "write_exr": "reference.storage.exr",
-}
 
+def _exported() -> dict[str, tuple[str, str]]:
+    """Return the module and the name there of each name above, read from this file."""
+    block = next(
+        each
+        for each in ast.parse(Path(__file__).read_text(encoding="utf-8")).body
+        if isinstance(each, ast.If) and ast.unparse(each.test) == "TYPE_CHECKING"
+    )
+    imports = (each for each in block.body if isinstance(each, ast.ImportFrom))
+    return {name.asname or name.name: (each.module or "", name.name) for each in imports for name in each.names}
+
+
+_API = _exported()
 __all__ = ["__version__", "main", *_API]
 
 
 def __getattr__(name: str) -> Any:
     if name not in _API:
         raise AttributeError(f"module 'airlight' has no attribute {name!r}")
-    module, _, own = _API[name].partition(":")
-    return getattr(importlib.import_module(module), own or name)
+    module, own = _API[name]
+    return getattr(importlib.import_module(module), own)
 
 
 def __dir__() -> Sequence[str]:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parts of pages that are made from the program and from a report.
 
-A line `<!-- generated: NAME WORDS -->` of a page is replaced by Markdown that a function of `listed`, `measured`,
-`shown` or `tested` returns, before the page is read, so that nothing on the pages is copied by hand. In a plain viewer
-the marks are invisible: `.venv/bin/python -m sphinx -W --keep-going docs airlight-docs` builds the pages.
+A line `<!-- generated: NAME WORDS -->` of a page is replaced by Markdown that the function of that name in `listed`,
+`measured`, `shown` or `tested` returns, before the page is read, so that nothing on the pages is copied by hand. In a
+plain viewer the marks are invisible: `.venv/bin/python -m sphinx -W --keep-going docs airlight-docs` builds the pages.
 Links to Python files of the project, which have no pages, become the names of the files. A notebook is read as the
 Markdown of its cells and of what they printed and showed.
 """
@@ -20,33 +20,6 @@ from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 
 ROOT = Path(__file__).resolve().parents[2]
-PARTS = {
-    "names": listed.names,
-    "signatures": listed.signatures,
-    "keys": listed.keys,
-    "commands": listed.commands,
-    "methods": listed.methods,
-    "parameters": listed.parameters,
-    "light-points": listed.light_points,
-    "history": listed.history,
-    "studies": listed.studies,
-    "report-keys": listed.report_keys,
-    "sweep-columns": listed.sweep_columns,
-    "kernels": listed.kernels,
-    "method": measured.method,
-    "kernel-costs": measured.kernel_costs,
-    "left-out": measured.left_out,
-    "scenes": measured.scenes,
-    "strip": shown.strip,
-    "pictures": shown.pictures,
-    "claims": measured.claims,
-    "cycles": measured.cycles,
-    "numpy-faults": measured.numpy_faults,
-    "tested-claims": tested.claims,
-    "last-run": tested.last_run,
-    "fastest": measured.fastest,
-    "provenance": measured.provenance,
-}
 _MARK = re.compile(r"<!-- generated: ([a-z-]+)((?: [\w-]+)*) -->")
 _SOURCE = re.compile(r"\[([^\]]+)\]\(\.\./((?:analytic|realtime|reference|validation|reports)/[\w/]+)\.py\)")
 #: Documents in the folder above, and the pages that show them.
@@ -59,9 +32,12 @@ def fill(text: str) -> str:
 
 
 def _part(match: re.Match[str]) -> str:
-    if match[1] not in PARTS:
-        raise ExtensionError(f"{match[0]}: wanted one of {', '.join(PARTS)}")
-    return PARTS[match[1]](*match[2].split())
+    name = match[1].replace("-", "_")
+    for module in (listed, measured, shown, tested):
+        function = getattr(module, name, None)
+        if function is not None and function.__module__ == module.__name__:
+            return function(*match[2].split())
+    raise ExtensionError(f"{match[0]}: no module of docs/_ext has a function {name}")
 
 
 def _code(link: re.Match[str]) -> str:

@@ -59,7 +59,7 @@ def names() -> str:
     rows = [
         (f"{{py:obj}}`{name} <{value.__module__}.{value.__name__}>`", _sentence(value))
         if _documented(value)
-        else (f"`{name}`", f"see `{airlight._API[name]}`")
+        else (f"`{name}`", f"see `{airlight._API[name][0]}`")
         for name, value in _public().items()
     ]
     return table(("name", "what it is"), rows, 2)

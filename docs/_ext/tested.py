@@ -12,7 +12,7 @@ from sphinx.errors import ExtensionError
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def claims() -> str:
+def tested_claims() -> str:
     """Return the claims of `docs/claims.toml` by topic, each with its tests, their tier and what they allow.
 
     A claim without a test, or a test of a claim that is not listed, ends the build.
