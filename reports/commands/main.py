@@ -287,7 +287,7 @@ def run(arguments: Sequence[str]) -> int:
         packages = missing_packages()
         if not packages:
             raise
-        return _fail(f"system libraries are missing, install them with `{install_line(packages)}`", MISSING)
+        return _fail(f"system libraries are missing. To install them: {install_line(packages)}", MISSING)
     except cyclopts.CycloptsError as error:
         path = " ".join(["airlight", *(error.command_chain or ())])
         return _fail(f"{str(error).rstrip('.')} (see `{path} --help`)", WRONG_INPUT)

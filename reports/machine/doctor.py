@@ -6,7 +6,7 @@ that crashes.
 
     python -m reports.machine.doctor
 
-prints what is missing, for the launcher: Debian's names of the packages, and what to type on this system.
+prints Debian's names of the packages that are missing, for the launcher.
 """
 
 import json
@@ -23,7 +23,6 @@ from reports.machine.environment import (
     MissingError,
     atomic_problem,
     child_environment,
-    install_line,
     missing_packages,
     prepare,
     processor,
@@ -279,5 +278,4 @@ if __name__ == "__main__":
     if sys.argv[1:] == ["--probe"]:
         _probe()
     else:
-        _missing = missing_packages()
-        print(" ".join(_missing), install_line(_missing) if _missing else "", sep="\n")
+        print(*missing_packages())

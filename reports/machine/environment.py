@@ -5,10 +5,8 @@ Importing this module imports neither Mitsuba nor Dr.Jit. `activate` is the only
 """
 
 import ctypes
-import difflib
 import importlib
 import os
-import shutil
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -28,14 +26,6 @@ VARIANTS = ("cuda_ad_rgb", "llvm_ad_rgb")
 VARIANT_VARIABLE = "AIRLIGHT_VARIANT"
 
 _PACKAGES = ("mitsuba", "drjit", "numpy", "scipy", "mpmath", "OpenEXR", "colour-science", "matplotlib")
-# Debian's package names, and how other installers name the same two libraries; these were not tried.
-_INSTALLERS = {
-    "apt-get": ("sudo apt-get install -y", {}),
-    "dnf": ("sudo dnf install -y", {"libllvm19": "llvm-libs", "libatomic1": "libatomic"}),
-    "zypper": ("sudo zypper install -y", {"libllvm19": "libLLVM19"}),
-    "pacman": ("sudo pacman -S", {"libllvm19": "llvm-libs", "libatomic1": "gcc-libs"}),
-}  # fmt: skip
-_CONDA = "conda install -y -c conda-forge"
 
 
 class MissingError(RuntimeError):
@@ -77,7 +67,7 @@ def prepare(variant: str | None = None) -> Prepared:
     problems = [problem for problem in (llvm_problem(llvm) if on_processor else "", atomic_problem()) if problem]
     if problems:
         packages = missing_packages()
-        install = f". Install what is missing with `{install_line(packages)}`" if packages else ""
+        install = f". To install what is missing: {install_line(packages)}" if packages else ""
         raise MissingError("; ".join(problems) + install)
     if llvm is None or not llvm.works:
         return Prepared(variant, None)
@@ -140,12 +130,10 @@ def child_environment(variant: str | None = None) -> dict[str, str]:
 
 def check_variant(variant: str) -> None:
     """Raise InputError for a variant that is not one of `VARIANTS`."""
-    from analytic.errors import InputError
+    from analytic.errors import InputError, nearest
 
     if variant not in VARIANTS:
-        nearest = difflib.get_close_matches(variant, VARIANTS, n=1)
-        hint = f"; did you mean {nearest[0]}?" if nearest else ""
-        raise InputError(f"variant: got {variant!r}, wanted one of {', '.join(VARIANTS)}{hint}")
+        raise InputError(f"variant: got {variant!r}, wanted one of {', '.join(VARIANTS)}" + nearest(variant, VARIANTS))
 
 
 def atomic_problem() -> str:
@@ -186,17 +174,9 @@ def missing_packages() -> list[str]:
 
 
 def install_line(packages: list[str]) -> str:
-    """Return the line to type on this system to install packages known by Debian's names.
-
-    In an environment of conda that is conda's, which needs no superuser; else that of the first installer there is.
-    """
-    if Path(sys.prefix, "conda-meta").is_dir():
-        return f"{_CONDA} {' '.join(packages)}".replace("libatomic1", "libgcc")
-    for program, (line, names) in _INSTALLERS.items():
-        if shutil.which(program):
-            line = line.removeprefix("sudo ") if os.geteuid() == 0 else line
-            return f"{line} {' '.join(names.get(package, package) for package in packages)}"
-    return f"your system's installer for {' and '.join(packages)}"
+    """Return in words how packages known by Debian's names are installed."""
+    line = f"{'' if os.geteuid() == 0 else 'sudo '}apt-get install -y {' '.join(packages)}"
+    return f"`{line}` on Debian; docs/install.md has the names of other systems"
 
 
 def threads() -> int:

@@ -2,8 +2,6 @@
 """`airlight doctor`: whole, piped, and on machines where something is wrong."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -83,9 +81,3 @@ def test_the_cache_is_shown_and_cleared(filled, monkeypatch):
     assert (cleared.cache["removed"], cleared.cache["freed"], cleared.cache["files"]) == (6, size, 0)
     assert not list(filled.rglob("*.npz"))
     assert cleared.passed
-
-
-def test_the_launcher_gets_packages_and_a_line():
-    ran = subprocess.run([sys.executable, "-m", "reports.machine.doctor"], capture_output=True, text=True, check=True)
-    packages, line = ran.stdout.splitlines()
-    assert bool(packages) == bool(line)
