@@ -2,7 +2,7 @@
 """How numbers are written on the page of a report, and the sentences that the page makes of its data."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from reports.tables.drawing import DASH, sentence_in_html, typeset
@@ -29,7 +29,6 @@ KEYS: tuple[tuple[tuple[str, ...], str], ...] = (
     (("f",), "flip: one picture, reference and method in the same place"),
     (("v",), "one picture, or all side by side"),
     (("e",), "next kind of error map"),
-    (("r",), "next range of the error map, or next amplification"),
     (("l",), "next layer: airlight, surface, total"),
     (("+", "-", "0"), "exposure half a stop up, half a stop down, as at first"),
     (("n", "p"), "next scene, scene before"),
@@ -89,24 +88,13 @@ def kept_words(data: Mapping[str, Any]) -> str:
 
 
 def viewer_words(index: Mapping[str, Any]) -> str:
-    """Return how exact the images of a scene are on the page."""
+    """Return how many pixels the images of a scene have on the page, and their exposure."""
     stride, (width, height) = index["stride"], index["full"]
     size = f"{width} \N{MULTIPLICATION SIGN} {height} pixels"
     if stride > 1:
         size += f", of which the page holds one in {stride} along both axes to stay small; the files have all"
     exposure = f"Exposure {number(index['exposure'])}\N{MULTIPLICATION SIGN} at 0 stops."
-    return f"{size}, differences rounded to {percent(index['of_difference'], 2)} of themselves. {exposure}"
-
-
-def precision_words(indices: Sequence[Mapping[str, Any]]) -> str:
-    """Return how exact the differences of the images are, of the coarsest of the scenes."""
-    if not indices:
-        return ""
-    coarsest = max(indices, key=lambda index: index["of_difference"])
-    return (
-        f"A difference is rounded by at most {percent(coarsest['of_difference'], 2)} of itself where it is large, and "
-        f"by {number(coarsest['of_value'], 2)} of the value where it is small."
-    )
+    return f"{size}. {exposure}"
 
 
 FILTERS: Mapping[str, Callable[..., str]] = {

@@ -2,9 +2,8 @@
 """The images of a report as data for its page: packed, with an index that the page's script reads.
 
 Each scene becomes one string of base64 that holds all of its packed planes, and an entry of the index that says where
-each lies and how it was coded (`reports.page.image_codec`). A page has a limit of bytes; the largest scenes go down
-`LADDER` until all fit: first the differences are coded more coarsely, then every second,
-third ... pixel is kept. What was done is in the index, and the page says so.
+each lies (`reports.page.image_codec` says how it is coded). A page has a limit of bytes; the largest scenes go down
+`STRIDES` until all fit: every pixel is kept, every second, third ... The index has which, and the page says so.
 """
 
 import base64
@@ -22,9 +21,9 @@ from reference.storage.exr import TOTAL, read_exr
 from reports.page.image_codec import (
     DIFFERENCE_BITS,
     FLIP_BITS,
-    PRECISIONS,
     REFERENCE_BITS,
-    Precision,
+    K,
+    S,
     difference_codes,
     pack_planes,
     reference_codes,
@@ -37,11 +36,7 @@ LAYERS = ("airlight", "surface")
 FLIP_LAYER = "flip"
 FLIP_LEVELS = 255  #: code of an HDR-FLIP of 1
 DARK = 1e-3  #: fraction of the reference's mean; darker pixels are compared with this floor, as in the tables
-#: Precision of the differences and stride of the pixels, from the finest down.
-LADDER: tuple[tuple[Precision, int], ...] = (
-    *((precision, 1) for precision in PRECISIONS),
-    *((PRECISIONS[1], stride) for stride in (2, 3, 4, 6, 8, 12, 16)),
-)
+STRIDES = (1, 2, 3, 4, 6, 8, 12, 16)  #: of the pixels that are kept
 
 
 @dataclass(frozen=True)
@@ -63,20 +58,19 @@ class StoredImages:
 def page_images(scenes: Sequence[Mapping[str, Any]], folder: Path, limit: int) -> list[SceneImages]:
     """Return the images of scenes of report.json from a folder, all together in at most `limit` characters.
 
-    Every scene begins with the finest rung of `LADDER`; while the page is too large the largest goes a rung down.
+    Every scene begins with all pixels; while the page is too large the largest goes down `STRIDES`.
     """
-    rungs = [0] * len(scenes)
-    packed = [packed_scene(scene, read_images(scene, folder), *LADDER[0]) for scene in scenes]
+    packed = [packed_scene(scene, read_images(scene, folder), STRIDES[0]) for scene in scenes]
     while (total := sum(len(images.data) for images in packed)) > limit:
-        coarser = [place for place, rung in enumerate(rungs) if rung + 1 < len(LADDER)]
+        coarser = [place for place, images in enumerate(packed) if images.index["stride"] < STRIDES[-1]]
         if not coarser:
             raise InputError(
-                f"report: the images take {total / 1e6:.1f} MB of the page even with one pixel in {LADDER[-1][1]} "
+                f"report: the images take {total / 1e6:.1f} MB of the page even with one pixel in {STRIDES[-1]} "
                 f"along both axes, wanted at most {limit / 1e6:.1f} MB; report fewer scenes or methods at once"
             )
         largest = max(coarser, key=lambda place: len(packed[place].data))
-        rungs[largest] += 1
-        packed[largest] = packed_scene(scenes[largest], read_images(scenes[largest], folder), *LADDER[rungs[largest]])
+        stride = STRIDES[STRIDES.index(packed[largest].index["stride"]) + 1]
+        packed[largest] = packed_scene(scenes[largest], read_images(scenes[largest], folder), stride)
     return packed
 
 
@@ -103,7 +97,7 @@ def _layers(path: Path) -> dict[str, Array]:
     return {name: np.asarray(layers[name], dtype=np.float64) for name in wanted if name in layers}
 
 
-def packed_scene(scene: Mapping[str, Any], images: StoredImages, precision: Precision, stride: int) -> SceneImages:
+def packed_scene(scene: Mapping[str, Any], images: StoredImages, stride: int) -> SceneImages:
     """Return the images of a scene of report.json for the page: one pixel in `stride` along both axes."""
 
     def thin(layers: Mapping[str, Array]) -> dict[str, Array]:
@@ -122,17 +116,16 @@ def packed_scene(scene: Mapping[str, Any], images: StoredImages, precision: Prec
     rounded[TOTAL] = rounded["airlight"] + rounded["surface"]
     shown = [entry for entry in scene["methods"] if entry["files"]]
 
-    def packed(number: int) -> dict[str, tuple[bytes, float]]:
-        """Return the packed layers of a method, each with its k."""
+    def packed(number: int) -> dict[str, bytes]:
+        """Return the packed layers of a method."""
         packed_layers = {}
         for name, layer in thin(images.methods[number]).items():
             if name == FLIP_LAYER:
                 levels = np.round(FLIP_LEVELS * np.clip(np.nan_to_num(layer[..., :1]), 0, 1)).astype(np.int32)
-                packed_layers[name] = pack_planes(levels, FLIP_BITS), float(FLIP_LEVELS)
+                packed_layers[name] = pack_planes(levels, FLIP_BITS)
             else:
                 relative = relative_difference(exact[name], rounded[name], layer, floors[name])
-                method_codes, k = difference_codes(relative, precision)
-                packed_layers[name] = pack_planes(method_codes, DIFFERENCE_BITS), k
+                packed_layers[name] = pack_planes(difference_codes(relative), DIFFERENCE_BITS)
         return packed_layers
 
     with ThreadPoolExecutor() as pool:
@@ -147,15 +140,10 @@ def packed_scene(scene: Mapping[str, Any], images: StoredImages, precision: Prec
         "stride": stride,
         "exposure": scene["exposure"],
         "floors": floors,
-        "s": precision.s,
-        "of_difference": precision.of_difference,
-        "of_value": precision.of_value,
+        "scale": [K, S],
         "reference": {name: store.add(plane) for name, plane in zip(LAYERS, references)},
         "methods": [
-            {
-                "label": entry["label"],
-                "layers": {name: store.add(what) | {"k": k} for name, (what, k) in layers.items()},
-            }
+            {"label": entry["label"], "layers": {name: store.add(what) for name, what in layers.items()}}
             for entry, layers in zip(shown, methods)
         ],
     }

@@ -4,6 +4,7 @@
 const MAGENTA = 0xffff00ff;  // as all pixels here: alpha, blue, green, red
 const PURPLE = 0xff7a007a;
 const STEPS = 16384;
+const FLOOR = 1e-4;  // relative error that is white, as in all error maps
 
 // sRGB of linear values in steps of 1 / STEPS, IEC 61966-2-1.
 const SRGB = Uint8Array.from({length: STEPS + 1}, (_, i) => {
@@ -52,21 +53,21 @@ function colourTable(base64) {
     (0xff000000 | bytes[3 * i + 2] << 16 | bytes[3 * i + 1] << 8 | bytes[3 * i]) >>> 0);
 }
 
-// Where a relative error lies between floor and 1 on a scale of decades, 0 to 1.
-function decade(size, floor) {
-  return Math.min(1, Math.max(0, Math.log10(Math.max(size, 1e-30) / floor) / -Math.log10(floor)));
+// Where a relative error lies between FLOOR and 1 on a scale of decades, 0 to 1.
+function decade(size) {
+  return Math.min(1, Math.max(0, Math.log10(Math.max(size, 1e-30) / FLOOR) / -Math.log10(FLOOR)));
 }
 
-// The error maps by name: colour(error) of a pixel in the table, and the ticks of the scale as [place, label].
+// The error maps by name: the colour of a pixel in the table, and the ticks of the scale as [place, label].
 const MAPS = {
   signed: {
     words: "signed relative error: blue too dark, red too bright",
-    colour(table, error, floor) {
+    colour(table, error) {
       const middle = (table.length - 1) / 2;
-      return table[Math.round(middle * (1 + Math.sign(error) * decade(Math.abs(error), floor)))];
+      return table[Math.round(middle * (1 + Math.sign(error) * decade(Math.abs(error))))];
     },
-    ticks(floor) {
-      const decades = decadesFrom(floor);
+    ticks() {
+      const decades = decadeTicks();
       const up = decades.slice(1).map(([place, label]) => [0.5 + place / 2, "+" + label]);
       const down = decades.slice(1).map(([place, label]) => [0.5 - place / 2, "\u2212" + label]).reverse();
       return [...down, [0.5, "\u00b1" + decades[0][1]], ...up];
@@ -74,25 +75,23 @@ const MAPS = {
   },
   relative: {
     words: "relative error, without its sign",
-    colour: (table, error, floor) => table[Math.round(255 * decade(Math.abs(error), floor))],
-    ticks: (floor) => decadesFrom(floor),
+    colour: (table, error) => table[Math.round(255 * decade(Math.abs(error)))],
+    ticks: () => decadeTicks(),
   },
   flip: {
     words: "HDR-FLIP of all light",
     colour: (table, error) => table[Math.round(255 * Math.min(1, error))],
     ticks: () => [0, 0.2, 0.4, 0.6, 0.8, 1].map((value) => [value, String(value)]),
   },
-  difference: {words: "absolute difference, amplified, in the exposure of the pictures"},
 };
 
-function decadesFrom(floor) {
-  const decades = Math.round(-Math.log10(floor));
-  return Array.from({length: decades + 1}, (_, n) => [n / decades, percentWords(floor * 10 ** n)]);
+function decadeTicks() {
+  const decades = Math.round(-Math.log10(FLOOR));
+  return Array.from({length: decades + 1}, (_, n) => [n / decades, percentWords(FLOOR * 10 ** n)]);
 }
 
 function percentWords(value) {
-  const percent = 100 * value;
-  return percent > 9e-4 ? `${Number(percent.toPrecision(3))} %` : `10${superscript(Math.round(Math.log10(percent)))} %`;
+  return `${Number((100 * value).toPrecision(3))} %`;
 }
 
 function superscript(number) {

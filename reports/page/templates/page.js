@@ -6,7 +6,7 @@
   const tables = Object.fromEntries(Object.entries(data.maps).map(([name, map]) => [name, colourTable(map)]));
   const live = document.getElementById("live");
   const help = document.getElementById("help");
-  const SHARED = ["layer", "mode", "floor", "gain", "stops", "view", "shown"];
+  const SHARED = ["layer", "mode", "stops", "view", "shown"];
   const KEEP = 3;  // scenes whose images stay decoded
   let all = true, active = null, keys = true;
   const recent = [];
@@ -37,8 +37,7 @@
   }
 
   function redrawStrips(changedViewers, what) {
-    if (!["layer", "mode", "floor", "gain", "stops"].some((name) => name in what)) return;
-    if ("stops" in what && changedViewers.every((viewer) => viewer.state.mode !== "difference")) return;
+    if (!("layer" in what || "mode" in what)) return;
     clearTimeout(redrawStrips.timer);
     redrawStrips.timer = setTimeout(() => changedViewers.forEach((viewer) => viewer.redrawStrip()), 150);
   }
@@ -126,8 +125,6 @@
       say(MAPS[v.state.mode].words);
     },
     l: (v) => { v.set({layer: cycled(["airlight", "surface", "total"], v.state.layer)}); say(v.state.layer); },
-    r: (v) => v.state.mode === "difference" ? v.set({gain: cycled(GAINS, v.state.gain)})
-      : v.set({floor: cycled(FLOORS, v.state.floor)}),
     "+": (v) => expose(v, v.state.stops + 0.5),
     "-": (v) => expose(v, v.state.stops - 0.5),
     "0": (v) => expose(v, 0),

@@ -47,7 +47,7 @@ class SceneImages {
       const loaded = {};
       for (const [name, entry] of Object.entries(this.index.methods[number].layers)) {
         if (name === "flip") [loaded.flip] = await this.planes(entry, 8);
-        else loaded[name] = (await this.planes(entry, 16)).map((p) => differenceValues(p, entry.k, this.index.s));
+        else loaded[name] = (await this.planes(entry, 16)).map((p) => differenceValues(p, ...this.index.scale));
       }
       this.methods[number] = loaded;
     });

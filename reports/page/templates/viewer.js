@@ -1,8 +1,6 @@
 // The viewer of one scene: reference, method and error map in one exposure, the strip of all error maps, the probe.
 "use strict";
 
-const GAINS = [1, 10, 100, 1000, 10000];
-const FLOORS = [1e-4, 1e-5, 1e-6];
 const STOPS = 10;  // of exposure either way
 
 class Viewer {
@@ -11,8 +9,8 @@ class Viewer {
     this.images = images;
     this.tables = tables;
     this.changed = changed;  // called with (viewer, what changed) after the user changed something
-    this.state = {method: Number(element.dataset.method), layer: "airlight", mode: "signed", floor: FLOORS[0], gain: 10,
-      stops: 0, view: "side", shown: "method", pixel: null, pinned: false};
+    this.state = {method: Number(element.dataset.method), layer: "airlight", mode: "signed", stops: 0,
+      view: "side", shown: "method", pixel: null, pinned: false};
     this.visible = false;
     this.stale = true;  // what is drawn is not what was asked for
     this.find = (selector) => element.querySelector(selector);
@@ -150,15 +148,10 @@ class Viewer {
     const layer = images.layerOf(number, state.layer);
     const mode = state.mode === "flip" && !images.methods[number].flip ? "signed" : state.mode;
     const {width, height} = images;
-    if (mode === "difference") {
-      const factor = this.factor * state.gain;
-      return drawPicture(canvas, width, height,
-        (c, i) => Math.abs(images.difference(number, layer, c, i)) * images.unit(layer, c, i), factor);
-    }
     const table = this.tables[mode], {colour} = MAPS[mode], {flip} = images.methods[number];
     return drawPixels(canvas, width, height, (i) => {
       const error = mode === "flip" ? flip[i] / 255 : images.worst(number, layer, i);
-      return Number.isFinite(error) ? colour(table, error, state.floor) : NaN;
+      return Number.isFinite(error) ? colour(table, error) : NaN;
     });
   }
 
@@ -185,11 +178,11 @@ class Viewer {
     const label = this.labels[state.method];
     const holes = (count) => count ? `; ${count} pixel${count > 1 ? "s" : ""} not finite (hatched in magenta)` : "";
     const other = layer === state.layer ? "" : ` (it has no ${state.layer}: its ${layer} is shown)`;
-    const map = this.mode === "difference" ? `${MAPS.difference.words}, ${state.gain} times` : MAPS[this.mode].words;
+    const map = MAPS[this.mode].words;
     const missing = this.mode === state.mode ? "" : " (no HDR-FLIP here)";
     this.find(".reference figcaption").textContent = `Reference (quadrature), ${layer}${holes(bad.reference)}`;
     this.find(".method figcaption").textContent = `${label}, ${layer}${other}${holes(bad.method)}`;
-    const white = this.allWhite() ? `; all white: below ${percentWords(state.floor)} in every pixel` : "";
+    const white = this.allWhite() ? `; all white: below ${percentWords(FLOOR)} in every pixel` : "";
     this.find(".error .what").textContent = `Error of ${label}: ${map}${missing}${white}${holes(bad.error)}`;
     const probe = "Arrow keys move the probe.";
     this.canvases.reference.setAttribute("aria-label", `${index.name}: reference, ${layer}. ${probe}`);
@@ -203,24 +196,14 @@ class Viewer {
     const {images, state, layer} = this;
     if (this.mode !== "signed") return false;
     for (let i = 0; i < images.width * images.height; i++)
-      if (!(Math.abs(images.worst(state.method, layer, i)) < state.floor)) return false;
+      if (!(Math.abs(images.worst(state.method, layer, i)) < FLOOR)) return false;
     return true;
   }
 
   showScale() {
     const bar = this.find(".scale canvas"), ticks = this.find(".scale .ticks");
-    const {mode, state} = this;
-    let marks;
-    if (mode === "difference") {
-      const white = 1 / (this.factor * state.gain);
-      drawPixels(bar, 256, 1, (i) => { const v = encoded(i / 255); return 0xff000000 | v << 16 | v << 8 | v; });
-      marks = [0, 0.5, 1].map((place) => [place, numberWords(place * white, 2)]);
-      marks[2][1] += " W/(m\u00b2 sr)";
-    } else {
-      const table = this.tables[mode];
-      drawPixels(bar, table.length, 1, (i) => table[i]);
-      marks = MAPS[mode].ticks(state.floor);
-    }
+    const {mode} = this, table = this.tables[mode], marks = MAPS[mode].ticks();
+    drawPixels(bar, table.length, 1, (i) => table[i]);
     // Where there are many ticks every second one has its words, and always both ends and the middle.
     const outer = mode === "signed" ? (marks.length - 1) / 2 : marks.length - 1;
     ticks.replaceChildren(...marks.map(([place, words], number) => {
@@ -242,8 +225,6 @@ class Viewer {
     }
     controls.querySelector("output").textContent =
       `${state.stops > 0 ? "+" : state.stops < 0 ? "\u2212" : ""}${Math.abs(state.stops)} stops`;
-    controls.querySelector(".floor").hidden = !["signed", "relative"].includes(this.mode);
-    controls.querySelector(".gain").hidden = this.mode !== "difference";
     controls.querySelector("option[value=flip]").disabled = !this.hasFlip;
     for (const button of controls.querySelectorAll("button[data-does=show]"))
       button.setAttribute("aria-pressed", String(state.view === "flip" && button.dataset.shown === state.shown));
