@@ -40,7 +40,6 @@ def compare(
     pixel: Literal["centre", "area"] | None = None,
     mask: Mask | None = None,
     margin: float | None = None,
-    by_order: bool = False,
     all_metrics: bool = False,
     diagnose: bool = False,
     fit: Words | None = None,
@@ -79,8 +78,6 @@ def compare(
         An EXR file that is 0 in pixels to leave out; from Python also truth values, (height, width).
     margin
         Largest relative bias that counts as agreement, such as 0.005; two images need standard errors for it.
-    by_order
-        With two images: also compare the layers by order of scattering, such as airlight_3_4.
     all_metrics
         Also compute the errors of other tools, colour differences, and HDR-FLIP by flip-evaluator.
     diagnose
@@ -124,8 +121,7 @@ def compare(
     for name, value in own.items():
         if value is not None and scene is None:
             raise InputError(f"{name}: goes with a scene in the place of the reference; two images are what they are")
-    about = {"output": files or None, "margin": margin, "by_order": by_order or None}
-    about |= {"all_metrics": all_metrics or None}
+    about = {"output": files or None, "margin": margin, "all_metrics": all_metrics or None}
     given = [name for name, value in about.items() if value is not None]
     if diagnose and fit is not None:
         raise InputError("diagnose, fit: are two questions; give one of them")
@@ -141,22 +137,13 @@ def compare(
         raise InputError(f"{asked}: {', '.join(given)} is about a comparison; leave one out")
     if diagnose and mask is not None:
         raise InputError("diagnose: looks at all pixels; leave out the mask")
-    if scene is not None and by_order:
-        raise InputError(
-            "by_order: compares two images; make the reference by airlight reference SCENE --estimator cloud-paths"
-        )
     for path in files:
         _check_difference(path)
     if fit is not None:
         return _fit(scene, test, fit, layer=layer, holds=holds, pixel=pixel, mask=mask, progress=progress)
-    options: dict[str, Any] = {
-        "mask": mask,
-        "margin": margin,
-        "all_metrics": all_metrics,
-        "flip": all_metrics,
-    }
+    options: dict[str, Any] = {"mask": mask, "margin": margin, "all_metrics": all_metrics}
     if scene is None:
-        return _two_images(reference, test, layer, by_order=by_order, files=files, **options)
+        return _two_images(reference, test, layer, files=files, **options)
     how = {"layer": layer, "holds": holds, "pixel": pixel}
     with _as_file(test) as path:
         from reference.storage.exr import read_exr
@@ -225,21 +212,17 @@ def _as_file(image: Any) -> Iterator[Path]:
 def as_image(image: Any, layer: str | None, name: str) -> "tuple[Image, str]":
     """Return layers of an `ImageLike`, and what to call it: `name` where it has none of its own.
 
-    An array, (height, width[, 3]), becomes the layer; a file without the layer is refused.
+    An array, (height, width[, 3]), becomes the layer.
     """
     import numpy as np
 
     from reference.storage.exr import Image, read_exr
-    from reference.storage.exr import layer as image_layer
     from reports.api.results import LayeredImage
 
     if isinstance(image, LayeredImage):
         return image.with_total(), image.title
     if isinstance(image, str | os.PathLike):
-        read = read_exr(image)
-        if layer is not None:
-            image_layer(read, layer, image)  # a message about a missing layer then names the file
-        return read, Path(image).name
+        return read_exr(image), Path(image).name
     if isinstance(image, Image):
         return image, name
     values = np.asarray(image)
@@ -263,34 +246,21 @@ def _mask(mask: Any) -> Any:
 
 
 def _two_images(
-    reference: Any, test: Any, layer: str | None, *, mask: Any, by_order: bool, files: list[Path], **options: Any
+    reference: Any, test: Any, layer: str | None, *, mask: Any, files: list[Path], **options: Any
 ) -> "ImageComparison":
     from reference.storage.exr import layer as image_layer
-    from reference.storage.exr import read_exr
     from reports.api.comparisons import ImageComparison, write_difference
-    from validation.comparison.images import common_layer, compare_files, compare_images
-
-    if layer is None:
-        read = [(str(path), read_exr(path)) for path in (reference, test) if isinstance(path, str | os.PathLike)]
-        layer = common_layer(*read) if len(read) == 2 else "airlight"
+    from validation.comparison.images import compare_images
 
     exact, exact_name = as_image(reference, layer, "the reference")
     tested, test_name = as_image(test, layer, "the test image")
-    chosen = _mask(mask)
-    if all(isinstance(image, str | os.PathLike) for image in (reference, test)):
-        file = None if mask is None or not isinstance(mask, str | os.PathLike) else mask
-        if mask is None or file is not None:
-            comparison = compare_files(reference, test, layer, mask=file, by_order=by_order, **options)
-        else:
-            comparison = compare_images(exact, tested, layer=layer, mask=chosen, **options)
-    elif by_order:
-        raise InputError("by_order: compares two files; save the images first")
-    else:
-        comparison = compare_images(exact, tested, layer=layer, mask=chosen, **options)
+    chosen, names = _mask(mask), (exact_name, test_name)
+    paths = [str(each) if isinstance(each, str | os.PathLike) else name for each, name in zip((reference, test), names)]
+    comparison = compare_images(exact, tested, layer=layer, mask=chosen, names=(paths[0], paths[1]), **options)
     kept: dict[str, Any] = {field.name: getattr(comparison, field.name) for field in dataclasses.fields(comparison)}
-    kept |= {"reference": image_layer(exact, layer), "test": image_layer(tested, layer)}
+    kept |= {each: image_layer(image, comparison.layer) for each, image in (("reference", exact), ("test", tested))}
     said = tuple((str(path), write_difference(path, kept["reference"], kept["test"], kept=chosen)) for path in files)
-    return ImageComparison(**kept, names=(exact_name, test_name), files=said)
+    return ImageComparison(**kept, names=names, files=said)
 
 
 def _with_scene(

@@ -4,6 +4,7 @@
 import math
 import os
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -36,7 +37,7 @@ class Comparison:
     errors_normalised: PublishedErrors | None = None  #: the same with the mean of the reference as the unit
     colour: ColourDifference | None = None  #: None if it was not asked for
     flip: Flip | None = None  #: None if it was not asked for
-    orders: tuple["Comparison", ...] = ()  #: of the layers by order of scattering that both images have, if asked for
+    orders: tuple["Comparison", ...] = ()  #: of the layers by order of scattering that both images have
     notes: tuple[str, ...] = ()  #: what was changed or left out when files were read
 
     @property
@@ -89,31 +90,50 @@ def compare_images(
     reference: Image,
     test: Image,
     *,
-    layer: str = "airlight",
+    layer: str | None = None,
     mask: ArrayLike | None = None,
     margin: float | None = None,
     all_metrics: bool = False,
-    flip: bool = False,
     names: tuple[str, str] = ("the reference", "the test image"),
 ) -> Comparison:
     """Compare a layer of two images whose errors are independent, `total` for the plain channels.
 
+    By default that is the airlight where both have one, else the plain channels; with the airlight also the layers by
+    order of scattering that both have, such as `airlight_3_4`.
+
     Statistics need the standard errors in the layer `<layer>_se` of either image; with both, both count. The header
     attribute `airlight:batches` says from how many batch means they come.
 
-    The mask says which pixels to compare, (height, width) of truth values. The `margin` is the largest relative bias
-    that counts as agreement; it wants standard errors. `all_metrics` adds the errors by the formulae of other tools and
-    the colour differences, `flip` HDR-FLIP, what goes wrong with which is a note. Messages call the images by their
-    `names`.
+    The mask says which pixels to compare, (height, width) of truth values; pixels of the frame that a file does not
+    hold are left out too. The `margin` is the largest relative bias that counts as agreement; it wants standard errors.
+    `all_metrics` adds the errors by the formulae of other tools, the colour differences and HDR-FLIP. Messages call the
+    images by their `names`.
     """
-    expected, tested = (_estimate(path, image, layer) for path, image in zip(names, (reference, test)))
+    named = tuple(zip(names, (reference, test)))
+    chosen = test.with_data(reference.with_data(None if mask is None else np.asarray(mask)))
+    name = common_layer(*named) if layer is None else layer
+    whole = _compared(named, name, chosen, margin, all_metrics=all_metrics)
+    orders = [each for each in reference.layers if _ORDER.fullmatch(each) and each in test.layers]
+    orders = sorted(orders, key=lambda each: int(each.split("_")[1])) if name == "airlight" else []
+    return replace(
+        whole,
+        notes=tuple(f"{path}: {image.attributes[NOTE]}" for path, image in named if NOTE in image.attributes),
+        orders=tuple(_compared(named, each, chosen) for each in orders),
+    )
+
+
+def _compared(
+    named: Sequence[tuple[str, Image]], layer: str, mask: Any, margin: float | None = None, *, all_metrics: bool = False
+) -> Comparison:
+    """Compare a layer of two images, each with its name."""
+    expected, tested = (_estimate(path, image, layer) for path, image in named)
     metrics = error_metrics(expected.mean, tested.mean, mask=mask)
     statistics = None
     if expected.standard_error is not None or tested.standard_error is not None:
         statistics = compare_statistics(expected, tested, mask=mask, margin=margin)
     elif margin is not None:
         raise InputError(
-            f"a margin wants standard errors, and neither {names[0]} nor {names[1]} has a layer "
+            f"a margin wants standard errors, and neither {named[0][0]} nor {named[1][0]} has a layer "
             f"'{layer}_se'; leave the margin out, or make the reference by Monte Carlo"
         )
     images: tuple[ArrayLike, ArrayLike] = (expected.mean, tested.mean)
@@ -132,38 +152,8 @@ def compare_images(
         errors=published_errors(*images, mask=mask) if all_metrics else None,
         errors_normalised=published_errors(*images, mask=mask, unit=None) if all_metrics else None,
         colour=colour_difference(*images, mask=mask) if all_metrics else None,
-        flip=flip_hdr(*images, mask=mask)[0] if flip else None,
+        flip=flip_hdr(*images, mask=mask)[0] if all_metrics else None,
     )
-
-
-def compare_files(
-    reference: str | os.PathLike[str],
-    test: str | os.PathLike[str],
-    layer: str | None = None,
-    *,
-    mask: str | os.PathLike[str] | None = None,
-    margin: float | None = None,
-    by_order: bool = False,
-    **options: Any,
-) -> Comparison:
-    """Compare a layer of two EXR files, by default the airlight where both have one, else the plain channels.
-
-    The mask is an EXR file: pixels whose R, G and B (or Y) are all zero there are left out, and so are pixels of the
-    frame that a file does not hold. `by_order` compares as well the layers by order of scattering that both files have,
-    such as `airlight_3_4`. Margin and other options are those of `compare_images`.
-    """
-    images = read_exr(reference), read_exr(test)
-    chosen = images[1].with_data(images[0].with_data(None if mask is None else read_mask(mask)))
-    names = str(reference), str(test)
-    named = tuple(zip(names, images))
-
-    def compare(layer: str, **more: Any) -> Comparison:
-        return compare_images(*images, layer=layer, mask=chosen, margin=margin, names=names, **more)
-
-    whole = compare(common_layer(*named) if layer is None else layer, **options)
-    notes = tuple(f"{path}: {image.attributes[NOTE]}" for path, image in named if NOTE in image.attributes)
-    orders = tuple(compare(name) for name in _layers_by_order(*named)) if by_order else ()
-    return replace(whole, notes=notes, orders=orders)
 
 
 def common_layer(reference: tuple[str, Image], test: tuple[str, Image]) -> str:
@@ -176,16 +166,6 @@ def common_layer(reference: tuple[str, Image], test: tuple[str, Image]) -> str:
         return common[0]
     have = "; ".join(f"{path} has {layer_names(image)}" for path, image in (reference, test))
     raise InputError(f"the files share {'no layer' if not common else 'several layers, name one by --layer'}: {have}")
-
-
-def _layers_by_order(reference: tuple[str, Image], test: tuple[str, Image]) -> list[str]:
-    """Return the layers by order that both images have, by their first order."""
-    of_both = [name for name in reference[1].layers if _ORDER.fullmatch(name) and name in test[1].layers]
-    if not of_both:
-        have = {path: [name for name in image.layers if _ORDER.fullmatch(name)] for path, image in (reference, test)}
-        told = "; ".join(f"{path} has {', '.join(names) or 'none'}" for path, names in have.items())
-        raise InputError(f"--by-order: the files share no layer by order of scattering, such as airlight_3_4: {told}")
-    return sorted(of_both, key=lambda name: int(name.split("_")[1]))
 
 
 def read_mask(path: str | os.PathLike[str]) -> NDArray[np.bool_]:

@@ -200,7 +200,6 @@ def compare_scene(
     mask: str | os.PathLike[str] | None = None,
     margin: float | None = None,
     all_metrics: bool = False,
-    flip: bool = False,
     progress: Progress | None = None,
 ) -> EngineComparison:
     """Compare an EXR file with the truth of a scene at the file's size.
@@ -214,8 +213,10 @@ def compare_scene(
     pixel
         'centre' or 'area', see `reference.quadrature.image.quadrature_image`; by default what the image says of itself,
         or what fits.
-    mask, all_metrics, flip
-        See `validation.comparison.images.compare_files`.
+    mask
+        An EXR file that is 0 in pixels to leave out.
+    all_metrics
+        See `validation.comparison.images.compare_images`.
     margin
         Largest relative bias [1] that counts as agreement; with standard errors, what they can show counts.
     """
@@ -233,7 +234,6 @@ def compare_scene(
         mask=chosen,
         margin=margin,
         all_metrics=all_metrics,
-        flip=flip,
     )
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, read_exr, write_exr
-from validation.comparison.images import compare_files
+from validation.comparison.images import compare_images
 from validation.engine.error_place import error_place
 from validation.engine.hints import find_hints
 from validation.engine.images import EngineImage, measure_image
@@ -150,7 +150,7 @@ def test_the_references_own_standard_errors_count_as_those_of_its_file(tmp_path,
     image = {layer: values + 1e-4 * values.mean(), f"{layer}_se": sure}
     reference = tmp_path / "reference.exr"
     write_exr(reference, Image({layer: values, f"{layer}_se": errors}, attributes={"airlight:batches": 8}))
-    by_file = compare_files(reference, write(**image), layer, margin=0.01).statistics
+    by_file = compare_images(read_exr(reference), read_exr(write(**image)), layer=layer, margin=0.01).statistics
     compared = compare_scene(path, write(**image), layer=layer, pixel="centre", margin=0.01)
     by_scene = compared.comparison.statistics
     assert by_scene.reference_variance_share == pytest.approx(by_file.reference_variance_share, rel=1e-5)
