@@ -55,32 +55,10 @@ def parse_place(word: str | None) -> Place:
 
 @contextmanager
 def connected(place: Place, *, quick: bool = False) -> Iterator[Client]:
-    """Give the connection to a place, with workers that are of our version; others are refused by name.
-
-    `quick` compiles kernels quickly in processes of this machine, where nothing is timed.
-    """
+    """Give the connection to a place; `quick` compiles kernels quickly in its processes, where nothing is timed."""
     _quiet()
-    with ExitStack() as stack:
-        client = stack.enter_context(_local(place.workers, quick=quick) if place.workers else _remote(place.scheduler))
-        check_workers(client)
+    with _local(place.workers, quick=quick) if place.workers else _remote(place.scheduler) as client:
         yield client
-
-
-def check_workers(client: Client) -> None:
-    """Raise InputError for workers that have another version of airlight, or none, by address."""
-    from analytic.errors import InputError
-
-    own = facts()
-    wrong = []
-    for address, answer in client.run(facts, on_error="return").items():
-        if isinstance(answer, OSError):  # it went away meanwhile
-            continue
-        if isinstance(answer, BaseException):
-            wrong.append(f"worker {address} cannot do the work ({type(answer).__name__}: {answer})")
-        elif own.differences(answer):
-            wrong.append(f"worker {address} has {', '.join(own.differences(answer))}")
-    if wrong:
-        raise InputError(f"{'; '.join(wrong)}: install the same airlight there, or stop it")
 
 
 @contextmanager
@@ -143,11 +121,6 @@ def _start_quiet_tracker() -> None:
 @contextmanager
 def _without_interrupts() -> Iterator[None]:
     """Let processes that are started within the block ignore Ctrl-C: this one ends them."""
-    import threading
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield

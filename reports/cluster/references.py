@@ -5,6 +5,7 @@ So the bytes of a file do not depend on where its numbers were computed. What wo
 them, is computed here.
 """
 
+import pickle
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -78,8 +79,8 @@ def tracing(
 
     The rest is as for `validation.estimates.monte_carlo.monte_carlo_batches`.
     """
-    by_pixel = None if counts is None else (counts.shape, counts.astype(np.int64).tobytes())
-    kind = _Kind(picture, estimator, samples, orders, by_pixel)
+    # As bytes, by which a worker knows again what it has prepared.
+    kind = pickle.dumps((picture, estimator, {"samples": samples, "orders": orders, "counts": counts}))
 
     def bring(seeds: list[int]) -> Iterator[tuple[Batches, Spent]]:
         # One task in a group: what is sent at once then depends on the workers alone.
@@ -101,27 +102,12 @@ def _truth(picture: Picture, pixel: str, since: float | None) -> tuple[TruthImag
         return truth_image(scene, pixel=pixel), spent()
 
 
-@dataclass(frozen=True)
-class _Kind:
-    """What the batches of a picture have in common, but for their seeds."""
-
-    picture: Picture
-    estimator: str
-    samples: int
-    orders: tuple[str, ...] | None
-    counts: tuple[tuple[int, ...], bytes] | None  #: shape and content, int64
-
-
-def _batch(kind: _Kind, seed: int) -> tuple[Batches, Spent]:
+def _batch(kind: bytes, seed: int) -> tuple[Batches, Spent]:
     trace, spent = _tracer(kind), stopwatch()
     return trace(seed), spent()
 
 
 @lru_cache(maxsize=1)
-def _tracer(kind: _Kind) -> Trace:
-    counts = None
-    if kind.counts is not None:
-        shape, content = kind.counts
-        counts = np.frombuffer(content, dtype=np.int64).reshape(shape)
-    given: dict[str, Any] = {"samples": kind.samples, "orders": kind.orders, "counts": counts}
-    return batch_tracer(kind.picture.load(), kind.estimator, **given)[1]
+def _tracer(kind: bytes) -> Trace:
+    picture, estimator, given = pickle.loads(kind)
+    return batch_tracer(picture.load(), estimator, **given)[1]

@@ -62,7 +62,7 @@ class Outcome:
 
 
 class _Refused(Exception):
-    """A worker has another version; the message says which."""
+    """A worker cannot do the work or has another version; the message says which."""
 
 
 def run_groups(client: Client, groups: Iterable[Group], *, made: Any = None, retries: int = 3) -> Iterator[Outcome]:
@@ -102,7 +102,7 @@ def run_groups(client: Client, groups: Iterable[Group], *, made: Any = None, ret
             group, attempts = flying.pop(future)
             try:
                 yield from (replace(outcome, attempts=attempts) for outcome in future.result())
-            except _Refused as error:
+            except (_Refused, ImportError) as error:  # the latter is what a worker without airlight raises
                 raise InputError(f"{error}: install the same airlight there, or stop it") from None
             except KilledWorker:
                 name, since = begun.pop(future.key, ("", time.monotonic()))
@@ -176,7 +176,10 @@ def is_alone(worker: Any) -> bool:
 def _check(worker: Any, made: Any) -> None:
     """Make the first kernel possible; refuse a worker that is made of anything else."""
     if "airlight_made" not in worker.__dict__:
-        worker.airlight_made = facts()
+        try:
+            worker.airlight_made = facts()
+        except Exception as error:  # it lacks a library or cannot compile kernels
+            raise _Refused(f"worker {worker.address} cannot do the work ({type(error).__name__}: {error})") from None
         import drjit as dr
 
         dr.set_thread_count(worker.state.nthreads)
