@@ -331,7 +331,6 @@ def diff(
     old: File,
     new: File,
     *,
-    error_tolerance: float = 0.02,
     time_tolerance: float = 0.25,
     common: bool = False,
 ) -> ReportDifference:
@@ -339,7 +338,7 @@ def diff(
 
     The result also has what got better, what is new and what is gone.
 
-    Errors have little noise: they may change within a relative tolerance, or by float32 rounding. Times have much: the
+    Errors have little noise: they may change by 2 %, a maximum by 4 %, or by float32 rounding. Times have much: the
     quartiles of both reports say how busy the machine was, and a change must appear in all stages that share it. Times
     of two machines are compared relative to the median of all. The exit status is 1 if anything is worse, gone, newly
     refused or no longer finite, or if the reference is no longer confirmed.
@@ -350,8 +349,6 @@ def diff(
         The earlier report.json, or its folder.
     new
         The later report.json, or its folder.
-    error_tolerance
-        Relative change of an error that counts as noise; for a maximum, twice as much.
     time_tolerance
         Relative change of a time that counts as noise on a quiet machine; inf compares no times.
     common
@@ -362,9 +359,7 @@ def diff(
 
     tolerance = None if time_tolerance == math.inf else time_tolerance
     reports = read_report(Path(old)), read_report(Path(new))
-    return ReportDifference(
-        compare_reports(*reports, error_tolerance=error_tolerance, time_tolerance=tolerance, common=common)
-    )
+    return ReportDifference(compare_reports(*reports, time_tolerance=tolerance, common=common))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

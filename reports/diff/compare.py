@@ -6,7 +6,7 @@ makes the comparison fail, and so does what disappeared: a method that is no lon
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -14,10 +14,9 @@ from analytic.errors import InputError
 from reports.data.claims import confirmed
 from reports.diff.times import Finding, Report, TimeComparison, compare_times
 from reports.tables.agreement import verdict
-from reports.tables.methods import TARGETS, fastest_within
 from reports.tables.scaling import TIMES, WORK, same_records
 from reports.tables.table import Column, Table, table, words
-from validation.statistics.noise import ERROR_TOLERANCE, FLOORS, TIME_TOLERANCE, error_band, other_power
+from validation.statistics.noise import FLOORS, TIME_TOLERANCE, error_band, other_power
 
 _ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative")
 #: Units of figures that depend on how busy the machine was: another verdict is a note.
@@ -56,17 +55,15 @@ def compare_reports(
     old: Report,
     new: Report,
     *,
-    error_tolerance: float = ERROR_TOLERANCE,
     time_tolerance: float | None = TIME_TOLERANCE,
     common: bool = False,
 ) -> Difference:
-    """Compare two reports of `read_report`; tolerances are relative, None for times compares none.
+    """Compare two reports of `read_report`; the tolerance of times is relative, None compares none.
 
     With `common` what only one of the reports holds is a note, not a loss. Reports without a common number are refused.
     """
-    for name, value in (("error", error_tolerance), ("time", time_tolerance)):
-        if value is not None and not 0 < value < float("inf"):
-            raise InputError(f"--{name}-tolerance: got {value:g}, wanted a number above 0, such as 0.1 for 10 %")
+    if time_tolerance is not None and not 0 < time_tolerance < math.inf:
+        raise InputError(f"--time-tolerance: got {time_tolerance:g}, wanted a number above 0, such as 0.1 for 10 %")
     before, after = ({scene["name"]: scene for scene in report["scenes"]} for report in (old, new))
     findings: list[Finding] = []
     compared = 0
@@ -76,12 +73,12 @@ def compare_reports(
             findings.append(Finding(gone, name, "", "the scene is gone"))
             continue
         findings += _reference(before[name], after[name], gone)
-        differences, count = _methods(before[name], after[name], tolerance=error_tolerance, gone=gone)
+        differences, count = _methods(before[name], after[name], gone)
         findings += differences
         compared += count
     findings += [Finding("note", name, "", "the scene is new") for name in after if name not in before]
     times = compare_times(old, new, tolerance=time_tolerance)
-    findings += [*times.findings, *_whole(old, new), *_winners(before, after)]
+    findings += [*times.findings, *_whole(old, new)]
     findings += _papers(old, new, gone)
     if not compared and not times.compared:
         raise InputError(
@@ -95,7 +92,7 @@ def compare_reports(
 # Errors, scene by scene and method by method
 
 
-def _methods(old: Report, new: Report, *, tolerance: float, gone: str) -> tuple[list[Finding], int]:
+def _methods(old: Report, new: Report, gone: str) -> tuple[list[Finding], int]:
     """Return the findings on the methods of a scene, and how many numbers were compared."""
     name = old["name"]
     before, after = ({entry["label"]: entry for entry in scene["methods"]} for scene in (old, new))
@@ -119,10 +116,10 @@ def _methods(old: Report, new: Report, *, tolerance: float, gone: str) -> tuple[
             for layer, key in (("", "error"), ("surface ", "surface_error")):
                 noisy = key == "error" and bool(old_entry.get("noise") and new_entry.get("noise"))
                 was, is_now = (_of_runs(each) if noisy else each.get(key) for each in (old_entry, new_entry))
-                changes, count = _errors(was, is_now, tolerance, prefix=layer)
+                changes, count = _errors(was, is_now, prefix=layer)
                 findings += [Finding(v, name, label, what, a, b) for v, what, a, b in changes]
                 compared += count
-            changes, count = _flip(old_entry, new_entry, tolerance)
+            changes, count = _flip(old_entry, new_entry)
             findings += [Finding(v, name, label, what, a, b) for v, what, a, b in changes]
             compared += count
     return findings, compared
@@ -156,7 +153,7 @@ def _of_runs(entry: Report) -> Report:
     return {**error, **of_runs}
 
 
-def _errors(old: Report | None, new: Report | None, tolerance: float, *, prefix: str) -> tuple[list[Change], int]:
+def _errors(old: Report | None, new: Report | None, *, prefix: str) -> tuple[list[Change], int]:
     """Compare the errors of a configuration in one layer; what has an interval may differ by it too."""
     if old is None or new is None:
         return ([("worse", f"{prefix}error is gone", None, None)] if old else []), 0
@@ -168,7 +165,7 @@ def _errors(old: Report | None, new: Report | None, tolerance: float, *, prefix:
             if before is not after:  # JSON writes NaN as null
                 changes.append(("worse" if after is None else "better", what, before, after))
             continue
-        band = error_band(name, before, tolerance=tolerance, pixels=old["pixels"], rmse=old.get("relative_rmse") or 0.0)
+        band = error_band(name, before, pixels=old["pixels"], rmse=old.get("relative_rmse") or 0.0)
         band += math.hypot(*(each.get(f"{name}_within", 0.0) for each in (old, new)))
         grown = abs(after) - abs(before)
         if abs(grown) > band:
@@ -176,11 +173,11 @@ def _errors(old: Report | None, new: Report | None, tolerance: float, *, prefix:
     return changes, len(_ERRORS)
 
 
-def _flip(old: Report, new: Report, tolerance: float) -> tuple[list[Change], int]:
+def _flip(old: Report, new: Report) -> tuple[list[Change], int]:
     before, after = ((entry.get("flip") or {}).get("value") for entry in (old, new))
     if before is None or after is None:
         return [], 0
-    if abs(after - before) <= error_band("flip", before, tolerance=tolerance):
+    if abs(after - before) <= error_band("flip", before):
         return [], 1
     return [("worse" if after > before else "better", "HDR-FLIP", before, after)], 1
 
@@ -246,21 +243,6 @@ def _growth(old: Report, new: Report) -> Iterator[Finding]:
                 was, is_now = before["growth"][name]["exponent"], growth["exponent"]
                 what = f"the power of the {WORK[after['kind']]} with which {TIMES[name]} grows"
                 yield Finding("worse" if is_now > was else "better", after["scene"], after["label"], what, was, is_now)
-
-
-def _winners(before: Mapping[str, Report], after: Mapping[str, Report]) -> Iterator[Finding]:
-    """Return a note where another method is the fastest: no fault, as the noise may change the order."""
-    for name in [name for name in before if name in after]:
-        for target in TARGETS:
-            was, is_now = (_fastest(scene, target) for scene in (before[name], after[name]))
-            if was != is_now:
-                words = f"fastest within {100 * target:g} %: {was or 'none'} before, {is_now or 'none'} now"
-                yield Finding("note", name, "", words)
-
-
-def _fastest(scene: Report, target: float) -> str | None:
-    best = fastest_within(target, scene["methods"])
-    return best["label"] if best else None
 
 
 # Claims of papers

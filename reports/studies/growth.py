@@ -9,8 +9,6 @@ from typing import Any
 
 from analytic.errors import InputError
 from reports.api.inputs import (
-    KernelLike,
-    Kernels,
     MethodLike,
     Methods,
     Progress,
@@ -18,7 +16,6 @@ from reports.api.inputs import (
     Size,
     Values,
     Words,
-    kernel_name,
     listed,
     one_error,
     pixels_of,
@@ -36,8 +33,6 @@ def scaling(
     *,
     kinds: Words = "size,triangles,lights,map",
     method: Methods = (),
-    kernel: Kernels = (),
-    settings: Values = (),
     size: Size = (800, 600),
     progress: Progress = None,
 ) -> Study:
@@ -54,10 +49,6 @@ def scaling(
         What grows: some of size,triangles,lights,media,map.
     method
         A method, as in `airlight study methods`; by default one configuration of each method with shadows.
-    kernel
-        Airlight kernel of the methods; may be given several times.
-    settings
-        NAME=VALUE, a parameter for each method that `--method` names; may be given several times.
     size
         Width and height [pixels], or WxH.
     progress
@@ -78,7 +69,7 @@ def scaling(
     from reports.tables.scaling import cliffs, scaling_tables
     from validation.study.growth import METHODS, study_scaling
 
-    chosen, _ = asked_configurations(method, kernel, settings, usual=METHODS)
+    chosen, _ = asked_configurations(method, (), (), usual=METHODS)
     pixels = pixels_of(size)
     assert pixels is not None
     # Scenes that have nothing of a kind are refused before an hour of work, not after.
@@ -137,7 +128,6 @@ def map_size(
     scenes: Scenes = (),
     *,
     method: MethodLike = "light-volumes",
-    kernel: KernelLike | None = None,
     settings: Values = (),
     sizes: Words = "32,64,128,256,512,1024,2048,4096",
     size: Size = (160, 120),
@@ -153,8 +143,6 @@ def map_size(
         Built-in scenes, random:SEED and Mitsuba XML files; all built-in scenes for fog by default.
     method
         A method with a shadow map.
-    kernel
-        Airlight kernel of the method.
     settings
         NAME=VALUE, a parameter of the method; may be given several times. Choose them so that errors of other causes
         are well below the error of the largest map.
@@ -178,10 +166,10 @@ def map_size(
     parameters = dict(settings) if isinstance(settings, Mapping) else parse_settings(several(settings))
     if "map" in parameters:
         raise InputError(f"set: got map={parameters['map']}, wanted it in sizes: the map's size is what varies")
-    pixels, name = pixels_of(size), kernel_name(kernel)
+    pixels = pixels_of(size)
     from reports.api.render import checked_configuration
 
-    largest, apart = checked_configuration(method, kernel, parameters | {"map": texels[-1]})
+    largest, apart = checked_configuration(method, None, parameters | {"map": texels[-1]})
     activate()
     call: Any = _map_study
     if apart:
@@ -192,7 +180,7 @@ def map_size(
     from validation.scenes.registry import FOG_SCENES
 
     names = several(scenes) or list(FOG_SCENES)
-    studied = call(names, pixels, texels, method, name, parameters, progress)
+    studied = call(names, pixels, texels, method, parameters, progress)
     shared = tuple(each for each in largest.parameters if each[0] != "map")
     return _map_result(studied, pixels, texels, replace(largest, parameters=shared).label)
 
@@ -202,7 +190,6 @@ def _map_study(
     pixels: Any,
     texels: list[int],
     method: Any,
-    kernel: str | None,
     parameters: dict[str, Any],
     progress: Progress,
 ) -> list[tuple[str, Any]]:
@@ -220,7 +207,7 @@ def _map_study(
     works = [truth_work(pixels, lights=len(each.scene.emitters())) for each in loaded]
     works += [frame_work(pixels, frames=len(texels)) for _ in loaded]
     check_work(f"map-size, {pixels[0]} x {pixels[1]}", works)
-    by_size = [configuration(method, kernel, parameters | {"map": size}) for size in texels]
+    by_size = [configuration(method, None, parameters | {"map": size}) for size in texels]
     for each in loaded:  # refuse unusable scenes, and maps that exceed the memory, before any work
         prepared(read_scene(each.scene), by_size[-1])
     studied = []

@@ -220,7 +220,6 @@ def decomposition(
     scenes: Scenes = ("colonnade",),
     *,
     method: Methods = (),
-    kernel: Kernels = (),
     settings: Values = (),
     size: Size | None = (240, 180),
     progress: Progress = None,
@@ -236,8 +235,6 @@ def decomposition(
         Built-in scenes, random:SEED and Mitsuba XML files.
     method
         A method, as in `airlight study methods`; by default a ray march by a map, min-max and froxel-fog.
-    kernel
-        Airlight kernel of the methods; may be given several times.
     settings
         NAME=VALUE, a parameter for each method that `--method` names; may be given several times.
     size
@@ -252,7 +249,7 @@ def decomposition(
     from validation.study.configuration import configuration
 
     usual = [configuration(name, parameters=values) for name, values in _SPLIT]
-    chosen, apart = asked_configurations(method, kernel, settings, usual=usual)
+    chosen, apart = asked_configurations(method, (), settings, usual=usual)
     loaded = _scenes(scenes, size)
     _check_work("decomposition", loaded, chosen, progress=progress)
     data, tables, rows, drawn = [], [], [], []

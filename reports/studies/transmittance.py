@@ -5,10 +5,11 @@ from dataclasses import asdict
 from functools import partial
 from typing import Any
 
-from reports.api.inputs import Progress, SceneLike, Words, listed, one_error, telling
+from reports.api.inputs import Progress, SceneLike, one_error, telling
 from reports.studies.result import FRACTION, Study, with_environment
 from reports.tables.table import numbers, table, words
 
+_STEPS = (2, 4, 8, 16, 32)  # of the marches
 _STYLES = {
     "naive": ("vermillion", "o"),
     "jackknife": ("green", "^"),
@@ -18,9 +19,7 @@ _STYLES = {
 
 
 @one_error
-def transmittance(
-    scene: SceneLike = "smoke", *, steps: Words = "2,4,8,16,32", thicker: float = 1.0, progress: Progress = None
-) -> Study:
+def transmittance(scene: SceneLike = "smoke", *, progress: Progress = None) -> Study:
     """Measure estimators of the transmittance of rays through a density grid.
 
     Naive exponentials of a marched sum are too bright, by Jensen's inequality: the row says by how much, and how much
@@ -31,21 +30,11 @@ def transmittance(
     ----------
     scene
         A scene with a density grid around its camera.
-    steps
-        Of the marches, with commas.
-    thicker
-        What the extinction is multiplied by.
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from analytic.errors import InputError
     from reports.machine.environment import activate
 
-    counts = [int(each) if each.isdigit() else 0 for each in listed("steps", steps)]
-    if not counts or min(counts) < 1:
-        raise InputError(f"steps: got {steps!r}, wanted numbers of 1 or more, with commas")
-    if not 0 < thicker <= 1e6:
-        raise InputError(f"thicker: got {thicker:g}, wanted a number above 0, at most 1e6")
     activate()
     from reference.scene.read import read_truth
     from reports.api.scenes import opened
@@ -53,14 +42,14 @@ def transmittance(
 
     with telling(progress, "rays") as tell:
         truth = read_truth(opened(scene, (8, 6)).scene)
-        rows = [asdict(each) for each in transmittance_errors(truth, counts, thicker, progress=tell)]
+        rows = [asdict(each) for each in transmittance_errors(truth, _STEPS, progress=tell)]
     columns = (
         *words("estimator"),
         *numbers("steps", look_ups="look-ups"),
         *numbers(bias="bias", bias_error="its error", jensen="by Jensen", spread="std. dev.", how=FRACTION),
     )
-    title = f"{scene}, extinction x {thicker:g}: transmittance of 48 rays, relative to its mean"
-    data = with_environment(scene=str(scene), thicker=thicker, rows=rows)
+    title = f"{scene}: transmittance of 48 rays, relative to its mean"
+    data = with_environment(scene=str(scene), rows=rows)
     drawn = table(title, columns, rows)
     return Study(name="transmittance", data=data, drawn=(drawn,), rows=tuple(rows), draw=partial(_draw, rows))
 

@@ -105,14 +105,12 @@ def ratio_tracking(look: Look, random: np.random.Generator, times: int, majorant
 def transmittance_errors(
     truth: TruthScene,
     steps: Sequence[int],
-    thicker: float = 1.0,
     *,
     progress: Callable[[float, str], None] | None = None,
 ) -> list[TransmittanceError]:
     """Return how wrong the estimators are along rays through the grid of a scene.
 
-    `steps`: of the marches; `thicker`: what the extinction is multiplied by; `progress`: called with (fraction done,
-    what).
+    `steps`: of the marches; `progress`: called with (fraction done, what).
 
     Rays go between random places in the box; each has 1024 estimates by each estimator. Raises InputError for a scene
     without a grid.
@@ -124,7 +122,7 @@ def transmittance_errors(
     begin, end = medium.low + random.random((2, _RAYS, 3)) * (medium.high - medium.low)
     length = np.linalg.norm(end - begin, axis=1)
     depth = field_of(truth).optical_depth(begin, (end - begin) / length[:, None], np.zeros(_RAYS), length)[:, 0]
-    exact = np.exp(-thicker * depth)
+    exact = np.exp(-depth)
     found: dict[tuple[str, int], list[tuple[float, float, float, float]]] = {}
 
     def keep(name: str, count: int, values: Array, look_ups: float, variance: float = 0.0) -> None:
@@ -136,7 +134,7 @@ def transmittance_errors(
 
         def look(share: Array, ray: int = ray) -> Array:
             places = begin[ray] + share[..., None] * (end - begin)[ray]
-            return thicker * length[ray] * medium.extinction(places.reshape(-1, 3)).reshape(share.shape)
+            return length[ray] * medium.extinction(places.reshape(-1, 3)).reshape(share.shape)
 
         for count in steps:
             one = marches(look, random, _TIMES, count)
@@ -149,7 +147,7 @@ def transmittance_errors(
                 each = [marches(look, random, len(rows), count) for _ in range(order + 1)]
                 values[rows] = power_series(np.stack(each, axis=1))
             keep("unbiased-ray-marching", count, values, count * (1 + float(chosen.mean())))
-        majorant = thicker * length[ray] * float(medium.largest[0])
+        majorant = length[ray] * float(medium.largest[0])
         for times in (1, 4):
             keep("ratio-tracking", times, *ratio_tracking(look, random, _TIMES, times * majorant))
     return [_over_rays(name, count, np.array(rays), exact) for (name, count), rays in sorted(found.items())]
