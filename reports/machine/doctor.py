@@ -57,7 +57,7 @@ class Doctor(Result):
     @property
     def tables(self) -> Sequence[Table]:
         """What works, with details."""
-        return [table("", words("what", "works", "details"), _rows(self.machine))]
+        return [table("", words("what", "works", "details"), self.machine["checks"])]
 
     @property
     def lines(self) -> Sequence[str]:
@@ -147,13 +147,16 @@ def diagnose() -> dict[str, Any]:
     """Examine this machine, ready for JSON.
 
     ``works`` says whether kernels run here, ``problem`` what is wrong and what to do (None if nothing), ``variant``
-    what was chosen and ``kernel`` what the test kernel found: the libLLVM that it really loaded, its threads and the
-    shadow-ray epsilon.
+    what was chosen, ``kernel`` what the test kernel found (the libLLVM that it really loaded, its threads and the
+    shadow-ray epsilon), and ``checks`` of each part whether it works, and details.
     """
     import platform
 
-    libraries = find_llvm()
-    cuda, optix, atomic = cuda_status(), optix_status(), atomic_problem()
+    checks: list[dict[str, Any]] = []
+
+    def check(what: str, works: bool | None, details: str) -> None:
+        checks.append({"what": what, "works": works, "details": details})
+
     variant, used, problem, kernel = None, None, None, None
     try:
         prepared = prepare()
@@ -162,32 +165,28 @@ def diagnose() -> dict[str, Any]:
         problem = kernel.pop("problem", None)
     except MissingError as error:
         problem = str(error)
+    check("platform", None, f"{platform.platform()}, {processor()}, {threads()} threads")
+    for name, version in versions().items():
+        check(name, version != "missing", f"{version}, {sys.executable}" if name == "python" else version)
+    libraries = find_llvm()
+    for llvm in libraries:
+        check(llvm.label, llvm.works, f"{llvm.path}: {llvm.reason}{', used' if llvm.path == used else ''}")
+    if not libraries:
+        check("LLVM", False, "none found")
+    atomic = atomic_problem()
+    check("libatomic.so.1", not atomic, atomic or "can be loaded")
+    for name, status in (("CUDA", cuda_status()), ("OptiX", optix_status())):
+        check(name, status.works, status.reason)
     opengl = opengl_status(judged=problem is None)
-    return {
-        "works": problem is None,
-        "problem": problem,
-        "versions": versions(),
-        "platform": platform.platform(),
-        "python": sys.executable,
-        "processor": processor(),
-        "threads": threads(),
-        "llvm": [
-            {
-                "path": llvm.path,
-                "version": None if llvm.version is None else ".".join(map(str, llvm.version)),
-                "works": llvm.works,
-                "reason": llvm.reason,
-                "used": llvm.path == used,
-            }
-            for llvm in libraries
-        ],
-        "libatomic": {"works": not atomic, "reason": atomic or "can be loaded"},
-        "cuda": {"works": cuda.works, "reason": cuda.reason},
-        "optix": {"works": optix.works, "reason": optix.reason},
-        "opengl": {"works": opengl.works, "reason": opengl.reason},
-        "variant": variant,
-        "kernel": kernel,
-    }
+    check("OpenGL", opengl.works, opengl.reason)
+    check("variant", variant is not None, variant or "none works")
+    if kernel:
+        loaded = f"; loaded {kernel['library']}" if kernel["library"] else ""
+        check("test kernel", True, f"ran in {kernel['seconds']:.1f} s on {kernel['threads']} threads{loaded}")
+        check("shadow-ray epsilon", None, f"{kernel['epsilon']:.4g}, relative; measured")
+    elif variant:
+        check("test kernel", False, "failed")
+    return {"works": problem is None, "problem": problem, "variant": variant, "kernel": kernel, "checks": checks}
 
 
 def try_kernel(variant: str, patience: float = _PATIENCE) -> dict[str, Any]:
@@ -205,38 +204,6 @@ def try_kernel(variant: str, patience: float = _PATIENCE) -> dict[str, Any]:
     if ran.returncode < 0:
         how = f"killed by {signal.Signals(-ran.returncode).name}"
     return {"problem": f"the test kernel in {variant} failed, {how}: {words[-1] if words else 'without a word'}"}
-
-
-def _rows(diagnosis: Mapping[str, Any]) -> list[tuple[str, str, str]]:
-    kernel = diagnosis["kernel"] or {}
-    rows = [
-        ("Python", "yes", f"{diagnosis['versions']['python']}, {diagnosis['python']}"),
-        ("platform", "", f"{diagnosis['platform']}, {diagnosis['processor']}, {diagnosis['threads']} threads"),
-    ]
-    rows += [
-        (name, "no" if version == "missing" else "yes", version)
-        for name, version in diagnosis["versions"].items()
-        if name != "python"
-    ]
-    for llvm in diagnosis["llvm"]:
-        used = ", used" if llvm["used"] else ""
-        rows.append((f"LLVM {llvm['version'] or '?'}", _yes(llvm["works"]), f"{llvm['path']}: {llvm['reason']}{used}"))
-    if not diagnosis["llvm"]:
-        rows.append(("LLVM", "no", "none found"))
-    for key, name in {"libatomic": "libatomic.so.1", "cuda": "CUDA", "optix": "OptiX", "opengl": "OpenGL"}.items():
-        rows.append((name, _yes(diagnosis[key]["works"]), diagnosis[key]["reason"]))
-    rows.append(("variant", _yes(diagnosis["variant"] is not None), diagnosis["variant"] or "none works"))
-    if "epsilon" in kernel:
-        loaded = f"; loaded {kernel['library']}" if kernel["library"] else ""
-        rows.append(("test kernel", "yes", f"ran in {kernel['seconds']:.1f} s on {kernel['threads']} threads{loaded}"))
-        rows.append(("shadow-ray epsilon", "", f"{kernel['epsilon']:.4g}, relative; measured"))
-    elif diagnosis["variant"]:
-        rows.append(("test kernel", "no", "failed"))
-    return rows
-
-
-def _yes(works: bool) -> str:
-    return "yes" if works else "no"
 
 
 def _probe() -> None:

@@ -21,14 +21,19 @@ LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"
 
 # Of the distributions and apt.llvm.org, of Homebrew, and of archives unpacked in /opt or /usr/local.
 _FOLDERS = (
-    *("usr/lib/*-linux-gnu", "usr/lib/llvm-*/lib", "usr/lib64/llvm*/lib*", "usr/lib64", "usr/lib", "usr/local/lib"),
+    *(
+        f"usr/lib/{os.uname().machine}-linux-gnu",
+        "usr/lib/llvm-*/lib",
+        "usr/lib64/llvm*/lib*",
+        "usr/lib64",
+        "usr/lib",
+        "usr/local/lib",
+    ),
     *("home/linuxbrew/.linuxbrew/opt/llvm*/lib", "opt/[lL][lL][vV][mM]*/lib", "usr/local/[lL][lL][vV][mM]*/lib"),
 )
 # libLLVM-14.so.1, libLLVM-14.0.6.so, libLLVM.so.19.1, without a version libLLVM.so; not the libraries of single
 # components, such as libLLVMCore.so.19.1.
 _LIBRARY = re.compile(r"libLLVM(?:-(\d+)(?:\.(\d+))?[^/]*\.so[^/]*|\.so\.(\d+)(?:\.(\d+))?[^/]*|\.so)")
-# Homebrew and archives name the version in a folder: /opt/llvm@18/lib, /opt/LLVM-19.1.7-Linux-X64/lib
-_FOLDER = re.compile(r"/llvm(?:@|-)(\d+)(?:\.(\d+))?[^/]*/lib", flags=re.IGNORECASE)
 _ASK_VERSION = (
     "import ctypes, sys\n"
     "numbers = [ctypes.c_uint() for _ in range(3)]\n"
@@ -49,7 +54,7 @@ class Llvm:
     @property
     def label(self) -> str:
         """The version in words."""
-        return "version unknown" if self.version is None else f"LLVM {self.version[0]}.{self.version[1]}"
+        return "LLVM ?" if self.version is None else f"LLVM {self.version[0]}.{self.version[1]}"
 
 
 def llvm_folders() -> list[Path]:
@@ -76,9 +81,6 @@ def examine_llvm(path: str) -> Llvm:
     """Say what a libLLVM is and whether it works, if possible without loading it."""
     if os.path.dirname(path) and not os.path.isfile(path):
         return Llvm(path, None, False, "there is no such file")
-    wrong = _wrong_binary(path)
-    if wrong:
-        return Llvm(path, None, False, wrong)
     version = _version_of_name(path) or _version_asked(path)
     if version is None:
         return Llvm(path, None, False, "its version is unknown: it has no LLVMGetVersion, so it is older than 16")
@@ -97,13 +99,8 @@ def _libraries(folders: Iterable[Path]) -> Iterator[str]:
 
 
 def _version_of_name(path: str) -> tuple[int, int] | None:
-    real = os.path.realpath(path)
-    name = _LIBRARY.fullmatch(os.path.basename(real))
+    name = _LIBRARY.fullmatch(os.path.basename(os.path.realpath(path)))
     groups = [group for group in name.groups() if group] if name else []
-    if not groups:
-        places = (Path(name).parent.as_posix() for name in (real, path))
-        folder = next(filter(None, map(_FOLDER.search, places)), None)
-        groups = [group for group in folder.groups() if group] if folder else []
     return (int(groups[0]), int(groups[1]) if len(groups) > 1 else 0) if groups else None
 
 
@@ -115,20 +112,3 @@ def _version_asked(path: str) -> tuple[int, int] | None:
     except (OSError, subprocess.SubprocessError):
         return None
     return (int(answer[0]), int(answer[1])) if len(answer) == 2 else None
-
-
-def _wrong_binary(path: str) -> str:
-    """Say what is wrong with the file as a shared library of this machine; nothing wrong gives an empty string."""
-    if sys.platform != "linux" or not os.path.dirname(path):
-        return ""
-    try:
-        with open(path, "rb") as file, open(sys.executable, "rb") as own:
-            header, expected = file.read(20), own.read(20)
-    except OSError as error:
-        return f"cannot be read: {error.strerror}"
-    if header[:4] != b"\x7fELF":
-        return "not a shared library"
-    # Bytes 4 and 5: word size and byte order; 18 and 19: the machine (ELF specification, figure 1-3).
-    if expected[:4] == b"\x7fELF" and (header[4:6], header[18:]) != (expected[4:6], expected[18:]):
-        return "built for another kind of processor"
-    return ""

@@ -17,7 +17,7 @@ from reports.tables.table import Column, Table, number, numbers, table, words
 
 if TYPE_CHECKING:
     import numpy as np
-    from numpy.typing import DTypeLike, NDArray
+    from numpy.typing import NDArray
 
     from validation.kernels.case_files import Cases
 
@@ -247,17 +247,6 @@ class Integrals(Study):
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(self.value == self.J, 0.0, (self.J - self.value) / np.abs(self.value))
 
-    def numpy(self, dtype: "DTypeLike | None" = None) -> "NDArray[Any]":
-        """Return J as an array of the caller's own, which can be written to."""
-        import numpy as np
-
-        return np.array(self.J, dtype=dtype)
-
-    def __array__(self, dtype: "DTypeLike | None" = None, copy: bool | None = None) -> "NDArray[Any]":
-        from reports.api.results import as_array
-
-        return as_array(self.J, dtype, copy)
-
     def __len__(self) -> int:
         return self.J.size
 
@@ -291,21 +280,16 @@ class Integrals(Study):
     @property
     def title(self) -> str:
         """How many, by what, and how wrong."""
-        compared = self.summary.get("p50") is not None
-        errors = [f"{name} {self.summary[name]:.3g}" for name in ("p50", "p99", "max")] if compared else []
-        said = f"; relative error {', '.join(errors)}" if errors else ""
+        found, said = self.summary, ""
+        if found["compared"]:
+            errors = ", ".join(f"{name} {found[name]:.3g}" for name in ("p50", "p99", "max"))
+            said = f"; relative error of {found['compared']}: {errors}; worst in row {found['worst_row']}"
         return f"{len(self)} integrals by {self.kernel} in {self.precision} precision{said}"
 
-    def text(self, *, width: int | None = None, styled: bool = False) -> str:
-        """Return how many there are and how wrong they are; the values where nothing is compared."""
-        found = self.summary
-        if not found["compared"]:
-            return "".join(f"{value:.9g}\n" for value in self.J.reshape(-1))
-        errors = ", ".join(f"{name} {found[name]:.3g}" for name in ("p50", "p99", "max"))
-        return (
-            f"{found['rows']} rows with {self.kernel} in {self.precision} precision\n"
-            f"relative error against `value`, {found['compared']} rows: {errors}; worst in row {found['worst_row']}\n"
-        )
+    @property
+    def lines(self) -> Sequence[str]:
+        """The title."""
+        return (self.title,)
 
 
 @one_error

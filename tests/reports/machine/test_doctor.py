@@ -35,7 +35,8 @@ def test_a_missing_library_is_shown_with_what_to_do(monkeypatch, capsys):
     monkeypatch.setattr(doctor, "find_llvm", lambda: [])
     assert run(["doctor", "--json"]) == 3
     printed = json.loads(capsys.readouterr().out)
-    assert (printed["works"], printed["problem"], printed["llvm"]) == (False, "no libLLVM found: install it", [])
+    assert (printed["works"], printed["problem"]) == (False, "no libLLVM found: install it")
+    assert {"what": "LLVM", "works": False, "details": "none found"} in printed["checks"]
     assert run(["doctor"]) == 3
     assert "Not ready: no libLLVM found: install it" in capsys.readouterr().out
 

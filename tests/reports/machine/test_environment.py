@@ -13,7 +13,7 @@ from reports.machine.environment import (
     missing_packages,
     prepare,
 )
-from reports.machine.llvm import examine_llvm, find_llvm
+from reports.machine.llvm import find_llvm
 
 HEADER = Path(sys.executable).read_bytes()[:64]  # of a binary that suits this machine
 
@@ -63,13 +63,6 @@ class TestFindLlvm:
             _library(only, name)
         (only / "libLLVM-19.so").symlink_to(only / "libLLVM.so.19.1")
         assert [library.version for library in find_llvm()] == [(20, 1), (19, 1), (18, 1), (14, 0)]
-
-    def test_files_that_cannot_be_loaded_here(self, only):
-        other_machine = HEADER[:18] + bytes([HEADER[18] ^ 0x80, HEADER[19]]) + HEADER[20:]
-        assert not examine_llvm(str(_library(only, "libLLVM.so.19.1", other_machine))).works
-        assert "kind of processor" in examine_llvm(str(only / "libLLVM.so.19.1")).reason
-        assert "not a shared library" in examine_llvm(str(_library(only, "libLLVM.so.18.1", b"text"))).reason
-        assert "no such file" in examine_llvm(str(only / "libLLVM.so.17.1")).reason
 
 
 @linux
