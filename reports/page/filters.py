@@ -27,12 +27,6 @@ KEYS: tuple[tuple[tuple[str, ...], str], ...] = (
     (("1", "…", "9"), "show the first to the ninth method"),
     (("←", "→"), "show the method before, the next one; on a picture: move the probe"),
     (("f",), "flip: one picture, reference and method in the same place"),
-    (("v",), "one picture, or all side by side"),
-    (("e",), "next kind of error map"),
-    (("l",), "next layer: airlight, surface, total"),
-    (("+", "-", "0"), "exposure half a stop up, half a stop down, as at first"),
-    (("n", "p"), "next scene, scene before"),
-    (("Esc",), "let go of the probe"),
     (("?",), "this list"),
 )
 

@@ -8,7 +8,7 @@
   const help = document.getElementById("help");
   const SHARED = ["layer", "mode", "stops", "view", "shown"];
   const KEEP = 3;  // scenes whose images stay decoded
-  let all = true, active = null, keys = true;
+  let active = null, keys = true;
   const recent = [];
 
   function say(words) { live.textContent = words; }
@@ -22,8 +22,6 @@
   function changed(viewer, what) {
     active = viewer;
     if ("spoken" in what) return say(what.spoken);
-    if ("all" in what) return shareAll(what.all);
-    if (!all) return redrawStrips([viewer], what);
     const shared = Object.fromEntries(Object.entries(what).filter(([name]) => SHARED.includes(name)));
     for (const other of viewers) {
       if (other === viewer) continue;
@@ -31,21 +29,9 @@
       const changes = same >= 0 ? {...shared, method: same} : shared;
       if (Object.keys(changes).length) other.set(changes, false);
     }
-    redrawStrips(viewers, what);
+    if ("layer" in what || "mode" in what) viewers.forEach((other) => other.redrawStrip());
     clearTimeout(changed.timer);
     changed.timer = setTimeout(drawRest, 1500);
-  }
-
-  function redrawStrips(changedViewers, what) {
-    if (!("layer" in what || "mode" in what)) return;
-    clearTimeout(redrawStrips.timer);
-    redrawStrips.timer = setTimeout(() => changedViewers.forEach((viewer) => viewer.redrawStrip()), 150);
-  }
-
-  function shareAll(wanted) {
-    all = wanted;
-    for (const viewer of viewers) viewer.controls.querySelector("[name=all]").checked = all;
-    if (all && active) changed(active, Object.fromEntries(SHARED.map((name) => [name, active.state[name]])));
   }
 
   // Decoded images take some 100 MB a scene: keep those of the scenes looked at last.
@@ -84,31 +70,12 @@
 
   // --- keys ---
 
-  function current() {
-    if (active) {
-      const box = active.element.getBoundingClientRect();
-      if (box.bottom > 0 && box.top < innerHeight) return active;
-    }
-    const middle = (viewer) => {
-      const box = viewer.element.getBoundingClientRect();
-      return Math.abs((box.top + box.bottom) / 2 - innerHeight / 2);
-    };
-    return viewers.reduce((best, viewer) => (best && middle(best) <= middle(viewer) ? best : viewer), null);
-  }
-
-  function cycled(values, value, step = 1) {
-    return values[(values.indexOf(value) + step + values.length) % values.length];
-  }
+  function current() { return active ?? viewers.find((viewer) => viewer.visible); }
 
   function choose(viewer, number) {
     if (number < 0 || number >= viewer.labels.length) return;
     viewer.set({method: number});
     say(viewer.labels[number]);
-  }
-
-  function expose(viewer, stops) {
-    viewer.set({stops: Math.max(-STOPS, Math.min(STOPS, stops))});
-    say(`Exposure ${viewer.state.stops} stops`);
   }
 
   const ACTIONS = {
@@ -118,35 +85,11 @@
       v.set({view: "flip", shown: v.state.view === "flip" && v.state.shown === "method" ? "reference" : "method"});
       say(v.state.shown === "reference" ? "reference" : v.labels[v.state.method]);
     },
-    v: (v) => v.set({view: v.state.view === "side" ? "flip" : "side"}),
-    e: (v) => {
-      const modes = Object.keys(MAPS).filter((mode) => mode !== "flip" || v.hasFlip);
-      v.set({mode: cycled(modes, v.mode)});
-      say(MAPS[v.state.mode].words);
-    },
-    l: (v) => { v.set({layer: cycled(["airlight", "surface", "total"], v.state.layer)}); say(v.state.layer); },
-    "+": (v) => expose(v, v.state.stops + 0.5),
-    "-": (v) => expose(v, v.state.stops - 0.5),
-    "0": (v) => expose(v, 0),
-    n: (v) => go(v, 1),
-    p: (v) => go(v, -1),
-    Escape: (v) => { v.state.pinned = false; },
   };
-  ACTIONS["="] = ACTIONS["+"];
-
-  function go(viewer, step) {
-    const next = viewers[viewers.indexOf(viewer) + step];
-    if (!next) return;
-    active = next;
-    next.element.closest("section").scrollIntoView();
-    say(next.images.index.name);
-  }
 
   // Keys that the focused control needs for itself.
   function taken(target, key) {
-    if (target.closest("select, textarea, dialog")) return true;
-    if (!target.closest("input")) return false;
-    return key.length > 1 || key === " " || (target.type === "range" && "+-".includes(key));
+    return target.closest("select, textarea, dialog") || (target.closest("input") && key.length > 1);
   }
 
   document.addEventListener("keydown", (event) => {

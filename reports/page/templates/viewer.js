@@ -1,8 +1,6 @@
 // The viewer of one scene: reference, method and error map in one exposure, the strip of all error maps, the probe.
 "use strict";
 
-const STOPS = 10;  // of exposure either way
-
 class Viewer {
   constructor(element, images, tables, changed) {
     this.element = element;
@@ -46,7 +44,6 @@ class Viewer {
 
   listen() {
     this.controls.addEventListener("input", ({target}) => {
-      if (target.name === "all") return this.changed(this, {all: target.checked});
       const {value} = target;
       if (target.dataset.sets === "layer" || target.dataset.sets === "mode") this.set({[target.dataset.sets]: value});
       else this.set({[target.dataset.sets]: Number(value)});
