@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which property of a scene goes with the error: rank correlations over scenes, and a sentence for each configuration.
+"""Which property of a scene goes with the error: rank correlations over scenes, the strongest of each configuration.
 
 Ranks, as neither an error nor a property has a scale of its own: the correlation is the same in decades. What goes with
 an error need not cause it. Properties go with one another too (more lights, more silhouettes): of several that say
@@ -9,7 +9,7 @@ All intervals hold together with the level (Bonferroni): each has the level 1 - 
 hundreds of these, some would be away from zero by chance otherwise.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,7 @@ from validation.properties.properties import PROPERTIES
 from validation.statistics.samples import LEVEL, rank_correlation
 
 SAME = 0.8  #: rank correlation of two properties from which on they say nearly the same
-NAMED = 3  #: properties that a sentence names at most
+NAMED = 3  #: properties that are named of a configuration at most
 LEAST = 10  #: scenes below which no correlation is stated
 
 
@@ -80,32 +80,6 @@ def _same(sweep: Sweep, sample: Sample, first: str, second: str) -> bool:
 
 def _of(sweep: Sweep, sample: Sample, name: str) -> Numbers:
     return sweep.property(name)[list(sample.rows)]
-
-
-def sentences(strongest_of: Mapping[str, Sequence[Correlation]]) -> list[str]:
-    """Return in plain words what goes with the error of each configuration, and last of which nothing does.
-
-    `strongest_of` has what `strongest` returns by the labels of configurations.
-    """
-    made = [sentence(name, chosen) for name, chosen in strongest_of.items() if chosen]
-    without = [name for name, chosen in strongest_of.items() if not chosen]
-    if not without:
-        return made
-    return [*made, f"No property goes for sure with the error of {_listed(without)}."]
-
-
-def sentence(name: str, chosen: Sequence[Correlation]) -> str:
-    """Return in plain words what goes with the error of a configuration; `chosen` from `strongest`, at least one."""
-    parts = []
-    for verb, several in (("grows", [c for c in chosen if c.r > 0]), ("falls", [c for c in chosen if c.r < 0])):
-        if several:
-            named = [f"{property_words(c.property)} ({c.r:+.2f}, {c.low:+.2f} to {c.high:+.2f})" for c in several]
-            parts.append(f"{verb} with the {_listed(named)}")
-    return f"{name}: the error {', and it '.join(parts)}."
-
-
-def _listed(words: Sequence[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]
 
 
 def property_words(name: str) -> str:

@@ -25,12 +25,12 @@ from reports.sweep.claims import TARGETS
 from reports.sweep.correlations import LEAST, NAMED, SAME, property_words
 from reports.sweep.figures import drawn as drawn_figures
 from reports.sweep.read import read_sweep
-from reports.sweep.summary import Summary, goes_with_words, headlines, sound_words, summary_of, to_json
+from reports.sweep.summary import Summary, headlines, sound_words, summary_of, to_json
 
 PAGE, CLAIMS, FIGURES = "sweep.html", "sweep.json", "figures"  #: in the folder of a sweep
 PAGE_LIMIT = 20_000_000  #: bytes of a page
 
-_TABLES = ("errors", "speed", "refusals", "checks", "faults", "references", "hosts")
+_TABLES = ("errors", "speed", "correlations", "refusals", "checks", "faults", "references", "hosts")
 
 
 def write_sweep(source: Path, target: Path | None = None) -> tuple[Summary, Path]:
@@ -70,7 +70,6 @@ def render_sweep(said: Summary, charts: Mapping[str, str], *, limit: int = PAGE_
         "headlines": headlines(said),
         "charts": {name: Markup(chart) for name, chart in charts.items()},
         "sound": sound_words(said),
-        "goes_with": goes_with_words(said),
         "source": said.sweep.path.name,
         "folder": said.sweep.path.parent,
         "timed": sum(int(np.isfinite(sample.times).sum()) for sample in said.samples),

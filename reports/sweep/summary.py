@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from reports.sweep.claims import TARGETS, Claim, best_claims, claims, percent, written
-from reports.sweep.correlations import Correlation, correlations, property_words, sentences, strongest
+from reports.sweep.correlations import Correlation, correlations, property_words, strongest
 from reports.sweep.faults import Check, Fault, Reason, Worst, checks, faults, reasons, worst
 from reports.sweep.read import Numbers, Sweep
 from reports.sweep.samples import FAULTS, Fastest, Sample, drawn_at_random, fastest_within, samples
@@ -161,11 +161,6 @@ def headlines(said: Summary) -> list[dict[str, Any]]:
     return made
 
 
-def goes_with_words(said: Summary) -> list[str]:
-    """Return in sentences which properties go with the error of each configuration."""
-    return sentences({sample.label: said.strongest[sample.label] for sample in said.samples})
-
-
 def check_words(check: Check) -> str:
     """Return in a sentence how many images have a fault."""
     return (
@@ -204,7 +199,6 @@ def to_json(said: Summary) -> dict[str, Any]:
         "configurations": [_configuration(sample) for sample in said.samples],
         "fastest": [plain(each) | {"counts": dict(zip(names, each.counts))} for each in said.fastest],
         "goes_with": {label: [each.property for each in said.strongest[label]] for label in names},
-        "goes_with_words": goes_with_words(said),
         "refusals": [plain(each) for each in said.reasons if each.status == "refused"],
         "not_done": [plain(each) for each in said.reasons if each.status != "refused"],
     }

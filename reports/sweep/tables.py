@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from reports.sweep.claims import TARGETS, written
+from reports.sweep.correlations import property_words
 from reports.sweep.faults import Check, Fault
 from reports.sweep.samples import FAULTS, UNTOLD
 from reports.sweep.summary import Host, ReferenceErrors, Summary, quantiles
@@ -85,6 +86,20 @@ def speed_table(said: Summary) -> Table:
         f"which no method is within the error: {none}."
     )
     return table("Times, and the fastest method within an error", columns, rows, explanation=explanation)
+
+
+def correlations_table(said: Summary) -> Table:
+    """Return the properties that go with the error of each configuration most."""
+    columns = (
+        *words(label="method", property="property"),
+        Column("r", "correlation", sign=True, spread="interval", places=2),
+    )
+    rows = [
+        {"label": label, "property": property_words(each.property), "r": Measured(each.r, each.low, each.high)}
+        for label, chosen in said.strongest.items()
+        for each in chosen
+    ]
+    return table("What goes with the error", columns, rows)
 
 
 def refusals_table(said: Summary) -> Table:
