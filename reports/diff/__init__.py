@@ -4,5 +4,5 @@
 Read in this order:
 
 - `times.py`: a finding; times, by the rules of `validation.statistics.noise`
-- `compare.py`: errors, references, claims, papers, and all of these together
+- `compare.py`: errors, references, papers, and all of these together
 """

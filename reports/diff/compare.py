@@ -78,7 +78,7 @@ def compare_reports(
         compared += count
     findings += [Finding("note", name, "", "the scene is new") for name in after if name not in before]
     times = compare_times(old, new, tolerance=time_tolerance)
-    findings += [*times.findings, *_whole(old, new)]
+    findings += [*times.findings, *_stability(old, new), *_growth(old, new)]
     findings += _papers(old, new, gone)
     if not compared and not times.compared:
         raise InputError(
@@ -182,7 +182,7 @@ def _flip(old: Report, new: Report) -> tuple[list[Change], int]:
     return [("worse" if after > before else "better", "HDR-FLIP", before, after)], 1
 
 
-# References, claims, kernels that break, times that grow, the fastest
+# References, kernels that break, times that grow
 
 
 def _reference(old: Report, new: Report, gone: str) -> Iterator[Finding]:
@@ -202,27 +202,6 @@ def _reference(old: Report, new: Report, gone: str) -> Iterator[Finding]:
             before, after = old["reference"].get(key), new["reference"].get(key)
             if before is not None and after is not None and after > before:
                 yield Finding("worse", name, "", f"lit intervals of the reference: {key}", before, after)
-
-
-def _whole(old: Report, new: Report) -> Iterator[Finding]:
-    """Compare the parts that concern the whole report."""
-    yield from _claims(old, new)
-    yield from _stability(old, new)
-    yield from _growth(old, new)
-
-
-def _claims(old: Report, new: Report) -> Iterator[Finding]:
-    """Compare the verdicts at the top: of each kind, how many are bad."""
-    before, after = old["claims"], new["claims"]
-    for kind in dict.fromkeys(entry["kind"] for entry in (*before, *after)):
-        bad = [
-            [entry["text"] for entry in claims if entry["kind"] == kind and entry["good"] is False]
-            for claims in (before, after)
-        ]
-        if len(bad[1]) > len(bad[0]):
-            yield from (Finding("worse", "", "", f"claim: {text}") for text in bad[1] if text not in bad[0])
-        elif len(bad[1]) < len(bad[0]):
-            yield from (Finding("better", "", "", f"no longer: {text}") for text in bad[0] if text not in bad[1])
 
 
 def _stability(old: Report, new: Report) -> Iterator[Finding]:
