@@ -66,10 +66,6 @@ class ImageComparison(Comparison, Pictured):
         """The numbers, a line for each group."""
         return [*self.summary().split("\n"), *_difference_lines(self.files)]
 
-    def numpy(self, dtype: DTypeLike | None = None) -> Array:
-        """Return `error` as an array of one's own, which can be written to."""
-        return np.array(self.error, dtype=dtype)
-
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Array:
         return as_array(self.error, dtype, copy)
 

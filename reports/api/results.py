@@ -3,10 +3,9 @@
 
 Arrays are (height, width, 3) of linear RGB radiance [W/(m^2 sr)], the first row at the top, and read-only. They keep
 the precision of what made them: float32 from a method in single precision, float64 from one in double and from the
-reference, whose error is far below what float32 can hold; `.numpy(numpy.float32)` converts.
+reference, whose error is far below what float32 can hold.
 """
 
-import math
 import os
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -31,7 +30,6 @@ from reports.plotting.pictures import (
 )
 from reports.tables.methods import rate_words
 from reports.tables.record import Result
-from reports.tables.table import number
 from validation.metrics.errors import plain
 from validation.study.frame_times import FrameTimes
 
@@ -113,10 +111,6 @@ class LayeredImage(Pictured):
         height, width = self.airlight.shape[:2]
         return width, height
 
-    def numpy(self, dtype: DTypeLike | None = None) -> Array:
-        """Return the total as an array of one's own, which can be written to."""
-        return np.array(self.total, dtype=dtype)
-
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Array:
         return as_array(self.total, dtype, copy)
 
@@ -140,28 +134,21 @@ class LayeredImage(Pictured):
         radiance = np.asarray(image_layer(self.with_total(), layer), dtype=np.float64)
         return tone_mapped(radiance, 2.0**stops)
 
-    def save(self, path: str | os.PathLike[str], exposure: float | None = None) -> Path:
+    def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the layers as EXR or a picture of the total as PNG, by the suffix of the path; return the path.
 
         Parameters
         ----------
         path
-            Ends in .exr or .png.
-        exposure
-            Of the picture [stops], linear up to white; by default it goes through a tone curve that suits it, see
-            `reports.plotting.pictures.tone_curve`.
+            Ends in .exr, or in .png for a picture through `reports.plotting.pictures.tone_curve`.
 
         Raises
         ------
         InputError
             For another suffix, or if the file cannot be written.
         """
-        target = Path(path)
-        if exposure is not None and target.suffix.lower() == ".png":
-            write_png(target, self.picture(exposure=exposure))
-        else:
-            write_image(target, self.image, total=self.total)
-        return target
+        write_image(Path(path), self.image, total=self.total)
+        return Path(path)
 
     @property
     def title(self) -> str:
@@ -177,7 +164,7 @@ class LayeredImage(Pictured):
             png = png_bytes(self.picture("airlight"))
             shown.append(picture(png, self.size[0], alt=f"{title}, the airlight", caption="airlight"))
         said = [line for line in self.lines[1:] if not line.startswith(_NOTHING)]
-        return block(title, *shown, bullets([*said, *_levels(self)]))
+        return block(title, *shown, bullets(said))
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.title}, {self.size[0]} x {self.size[1]})"
@@ -398,15 +385,3 @@ def as_array(values: Array, dtype: DTypeLike | None, copy: bool | None) -> Array
             raise ValueError(f"a copy is needed to turn {values.dtype} into {np.dtype(dtype)}")
         return values.astype(dtype)
     return values.copy() if copy else values
-
-
-def _levels(image: LayeredImage) -> list[str]:
-    """Return the mean of each layer, and how many of its pixels are not finite or negative."""
-    levels = []
-    for name, values in (("airlight", image.airlight), ("surface", image.surface)):
-        finite = np.isfinite(values)
-        mean = float(values[finite].mean(dtype=np.float64)) if finite.any() else math.nan
-        odd = [f"{int((~finite).any(axis=-1).sum())} pixels not finite"] if not finite.all() else []
-        odd += [f"{int((values < 0).any(axis=-1).sum())} pixels negative"] if (values < 0).any() else []
-        levels.append(", ".join([f"mean {name} {number(mean, 4)} W/(m^2 sr)", *odd]))
-    return levels

@@ -15,7 +15,7 @@ from analytic.errors import InputError, nearest
 from reference.storage.exr import layer as image_layer
 from reference.storage.exr import read_exr
 from reference.storage.files import write_text
-from reports.data.reader import load_report, read_json
+from reports.data.reader import load_report
 from reports.plotting.figure import ENDINGS, new_figure, save_figure, show_picture, speed_panel
 from reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure, tone_mapped
 from reports.plotting.style import COLOURS, WIDTHS, report_styles
@@ -38,7 +38,6 @@ def write_figures(
     The strip shows `scene` and `labels`: by default the first scene with shadows and the most accurate of each method.
     """
     data, place = load_report(folder)
-    _add_times(data["scenes"], place / "times.json")
     drawn: dict[str, Callable[[str], Any]] = {}
     if any(_timed(each) for each in data["scenes"]):
         drawn["frame-speed"] = partial(draw_speed, data["scenes"])
@@ -47,23 +46,6 @@ def write_figures(
     paths = [save_figure(folder / f"{name}{end}", draw, column) for name, draw in drawn.items() for end in ENDINGS]
     write_text(folder / "methods-table.tex", latex_table(data["scenes"]))
     return tuple(str(path) for path in (*paths, folder / "methods-table.tex"))
-
-
-def _add_times(scenes: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """Give images from elsewhere the times that were measured there: label -> median and quartiles [ms]."""
-    if not path.is_file():
-        return
-    wanted = 'what was measured elsewhere, such as {"engine": [4.2, 4.1, 4.4]}, median and quartiles in milliseconds'
-    times = read_json(path, wanted)
-    for entry in (entry for scene in scenes for entry in scene["methods"] if entry["kind"] == "image"):
-        if entry["label"] in times:
-            try:
-                median, low, high = map(float, times[entry["label"]])
-            except (TypeError, ValueError):
-                raise InputError(
-                    f"{path}: got {times[entry['label']]!r} for {entry['label']}; wanted {wanted}"
-                ) from None
-            entry["times"] = {"frame": {"median_ms": median, "low_ms": low, "high_ms": high}}
 
 
 def latex_table(scenes: Sequence[Mapping[str, Any]]) -> str:

@@ -44,7 +44,7 @@ def test_results_are_frozen_and_so_are_their_arrays(name):
             setattr(result, field.name, None)
     with pytest.raises(ValueError, match="read-only"):
         np.asarray(result)[0] = 0
-    own = result.numpy()
+    own = np.array(result)
     own[0] = 0  # one's own
 
 

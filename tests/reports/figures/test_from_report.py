@@ -65,17 +65,10 @@ def report(tmp_path_factory):
     return folder
 
 
-def test_the_chart_has_the_methods_with_times_and_an_image_with_a_time_from_elsewhere(report, tmp_path):
+def test_the_chart_has_what_has_times(report):
     data, _ = load_report(report)
     labels = [entry["label"] for scene in data["scenes"] for entry in figures._timed(scene)]
     assert labels == list(_WRONG)  # neither the refused one nor the one without times
-    (tmp_path / "times.json").write_text(json.dumps({"engine": [4.2, 4.1, 4.4]}))
-    figures._add_times(data["scenes"], tmp_path / "times.json")
-    timed = {entry["label"]: entry["times"]["frame"]["median_ms"] for entry in figures._timed(data["scenes"][0])}
-    assert timed["engine"] == 4.2
-    (tmp_path / "times.json").write_text(json.dumps({"engine": 4.2}))
-    with pytest.raises(InputError, match="median and quartiles"):
-        figures._add_times(data["scenes"], tmp_path / "times.json")
 
 
 @pytest.mark.claim("figures-repeat", tolerance="none: equal bytes")
