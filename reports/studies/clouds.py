@@ -116,10 +116,10 @@ def slab(
     with telling(progress, "slab") as tell:
         record = json.loads(json.dumps(slab_numbers(request, photons=int(photons), progress=tell)))
     total = record["total"]
-    worst = max(_relative_errors(record, record["error"]), default=0.0)
+    error = record["error"]["total"]
     said = (
-        f"All orders: reflectance {total['reflectance']:.7g}, transmittance {total['transmittance']:.7g} (with the "
-        f"light that was never scattered). Largest relative error of all numbers, estimated: {worst:.1g}."
+        f"All orders: reflectance {total['reflectance']:.7g} +- {error['reflectance']:.1g}, transmittance "
+        f"{total['transmittance']:.7g} +- {error['transmittance']:.1g} (with the light that was never scattered)."
     )
     return SlabStudy(
         name="slab",
@@ -129,18 +129,6 @@ def slab(
         rows=tuple(record["orders"]),
         draw=partial(_draw_slab, record),
     )
-
-
-def _relative_errors(values: Any, errors: Any) -> Iterator[float]:
-    if isinstance(errors, Mapping):
-        for name in errors:
-            if name not in ("depth", "mu", "phi"):
-                yield from _relative_errors(values[name], errors[name])
-    elif isinstance(errors, list):
-        for pair in zip(values, errors, strict=True):
-            yield from _relative_errors(*pair)
-    elif isinstance(errors, float) and values:
-        yield errors / abs(values)
 
 
 def _slab_tables(record: Mapping[str, Any]) -> Iterator[Table]:

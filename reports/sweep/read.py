@@ -74,32 +74,23 @@ def read_sweep(path: Path | str) -> Sweep:
 
     A file that is missing, cannot be read, has no rows or is not of this version is refused.
     """
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
     file = _file_of(Path(path))
     with _reading(file):
-        schema = pq.read_schema(file)
-        names = [name for name in schema.names if name != "picture"]
+        names = [name for name in pq.read_schema(file).names if name != "picture"]
         missing = [name for name in _NEEDED if name not in names]
         if missing:
             raise InputError(
                 f"{file} has no column {missing[0]!r}, wanted the columns of a sweep of this version of airlight; "
                 "run the sweep again: what its rows hold is kept"
             )
-        kinds = {column.key: column.kind for column in COLUMNS}
-        for name in names:
-            text = pa.types.is_string(schema.field(name).type) or pa.types.is_large_string(schema.field(name).type)
-            if text != (kinds.get(name, "float64") == "string") and name in kinds:
-                raise InputError(
-                    f"{file} has {schema.field(name).type} in the column {name!r}, wanted {kinds[name]}; "
-                    "run the sweep again with this version of airlight"
-                )
-        wanted = [name for name in names if name in kinds or name.startswith(PROPERTY)]
+        known = {column.key for column in COLUMNS}
+        wanted = [name for name in names if name in known or name.startswith(PROPERTY)]
         table = pq.read_table(file, columns=wanted, page_checksum_verification=True)
+        columns = {name: _array(table[name]) for name in table.column_names}
     if not table.num_rows:
         raise InputError(f"{file} has no rows: no cell of the sweep has ended; run it to its end, or for longer")
-    columns = {name: _array(table[name]) for name in table.column_names}
     unknown = sorted(set(columns["status"]) - set(STATUSES))
     if unknown:
         raise InputError(f"{file} has the status {unknown[0]!r}, wanted one of {', '.join(STATUSES)}; run it again")
