@@ -5,7 +5,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from analytic.errors import InputError
 from reports.api.inputs import (
@@ -25,6 +25,9 @@ from reports.api.inputs import (
 )
 from reports.tables.record import Result
 from reports.tables.table import Table
+
+if TYPE_CHECKING:
+    from reports.interchange.folder import FolderLog
 
 
 @dataclass(frozen=True, repr=False)
@@ -64,27 +67,6 @@ class Description(Result):
             more = f"; cut into triangles: {cut}" if cut else ""
             lines.append(f"{self.written['path']}: {self.written['triangles']} triangles{more}")
         return [*lines, f"the fog as a grid: {self.grid}"] if self.grid else lines
-
-
-@dataclass(frozen=True, repr=False)
-class FolderLog(Result):
-    """What becomes of each scene file of a folder."""
-
-    folder: Path
-    outcomes: Any  #: of `reports.interchange.folder.describe_folder`
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight describe FOLDER --json` prints."""
-        from reports.interchange.folder import folder_data
-
-        return folder_data(self.folder, self.outcomes)
-
-    @property
-    def tables(self) -> Sequence[Table]:
-        """A row for each file."""
-        from reports.interchange.folder import folder_table
-
-        return [folder_table(self.outcomes)]
 
 
 @one_error
@@ -130,7 +112,7 @@ def describe(
 
         if size or files:
             raise InputError(f"scene: got the folder {scene}; leave out size and output")
-        return FolderLog(Path(scene), describe_folder(Path(scene)))
+        return describe_folder(Path(scene))
     from reports.api.scenes import opened
     from reports.interchange.gltf import write_gltf
     from reports.interchange.scene import describe_scene

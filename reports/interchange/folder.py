@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What becomes of each scene file of a folder: taken, or refused with which words."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -9,14 +10,9 @@ from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
 from reports.interchange.scene import describe_scene
 from reports.machine.mitsuba_log import collected_notes
-from reports.tables.table import Column, Table, table
+from reports.tables.record import Result
+from reports.tables.table import Table, table, words
 from validation.scenes.loading import load_scene
-
-COLUMNS = (
-    Column("file", "file", words=True),
-    Column("outcome", "", words=True),
-    Column("words", "notes, or what stands in the way", words=True, long=True),
-)
 
 
 @dataclass(frozen=True)
@@ -28,12 +24,32 @@ class FileOutcome:
     words: str  #: notes of a file that was taken, else what stands in the way
 
 
-def describe_folder(folder: Path) -> list[FileOutcome]:
+@dataclass(frozen=True, repr=False)
+class FolderLog(Result):
+    """What becomes of each scene file of a folder."""
+
+    folder: str
+    files: list[FileOutcome]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `airlight describe FOLDER --json` prints."""
+        return asdict(self)
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """A row for each file."""
+        counts = {word: sum(each.outcome == word for each in self.files) for word in ("taken", "refused", "failed")}
+        summed = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
+        columns = (*words("file", "outcome"), *words(words="notes, or what stands in the way", how={"long": True}))
+        return [table(f"{len(self.files)} scene files: {summed}", columns, map(vars, self.files))]
+
+
+def describe_folder(folder: Path) -> FolderLog:
     """Return what `describe` makes of each XML file in a folder and its folders."""
     files = sorted(folder.rglob("*.xml"))
     if not files:
         raise InputError(f"scene: the folder {folder} holds no .xml file; wanted Mitsuba scene files")
-    return [_outcome(path, folder) for path in files]
+    return FolderLog(str(folder), [_outcome(path, folder) for path in files])
 
 
 def _outcome(path: Path, folder: Path) -> FileOutcome:
@@ -46,15 +62,3 @@ def _outcome(path: Path, folder: Path) -> FileOutcome:
         return FileOutcome(name, "refused", str(reason).replace(str(path), path.name))
     except Exception as error:  # a fault of the program, which a log of many files shall show and outlive
         return FileOutcome(name, "failed", f"{type(error).__name__}: {' '.join(str(error).split())}")
-
-
-def folder_table(outcomes: list[FileOutcome]) -> Table:
-    """Return the log as a table."""
-    counts = {word: sum(each.outcome == word for each in outcomes) for word in ("taken", "refused", "failed")}
-    summed = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
-    return table(f"{len(outcomes)} scene files: {summed}", COLUMNS, [asdict(each) for each in outcomes])
-
-
-def folder_data(folder: Path, outcomes: list[FileOutcome]) -> dict[str, Any]:
-    """Return the log for JSON."""
-    return {"folder": str(folder), "files": [asdict(each) for each in outcomes]}

@@ -4,7 +4,7 @@
 import pytest
 
 from analytic.errors import InputError
-from reports.interchange.folder import describe_folder, folder_table
+from reports.interchange.folder import describe_folder
 
 LOOK = '<transform name="to_world"><lookat origin="0.2, -4.1, 1.3" target="0.1, 0, 0.6" up="0, 0, 1"/></transform>'
 SCENE = f"""<scene version="3.0.0"><medium type="homogeneous" id="mist">{{}}</medium>
@@ -20,7 +20,8 @@ def test_each_file_has_its_outcome(variant, tmp_path):
     (tmp_path / "old" / "mist.xml").write_text(SCENE.format(OLD, LAMP))
     (tmp_path / "projector.xml").write_text(SCENE.format(COEFFICIENTS, LAMP.replace("point", "projector", 1)))
     (tmp_path / "torn.xml").write_text("<scene")
-    found = {each.file: each for each in describe_folder(tmp_path)}
+    log = describe_folder(tmp_path)
+    found = {each.file: each for each in log.files}
     outcomes = {name: each.outcome for name, each in found.items()}
     assert outcomes == {
         "good.xml": "taken",
@@ -31,7 +32,7 @@ def test_each_file_has_its_outcome(variant, tmp_path):
     assert found["good.xml"].words == ""
     assert "sigma_t 0.4 and albedo 0.75" in found["old/mist.xml"].words
     assert "projector" in found["projector.xml"].words
-    assert folder_table(list(found.values())).title == "4 scene files: 2 taken, 2 refused"
+    assert log.tables[0].title == "4 scene files: 2 taken, 2 refused"
 
 
 def test_a_folder_without_scenes_is_refused(tmp_path):
