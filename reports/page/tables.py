@@ -20,10 +20,6 @@ _METHODS = (
     *("label", "frame", "frame_rate", "airlight", "surface", "light_moved", "objects_moved"),
     *("relative_rmse", "relative_bias", "p50", "p99", "flip", "nonfinite"),
 )
-_AGREEMENT = (
-    *("name", "agrees", "margin", "relative_bias", "interval", "detectable_bias", "epsilon", "uncorrected_bias"),
-    *("z_mean", "z_std", "rejected", "expected_rejections", "masked", "effort"),
-)
 
 
 def methods(scene: Data, timed: Sequence[int]) -> Table:
@@ -44,19 +40,6 @@ def methods(scene: Data, timed: Sequence[int]) -> Table:
     return methods_table(
         f"Times and errors of the methods in {scene['name']}", rows, *_METHODS, explanation=explanation
     )
-
-
-def agreement(scene: Data) -> Table:
-    """Return what estimators say of the reference of a scene."""
-    explanation = (
-        "Our own integrator, and Mitsuba's volpath against the same integral with the shadow ray shortened by the "
-        "measured epsilon."
-    )
-    title = f"Monte Carlo estimators against the quadrature in {scene['name']}"
-    shown = agreement_table(title, scene["agreement"].items(), *_AGREEMENT, explanation=explanation)
-    # A terminal rounds a bias to 0.001 %; the page has every number of report.json.
-    columns = (replace(column, places=None) if column.key.endswith("bias") else column for column in shown.columns)
-    return replace(shown, columns=tuple(columns))
 
 
 def seconds(scenes: Sequence[Data]) -> Table:
@@ -106,7 +89,7 @@ def drawn(function: Callable[..., Table | Iterable[Table]]) -> Callable[..., Any
 TABLES: dict[str, Callable[..., Any]] = {
     "fastest_table": drawn(fastest_table),
     "methods_table": drawn(methods),
-    "agreement_table": drawn(agreement),
+    "agreement_table": drawn(agreement_table),
     "trust_table": drawn(trust_table),
     "stability_table": drawn(stability_summary),
     "scaling_tables": drawn(scaling_tables),

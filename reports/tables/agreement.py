@@ -6,34 +6,31 @@ from typing import Any
 
 from reports.tables.table import Column, Interval, Name, Row, Table, Value, Verdict, numbers, table, words
 
-_UNCORRECTED = "the bias without the shadow-ray epsilon"
-_DETECTABLE = "the least bias that is found in nine runs of ten"
-_PERCENT = {"percent": True, "sign": True, "places": 3}
+_PERCENT = {"percent": True, "sign": True}
+#: Columns of what estimators say of the reference, with their meaning.
 COLUMNS = (
-    *words(name="the reference of", estimator="checked by"),
-    *numbers("samples", how={"after": " M", "places": 0, "minor": True}),
+    *words(name="layer"),
+    *numbers(agrees="agree"),
+    *numbers("margin", how={"percent": True, "meaning": "agreement: the whole interval lies inside it, either way"}),
     *numbers(
         relative_bias="bias",
         how={**_PERCENT, "meaning": "mean of the estimator less the reference, over the reference"},
     ),
     *numbers(interval="95 % interval", how={**_PERCENT, "meaning": "where 19 of 20 such runs find the bias"}),
-    *numbers(uncorrected_bias="uncorrected", how={**_PERCENT, "minor": True, "meaning": _UNCORRECTED}),
-    *numbers("margin", how={"percent": True, "meaning": "agreement: the whole interval lies inside it, either way"}),
-    *numbers(detectable_bias="detectable", how={"percent": True, "digits": 2, "minor": True, "meaning": _DETECTABLE}),
-    *numbers("rejected", how={"meaning": "pixels that differ by more than their noise explains"}),
-    *numbers("masked", how={"meaning": "pixels left out: their ray passes close to a light"}),
+    *numbers(
+        detectable_bias="detectable",
+        how={"percent": True, "digits": 2, "meaning": "the least bias that is found in nine runs of ten"},
+    ),
     *numbers(
         epsilon="shadow-ray epsilon", how={"meaning": "by what fraction Mitsuba's shadow rays end before the light"}
     ),
+    *numbers(uncorrected_bias="uncorrected", how={**_PERCENT, "meaning": "the bias without the shadow-ray epsilon"}),
     *numbers(z_mean="z: mean", how={"meaning": "errors of pixels in units of their noise: 0 if there is no bias"}),
     *numbers(z_std="z: st. deviation", how={"meaning": "1 if the noise is as large as was estimated"}),
+    *numbers("rejected", how={"meaning": "pixels that differ by more than their noise explains"}),
     *numbers(expected_rejections="expected", how={"digits": 2, "meaning": "how many would be rejected by chance"}),
+    *numbers("masked", how={"meaning": "pixels left out: their ray passes close to a light"}),
     *words("effort"),
-    *numbers(agrees="agree"),
-)
-BENCH = (
-    *("name", "estimator", "samples", "relative_bias", "interval", "margin"),
-    *("detectable_bias", "uncorrected_bias", "agrees"),
 )
 
 
@@ -109,27 +106,24 @@ def _trust(scene: Mapping[str, Any], estimators: Iterable[str]) -> Row:
     return Row(values)
 
 
-def agreement_table(
-    title: str, compared: Iterable[tuple[str, Mapping[str, Any]]], *keys: str, explanation: str = ""
-) -> Table:
-    """Return the table of comparisons of the reference, `agreement` in report.json, each with the name of what it
-    compares.
-
-    `keys` are those of `COLUMNS`; `BENCH` by default.
-    """
-    rows = (_values(name, comparison) for name, comparison in compared)
-    return table(title, COLUMNS, rows, explanation=explanation).only(*(keys or BENCH))
+def agreement_table(scene: Mapping[str, Any]) -> Table:
+    """Return what estimators say of the reference of a scene of report.json."""
+    return table(
+        f"Monte Carlo estimators against the quadrature in {scene['name']}",
+        COLUMNS,
+        [_values(name, comparison) for name, comparison in scene["agreement"].items()],
+        explanation="Our own integrator, and Mitsuba's volpath against the same integral with the shadow ray shortened "
+        "by the measured epsilon.",
+    )
 
 
 def _values(name: str, comparison: Mapping[str, Any]) -> Mapping[str, Any]:
-    width, height, batches, samples = (comparison[key] for key in ("width", "height", "batches", "samples"))
     return {
         **comparison,
         **comparison["statistics"],
         "name": name,
-        "samples": width * height * batches * samples / 1e6,
         "interval": Interval.of(comparison["statistics"]["relative_bias_ci"]),
-        "effort": f"{width} x {height} pixels, {batches} x {samples} spp",
+        "effort": "{width} x {height} pixels, {batches} x {samples} spp".format(**comparison),
         "agrees": Verdict(verdict(comparison)),
     }
 
