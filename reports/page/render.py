@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 PAGE_LIMIT = 30_000_000  #: bytes of a page
 WORDS_LIMIT = 2_500_000  #: bytes of these for everything but images
-SCRIPTS = ("codec.js", "scene.js", "draw.js", "viewer.js", "page.js", "every.js")
+SCRIPTS = ("codec.js", "scene.js", "draw.js", "viewer.js", "page.js")
 TEMPLATES = Path(__file__).parent / "templates"
 
 

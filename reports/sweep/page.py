@@ -80,7 +80,6 @@ def render_sweep(said: Summary, charts: Mapping[str, str], *, limit: int = PAGE_
         "least": LEAST,
         "version": __version__,
         "css": Markup(template_text("report.css") + template_text("sweep.css")),
-        "scripts": [template_text("every.js")],
     }
 
     def page(pictures: Mapping[str, str], omitted: int) -> str:

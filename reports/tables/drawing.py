@@ -165,7 +165,7 @@ def html(table: Table) -> str:
     """Return a table as HTML, in a box that scrolls sideways; shares are in per cent."""
     head = "".join(f'<th scope="col"{_layout(column)}>{_in_html(column.title)}</th>' for column in table.columns)
     named = f' role="group" aria-label="{_in_html(table.title)}"' if table.title else ""
-    lines = [f'<div class="scroll"{named}><table>']
+    lines = [f'<div class="scroll" tabindex="0"{named}><table>']
     caption = ". ".join(part for part in (table.title, table.explanation) if part)
     lines += [f"<caption>{_in_html(caption)}</caption>"] if caption else []
     lines += [f"<thead><tr>{head}</tr></thead>"] if any(column.heading for column in table.columns) else []
@@ -260,7 +260,7 @@ def _cell(value: Value, column: Column, style: _Style) -> str:
     def written(number: float) -> str:
         return style.digits(digits_of(number, column, zeros=style.zeros, percent=percent))
 
-    after = style.percent if percent else style.words(column.after)
+    after = style.percent if percent else ""
     if value is None:
         return style.dash
     if isinstance(value, Measured):

@@ -67,7 +67,6 @@ class Column:
     sign: bool = False  #: positive numbers have a plus
     percent: bool = False  #: a share, written in per cent
     share: bool = False  #: a share that HTML writes in per cent and the others as it is
-    after: str = ""  #: behind every number, such as a multiplication sign
     spread: str = ""  #: heading of the quartiles of `Measured`, in a column of their own where cells have no room
     alarm: bool = False  #: anything but zero is bad
     meaning: str = ""  #: what its values are, in words; HTML explains it below the table

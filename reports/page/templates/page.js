@@ -104,9 +104,12 @@
     action(viewer);
   });
 
-  // --- help, theme ---
+  // --- help ---
 
-  for (const button of document.querySelectorAll("[data-opens=help]")) button.addEventListener("click", () => help.showModal());
+  for (const button of document.querySelectorAll("[data-opens=help]")) {
+    button.hidden = false;
+    button.addEventListener("click", () => help.showModal());
+  }
   document.getElementById("keys-on").addEventListener("change", ({target}) => { keys = target.checked; });
 
   for (const viewer of viewers) {
