@@ -160,14 +160,6 @@ def sweep_columns() -> str:
     return table(("column", "unit", "meaning"), rows, 3)
 
 
-def keys() -> str:
-    """Return the keys of a report's page."""
-    from reports.page.filters import KEYS
-
-    rows = [(" ".join(f"`{key}`" for key in names), words) for names, words in KEYS]
-    return table(("key", "what it does"), rows, 2)
-
-
 @cache
 def commands() -> str:
     """Return every command and every study with its arguments, options and words."""

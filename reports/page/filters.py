@@ -22,14 +22,6 @@ KINDS = {
 #: By whether a claim is good: a mark, and its words for screen readers.
 MARKS = {True: ("✓", "holds"), False: ("✗", "does not hold"), None: ("·", "")}
 
-#: The keys of the page, and what they do.
-KEYS: tuple[tuple[tuple[str, ...], str], ...] = (
-    (("1", "…", "9"), "show the first to the ninth method"),
-    (("←", "→"), "show the method before, the next one; on a picture: move the probe"),
-    (("f",), "flip: one picture, reference and method in the same place"),
-    (("?",), "this list"),
-)
-
 
 def number(value: float | None, digits: int = 3) -> str:
     """Return a number with some significant digits, an en dash for none."""

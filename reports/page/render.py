@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from analytic.errors import InputError
 from reports.page.chart import scene_chart, speed_error_chart
-from reports.page.filters import FILTERS, KEYS, KINDS, MARKS, kept_words, viewer_words
+from reports.page.filters import FILTERS, KINDS, MARKS, kept_words, viewer_words
 from reports.page.image_index import SceneImages, page_images
 from reports.page.tables import TABLES, trust_words
 from reports.plotting.colour_maps import signed_colours, unsigned_colours
@@ -62,7 +62,6 @@ def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) 
         scripts=[template_text(name) for name in SCRIPTS],
         images=Markup(_script_json({"scenes": [scene_images.index for scene_images in images], "maps": _maps()})),
         pixels=[Markup(scene_images.data) for scene_images in images],
-        key_table=KEYS,
         kept=kept_words(data),
     )
     if len(page.encode()) > limit:

@@ -1,11 +1,10 @@
-// The page: one viewer a scene, what they share, keys, help.
+// The page: one viewer a scene, what they share, keys.
 "use strict";
 
 (function () {
   const data = JSON.parse(document.getElementById("images").textContent);
   const tables = Object.fromEntries(Object.entries(data.maps).map(([name, map]) => [name, colourTable(map)]));
   const live = document.getElementById("live");
-  const help = document.getElementById("help");
   const SHARED = ["layer", "mode", "stops", "view", "shown"];
   const KEEP = 3;  // scenes whose images stay decoded
   let active = null, keys = true;
@@ -89,12 +88,11 @@
 
   // Keys that the focused control needs for itself.
   function taken(target, key) {
-    return target.closest("select, textarea, dialog") || (target.closest("input") && key.length > 1);
+    return target.closest("select, textarea") || (target.closest("input") && key.length > 1);
   }
 
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented || taken(event.target, event.key)) return;
-    if (event.key === "?") return help.showModal();
     const viewer = current();
     if (!keys || !viewer) return;
     if (/^[1-9]$/.test(event.key)) return choose(viewer, Number(event.key) - 1);
@@ -104,13 +102,7 @@
     action(viewer);
   });
 
-  // --- help ---
-
-  for (const button of document.querySelectorAll("[data-opens=help]")) {
-    button.hidden = false;
-    button.addEventListener("click", () => help.showModal());
-  }
-  document.getElementById("keys-on").addEventListener("change", ({target}) => { keys = target.checked; });
+  document.getElementById("keys-on")?.addEventListener("change", ({target}) => { keys = target.checked; });
 
   for (const viewer of viewers) {
     viewer.showControls();
