@@ -61,8 +61,6 @@ def prepare(variant: str | None = None) -> Prepared:
             raise MissingError(f"the variant cuda_ad_rgb does not work here: {reason}; use --variant llvm_ad_rgb")
         variant = "llvm_ad_rgb" if reason else "cuda_ad_rgb"
     on_processor = variant == "llvm_ad_rgb"
-    if on_processor and not _has_fma():
-        raise MissingError("the processor has no fused multiply-add (FMA), which Dr.Jit needs: use another machine")
     llvm = next(iter(find_llvm()), None)
     problems = [problem for problem in (llvm_problem(llvm) if on_processor else "", atomic_problem()) if problem]
     if problems:
@@ -242,13 +240,6 @@ def machine_in_words(environment: Mapping[str, Any]) -> str:
     """Return what stands beside times in tables, from `describe_environment`: the GPU first, where there is one."""
     device = f"{environment['device']}, " if environment.get("device") else ""
     return f"{device}{environment['processor']}, {environment['threads']} threads, {environment['variant']}"
-
-
-def _has_fma() -> bool:
-    if sys.platform != "linux" or os.uname().machine not in ("x86_64", "i686"):
-        return True
-    flags = _cpuinfo("flags")
-    return not flags or "fma" in flags.split()
 
 
 def _cpuinfo(key: str) -> str:

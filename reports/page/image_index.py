@@ -103,7 +103,12 @@ def packed_scene(scene: Mapping[str, Any], images: StoredImages, stride: int) ->
     def thin(layers: Mapping[str, Array]) -> dict[str, Array]:
         return {name: layer[::stride, ::stride] for name, layer in layers.items()}
 
-    store = _Store()
+    store = bytearray()
+
+    def add(planes: bytes) -> dict[str, int]:
+        store.extend(planes)
+        return {"at": len(store) - len(planes), "bytes": len(planes)}
+
     exact = thin(images.reference)
     exact.setdefault("surface", np.zeros_like(exact["airlight"]))
     codes = {name: reference_codes(exact[name]) for name in LAYERS}
@@ -141,13 +146,13 @@ def packed_scene(scene: Mapping[str, Any], images: StoredImages, stride: int) ->
         "exposure": scene["exposure"],
         "floors": floors,
         "scale": [K, S],
-        "reference": {name: store.add(plane) for name, plane in zip(LAYERS, references)},
+        "reference": {name: add(plane) for name, plane in zip(LAYERS, references)},
         "methods": [
-            {"label": entry["label"], "layers": {name: store.add(what) for name, what in layers.items()}}
+            {"label": entry["label"], "layers": {name: add(what) for name, what in layers.items()}}
             for entry, layers in zip(shown, methods)
         ],
     }
-    return SceneImages(index, base64.b64encode(store.whole()).decode("ascii"))
+    return SceneImages(index, base64.b64encode(store).decode("ascii"))
 
 
 def relative_difference(exact: Array, rounded: Array, test: Array, floor: float) -> Array:
@@ -168,21 +173,3 @@ def _floor(reference: Array | None) -> float:
     finite = np.isfinite(reference)
     mean = float(reference[finite].mean()) if finite.any() else 0.0
     return DARK * mean if mean > 0 else 1.0
-
-
-class _Store:
-    """Packed planes one behind the other; equal ones once."""
-
-    def __init__(self) -> None:
-        self._parts: dict[bytes, int] = {}
-        self._length = 0
-
-    def add(self, data: bytes) -> dict[str, int]:
-        """Put planes into the store; return where they lie."""
-        if data not in self._parts:
-            self._parts[data] = self._length
-            self._length += len(data)
-        return {"at": self._parts[data], "bytes": len(data)}
-
-    def whole(self) -> bytes:
-        return b"".join(self._parts)

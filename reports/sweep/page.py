@@ -30,7 +30,7 @@ from reports.sweep.summary import Summary, headlines, sound_words, summary_of, t
 PAGE, CLAIMS, FIGURES = "sweep.html", "sweep.json", "figures"  #: in the folder of a sweep
 PAGE_LIMIT = 20_000_000  #: bytes of a page
 
-_TABLES = ("errors", "speed", "correlations", "refusals", "checks", "faults", "references", "hosts")
+_TABLES = ("errors", "speed", "correlations", "refusals", "checks", "faults")
 
 
 def write_sweep(source: Path, target: Path | None = None) -> tuple[Summary, Path]:

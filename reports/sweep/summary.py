@@ -13,35 +13,13 @@ from reports.sweep.correlations import Correlation, correlations, property_words
 from reports.sweep.faults import Check, Fault, Reason, Worst, checks, faults, reasons, worst
 from reports.sweep.read import Numbers, Sweep
 from reports.sweep.samples import FAULTS, Fastest, Sample, drawn_at_random, fastest_within, samples
-from validation.columns import column
 from validation.metrics.errors import plain
 from validation.statistics.samples import LEVEL, binomial_interval, quantile_interval
 
 SCHEMA = "airlight-sweep/1"
 
 #: What made the rows, by column.
-_VERSIONS = ("airlight", "source", "mitsuba", "drjit", "python", "variant")
-
-
-@dataclass(frozen=True)
-class ReferenceErrors:
-    """What one estimator says of its own error."""
-
-    estimator: str = column("reference")
-    scenes: int = column()
-    median: float = column("own error, median", meaning="over its scenes, relative to the mean of the reference")
-    largest: float = column("own error, largest")
-
-
-@dataclass(frozen=True)
-class Host:
-    """Where rows were computed."""
-
-    host: str = column()
-    device: str = column()
-    threads: int | None = column()
-    rows: int = column("cells")
-    timed_alone: int = column()
+_VERSIONS = ("airlight", "source", "mitsuba", "drjit", "python", "variant", "host", "device")
 
 
 @dataclass(frozen=True)
@@ -59,19 +37,13 @@ class Summary:
     reasons: tuple[Reason, ...]
     checks: tuple[Check, ...]
     faults: tuple[Fault, ...]
-    references: tuple[ReferenceErrors, ...]
-    hosts: tuple[Host, ...]
+    reference_errors: tuple[float, float] | None  #: of the references themselves: median and largest, over the mean [1]
     versions: Mapping[str, tuple[str, ...]]
     statuses: Mapping[str, int]  #: rows that ended so
     scenes: int  #: that claims are about
     named_scenes: int  #: others
     studies: tuple[str, ...]
     started: tuple[str, str] | None  #: when the first and the last cell began
-
-    @property
-    def timed_alone(self) -> int:
-        """Rows whose times were taken with the machine to themselves."""
-        return sum(host.timed_alone for host in self.hosts)
 
 
 def summary_of(sweep: Sweep) -> Summary:
@@ -82,6 +54,8 @@ def summary_of(sweep: Sweep) -> Summary:
     random = np.isfinite(sweep.numbers("seed"))
     names = sweep.texts("scene")
     drawn = drawn_at_random(sweep)
+    own = sweep.numbers("reference.error")
+    own = own[np.isfinite(own)]
     return Summary(
         sweep=sweep,
         drawn=drawn,
@@ -97,8 +71,7 @@ def summary_of(sweep: Sweep) -> Summary:
         reasons=tuple(reasons(sweep)),
         checks=tuple(checks(sweep)),
         faults=tuple(faults(sweep)),
-        references=tuple(_references(sweep)),
-        hosts=tuple(_hosts(sweep)),
+        reference_errors=(float(np.median(own)), float(own.max())) if own.size else None,
         versions={name: tuple(sorted(set(sweep.texts(f"origin.{name}")) - {None})) for name in _VERSIONS},
         statuses=dict(Counter(sweep.texts("status").tolist()).most_common()),
         scenes=len(set(names[random] if drawn else names)),
@@ -184,8 +157,8 @@ def sound_words(said: Summary) -> str:
 def to_json(said: Summary) -> dict[str, Any]:
     """Return everything as plain data, for `--json`; nothing in it is infinite or NaN."""
     names = {sample.label: sample for sample in said.samples}
-    counts = ("studies", "statuses", "scenes", "named_scenes", "timed_alone")
-    lists = ("correlations", "checks", "faults", "references", "hosts")
+    counts = ("studies", "statuses", "scenes", "named_scenes", "reference_errors")
+    lists = ("correlations", "checks", "faults")
     return {
         "schema": SCHEMA,
         "source": str(said.sweep.path),
@@ -227,33 +200,6 @@ def _configuration(sample: Sample) -> dict[str, Any]:
         "frame_ms": finite_median(sample.times),
         "timed_alone": int(np.isfinite(sample.times).sum()),
     }
-
-
-def _references(sweep: Sweep) -> list[ReferenceErrors]:
-    estimators, scenes = sweep.texts("reference.estimator"), sweep.texts("scene")
-    errors = sweep.numbers("reference.error")
-    made = []
-    for estimator in sorted(set(estimators) - {None}):
-        own = (estimators == estimator) & np.isfinite(errors)
-        if own.any():
-            values = errors[own]
-            made.append(
-                ReferenceErrors(estimator, len(set(scenes[own])), float(np.median(values)), float(values.max()))
-            )
-    return made
-
-
-def _hosts(sweep: Sweep) -> list[Host]:
-    hosts, devices = sweep.texts("origin.host"), sweep.texts("origin.device")
-    threads_of = sweep.numbers("origin.threads")
-    places = Counter(zip(hosts, devices, threads_of.tolist()))
-    alone = sweep.numbers("cost.alone") == 1
-    timed = Counter(zip(hosts[alone], devices[alone], threads_of[alone]))
-    return [
-        Host(host or "", device or "", None if np.isnan(threads) else int(threads), rows, timed[host, device, threads])
-        for (host, device, threads), rows in places.most_common()
-        if host is not None
-    ]
 
 
 def _span(sweep: Sweep) -> tuple[str, str] | None:

@@ -11,7 +11,7 @@ from reports.sweep.claims import TARGETS, written
 from reports.sweep.correlations import property_words
 from reports.sweep.faults import Check, Fault
 from reports.sweep.samples import FAULTS, UNTOLD
-from reports.sweep.summary import Host, ReferenceErrors, Summary, quantiles
+from reports.sweep.summary import Summary, quantiles
 from reports.tables.table import Column, Measured, Name, Table, numbers, table, words
 from validation.columns import columns_of
 
@@ -143,20 +143,6 @@ def faults_table(said: Summary, most: int = 30) -> Table:
     explanation = f"{left} more are in --json." if left > 0 else ""
     how = {"command": {"long": True, "minor": True}}
     return _table_of("Images at fault", Fault, rows, explanation=explanation, how=how)
-
-
-def references_table(said: Summary) -> Table:
-    """Return what the references say of their own errors."""
-    explanation = "Relative to the mean of the airlight: the quadrature's bound, or Monte Carlo's standard error."
-    how = {"median": _SHARE, "largest": _SHARE}
-    return _table_of(
-        "Errors of the reference itself", ReferenceErrors, said.references, explanation=explanation, how=how
-    )
-
-
-def hosts_table(said: Summary) -> Table:
-    """Return where rows were computed."""
-    return _table_of("Where it ran", Host, said.hosts)
 
 
 def _table_of(
