@@ -13,7 +13,6 @@ A claim is {"kind", "text", "good"}: `good` is true or false for what is a verdi
     not-measured   what was left out for its time, HDR-FLIP that could not be computed
 """
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -173,18 +172,11 @@ def _listed(kind: str, words: str, entries: Sequence[tuple[str, Mapping[str, Any
 
 
 def _without_flip(scenes: Scenes) -> list[Claim]:
-    """Return a claim for each reason why HDR-FLIP is missing."""
+    """Return a claim on the images that have no HDR-FLIP, with the reason of the first."""
     everything = _methods(scenes) + _methods(scenes, images=True)
-    reasons: dict[str, list[str]] = {}
-    for name, m in everything:
-        flip = m.get("flip")
-        if flip and flip["value"] is None:
-            # How many pixels it is differs from image to image and is in the tables: the reason is the same.
-            reason = re.sub(r"^\d+ pixels of the (reference|test image) are", r"pixels of the \1 are", flip["note"])
-            reasons.setdefault(reason, []).append(f"{m['label']} in {name}")
-    return [
-        _claim(
-            "not-measured", f"No HDR-FLIP ({reason}): {'; '.join(names) if len(names) < 8 else f'{len(names)} images'}."
-        )
-        for reason, names in reasons.items()
-    ]
+    without = [(name, m) for name, m in everything if m.get("flip") and m["flip"]["value"] is None]
+    if not without:
+        return []
+    name, first = without[0]
+    count = f"{len(without)} image{'' if len(without) == 1 else 's'}"
+    return [_claim("not-measured", f"No HDR-FLIP of {count}; of {first['label']} in {name}: {first['flip']['note']}.")]

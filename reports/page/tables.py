@@ -42,16 +42,6 @@ def methods(scene: Data, timed: Sequence[int]) -> Table:
     )
 
 
-def seconds(scenes: Sequence[Data]) -> Table:
-    """Return where the time went."""
-    parts = list(scenes[0]["seconds"])
-    columns = [Column("scene", "scene", words=True), *(Column(part, part, "s") for part in parts)]
-    rows = [Row({"scene": scene["name"]} | {part: scene["seconds"][part] for part in parts}) for scene in scenes]
-    return table(
-        "Where the time went", columns, rows, explanation="Of cached results, what they took when they were measured."
-    )
-
-
 def facts(title: str, entries: Data) -> Table:
     """Return what is known by name."""
     columns = (Column("name", "", words=True), Column("value", "", words=True, long=True))
@@ -94,7 +84,6 @@ TABLES: dict[str, Callable[..., Any]] = {
     "stability_table": drawn(stability_summary),
     "scaling_tables": drawn(scaling_tables),
     "left_out_table": drawn(left_out_table),
-    "seconds_table": drawn(seconds),
     "facts_table": drawn(facts),
     "paper_tables": drawn(paper_tables),
 }
