@@ -12,8 +12,8 @@ from analytic.errors import InputError
 from reports.api.inputs import File, KernelLike, Kernels, Progress, kernel_name, one_error, several, telling
 from reports.machine.progress import counted
 from reports.studies.result import Study, with_environment
-from reports.tables.kernels import kernel_tables
-from reports.tables.table import Column, Table, number, numbers, table, words
+from reports.tables.kernels import kernel_tables, stability_summary
+from reports.tables.table import Column, Table, table
 
 if TYPE_CHECKING:
     import numpy as np
@@ -99,11 +99,9 @@ def _draw_costs(costs: Sequence[Mapping[str, Any]], column: str) -> Any:
     return figure
 
 
-# Where they break, in the manner of Boost's accuracy reports: Max = 3.2ε (Mean = 0.4ε)
+# Where they break
 
-_EPSILON = {"single": 2.0**-23, "double": 2.0**-52}
 _TRIED_RAYS = 100_000
-_ALARM = {"alarm": True}
 
 
 @one_error
@@ -132,21 +130,13 @@ def stability(*, kernel: Kernels = (), progress: Progress = None) -> Study:
     with telling(progress, "stability") as tell:
         found = run(named, count=_TRIED_RAYS, progress=counted(tell))
     data = plain({"certified": CERTIFIED, "bar": BAR, "kernels": found})
-    drawn = [each for one in data["kernels"] for each in _stability_tables(one)]
     return Study(
         name="stability",
         data=with_environment(**data),
-        drawn=tuple(drawn),
+        drawn=(stability_summary(data["kernels"]),),
         said=tuple(line for one in data["kernels"] for line in _stability_lines(one)),
         good=not any(one["broken"] for one in data["kernels"]),
     )
-
-
-def _stability_tables(kernel: Mapping[str, Any]) -> Iterator[Table]:
-    claim = ", claims to be exact" if kernel["exact"] else ""
-    for rays in kernel["sets"]:
-        yield replace(_set_table(rays), title=f"{kernel['kernel']}{claim}, {rays['name']}")
-    yield replace(_gamma_table(kernel["gamma"]), title=f"{kernel['kernel']}: thin lit slivers far from the light")
 
 
 def _stability_lines(kernel: Mapping[str, Any]) -> Iterator[str]:
@@ -158,62 +148,6 @@ def _stability_lines(kernel: Mapping[str, Any]) -> Iterator[str]:
             yield f"worst rays of {kernel['kernel']}, float32 then float64:"
             yield from (rays["columns"], *filter(None, worst))
     yield from (f"BROKEN: {kernel['kernel']}, {reason}" for reason in kernel["broken"])
-
-
-def _set_table(rays: Mapping[str, Any]) -> Table:
-    """Return the errors of a kernel on one set of rays, by group."""
-    columns = (
-        *words(group="rays"),
-        *numbers(rays="count", refused=""),
-        *words(single="float32"),
-        *numbers("median", p99="99 %", odd="NaN/Inf/<0"),
-        *words(double="float64"),
-        *numbers(double_odd="NaN/Inf/<0", both="32 vs 64"),
-    )
-
-    def rows() -> Iterator[Mapping[str, Any]]:
-        for group, single in rays["single"].items():
-            double, both = rays["double"][group], rays["single_against_double"][group]["max"]
-            written = {"single": in_epsilons(single, "single"), "double": in_epsilons(double, "double")}
-            odd = {"odd": _odd(single), "double_odd": _odd(double)}
-            yield {**single, **written, **odd, "group": group, "refused": single["refused"] or "", "both": both}
-
-    about = "Relative errors; ε is 1.2e-7 in float32 and 2.2e-16 in float64, median and 99 % are of float32."
-    return table(rays["name"], columns, rows(), explanation=about)
-
-
-def in_epsilons(errors: Mapping[str, Any], precision: str) -> str:
-    """Return 'Max = 3.2ε (Mean = 0.4ε)', a dash where nothing was compared."""
-    if errors["max"] is None or errors["mean"] is None:
-        return "-"
-    epsilon = _EPSILON[precision]
-    return f"Max = {number(errors['max'] / epsilon)}ε (Mean = {number(errors['mean'] / epsilon)}ε)"
-
-
-def _odd(errors: Mapping[str, Any]) -> str:
-    counts = (errors["nan"], errors["infinite"], errors["negative"])
-    return "/".join(map(str, counts)) if any(counts) else ""
-
-
-def _gamma_table(by_precision: Mapping[str, Any]) -> Table:
-    """Return what is lost to cancellation where J is a difference of two Gammas."""
-    columns = (
-        *words(precision="slivers", direct="J(x0, x1)", difference="J(0, x1) - J(0, x0)"),
-        *numbers("median"),
-        *numbers("negative", how=_ALARM),
-        *words(rounding="in ε (J(0, x0) + J(0, x1))"),
-    )
-    rows = [
-        {
-            **study["difference"],
-            "precision": precision,
-            "direct": in_epsilons(study["direct"], precision),
-            "difference": in_epsilons(study["difference"], precision),
-            "rounding": f"Max = {number(study['max_rounding'])} (Median = {number(study['median_rounding'])})",
-        }
-        for precision, study in by_precision.items()
-    ]
-    return table("cancellation", columns, rows)
 
 
 # Integrals of a file

@@ -30,7 +30,7 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _MARKS = {sign: f"\\{sign}" for sign in "{}$&%#_"}
 _MARKS |= {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", '"': r"\textquotedbl{}"}
 _MARKS |= {"<": r"\textless{}", ">": r"\textgreater{}", "\n": " ", "\N{EN DASH}": "--"}
-_MARKS |= {"\N{MULTIPLICATION SIGN}": r"$\times$", "\N{PLUS-MINUS SIGN}": r"$\pm$", "ε": r"$\varepsilon$"}
+_MARKS |= {"\N{MULTIPLICATION SIGN}": r"$\times$", "\N{PLUS-MINUS SIGN}": r"$\pm$"}
 _LATEX = {ord(sign): written for sign, written in _MARKS.items()}
 
 
