@@ -332,7 +332,6 @@ def diff(
     new: File,
     *,
     time_tolerance: float = 0.25,
-    common: bool = False,
 ) -> ReportDifference:
     """Compare two reports: what got slower or less accurate.
 
@@ -351,15 +350,13 @@ def diff(
         The later report.json, or its folder.
     time_tolerance
         Relative change of a time that counts as noise on a quiet machine; inf compares no times.
-    common
-        Compare only what both reports have; what the new one lacks is no loss.
     """
     from reports.data.reader import read_report
     from reports.diff.compare import compare_reports
 
     tolerance = None if time_tolerance == math.inf else time_tolerance
     reports = read_report(Path(old)), read_report(Path(new))
-    return ReportDifference(compare_reports(*reports, time_tolerance=tolerance, common=common))
+    return ReportDifference(compare_reports(*reports, time_tolerance=tolerance))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

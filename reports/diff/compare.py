@@ -56,30 +56,28 @@ def compare_reports(
     new: Report,
     *,
     time_tolerance: float | None = TIME_TOLERANCE,
-    common: bool = False,
 ) -> Difference:
     """Compare two reports of `read_report`; the tolerance of times is relative, None compares none.
 
-    With `common` what only one of the reports holds is a note, not a loss. Reports without a common number are refused.
+    Reports without a common number are refused.
     """
     if time_tolerance is not None and not 0 < time_tolerance < math.inf:
         raise InputError(f"--time-tolerance: got {time_tolerance:g}, wanted a number above 0, such as 0.1 for 10 %")
     before, after = ({scene["name"]: scene for scene in report["scenes"]} for report in (old, new))
     findings: list[Finding] = []
     compared = 0
-    gone = "note" if common else "worse"
     for name in before:
         if name not in after:
-            findings.append(Finding(gone, name, "", "the scene is gone"))
+            findings.append(Finding("worse", name, "", "the scene is gone"))
             continue
-        findings += _reference(before[name], after[name], gone)
-        differences, count = _methods(before[name], after[name], gone)
+        findings += _reference(before[name], after[name])
+        differences, count = _methods(before[name], after[name])
         findings += differences
         compared += count
     findings += [Finding("note", name, "", "the scene is new") for name in after if name not in before]
     times = compare_times(old, new, tolerance=time_tolerance)
     findings += [*times.findings, *_stability(old, new), *_growth(old, new)]
-    findings += _papers(old, new, gone)
+    findings += _papers(old, new)
     if not compared and not times.compared:
         raise InputError(
             "reports: no number can be compared: no method of a scene was measured in both at one size; "
@@ -92,11 +90,11 @@ def compare_reports(
 # Errors, scene by scene and method by method
 
 
-def _methods(old: Report, new: Report, gone: str) -> tuple[list[Finding], int]:
+def _methods(old: Report, new: Report) -> tuple[list[Finding], int]:
     """Return the findings on the methods of a scene, and how many numbers were compared."""
     name = old["name"]
     before, after = ({entry["label"]: entry for entry in scene["methods"]} for scene in (old, new))
-    findings = [Finding(gone, name, label, "gone") for label in before if label not in after]
+    findings = [Finding("worse", name, label, "gone") for label in before if label not in after]
     findings += [Finding("note", name, label, "new") for label in after if label not in before]
     reason = _incomparable(old, new)
     if reason:
@@ -185,7 +183,7 @@ def _flip(old: Report, new: Report) -> tuple[list[Change], int]:
 # References, kernels that break, times that grow
 
 
-def _reference(old: Report, new: Report, gone: str) -> Iterator[Finding]:
+def _reference(old: Report, new: Report) -> Iterator[Finding]:
     """Compare the reference of a scene in two reports."""
     name = old["name"]
     if not confirmed([new]) and confirmed([old]):
@@ -194,7 +192,7 @@ def _reference(old: Report, new: Report, gone: str) -> Iterator[Finding]:
         yield Finding("better", name, "", "the reference is confirmed now")
     for key, agreement in old["agreement"].items():
         if key not in new["agreement"]:
-            yield Finding(gone, name, "", f"the comparison with {key} is gone")
+            yield Finding("worse", name, "", f"the comparison with {key} is gone")
         elif verdict(agreement) is True and verdict(new["agreement"][key]) is None:
             yield Finding("note", name, "", f"{key} ran out of time before it could confirm the reference")
     if old["size"] == new["size"]:
@@ -227,8 +225,8 @@ def _growth(old: Report, new: Report) -> Iterator[Finding]:
 # Claims of papers
 
 
-def _papers(old: Report, new: Report, gone: str) -> Iterator[Finding]:
-    """Compare which claims are reproduced; a row that only the old report has is `gone`, 'worse' or 'note'."""
+def _papers(old: Report, new: Report) -> Iterator[Finding]:
+    """Compare which claims are reproduced."""
     before, after = ({(row["paper"], row["item"]): row for row in report.get("papers", ())} for report in (old, new))
     if not before or not after:
         return
@@ -236,7 +234,7 @@ def _papers(old: Report, new: Report, gone: str) -> Iterator[Finding]:
         now = after.get((paper, item))
         name = f"{paper}, {item}"
         if now is None:
-            yield Finding(gone, "", "", f"{name}: the row is gone")
+            yield Finding("worse", "", "", f"{name}: the row is gone")
         elif now["published"] != row["published"]:
             yield Finding("worse", "", "", f"{name}: the published figure", row["published"], now["published"])
         elif now["verdict"] != row["verdict"]:

@@ -57,11 +57,19 @@ def _rows(described: Mapping[str, Any]) -> Iterator[Cells]:
 
 
 def _block(what: str, part: Mapping[str, Any]) -> Iterator[Cells]:
-    """Yield a row for each member of a part, lists of records a row each."""
+    """Yield a row for each member of a part; of several records a row each."""
     for name, value in part.items():
-        if isinstance(value, list | tuple) and value and isinstance(value[0], Mapping):
-            for number, each in enumerate(value, 1):
-                yield what, f"{_spoken(name)} {number}", _words(each)
+        records: Any = (
+            value.items()
+            if isinstance(value, Mapping)
+            else enumerate(value, 1)
+            if isinstance(value, list | tuple)
+            else ()
+        )
+        records = list(records)
+        if records and all(isinstance(each, Mapping) for _, each in records):
+            for key, each in records:
+                yield what, f"{_spoken(name)} {key}", _words(each)
                 what = ""
         else:
             yield what, _spoken(name), _words(value, name)

@@ -63,7 +63,6 @@ def test_options_choose_what_counts(files, capsys):
     gone = report()
     gone["scenes"] = gone["scenes"][:2]
     assert run(["diff", *files(report(), gone)]) == 1
-    assert run(["diff", *files(report(), gone), "--common"]) == 0
     slow = files(report(), report(machine=5.0))
     assert [run(["diff", *slow, *more]) for more in ([], ["--time-tolerance", "inf"], ["--time-tolerance", "6"])] == [
         1,
