@@ -59,14 +59,8 @@ def _rows(described: Mapping[str, Any]) -> Iterator[Cells]:
 def _block(what: str, part: Mapping[str, Any]) -> Iterator[Cells]:
     """Yield a row for each member of a part; of several records a row each."""
     for name, value in part.items():
-        records: Any = (
-            value.items()
-            if isinstance(value, Mapping)
-            else enumerate(value, 1)
-            if isinstance(value, list | tuple)
-            else ()
-        )
-        records = list(records)
+        listed = dict(enumerate(value, 1)) if isinstance(value, list | tuple) else value
+        records = list(listed.items()) if isinstance(listed, Mapping) else []
         if records and all(isinstance(each, Mapping) for _, each in records):
             for key, each in records:
                 yield what, f"{_spoken(name)} {key}", _words(each)
