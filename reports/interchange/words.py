@@ -63,21 +63,17 @@ def _block(what: str, part: Mapping[str, Any]) -> Iterator[Cells]:
         records = list(listed.items()) if isinstance(listed, Mapping) else []
         if records and all(isinstance(each, Mapping) for _, each in records):
             for key, each in records:
-                yield what, f"{_spoken(name)} {key}", _words(each)
+                yield what, f"{name} {key}", _words(each)
                 what = ""
         else:
-            yield what, _spoken(name), _words(value, name)
+            yield what, name, _words(value, name)
             what = ""
-
-
-def _spoken(name: str) -> str:
-    return name.replace("_", " ")
 
 
 def _words(value: Any, name: str = "") -> str:
     """Return a value in words, with the unit that its name has."""
     if isinstance(value, Mapping):
-        return "; ".join(f"{_spoken(key)} {_words(each, key)}" for key, each in value.items())
+        return "; ".join(f"{key} {_words(each, key)}" for key, each in value.items())
     if isinstance(value, list | tuple) and len(value) > _LISTED:
         return f"{len(value)} values"
     if isinstance(value, list | tuple):
