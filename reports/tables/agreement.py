@@ -16,7 +16,9 @@ COLUMNS = (
         relative_bias="bias",
         how={**_PERCENT, "meaning": "mean of the estimator less the reference, over the reference"},
     ),
-    *numbers(interval="95 % interval", how={**_PERCENT, "meaning": "where 19 of 20 such runs find the bias"}),
+    *numbers(
+        interval="95 % interval", how={**_PERCENT, "places": 3, "meaning": "where 19 of 20 such runs find the bias"}
+    ),
     *numbers(
         detectable_bias="detectable",
         how={"percent": True, "digits": 2, "meaning": "the least bias that is found in nine runs of ten"},
