@@ -251,6 +251,11 @@ class Reference(LayeredImage):
         """The standard error of the airlight [W/(m^2 sr)], (height, width, 3); None for the quadrature."""
         return self.image.layers.get("airlight_se")
 
+    @property
+    def surface_standard_error(self) -> Array | None:
+        """The standard error of the surface [W/(m^2 sr)], (height, width, 3); None for the quadrature."""
+        return self.image.layers.get("surface_se")
+
     def to_dict(self) -> dict[str, Any]:
         """Return what `airlight reference --json` prints, without the files."""
         means = {name: layer.mean(axis=(0, 1)).tolist() for name, layer in self.image.layers.items()}
