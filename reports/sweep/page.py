@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from analytic.errors import InputError
 from reference.storage.files import ensure_folder, write_bytes, write_text
 from reports import __version__
 from reports.page.chart import svg_text
@@ -28,7 +27,7 @@ from reports.sweep.read import read_sweep
 from reports.sweep.summary import Summary, headlines, sound_words, summary_of, to_json
 
 PAGE, CLAIMS, FIGURES = "sweep.html", "sweep.json", "figures"  #: in the folder of a sweep
-PAGE_LIMIT = 20_000_000  #: bytes of a page
+PICTURES = 400  #: most on a page, of some 20 kB each
 
 _TABLES = ("errors", "speed", "correlations", "refusals", "checks", "faults")
 
@@ -51,12 +50,8 @@ def write_sweep(source: Path, target: Path | None = None) -> tuple[Summary, Path
     return said, folder / PAGE
 
 
-def render_sweep(said: Summary, charts: Mapping[str, str], *, limit: int = PAGE_LIMIT) -> str:
-    """Return the HTML page of a sweep, with its figures as SVG by name.
-
-    Pictures are left out to keep the `limit` [bytes], those of the least bad scenes first. A page that is larger
-    without any of them is refused.
-    """
+def render_sweep(said: Summary, charts: Mapping[str, str]) -> str:
+    """Return the HTML page of a sweep, with its figures as SVG by name, and pictures of the worst scenes."""
     from markupsafe import Markup
 
     environment = page_environment()
@@ -64,7 +59,10 @@ def render_sweep(said: Summary, charts: Mapping[str, str], *, limit: int = PAGE_
     environment.globals |= {f"{name}_table": drawn(getattr(tables, f"{name}_table")) for name in _TABLES}
     environment.globals |= {"facts_table": drawn(facts), "property_words": property_words}
     template = environment.get_template("sweep.html.j2")
+    worst = _worst_keys(said)
     content = {
+        "pictures": _pictures(said, worst[:PICTURES]),
+        "omitted": max(0, len(worst) - PICTURES),
         "said": said,
         "scenes": f"{said.scenes} {'random ' * said.drawn}scene{'s' * (said.scenes != 1)}",
         "headlines": headlines(said),
@@ -82,23 +80,7 @@ def render_sweep(said: Summary, charts: Mapping[str, str], *, limit: int = PAGE_
         "css": Markup(template_text("report.css") + template_text("sweep.css")),
     }
 
-    def page(pictures: Mapping[str, str], omitted: int) -> str:
-        return template.render(content | {"pictures": pictures, "omitted": omitted})
-
-    every = _pictures(said)
-    words = len(page({}, len(every)).encode())
-    if words > limit:
-        raise InputError(
-            f"sweep: the page takes {words / 1e6:.1f} MB, wanted at most {limit / 1e6:g} MB; "
-            "ask for fewer methods or parameters at once"
-        )
-    room, shown = limit - words - 1000, {}
-    for key, address in every.items():
-        room -= len(address) + 400  # with the words around it
-        if room < 0:
-            break
-        shown[key] = address
-    return page(shown, len(every) - len(shown))
+    return template.render(content)
 
 
 def error_words(value: float | None) -> str:
@@ -108,9 +90,13 @@ def error_words(value: float | None) -> str:
     return unbroken(f"{100 * value:.0f} %" if 1 <= value < 1000 else percent(value, 2))
 
 
-def _pictures(said: Summary) -> dict[str, str]:
-    """Return the pictures of the worst scenes as addresses that hold them, the worst of every configuration first."""
+def _worst_keys(said: Summary) -> list[str]:
+    """Return the keys of the worst scenes' rows, the worst of every configuration first."""
     ranks = max((len(several) for several in said.worst.values()), default=0)
-    keys = [several[rank].key for rank in range(ranks) for several in said.worst.values() if rank < len(several)]
+    return [several[rank].key for rank in range(ranks) for several in said.worst.values() if rank < len(several)]
+
+
+def _pictures(said: Summary, keys: list[str]) -> dict[str, str]:
+    """Return pictures of rows as addresses that hold them, by key."""
     kept: dict[str, Any] = said.sweep.pictures(keys)
     return {key: f"data:image/webp;base64,{base64.b64encode(kept[key]).decode()}" for key in keys if key in kept}

@@ -6,7 +6,6 @@ import re
 
 import pytest
 
-from analytic.errors import InputError
 from reports.page.chart import svg_text
 from reports.sweep.figures import FIGURES, drawn
 from reports.sweep.page import render_sweep, write_sweep
@@ -54,19 +53,13 @@ def test_page_needs_nothing_but_itself(page):
 
 
 @pytest.mark.claim("sweep-page-stands-alone")
-def test_page_keeps_its_limit_by_leaving_out_pictures_of_the_least_bad(said, charts):
-    whole = render_sweep(said, charts)
-    without = len(whole.encode()) - sum(map(len, re.findall(r'src="(data:image/webp[^"]+)"', whole)))
-    small = render_sweep(said, charts, limit=len(whole.encode()) - 8000)
-    assert len(small.encode()) <= len(whole.encode()) - 8000
-    shown = Page(small)
-    assert 0 < len(shown.attributes("img")) < 50
+def test_page_keeps_the_pictures_of_the_worst(said, charts, monkeypatch):
+    monkeypatch.setattr("reports.sweep.page.PICTURES", len(said.worst))
+    shown = Page(render_sweep(said, charts))
     assert re.search(r"\d+ pictures are left out to keep the page small", shown.text)
     # The worst scene of every configuration keeps its picture.
     kept = {attributes["alt"].split(":")[1] for attributes in shown.attributes("img")}
-    assert {several[0].scene.split(":")[1] for several in said.worst.values()} <= kept
-    with pytest.raises(InputError, match="wanted at most"):
-        render_sweep(said, charts, limit=without - 60_000)
+    assert kept == {several[0].scene.split(":")[1] for several in said.worst.values()}
 
 
 @pytest.mark.slow
