@@ -102,7 +102,6 @@ def sweep(
     random: int | None = None,
     cluster: str | None = None,
     output: File | None = None,
-    again: bool = False,
     from_: File | None = None,
     progress: Progress = None,
 ) -> SweepRun | SweepFindings:
@@ -111,7 +110,8 @@ def sweep(
     A study names scenes, methods, kernels, parameters, media and sizes; every combination is a cell and becomes one
     row of DIR/sweep.parquet. A process for each processor computes them unless `--cluster` says otherwise.
 
-    Finished rows are kept: a run that was interrupted goes on where it was, and the same study twice computes nothing.
+    Finished rows are kept: a run that was interrupted goes on where it was, and the same study twice computes nothing
+    but cells that failed, hung or aborted.
 
     `--from DIR` writes what the rows say: DIR/sweep.html, figures, and claims with their confidence as JSON; with -o
     into another folder.
@@ -130,8 +130,6 @@ def sweep(
         network that you trust; tls takes the certificates of Dask's configuration.
     output
         Folder of the rows; sweep-NAME by default.
-    again
-        Compute again the cells that failed, hung or aborted; the others stay.
     from_
         Write the page, figures and claims of this sweep from its Parquet file, without computing cells.
     progress
@@ -141,7 +139,7 @@ def sweep(
 
     require("pyarrow", "sweep", "a sweep")
     if from_ is not None:
-        beside = {"a study": study, "random": random, "cluster": cluster, "again": again}
+        beside = {"a study": study, "random": random, "cluster": cluster}
         only_from("sweep", "computes nothing", beside)
         from reports.sweep.page import write_sweep
 
@@ -156,14 +154,12 @@ def sweep(
     folder = Path(output or f"sweep-{chosen.name}")
     variant = activate()
     with RowStore(folder) as store:
-        summary = _run(chosen, store, place, variant=variant, again=again, progress=progress)
+        summary = _run(chosen, store, place, variant=variant, progress=progress)
         summary["parquet"] = str(store.write_parquet()) if len(store) else None
     return SweepRun(summary)
 
 
-def _run(
-    study: "Study", store: "RowStore", place: "Place", *, variant: str, again: bool, progress: Any
-) -> dict[str, Any]:
+def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, progress: Any) -> dict[str, Any]:
     """Compute what is missing, add it to the store, and return what came of it."""
     from reports import __version__
     from reports.cluster.cells import cell_groups, row_without_numbers, timing_groups
@@ -187,7 +183,7 @@ def _run(
 
     # Images that nobody times are rendered once: their kernels compile longer than they run.
     quick = study.measure.times not in ("with", "stages")
-    missing, counts = part(place, partial(cell_groups, again=again), with_errors, quick=quick)
+    missing, counts = part(place, cell_groups, with_errors, quick=quick)
     untimed, timed = 0, Counter[str]()
     if study.measure.times == "alone":
         where = replace(place, workers=1) if place.workers else place

@@ -29,7 +29,7 @@ from validation.study.rows import RowStore
 from validation.study.run import cell_row, render, run
 from validation.study.study import Cell, Study
 
-_AGAIN = ("failed", "hung", "aborted")  #: what `--again` computes again
+_DONE = ("done", "refused", "left out")  #: what is not computed again
 _QUALITY = 60  # of WebP
 _SMALLER = 320  # pixels: wider images are shown smaller in the rows' pictures
 
@@ -78,12 +78,10 @@ def timing_groups(study: Study, made: Made, *, store: RowStore, scenes: dict[str
             )
 
 
-def cell_groups(study: Study, made: Made, *, store: RowStore, again: bool, scenes: dict[str, str]) -> Groups:
-    """Yield the tasks of every image that lacks rows; `again` computes those that failed, hung or aborted again."""
+def cell_groups(study: Study, made: Made, *, store: RowStore, scenes: dict[str, str]) -> Groups:
+    """Yield the tasks of every image that lacks rows, or whose cells failed, hung or aborted."""
     for keyed in _keyed(study.images(), made, scenes):
-        missing = {
-            key: cell for key, cell in keyed.items() if key not in store or (again and store.status(key) in _AGAIN)
-        }
+        missing = {key: cell for key, cell in keyed.items() if store.status(key) not in _DONE}
         if missing:
             image = next(iter(missing.values())).image
             words = " ".join((image.scene, *image.medium, f"{image.size[0]}x{image.size[1]}"))
