@@ -22,6 +22,7 @@ from reference.storage.exr import TOTAL, Image
 from reference.storage.exr import layer as image_layer
 from reports.plotting.pictures import (
     ToneCurve,
+    exposure,
     png_bytes,
     preview,
     tone_curve,
@@ -118,21 +119,10 @@ class LayeredImage(Pictured):
         """Return the layers and the total among them."""
         return replace(self.image, layers=dict(self.image.layers) | {TOTAL: self.total})
 
-    def picture(self, layer: str = TOTAL, exposure: float | None = None) -> NDArray[np.uint8]:
-        """Return a layer as a picture for a screen, (height, width, 3).
-
-        Parameters
-        ----------
-        layer
-            'total', 'airlight', 'surface' or another layer that is there.
-        exposure
-            Stops: the radiance is multiplied by 2 to this power. By default one that suits the total.
-        """
-        from validation.metrics.colour import auto_exposure
-
-        stops = auto_exposure(self.total) if exposure is None else exposure
+    def picture(self, layer: str = TOTAL) -> NDArray[np.uint8]:
+        """Return a layer, such as 'airlight' or 'surface', in the exposure of the total, (height, width, 3)."""
         radiance = np.asarray(image_layer(self.with_total(), layer), dtype=np.float64)
-        return tone_mapped(radiance, 2.0**stops)
+        return tone_mapped(radiance, exposure(np.asarray(self.total, dtype=np.float64)))
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the layers as EXR or a picture of the total as PNG, by the suffix of the path; return the path.

@@ -38,17 +38,14 @@ def parse_place(word: str | None) -> Place:
 
     require("distributed", "sweep", "work on several processes or machines")
     word = "local" if word is None else word.strip()
-    kind, _, number = word.partition(":")
     if word == "local":
         return Place(threads())
-    if kind == "local":
-        if not (number.isascii() and number.isdigit() and 1 <= int(number) <= 4096):
-            raise InputError(f"--cluster: got {word!r}, wanted local:N with a number of processes from 1 to 4096")
-        return Place(int(number))
+    if local := re.fullmatch(r"local:([1-9]\d{0,3})", word):
+        return Place(int(local[1]))
     if _ADDRESS.fullmatch(word) or Path(word).is_file():
         return Place(scheduler=word)
     raise InputError(
-        f"--cluster: got {word!r}, wanted local, local:N, tcp://HOST:PORT, or the file that "
+        f"--cluster: got {word!r}, wanted local, local:N with up to 9999 processes, tcp://HOST:PORT, or the file that "
         "`dask scheduler --scheduler-file` writes"
     )
 

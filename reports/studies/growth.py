@@ -238,7 +238,8 @@ def _map_result(studied: list[tuple[str, Any]], pixels: Any, texels: list[int], 
         rows += [{"scene": name, "label": label, **row} for row in of_scene]
         tables.append(table(f"{title}: error", (*numbers("map"), *_SHARES), of_scene))
         order = fitted_slope(texels, [row["relative_rmse"] for row in of_scene])
-        said.append(f"{name}: the relative RMSE {_trend(*order)}.")
+        power = f"falls as size^-({order[0]:.2f} +- {order[1]:.1g})"
+        said.append(f"{name}: the relative RMSE {power if math.isfinite(order[0]) else 'has too few values above 0'}.")
         data.append({"name": name, "method": label, "errors": plain(of_scene), "order": plain(order)})
         drawn.append((name, [row["relative_rmse"] for row in of_scene], *order))
     return Study(
@@ -249,18 +250,6 @@ def _map_result(studied: list[tuple[str, Any]], pixels: Any, texels: list[int], 
         rows=tuple(rows),
         draw=partial(_draw_maps, label, texels, drawn),
     )
-
-
-def _trend(order: float, standard_error: float) -> str:
-    """Return how errors change with the size of the map, as the predicate of a sentence."""
-    if math.isnan(order):
-        return "follows no law: too few errors above 0"
-    spread = "" if math.isnan(standard_error) else f" +- {standard_error:.1g}"
-    if abs(order) < 0.01:
-        return "does not depend on the size"
-    if order < 0:
-        return f"does not fall: it grows as size^{-order:.2f}{spread}"
-    return f"falls as size^-{order:.2f}{spread}"
 
 
 def _draw_maps(label: str, texels: list[int], drawn: list[tuple[str, list[float], float, float]], column: str) -> Any:
