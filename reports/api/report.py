@@ -286,15 +286,11 @@ def _measured(
 
 def _done(data: Mapping[str, Any]) -> str:
     """Say how long it took, and how much of it had been measured before."""
-    seconds, kept, computed = data["seconds"], data["cached"], data["computed"]
-    if not kept:
-        return f"{computed} results in {seconds:.0f} s"
-    when = data["measured"]
-    rest = f"{kept} of {kept + computed}" if computed else f"all {kept}"
-    return (
-        f"{seconds:.0f} s: {rest} results cached by earlier runs, measured from {when['first']} to {when['last']}; "
-        "--fresh measures again"
-    )
+    from reports.page.filters import kept_words
+
+    kept = kept_words(data)
+    more = f"; {kept}; --fresh measures again" if kept else ""
+    return f"{data['computed']} results in {data['seconds']:.0f} s{more}"
 
 
 @dataclass(frozen=True, repr=False)
