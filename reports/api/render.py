@@ -427,14 +427,11 @@ def _warnings(renderer: Any) -> tuple[str, ...]:
 
 
 def _check_work(name: str, scene: Any, chosen: "Configuration", frames: int) -> None:
-    from validation.study.configuration import rendered_lights
-    from validation.study.cost import check_work, frame_work, steps_of
+    from validation.study.configuration import configuration_work
+    from validation.study.cost import check_work
 
-    size = scene.camera.width, scene.camera.height
-    marches = chosen.method == "ray-march" or "steps" in dict(chosen.parameters)
-    steps = steps_of(chosen.parameters) if marches else 0
-    work = frame_work(size, lights=rendered_lights(scene, chosen), steps=steps, frames=frames)
-    check_work(f"render {name}, {size[0]} x {size[1]}, {chosen.label}", [work])
+    what = f"render {name}, {scene.camera.width} x {scene.camera.height}, {chosen.label}"
+    check_work(what, [configuration_work(scene, chosen, frames)])
 
 
 def asked_configurations(

@@ -134,8 +134,8 @@ def methods(
 
 def _check_work(what: str, loaded: list[Any], chosen: list[Any], *, progress: Any) -> None:
     from realtime.scene.read_scene import read_scene
-    from validation.study.configuration import rendered_lights
-    from validation.study.cost import check_work, frame_work, steps_of, truth_work
+    from validation.study.configuration import configuration_work
+    from validation.study.cost import check_work, truth_work
 
     works = []
     for each in loaded:
@@ -143,9 +143,7 @@ def _check_work(what: str, loaded: list[Any], chosen: list[Any], *, progress: An
         note(progress, scene.features.notes)
         at = scene.camera.width, scene.camera.height
         works.append(truth_work(at, lights=len(scene.lights) + len(scene.area_lights)))
-        for one in chosen:
-            steps = steps_of(one.parameters) if one.method == "ray-march" else 0
-            works.append(frame_work(at, lights=rendered_lights(scene, one), steps=steps))
+        works += [configuration_work(scene, one) for one in chosen]
     check_work(what, works)
 
 

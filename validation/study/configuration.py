@@ -25,6 +25,7 @@ from realtime.methods.user_method import method_file, user_errors, user_object
 from realtime.parameters import values
 from realtime.scene.read_scene import Scene
 from reference.storage.kept import code_digest
+from validation.study.cost import TIMED, Work, frame_work
 
 
 @dataclass(frozen=True)
@@ -138,6 +139,14 @@ def rendered_lights(scene: Scene, chosen: Configuration) -> int:
     method = find_method("unshadowed" if is_users(chosen.method) else chosen.method)
     points = dict(chosen.parameters).get("points", method.light_points.points)
     return len(scene.lights) + int(points) * len(scene.area_lights)
+
+
+def configuration_work(scene: Scene, chosen: Configuration, frames: float = TIMED) -> Work:
+    """Return the work of some frames of a configuration at the size of a scene's image."""
+    given = dict(chosen.parameters)
+    steps = float(given.get("steps", 100)) if chosen.method == "ray-march" or "steps" in given else 0.0
+    size = scene.camera.width, scene.camera.height
+    return frame_work(size, lights=rendered_lights(scene, chosen), steps=steps, frames=frames)
 
 
 def _function_name(function: Callable[..., Any]) -> str:

@@ -8,7 +8,6 @@ scene can be some times cheaper or costlier. That is enough to tell a minute fro
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -52,11 +51,6 @@ def sampled_work(size: tuple[int, int], samples: float, *, clouds: bool = False)
     """Return the work of an image by random samples, so many in each pixel, each a path through clouds or one step."""
     pixels = float(size[0]) * size[1]
     return Work(pixels * samples * (_PATH if clouds else _SAMPLE), pixels * _SAMPLED_BYTES)
-
-
-def steps_of(parameters: Iterable[tuple[str, Any]]) -> float:
-    """Return how many steps the parameters of a configuration ask for."""
-    return float(next((value for name, value in parameters if name == "steps"), 100))
 
 
 def forced() -> bool:

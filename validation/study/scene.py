@@ -31,8 +31,8 @@ from validation.estimates.quadrature import has_truth, kept_truth, truth_image
 from validation.metrics.errors import plain
 from validation.metrics.flip import flip_hdr
 from validation.scenes.loading import LoadedScene, load_scene, resize, scene_identity
-from validation.study.configuration import Configuration, rendered_lights, user_code
-from validation.study.cost import frame_work, sampled_work, steps_of, truth_work
+from validation.study.configuration import Configuration, configuration_work, user_code
+from validation.study.cost import sampled_work, truth_work
 from validation.study.reference import of_image
 from validation.study.results import Computed, Result, cached_result
 from validation.study.row import Row
@@ -134,9 +134,7 @@ class SceneStudy:
         samples = 20 * checks.multiple[0] * checks.multiple[1]
         works = {"multiple scattering": (_multiple_key(self), sampled_work(_MULTIPLE, samples))}
         for chosen in self.configurations:
-            steps = steps_of(chosen.parameters) if chosen.method == "ray-march" else 0
-            work = frame_work(self.size, lights=rendered_lights(self.scene, chosen), steps=steps)
-            works[chosen.label] = (_cell_key(self, chosen), work)
+            works[chosen.label] = (_cell_key(self, chosen), configuration_work(self.scene, chosen))
         return parts | {name: 0.0 if is_kept(key) else _COMPILED + work.seconds for name, (key, work) in works.items()}
 
 
