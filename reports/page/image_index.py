@@ -47,20 +47,12 @@ class SceneImages:
     data: str  #: all packed planes, in base64
 
 
-@dataclass(frozen=True)
-class StoredImages:
-    """The layers of one scene as they are in the files: of the reference, and of each method with its FLIP map."""
-
-    reference: Mapping[str, Array]
-    methods: Sequence[Mapping[str, Array]]
-
-
 def page_images(scenes: Sequence[Mapping[str, Any]], folder: Path, limit: int) -> list[SceneImages]:
     """Return the images of scenes of report.json from a folder, all together in at most `limit` characters.
 
     Every scene begins with all pixels; while the page is too large the largest goes down `STRIDES`.
     """
-    packed = [packed_scene(scene, read_images(scene, folder), STRIDES[0]) for scene in scenes]
+    packed = [packed_scene(scene, folder, STRIDES[0]) for scene in scenes]
     while (total := sum(len(images.data) for images in packed)) > limit:
         coarser = [place for place, images in enumerate(packed) if images.index["stride"] < STRIDES[-1]]
         if not coarser:
@@ -70,12 +62,12 @@ def page_images(scenes: Sequence[Mapping[str, Any]], folder: Path, limit: int) -
             )
         largest = max(coarser, key=lambda place: len(packed[place].data))
         stride = STRIDES[STRIDES.index(packed[largest].index["stride"]) + 1]
-        packed[largest] = packed_scene(scenes[largest], read_images(scenes[largest], folder), stride)
+        packed[largest] = packed_scene(scenes[largest], folder, stride)
     return packed
 
 
-def read_images(scene: Mapping[str, Any], folder: Path) -> StoredImages:
-    """Return the images of a scene of report.json from the files that it names, all of the size of the reference."""
+def read_images(scene: Mapping[str, Any], folder: Path) -> list[dict[str, Array]]:
+    """Return the layers of the files of a scene of report.json: of the reference, then of each method with images."""
     reference = _layers(folder / scene["files"]["exr"])
     files = [folder / entry["files"]["exr"] for entry in scene["methods"] if entry["files"]]
     methods = [_layers(path) for path in files]  # not in parallel: reading turns the standard error stream off
@@ -87,7 +79,7 @@ def read_images(scene: Mapping[str, Any], folder: Path) -> StoredImages:
                     f"{path}: got {layer.shape[1]} x {layer.shape[0]} pixels, wanted the {size[1]} x {size[0]} of the "
                     "scene's reference; make the report again"
                 )
-    return StoredImages(reference, methods)
+    return [reference, *methods]
 
 
 def _layers(path: Path) -> dict[str, Array]:
@@ -97,7 +89,7 @@ def _layers(path: Path) -> dict[str, Array]:
     return {name: np.asarray(layers[name], dtype=np.float64) for name in wanted if name in layers}
 
 
-def packed_scene(scene: Mapping[str, Any], images: StoredImages, stride: int) -> SceneImages:
+def packed_scene(scene: Mapping[str, Any], folder: Path, stride: int) -> SceneImages:
     """Return the images of a scene of report.json for the page: one pixel in `stride` along both axes."""
 
     def thin(layers: Mapping[str, Array]) -> dict[str, Array]:
@@ -109,11 +101,12 @@ def packed_scene(scene: Mapping[str, Any], images: StoredImages, stride: int) ->
         store.extend(planes)
         return {"at": len(store) - len(planes), "bytes": len(planes)}
 
-    exact = thin(images.reference)
+    reference, *tested = read_images(scene, folder)
+    exact = thin(reference)
     exact.setdefault("surface", np.zeros_like(exact["airlight"]))
     codes = {name: reference_codes(exact[name]) for name in LAYERS}
     # The floors are those of the whole image, so that they do not depend on which pixels are kept.
-    whole = dict(images.reference)
+    whole = dict(reference)
     whole[TOTAL] = whole["airlight"] + whole.get("surface", 0)
     floors = {name: _floor(whole.get(name)) for name in (*LAYERS, TOTAL)}
     exact[TOTAL] = exact["airlight"] + exact["surface"]
@@ -124,7 +117,7 @@ def packed_scene(scene: Mapping[str, Any], images: StoredImages, stride: int) ->
     def packed(number: int) -> dict[str, bytes]:
         """Return the packed layers of a method."""
         packed_layers = {}
-        for name, layer in thin(images.methods[number]).items():
+        for name, layer in thin(tested[number]).items():
             if name == FLIP_LAYER:
                 levels = np.round(FLIP_LEVELS * np.clip(np.nan_to_num(layer[..., :1]), 0, 1)).astype(np.int32)
                 packed_layers[name] = pack_planes(levels, FLIP_BITS)
@@ -137,7 +130,7 @@ def packed_scene(scene: Mapping[str, Any], images: StoredImages, stride: int) ->
         references = list(pool.map(lambda name: pack_planes(codes[name], REFERENCE_BITS), LAYERS))
         methods = list(pool.map(packed, range(len(shown))))
     height, width = codes["airlight"].shape[:2]
-    full_height, full_width = images.reference["airlight"].shape[:2]
+    full_height, full_width = reference["airlight"].shape[:2]
     index = {
         "name": scene["name"],
         "size": [width, height],
