@@ -51,7 +51,7 @@ def bring_references(cluster: Client, pictures: Sequence[Picture], *, pixel: str
     lacking = [picture for picture in pictures if not has_truth(picture.load(), pixel=pixel)]
     named = {f"reference {number}": picture for number, picture in enumerate(lacking)}
     given = pixel, fresh_since()
-    groups = [Group((Task(name, _truth, (picture, *given), _LIMIT),)) for name, picture in named.items()]
+    groups = [Group((Task(name, _reference, (picture, *given), _LIMIT),)) for name, picture in named.items()]
     for name, value in _done(cluster, groups):
         keep_truth(named[name].load(), *value, pixel=pixel)
 
@@ -96,7 +96,7 @@ def spread(cluster: Client, picture: Picture) -> ElsewhereFor:
     return lambda estimator, samples, counts: tracing(cluster, picture, estimator, samples=samples, counts=counts)
 
 
-def _truth(picture: Picture, pixel: str, since: float | None) -> tuple[TruthImage, Spent]:
+def _reference(picture: Picture, pixel: str, since: float | None) -> tuple[TruthImage, Spent]:
     scene, spent = picture.load(), stopwatch()
     with fresh_results(since):
         return truth_image(scene, pixel=pixel), spent()

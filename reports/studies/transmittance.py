@@ -41,8 +41,8 @@ def transmittance(scene: SceneLike = "smoke", *, progress: Progress = None) -> S
     from validation.estimates.transmittance import transmittance_errors
 
     with telling(progress, "rays") as tell:
-        truth = read_truth(opened(scene, (8, 6)).scene)
-        rows = [asdict(each) for each in transmittance_errors(truth, _STEPS, progress=tell)]
+        read = read_truth(opened(scene, (8, 6)).scene)
+        rows = [asdict(each) for each in transmittance_errors(read, _STEPS, progress=tell)]
     columns = (
         *words("estimator"),
         *numbers("steps", look_ups="look-ups"),
