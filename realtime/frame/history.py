@@ -10,7 +10,7 @@ frames, and its ghost fades as (1 - alpha)^n.
 
 P is the same pixel, or with `reproject=surface` where the last camera saw the surface of the pixel, the sky as a point
 at infinity. There the four pixels about P count by bilinear weights, those only whose surface is as far from the last
-camera to 5 %; where there is none, the pixel starts anew. Airlight lies before the surface: under a camera that moves
+camera to 5 %; where there is none, the pixel starts again. Airlight lies before the surface: under a camera that moves
 its parallax is another one. Surfaces are taken to stand still.
 
 C leaves what the frames before showed as it is, or brings each channel into a range about the nine pixels around in

@@ -57,8 +57,7 @@ def next_frame(
     ones will use: then these record nothing. `camera_moved`, `geometry_moved`, `light_moved`: what is elsewhere than in
     the last frame, or turned: the camera, shapes or the bounds of media, a light. The medium and the colours of lights
     may have changed in any case. Returns `stages`: as from `realtime.frame.renderer.run_stages`: bit by bit what it
-    returns for this scene;
-    `cache`: for the next frame.
+    returns for this scene; `cache`: for the next frame.
     """
     moved = {"camera_moved": camera_moved, "geometry_moved": geometry_moved, "light_moved": light_moved}
     return _next_of(replace(renderer, scene=scene), cache, None, **moved)

@@ -5,7 +5,7 @@ What the function takes decides: a keyword `kernel` means that it calls one, oth
 defaults give them their types. What it returns is checked, because nobody else has. See docs/your-method.md.
 
 It is not frozen unless its author says that it can be: a frozen function that copies NumPy's arrays in or reads values
-out ends the process (Dr.Jit 1.5). Tracing `unshadowed` anew for every frame costs 0.3 ms (2 threads).
+out ends the process (Dr.Jit 1.5). Tracing `unshadowed` again for every frame costs 0.3 ms (2 threads).
 """
 
 import importlib

@@ -45,7 +45,7 @@ _OF_PATTERNS, _OF_RUN = 2**30, 2**31  # where streams of patterns begin, and of 
 
 @dataclass(frozen=True)
 class Noise:
-    """The numbers of a run and of a frame in it; opaque, so that what is recorded once draws anew in each frame."""
+    """The numbers of a run and of a frame in it; opaque, so that a recorded method has new numbers in each frame."""
 
     run: Any
     frame: Any

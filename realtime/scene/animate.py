@@ -148,7 +148,7 @@ def _numbers(parameters, names: Sequence[str], shapes) -> dict[str, int]:
 def replace_positions(parameters, positions: Mapping[str, NDArray[Any]]) -> None:
     """Move the vertices of shapes in Mitsuba's scene, which holds them in float32.
 
-    The arrays are aligned, so that a frozen function that reads them is not recorded anew.
+    The arrays are aligned, so that a frozen function that reads them is not recorded again.
     """
     for name, vertices in positions.items():
         parameters[f"{name}.vertex_positions"] = aligned_array(mi.Float, vertices.ravel())

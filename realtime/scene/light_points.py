@@ -64,7 +64,7 @@ def read_light_points(points: Sequence[Light]) -> HostLightPoints:
 
 
 def _points_of(placed: PlacedPoints, source: int, types: ArrayTypes) -> list[Light]:
-    # What the points have in common is there once: a frame after a light moved makes all arrays anew.
+    # What the points have in common is there once: a frame after a light moved makes all arrays again.
     intensity = types.color(*aligned_numbers(types.scalar, placed.intensity))
     lift, chord = aligned_numbers(types.scalar, np.array([placed.lift, placed.chord]))
     alike = len(placed.normals) > 1 and bool(np.all(placed.normals == placed.normals[0]))

@@ -37,7 +37,7 @@ class Choice:
     normal: Array  #: unit, (..., 3)
     area: Array  #: [m^2]
     chance: Array  #: with which a triangle was chosen [1]
-    square: Array  #: points of the unit square, anew within each triangle, (..., 2)
+    square: Array  #: points of the unit square, spread over it within each triangle, (..., 2)
     near: NDArray[np.bool_]  #: whether it is so close to its ray, or point, that its points differ in what they send
 
 

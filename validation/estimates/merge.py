@@ -60,7 +60,7 @@ def merged_references(files: Sequence[tuple[str, Image]]) -> Image:
         raise InputError(
             f"the files to merge differ in their layers: {', '.join(odd)}; make all with the same --orders"
         )
-    # Those without a standard error are the same in all files; the total is written anew.
+    # Those without a standard error are the same in all files; the total is written again.
     layers = {name: values for name, values in parts[0].image.layers.items() if name != TOTAL}
     for layer in [name for name in layers if f"{name}_se" in layers]:
         count, mean, squares = parts[0].moments(layer)

@@ -32,7 +32,7 @@ from validation.scenes.loading import LoadedScene
 
 Array = NDArray[np.float64]
 
-_MOVES = 12  # rounds in which lit intervals are found anew
+_MOVES = 12  # rounds in which lit intervals are found again
 _STILL = 1e-6  # of the distance of a light from the camera: it does not move any more
 _STILL_IN_NOISE = 0.02  # of a standard error: the interval would not show it
 _KNOWN = 1e-6  # a standard error that is always there: scenes are read, and images written, in float32

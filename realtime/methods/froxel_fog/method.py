@@ -2,8 +2,7 @@
 """Froxel fog as a method: what engines ship for volumetric light, by the parameters that they have.
 
 A frame injects the scattered light into a grid along the view, sums it front to back, and looks the sum up at the depth
-of every pixel. Three kernels: over froxels, columns and pixels. The
-cost of the first two does not depend on the image.
+of every pixel. Three kernels: over froxels, columns and pixels. The cost of the first two does not depend on the image.
 
 References
 ----------

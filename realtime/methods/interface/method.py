@@ -64,7 +64,7 @@ class View(Rays):
 
     @property
     def frame(self) -> Any:
-        """The number of the frame in its run, an opaque `mi.UInt32`, so that a frozen method draws anew in each."""
+        """The number of the frame in its run, an opaque `mi.UInt32`: a frozen method draws new numbers in each."""
         return self.random.frame
 
     def uniform(self, stream: int = 0) -> tuple[Any, Any, Any, Any]:

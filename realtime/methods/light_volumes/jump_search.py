@@ -131,7 +131,7 @@ def _trace(heights: InverseDepthField, scene, light: Light, sides, walls):
         dr.scatter_reduce(dr.ReduceOp.Or, walls, number_there, texel, jumps & active)
     pair = dr.select(place < size, behind, before), dr.select(place > 0, before, behind)
     dr.eval(walls, pair)
-    # Not `dr.concat`: it would put the number of sides into a kernel, which each light that moves would compile anew.
+    # Not `dr.concat`: it would put the number of sides into a kernel, which each light that moves would compile again.
     lane = dr.arange(mi.UInt32, 2 * dr.width(place))
     first, second = (dr.gather(mi.UInt32, texels, lane >> 1) for texels in pair)
     return dr.select((lane & 1) == 0, first, second)

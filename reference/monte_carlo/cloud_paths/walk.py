@@ -28,7 +28,7 @@ length of its next stretch.
 A cloud with a density has its largest extinction for `sigma_t`, and the share rho of it at each place. Flights go as if
 it had the largest everywhere, and where one ends it is scattered with the probability rho, otherwise it flies on (delta
 tracking, Woodcock 1965). A shadow ray has such flights too, and goes on with the factor 1 - rho where one ends (ratio
-tracking, Novak, Selle, Jarosz 2014), or by the roulette above. Each flight casts the ray of its turn anew.
+tracking, Novak, Selle, Jarosz 2014), or by the roulette above. Each flight casts the ray of its turn again.
 
 A lane of the loop follows the samples of one pixel one after another, so that lanes end at nearly the same time.
 """

@@ -8,7 +8,7 @@ For each light and each medium that a ray crosses,
 w the unit vector from the point y of the light to the point x of the ray. One sample is one point y and one distance
 along the ray. The points are those of a Kronecker sequence with a random start (`_STEPS`), the distances lie in the
 cells of `reference.monte_carlo.single_scatter.stretches`. The plane of y clips the ray: what lies behind it gets no
-light from there. Phase function, material and media are the answers of Mitsuba's own plugins; the light is read anew
+light from there. Phase function, material and media are the answers of Mitsuba's own plugins; the light is read again
 (`reference.monte_carlo.single_scatter.area_sampling`), and nothing asks Mitsuba's `sample_direction` for it.
 
 A surface at the end of a ray adds f cos Le max(0, n . w)/r^2 V T T, the mean over points spread evenly over the area.

@@ -88,7 +88,7 @@ class _Mesh:
         return self._vector(self.normals, number * 3)
 
     def choose(self, u):
-        """Return triangles chosen by area, and the numbers spread over 0 to 1 anew in each."""
+        """Return triangles chosen by area, and the numbers spread over 0 to 1 in each."""
         number = dr.binary_search(0, self.count - 1, lambda i: dr.gather(mi.Float64, self.below, i) <= u)
         before = dr.gather(mi.Float64, self.below, dr.maximum(number, 1) - 1)
         before = dr.select(number == 0, 0, before)

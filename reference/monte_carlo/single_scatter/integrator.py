@@ -7,7 +7,7 @@ through the pixel centres, which `reference.scene` reads as facts of the scene, 
 beyond the integral itself (`tests/test_independence.py` follows the imports to their end).
 
 The n samples of a ray lie in n cells of the unit interval, each at a random place of its cell; the grid of cells is
-itself at a random place, drawn anew for each light and medium. The estimate is unbiased, its error falls as n^-1.5
+itself at a random place, a new one for each light and medium. The estimate is unbiased, its error falls as n^-1.5
 where the integrand is smooth and as 1/n at the edge of a shadow, and batches of different seeds are independent.
 
 Rounding: a ray's foot and height are computed in double precision; everything after that is relative to the light, in

@@ -184,8 +184,8 @@ def test_few_pixels_of_a_large_image_have_a_lag_where_it_can_be_told(counts):
     frames = averaged(light)
     beside, nowhere = np.zeros((2, 240, 384), dtype=bool)
     beside[4:6, 20:22] = True
-    selected = lambda n: beside if n in counts else nowhere  # noqa: E731 - a mask by frame
-    found = measure(Sequence(FRAMES, frames.__getitem__, light.__getitem__, selected))
+    masks = [beside if n in counts else nowhere for n in range(FRAMES)]
+    found = measure(Sequence(FRAMES, frames.__getitem__, light.__getitem__, masks.__getitem__))
     assert found.values == 12 * len(counts)
     told = found.lag.persistence.value
     assert told is None if len(counts) == 2 else told == pytest.approx(1 - WEIGHT, abs=1e-6)

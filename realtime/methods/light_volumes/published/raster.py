@@ -96,7 +96,7 @@ def _camera_basis(camera: Camera):
 
 
 def _opaque(values):
-    """Return a vector of which no kernel knows the value, so that none is compiled anew when it changes."""
+    """Return a vector of which no kernel knows the value, so that none is compiled again when it changes."""
     return mi.Vector3d(*(dr.opaque(mi.Float64, float(component)) for component in values))
 
 
