@@ -86,11 +86,29 @@ def exp_bounded(x):
     Float = type(x)
     if not is_single(Float) or dr.backend_v(Float) != dr.JitBackend.LLVM or dr.grad_enabled(x):
         return dr.exp(x)
-    # 2^n 2^f with n an integer and |f| <= 1/2; the fused steps keep f exact up to the rounding of log2(e) in two parts.
-    clamped = dr.maximum(x, -87.0)
-    n = dr.round(clamped * _LOG2_E_HIGH)
-    f = dr.fma(clamped, _LOG2_E_LOW, dr.fma(clamped, _LOG2_E_HIGH, -n))
-    return _scaled_power(f, n)
+    return _scaled_power(*_power_of_two(x))
+
+
+def exp_expm1_bounded(x):
+    """Return exp(x), and exp(x) - 1 without the cancellation beside 0; valid for x <= 88.
+
+    Relative errors in float32 are below 2e-7 and 5e-7.
+
+    The polynomial of 2^f has the term 1 apart, so that float32 lanes on a processor pay no more than for exp(x).
+    Elsewhere the rounding of exp(x) is taken back by its logarithm (Kahan).
+    """
+    Float = type(x)
+    if not is_single(Float) or dr.backend_v(Float) != dr.JitBackend.LLVM or dr.grad_enabled(x):
+        power = dr.exp(x)
+        less = dr.select(dr.abs(x) > 1, power - 1, dr.select(power == 1, x, (power - 1) * (x / dr.log(power))))
+        return power, less
+    f, n = _power_of_two(x)
+    value = Float(_EXP2[0])
+    for coefficient in _EXP2[1:-1]:
+        value = dr.fma(value, f, coefficient)
+    Int = dr.int32_array_t(Float)
+    scale, rest = dr.reinterpret_array(Float, (Int(n) + 127) << 23), value * f
+    return dr.fma(scale, rest, scale), dr.fma(scale, rest, scale - 1)
 
 
 def exp2_bounded(x):
@@ -116,6 +134,16 @@ def sinh_bounded(y):
     for coefficient in _SINH[1:]:
         value = dr.fma(value, square, coefficient)
     return value * y
+
+
+def _power_of_two(x):
+    """Return f and n of exp(x) = 2^(n + f), n a whole number and |f| <= 1/2, for x >= -87; below it is that of -87.
+
+    The fused steps keep f exact up to the rounding of log2(e) in two parts.
+    """
+    clamped = dr.maximum(x, -87.0)
+    n = dr.round(clamped * _LOG2_E_HIGH)
+    return dr.fma(clamped, _LOG2_E_LOW, dr.fma(clamped, _LOG2_E_HIGH, -n)), n
 
 
 def _scaled_power(f, n):

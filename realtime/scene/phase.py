@@ -202,7 +202,7 @@ class HenyeyGreenstein(Phase):
         """Return the value from (1 -+ cos)/2."""
         g = type(up)(self.g)
         base = dr.fma(4 * dr.abs(g), dr.select(g >= 0, down, up), dr.square(1 - dr.abs(g)))
-        return (1 - g) * (1 + g) * dr.rsqrt(base) / base
+        return (1 - g) * (1 + g) / (base * dr.sqrt(base))
 
     def evaluate(self, cos_scatter) -> Any:
         """Return the value.
@@ -211,7 +211,7 @@ class HenyeyGreenstein(Phase):
         """
         g = type(cos_scatter)(self.g)
         base = dr.fma(2 * dr.abs(g), 1 - dr.mulsign(cos_scatter, g), dr.square(1 - dr.abs(g)))
-        return (1 - g) * (1 + g) * dr.rsqrt(base) / base
+        return (1 - g) * (1 + g) / (base * dr.sqrt(base))
 
     def density(self, f, c, scale) -> Any:
         """Return it by (1 - g)(1 + g)/b^(3/2) with b (1 + E^2) = (1 - g)^2 + (1 + g)^2 E^2, whatever the sign of g.

@@ -7,9 +7,8 @@ With the height z of a point and layers i
 
 **Optical depth.** A layer's mean over a segment is its density at the *lower* end times phi(u) = (1 - e^-u)/u, with
 u >= 0 the rise in scale heights: from the upper end e^u would overflow where the value is small. Rounding of u near 0
-changes phi by half as much, so level rays are no special case. In float32 phi is its series to u^6 below 1/2 and the
-quotient above: 2.5e-7. The length in which a layer's depth grows by T follows by inversion, -log(1 - c T/s)/c with the
-density s where it begins and c = dz/H.
+changes phi by half as much, so level rays are no special case. The length in which a layer's depth grows by T follows
+by inversion, -log(1 - c T/s)/c with the density s where it begins and c = dz/H.
 
 **Suns.** tau(x, sun) = (1/mu) int_z^cap sigma_t dz, mu the height of the sun, so that the exponent E of both ways grows
 by sigma_t (1 - dz/mu) along a ray, whatever the layers. Over a lit segment of the depth tau
@@ -18,12 +17,15 @@ by sigma_t (1 - dz/mu) along a ray, whatever the layers. Over a lit segment of t
 
 (plane-parallel single scattering, Chandrasekhar 1960). It costs two optical depths and no node.
 
-**Lights at places.** Panels of nodes end where they would turn by some angle about the light, grow in distance from it
-by some factor, rise by some scale heights or be optically thicker than some depth. In a panel the tangent of the angle
-from its beginning is linear in t, which takes 1/r^2 away and cancels nowhere (`realtime.scene.media.bounded_rays`).
-Segments are cut at the bases of clamped layers.
+**Lights at places.** With s = x - foot, h the height and w = asinh(s/h), dx/r^2 = dw/r, and what is left is smooth: the
+poles of 1/r and of Henyey and Greenstein's lobes lie at Im w = pi/2. Panels of nodes in w end where they would be too
+wide, rise by too many scale heights or be optically too thick; 8 nodes are right to 2e-6, 16 to 2e-11 (certified rays).
+Segments are cut at the bases of clamped layers. Of a layer that is not clamped, the depth from z to z' is sigma_i H_i
+|e(z) - e(z')| times the length that rises by one scale height: one exponential a leg, whose difference from 1 comes
+with it.
 """
 
+import math
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any
@@ -33,14 +35,15 @@ import mitsuba as mi
 
 from realtime.errors import InputError
 from realtime.numerics.array_types import is_single
-from realtime.numerics.functions import exp_bounded, unit_nodes
+from realtime.numerics.functions import exp_bounded, exp_expm1_bounded, unit_nodes
 from realtime.scene.media.medium import LitRays, VaryingMedium, optical_reach
 from realtime.scene.phase import Phase
 
-_NODES, _NODES_DOUBLE = 8, 12
-_TANGENT, _FARTHER, _NEARER, _SCALE_HEIGHTS, _DEPTH = 1.0, 1.5, 0.6, 3.0, 3.0  # of a panel at most
+_NODES, _NODES_DOUBLE = 8, 16
+_WIDEST, _SCALE_HEIGHTS, _DEPTH = 3.4, 6.0, 10.0  # of a panel at most: in w, in scale heights, in optical depth
 _MOST = 200  # panels of a segment: no segment needs as many
 _ENDLESS = 1e9  # [m]
+_LEVEL = 1e-20  # the rise of a ray, and a difference of heights [m], that stand for none
 
 
 @dataclass(frozen=True)
@@ -149,8 +152,25 @@ class HeightFog(VaryingMedium):
         return HeightRays(self, light, rays, geometry, kernel, nodes)
 
     def _fall(self, layer: Layer, z):
-        above = (z - layer.base) / layer.scale_height
-        return exp_bounded(-dr.maximum(above, 0)) if self.clamped else dr.exp(-above)
+        # A quotient to its last digit by the reciprocal, which is the same everywhere.
+        height, steep = z - layer.base, dr.rcp(layer.scale_height)
+        above = height * steep
+        above = dr.fma(dr.fma(-above, layer.scale_height, height), steep, above)
+        return exp_bounded(-dr.maximum(above, 0 if self.clamped else -88.0))
+
+    def _from(self, layer: Layer, height):
+        """Return a function of how far below a height a place is: a layer's exponential, and its difference exactly.
+
+        From forty scale heights above the base on, the exponential is as good as 0.
+        """
+        least, steep = dr.minimum(height, dr.fma(40, layer.scale_height, layer.base)), dr.rcp(layer.scale_height)
+        there, beyond = self._fall(layer, least), (least - height) * steep
+
+        def at(below):
+            factor, less = exp_expm1_bounded(dr.fma(below, steep, beyond))
+            return there * factor, there * dr.abs(less)
+
+        return at
 
     def _mean(self, low, rise):
         """Return the mean density between a height `low` and one `rise` above it, both between floor and cap [1/m]."""
@@ -194,10 +214,7 @@ class HeightRays(LitRays):
             return medium.albedo * dr.select(x1 > x0, self._sun(x0, x1), 0)
         # Twice the usual reach: out of thick fog the way to the light may lose more depth than the camera's gains.
         x1 = dr.minimum(x1, x0 + medium.length_from(self.rays, x0, 2 * optical_reach(type(x0))))
-        total = type(x0)(0)
-        for begin, end in self._smooth(x0, x1):
-            total += dr.select(end > begin, self._panels(begin, end), 0)
-        return medium.albedo * total
+        return medium.albedo * sum(self._panels(begin, end) for begin, end in self._smooth(x0, x1))
 
     def _smooth(self, x0, x1):
         """Cut segments where soft spots and the bases of clamped layers put kinks."""
@@ -221,16 +238,16 @@ class HeightRays(LitRays):
 
     def _panels(self, x0, x1):
         """Sum panels of a segment in which the integrand is smooth."""
-        Float = type(x0)
+        Float, integrand = type(x0), self._integrand()
         if self.nodes is not None:
             foot = dr.clip(self.geometry.foot, x0, x1)
-            return self._in_w(x0, foot) + self._in_w(foot, x1)
+            return sum(self._panel(integrand, a, b, self.nodes) for a, b in ((x0, foot), (foot, x1)))
         count = _NODES if is_single(Float) else _NODES_DOUBLE
         width = dr.width(self.geometry.height, x0, x1)
 
         def panel(turn, x, total):
-            end = dr.minimum(x + self._longest(x), x1)
-            return turn + 1, end, total + self._panel(x, end, count)
+            end = dr.minimum(x + self._longest(x0, x), x1)
+            return turn + 1, end, total + self._panel(integrand, x, end, count)
 
         *_, total = dr.while_loop(
             state=(dr.zeros(mi.UInt32, width), x0 + dr.zeros(Float, width), dr.zeros(Float, width)),
@@ -240,89 +257,82 @@ class HeightRays(LitRays):
         )
         return total
 
-    def _longest(self, x):
-        """Return the length of the longest panel that begins at x [m]."""
-        medium, (_, rise) = self.medium, self.rays.crossed[1]
-        h = dr.maximum(self.geometry.height, 1e-12)
-        s = x - self.geometry.foot
-        r = dr.sqrt(dr.fma(s, s, h * h))
-        turning = h - _TANGENT * s
-        longest = dr.select(turning > 0, _TANGENT * dr.square(r) / turning, dr.inf)
-        longest = dr.minimum(longest, dr.select(s < 0, _NEARER, _FARTHER) * r)
+    def _longest(self, x0, x):
+        """Return the length of the longest panel that begins at x, of a segment that begins at x0 [m]."""
+        medium, (start, rise) = self.medium, self.rays.crossed[1]
+        s, h = x - self.geometry.foot, self._height()
+        # From w to w + W in w = asinh(s/h), s grows to s cosh W + r sinh W.
+        longest = dr.fma(s, math.cosh(_WIDEST) - 1, dr.sqrt(dr.fma(s, s, h * h)) * math.sinh(_WIDEST))
+        thickness = _DEPTH / medium.density(dr.fma(rise, x, start))
         if medium.layers:
-            least = reduce(dr.minimum, [layer.scale_height for layer in medium.layers])
-            longest = dr.minimum(longest, _SCALE_HEIGHTS * least / dr.abs(rise))
-        return dr.minimum(longest, medium.length_from(self.rays, x, _DEPTH))
+            slope = dr.abs(rise) / reduce(dr.minimum, [layer.scale_height for layer in medium.layers])
+            # Upwards less and less is left to be right about.
+            longest = dr.minimum(longest, _SCALE_HEIGHTS / slope + dr.select(rise > 0, x - x0, 0))
+            # Downwards the depth grows by T in log(1 + y)/slope, y = slope T/density; 2y/(2 + y) is a lower bound.
+            thickness *= dr.select(rise < 0, 2 / dr.fma(slope, thickness, 2), 1)
+        return dr.minimum(longest, thickness)
 
-    def _panel(self, x0, x1, count: int):
-        """Integrate one panel by nodes that are equal in the tangent of the angle from its beginning."""
-        foot, h = self.geometry.foot, dr.maximum(self.geometry.height, 1e-12)
-        s0, s1 = x0 - foot, x1 - foot
-        square = dr.fma(s0, s0, h * h)
-        d = dr.fma(s0, s1, h * h)
-        tangent = h * (x1 - x0) / d
-        total = type(x0)(0)
-        for t, weight in unit_nodes(count):
-            near, far = (1 - t) * d, t * square
-            s = dr.fma(near, s0, far * s1) / (near + far)
-            total += self._integrand(s, dr.sqrt(dr.fma(s, s, h * h))) * (weight / dr.fma(t * tangent, t * tangent, 1))
-        return dr.select(x1 > x0, total * ((x1 - x0) / d), 0)
+    def _height(self):
+        return dr.maximum(self.geometry.height, 1e-12)
 
-    def _in_w(self, x0, x1):
-        """Integrate a segment beside the foot in one panel of w = asinh((x - foot)/height)."""
-        foot, h = self.geometry.foot, dr.maximum(self.geometry.height, 1e-12)
-        w0, w1 = dr.asinh((x0 - foot) / h), dr.asinh((x1 - foot) / h)
-        total = type(x0)(0)
-        for t, weight in unit_nodes(self.nodes or 0):
-            grown = dr.exp(dr.lerp(w0, w1, t))
-            sinh, cosh = 0.5 * (grown - dr.rcp(grown)), 0.5 * (grown + dr.rcp(grown))
-            total += self._integrand(h * sinh, h * cosh) * (weight / cosh)
-        return dr.select(x1 > x0, total * ((w1 - w0) / h), 0)
+    def _panel(self, integrand, x0, x1, count: int):
+        """Integrate one panel by nodes in w, with dx/r^2 = dw/r.
 
-    def _integrand(self, s, r):
-        """Return sigma_t exp(-tau) p at s = x - foot and r from the light [1/m]."""
+        With p = s + r = h e^w the middle is at h e^w = sqrt(p0 p1), and w1 - w0 = log(p1/p0), where p1/p0 - 1 =
+        (x1 - x0)/(r0 + r1) (1 + p1/p0) keeps its digits in short panels. A pair of nodes has one exponential.
+        """
+        h = self._height()
+        s0, s1 = x0 - self.geometry.foot, x1 - self.geometry.foot
+        r0, r1 = dr.sqrt(dr.fma(s0, s0, h * h)), dr.sqrt(dr.fma(s1, s1, h * h))
+        p0, p1 = (dr.select(s >= 0, s + r, h * h / (r - s)) for s, r in ((s0, r0), (s1, r1)))
+        grows = (x1 - x0) / (r0 + r1) * (1 + p1 / p0)
+        grown = 1 + grows
+        half = 0.5 * dr.select(grown == 1, grows, dr.log(grown) * (grows / (grown - 1)))
+        after = dr.sqrt(p0) * dr.sqrt(p1)
+        before = h * h / after
+        total, nodes = type(x0)(0), unit_nodes(count)
+        for t, weight in nodes[: count // 2]:
+            grown = exp_bounded((1 - 2 * t) * half)
+            shrunk = dr.rcp(grown)
+            total += weight * (integrand(after * grown, before * shrunk) + integrand(after * shrunk, before * grown))
+        return dr.select(x1 > x0, 2 * half * total, 0)
+
+    def _integrand(self):
+        """Return a function of r + s and r - s, s = x - foot and r from the light [m]: sigma_t exp(-tau) p / r."""
         medium, ((enter, _), (start, rise)) = self.medium, self.rays.crossed
-        x = self.geometry.foot + s
-        z = dr.fma(rise, x, start)
         at_light = dr.dot(self.light.position, medium.up)
-        if medium.clamped:
-            density, exponent = medium.density(z), medium.optical_depth(self.rays, 0, x)[0]
-            exponent += medium._between(z, at_light, r)
-        else:
-            # One exponential a layer: those where the ray enters and at the light are the same for all nodes.
-            length, end = dr.maximum(x - enter, 0), dr.clip(at_light, medium.floor, medium.cap)
-            away = dr.abs(at_light - z)
-            within = dr.select(end == at_light, r, r * (dr.abs(end - z) / dr.maximum(away, 1e-12)))
-            density, exponent = medium.constant, medium.constant * (length + within)
-            for layer in medium.layers:
-                here, there = medium._fall(layer, z), medium._fall(layer, end)
-                before = medium._fall(layer, dr.fma(rise, enter, start))
-                rises = dr.abs(rise) * length / layer.scale_height, dr.abs(end - z) / layer.scale_height
-                depth = length * mean_fall(before, here, rises[0]) + within * mean_fall(here, there, rises[1])
-                density = dr.fma(layer.sigma_t, here, density)
-                exponent = dr.fma(layer.sigma_t, depth, exponent)
-        value = density * exp_bounded(-exponent) * medium.phase.evaluate(-s / r)
-        return value * self.geometry.falloff_beside(self.light, s) if self.light.varies else value
+        end, climb = dr.clip(at_light, medium.floor, medium.cap), dr.select(dr.abs(rise) < _LEVEL, _LEVEL, rise)
+        flat, entry = dr.rcp(dr.abs(climb)), dr.fma(rise, enter, start)
+        layers = [(layer, medium._from(layer, entry), medium._from(layer, end)) for layer in medium.layers]
 
+        def integrand(after, before):
+            total, s = after + before, 0.5 * (after - before)
+            r, x = 0.5 * total, self.geometry.foot + s
+            z = dr.fma(rise, x, start)
+            fall = dr.maximum(dr.abs(at_light - z), _LEVEL)
+            both = dr.rcp(total * fall)  # one division for two
+            slant, inverse = r * total * both, fall * both
+            if medium.clamped:
+                density, exponent = medium.density(z), medium.optical_depth(self.rays, 0, x)[0]
+                exponent += medium._between(z, at_light, r)
+            else:
+                # A layer's depth is the difference of its exponentials times the length that rises by one scale height.
+                length, density, to_camera = x - enter, medium.constant, 0
+                to_light = medium.constant * dr.abs(end - z)
+                for layer, from_entry, from_end in layers:
+                    column, (here, difference) = layer.sigma_t * layer.scale_height, from_end(end - z)
+                    density = dr.fma(layer.sigma_t, here, density)
+                    to_camera = dr.fma(column, from_entry(-climb * length)[1], to_camera)
+                    to_light = dr.fma(column, difference, to_light)
+                exponent = dr.fma(to_camera, flat, medium.constant * length)
+                exponent += dr.select(fall > _LEVEL, to_light * slant, density * r)
+            phase = medium.phase.evaluate_half(after * inverse, before * inverse)
+            value = density * exp_bounded(-exponent) * phase * (2 * inverse)
+            return value * self.geometry.falloff_beside(self.light, s) if self.light.varies else value
 
-def mean_fall(a, b, u):
-    """Return the mean of an exponential between two places where it is a and b, u >= 0 scale heights apart."""
-    if is_single(type(u)):
-        return dr.select(u < 0.5, dr.maximum(a, b) * _series(u), dr.abs(a - b) / u)
-    return dr.maximum(a, b) * phi(u)
-
-
-def _series(u):
-    """Return (1 - e^-u)/u to u^6, in float32 right to rounding below 1/2."""
-    series = type(u)(1 / 5040)
-    for divisor in (720, 120, 24, 6, 2, 1):
-        series = dr.fma(-u, series, 1 / divisor)
-    return series
+        return integrand
 
 
 def phi(u):
     """Return (1 - e^-u)/u, 1 at u = 0, for u >= 0 (see the module)."""
-    if is_single(type(u)):
-        return dr.select(u < 0.5, _series(u), (1 - exp_bounded(-u)) / u)
-    e = dr.exp(-u)
-    return dr.select(e == 1, 1, (1 - e) / dr.select(u < 1, -dr.log(e), u))
+    return dr.select(u > 0, -exp_expm1_bounded(-u)[1] / u, 1)
