@@ -224,8 +224,9 @@ def _channels_of(
             )
         )
         prefix = "" if len(parts) == 1 or part.name.lower() in _PLAIN else f"{part.name}."
+        named = len(part.planes) == 1 and part.name.rpartition(".")[2].lower() in _COLOURS  # a part for each channel
         for key, (pixels, across, down) in part.planes.items():
-            name = key if "." in key else prefix + key
+            name = part.name if named else key if "." in key else prefix + key
             if name in channels:
                 raise InputError(f"{path} has the channel '{name}' in two parts; save each layer once")
             if across * down != 1:

@@ -177,7 +177,8 @@ def write_parts(path, parts):
 
 @pytest.mark.claim("image-parts", tolerance="none: equal")
 def test_reads_the_parts_of_a_file(tmp_path):
-    """Blender names the layer in the channel, others in the part alone; a part named rgba is the image itself."""
+    """Blender names the layer in the channel, others in the part alone; a part named rgba is the image itself,
+    and one of a single channel may be named by that."""
     value = iter(np.arange(1, 20, dtype=np.float32))
     plane = {key: np.full((3, 4), next(value)) for key in ("C.R", "C.G", "C.B", "C.A", "V.R", "V.G", "V.B", "R", "Z")}
     blender = [
@@ -197,6 +198,11 @@ def test_reads_the_parts_of_a_file(tmp_path):
     assert sorted(image.layers) == ["fog", "total"]
     np.testing.assert_array_equal(image.depth, plane["Z"])
     assert image.attributes == {"owner": "me"}
+    alone = [(key, {}, {"Y": plane["Z"]}) for key in ("R", "G", "fog.R", "fog.G", "fog.B")]
+    write_parts(tmp_path / "c.exr", [*alone, ("B", {}, {"B": plane["R"]})])
+    image = read_exr(tmp_path / "c.exr")
+    assert sorted(image.layers) == ["fog", "total"]
+    np.testing.assert_array_equal(image.layers["total"][2, 3], [9, 9, 8])
 
 
 def test_the_image_is_the_frame_whatever_window_a_file_holds(tmp_path):
