@@ -20,8 +20,6 @@ Array = NDArray[np.float64]
 Values = tuple[float, ...]
 Change = Callable[[Predictor, Guess, Values], Guess]
 
-KINDS = ("medium", "light", "layers", "camera", "brightness", "values")  #: in the order in which faults happen
-
 _NAMED = {
     "pi": math.pi,
     "2 pi": 2 * math.pi,
@@ -51,7 +49,6 @@ class Fault:
     """A fault."""
 
     name: str
-    kind: str  #: of `KINDS`
     words: str  #: a sentence with {0}, {1}, .. for the parameters
     change: Change
     parameters: tuple[Parameter, ...] = ()
@@ -66,6 +63,7 @@ class Fault:
     applies: Callable[[Predictor], bool] = lambda predictor: True
     undo: Callable[[Array], Array] | None = None  #: the image without it, (height, width, 3) -> the same
     factor: bool = False  #: whether its number is a factor that may have a name
+    kind: str = ""  #: of the table that it is in: one of `validation.engine.faults.KINDS`
 
     def sentence(self, values: Values) -> str:
         """Return what is said of an image with it."""

@@ -5,6 +5,8 @@
 fault back from a whole image, without any path of light.
 """
 
+from dataclasses import replace
+
 from validation.engine.fault import Fault, shows_both
 from validation.engine.image_faults import BRIGHTNESS, CAMERA, VALUES
 from validation.engine.layer_faults import FOG_AND_SURFACES, factor_fault, scaled
@@ -15,7 +17,16 @@ from validation.fog_model.view import light_sources
 
 _MANY_LIGHTS = 6  # of more, a fault of a single one is not looked for
 
-FAULTS: tuple[Fault, ...] = (BRIGHTNESS, *LIGHTS, *MEDIUM, *FOG_AND_SURFACES, *CAMERA, *VALUES)
+_TABLES = {
+    "brightness": (BRIGHTNESS,),
+    "light": LIGHTS,
+    "medium": MEDIUM,
+    "layers": FOG_AND_SURFACES,
+    "camera": CAMERA,
+    "values": VALUES,
+}
+KINDS = ("medium", "light", "layers", "camera", "brightness", "values")  #: in the order in which faults happen
+FAULTS = tuple(replace(fault, kind=kind) for kind, table in _TABLES.items() for fault in table)
 
 
 def faults_of(predictor: Predictor) -> tuple[Fault, ...]:

@@ -8,16 +8,7 @@ from itertools import permutations, product
 import numpy as np
 
 from validation.engine.curves import TONE_CURVES, from_srgb, gamma, srgb_in_8_bits, to_srgb
-from validation.engine.fault import (
-    Array,
-    Change,
-    Fault,
-    Parameter,
-    Values,
-    changed_values,
-    scenery_number,
-    undone,
-)
+from validation.engine.fault import Array, Change, Fault, Parameter, Values, changed_values, scenery_number, undone
 from validation.engine.prediction import Guess, Predictor
 
 
@@ -62,24 +53,21 @@ TURNS: tuple[tuple[str, Callable[[Array], Array]], ...] = (
 )
 
 CAMERA = (
-    *(Fault("flip", "camera", f"the image is {words}", undone(turn), undo=turn) for words, turn in TURNS),
+    *(Fault("flip", f"the image is {words}", undone(turn), undo=turn) for words, turn in TURNS),
     Fault(
         "flip",
-        "camera",
         "rows and columns are interchanged",
         undone(lambda image: image.transpose(1, 0, 2)),
         applies=lambda predictor: predictor.shape[0] == predictor.shape[1],
     ),
     Fault(
         "fov-axis",
-        "camera",
         "the field of view is that of the other axis",
         _other_axis,
         applies=lambda predictor: predictor.shape[0] != predictor.shape[1],
     ),
     Fault(
         "fov",
-        "camera",
         "the image shows {0:.4g} times the width that it should",
         scenery_number("zoom", 5),
         (Parameter(0.2, 5.0, (0.9, 1.1), logarithmic=True, step=0.01),),
@@ -87,7 +75,6 @@ CAMERA = (
     ),
     Fault(
         "shift",
-        "camera",
         "the image is {0:.3g} pixels too far right and {1:.3g} too far down",
         shifted,
         SHIFT,
@@ -95,7 +82,6 @@ CAMERA = (
     ),
     Fault(
         "vignette",
-        "camera",
         "the image falls off to its corners: a vignette, cos^{0:.3g} of the angle from the camera's axis",
         _vignette,
         (Parameter(0.0, 100.0, (4.0, 1.0, 12.0)),),
@@ -148,14 +134,11 @@ def _coloured(predictor: Predictor) -> bool:
 def _swapped(order: tuple[int, ...]) -> Fault:
     words = f"the image is in the channel order {', '.join('RGB'[channel] for channel in order)}"
     undo = (lambda image: image[..., order]) if order == (2, 1, 0) else None  # which undoes itself
-    return Fault(
-        "channels", "values", words, changed_values(lambda radiance: radiance[..., order]), applies=_coloured, undo=undo
-    )
+    return Fault("channels", words, changed_values(lambda radiance: radiance[..., order]), applies=_coloured, undo=undo)
 
 
 BRIGHTNESS = Fault(
     "factor",
-    "brightness",
     "the image is {0:.4g} times as bright as it should be",
     _exposed,
     (Parameter(1e-9, 1e9, logarithmic=True),),
@@ -166,27 +149,24 @@ BRIGHTNESS = Fault(
 VALUES = (
     Fault(
         "transfer",
-        "values",
         "the image is encoded by the sRGB curve (write linear values)",
         changed_values(to_srgb),
         undo=from_srgb,
     ),
-    Fault("transfer", "values", "the values were written in 8 bits by the sRGB curve", changed_values(srgb_in_8_bits)),
+    Fault("transfer", "the values were written in 8 bits by the sRGB curve", changed_values(srgb_in_8_bits)),
     Fault(
         "transfer",
-        "values",
         "the values are encoded by a gamma of {0:.3g}: write linear ones",
         changed_values(gamma),
         (Parameter(0.2, 5.0, (0.4545, 1.8, 2.2, 2.4), logarithmic=True),),
     ),
-    Fault("clamp", "values", "the values are cut off at the largest one: write floats", _clamp, applies=_stops),
+    Fault("clamp", "the values are cut off at the largest one: write floats", _clamp, applies=_stops),
     *(
-        Fault("tone-map", "values", f"the values went through {words}", changed_values(curve))
+        Fault("tone-map", f"the values went through {words}", changed_values(curve))
         for words, curve in TONE_CURVES.items()
     ),
     Fault(
         "black-level",
-        "values",
         "every value has {0:.3g} added: a black level, a veil or light from elsewhere",
         changed_values(lambda radiance, level: radiance + level),
         (Parameter(1e-30, 1e30, logarithmic=True),),

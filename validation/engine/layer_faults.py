@@ -63,7 +63,7 @@ def _weighted_median(values: Array, weights: Array) -> float:
 def factor_fault(name: str, words: str, change: Change, applies: Callable[[Predictor], bool]) -> Fault:
     """Return a fault that multiplies a part of the light."""
     one = (Parameter(1e-9, 1e9, logarithmic=True),)
-    return Fault(name, "layers", words, change, one, begin=_times(change), applies=applies, factor=True)
+    return Fault(name, words, change, one, begin=_times(change), applies=applies, factor=True, kind="layers")
 
 
 def _opacity(change: Callable[[Array, Array, Array], tuple[Array, Array]]) -> Change:
@@ -106,7 +106,7 @@ FOG_AND_SURFACES = (
         shows_both,
     ),
     *(
-        Fault("opacity", "layers", words, _opacity(change), applies=applies)
+        Fault("opacity", words, _opacity(change), applies=applies)
         for words, applies, change in (
             (
                 "the fog is multiplied by its opacity once more: it was blended as a colour, or premultiplied twice",
@@ -137,7 +137,6 @@ FOG_AND_SURFACES = (
     ),
     Fault(
         "ambient",
-        "layers",
         "ambient light with the colour ({0:.3g}, {1:.3g}, {2:.3g}) W/(m^2 sr) is in the fog",
         _ambient,
         tuple(Parameter(0.0, 1e30) for _ in range(3)),
@@ -148,7 +147,6 @@ FOG_AND_SURFACES = (
     ),
     Fault(
         "fog-shift",
-        "layers",
         "the fog lies {0:.3g} pixels too far right and {1:.3g} too far down, against the surfaces",
         of_fog_alone(shifted),
         SHIFT,
@@ -159,7 +157,6 @@ FOG_AND_SURFACES = (
     ),
     Fault(
         "fog-shift",
-        "layers",
         "the fog shows {0:.4g} times the width that surfaces do",
         of_fog_alone(scenery_number("zoom", 5)),
         (Parameter(0.2, 5.0, (0.95, 1.05), logarithmic=True, step=0.01),),
@@ -170,7 +167,6 @@ FOG_AND_SURFACES = (
     *(
         Fault(
             "light-lag",
-            "layers",
             f"the first light is off by ({{0:.3g}}, {{1:.3g}}, {{2:.3g}}) m for {words}: one of them lags",
             alone(at_position),
             PLACE,

@@ -62,23 +62,21 @@ def position_held(predictor: Predictor, guess: Guess, p: Values, at: Values) -> 
 PLACE = tuple(Parameter(-1e3, 1e3, (0.0,), step=0.003, stride=0.1) for _ in range(3))
 
 LIGHTS = (
-    Fault("no-shadow", "light", "nothing casts a shadow", with_scenery(shadows=False), applies=has_shapes),
+    Fault("no-shadow", "nothing casts a shadow", with_scenery(shadows=False), applies=has_shapes),
     Fault(
         "no-shadow",
-        "light",
         "nothing casts a shadow in the fog, on surfaces it does",
         of_fog_alone(with_scenery(shadows=False)),
         applies=shows_both,
     ),
     Fault(
         "no-shadow",
-        "light",
         "nothing casts a shadow on surfaces, in the fog it does",
         of_surfaces_alone(with_scenery(shadows=False)),
         applies=shows_both,
     ),
     *(
-        Fault("distance-law", "light", words, with_law(distance_power=power), applies=has_near_lights)
+        Fault("distance-law", words, with_law(distance_power=power), applies=has_near_lights)
         for words, power in (
             ("the light falls as one over the distance, not over its square", 1.0),
             ("the light does not fall with the distance", 0.0),
@@ -87,7 +85,6 @@ LIGHTS = (
     *(
         Fault(
             "light-range",
-            "light",
             f"lights have a range: {words} {{0:.4g}} m",
             _window(change),
             (Parameter(1e-3, 1e6, logarithmic=True),),
@@ -103,7 +100,7 @@ LIGHTS = (
         )
     ),
     *(
-        Fault("spot-angle", "light", words, with_scenery(cone=factor), applies=has_spots)
+        Fault("spot-angle", words, with_scenery(cone=factor), applies=has_spots)
         for words, factor in (
             ("the angles of spots are twice what they should be: a half angle was taken for a whole one", 2.0),
             ("the angles of spots are half of what they should be: a whole angle was taken for a half one", 0.5),
@@ -111,30 +108,21 @@ LIGHTS = (
     ),
     Fault(
         "spot-angle",
-        "light",
         "the angles of spots are {0:.4g} times what they should be",
         scenery_number("cone"),
         (Parameter(0.2, 4.0, (0.8, 1.25), logarithmic=True, step=0.02),),
         costly=1,
         applies=has_spots,
     ),
+    Fault("spot-falloff", "spots have a hard edge, without falloff", with_scenery(edge="hard"), applies=has_soft_spots),
     Fault(
         "spot-falloff",
-        "light",
-        "spots have a hard edge, without falloff",
-        with_scenery(edge="hard"),
-        applies=has_soft_spots,
-    ),
-    Fault(
-        "spot-falloff",
-        "light",
         "spots fall off from their axis on, not from the beam's edge",
         with_scenery(edge="smooth"),
         applies=has_spots,
     ),
     Fault(
         "spot-falloff",
-        "light",
         "spots fall off as Blender's with a blend of {0:.3g}, which its own is 0.15: smoothly by the cosine",
         scenery_number("blend"),
         (Parameter(0.01, 1.0, (0.15, 0.5, 1.0), step=0.01),),
@@ -143,7 +131,6 @@ LIGHTS = (
     ),
     Fault(
         "light-radius",
-        "light",
         "point lights are spheres of the radius {0:.3g} m",
         scenery_number("radius"),
         (Parameter(0.0, 10.0, (0.05, 0.2, 0.5), step=0.01),),
@@ -152,7 +139,6 @@ LIGHTS = (
     ),
     Fault(
         "light-position",
-        "light",
         "the first light is off by ({0:.3g}, {1:.3g}, {2:.3g}) m",
         at_position,
         PLACE,

@@ -198,21 +198,18 @@ def _brighter(predictor: Predictor) -> bool:
 MEDIUM = (
     Fault(
         "extinction",
-        "medium",
         "the extinction is one over what it should be: a mean free path was asked for",
         _optics(lambda sigma_t, albedo: (1 / sigma_t, albedo)),
         applies=lambda predictor: not in_height_fog(predictor),
     ),
     Fault(
         "extinction",
-        "medium",
         "the extinction is {0:.4g} times what it should be",
         _optics(lambda sigma_t, albedo, factor: (sigma_t * factor, albedo)),
         (Parameter(1e-3, 1e3, (*_FACTOR, 0.1, 10.0), logarithmic=True),),
     ),
     Fault(
         "absorption",
-        "medium",
         "the absorption is {0:.4g} times what it should be, at the same scattering",
         _optics(_absorption),
         (Parameter(0.0, 50.0, (0.0, 0.5, 2.0, 5.0)),),
@@ -220,20 +217,18 @@ MEDIUM = (
     ),
     Fault(
         "absorption",
-        "medium",
         "the medium does not absorb: extinction is only what is scattered",
         _optics(_absorption),
         applies=absorbs,
     ),
     Fault(
         "sigma-s",
-        "medium",
         "the extinction was taken for the scattering coefficient, and absorption came on top",
         _optics(lambda sigma_t, albedo: (sigma_t / albedo if albedo > 0 else sigma_t, albedo)),
         applies=absorbs,
     ),
     *(
-        Fault("albedo", "medium", f"the albedo was {words}", _optics(change), applies=absorbs)
+        Fault("albedo", f"the albedo was {words}", _optics(change), applies=absorbs)
         for words, change in (
             ("applied twice", lambda sigma_t, albedo: (sigma_t, albedo**2)),
             ("left out", lambda sigma_t, albedo: (sigma_t, 1.0)),
@@ -246,14 +241,12 @@ MEDIUM = (
     ),
     Fault(
         "g-sign",
-        "medium",
         "g of the phase function has the other sign: light that should go on comes back",
         _lobes(lambda g: -g),
         applies=lambda predictor: has_lobe(predictor) and any(predictor.fog.phase),
     ),
     Fault(
         "g",
-        "medium",
         "g of the phase function is {0:.4g}",
         lambda predictor, guess, p: _lobes(lambda g: float(p[0]))(predictor, guess, ()),
         (Parameter(-0.99, 0.99, (-0.5, 0.0, 0.4, 0.8)),),
@@ -261,14 +254,13 @@ MEDIUM = (
     ),
     Fault(
         "g",
-        "medium",
         "the phase function is Henyey and Greenstein's with g {0:.4g}, not isotropic",
         lambda predictor, guess, p: _every_phase(float(p[0]))(predictor, guess, ()),
         (Parameter(-0.99, 0.99, (-0.5, 0.4, 0.8)),),
         applies=has_no_lobe,
     ),
     *(
-        Fault("phase", "medium", f"the phase function is {words}", change, applies=has_lobe)
+        Fault("phase", f"the phase function is {words}", change, applies=has_lobe)
         for words, change in (
             ("isotropic", _lobes(lambda g: 0.0)),
             ("Schlick's, with k = 1.55 g - 0.55 g^3", _lobes(lambda g: _schlick(1.55 * g - 0.55 * g**3))),
@@ -276,16 +268,15 @@ MEDIUM = (
             ("Cornette and Shanks's, with the same g", _lobes(_cornette_shanks)),
         )
     ),
-    Fault("phase", "medium", "the phase function is Rayleigh's", _every_phase(_rayleigh), applies=shows_fog),
-    Fault("phase", "medium", "a cosine was taken for the phase function", _every_phase(_cosine), applies=shows_fog),
+    Fault("phase", "the phase function is Rayleigh's", _every_phase(_rayleigh), applies=shows_fog),
+    Fault("phase", "a cosine was taken for the phase function", _every_phase(_cosine), applies=shows_fog),
     *(
-        Fault(name, "medium", f"the way {words} is not attenuated", with_law(**{name.replace("-", "_"): (0.0, 0.0)}))
+        Fault(name, f"the way {words} is not attenuated", with_law(**{name.replace("-", "_"): (0.0, 0.0)}))
         for name, words in (("light-leg", "from the light"), ("camera-leg", "to the camera"))
     ),
     *(
         Fault(
             name,
-            "medium",
             f"the way {words} is not attenuated for {which}",
             with_law(**{name.replace("-", "_"): legs}),
             applies=shows_both,
@@ -295,7 +286,6 @@ MEDIUM = (
     ),
     Fault(
         "unit-length",
-        "medium",
         "lengths are {0:.4g} times what they should be: another unit of length",
         _unit,
         (Parameter(1e-4, 1e4, (0.01, 100.0, 0.1, 10.0, 0.3048, 3.2808, 0.001, 1000.0), logarithmic=True),),
@@ -305,7 +295,6 @@ MEDIUM = (
     *(
         Fault(
             "near-plane",
-            "medium",
             f"the medium is missing up to {distance:g} m before the camera: a usual near plane",
             _between(False, "near", at=distance),
             applies=fog_surrounds,
@@ -314,7 +303,6 @@ MEDIUM = (
     ),
     Fault(
         "near-plane",
-        "medium",
         "the medium is missing up to {0:.4g} m before the camera: its near plane",
         _between(False, "near"),
         (Parameter(0.0, np.inf, (0.05, 0.2, 0.5, 1.0)),),
@@ -323,7 +311,6 @@ MEDIUM = (
     *(
         Fault(
             "fog-end",
-            "medium",
             f"the fog ends {{0:.3g}} m {words}: beyond, nothing is scattered or attenuated",
             _between(spherical, "far"),
             (Parameter(1e-3, np.inf, logarithmic=True),),
@@ -336,7 +323,6 @@ MEDIUM = (
     *(
         Fault(
             "depth-axis",
-            "medium",
             f"distances along the axis of the camera were taken for distances along the ray {where}",
             change,
             applies=applies,
@@ -354,7 +340,6 @@ MEDIUM = (
     ),
     Fault(
         "height-fog",
-        "medium",
         "the density falls with height, to 1/e in {0:.3g} m, and is {1:.3g} times what it should be at the camera",
         _falling,
         (Parameter(1e-2, 1e4, logarithmic=True), Parameter(1e-2, 1e2, logarithmic=True)),
@@ -364,7 +349,6 @@ MEDIUM = (
     ),
     Fault(
         "homogeneous",
-        "medium",
         "the fog is homogeneous, of the extinction {0:.4g} 1/m: its density does not fall with height",
         _even,
         (Parameter(1e-5, 1e3, logarithmic=True),),
@@ -373,7 +357,7 @@ MEDIUM = (
         applies=in_height_fog,
     ),
     *(
-        Fault("scale-height", "medium", words, _stretched(factor), applies=in_height_fog)
+        Fault("scale-height", words, _stretched(factor), applies=in_height_fog)
         for words, factor in (
             ("scale heights are one over what they should be: a falloff was asked for", lambda h: 1 / h),
             ("densities halve in what should be the scale height", lambda h: h / math.log(2)),
@@ -385,7 +369,6 @@ MEDIUM = (
     ),
     Fault(
         "scale-height",
-        "medium",
         "scale heights are {0:.4g} times what they should be",
         _stretched(lambda h, factor: h * factor),
         (Parameter(1e-3, 1e3, _FACTOR, logarithmic=True),),
@@ -393,7 +376,6 @@ MEDIUM = (
     ),
     Fault(
         "base-height",
-        "medium",
         "bases of layers are {0:+.4g} m higher than they should be",
         _layers(lambda layer, shift: replace(layer, base=layer.base + shift)),
         (_SHIFT,),
@@ -401,7 +383,6 @@ MEDIUM = (
     ),
     Fault(
         "height-fog",
-        "medium",
         "scale heights are {0:.4g} times what they should be, and bases {1:+.4g} m higher",
         _layers(lambda layer, factor, shift: Layer(layer.sigma_t, layer.base + shift, layer.scale_height * factor)),
         (Parameter(1e-3, 1e3, logarithmic=True), _SHIFT),
@@ -411,7 +392,6 @@ MEDIUM = (
     ),
     Fault(
         "multiple",
-        "medium",
         "{0:.3g} times the light of multiple scattering is included",
         _multiple(of_surfaces=False),
         (Parameter(0.0, 3.0),),
@@ -420,7 +400,6 @@ MEDIUM = (
     ),
     Fault(
         "multiple",
-        "medium",
         "{0:.3g} times the light of higher orders is included, between surfaces and of the medium",
         _multiple(of_surfaces=True),
         (Parameter(0.0, 3.0),),

@@ -17,7 +17,7 @@ def test_a_place_is_found_where_pixels_are_lit_or_dark():
     def errors(place):
         return np.repeat((widths < np.linalg.norm(np.array(place) - true))[:, None], 3, axis=1).astype(float)
 
-    place_of = Fault("place", "light", "", lambda predictor, guess, p: p, PLACE)
+    place_of = Fault("place", "", lambda predictor, guess, p: p, PLACE)
     search = _Search(SimpleNamespace(fog=None, errors=errors), (place_of,))
     begun = np.zeros(3)
     np.testing.assert_array_equal(search.by_steps(begun, 0.01, False), begun)
