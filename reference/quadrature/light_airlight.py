@@ -14,7 +14,7 @@ from reference.scene.read import TruthLight, TruthScene
 from reference.scene.shapes import Shapes, read_shapes
 from reference.visibility.candidates import Ball
 from reference.visibility.certificate import LitIntervals, coordinates
-from reference.visibility.lit_intervals import lit_intervals, obstacles, reaches
+from reference.visibility.lit_intervals import Obstacles, lit_intervals, obstacles, reaches
 from reference.visibility.planes import Rays, cone_interval, rays_at
 
 Array = NDArray[np.float64]
@@ -73,12 +73,19 @@ def lit_sums(
 
 
 def lit_rays(
-    truth: TruthScene, light: TruthLight, distance: Array, *, shapes: Shapes | None = None, checks: int = 32
+    truth: TruthScene,
+    light: TruthLight,
+    distance: Array,
+    *,
+    shapes: Shapes | None = None,
+    known: Obstacles | None = None,
+    checks: int = 32,
 ) -> LitRays:
     """Return which parts of the rays a point or spot light reaches.
 
     `truth`, `light`, `distance`: see `light_airlight`; `shapes`: what `reference.scene.shapes.read_shapes` returned, if
-    known; `checks`: random shadow rays to each ray.
+    known; `known`: what can stand in the light, if that was found for a ball that holds it; `checks`: random shadow
+    rays to each ray.
     """
     rays = rays_at(truth.origin, truth.direction, light.position)
     cone = cone_interval(rays, light, light.cutoff)
@@ -88,7 +95,7 @@ def lit_rays(
     normal = None
     if light.cosine and light.axis is not None:
         normal = np.broadcast_to(light.axis, truth.direction.shape)
-    known = obstacles(truth, Ball(light.position), distance, shapes)
+    known = obstacles(truth, Ball(light.position), distance, shapes) if known is None else known
     lit = lit_intervals(rays, ends, known, checks=checks, normal=normal)
     return LitRays(rays, lit, distance, known.shapes, ends[1])
 

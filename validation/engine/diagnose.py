@@ -29,11 +29,11 @@ from validation.engine.evidence import (
     scale_of,
     usual_error,
 )
-from validation.engine.fault import KINDS, Fault
-from validation.engine.faults import faults_of
+from validation.engine.fault import Fault
+from validation.engine.faults import KINDS, faults_of
 from validation.engine.judged_layer import JudgedLayer, judged_layer
 from validation.engine.prediction import Predictor, SceneLight
-from validation.engine.search import Explanation, begin, explain, explained_by
+from validation.engine.search import Explanation, begin, explain
 from validation.engine.seen import Progress, best_kind, layers_of, pixel_kinds, scene_of_size, seen_image
 from validation.metrics.errors import plain
 from validation.scenes.loading import LoadedScene
@@ -42,12 +42,13 @@ Array = NDArray[np.float64]
 
 RIGHT, UNEXPLAINED = "right", "unexplained"
 
+_FEWEST = 16  # pixels
 _REFINED = 5  # faults whose numbers are found to all digits: those that leave least after a coarse search
 _MOVED = 0.02  # fraction by which the error changes where a search left the unchanged scene
+_LESS = 0.9  # fraction of the error that a search leaves of which all digits are wanted where paths cost much
 # Errors over the least one that more digits do not bring down to it; the last where that one leaves noise.
 _FAR, _FAR_OF_PATHS, _FAR_FROM_NOISE = 10.0, 3.0, 1.5
-_MANY_TRIANGLES = 20_000  # of which paths cost much
-_LESS = 0.9  # of the error that few paths leave, what a fault must where it begins if its paths cost much
+_MANY_TRIANGLES = 20_000  # of which paths cost much: few pixels are looked at
 _PARTNERS = 12  # faults, those that leave least, with which all others are tried as pairs
 _PAIRS = 12  # pairs that are followed, those that leave least where they begin
 _BETTER = 0.7  # what a pair must leave of the error of one alone: with more numbers anything fits a little better
@@ -177,8 +178,11 @@ def diagnose_image(
     """
     judged = judged or judged_layer(image, path, name=layer, holds=holds)
     seen, wrong = seen_image(image, judged, loaded.scene)
-    if not seen.used.any():
-        raise InputError(f"{path}: the layer '{judged.name}' has no finite value; there is nothing to diagnose")
+    if (count := int(seen.used.sum())) < _FEWEST:
+        raise InputError(
+            f"{path}: {count} pixels of the layer '{judged.name}' say something; wanted at least {_FEWEST}, finite and "
+            "not of a light itself: fewer do not tell a fault from noise"
+        )
     light = light or SceneLight(seen.truth)
     shape = judged.size[1], judged.size[0]
 
@@ -218,10 +222,13 @@ class _Attempt:
     """The search among all faults, with pixels of one kind."""
 
     def __init__(self, predictor: Predictor, pixel: str, progress: Progress | None) -> None:
-        self.predictor, self.pixel, self.progress = predictor, pixel, progress
+        shapes = predictor.truth.occluders.shapes()
+        self.many = sum(shape.primitive_count() for shape in shapes) >= _MANY_TRIANGLES
+        self.predictor = predictor.coarse if self.many else predictor
+        self.pixel, self.progress = pixel, progress
         self.little = no_fault(predictor.truth)
-        self.right = explain(predictor, ())
-        self.faults = faults_of(predictor)
+        self.right = explain(self.predictor, ())
+        self.faults = faults_of(self.predictor)
         self.singles: list[Explanation] = []
         self.pairs: list[Explanation] = []
 
@@ -274,36 +281,17 @@ class _Attempt:
 
     def try_faults(self, costly: int) -> None:
         """Try all faults of a cost, each alone."""
-        own = [fault for fault in self.faults if fault.costly == costly]
-        many = costly > 0 and self._many_triangles
-        few, tried = many and costly > 1, list[Explanation]()
+        own, tried = [fault for fault in self.faults if fault.costly == costly], list[Explanation]()
         for number, fault in enumerate(own):
-            if many and any(gains(each, self.right) for each in tried):
-                break  # paths cost much there, and of two faults that move them one leaves a tenth at most
+            moved = [each for each in [*self.singles, *tried] if each.faults[0].costly]
+            if self.many and any(gains(each, self.right) for each in moved):
+                break  # of two faults that move paths one leaves a tenth at most
             self._tell(_PARTS[costly], number / len(own), fault.name)
-            tried += self._by_few(fault) if few else [explain(self.predictor, (fault,), fine=False)]
+            tried.append(explain(self.predictor, (fault,), fine=False))
         least = min((each.error for each in self.singles), default=1.0)
         # A sphere in the place of a light costs as much as all others: to all digits only where it explains most.
-        coarse = few or (costly > 1 and all(each.error > least for each in tried))
+        coarse = costly > 1 and (self.many or all(each.error > least for each in tried))
         self.singles += tried if coarse else self._refined(tried, least)
-
-    @property
-    def _many_triangles(self) -> bool:
-        shapes = self.predictor.truth.occluders.shapes()
-        return sum(shape.primitive_count() for shape in shapes) >= _MANY_TRIANGLES
-
-    def _by_few(self, fault: Fault) -> list[Explanation]:
-        """Return what a fault explains whose paths cost much, if few of them leave far less than the best does.
-
-        Its numbers are those of few paths: all of them, which cost minutes, only say what it leaves. A sphere of which
-        another fault leaves less than a per cent is missed, since eight samples leave as much.
-        """
-        few, best = self.predictor.coarse, self._with_pairs()
-        least = explained_by(few, best.faults, best.values).error
-        if begin(few, (fault,))[0] > _LESS * least:
-            return []
-        found = explain(few, (fault,), fine=False)
-        return [explained_by(self.predictor, found.faults, found.values)] if found.error < _BETTER * least else []
 
     def _settled(self, explanation: Explanation) -> bool:
         """Return whether nothing is left that another fault could explain."""
@@ -332,6 +320,8 @@ class _Attempt:
         """
         least = max(LEAST_EFFECT, min([least, *(each.error for each in explanations)]))
         moved = [each for each in explanations if abs(each.error - self.right.error) > _MOVED * self.right.error]
+        if self.many:
+            moved = [each for each in moved if each.error < _LESS * self.right.error]
         finer: dict[int, Explanation] = {}
         for each in sorted(moved, key=lambda each: each.error):
             far = min(_far(each), _FAR_FROM_NOISE if any(map(self._settled, finer.values())) else _FAR)

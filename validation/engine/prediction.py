@@ -24,7 +24,7 @@ Layers = Callable[[Array, Array], tuple[Array, Array]]  #: of airlight and surfa
 
 APART = 2  #: pixels between those whose errors are compared: a filter that is wider than a pixel joins neighbours
 _FEW_RAYS = 800  # with which faults that move paths are told apart
-_SPHERE_SAMPLES, _SPHERE_FEW = 32, 8  # of a sphere in the place of a point light; few where rays are
+_SPHERE_SAMPLES = 32  # of a sphere in the place of a point light
 _BATCHES, _PATHS = 4, 16  # batches of paths a pixel for the light of multiple scattering
 _SMOOTH = 40  # of the width of an image: the width of the filter for that light
 _FLOOR = 0.01  # of the mean of an image: below it values count relative to this
@@ -69,7 +69,7 @@ class Scenery:
 
     def model(self, seen: Seen, view: View, layer: int) -> FogModel:
         """Return the paths of a layer of an image, 0: airlight, 1: surfaces."""
-        ends, sphere = None, _SPHERE_FEW if seen.rays <= _FEW_RAYS else _SPHERE_SAMPLES
+        ends = None
         if self.near > 0 or np.isfinite(self.far):
             ends = view.ends((self.near, self.far), self.spherical)
         if self.planar:
@@ -83,7 +83,7 @@ class Scenery:
             blend=self.blend,
             airlight=layer == 0,
             surface=layer == 1,
-            samples=max(sphere if self.radius else 0, seen.samples),
+            samples=max(_SPHERE_SAMPLES if self.radius else 0, seen.samples),
         )
 
 

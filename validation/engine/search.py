@@ -31,6 +31,7 @@ _BEGUN, _BEGUN_BY_STEPS = 2, 3
 _TURNS, _TURNS_COARSE, _TURNS_LAST = 8, 4, 3  # steps of Gauss and Newton at most; the last with all paths
 _STRIDES = 10  # rounds of steps along the axes at most
 _DONE = 0.02  # fraction of the loss at which slopes find what is left
+_LOST = 0.5  # fraction of the loss that is left of what is not this fault, after steps of two sizes
 _LITTLE = 0.9  # fraction of the loss that a step leaves which gains little
 _SMALL = 0.02  # of the step of differences: a change that is none
 _NEAR = 3  # steps of differences: how far few paths are off at most
@@ -99,15 +100,10 @@ def explain(
             else:
                 places = [search.by_steps(place, scale, fine, moves and turn > 0) for place in places]
         best = min((search.outward(place) for place in places), key=lambda values: search.loss(values, scale))
-    return explained_by(predictor, faults, _parted(faults, best))
-
-
-def explained_by(predictor: Predictor, faults: Sequence[Fault], values: Sequence[Values]) -> Explanation:
-    """Return what faults explain with these values."""
-    guess = guess_of(predictor, faults, tuple(value for part in values for value in part))
+    guess = guess_of(predictor, faults, best)
     errors = predictor.errors(guess)
     error = float(np.abs(errors).mean())
-    return Explanation(tuple(faults), tuple(values), guess, errors, predictor.lit(guess), error)
+    return Explanation(tuple(faults), _parted(faults, best), guess, errors, predictor.lit(guess), error)
 
 
 def begin(predictor: Predictor, faults: Sequence[Fault]) -> tuple[float, tuple[Values, ...]]:
@@ -178,7 +174,7 @@ class _Search:
         return np.array([solved.x]) if solved.fun <= loss(float(place[0])) else place
 
     def along_axes(self, place: Array, scale: float) -> Array:
-        """Return the end of steps along the axes, halved where none of them gains; none if two sizes gain nothing.
+        """Return the end of steps along the axes, halved where none of them gains; of two sizes if these gain little.
 
         Where they have gained, diagonals are tried too: a shadow stays where a light moves towards what casts it.
         """
@@ -201,7 +197,7 @@ class _Search:
                     break
             else:
                 strides = 0.5 * strides
-                if least > _LITTLE * begun and np.all(strides < 0.5 * longest):
+                if least > _LOST * begun and np.all(strides < 0.5 * longest):
                     break
         return place
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from analytic.errors import InputError
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_truth
 from reference.storage.exr import Image
@@ -91,6 +92,11 @@ def test_a_light_with_a_radius_is_named(variant, tmp_path):
     model = FogModel(scattering_paths(view_of(own), radius=0.25, samples=64))
     image = model.layers(scene_fog(own)).sum(axis=0).reshape(SIZE[1], SIZE[0], 3)
     assert diagnosed(image, str(path)).first == "light-radius"
+
+
+def test_few_pixels_tell_no_fault_from_noise(variant):
+    with pytest.raises(InputError, match="12 pixels"):
+        diagnosed(np.full((3, 4, 3), 0.02), size=(4, 3))
 
 
 def test_noise_is_of_one_size_all_over_the_image(truth):
