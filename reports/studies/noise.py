@@ -89,11 +89,7 @@ def noise(
         name="noise",
         data=data,
         drawn=(table(title, columns, shown),),
-        said=tuple(
-            f"{each.label}: one value has {100 * each.noise.largest_share:.2g} % of the variance, which may be infinite"
-            for each in found
-            if each.noise.doubtful
-        ),
+        said=tuple(f"{each.label}: {each.noise.words}" for each in found),
         rows=tuple(rows),
         draw=partial(_draw, found),
     )
