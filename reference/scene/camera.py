@@ -21,14 +21,30 @@ def film_directions(sensor, positions: Array, size: tuple[int, int]) -> Array:
 
     Valid for positions outside of the film too.
     """
-    width, height = size
-    half_width = np.tan(0.5 * np.deg2rad(float(mi.traverse(sensor)["x_fov"][0])))
-    pixel = 2 * half_width / width
+    focal, principal = _pinhole(sensor, size)
     # In the camera's own frame x points left and y up.
-    focal = np.full(len(positions), 1 / pixel)
-    plane = np.stack([0.5 * width - positions[:, 0], 0.5 * height - positions[:, 1], focal], axis=1)
+    plane = np.concatenate([principal - positions, np.full((len(positions), 1), focal)], axis=1)
     direction = plane @ camera_matrix(sensor)[:3, :3].T
     return direction / np.linalg.norm(direction, axis=1, keepdims=True)
+
+
+def film_positions(sensor, directions: Array, size: tuple[int, int]) -> Array:
+    """Return the positions on the film that directions of any length pass, (n, 2) [pixels]; NaN for those behind it."""
+    local = np.linalg.solve(camera_matrix(sensor)[:3, :3], directions.T).T
+    focal, principal = _pinhole(sensor, size)
+    depth = np.where(local[:, 2] > 0, local[:, 2], np.nan)
+    return principal - local[:, :2] * (focal / depth)[:, None]
+
+
+def _pinhole(sensor, size: tuple[int, int]) -> tuple[float, Array]:
+    """Return the distance of the film and the position on it that the camera's axis passes, (2,) [pixels].
+
+    Mitsuba adds the offsets of the principal point, in parts of the film, to a position before it looks through it.
+    """
+    parameters = mi.traverse(sensor)
+    pixel = 2 * np.tan(0.5 * np.deg2rad(float(parameters["x_fov"][0]))) / size[0]
+    offset = [float(parameters[f"principal_point_offset_{axis}"][0]) for axis in "xy"]
+    return float(1 / pixel), (0.5 - np.array(offset)) * size
 
 
 def pixel_centres(size: tuple[int, int]) -> Array:

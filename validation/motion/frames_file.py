@@ -7,8 +7,9 @@
 ```
 
 `first`: number of the file that shows frame 0; `exposure`: stops, one number or a list: values are divided by
-2^stops; `resets`: frames with which a history begins; `changes`: a list by frame for each name of `--change`;
-`objects`: for each shape that moves a list by frame of matrices, 4 x 4, that take it from its place in the scene [m].
+2^stops; `resets`: frames with which a history begins; `jitter`: by frame how far right of and below the pixel centres
+its rays pass [pixels]; `changes`: a list by frame for each name of `--change`; `objects`: for each shape that moves a
+list by frame of matrices, 4 x 4, that take it from its place in the scene [m].
 """
 
 import json
@@ -28,6 +29,7 @@ from validation.readers import Reader, by_name, read_list, read_number, read_wor
 SCHEMA = "airlight-frames/1"
 _MARK = "#"
 _MOST = 1_000_000_000
+_FARTHEST = 1.0  # that rays are jittered [pixels]: what is more is in other units, of the film or of its half
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,7 @@ class FramesRecord:
     layer: str | None = None
     pixel: str | None = None
     resets: tuple[int, ...] = (0,)
+    jitter: tuple[tuple[float, ...], ...] | None = None  #: right and down [pixels]
     changes: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
     objects: Mapping[str, tuple[tuple[tuple[float, ...], ...], ...]] = field(default_factory=dict)
 
@@ -49,13 +52,12 @@ class FramesRecord:
         """Return the exposure of a frame [stops]."""
         return self.exposure[frame] if isinstance(self.exposure, tuple) else self.exposure
 
-    def changes_of(self, frame: int) -> dict[str, tuple[float, ...]]:
-        """Return the changes of the scene in a frame, by name."""
-        return {name: values[frame] for name, values in self.changes.items()}
-
-    def moves_of(self, frame: int) -> dict[str, tuple[tuple[float, ...], ...]]:
-        """Return the matrices of the shapes that move in a frame, by name."""
-        return {name: matrices[frame] for name, matrices in self.objects.items()}
+    def shown(self, frame: int) -> tuple[dict[str, Any], dict[str, Any], tuple[float, ...]]:
+        """Return what a frame shows: changes and matrices of shapes that move by name, and the jitter of its pixels."""
+        changes, moves = (
+            {name: values[frame] for name, values in each.items()} for each in (self.changes, self.objects)
+        )
+        return changes, moves, self.jitter[frame] if self.jitter else (0.0, 0.0)
 
     def text(self) -> str:
         """Return the file."""
@@ -78,8 +80,6 @@ def read_frames(path: str | os.PathLike[str]) -> FramesRecord:
         raise InputError(f"{path}: cannot be read as JSON: {reason}; see docs/your-engine.md for an example") from error
     if not isinstance(given, dict) or given.pop("schema", SCHEMA) != SCHEMA:
         raise InputError(f'{path}: wanted an object with "schema": "{SCHEMA}"')
-    if given.pop("jitter", None):
-        raise InputError(f'{path}: jitter is not followed; wanted frames without it, or averaged with "pixel": "area"')
     for name in given.keys() - _KINDS.keys():
         raise InputError(f"{path}: got {name!r}, wanted some of {', '.join(_KINDS)}{nearest(name, _KINDS)}")
     if "frames" not in given:
@@ -88,6 +88,7 @@ def read_frames(path: str | os.PathLike[str]) -> FramesRecord:
     record = FramesRecord(**read)
     lists: dict[str, Any] = {**record.changes, **record.objects}
     lists |= {"exposure": record.exposure} if isinstance(record.exposure, tuple) else {}
+    lists |= {"jitter": record.jitter} if record.jitter is not None else {}
     for name, values in lists.items():
         if len(values) != record.frames:
             raise InputError(f"{path}: {name} has {len(values)} values, wanted one for each of {record.frames} frames")
@@ -145,6 +146,13 @@ def _values(what: str, value: Any) -> tuple[float, ...]:
     return _by_frame(_number)(what, value) if isinstance(value, list) else (_number(what, value),)
 
 
+def _offset(what: str, value: Any) -> tuple[float, ...]:
+    found = _by_frame(_number)(what, value)
+    if len(found) != 2 or max(map(abs, found)) > _FARTHEST:
+        raise InputError(f"{what}: got {value!r}, wanted right and down [pixels], each at most {_FARTHEST:g}")
+    return tuple(found)
+
+
 def _matrix(what: str, value: Any) -> tuple[tuple[float, ...], ...]:
     wanted = "a 4 x 4 matrix by rows: a rotation times a scale, a shift, and 0 0 0 1"
     rows = [[_number(what, each) for each in read_list(what, row, 0)] for row in read_list(what, value, 0)]
@@ -167,6 +175,7 @@ _KINDS: dict[str, Reader] = {
     "layer": read_word,
     "pixel": read_word,
     "resets": _by_frame(partial(read_number, least=0, most=_MOST)),
+    "jitter": _by_frame(_offset),
     "changes": by_name(_by_frame(_values)),
     "objects": by_name(_by_frame(_matrix)),
 }

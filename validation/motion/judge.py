@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from reference.scene.camera import film_positions
 from reference.scene.read import TruthScene, read_truth
 from reference.storage.exr import NOTE, read_exr
 from reference.storage.files import temporary_folder
@@ -33,7 +34,7 @@ from validation.metrics.errors import plain
 from validation.motion.blocks import BLOCK, told
 from validation.motion.frames_file import FramesRecord, frame_paths, read_frames
 from validation.motion.measures import AGES, Measures, Sequence, measure
-from validation.scenes.changes import move_shapes
+from validation.scenes.changes import move_shapes, shift_film
 from validation.scenes.loading import load_scene
 
 Array = NDArray[np.float64]
@@ -241,15 +242,17 @@ class _Frames:
 
     def expect(self, n: int) -> None:
         """Keep the reference and the masks of a frame; refuse changes that the scene does not have, by its number."""
-        changes, moves = self._record.changes_of(n), self._record.moves_of(n)
-        if n and (changes, moves) == (self._record.changes_of(n - 1), self._record.moves_of(n - 1)):
+        record = self._record
+        if n and record.shown(n) == record.shown(n - 1):
             self._shown.append(self._shown[-1])
             self._ages = self._ages + 1
             self._beside[n] = self._beside[n - 1]
         else:
             try:
+                changes, moves, jitter = record.shown(n)
                 loaded = load_scene(self._scene, self._judged.size, changes)
                 move_shapes(loaded.scene, moves)
+                shift_film(loaded.scene, *jitter)
                 image = truth_image(loaded.scene, pixel=self._pixel)
             except InputError as error:
                 raise InputError(f"frame {n}: {error}") from error
@@ -306,25 +309,12 @@ def _blocks(some: Bools) -> slice:
 
 
 def _pixel_of(truth: TruthScene, points: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Bools]:
-    """Return row and column of the pixels that show points, and whether these lie in the image.
-
-    Rays through pixel centres are affine in row and column before they are scaled: three of them give the map.
-    """
-    rays = truth.direction.reshape(truth.height, truth.width, 3)
-    axis = np.cross(rays[0, -1] - rays[0, 0], rays[-1, 0] - rays[0, 0])
-    axis /= np.linalg.norm(axis)
-    flat = rays / (rays @ axis)[..., None]
-    across = (flat[0, -1] - flat[0, 0]) / max(truth.width - 1, 1)
-    down = (flat[-1, 0] - flat[0, 0]) / max(truth.height - 1, 1)
-    to = points - truth.origin
-    depth = to @ axis
-    ahead = depth > 0
-    offset = to / np.where(ahead, depth, 1.0)[:, None] - flat[0, 0]
-    column = np.rint(offset @ across / (across @ across))
-    row = np.rint(offset @ down / (down @ down))
-    inside = ahead & (column >= 0) & (column < truth.width) & (row >= 0) & (row < truth.height)
-    place = [np.where(inside, each, 0).astype(np.int64) for each in (row, column)]
-    return place[0], place[1], inside
+    """Return row and column of the pixels that show points, and whether these lie in the image."""
+    size = truth.width, truth.height
+    place = np.floor(film_positions(truth.scene.sensors()[0], points - truth.origin, size))
+    inside = ((place >= 0) & (place < size)).all(axis=1)  # behind the camera it is NaN
+    column, row = np.where(inside[:, None], place, 0).astype(np.int64).T
+    return row, column, inside
 
 
 def _shifts(sequence: Sequence) -> dict[int, float]:

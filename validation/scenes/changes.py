@@ -121,6 +121,14 @@ def move_shapes(scene, matrices: Mapping[str, Sequence[Sequence[float]]]) -> Non
     parameters.update()
 
 
+def shift_film(scene, right: float, down: float) -> None:
+    """Let the rays of an `mi.Scene` pass right of and below the centres of its pixels [pixels], in place."""
+    parameters = mi.traverse(scene.sensors()[0])
+    for axis, size, shift in zip("xy", parameters["film.size"], (right, down), strict=True):
+        parameters[f"principal_point_offset_{axis}"] = shift / int(size)
+    parameters.update()
+
+
 def _numbered(kind: str, number: int) -> str:
     return kind if number == 1 else f"{kind}-{number}"
 

@@ -6,6 +6,7 @@ import pytest
 from analytic.errors import InputError
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import read_scene
+from reference.scene.camera import film_positions, pixel_centres
 from reference.scene.read import read_truth
 from tests.helpers.scenes import spot, tiny_scene
 
@@ -30,13 +31,22 @@ def test_both_sides_read_the_same_scene(variant):
 
 
 @pytest.mark.claim("pixel-centre", tolerance="5e-7: Mitsuba's float32 matrices")
-def test_rays_are_those_of_mitsuba(variant):
-    scene = mi.load_dict(tiny_scene(size=(33, 21)))
+@pytest.mark.parametrize("principal", [(0.0, 0.0), (0.13, -0.07)])
+def test_rays_are_those_of_mitsuba(variant, principal):
+    size = (33, 21)
+    scene = mi.load_dict(tiny_scene(size=size))
+    parameters = mi.traverse(scene.sensors()[0])
+    for axis, offset in zip("xy", principal):
+        parameters[f"principal_point_offset_{axis}"] = offset
+    parameters.update()
     truth = read_truth(scene)
-    number = np.arange(33 * 21)
-    position = mi.Point2f((number % 33 + 0.5) / 33, (number // 33 + 0.5) / 21)
-    ray, _ = scene.sensors()[0].sample_ray(0.0, 0.5, position, mi.Point2f(0.5))
+    position = pixel_centres(size)
+    film = mi.Point2f(*(position / size).T)
+    ray, _ = scene.sensors()[0].sample_ray(0.0, 0.5, film, mi.Point2f(0.5))
     assert np.max(np.abs(np.array(ray.d).T - truth.direction)) < 5e-7  # float32 matrices on Mitsuba's side
+    found = film_positions(scene.sensors()[0], np.concatenate([3 * truth.direction, -truth.direction]), size)
+    np.testing.assert_allclose(found[: len(position)], position, rtol=0, atol=1e-11)
+    assert np.isnan(found[len(position) :]).all()
 
 
 @pytest.mark.claim("scenes-refused-by-name")

@@ -53,6 +53,22 @@ def test_exposure_is_taken_away(lights, tmp_path):
     assert found.verdict.kind == "exact"
 
 
+def test_jittered_frames_are_those_between_the_pixels(variant, tmp_path):
+    """Every second pixel of an image of twice the size passes a quarter of a pixel beside the centres."""
+    size, quarters = (16, 12), [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)]
+    fine = truth_image(load_scene("sphere-spot", (32, 24)).scene).airlight
+    frames = [fine[int(down > 0) :: 2, int(right > 0) :: 2] for right, down in 2 * quarters]
+    assert frames[0].shape == (*size[::-1], 3)
+    kinds = {}
+    for sign in (1, -1):
+        jitter = [[sign * right, sign * down] for right, down in 2 * quarters]
+        found = compare_frames("sphere-spot", *written(tmp_path, frames, jitter=jitter, pixel="centre"))
+        kinds[sign] = found.verdict.kind
+        assert "disoccluded" not in found.masks
+    assert kinds[1] == "exact"
+    assert kinds[-1] != "exact"
+
+
 def test_what_a_camera_uncovers_has_a_row_of_its_own(variant, tmp_path):
     size = (48, 36)
     origin = np.array(load_scene("sphere-spot", size).scene.sensors()[0].world_transform().matrix)[:3, 3].ravel()
@@ -113,7 +129,9 @@ def test_objects_that_move_are_where_a_scene_file_has_them(variant, tmp_path):
         ({"resets": [8]}, "resets has 8, wanted frames from 0 to 7"),
         ({"fps": 0}, "fps: got 0, wanted a number above 0"),
         ({"frame": 8}, "got 'frame'"),
-        ({"jitter": [[0, 0]]}, "jitter is not followed"),
+        ({"jitter": [[0, 0]]}, "jitter has 1 values"),
+        ({"jitter": [[0, 0, 0]] * FRAMES}, "jitter[0]: got [0, 0, 0], wanted right and down [pixels]"),
+        ({"jitter": [[0, 3]] * FRAMES}, "jitter[0]: got [0, 3], wanted right and down [pixels], each at most 1"),
         ({"objects": {"ground": [np.eye(4).tolist()]}}, "ground has 1 values, wanted one for each of 8"),
         ({"objects": {"ground": [np.eye(3).tolist()] * FRAMES}}, "objects.ground[0]: got [[1.0"),
         ({"objects": {"ground": [np.diag([1, 1, 2, 1]).tolist()] * FRAMES}}, "not a rotation times a scale"),
