@@ -75,7 +75,8 @@ class LiveScene:
     @property
     def goes_on(self) -> bool:
         """Whether frames differ while nothing moves: they build on the last one, or draw random numbers."""
-        return self.renderer.method.carries or self.renderer.method.noisy
+        made = self.renderer
+        return made.method.carries or made.method.noisy or made.history is not None
 
     def begin_mean(self) -> None:
         """Forget the mean of the frames of a method that draws random numbers: from now on they show another thing."""

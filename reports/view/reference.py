@@ -38,12 +38,12 @@ class ReferenceInBackground:
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
 
-    def start(self, scene: str, size: tuple[int, int], changes: Mapping[str, Values]) -> None:
-        """Compute the reference of a scene from now on."""
+    def start(self, scene: str, size: tuple[int, int], changes: Mapping[str, Values], most: int | None = None) -> None:
+        """Compute the reference of a scene from now on, of all pixels or of so many by chance."""
         with self._lock:
             self._number += 1
             self.known, self.done, self.failure = KnownReference.of_size(*size), False, ""
-            self._send(Task(self._number, scene, size, dict(changes)))
+            self._send(Task(self._number, scene, size, dict(changes), most))
 
     def stop(self) -> None:
         """Compute nothing, and forget what was found."""

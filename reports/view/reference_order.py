@@ -5,6 +5,7 @@ Pixels of a coarse grid come first, then those of grids of half its step. Within
 what is known is a fair sample of the image at any time, and the picture of it grows sharper.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,3 +95,10 @@ def view_error(found: KnownReference, airlight: Array) -> ViewError | None:
         count,
         pixels,
     )
+
+
+def motion_error(errors: Sequence[ViewError]) -> tuple[float, float]:
+    """Return the root mean square of the errors of frames, and half of its 95 % interval for the pixels left out."""
+    rmse, halves = (np.array([getattr(each, name) for each in errors]) for name in ("relative_rmse", "interval"))
+    mean = float(np.sqrt(np.mean(rmse**2)))
+    return mean, float(np.linalg.norm(rmse * halves)) / (len(errors) * mean) if mean > 0 else 0.0

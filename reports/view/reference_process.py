@@ -29,6 +29,7 @@ class Task:
     scene: str  #: name or path
     size: tuple[int, int]  #: [pixels]
     changes: dict[str, Values]  #: `validation.scenes.changes`
+    most: int | None = None  #: pixels, by chance; None: all, in their order
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,8 @@ def answers(task: Task) -> Iterator[Answer]:
 
     scene = load_scene(task.scene, task.size, task.changes).scene
     order = pixel_order(*task.size)
+    if task.most is not None:  # others for each frame
+        order = np.random.default_rng(task.number).permutation(order)[: task.most]
     begin, rays = 0, _FIRST
     while begin < len(order):
         chosen = order[begin : begin + rays]

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The loop of the view: it draws what the page asks for, and computes its reference while nothing moves.
 
+While the scene changes, one frame at a time is judged as it was shown, with its noise and its history, by its own
+reference in some pixels; the next one when that is known.
+
 Threads of the server put what the page says into a list; this loop alone touches Dr.Jit. It takes all that has come
 since the last frame at once, so frames that nobody would see are not drawn, and it waits for the page to show a frame
 before it sends the next but one.
@@ -9,6 +12,7 @@ before it sends the next but one.
 import threading
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -23,7 +27,7 @@ from reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, err
 from reports.view.live_scene import LiveScene, Shown
 from reports.view.picture import LAYERS, Pictures, rgba
 from reports.view.reference import ReferenceInBackground
-from reports.view.reference_order import view_error
+from reports.view.reference_order import ViewError, motion_error, view_error
 from reports.view.server import Page
 from reports.view.stages import WORDS
 from reports.view.state import ViewState
@@ -45,6 +49,7 @@ _NEWS = 0.4  # between two pictures of what is known of the reference [s]
 _BY_STAGE = 8  # of so many frames one is timed by stage
 _STOPS = 20.0  # of exposure, brighter or darker
 _LOOKS = 0.3  # between two looks at the files of a shader [s]
+_IN_MOTION = 256  # pixels in which a frame is judged while the scene changes
 _GOES_ON = 64  # frames drawn of a still scene where each builds on the last
 
 
@@ -70,6 +75,10 @@ class Session:
         self._told = self._news_at = 0.0
         self._reference_of: Any = None
         self._news = False
+        self._moves_on = False  # whether the scene has changed since the last reference of a scene at rest
+        self._judged: Any = None  # airlight of the frame of a scene that changes whose reference is computed
+        self._last_judged = 0  # number of that frame
+        self._in_motion: list[ViewError] = []
         self._shader = self.live.shader_stamp()
 
     # What the server's threads call -----------------------------------------------------------------------------------
@@ -175,8 +184,10 @@ class Session:
             page.tell("mistake", message=" ".join(str(error).split()))
         else:
             page.tell("mistake", message="")
+            self._moves_on |= of_scene
             if of_scene and self._reference_of is not None:
                 self._reference_of = None
+                self._in_motion.clear()
                 self.reference.stop()
             self._news = True
         self._touch()
@@ -197,7 +208,7 @@ class Session:
     def _do(self, page: Page, message: Mapping[str, Any]) -> None:
         kind = message.get("kind")
         if kind == "opened":
-            self._sent = self._drawn = self._moves = 0
+            self._sent = self._drawn = self._moves = self._last_judged = 0
             self._open(page)
         elif kind == "drawn":
             self._drawn = max(self._drawn, int(_number(message.get("frame"))))
@@ -282,9 +293,10 @@ class Session:
         except (InputError, MethodError) as error:
             page.tell("mistake", message=" ".join(str(error).split()))
             self._wanted, self._show["run"], self._asked_at = 0, False, None
+            self._last_judged = self._sent  # what is shown is no frame of the scene as it is
             return
         self._shown, self._wanted = shown, max(self._wanted - 1, 0)
-        self._news |= self.live.summed > 0
+        self._news |= self.live.goes_on
         if by_stage:
             self._stages = shown.stages_ms
         begin = time.perf_counter()
@@ -313,12 +325,32 @@ class Session:
         now = time.perf_counter()
         if self._told < self._changed_at and now >= self._changed_at + _QUIET:
             self._tell_state(page)
+        if self._moves_on:
+            self._judge_motion(page)
         if self._reference_of is None and now >= self._changed_at + _STILL and self._shown is not None:
             self._reference_of = dict(self.live.changes)
+            self._moves_on, self._judged = False, None
             self.reference.start(self._given.scene, self._given.size, self._reference_of)
         if self._news and now >= self._news_at + _NEWS and self._reference_of is not None and self._shown is not None:
             self._news, self._news_at = False, now
             self._tell_error(page, self._shown)
+
+    def _judge_motion(self, page: Page) -> None:
+        """Tell the error of the frame that is judged when its reference is known, then begin with the newest one."""
+        known = self.reference.known
+        if self._judged is not None and known is not None and (self.reference.done or self.reference.failure):
+            error, self._judged = view_error(known, self._judged), None
+            if self.reference.done and error is not None:
+                self._in_motion.append(error)
+                rmse, interval = motion_error(self._in_motion)
+                told = {"rmse": rmse, "interval": interval, "frames": len(self._in_motion), "pixels": error.known}
+                page.tell("motion", **plain(told))
+        # A change that no frame shows yet has another reference.
+        new = self._sent > self._last_judged and self._asked_at is None
+        if self._judged is None and self._shown is not None and new:
+            with suppress(InputError, MethodError):
+                self._last_judged, self._judged = self._sent, self.live.on_host(self._shown).airlight
+                self.reference.start(self._given.scene, self._given.size, self.live.changes, _IN_MOTION)
 
     def _tell_error(self, page: Page, shown: Shown) -> None:
         found = self.reference.known

@@ -125,6 +125,11 @@ hear.error = ({failure, error, done, frames, mean}) => {
   $("#other").dataset.stale = String(!error);
 };
 
+hear.motion = ({rmse, interval, frames, pixels}) => {
+  $("#motion").textContent = `While the scene changed: RMSE ${percent(rmse)} ± ${percent(interval)}, of ${frames} ` +
+    `${frames === 1 ? "frame" : "frames"} as shown, each against its own reference in ${pixels} pixels by chance.`;
+};
+
 // The camera ------------------------------------------------------------------------------------------------------
 
 const camera = {origin: [0, 0, 0], target: [0, 1, 0], up: [0, 0, 1], vertical: [0, 0, 1], moved: false, waits: false, last: 0, sent: 0, taken: 0, held: new Set()};

@@ -31,10 +31,10 @@ class ReferenceAtOnce:
     def __init__(self, told, variant):
         self.told, self.known, self.done, self.failure, self.starts = told, None, False, "", 0
 
-    def start(self, scene, size, changes):
-        self.starts += 1
-        self.known = KnownReference.of_size(*size)
-        for answer in answers(Task(1, scene, size, dict(changes))):
+    def start(self, scene, size, changes, most=None):
+        self.starts += most is None
+        self.known, self.done = KnownReference.of_size(*size), False
+        for answer in answers(Task(1, scene, size, dict(changes), most)):
             if answer.pixels is not None:
                 self.known.add(answer.pixels, answer.airlight, answer.surface, answer.bound)
             self.done = answer.done
@@ -163,6 +163,23 @@ def test_the_mean_of_noisy_frames_comes_nearer_to_the_reference_until_something_
     assert session.live.summed < 32
     ask(session, page, kind="choose", method="unshadowed")
     assert session.live.summed == 0
+
+
+@pytest.mark.claim("view-error")
+@pytest.mark.parametrize("method", ["ray-march", "ray-march+history"])
+def test_frames_of_a_scene_that_changes_are_judged_as_they_were_shown(view, monkeypatch, method):
+    """A history has the light of earlier frames: while a light moves it is further off than the same method at rest."""
+    monkeypatch.setattr("reports.view.session._STILL", 1e9)
+    session, page = view("open-fog", method, steps=64)
+    for n in range(6):
+        ask(session, page, kind="change", changes={"light.position": [0.83 - 0.3 * n, 0.47, 1.57]})
+    moving = page.last("motion")
+    assert moving["frames"] >= 5
+    assert moving["pixels"] == 256
+    monkeypatch.setattr("reports.view.session._STILL", 0.0)
+    turns(session, lambda: session.reference.done and session._wanted == 0 and not session._news, 60)
+    still = page.last("error")["error"]["relative_rmse"]
+    assert (moving["rmse"] > 10 * still) == ("history" in method)
 
 
 @pytest.mark.parametrize(
