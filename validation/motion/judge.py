@@ -312,7 +312,7 @@ def _pixel_of(truth: TruthScene, points: Array) -> tuple[NDArray[np.int64], NDAr
     """Return row and column of the pixels that show points, and whether these lie in the image."""
     size = truth.width, truth.height
     place = np.floor(film_positions(truth.scene.sensors()[0], points - truth.origin, size))
-    inside = ((place >= 0) & (place < size)).all(axis=1)  # behind the camera it is NaN
+    inside = np.all((place >= 0) & (place < np.array(size)), axis=1)  # behind the camera it is NaN
     column, row = np.where(inside[:, None], place, 0).astype(np.int64).T
     return row, column, inside
 

@@ -120,7 +120,7 @@ def test_the_commands_on_the_page_show_what_is_shown(view, tmp_path, monkeypatch
         cli.run(commands["view"])
     assert started == [session._state()]
     assert cli.run([*commands["reference"], "-o", str(tmp_path / "truth.exr")]) == 0
-    turns(session, lambda: session.reference.done)
+    turns(session, lambda: session.reference.done and session._reference_of is not None)
     # float32 in the file
     np.testing.assert_allclose(
         session.reference.known.airlight, read_exr(tmp_path / "truth.exr").layers["airlight"], rtol=1e-6
@@ -177,7 +177,13 @@ def test_frames_of_a_scene_that_changes_are_judged_as_they_were_shown(view, monk
     assert moving["frames"] >= 5
     assert moving["pixels"] == 256
     monkeypatch.setattr("reports.view.session._STILL", 0.0)
-    turns(session, lambda: session.reference.done and session._wanted == 0 and not session._news, 60)
+    turns(
+        session,
+        lambda: (
+            session._reference_of is not None and session.reference.done and session._wanted == 0 and not session._news
+        ),
+        60,
+    )
     still = page.last("error")["error"]["relative_rmse"]
     assert (moving["rmse"] > 10 * still) == ("history" in method)
 
