@@ -17,17 +17,24 @@ by sigma_t (1 - dz/mu) along a ray, whatever the layers. Over a lit segment of t
 
 (plane-parallel single scattering, Chandrasekhar 1960). It costs two optical depths and no node.
 
-**Lights at places.** With s = x - foot, h the height and w = asinh(s/h), dx/r^2 = dw/r, and what is left is smooth: the
-poles of 1/r and of Henyey and Greenstein's lobes lie at Im w = pi/2. Panels of nodes in w end where they would be too
-wide, rise by too many scale heights or be optically too thick; 8 nodes are right to 2e-6, 16 to 2e-11 (certified rays).
-Segments are cut at the bases of clamped layers. Of a layer that is not clamped, the depth from z to z' is sigma_i H_i
-|e(z) - e(z')| times the length that rises by one scale height: one exponential a leg, whose difference from 1 comes
-with it.
+**Lights at places.** With s = x - foot, the height h and distance r of the light, N^2 = (r + s)/2 and D^2 = (r - s)/2,
+2 N D is h. At E = N/D = (r + s)/h there is s/r = (E^2 - 1)/(E^2 + 1), E^2/(1 + E^2) and 1/(1 + E^2) are sin^2 and
+cos^2 of half the scattering angle, and dx/r^2 = (2/h) dE/(1 + E^2). In a panel N and D are linear in t from 0 to 1,
+with C = N0 N1 + D0 D1, and
+
+    s - s0 = t h (s1 - s0)/(2 C) (N N0 + D D0)/(N D),    r = h (N^2 + D^2)/(2 N D),
+    dx/r^2 = (s1 - s0)/C dt/(N^2 + D^2).
+
+Nothing cancels or divides by h, and there is no function but the reciprocal. In the middle E is the geometric mean of
+the ends', and about exponential in t throughout; by w = ln E the light and the lobe of Henyey and Greenstein lie at
+|Im w| = pi/2, whatever g is. A panel may be so wide in w, or rise by so many scale heights or change either depth by so
+much, and less of each if they come together. It begins at its lower end: there a node has one exponential for each
+layer, e^-u - 1, for the density and for the depth from the camera; the depth to the light takes the density at both its
+ends. Panels end at the bases of clamped layers and at kinks of spots.
 """
 
 import math
 from dataclasses import dataclass, replace
-from functools import reduce
 from typing import Any
 
 import drjit as dr
@@ -39,8 +46,9 @@ from realtime.numerics.functions import exp_bounded, exp_expm1_bounded, unit_nod
 from realtime.scene.media.medium import LitRays, VaryingMedium, optical_reach
 from realtime.scene.phase import Phase
 
-_NODES, _NODES_DOUBLE = 8, 16
-_WIDEST, _SCALE_HEIGHTS, _DEPTH = 3.4, 6.0, 10.0  # of a panel at most: in w, in scale heights, in optical depth
+_NODES, _NODES_DOUBLE = 12, 28
+_WIDTH, _SCALE_HEIGHTS, _DEPTH = 4.2, 10.0, 12.0  # of a panel at most: in ln E, of rise, of optical depth
+_WIDTH_ASKED = 6.0  # in ln E of panels with a number of nodes that was asked for
 _MOST = 200  # panels of a segment: no segment needs as many
 _ENDLESS = 1e9  # [m]
 _LEVEL = 1e-20  # the rise of a ray, and a difference of heights [m], that stand for none
@@ -98,7 +106,7 @@ class HeightFog(VaryingMedium):
         """Return the optical depth from points [m] to a light, in closed form [1]."""
         z = dr.dot(point, self.up)
         if not getattr(light, "w", 1):
-            return (self._column(z) / -dr.dot(light.axis, self.up),)
+            return (self._overhead(z) / -dr.dot(light.axis, self.up),)
         return (self._between(z, dr.dot(light.position, self.up), r),)
 
     def length_from(self, rays, x, depth: float):
@@ -156,21 +164,21 @@ class HeightFog(VaryingMedium):
         height, steep = z - layer.base, dr.rcp(layer.scale_height)
         above = height * steep
         above = dr.fma(dr.fma(-above, layer.scale_height, height), steep, above)
-        return exp_bounded(-dr.maximum(above, 0 if self.clamped else -88.0))
+        # Where it is 1e24, all is as dark as beyond.
+        return exp_bounded(-dr.maximum(above, 0 if self.clamped else -55.0))
 
-    def _from(self, layer: Layer, height):
-        """Return a function of how far below a height a place is: a layer's exponential, and its difference exactly.
-
-        From forty scale heights above the base on, the exponential is as good as 0.
-        """
-        least, steep = dr.minimum(height, dr.fma(40, layer.scale_height, layer.base)), dr.rcp(layer.scale_height)
-        there, beyond = self._fall(layer, least), (least - height) * steep
-
-        def at(below):
-            factor, less = exp_expm1_bounded(dr.fma(below, steep, beyond))
-            return there * factor, there * dr.abs(less)
-
-        return at
+    def _column(self, layer: Layer, low, rise, ends):
+        """Return the integral of a layer over heights, `rise` [m] from `low` up, by its densities at the `ends` [m]."""
+        below = dr.clip(layer.base - low, 0, rise) if self.clamped else 0
+        above, largest = rise - below, dr.maximum(*ends)
+        u = above / layer.scale_height
+        if not is_single(type(u)):
+            return below + above * largest * phi(u)
+        # Above 1/2 the difference has its digits; below, the series does, and takes less than an exponential.
+        series = type(u)(1 / 5040)
+        for divisor in (720, 120, 24, 6, 2, 1):
+            series = dr.fma(-u, series, 1 / divisor)
+        return below + dr.select(u < 0.5, largest * (above * series), layer.scale_height * dr.abs(ends[0] - ends[1]))
 
     def _mean(self, low, rise):
         """Return the mean density between a height `low` and one `rise` above it, both between floor and cap [1/m]."""
@@ -193,7 +201,7 @@ class HeightFog(VaryingMedium):
         length = dr.select(inside, r, dr.select(whole > 0, r * (rise / whole), 0))
         return length * self._mean(low, rise)
 
-    def _column(self, z):
+    def _overhead(self, z):
         """Return the optical depth straight up from heights [m]."""
         low = dr.clip(z, self.floor, self.cap)
         return (self.cap - low) * self._mean(low, self.cap - low)
@@ -203,7 +211,12 @@ class HeightFog(VaryingMedium):
 class HeightRays(LitRays):
     """Rays in height fog with one light: integrals are RGB [1/m^2], of suns [1]."""
 
-    nodes: int | None = None  #: of each side of the foot, in one panel; None: panels as they are needed
+    nodes: int | None = None  #: of each panel, which then ends at the foot, too; None: as many as float32 needs
+
+    @property
+    def end(self):
+        """The height of the light, or where the fog ends before it [m]."""
+        return dr.clip(dr.dot(self.light.position, self.medium.up), self.medium.floor, self.medium.cap)
 
     def airlight(self, x0, x1):
         """Return the integral over lit segments [x0, x1] [m]."""
@@ -212,20 +225,7 @@ class HeightRays(LitRays):
         x0, x1 = dr.clip(x0, enter, leave), dr.clip(x1, enter, leave)
         if not self.light.w:
             return medium.albedo * dr.select(x1 > x0, self._sun(x0, x1), 0)
-        # Twice the usual reach: out of thick fog the way to the light may lose more depth than the camera's gains.
-        x1 = dr.minimum(x1, x0 + medium.length_from(self.rays, x0, 2 * optical_reach(type(x0))))
-        return medium.albedo * sum(self._panels(begin, end) for begin, end in self._smooth(x0, x1))
-
-    def _smooth(self, x0, x1):
-        """Cut segments where soft spots and the bases of clamped layers put kinks."""
-        parts = self.geometry.smooth_subsegments(self.light, x0, x1)
-        if not self.medium.clamped:
-            return parts
-        start, rise = self.rays.crossed[1]
-        for layer in self.medium.layers:
-            cut = dr.select(rise == 0, 0, (layer.base - start) / rise)
-            parts = [part for a, b in parts for part in ((a, dr.clip(cut, a, b)), (dr.clip(cut, a, b), b))]
-        return parts
+        return medium.albedo * dr.select(x1 > x0, self._panels(x0, x1), 0)
 
     def _sun(self, x0, x1):
         medium, (start, rise) = self.medium, self.rays.crossed[1]
@@ -233,104 +233,117 @@ class HeightRays(LitRays):
         (tau,) = medium.optical_depth(self.rays, x0, x1)
         q = (1 - rise / mu) * tau
         x = dr.select(q >= 0, x0, x1)
-        exponent = medium.optical_depth(self.rays, 0, x)[0] + medium._column(dr.fma(rise, x, start)) / mu
+        exponent = medium.optical_depth(self.rays, 0, x)[0] + medium._overhead(dr.fma(rise, x, start)) / mu
         return exp_bounded(-exponent) * tau * phi(dr.abs(q)) * self.angle(None, None)(medium.phase)
 
     def _panels(self, x0, x1):
-        """Sum panels of a segment in which the integrand is smooth."""
-        Float, integrand = type(x0), self._integrand()
-        if self.nodes is not None:
-            foot = dr.clip(self.geometry.foot, x0, x1)
-            return sum(self._panel(integrand, a, b, self.nodes) for a, b in ((x0, foot), (foot, x1)))
-        count = _NODES if is_single(Float) else _NODES_DOUBLE
+        """Sum panels of a segment."""
+        Float, medium, (start, rise) = type(x0), self.medium, self.rays.crossed[1]
         width = dr.width(self.geometry.height, x0, x1)
+        bends = [end for _, end in self.geometry.smooth_subsegments(self.light, x0, x1)[:-1]]
+        if medium.clamped:
+            bends += [(layer.base - start) / rise for layer in medium.layers]
+        (before,) = medium.optical_depth(self.rays, 0, x0)
+        # Twice the usual reach: out of thick fog the way to the light may lose more depth than the camera's gains.
+        reach = 2 * optical_reach(Float)
+        deepest = before + reach
+        if self.nodes is not None:
+            bends.append(self.geometry.foot)
+            x1 = dr.minimum(x1, x0 + medium.length_from(self.rays, x0, reach))
 
-        def panel(turn, x, total):
-            end = dr.minimum(x + self._longest(x0, x), x1)
-            return turn + 1, end, total + self._panel(integrand, x, end, count)
+        def panel(turn, x, depth, total):
+            end = dr.minimum(x + self._longest(x), x1)
+            for bend in bends:
+                end = dr.minimum(end, dr.select(bend > x, bend, dr.inf))
+            part, depth = self._panel(x, end, depth)
+            return turn + 1, end, depth, total + part
 
         *_, total = dr.while_loop(
-            state=(dr.zeros(mi.UInt32, width), x0 + dr.zeros(Float, width), dr.zeros(Float, width)),
-            cond=lambda turn, x, total: (x < x1) & (turn < _MOST),
+            state=(dr.zeros(mi.UInt32, width), x0 + dr.zeros(Float, width), before, dr.zeros(Float, width)),
+            cond=lambda turn, x, depth, total: (x < x1) & (depth < deepest) & (turn < _MOST),
             body=panel,
-            labels=("turn", "x", "total"),
+            labels=("turn", "x", "depth", "total"),
         )
         return total
 
-    def _longest(self, x0, x):
-        """Return the length of the longest panel that begins at x, of a segment that begins at x0 [m]."""
+    def _longest(self, x):
+        """Return the length of the longest panel that begins at x [m]."""
         medium, (start, rise) = self.medium, self.rays.crossed[1]
-        s, h = x - self.geometry.foot, self._height()
-        # From w to w + W in w = asinh(s/h), s grows to s cosh W + r sinh W.
-        longest = dr.fma(s, math.cosh(_WIDEST) - 1, dr.sqrt(dr.fma(s, s, h * h)) * math.sinh(_WIDEST))
-        thickness = _DEPTH / medium.density(dr.fma(rise, x, start))
-        if medium.layers:
-            slope = dr.abs(rise) / reduce(dr.minimum, [layer.scale_height for layer in medium.layers])
-            # Upwards less and less is left to be right about.
-            longest = dr.minimum(longest, _SCALE_HEIGHTS / slope + dr.select(rise > 0, x - x0, 0))
-            # Downwards the depth grows by T in log(1 + y)/slope, y = slope T/density; 2y/(2 + y) is a lower bound.
-            thickness *= dr.select(rise < 0, 2 / dr.fma(slope, thickness, 2), 1)
-        return dr.minimum(longest, thickness)
+        s = x - self.geometry.foot
+        r = dr.sqrt(dr.fma(s, s, dr.square(self.geometry.height)))
+        width = _WIDTH if self.nodes is None else _WIDTH_ASKED
+        longest = dr.fma(math.cosh(width) - 1, s, math.sinh(width) * r)
+        if self.nodes is not None:
+            return longest
+        z = dr.fma(rise, x, start)
+        whole, part, low = self._to_light(z)
+        density, leg, falling, steepest = medium.constant, medium.constant * part, 0, 0
+        for layer in medium.layers:
+            here, steep = medium._fall(layer, z), dr.rcp(layer.scale_height)
+            own = layer.sigma_t * here
+            density, falling, steepest = density + own, dr.fma(own, steep, falling), dr.maximum(steepest, steep)
+            leg = dr.fma(layer.sigma_t, medium._column(layer, low, part, (here, medium._fall(layer, self.end))), leg)
+        # Upwards the layers by their share in the density; downwards, where it grows, any can become the largest.
+        steep = rise * dr.select(rise > 0, falling * dr.rcp(dr.maximum(density, 1e-30)), steepest)
+        thick = dr.maximum(dr.fma(-0.5 * _DEPTH, dr.minimum(steep, 0), density), leg * dr.rcp(whole))
+        rate = dr.maximum((1 / _DEPTH) * thick, (1 / _SCALE_HEIGHTS) * dr.abs(steep))
+        return longest * dr.rsqrt(dr.fma(longest * rate, longest * rate, 1))
 
-    def _height(self):
-        return dr.maximum(self.geometry.height, 1e-12)
+    def _to_light(self, z):
+        """Return how far the light is from heights upwards, how far within the fog, and the lower end of that [m]."""
+        ends = dr.dot(self.light.position, self.medium.up), self.end
+        whole, part = (dr.maximum(dr.abs(end - z), _LEVEL) for end in ends)
+        return whole, part, dr.minimum(z, self.end)
 
-    def _panel(self, integrand, x0, x1, count: int):
-        """Integrate one panel by nodes in w, with dx/r^2 = dw/r.
-
-        With p = s + r = h e^w the middle is at h e^w = sqrt(p0 p1), and w1 - w0 = log(p1/p0), where p1/p0 - 1 =
-        (x1 - x0)/(r0 + r1) (1 + p1/p0) keeps its digits in short panels. A pair of nodes has one exponential.
-        """
-        h = self._height()
-        s0, s1 = x0 - self.geometry.foot, x1 - self.geometry.foot
-        r0, r1 = dr.sqrt(dr.fma(s0, s0, h * h)), dr.sqrt(dr.fma(s1, s1, h * h))
-        p0, p1 = (dr.select(s >= 0, s + r, h * h / (r - s)) for s, r in ((s0, r0), (s1, r1)))
-        grows = (x1 - x0) / (r0 + r1) * (1 + p1 / p0)
-        grown = 1 + grows
-        half = 0.5 * dr.select(grown == 1, grows, dr.log(grown) * (grows / (grown - 1)))
-        after = dr.sqrt(p0) * dr.sqrt(p1)
-        before = h * h / after
-        total, nodes = type(x0)(0), unit_nodes(count)
-        for t, weight in nodes[: count // 2]:
-            grown = exp_bounded((1 - 2 * t) * half)
-            shrunk = dr.rcp(grown)
-            total += weight * (integrand(after * grown, before * shrunk) + integrand(after * shrunk, before * grown))
-        return dr.select(x1 > x0, 2 * half * total, 0)
-
-    def _integrand(self):
-        """Return a function of r + s and r - s, s = x - foot and r from the light [m]: sigma_t exp(-tau) p / r."""
-        medium, ((enter, _), (start, rise)) = self.medium, self.rays.crossed
-        at_light = dr.dot(self.light.position, medium.up)
-        end, climb = dr.clip(at_light, medium.floor, medium.cap), dr.select(dr.abs(rise) < _LEVEL, _LEVEL, rise)
-        flat, entry = dr.rcp(dr.abs(climb)), dr.fma(rise, enter, start)
-        layers = [(layer, medium._from(layer, entry), medium._from(layer, end)) for layer in medium.layers]
-
-        def integrand(after, before):
-            total, s = after + before, 0.5 * (after - before)
-            r, x = 0.5 * total, self.geometry.foot + s
-            z = dr.fma(rise, x, start)
-            fall = dr.maximum(dr.abs(at_light - z), _LEVEL)
-            both = dr.rcp(total * fall)  # one division for two
-            slant, inverse = r * total * both, fall * both
+    def _panel(self, x0, x1, before):
+        """Integrate one panel, to whose beginning the optical depth is `before`; return that to its end, too."""
+        Float, medium, (start, slope) = type(x0), self.medium, self.rays.crossed[1]
+        foot, h, length = self.geometry.foot, dr.maximum(self.geometry.height, 1e-12), x1 - x0
+        up, rise = slope > 0, dr.abs(slope)
+        low, high = dr.select(up, x0, x1), dr.select(up, x1, x0)
+        z_low = dr.fma(slope, low, start)
+        across, layers = medium.constant * length, []
+        for layer in medium.layers:
+            steep = dr.maximum(rise / layer.scale_height, 1e-12)
             if medium.clamped:
-                density, exponent = medium.density(z), medium.optical_depth(self.rays, 0, x)[0]
-                exponent += medium._between(z, at_light, r)
-            else:
-                # A layer's depth is the difference of its exponentials times the length that rises by one scale height.
-                length, density, to_camera = x - enter, medium.constant, 0
-                to_light = medium.constant * dr.abs(end - z)
-                for layer, from_entry, from_end in layers:
-                    column, (here, difference) = layer.sigma_t * layer.scale_height, from_end(end - z)
-                    density = dr.fma(layer.sigma_t, here, density)
-                    to_camera = dr.fma(column, from_entry(-climb * length)[1], to_camera)
-                    to_light = dr.fma(column, difference, to_light)
-                exponent = dr.fma(to_camera, flat, medium.constant * length)
-                exponent += dr.select(fall > _LEVEL, to_light * slant, density * r)
-            phase = medium.phase.evaluate_half(after * inverse, before * inverse)
-            value = density * exp_bounded(-exponent) * phase * (2 * inverse)
-            return value * self.geometry.falloff_beside(self.light, s) if self.light.varies else value
+                steep = dr.select(dr.fma(0.5 * rise, length, z_low) < layer.base, 1e-12, steep)
+            at_low = medium._fall(layer, z_low)
+            along = -at_low / steep
+            across = dr.fma(layer.sigma_t * along, exp_expm1_bounded(-steep * length)[1], across)
+            layers.append((layer, steep, at_low, along, medium._fall(layer, self.end)))
+        after = before + across
+        at_lowest, sign = dr.select(up, before, after), dr.select(up, Float(1), -1)
+        (n0, d0), (n1, d1) = _roots(low - foot, h), _roots(high - foot, h)
+        share = length / dr.fma(n0, n1, d0 * d1)
+        total = Float(0)
+        for t, weight in unit_nodes(self.nodes or (_NODES if is_single(Float) else _NODES_DOUBLE)):
+            n, d = dr.fma(n1 - n0, t, n0), dr.fma(d1 - d0, t, d0)
+            square_n, square_d = dr.square(n), dr.square(d)
+            inverse, scale = dr.rcp(square_n + square_d), 0.5 * h * dr.rcp(n * d)
+            far, r = share * t * (dr.fma(n, n0, d * d0) * scale), (square_n + square_d) * scale
+            whole, part, lower = self._to_light(dr.fma(rise, far, z_low))
+            density, camera, leg = medium.constant, medium.constant * far, medium.constant * part
+            for layer, steep, at_low, along, at_end in layers:
+                kept, less = exp_expm1_bounded(-steep * far)
+                here = at_low * kept
+                density = dr.fma(layer.sigma_t, here, density)
+                camera = dr.fma(layer.sigma_t * along, less, camera)
+                leg = dr.fma(layer.sigma_t, medium._column(layer, lower, part, (here, at_end)), leg)
+            exponent = dr.fma(sign, camera, at_lowest) + r * (leg * dr.rcp(whole))
+            value = weight * inverse * density * exp_bounded(-exponent)
+            if not medium.phase.constant:
+                value *= medium.phase.evaluate_half(square_n * inverse, square_d * inverse)
+            if self.light.varies:
+                value *= self.geometry.falloff_beside(self.light, (square_n - square_d) * scale)
+            total += value
+        return dr.select(x1 > x0, total * share, 0), after
 
-        return integrand
+
+def _roots(s, h):
+    """Return N and D, the square roots of (r + s)/2 and (r - s)/2 (see the module); 2 N D = h."""
+    larger = dr.sqrt(0.5 * (dr.abs(s) + dr.sqrt(dr.fma(s, s, h * h))))
+    smaller = 0.5 * h * dr.rcp(larger)
+    return dr.select(s > 0, larger, smaller), dr.select(s > 0, smaller, larger)
 
 
 def phi(u):

@@ -47,6 +47,8 @@ MISTAKES = (
     ("compare open-fog image.exr --diagnose --all-metrics", "diagnose: all_metrics is about a comparison"),
     ("compare open-fog image.exr --fit sigmat", "did you mean"),
     ("compare open-fog image.exr --fit sigma_t=", "wanted NAME or NAME=VALUE"),
+    ("compare smoke image.exr --fit sigma_t", "the medium is a density grid"),
+    ("compare smoke image.exr --diagnose", "the medium is a density grid"),
     ("describe open-frog", "did you mean 'open-fog'"),
     ("describe open-fog -o fog.gltf", "wanted a name that ends in .glb or .vol"),
     ("study integrals rays.csv --phase mie:51", "2 to 50 um"),
