@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The truth of an image: the values of the rays through pixel centres, or means over the areas of pixels.
+"""The reference of an image: the values of the rays through pixel centres, or means over the areas of pixels.
 
 A mean over a pixel is a sum over positions in it: eight replicates of a scrambled net, whose spread is the standard
 error, and a pilot that says how many positions a pixel needs (`reference.quadrature.replicates`). All pixels share the
@@ -50,7 +50,7 @@ def quadrature_image(
     plan: PointPlan | None = None,
     keep: Keep | None = None,
 ) -> TruthImage:
-    """Compute the truth of an image.
+    """Compute the reference of an image.
 
     `truth`: the scene; `checks`: random shadow rays to each ray and light, which check the lit intervals;
     `shadow_scale`: attenuate over this share [1] of each shadow segment: 1 is the truth, 1 - epsilon what a renderer

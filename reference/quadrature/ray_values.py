@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The truth along camera rays: certified airlight integrals summed over the lit intervals of every ray.
+"""The reference along camera rays: certified airlight integrals summed over the lit intervals of every ray.
 
 For each light and each ray, in float64:
 

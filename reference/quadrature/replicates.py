@@ -2,12 +2,12 @@
 r"""How many points of an area light a ray needs, and replicates of their sums whose intervals hold.
 
 Eight independent scramblings of N points each give a mean; their spread S gives the standard error S/sqrt(8). If the
-means are normal, (mean - truth)/(S/sqrt(8)) has Student's distribution with 7 degrees of freedom, and 2.365 standard
-errors to either side hold the truth in 95 % of all runs. That is so for an N that is fixed beforehand. If points are
+means are normal, (mean - value)/(S/sqrt(8)) has Student's distribution with 7 degrees of freedom, and 2.365 standard
+errors to either side hold the value in 95 % of all runs. That is so for an N that is fixed beforehand. If points are
 doubled until S *of the same points* is small, N is a stopping time, and S, given that it stopped the doubling, is too
-small. With n_k = 2^k n_0, means of variance sigma_k^2 and S_k^2 = sigma_k^2 chi^2_7/7 the intervals hold the truth with
+small. With n_k = 2^k n_0, means of variance sigma_k^2 and S_k^2 = sigma_k^2 chi^2_7/7 the intervals hold the value with
 
-    sum_k  P(S_0, ..., S_{k-1} > e)  P(S_k <= e, |mean - truth| < 2.365 S_k/sqrt(8)),
+    sum_k  P(S_0, ..., S_{k-1} > e)  P(S_k <= e, |mean - value| < 2.365 S_k/sqrt(8)),
 
 where a round that stops by chance has an S_k below e and far below sigma_k. For independent rounds with S ~ 1/N this is
 92.4 to 95 % as e/sigma_0 varies, for S ~ N^-1/2 it is 90.4 to 95 %: too few.

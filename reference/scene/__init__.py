@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A Mitsuba scene as numbers in float64: what all estimators of the truth may share.
+"""A Mitsuba scene as numbers in float64: what all estimators of the reference may share.
 
 These are facts that Mitsuba gives when it is asked. What follows from them along a ray is derived elsewhere.
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The density of a `heterogeneous` cloud for the ground truth: Mitsuba's own volume, over its largest value."""
+"""The density of a `heterogeneous` cloud for the reference: Mitsuba's own volume, over its largest value."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -66,7 +66,7 @@ def read_cloud_density(shape: Any, name: str) -> CloudDensity:
     parameters = mi.traverse(medium)
     for key, what in (("sigma_t.data", "a grid as its extinction"), ("albedo.value.value", "one albedo everywhere")):
         if key not in parameters:
-            raise InputError(f"{name} is heterogeneous without {what}; the truth of clouds wants one")
+            raise InputError(f"{name} is heterogeneous without {what}; the reference of clouds wants one")
     values, low, high = grid_values(medium, name)
     box = shape.bbox()
     margin = _BEYOND * (high - low)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reading a scene of clouds for the ground truth: media of any order of scattering in closed meshes of any shape.
+"""Reading a scene of clouds for the reference: media of any order of scattering in closed meshes of any shape.
 
 Clouds lie in clear air, apart from one another. Suns are directional emitters, the sky is at most one emitter of
 constant radiance. Other lights are refused by name.
@@ -37,7 +37,7 @@ class Cloud(TruthMedium):
 
 @dataclass(frozen=True)
 class CloudScene:
-    """A scene of clouds as the truth sees it."""
+    """A scene of clouds as the reference sees it."""
 
     scene: Any  #: the `mi.Scene`, whole
     occluders: Any  #: an `mi.Scene` of the opaque shapes alone

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reading a Mitsuba scene for the ground truth, in float64 NumPy.
+"""Reading a Mitsuba scene for the reference, in float64 NumPy.
 
 `realtime.scene.read_scene` reads the same scene for the methods under test. The two share no code on purpose: this one
 asks Mitsuba's emitters for their intensity and reads the parameters of the medium, where the other does it the other
@@ -81,7 +81,7 @@ class BoundedMedium(TruthMedium):
 
 @dataclass(frozen=True)
 class TruthScene:
-    """A scene as the truth sees it."""
+    """A scene as the reference sees it."""
 
     scene: Any  #: the `mi.Scene`, whole
     occluders: Any  #: an `mi.Scene` of the opaque shapes alone: cast rays here
@@ -108,7 +108,7 @@ class TruthScene:
 def read_truth(scene) -> TruthScene:
     """Read a Mitsuba scene of the current RGB variant.
 
-    Raises InputError for a scene whose truth cannot be computed, with the name of what is in the way.
+    Raises InputError for a scene whose reference cannot be computed, with the name of what is in the way.
     """
     if not scene.sensors():
         raise InputError("the scene has no camera; wanted a sensor of type 'perspective'")

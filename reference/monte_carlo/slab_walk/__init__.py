@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The truth of slabs and clouds by order of scattering: photons, followed in NumPy and float64.
+"""The reference of slabs and clouds by order of scattering: photons, followed in NumPy and float64.
 
 Read in this order:
 
