@@ -8,7 +8,7 @@ Read in this order:
 - `density.py`: clouds whose density differs from place to place;
 - `lights.py`: point, spot and directional lights as homogeneous positions;
 - `media/`: media, which answer for themselves: extinction, optical depths, airlight;
-- `closed_mesh.py`: closed meshes of any shape: their flaws by the name of an edge, and what lies inside;
+- `closed_mesh.py`: closed meshes of any shape, and what lies inside;
 - `convex_bounds.py`: the convex bounds of media;
 - `directional_extent.py`: the smallest rectangle across a directional light through which all light of the media comes;
 - `triangle_table.py`: what shading needs of every triangle;

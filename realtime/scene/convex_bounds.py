@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog, nnls
 
 from realtime.errors import InputError
 from realtime.scene.closed_mesh import ClosedMesh, closed_mesh
@@ -20,7 +19,7 @@ from realtime.scene.mesh_adjacency import mesh_triangles
 Array = NDArray[np.float64]
 
 _OUTWARDS = "normals that point outwards: change flip_normals, which a mirrored to_world of a mesh asks for too"
-_FLAT = 1e-5  # relative to the size of the body
+FLAT = 1e-5  #: relative to the size of the body
 CELLS = 8  #: of directions along each axis, by which walks over the facets find a place to begin
 _SOME = 64  # triangles by which most shapes that are not convex are told at once
 _SAMPLES = 1 << 16  # pairs of points for the mean distance: its standard error is 0.2 %
@@ -65,7 +64,7 @@ def _read_sphere(shape) -> Bounds:
     box = shape.bbox()
     low, high = np.array(box.min, dtype=np.float64).ravel(), np.array(box.max, dtype=np.float64).ravel()
     size = high - low
-    if np.ptp(size) > _FLAT * size.max():
+    if np.ptp(size) > FLAT * size.max():
         raise _refusal(shape.id(), "is a sphere with different scales along its axes", "one scale, or a mesh")
     if shape.has_flipped_normals():
         raise _refusal(shape.id(), "is inside out", "normals that point outwards: remove flip_normals")
@@ -88,19 +87,19 @@ def mesh_bounds(name: str, vertices: Array, faces: NDArray[Any], mesh: ClosedMes
     twice = np.linalg.norm(area, axis=1)
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     volume = np.sum((corners[:, 0] - vertices.mean(axis=0)) * area) / 6
-    if not abs(volume) > _FLAT * size**3 * 1e-3:
+    if not abs(volume) > FLAT * size**3 * 1e-3:
         raise _refusal(name, "has no volume", "a closed mesh around a body")
     if volume < 0:
         flaw = f"is inside out, at {mesh.edge_words(*mesh.faces[0, :2])}"
         raise _refusal(name, flaw, _OUTWARDS)
-    sound = twice > _FLAT * size * longest
+    sound = twice > FLAT * size * longest
     normals = area[sound] / twice[sound, None]
     offsets = np.mean(np.sum(corners[sound] * normals[:, None], axis=2), axis=1)
     some = slice(None, None, max(1, len(normals) // _SOME))
-    if np.any(vertices @ normals[some].T > offsets[some] + 2 * _FLAT * size):
+    if np.any(vertices @ normals[some].T > offsets[some] + 2 * FLAT * size):
         return None
     normals, offsets = _merged(normals, offsets, size)
-    if np.any(vertices @ normals.T > offsets + 2 * _FLAT * size):
+    if np.any(vertices @ normals.T > offsets + 2 * FLAT * size):
         return None
     centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     radius = float(np.linalg.norm(vertices - centre, axis=1).max())
@@ -112,7 +111,7 @@ def _merged(normals: Array, offsets: Array, size: float) -> tuple[Array, Array]:
     key = np.column_stack([normals, offsets / size])
     kept: list[int] = []
     for number, row in enumerate(key):
-        if not kept or np.abs(key[kept] - row).max(axis=1).min() > _FLAT:
+        if not kept or np.abs(key[kept] - row).max(axis=1).min() > FLAT:
             kept.append(number)
     return normals[kept], offsets[kept]
 
@@ -127,7 +126,7 @@ def plane_neighbours(bounds: Bounds) -> NDArray[np.uint32]:
     Planes through the same two corners, to the precision of the corners: where facets are tiny that may be more.
     """
     corners = np.unique(bounds.corners.reshape(-1, 3), axis=0)
-    on = np.abs(corners @ bounds.normals.T - bounds.offsets) < 4 * _FLAT * bounds.radius
+    on = np.abs(corners @ bounds.normals.T - bounds.offsets) < 4 * FLAT * bounds.radius
     shared = on.T.astype(np.float32) @ on.astype(np.float32)
     np.fill_diagonal(shared, 0)
     rows = [np.flatnonzero(row >= 2) for row in shared]
@@ -162,43 +161,6 @@ def touches(bounds: Bounds, point: Array) -> bool:
         return bool(abs(np.linalg.norm(point - bounds.centre) - bounds.radius) < margin)
     beyond = float((bounds.normals @ point - bounds.offsets).max())
     return abs(beyond) < margin
-
-
-def overlap(first: Bounds, second: Bounds) -> bool:
-    """Return whether two bounds share more than 1e-5 of their size; bounds that touch do not."""
-    gap = float(np.linalg.norm(first.centre - second.centre))
-    margin = _FLAT * min(first.radius, second.radius)
-    if gap >= first.radius + second.radius - margin:
-        return False
-    if first.is_sphere and second.is_sphere:
-        return True
-    if first.is_sphere or second.is_sphere:
-        sphere, mesh = (first, second) if first.is_sphere else (second, first)
-        return _distance_to_hull(mesh, sphere.centre) < sphere.radius - margin
-    # The largest sphere in both: maximise t under n . x + t <= offset.
-    planes = np.concatenate([first.normals, second.normals])
-    largest_sphere = linprog(
-        [0, 0, 0, -1],
-        A_ub=np.column_stack([planes, np.ones(len(planes))]),
-        b_ub=np.concatenate([first.offsets, second.offsets]),
-        bounds=[(None, None)] * 4,
-    )
-    return bool(largest_sphere.status == 0 and -largest_sphere.fun > margin)
-
-
-def _distance_to_hull(bounds: Bounds, point: Array) -> float:
-    """Return the distance from a point to the convex hull of the corners.
-
-    min |sum_i l_i v_i - point| with l_i >= 0 and sum l_i = 1 is a problem of non-negative least squares; a heavy last
-    row holds the sum.
-    """
-    if holds(bounds, point):
-        return 0.0
-    weight = 1e4 * bounds.radius
-    corners = np.unique(bounds.corners.reshape(-1, 3), axis=0) - point
-    matrix = np.vstack([corners.T, np.full(len(corners), weight)])
-    shares, _ = nnls(matrix, np.array([0.0, 0.0, 0.0, weight]))
-    return float(np.linalg.norm(shares @ corners / shares.sum()))
 
 
 def mean_distance(bounds: Bounds) -> float:

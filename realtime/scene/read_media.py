@@ -16,12 +16,11 @@ import numpy as np
 
 from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes, aligned_array
-from realtime.scene.closed_mesh import ClosedMesh, check_bodies, encloses
+from realtime.scene.closed_mesh import ClosedMesh, encloses
 from realtime.scene.convex_bounds import (
     Bounds,
     holds,
     mean_distance,
-    overlap,
     plane_neighbours,
     radial_planes,
     read_bounds,
@@ -124,10 +123,6 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[Cl
     uneven = [shape.id() for shape in boundaries if not shape.interior_medium().is_homogeneous()]
     all_convex = len(bounds) == len(boundaries) and not uneven
     meshes = () if all_convex else _closed_meshes(shapes, uneven)
-    if all_convex:
-        _check_disjoint(bounds)
-    else:
-        check_bodies(meshes, boundaries)
     around = _surrounding(sensor, boundaries, meshes or bounds)
     if around is not None and not all_convex:
         raise InputError(
@@ -223,16 +218,6 @@ def _surrounding(sensor, boundaries, bounds: Sequence[Bounds | ClosedMesh]):
                 "wanted one medium around all bounded media, or none at all"
             )
     return around
-
-
-def _check_disjoint(bounds: list[Bounds]) -> None:
-    for number, later in enumerate(bounds):
-        for earlier in bounds[:number]:
-            if overlap(later, earlier):
-                raise InputError(
-                    f"the media of shapes '{earlier.name}' and '{later.name}' overlap or one holds the other; wanted "
-                    "disjoint bounds"
-                )
 
 
 def make_bounded_medium(medium: Homogeneous, bounds: Bounds, types: ArrayTypes) -> BoundedMedium:

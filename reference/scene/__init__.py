@@ -14,7 +14,6 @@ Read in this order:
 - `height_fog.py`: media whose density depends on height;
 - `density_grid.py`: media whose density is a grid;
 - `read.py`: the whole scene: lights, media, camera rays;
-- `closed_mesh.py`: whether meshes bound bodies apart from one another;
 - `cloud_density.py`: clouds whose density differs from place to place;
 - `clouds.py`: scenes of clouds: media of any shape, suns and a sky;
 - `shapes.py`: opaque shapes as triangles and spheres;

@@ -8,16 +8,24 @@ constant radiance. Other lights are refused by name.
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
-from reference.scene.closed_mesh import check_apart, check_closed, enclosing
 from reference.scene.cloud_density import CloudDensity, read_cloud_density
 from reference.scene.directional_light import DirectionalLight, is_directional, read_directional
-from reference.scene.read import CLEAR_AIR, TruthMedium, read_medium, read_scattering, scene_of, sorted_shapes
+from reference.scene.read import (
+    CLEAR_AIR,
+    TruthMedium,
+    read_medium,
+    read_scattering,
+    scene_from,
+    scene_of,
+    sorted_shapes,
+)
 
 Array = NDArray[np.float64]
 
@@ -79,8 +87,6 @@ def read_clouds(scene) -> CloudScene:
     for shape in boundaries:
         if shape.exterior_medium() is not None:
             raise InputError(f"the exterior medium of shape '{shape.id()}' is not clear air; wanted none around clouds")
-        check_closed(shape)
-    check_apart(boundaries)
     clouds = tuple(_read_cloud(shape) for shape in boundaries)
     width, height = (int(n) for n in sensor.film().size())
     origin = camera_matrix(sensor)[:3, 3]
@@ -134,7 +140,7 @@ def _read_cloud(shape) -> Cloud:
 
 def _camera_cloud(sensor, boundaries: list[Any], origin: Array) -> int:
     """Return in which cloud the camera is, and check that it says so itself."""
-    number = enclosing(boundaries, origin)
+    number = _enclosing(boundaries, origin)
     own = sensor.get_medium()
     if number < 0 and own is not None:
         raise InputError("the camera references a medium and is in no cloud; remove the medium from the sensor")
@@ -144,3 +150,20 @@ def _camera_cloud(sensor, boundaries: list[Any], origin: Array) -> int:
             "reference that shape's interior medium in the sensor"
         )
     return number
+
+
+def _enclosing(shapes: list[Any], point: Array) -> int:
+    """Return the number of the closed surface around a point, (3,) [m], -1 if there is none.
+
+    A ray from the point meets the surfaces that enclose it an odd number of times; the one met first from inside is it.
+    """
+    scene = scene_from(shapes)
+    for direction in ((0.2672, 0.5345, 0.8018), (-0.6247, 0.3714, 0.6868)):
+        ray = mi.Ray3f(mi.Point3f(*(float(c) for c in point)), mi.Vector3f(*direction))
+        dr.make_opaque(ray)
+        si = scene.ray_intersect(ray)
+        dr.eval(si)
+        if not bool(si.is_valid()[0]) or float(dr.dot(si.n, mi.Vector3f(*direction))[0]) <= 0:
+            return -1
+    hit = si.shape
+    return next(number for number, shape in enumerate(shapes) if bool((hit == mi.ShapePtr(shape))[0]))

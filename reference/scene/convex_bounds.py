@@ -16,7 +16,6 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog, nnls
 
 from analytic.errors import InputError
 
@@ -152,37 +151,3 @@ def normals_at(bounds: Bounds, points: Array) -> Array:
     if isinstance(bounds, Sphere):
         return (points - bounds.centre) / bounds.radius
     return bounds.normal[np.argmax(points @ bounds.normal.T - bounds.offset, axis=1)]
-
-
-def overlap(first: Bounds, second: Bounds) -> bool:
-    """Return whether two bodies share more than their boundaries, to 1e-6 of their sizes."""
-    if isinstance(first, Sphere) and isinstance(second, Sphere):
-        gap = float(np.linalg.norm(first.centre - second.centre))
-        return gap < (first.radius + second.radius) * (1 - _FLAT)
-    if isinstance(first, Sphere):
-        assert isinstance(second, Polyhedron)
-        return _distance(second, first.centre) < first.radius * (1 - _FLAT)
-    if isinstance(second, Sphere):
-        return overlap(second, first)
-    # The largest sphere in what both have in common: maximise its radius t under n . x + t <= offset.
-    planes = np.concatenate([first.normal, second.normal])
-    result = linprog(
-        [0.0, 0.0, 0.0, -1.0],
-        A_ub=np.column_stack([planes, np.ones(len(planes))]),
-        b_ub=np.concatenate([first.offset, second.offset]),
-        bounds=[(None, None)] * 4,
-    )
-    size = min(float(np.linalg.norm(np.ptp(body.edge.reshape(-1, 3), axis=0))) for body in (first, second))
-    return bool(result.status == 0 and -result.fun > _FLAT * size)
-
-
-def _distance(body: Polyhedron, point: Array) -> float:
-    """Return the distance from a point to a polyhedron, 0 inside (Lawson and Hanson 1974, chapter 23: LDP by NNLS)."""
-    room = body.offset - body.normal @ point
-    if np.all(room >= 0):
-        return 0.0
-    # min |u| under -n . u >= -room; the residual of the dual problem carries the solution.
-    dual = np.vstack([-body.normal.T, -room])
-    weights, _ = nnls(dual, np.array([0.0, 0.0, 0.0, 1.0]))
-    residual = dual @ weights - np.array([0.0, 0.0, 0.0, 1.0])
-    return float(np.linalg.norm(residual[:3] / residual[3]))

@@ -18,7 +18,7 @@ from analytic.errors import InputError
 from analytic.phase import PhaseFunction
 from reference.scene.area_light import TruthAreaLight, is_area, read_area_light
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
-from reference.scene.convex_bounds import Bounds, holds, in_surface, overlap, read_bounds
+from reference.scene.convex_bounds import Bounds, holds, in_surface, read_bounds
 from reference.scene.density_grid import GridMedium, is_grid, read_grid
 from reference.scene.directional_light import (
     DirectionalLight,
@@ -129,7 +129,6 @@ def read_truth(scene) -> TruthScene:
     opaque, boundaries = sorted_shapes(scene)
     grid = _grid_in_a_shape(sensor, boundaries, origin)
     media = () if grid else tuple(_read_bounded(shape) for shape in boundaries)
-    _check_disjoint(media)
     medium = grid or _read_ambient(sensor, origin, media, boundaries)
     suns = tuple(read_directional(emitter) for emitter in far)
     for emitter, sun in zip(far, suns, strict=True):
@@ -249,16 +248,6 @@ def scene_from(shapes: list[Any]):
     return mi.load_dict(
         {"type": "scene"} | {shape.id() if sound else f"shape{number}": shape for number, shape in enumerate(shapes)}
     )
-
-
-def _check_disjoint(media: tuple[BoundedMedium, ...]) -> None:
-    for number, medium in enumerate(media):
-        for other in media[:number]:
-            if overlap(medium.bounds, other.bounds):
-                raise InputError(
-                    f"the media of shapes '{other.name}' and '{medium.name}' overlap or one holds the other; wanted "
-                    "disjoint bounds"
-                )
 
 
 def _read_ambient(

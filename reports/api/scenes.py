@@ -10,6 +10,7 @@ import mitsuba as mi
 
 from analytic.errors import InputError
 from reports.api.inputs import one_error, pixels_of
+from validation.scenes.bodies import check_bodies
 from validation.scenes.loading import LoadedScene, load_scene, name_shapes, resize
 from validation.scenes.numbers import check_numbers
 
@@ -98,6 +99,7 @@ def _from_mitsuba(scene: Any) -> OpenScene:
         raise InputError("scene: it has no sensor; add one of the type 'perspective'")
     name_shapes(scene)
     check_numbers(scene)
+    check_bodies(scene)
     return OpenScene("scene", scene, "The user's scene.", "")
 
 

@@ -17,6 +17,7 @@ import mitsuba as mi
 
 from analytic.errors import InputError, nearest
 from reference.storage.scene_digest import scene_digest
+from validation.scenes.bodies import check_bodies
 from validation.scenes.changes import change_scene, isotropic_media, scene_with_lobes
 from validation.scenes.height_fog import register_height_fog
 from validation.scenes.numbers import check_numbers
@@ -175,6 +176,7 @@ def _read(path: Path, lobes: Mapping[str, float] = MappingProxyType({})):
         raise InputError(f"scene {path}: the file holds a single {type(scene).__name__}; wanted a whole <scene>")
     name_shapes(scene)
     check_numbers(scene)
+    check_bodies(scene)
     return scene
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from realtime.scene.convex_bounds import Bounds, holds, mean_distance, mesh_bounds, overlap
+from realtime.scene.convex_bounds import Bounds, holds, mean_distance, mesh_bounds
 from validation.scenes.meshes import box, icosphere, placed, rotation
 
 TURN = rotation((0.3, 1.0, 0.2), 27.3)
@@ -41,24 +41,6 @@ def test_what_the_half_spaces_hold_is_what_the_box_holds():
 def test_refusals_name_the_shape_and_the_flaw(mesh, message):
     with pytest.raises(InputError, match=message):
         bounds(mesh())
-
-
-@pytest.mark.parametrize("gap", [-0.01, 0.01])
-def test_bounds_overlap_as_soon_as_they_do(gap):
-    """Pairs at a distance known from their sizes."""
-    sphere = sphere_bounds((0.0, 0.0, 0.0), 0.7)
-    cube = box((1.0, 1.2, 1.4))
-    assert overlap(sphere, sphere_bounds((1.2 + gap, 0.0, 0.0), 0.5)) == (gap < 0)
-    assert overlap(sphere, bounds(placed(cube, (1.2 + gap, 0.1, 0.0)))) == (gap < 0)
-    # At an edge of the cube: its distance from the centre of the sphere counts, not its planes'.
-    corner = (0.7 + gap) / np.sqrt(2)
-    assert overlap(bounds(placed(cube, (0.5 + corner, 0.6 + corner, 0.0))), sphere) == (gap < 0)
-    assert overlap(bounds(cube), bounds(placed(cube, (1.0 + gap, 0.3, 0.2)))) == (gap < 0)
-
-
-def test_bounds_within_another_overlaps_it():
-    assert overlap(bounds(box((2.0, 2.1, 2.2))), bounds(box((0.2, 0.3, 0.4))))
-    assert overlap(sphere_bounds((0.1, 0.0, 0.0), 0.2), bounds(box((2.0, 2.1, 2.2))))
 
 
 def test_mean_distance_of_a_sphere_is_six_fifths_of_its_radius():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from reference.scene.convex_bounds import Polyhedron, overlap, read_bounds
+from reference.scene.convex_bounds import Polyhedron, read_bounds
 from reference.scene.read import read_truth
 from tests.helpers.scenes import bounded_medium, clear_scene
 from tests.helpers.shapes import bounds_of, box, sphere
@@ -32,27 +32,6 @@ def test_cube_has_six_planes_and_twelve_edges_that_bend(variant):
         map(tuple, np.vstack([np.eye(3), -np.eye(3)]))
     )
     assert np.all(bounds.normal @ [0.1, 0.2, 0.3] < bounds.offset)
-
-
-OVERLAPS = [
-    (lambda: (box(), box((2.0, 0, 0))), False),  # touching
-    (lambda: (box(), box((1.99, 0, 0))), True),
-    (lambda: (box(), box((0, 0, 0), (0.2, 0.2, 0.2))), True),  # nested
-    (lambda: (box(), sphere((2.3, 0, 0), 1.29)), False),
-    (lambda: (box(), sphere((2.3, 0, 0), 1.31)), True),
-    (lambda: (sphere((2, 2, 2), 1.73), box()), False),  # the corner is sqrt(3) = 1.732 away
-    (lambda: (sphere((2, 2, 2), 1.74), box()), True),
-    (lambda: (sphere(), box((0, 0, 0), (5.0, 5.0, 5.0))), True),
-    (lambda: (sphere(), sphere((0, 0, 2.1), 1.09)), False),
-    (lambda: (sphere(), sphere((0, 0, 2.1), 1.11)), True),
-]
-
-
-@pytest.mark.parametrize(("make", "expected"), OVERLAPS)
-def test_overlap(variant, make, expected):
-    first, second = (bounds_of(shape) for shape in make())
-    assert overlap(first, second) is expected
-    assert overlap(second, first) is expected
 
 
 L_SHAPE = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
@@ -95,10 +74,6 @@ AMBIENT = {"type": "homogeneous", "sigma_t": 0.2, "albedo": 0.5}
     ("changes", "message"),
     [
         (lambda: {"a": glass(box())}, "'a' bounds a medium and has a SmoothDielectric material"),
-        (
-            lambda: {"a": bounded_medium(box(), 0.3, GREY), "b": bounded_medium(sphere(radius=0.3), 0.3, GREY)},
-            "'b' and 'a' overlap",
-        ),
         (lambda: {"a": bounded_medium(box((0, -4.0, 1.0)), 0.3, GREY)}, "the camera is inside of shape 'a'"),
         (lambda: {"a": bounded_medium(box(), 0.3, GREY) | {"exterior": AMBIENT}}, "exterior medium of shape 'a'"),
         (lambda: {"a": box() | {"bsdf": {"type": "null"}, "exterior": AMBIENT}}, "'a' is a hole in a medium"),
