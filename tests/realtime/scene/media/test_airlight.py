@@ -104,7 +104,6 @@ def test_an_ambient_field_fills_bounded_media(variant):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        (lambda: {"ball": fog_sphere(SPHERE_AT, RADIUS), "other": fog_sphere((-0.5, 0.4, 0.7), RADIUS)}, "overlap"),
         (lambda: {"ball": fog_sphere((0.2, -4.1, 1.3), RADIUS)}, "inside of shape"),
         (lambda: {"disk": bounded_medium({"type": "disk"}, 0.5, (0.5, 0.5, 0.5))}, "is a disk"),
     ],
