@@ -19,6 +19,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from analytic.errors import InputError
+from realtime.errors import InputError as MeshError
 from realtime.numerics.array_types import aligned_array
 from realtime.scene.closed_mesh import ClosedMesh, encloses, shape_number, winding_number
 from realtime.scene.convex_bounds import FLAT, Bounds, holds, read_bounds
@@ -33,13 +34,16 @@ def check_bodies(scene: Any) -> None:
     """Refuse an `mi.Scene` in which the bounds of media are no disjoint bodies, with the name of an edge.
 
     Raises InputError for bounds that are no spheres or closed meshes, cross themselves or one another, are inside out,
-    or lie within one another. The first is that of `realtime`.
+    or lie within one another.
     """
     shapes = [shape for shape in scene.shapes() if _bounds_medium(shape)]
-    read = [read_bounds(shape) for shape in shapes]
+    try:
+        read = [read_bounds(shape) for shape in shapes]
+    except MeshError as error:
+        raise InputError(str(error)) from None
     convex = [bounds for bounds, _ in read if bounds is not None]
     if len(convex) == len(read):
-        shared = [pair for pair in combinations(convex, 2) if overlap(*pair)]
+        shared: list[tuple[Any, Any]] = [pair for pair in combinations(convex, 2) if overlap(*pair)]
     else:
         meshes, balls = [mesh for _, mesh in read if mesh], [bounds for bounds in convex if bounds.is_sphere]
         _check_crossings([mesh for _, mesh in read], shapes)
